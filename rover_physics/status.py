@@ -52,14 +52,14 @@ class BoundStatus(IntEnum):
 
 
 class TorquePolicy(IntEnum):
-    """How the wheels share the traction."""
+    """Distribution of the traction among the wheels."""
 
     EQUAL = 0
     """Equal traction on all wheels."""
     OPTIMAL = 1
     """The torques that need the least friction, as traction control can apply them."""
     SERVO = 2
-    """What speed servos at the rate of the commanded motion bring about."""
+    """Torques of speed servos at the rate of the commanded motion."""
 
 
 class Stall(IntEnum):

@@ -9,28 +9,32 @@ from dataclasses import replace
 
 import numpy as np
 
-from rover_physics.bounds.kernel import NOMINAL, UncertainGround, find_bounds
-from rover_physics.compilation import Step, compile_groups
+from rover_physics.bounds.kernel import NOMINAL, find_bounds
+from rover_physics.compilation import CompilationStep, compile_groups
 from rover_physics.prediction.evaluation import AHEAD, evaluate
 from rover_physics.prediction.map_sweep import score_poses
 from rover_physics.prediction.packed_model import pack_model
+from rover_physics.prediction.steered_step import predict_steered
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import pack_ground
 from rover_physics.traversability.judge import judge_path
+from rover_physics.traversability.torque_ranges import find_torque_ranges
 
 EXACT = (
-    Step("rover", "rover_physics.warm_up:pack_rover"),
-    Step("poses", "rover_physics.warm_up:evaluate_poses"),
-    Step("paths", "rover_physics.warm_up:judge_paths"),
+    CompilationStep("rover", "rover_physics.warm_up:pack_rover"),
+    CompilationStep("poses", "rover_physics.warm_up:evaluate_poses"),
+    CompilationStep("paths", "rover_physics.warm_up:judge_paths"),
 )
 """All that a question needs on a map whose heights are exact."""
-UNCERTAIN = (Step("uncertain heights", "rover_physics.warm_up:bound_poses"),)
+UNCERTAIN = (CompilationStep("uncertain heights", "rover_physics.warm_up:bound_poses"),)
 """All that a question needs besides on other maps."""
-SCORES = (Step("map scores", "rover_physics.warm_up:score_map"),)
+SCORES = (CompilationStep("map scores", "rover_physics.warm_up:score_map"),)
 """All that scores of single poses need."""
+SINGLE = (CompilationStep("single poses", "rover_physics.warm_up:evaluate_single_poses"),)
+"""All that torque ranges and a rover with measured steering angles need."""
 
 
 def warm_up() -> None:
@@ -64,13 +68,21 @@ def judge_paths() -> None:
 def bound_poses() -> None:
     """Bound a pose on a map with uncertain heights; it need not settle."""
     rover, step = _rover_and_step()
-    ground = UncertainGround(*(pack_ground(step),) * 3)
-    find_bounds(pack_model(rover, step), ground, np.zeros((1, 3)), AHEAD, np.zeros(1, NOMINAL))
+    grounds = (pack_ground(step),) * 3
+    find_bounds(pack_model(rover, step), grounds, np.zeros((1, 3)), AHEAD, np.zeros(1, NOMINAL))
 
 
 def score_map() -> None:
     """Score a pose."""
     score_poses(*_rover_and_step(), np.zeros((1, 3)))
+
+
+def evaluate_single_poses() -> None:
+    """Find torque ranges, and predict a rover with given steering angles."""
+    rover, step = _rover_and_step()
+    poses = np.array([[0.0, 0.0, 0.0], [0.01, 0.0, 0.0]])
+    find_torque_ranges(rover, step, poses)
+    predict_steered(rover, step, poses, (np.array([0.05, 0.0, 0.0]), np.zeros(6)))
 
 
 def _rover_and_step() -> tuple[Rover, Terrain]:
@@ -81,4 +93,4 @@ def _rover_and_step() -> tuple[Rover, Terrain]:
 
 
 if __name__ == "__main__":
-    compile_groups([EXACT, UNCERTAIN, SCORES], print, os.cpu_count() or 1)
+    compile_groups([(*EXACT, *SCORES, *SINGLE), UNCERTAIN], print, os.cpu_count() or 1)

@@ -39,7 +39,7 @@ def pytest_collection_modifyitems(items):
 def real_map():
     """Return a function that loads a preset, or a real map that is not part of the package."""
     from rover_physics.terrain.grid import load_terrain
-    from rover_physics.terrain.presets import terrain_presets
+    from rover_physics.terrain.terrain_file import terrain_presets
 
     beside = Path(__file__).resolve().parents[2] / "shared" / "terrain"
     folder = Path(os.environ.get("ROVER_TERRAIN_DIR", beside))

@@ -30,12 +30,12 @@ def bound_clearance(uncertain, work, bounds):
     turn = max(spread.q_high[1] - spread.q[1], spread.q[1] - spread.q_low[1])
     turn += max(spread.q_high[2] - spread.q[2], spread.q[2] - spread.q_low[2])
     half = 0.5 * np.hypot(belly[2] - belly[1], belly[4] - belly[3])
-    reach = np.hypot(half + max(abs(belly[1] + belly[2]), abs(belly[3] + belly[4])), belly[0])
-    shift = turn * (abs(belly[0]) + reach * (np.hypot(R[0, 2], R[1, 2]) + turn))
-    bend = turn * turn * reach
+    radius = np.hypot(half + max(abs(belly[1] + belly[2]), abs(belly[3] + belly[4])), belly[0])
+    shift = turn * (abs(belly[0]) + radius * (np.hypot(R[0, 2], R[1, 2]) + turn))
+    bend = turn * turn * radius
     slope_x, slope_y = -R[0, 2] / R[2, 2], -R[1, 2] / R[2, 2]
     cell = 1.0 / ground.inverse_resolution
-    extent = np.hypot(half + reach, belly[0]) + shift
+    extent = np.hypot(half + radius, belly[0]) + shift
     first_j = max(int(np.ceil((origin[0] - extent - ground.x0) / cell)), 0)
     last_j = min(int(np.floor((origin[0] + extent - ground.x0) / cell)), ground.columns - 1)
     first_i = max(int(np.ceil((origin[1] - extent - ground.y0) / cell)), 0)

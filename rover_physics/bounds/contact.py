@@ -30,7 +30,7 @@ RIM = record_type(
     ("gap", float, (MAX_CIRCLES, MAX_ANGLES)),  # vertical gap of each sample [m]
     ("lowest", float, (MAX_CIRCLES, MAX_ANGLES)),  # angle of a local minimum [rad], NaN if none
     ("largest_error", float),  # largest error of a height near the wheel [m]
-    ("reach", float),  # largest motion of the wheel forward or back [m]
+    ("shift", float),  # largest motion of the wheel forward or back [m]
     ("nearest", float, (MAX_CIRCLES,)),  # smallest gap of each circle [m]
     ("nearest_angle", float, (MAX_CIRCLES,)),  # contact angle of that gap [rad]
 )
@@ -54,40 +54,39 @@ def bound_contacts(uncertain, work, nominal):
 
     Args:
         uncertain: UNCERTAIN; the elevation of its `error` bounds the error of each height [m].
-        work: BOUNDS_WORK; `spread.reach` is the motion of the wheels forward or back.
+        work: BOUNDS_WORK; `spread.shift` is the motion of the wheels forward or back.
         nominal: NOMINAL contacts.
     """
     placement, contact_bounds = work.rover.placement, work.contact_bounds
-    angles, points, reach = nominal.contact_angle, nominal.contact_points, work.spread.reach
+    angles, points, shift = nominal.contact_angle, nominal.contact_points, work.spread.shift
     axis, rim = placement.axis, contact_bounds.rim
     for wheel in range(6):
         lateral = 0.0
         for i in range(3):
             lateral += axis[wheel, i] * (points[wheel, i] - placement.centres[wheel, i])
         angle = angles[wheel]
-        contact_bounds.angle[wheel] = contact_bounds.angle_low[wheel] = contact_bounds.angle_high[
-            wheel
-        ] = angle
+        contact_bounds.angle[wheel] = angle
+        contact_bounds.angle_low[wheel] = contact_bounds.angle_high[wheel] = angle
         contact_bounds.lateral[wheel] = lateral
         contact_bounds.lateral_low[wheel] = contact_bounds.lateral_high[wheel] = lateral
-        rim.reach = reach[wheel]
+        rim.shift = shift[wheel]
         rim.largest_error = _find_largest_error(uncertain, work, wheel)
-        if max(rim.largest_error, rim.reach) > 0.0:
+        if max(rim.largest_error, rim.shift) > 0.0:
             _look_around(uncertain.nominal, work.rover, wheel, angle, rim)
             _widen(uncertain, work, wheel)
 
 
 @kernel
 def _find_largest_error(uncertain, work, wheel):
-    """Return the largest error [m] of a height within reach of a wheel."""
+    """Return the largest error [m] of a height near a wheel."""
     ground, samples = uncertain.nominal.ground, uncertain.nominal.samples
     error, placement = uncertain.error, work.rover.placement
-    reach = samples.reach * ground.inverse_resolution
+    extent = samples.extent * ground.inverse_resolution
     gx = (placement.centres[wheel, 0] - ground.x0) * ground.inverse_resolution
     gy = (placement.centres[wheel, 1] - ground.y0) * ground.inverse_resolution
     largest = 0.0
-    for i in range(max(int(gy - reach), 0), min(int(gy + reach) + 2, error.rows)):
-        for j in range(max(int(gx - reach), 0), min(int(gx + reach) + 2, error.columns)):
+    for i in range(max(int(gy - extent), 0), min(int(gy + extent) + 2, error.rows)):
+        for j in range(max(int(gx - extent), 0), min(int(gx + extent) + 2, error.columns)):
             wrong = elevation_of(error, i, j)
             if wrong > largest:
                 largest = wrong
@@ -199,9 +198,9 @@ def _widen(uncertain, work, wheel):
     give = COMPLIANCE * samples.radius
     first, last, largest = contact_bounds.lateral[wheel], contact_bounds.lateral[wheel], 0.0
     for m in range(samples.circles):
-        reach = _error_to_circle(uncertain, work, wheel, m, best)
-        largest = max(largest, reach)
-        if rim.nearest[m] - rim.nearest[best] <= reach + give:
+        error = _error_to_circle(uncertain, work, wheel, m, best)
+        largest = max(largest, error)
+        if rim.nearest[m] - rim.nearest[best] <= error + give:
             first, last = min(first, samples.laterals[m]), max(last, samples.laterals[m])
             _widen_angles(uncertain, work, wheel, m)
     # Circles whose gaps differ by less than `give` share the load: small errors shift it slightly.
@@ -226,7 +225,7 @@ def _shift_between(rim, angle, other):
     """Return the change of the gap difference of two angles [m] as the wheel moves forward."""
     angle = min(max(angle, -MAX_CONTACT_ANGLE), MAX_CONTACT_ANGLE)
     other = min(max(other, -MAX_CONTACT_ANGLE), MAX_CONTACT_ANGLE)
-    return rim.reach * abs(np.tan(angle) - np.tan(other))
+    return rim.shift * abs(np.tan(angle) - np.tan(other))
 
 
 @kernel

@@ -51,13 +51,11 @@ MAX_SOILS = 32
 
 BOX = record_type(
     ("base", float, (INPUT_COUNT,)),  # the nominal inputs
-    ("low", float, (INPUT_COUNT,)),  # smallest inputs
-    ("high", float, (INPUT_COUNT,)),  # largest inputs
+    ("ends", float, (2, INPUT_COUNT)),  # smallest and largest inputs
     ("at", float, (INPUT_COUNT,)),  # a point of the box
     ("value", float, (OUTPUT_COUNT,)),  # the outputs at that point
     ("base_value", float, (OUTPUT_COUNT,)),  # the nominal outputs
-    ("gain_low", float, (INPUT_COUNT, OUTPUT_COUNT)),  # output changes, one input at its low end
-    ("gain_high", float, (INPUT_COUNT, OUTPUT_COUNT)),  # output changes, one at its high end
+    ("gains", float, (2, INPUT_COUNT, OUTPUT_COUNT)),  # output changes, one input at either end
     ("smallest", float, (OUTPUT_COUNT,)),  # smallest outputs
     ("largest", float, (OUTPUT_COUNT,)),  # largest outputs
     ("mu_low", float, (6,)),  # smallest friction coefficient of ground that a wheel may touch
@@ -89,9 +87,8 @@ def bound_forces(model, work):
     _fill_box(work.spread, work.contact_bounds, box)
     place(model.linkage, rover.pose, work.spread.q, rover.placement)
     _find_grounds(model, rover.placement, work.contact_bounds, box)
-    box.columns = (
-        1 if settings.policy == TorquePolicy.EQUAL or settings.on_soil else 1 + FREE_FORCES
-    )
+    equal = settings.policy == TorquePolicy.EQUAL or settings.on_soil
+    box.columns = 1 if equal else 1 + FREE_FORCES
     if not _choose_torques(model, work):
         return False
     for output in range(OUTPUT_COUNT):
@@ -114,18 +111,17 @@ def bound_forces(model, work):
 
 @kernel
 def _fill_box(spread, contact_bounds, box):
+    low, high = box.ends[0], box.ends[1]
     for wheel in range(6):
-        box.base[HEIGHT_INPUTS + wheel] = 0.0
-        box.low[HEIGHT_INPUTS + wheel], box.high[HEIGHT_INPUTS + wheel] = (
-            spread.low[wheel],
-            spread.high[wheel],
-        )
-        box.base[ANGLE_INPUTS + wheel] = contact_bounds.angle[wheel]
-        box.low[ANGLE_INPUTS + wheel] = contact_bounds.angle_low[wheel]
-        box.high[ANGLE_INPUTS + wheel] = contact_bounds.angle_high[wheel]
-        box.base[PLACE_INPUTS + wheel] = contact_bounds.lateral[wheel]
-        box.low[PLACE_INPUTS + wheel] = contact_bounds.lateral_low[wheel]
-        box.high[PLACE_INPUTS + wheel] = contact_bounds.lateral_high[wheel]
+        height, angle, lateral = HEIGHT_INPUTS + wheel, ANGLE_INPUTS + wheel, PLACE_INPUTS + wheel
+        box.base[height] = 0.0
+        low[height], high[height] = spread.low[wheel], spread.high[wheel]
+        box.base[angle] = contact_bounds.angle[wheel]
+        low[angle] = contact_bounds.angle_low[wheel]
+        high[angle] = contact_bounds.angle_high[wheel]
+        box.base[lateral] = contact_bounds.lateral[wheel]
+        low[lateral] = contact_bounds.lateral_low[wheel]
+        high[lateral] = contact_bounds.lateral_high[wheel]
 
 
 @kernel
@@ -268,23 +264,15 @@ def _find_gains(model, work):
         box.at[k] = box.base[k]
     for k in range(INPUT_COUNT):
         for end in range(2):
-            box.at[k] = box.low[k] if end == 0 else box.high[k]
+            box.at[k] = box.ends[end, k]
+            box.gains[end, k, :] = 0.0
             if box.at[k] == box.base[k]:
-                for output in range(OUTPUT_COUNT):
-                    if end == 0:
-                        box.gain_low[k, output] = 0.0
-                    else:
-                        box.gain_high[k, output] = 0.0
                 continue
             if not _evaluate(model, work):
                 return False
             _include_values(box)
             for output in range(OUTPUT_COUNT):
-                gain = box.value[output] - box.base_value[output]
-                if end == 0:
-                    box.gain_low[k, output] = gain
-                else:
-                    box.gain_high[k, output] = gain
+                box.gains[end, k, output] = box.value[output] - box.base_value[output]
         box.at[k] = box.base[k]
     return True
 
@@ -320,9 +308,8 @@ def _bound_use(model, work, wheel):
     side = abs(box.base_value[SIDE_OUTPUTS + wheel])
     total = 0.0
     for k in range(INPUT_COUNT):
-        gain = max(
-            abs(box.gain_low[k, SIDE_OUTPUTS + wheel]), abs(box.gain_high[k, SIDE_OUTPUTS + wheel])
-        )
+        output = SIDE_OUTPUTS + wheel
+        gain = max(abs(box.gains[0, k, output]), abs(box.gains[1, k, output]))
         if not ANGLE_INPUTS <= k < PLACE_INPUTS:
             side += gain
         else:
@@ -357,11 +344,11 @@ def _go_to_extreme(model, work):
         low, high = 0.0, 0.0
         for output in range(OUTPUT_COUNT):
             if box.aim[output] != 0.0:
-                low += box.aim[output] * box.gain_low[k, output]
-                high += box.aim[output] * box.gain_high[k, output]
-        gain, end = low, box.low[k]
+                low += box.aim[output] * box.gains[0, k, output]
+                high += box.aim[output] * box.gains[1, k, output]
+        gain, end = low, box.ends[0, k]
         if high > low:
-            gain, end = high, box.high[k]
+            gain, end = high, box.ends[1, k]
         box.at[k] = box.base[k]
         box.gain[k], box.end[k] = max(gain, 0.0), end
         if gain > 0.0 and not ANGLE_INPUTS <= k < PLACE_INPUTS:

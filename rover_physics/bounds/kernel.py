@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bounds on the prediction at a pose on uncertain ground, and their parallel sweep over poses."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,7 @@ from rover_physics.forces.stability import CORNERS
 from rover_physics.numerics.interruption import slices
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.read_only import view_read_only
-from rover_physics.numerics.records import new_record, record_type, shared_array_of
+from rover_physics.numerics.records import new_record, record_type
 from rover_physics.numerics.threads import limit_threads, run_chunks
 from rover_physics.prediction.evaluation import CHUNK, MAX_CHUNKS, MODEL, WORK, set_pose
 from rover_physics.prediction.packed_model import PackedModel
@@ -74,18 +73,6 @@ BOUNDS_WORK = record_type(
 """Work space of one thread."""
 
 
-@dataclass(frozen=True, eq=False)
-class UncertainGround:
-    """A terrain whose heights are known within bounds."""
-
-    low: Ground
-    """The lowest ground."""
-    high: Ground
-    """The highest ground."""
-    error: Ground
-    """Its elevation is the largest error of each height [m]."""
-
-
 def new_bounds(n: int) -> Any:
     """Return BOUNDS (n,), all NaN with status 0."""
     blank = new_record(BOUNDS)
@@ -96,7 +83,7 @@ def new_bounds(n: int) -> Any:
 
 def find_bounds(
     model: PackedModel,
-    ground: UncertainGround,
+    grounds: tuple[Ground, Ground, Ground],
     poses: np.ndarray,
     motions: np.ndarray,
     nominal: np.ndarray,
@@ -105,7 +92,8 @@ def find_bounds(
 
     Args:
         model: The model on the nominal ground.
-        ground: The bounds of the ground.
+        grounds: The lowest and the highest ground, and one whose elevation is the largest error of
+            each height [m].
         poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
         motions: (n, 3) their motions, as for `evaluate`; the wheels are steered along them.
         nominal: (n,) NOMINAL, the prediction on the nominal ground.
@@ -114,7 +102,7 @@ def find_bounds(
     works = np.zeros(min(MAX_CHUNKS, -(-len(poses) // CHUNK)), BOUNDS_WORK)
     for name in ("held_height", "held_angle"):
         works["rover"]["contacts"][name] = np.nan
-    uncertain = shared_array_of(_pack_uncertain(model, ground))
+    uncertain = _pack_uncertain(model, *grounds)
     with limit_threads(BOUNDS_EFFORT * len(poses)) as threads:
         for part in slices(len(poses)):
             places = (view_read_only(one[part]) for one in (poses, motions, nominal))
@@ -123,13 +111,12 @@ def find_bounds(
     return bounds
 
 
-def _pack_uncertain(model: PackedModel, ground: UncertainGround) -> Any:
-    """Return the UNCERTAIN of a model; it is valid as long as the grounds live."""
-    uncertain = new_record(UNCERTAIN, error=ground.error.records[0])
-    for name, surface in (("nominal", None), ("low", ground.low), ("high", ground.high)):
-        uncertain[name] = model.record
-        if surface is not None:
-            uncertain[name]["ground"] = surface.records[0]
+def _pack_uncertain(model: PackedModel, low: Ground, high: Ground, error: Ground) -> Any:
+    """Return the UNCERTAIN (1,) of a model; it is valid as long as the grounds live."""
+    uncertain = np.zeros(1, UNCERTAIN)
+    uncertain["nominal"] = uncertain["low"] = uncertain["high"] = model.record
+    uncertain["low"]["ground"], uncertain["high"]["ground"] = low.records, high.records
+    uncertain["error"] = error.records
     return uncertain
 
 
@@ -204,14 +191,10 @@ def _write_wheel(model, wheel, box, result):
     """Write the bounds on load, sinkage, torque saturation and utilisation of a wheel."""
     ground, linkage, settings = model.ground, model.linkage, model.settings
     weight = linkage.mass * linkage.gravity
-    lightest, heaviest = (
-        weight * box.smallest[LOAD_OUTPUTS + wheel],
-        weight * box.largest[LOAD_OUTPUTS + wheel],
-    )
-    backward, forward = (
-        weight * box.smallest[PULL_OUTPUTS + wheel],
-        weight * box.largest[PULL_OUTPUTS + wheel],
-    )
+    lightest = weight * box.smallest[LOAD_OUTPUTS + wheel]
+    heaviest = weight * box.largest[LOAD_OUTPUTS + wheel]
+    backward = weight * box.smallest[PULL_OUTPUTS + wheel]
+    forward = weight * box.largest[PULL_OUTPUTS + wheel]
     most = max(abs(backward), abs(forward))
     least = min(abs(backward), abs(forward)) if backward * forward > 0.0 else 0.0
     result.wheel_loads[wheel, 0], result.wheel_loads[wheel, 1] = lightest, heaviest
@@ -233,9 +216,8 @@ def _write_wheel(model, wheel, box, result):
     result.friction_utilisation[wheel, 0] = 0.0
     if heaviest > 0.0:
         result.friction_utilisation[wheel, 0] = least / (box.mu_high[wheel] * heaviest)
-    result.friction_utilisation[wheel, 1] = (
-        box.largest[USE_OUTPUTS + wheel] if lightest > 0.0 else np.inf
-    )
+    largest = box.largest[USE_OUTPUTS + wheel]
+    result.friction_utilisation[wheel, 1] = largest if lightest > 0.0 else np.inf
 
 
 @kernel

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from rover_physics.bounds.forces import MAX_SOILS
-from rover_physics.bounds.kernel import NOMINAL, UncertainGround, find_bounds
+from rover_physics.bounds.kernel import BOUNDS, NOMINAL, find_bounds
 from rover_physics.errors import ModelError
 from rover_physics.names import EQUAL, OPTIMAL, SERVO
 from rover_physics.numerics.arrays import Floats
@@ -23,22 +23,11 @@ from rover_physics.results.path_bounds import PathBounds
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.terrain.ground import pack_ground
+from rover_physics.terrain.ground import Ground, pack_ground
 
 SIGMAS = 3.0
 """Default number of standard deviations by which the map's heights may be wrong."""
-BOUNDED_VALUES = (
-    "roll",
-    "pitch",
-    "rocker_angle",
-    "bogie_angle",
-    "belly_clearance",
-    "tip_over_ratio",
-    "wheel_loads",
-    "friction_utilisation",
-    "torque_saturation",
-    "sinkage",
-)
+BOUNDED_VALUES = tuple(name for name in BOUNDS.names or () if name != "status")
 """Names of the bounded values in `PathPrediction` and `PathBounds`."""
 
 
@@ -96,10 +85,10 @@ def bound_path(
             f"the terrain has {len(terrain.soil_names)} soils; bounds are found on maps with at "
             f"most {MAX_SOILS - 1}"
         )
-    ground, model = _pack_uncertain(terrain, allowed), pack_model(rover, terrain, options)
+    grounds, model = _pack_uncertain(terrain, allowed), pack_model(rover, terrain, options)
     found = find_bounds(
         model,
-        ground,
+        grounds,
         check_poses(prediction.poses),
         np.ascontiguousarray(prediction.motion),
         _pack_nominal(prediction),
@@ -109,14 +98,13 @@ def bound_path(
 
 
 @lru_cache(maxsize=2)
-def _pack_uncertain(terrain: Terrain, sigmas: float) -> UncertainGround:
+def _pack_uncertain(terrain: Terrain, sigmas: float) -> tuple[Ground, Ground, Ground]:
     """Return the lowest and highest terrain within its errors, and the errors."""
     assert terrain.elevation_std is not None
-    error = np.ascontiguousarray(sigmas * terrain.elevation_std)
+    error = sigmas * terrain.elevation_std
     heights = (terrain.elevation - error, terrain.elevation + error, error)
-    return UncertainGround(
-        *(pack_ground(replace(terrain, elevation=elevation)) for elevation in heights)
-    )
+    low, high, wrong = (pack_ground(replace(terrain, elevation=one)) for one in heights)
+    return low, high, wrong
 
 
 def prepare_bounds(terrain: Terrain, sigmas: float) -> None:

@@ -33,7 +33,7 @@ EXTREME_STEPS = 8
 MAX_GAP_LEFT = 0.2
 """Largest gap [wheel radii] left in an extreme configuration; above, a wheel is on an edge."""
 JUMP = 0.3
-"""Largest rise or fall [wheel radii] within reach of a wheel, in addition to that of the slope;
+"""Largest rise or fall [wheel radii] near a wheel, in addition to that of the slope;
 above, the wheel is on an edge."""
 LEVEL_CHANGES = (0.8, 0.95, 1.1, 1.3)
 """Rises and falls [wheel radii] at which a second resting place of a wheel is searched. A face too
@@ -50,7 +50,7 @@ SPREAD = record_type(
     ("high", float, (6,)),  # largest height of each wheel relative to the nominal one [m]
     ("q_low", float, (6,)),  # smallest q
     ("q_high", float, (6,)),  # largest q
-    ("reach", float, (6,)),  # largest motion of each wheel forward or back [m]
+    ("shift", float, (6,)),  # largest motion of each wheel forward or back [m]
     ("rate", float, (6,)),  # derivatives of a wheel's forward position by q
     ("trial", float, (6,)),  # q of the current step towards an extreme configuration
     ("raised", np.uint8, (6,)),  # 1 for the wheels on the high surface in that configuration
@@ -119,11 +119,9 @@ def _find_heights(uncertain, work):
     if not _invert(spread.rates, rover.J, spread.lift):
         return BoundStatus.ON_EDGE
     write_gap_rates(linkage, placement, contacts, GroundSlope.SLOPED, spread.rates)
-    return (
-        BoundStatus.BOUNDED
-        if _invert(spread.rates, rover.J, spread.response)
-        else BoundStatus.ON_EDGE
-    )
+    if not _invert(spread.rates, rover.J, spread.response):
+        return BoundStatus.ON_EDGE
+    return BoundStatus.BOUNDED
 
 
 @kernel
@@ -144,15 +142,15 @@ def _may_change_level(uncertain, work):
     fx, fy = placement.ahead[0], placement.ahead[1]
     for wheel in range(6):
         slope = -contacts.normal[wheel, 0] * fx - contacts.normal[wheel, 1] * fy
-        along, reach = _find_moves(linkage, work, wheel)
-        spread.reach[wheel] = reach
+        along, largest = _find_moves(linkage, work, wheel)
+        spread.shift[wheel] = largest
         ahead, arm = _find_arm(linkage, wheel, placement)
-        for way in range(2):
-            surface = uncertain.high if way == 0 else uncertain.low
-            sign = 1.0 - 2.0 * way
-            margin = spread.high[wheel] if way == 0 else -spread.low[wheel]
+        for falls in range(2):
+            surface = uncertain.low if falls else uncertain.high
+            sign = 1.0 - 2.0 * falls
+            margin = -spread.low[wheel] if falls else spread.high[wheel]
             for side in range(2):
-                shift = reach * (1.0 - 2.0 * side)
+                shift = largest * (1.0 - 2.0 * side)
                 rise = sign * _rise_at(surface, rover, wheel, shift)
                 if rise - sign * slope * shift - margin > JUMP * linkage.radius:
                     return True
@@ -215,15 +213,15 @@ def _find_moves(linkage, work, wheel):
     if linkage.on_bogie[wheel]:
         pivot = placement.bogie_pivots[side]
         rate[4 + side] = _shift(axis, centre, pivot, forward)
-    own, reach = 0.0, 0.0
+    own, largest = 0.0, 0.0
     for other in range(6):
         change = 0.0
         for i in range(6):
             change += rate[i] * spread.response[i, other]
             if other == wheel:
                 own += rate[i] * spread.lift[i, other]
-        reach += abs(change) * max(spread.high[other], -spread.low[other])
-    return own, reach
+        largest += abs(change) * max(spread.high[other], -spread.low[other])
+    return own, largest
 
 
 @kernel
@@ -240,11 +238,8 @@ def _find_contact_on(model, rover, wheel):
     contacts = rover.contacts
     outcome = find_contact(model, rover, wheel, SearchScope.QUICK)
     if outcome != ContactStatus.IN_CONTACT or contacts.gap[wheel] != contacts.gap[wheel]:
-        return (
-            BoundStatus.OFF_MAP_NEAR
-            if outcome == ContactStatus.OFF_MAP
-            else BoundStatus.UNKNOWN_NEAR
-        )
+        off_map = outcome == ContactStatus.OFF_MAP
+        return BoundStatus.OFF_MAP_NEAR if off_map else BoundStatus.UNKNOWN_NEAR
     find_contact(model, rover, wheel, SearchScope.FULL)
     return BoundStatus.BOUNDED
 

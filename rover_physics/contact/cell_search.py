@@ -80,19 +80,17 @@ def _look_at_vertices(ground, search, tops):
     high_t = search.half_width + max(lean, 0.0)
     rear, front = tops
     tilt = abs(tangent) * (max(high_t, -low_t) + 1.0)
-    low_s, high_s = (
-        -_find_reach(search, rear, tilt, scale),
-        _find_reach(search, front, tilt, scale),
-    )
+    low_s = -_find_extent(search, rear, tilt, scale)
+    high_s = _find_extent(search, front, tilt, scale)
     if not low_s < high_s:
         return ContactStatus.IN_CONTACT
-    # One cell more on all sides: edges reach out of the footprint.
+    # One cell more on all sides: edges extend beyond the footprint.
     low_s, high_s, low_t, high_t = low_s - 1.0, high_s + 1.0, low_t - 1.0, high_t + 1.0
-    reach_up = max(low_s * ey, high_s * ey) + max(low_t * ex, high_t * ex)
-    reach_down = min(low_s * ey, high_s * ey) + min(low_t * ex, high_t * ex)
+    high_y = max(low_s * ey, high_s * ey) + max(low_t * ex, high_t * ex)
+    low_y = min(low_s * ey, high_s * ey) + min(low_t * ex, high_t * ex)
     status = ContactStatus.IN_CONTACT
-    first = max(int64(np.ceil(search.y + reach_down)), 0)
-    last = min(int64(np.floor(search.y + reach_up)), ground.rows - 1)
+    first = max(int64(np.ceil(search.y + low_y)), 0)
+    last = min(int64(np.floor(search.y + high_y)), ground.rows - 1)
     slant_x = 1.0 / ex if abs(ex) > 1e-9 else 0.0
     slant_y = 1.0 / ey if abs(ey) > 1e-9 else 0.0
     flat = 1.0 / (R * R)
@@ -137,7 +135,7 @@ def _bound_dome(s, R, flat):
 
 
 @kernel
-def _find_reach(search, top, tilt, scale):
+def _find_extent(search, top, tilt, scale):
     """Return the largest s at which ground of height `top` [m] may touch the wheel."""
     if not top < np.inf:
         return search.radius

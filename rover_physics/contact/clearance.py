@@ -15,26 +15,17 @@ POINTS = 9
 
 
 class Underside(NamedTuple):
-    """The underside's plane above the cells of a map, linear in row i and column j."""
+    """The underside's plane above the cells of a map, linear in row i and column j.
 
-    z: float
-    """Height of the plane at cell [0, 0], map frame [m]."""
-    z_i: float
-    """Change of z per row [m]."""
-    z_j: float
-    """Change of z per column [m]."""
-    along: float
-    """Body x of the plane's point above cell [0, 0] [m]."""
-    along_i: float
-    """Change of `along` per row [m]."""
-    along_j: float
-    """Change of `along` per column [m]."""
-    across: float
-    """Body y of the plane's point above cell [0, 0] [m]."""
-    across_i: float
-    """Change of `across` per row [m]."""
-    across_j: float
-    """Change of `across` per column [m]."""
+    Each is (value at cell [0, 0], change per row, change per column) [m].
+    """
+
+    z: tuple[float, float, float]
+    """Height of the plane, map frame."""
+    along: tuple[float, float, float]
+    """Body x of the plane's point above a cell."""
+    across: tuple[float, float, float]
+    """Body y of the plane's point above a cell."""
 
 
 @kernel
@@ -107,37 +98,43 @@ def _describe_underside(ground, R, origin, belly):
     z = belly[0] / R[2, 2] + rise_x * dx + rise_y * dy
     z_i, z_j = rise_y * cell, rise_x * cell
     return Underside(
-        origin[2] + z,
-        z_i,
-        z_j,
-        R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * z,
-        R[1, 0] * cell + R[2, 0] * z_i,
-        R[0, 0] * cell + R[2, 0] * z_j,
-        R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * z,
-        R[1, 1] * cell + R[2, 1] * z_i,
-        R[0, 1] * cell + R[2, 1] * z_j,
+        (origin[2] + z, z_i, z_j),
+        (
+            R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * z,
+            R[1, 0] * cell + R[2, 0] * z_i,
+            R[0, 0] * cell + R[2, 0] * z_j,
+        ),
+        (
+            R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * z,
+            R[1, 1] * cell + R[2, 1] * z_i,
+            R[0, 1] * cell + R[2, 1] * z_j,
+        ),
     )
+
+
+@kernel
+def _at(linear, i, j):
+    """Return a value of an Underside at a place (row, column)."""
+    return linear[0] + linear[1] * i + linear[2] * j
 
 
 @kernel
 def _lowest_above(plane, bi, bj):
     """Return the lowest height [m] of the underside's plane above a block of cells."""
-    i = BLOCK * bi + (0 if plane.z_i > 0.0 else BLOCK - 1)
-    j = BLOCK * bj + (0 if plane.z_j > 0.0 else BLOCK - 1)
-    return plane.z + plane.z_i * i + plane.z_j * j
+    i = BLOCK * bi + (0 if plane.z[1] > 0.0 else BLOCK - 1)
+    j = BLOCK * bj + (0 if plane.z[2] > 0.0 else BLOCK - 1)
+    return _at(plane.z, i, j)
 
 
 @kernel
 def _is_below(plane, belly, bi, bj):
     """Return whether any cell of a block may be below the underside."""
     i, j = BLOCK * bi + HALF, BLOCK * bj + HALF
-    along = plane.along + plane.along_i * i + plane.along_j * j
-    across = plane.across + plane.across_i * i + plane.across_j * j
-    beyond = HALF * (abs(plane.along_i) + abs(plane.along_j))
-    aside = HALF * (abs(plane.across_i) + abs(plane.across_j))
+    beyond = HALF * (abs(plane.along[1]) + abs(plane.along[2]))
+    aside = HALF * (abs(plane.across[1]) + abs(plane.across[2]))
     return (
-        belly[1] - beyond <= along <= belly[2] + beyond
-        and belly[3] - aside <= across <= belly[4] + aside
+        belly[1] - beyond <= _at(plane.along, i, j) <= belly[2] + beyond
+        and belly[3] - aside <= _at(plane.across, i, j) <= belly[4] + aside
     )
 
 
@@ -146,12 +143,10 @@ def _clear_block(ground, plane, belly, block, smallest):
     """Return the smaller of `smallest` and the clearance above a block (row, column) [m]."""
     bi, bj = block
     for i in range(BLOCK * bi, min(BLOCK * (bi + 1), ground.rows)):
-        z = plane.z + plane.z_i * i
         for j in range(BLOCK * bj, min(BLOCK * (bj + 1), ground.columns)):
-            clearance = z + plane.z_j * j - elevation_of(ground, i, j)
+            clearance = _at(plane.z, i, j) - elevation_of(ground, i, j)
             if clearance < smallest:
-                along = plane.along + plane.along_i * i + plane.along_j * j
-                across = plane.across + plane.across_i * i + plane.across_j * j
+                along, across = _at(plane.along, i, j), _at(plane.across, i, j)
                 if belly[1] <= along <= belly[2] and belly[3] <= across <= belly[4]:
                     smallest = clearance
     return smallest

@@ -48,11 +48,8 @@ CONTACTS = record_type(
     ("kept_inside", np.int64, (6, KEPT)),  # `inside` of the kept contacts
     ("kept_turn", float, (6, KEPT, 2)),  # their sine and cosine
     ("kept_peak", float, (6, KEPT, 3)),  # their `peak`
-    ("noted_gap", float, (6,)),  # smallest gap of the last scan [m]
-    ("noted_circle", np.int64, (6,)),  # its circle: 0 right rim, 1 middle, 2 left rim
-    ("noted_row", np.int64, (6,)),  # its row of samples
 )
-"""Contacts of the six wheels, and notes of the search; written by `find_contact`."""
+"""Contacts of the six wheels, and what the search keeps; written by `find_contact`."""
 
 CELL_SEARCH = record_type(
     ("cell", float),  # size of a cell [m]

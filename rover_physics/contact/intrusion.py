@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far the ground intrudes into a wheel: the record of a search, and its elements.
+"""Intrusion of the ground into a wheel: begin of a search, and its elements.
 
 Lengths are in cells here. A point of the ground is at s along the wheel's heading and t to the
 left of its centre. The lower side of the cylinder is the surface tan(camber) t - sqrt(R^2 - s^2) /
@@ -23,10 +23,8 @@ def begin_search(model, work, wheel):
     scale = ground.inverse_resolution
     search.cell = 1.0 / scale
     search.radius = samples.radius * scale
-    search.x, search.y = (
-        (centres[wheel, 0] - ground.x0) * scale,
-        (centres[wheel, 1] - ground.y0) * scale,
-    )
+    search.x = (centres[wheel, 0] - ground.x0) * scale
+    search.y = (centres[wheel, 1] - ground.y0) * scale
     search.z = centres[wheel, 2]
     search.ahead_x, search.ahead_y = placement.forward[wheel, 0], placement.forward[wheel, 1]
     search.cosine, search.sine = placement.up[wheel, 2], placement.axis[wheel, 2]

@@ -17,24 +17,24 @@ from rover_physics.terrain.ground import (
 
 @kernel
 def scan_rims(model, work, wheel, scope):
-    """Sample circles of a wheel and write the nearest sample into `work.contacts`.
+    """Sample circles of a wheel.
 
     Args:
         model: A record with `ground` GROUND and `samples` WHEEL_SAMPLES.
-        work: A record with `placement` PLACEMENT and `contacts` CONTACTS.
+        work: A record with `placement` PLACEMENT.
         wheel: Index of the wheel.
         scope: A SearchScope. COARSE visits every other sample of the middle circle, the others
             visit the rims and the middle circle.
 
     Returns:
-        The worst ContactStatus of the samples.
+        The worst ContactStatus of the samples; and the nearest one: its gap [m], infinite if there
+        is none, its circle (0 right rim, 1 middle, 2 left rim), and its row.
     """
     if scope == SearchScope.COARSE:
         return scan_carefully(model, work, wheel, scope)
     rear, front = find_tops(model, work, wheel)
     if rear < np.inf and front < np.inf:
-        _scan_inside(model, work, wheel, (rear, front))
-        return ContactStatus.IN_CONTACT
+        return ContactStatus.IN_CONTACT, _scan_inside(model, work, wheel, (rear, front))
     return scan_carefully(model, work, wheel, scope)
 
 
@@ -71,7 +71,7 @@ def _find_max_below_half(model, work, wheel, half):
 
 @kernel
 def _scan_inside(model, work, wheel, tops):
-    """Sample circles over known ground.
+    """Sample circles over known ground; return the nearest sample as `scan_rims` does.
 
     A row holds the samples at one angle. The rows follow from the lowest one to the rear, and to
     the front. A direction ends once the gap to the highest ground exceeds the smallest gap. The
@@ -80,12 +80,11 @@ def _scan_inside(model, work, wheel, tops):
 
     Args:
         model: A record with `ground` and `samples`.
-        work: A record with `placement` and `contacts`.
+        work: A record with `placement`.
         wheel: Index of the wheel.
         tops: Highest ground [m] below the rear half and below the front half.
     """
-    ground, samples = model.ground, model.samples
-    placement, contacts = work.placement, work.contacts
+    ground, samples, placement = model.ground, model.samples, work.placement
     rear, front = tops
     middle, best = samples.rows // 2, np.inf
     axis, centres = placement.axis[wheel], placement.centres
@@ -119,18 +118,16 @@ def _scan_inside(model, work, wheel, tops):
                 if gap < best:
                     best, best_rim, best_row = gap, rim, k
             k += turn
-    contacts.noted_gap[wheel] = best
-    contacts.noted_circle[wheel], contacts.noted_row[wheel] = best_rim, best_row
+    return best, best_rim, best_row
 
 
 @kernel
 def scan_carefully(model, work, wheel, scope):
     """Sample circles that may be over unknown ground or off the map.
 
-    COARSE visits every other sample of the middle circle. Returns the worst ContactStatus.
+    COARSE visits every other sample of the middle circle. Returns what `scan_rims` returns.
     """
-    ground, samples = model.ground, model.samples
-    placement, contacts = work.placement, work.contacts
+    ground, samples, placement = model.ground, model.samples, work.placement
     first, last, stride = 0, RIMS - 1, 1
     if scope == SearchScope.COARSE:
         first, last, stride = 1, 1, 2
@@ -158,6 +155,4 @@ def scan_carefully(model, work, wheel, scope):
                 continue
             if gap < best:
                 best, best_rim, best_row = gap, rim, k
-    contacts.noted_gap[wheel] = best
-    contacts.noted_circle[wheel], contacts.noted_row[wheel] = best_rim, best_row
-    return status
+    return status, (best, best_rim, best_row)

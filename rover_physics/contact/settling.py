@@ -4,13 +4,19 @@
 The six unknowns are q = (z, roll, pitch, right rocker angle, right and left bogie angle). The six
 conditions are zero gaps of the wheels. This is the closure of the paper's eqs (1)-(7) in 3-D,
 without the assumption of small angles.
+
+Newton's method fails at edges, faces and in narrow hollows. There the gaps are closed wheel by
+wheel. A lift of a wheel is a change of the configuration that raises this wheel by one metre and
+leaves the heights of the others as they are, to first order. The gap of the wheel is a continuous
+function of its lift, negative far down and positive far up. So a root always exists, and
+bracketing finds it whatever the shape of the ground. The wheels are closed in turns, because a
+lift shifts the other wheels sideways.
 """
 
 import numpy as np
 
 from rover_physics.contact.contact_record import SearchScope
 from rover_physics.contact.gap_rates import GroundSlope, write_gap_rates
-from rover_physics.contact.recovery import close_gaps
 from rover_physics.contact.wheel import blend_contact, find_contact
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_solve import solve_in_place
@@ -28,19 +34,28 @@ QUICK_ATTEMPTS = 5
 PROMISING = 2.0
 """Growth of the largest gap from one attempt to the next that ends the quick attempts."""
 RECOVERIES = 7
-"""Times that the gaps are closed wheel by wheel, after the quick attempts have failed: first all
-wheels together, so that no side comes first, then, if that fails, one after the other."""
+"""Times that the gaps are closed wheel by wheel, after the quick attempts have failed."""
 FINAL_ATTEMPTS = 3
 """Newton's method runs up to so often after each recovery."""
 TURNED_OVER = 1.45
 """Roll or pitch [rad] above which the search stops: the rover is on its end or side."""
+TRIALS = 12
+"""Largest number of lifts of one wheel between two looks."""
+LOOKS = 2
+"""Largest number of looks at all ground below one wheel while it is closed."""
+CLOSER = 0.1
+"""Share of the largest gap to which each gap is closed."""
+MAX_TURN = 0.3
+"""Largest change of an angle in one trial [rad]."""
 
 
 @kernel
 def settle(model, work):
     """Settle the rover at `work.pose`: write `work.q`, its placement and its contacts.
 
-    The search starts from q = 0, so the result depends on the pose alone.
+    The search starts from q = 0, so the result depends on the pose alone. Where Newton's method
+    fails, the gaps are closed wheel by wheel: all wheels together, so that no side comes first,
+    then, if that fails, one after the other.
 
     Args:
         model: A record with `ground` GROUND, `linkage` LINKAGE and `samples` WHEEL_SAMPLES.
@@ -57,16 +72,10 @@ def settle(model, work):
     if np.isnan(worst):
         return _refuse(status)
     _lower_to_ground(work)
-    _descend(model, work, 1.0)
-    return settle_from(model, work)
-
-
-@kernel
-def settle_from(model, work):
-    """Settle the rover as `settle` does, but start from `work.q`, such as that of a neighbour.
-
-    This is faster. Over edges with several solutions, the start decides which one is found.
-    """
+    if _find_step(model.linkage, work, GroundSlope.LEVEL):
+        share = _limit_step(work.step)
+        for i in range(6):
+            work.q[i] -= share * work.step[i, 0]
     place(model.linkage, work.pose, work.q, work.placement)
     status, worst = _find_contacts(model, work, SearchScope.QUICK)
     if status != ContactStatus.IN_CONTACT:
@@ -74,7 +83,7 @@ def settle_from(model, work):
     worst = np.inf
     for _ in range(QUICK_ATTEMPTS):
         before = worst
-        _newton(model, work, SearchScope.NEAR)
+        _newton(model, work)
         status, worst = _find_contacts(model, work, SearchScope.FULL)
         if worst <= GAP_TOLERANCE or np.isnan(worst) or worst > PROMISING * before:
             break
@@ -103,7 +112,7 @@ def _recover(model, work, together):
     Args:
         model: As for `settle`.
         work: As for `settle`.
-        together: As for `close_gaps`.
+        together: As for `_close_gaps`.
 
     Returns:
         The worst ContactStatus, and the largest absolute gap [m]; infinite if the rover turns
@@ -111,16 +120,113 @@ def _recover(model, work, together):
     """
     status, worst = _find_contacts(model, work, SearchScope.WHOLE)
     for _ in range(RECOVERIES):
-        close_gaps(model, work, worst, together)
+        _close_gaps(model, work, worst, together)
         if _has_turned_over(work.q):
             return ContactStatus.IN_CONTACT, np.inf
         status, worst = _find_contacts(model, work, SearchScope.WHOLE)
         for _ in range(FINAL_ATTEMPTS):
             if worst <= GAP_TOLERANCE or np.isnan(worst):
                 return status, worst
-            _newton(model, work, SearchScope.NEAR)
+            _newton(model, work)
             status, worst = _find_contacts(model, work, SearchScope.FULL)
     return status, worst
+
+
+@kernel
+def _close_gaps(model, work, worst, together):
+    """Close the gaps wheel by wheel, each to a share of the largest one.
+
+    Args:
+        model: As for `settle`.
+        work: As for `settle`; contacts of all ground below the wheels at `work.q`. `work.q` and
+            the placement are written.
+        worst: Largest absolute gap [m].
+        together: Whether the lifts of all wheels are found from the same configuration and applied
+            together; else each starts where the one before has ended.
+    """
+    start, q = work.start, work.q
+    write_gap_rates(model.linkage, work.placement, work.contacts, GroundSlope.LEVEL, work.J)
+    work.lifts[:, :] = 0.0
+    for wheel in range(6):
+        work.lifts[wheel, wheel] = 1.0
+    if not solve_in_place(work.J, work.lifts, 6, 6):
+        return
+    for i in range(6):
+        start[i] = q[i]
+    for wheel in range(6):
+        if not together:
+            find_contact(model, work, wheel, SearchScope.WHOLE)
+        work.step[wheel, 0] = _close(model, work, wheel, CLOSER * worst)
+        if together:
+            _lift_to(model, work, wheel, 0.0)
+        else:
+            for i in range(6):
+                start[i] = q[i]
+    if together:
+        for wheel in range(6):
+            for i in range(6):
+                q[i] += work.step[wheel, 0] * work.lifts[i, wheel]
+        place(model.linkage, work.pose, q, work.placement)
+
+
+@kernel
+def _close(model, work, wheel, wanted):
+    """Lift a wheel from `work.start` until its gap is at most `wanted`; return the lift [m]."""
+    gaps = work.contacts.gap
+    lift, largest = 0.0, 0.0
+    if not abs(gaps[wheel]) > wanted:
+        return lift
+    for i in range(1, 6):
+        largest = max(largest, abs(work.lifts[i, wheel]))
+    longest = MAX_TURN / largest if largest > 0.0 else np.inf
+    for _ in range(LOOKS):
+        lift = _follow_to_ground(model, work, wheel, (lift, longest, 0.5 * wanted))
+        find_contact(model, work, wheel, SearchScope.FULL)
+        if not abs(gaps[wheel]) > wanted:
+            break
+    return lift
+
+
+@kernel
+def _follow_to_ground(model, work, wheel, search):
+    """Return the lift [m] at which the followed contacts of a wheel touch, by bracketing.
+
+    `search` is the lift to start from, the longest step, and the gap that is closed enough [m].
+    """
+    gaps = work.contacts.gap
+    lift, longest, wanted = search
+    low, high, low_gap, high_gap = -np.inf, np.inf, -np.inf, np.inf
+    step, last = -gaps[wheel], 0
+    for _ in range(TRIALS):
+        gap = gaps[wheel]
+        if not abs(gap) > wanted:
+            break
+        if gap < 0.0:
+            if last < 0:
+                high_gap *= 0.5  # the Illinois variant of false position
+            low, low_gap, last = lift, gap, -1
+        else:
+            if last > 0:
+                low_gap *= 0.5
+            high, high_gap, last = lift, gap, 1
+        if low > -np.inf and high < np.inf:
+            share = low_gap / (low_gap - high_gap)
+            lift = low + min(max(share, 0.02), 0.98) * (high - low)
+        else:
+            step = 2.0 * step if step * gap < 0.0 and 2.0 * abs(step) > abs(gap) else -gap
+            step = min(max(step, -longest), longest)
+            lift += step
+        _lift_to(model, work, wheel, lift)
+    return lift
+
+
+@kernel
+def _lift_to(model, work, wheel, lift):
+    """Lift a wheel by `lift` [m] from `work.start`, and follow its contacts."""
+    for i in range(6):
+        work.q[i] = work.start[i] + lift * work.lifts[i, wheel]
+    place(model.linkage, work.pose, work.q, work.placement)
+    find_contact(model, work, wheel, SearchScope.NEAR)
 
 
 @kernel
@@ -149,17 +255,17 @@ def _find_contacts(model, work, scope):
 
 
 @kernel
-def _newton(model, work, scope):
-    """Apply Newton's method with a halving line search; return the largest remaining gap [m]."""
+def _newton(model, work):
+    """Apply Newton's method with a halving line search; the last contacts are followed."""
     q, step = work.q, work.step
     worst = 0.0
     for wheel in range(6):
         worst = max(worst, abs(work.contacts.gap[wheel]))
     for _ in range(MAX_NEWTON_STEPS):
         if worst <= NEWTON_TOLERANCE or np.isnan(worst):
-            return worst
+            return
         if not _find_step(model.linkage, work, GroundSlope.SLOPED):
-            return worst
+            return
         fraction = _limit_step(step)
         improved = np.inf
         taken = 0.0
@@ -168,14 +274,13 @@ def _newton(model, work, scope):
                 q[i] -= (fraction - taken) * step[i, 0]
             taken = fraction
             place(model.linkage, work.pose, q, work.placement)
-            status, improved = _find_contacts(model, work, scope)
+            improved = _find_contacts(model, work, SearchScope.NEAR)[1]
             if improved < (1.0 - 0.1 * fraction) * worst:
                 break
             fraction *= 0.5
         if not improved < worst:
-            return improved
+            return
         worst = improved
-    return worst
 
 
 @kernel
@@ -193,15 +298,6 @@ def _lower_to_ground(work):
     work.q[0] -= mean
     for wheel in range(6):
         gap[wheel] -= mean
-
-
-@kernel
-def _descend(model, work, fraction):
-    """Take a fraction of the step that would close the gaps on level ground under each wheel."""
-    if _find_step(model.linkage, work, GroundSlope.LEVEL):
-        fraction *= _limit_step(work.step)
-        for i in range(6):
-            work.q[i] -= fraction * work.step[i, 0]
 
 
 @kernel

@@ -24,7 +24,7 @@ COMPLIANCE = 2e-3
 load, so on a plane a wheel touches in its middle, not at a random edge."""
 LEAST_RISE = 0.02
 """Least vertical part of a contact normal, so that a wheel at a wall has finite derivatives."""
-CIRCLE_REACH = 2e-2
+CIRCLE_GAP = 2e-2
 """Gap above the smallest one [wheel radii], at the contact angle, up to which another circle is
 searched for its share."""
 
@@ -59,11 +59,11 @@ def find_contact(model, work, wheel, scope):
     elif scope == SearchScope.QUICK:
         contacts.kept[wheel] = 0
     if lost or (scope != SearchScope.NEAR and scope != SearchScope.FULL):
-        status = scan_rims(model, work, wheel, scope)
-        if contacts.noted_gap[wheel] == np.inf:
+        status, nearest = scan_rims(model, work, wheel, scope)
+        if nearest[0] == np.inf:
             contacts.gap[wheel] = np.nan
             return status
-        _take_sample(model.samples, contacts, wheel)
+        _take_sample(model.samples, contacts, wheel, nearest)
         if scope != SearchScope.COARSE:
             follow_contact(model, work, wheel)
     if scope == SearchScope.NEAR:
@@ -71,7 +71,7 @@ def find_contact(model, work, wheel, scope):
     if scope == SearchScope.FULL or scope == SearchScope.WHOLE:
         rear, front = find_tops(model, work, wheel)
         if scope == SearchScope.FULL and not (rear < np.inf and front < np.inf):
-            status = scan_carefully(model, work, wheel, scope)
+            status = scan_carefully(model, work, wheel, scope)[0]
         below = look_everywhere(model, work, wheel, (rear, front))
         if status == ContactStatus.IN_CONTACT:
             status = below
@@ -86,16 +86,16 @@ def _guess(model, work, wheel):
     forward, up, centres = placement.forward[wheel], placement.up[wheel], placement.centres
     scale, radius = ground.inverse_resolution, samples.radius
     gx, gy = (centres[wheel, 0] - ground.x0) * scale, (centres[wheel, 1] - ground.y0) * scale
-    reach = radius * scale
+    size = radius * scale
     if not (
-        gx >= reach
-        and gy >= reach
-        and gx < ground.columns - 1 - reach
-        and gy < ground.rows - 1 - reach
+        gx >= size
+        and gy >= size
+        and gx < ground.columns - 1 - size
+        and gy < ground.rows - 1 - size
     ):
         return False
-    ahead_x, ahead_y = reach * forward[0], reach * forward[1]
-    down_x, down_y, down_z = reach * up[0], reach * up[1], radius * up[2]
+    ahead_x, ahead_y = size * forward[0], size * forward[1]
+    down_x, down_y, down_z = size * up[0], size * up[1], radius * up[2]
     nearest, row, total = np.inf, 0, 0.0
     for k in range(samples.rows // 2 % 2, samples.rows, 2):
         s, c = samples.sines[k], samples.cosines[k]
@@ -114,12 +114,11 @@ def _guess(model, work, wheel):
 
 
 @kernel
-def _take_sample(samples, contacts, wheel):
-    """Take the nearest sample as the contact."""
-    rim = contacts.noted_circle[wheel]
-    k = contacts.noted_row[wheel]
+def _take_sample(samples, contacts, wheel, nearest):
+    """Take the nearest sample, (gap, circle, row), as the contact."""
+    gap, rim, k = nearest
     contacts.across[wheel], contacts.inside[wheel] = (rim - 1) * samples.half_width, 0
-    contacts.gap[wheel] = contacts.noted_gap[wheel]
+    contacts.gap[wheel] = gap
     contacts.sine[wheel], contacts.cosine[wheel] = samples.sines[k], samples.cosines[k]
     contacts.slope[wheel, 0] = contacts.slope[wheel, 1] = 0.0
 
@@ -176,13 +175,13 @@ def blend_contact(model, work, wheel):
         write_point(samples, work, wheel, (s, c), 0.0)
         return
     allowance = COMPLIANCE * samples.radius
-    reach = contacts.gap[wheel] + CIRCLE_REACH * samples.radius
+    largest_gap = contacts.gap[wheel] + CIRCLE_GAP * samples.radius
     total, sine_sum, cosine_sum, across_sum = 0.0, 0.0, 0.0, 0.0
     turn = contacts.sine[wheel], contacts.cosine[wheel]
     largest = 0.0
     for m in range(samples.circles):
         across = samples.laterals[m]
-        if not _gap_at(model, work, (wheel, across), turn) < reach:
+        if not _gap_at(model, work, (wheel, across), turn) < largest_gap:
             continue
         gap, (s, c), _ = search_circle(model, work, (wheel, across), turn)
         weight = min(1.0 - (gap - contacts.gap[wheel]) / allowance, 1.0)

@@ -14,17 +14,14 @@ RIMS = 3
 """Scanned circles: both rims and the middle one."""
 WHEEL_SAMPLES = record_type(
     ("radius", float),  # wheel radius [m]
-    ("reach", float),  # largest horizontal distance of a sample from the wheel's centre [m]
+    ("extent", float),  # largest horizontal distance of a sample from the wheel's centre [m]
     ("rows", np.int64),  # number k of contact angles
     ("circles", np.int64),  # number m of circles
     ("sines", float, (MAX_ANGLES,)),  # (k,) sines of the contact angles, ascending
     ("cosines", float, (MAX_ANGLES,)),  # (k,) their cosines
     ("spacing_sine", float),  # sine of the angle between neighbouring samples
     ("spacing_cosine", float),  # cosine of the angle between neighbouring samples
-    ("beside_sine", float),  # sine of half that angle
-    ("beside_cosine", float),  # cosine of half that angle
     ("half_width", float),  # distance of the outer circles from the middle plane [m]
-    ("lateral_spacing", float),  # distance between neighbouring circles [m]
     ("laterals", float, (MAX_CIRCLES,)),  # (m,) distances from the middle plane [m], ascending
 )
 """Samples of a wheel's cylinder: k angles on each of m circles."""
@@ -42,16 +39,14 @@ def sample_wheel(rover: Rover, resolution: float) -> Any:
     samples = new_record(
         WHEEL_SAMPLES,
         radius=wheel.radius,
-        reach=np.hypot(wheel.radius, 0.5 * wheel.width),
+        extent=np.hypot(wheel.radius, 0.5 * wheel.width),
         rows=angles.size,
         circles=2 * half_laterals + 1,
+        half_width=0.5 * wheel.width,
         spacing_sine=np.sin(angles[1] - angles[0]),
         spacing_cosine=np.cos(angles[1] - angles[0]),
-        beside_sine=np.sin(0.5 * (angles[1] - angles[0])),
-        beside_cosine=np.cos(0.5 * (angles[1] - angles[0])),
     )
     samples.sines[: angles.size], samples.cosines[: angles.size] = np.sin(angles), np.cos(angles)
-    half = 0.5 * wheel.width
-    samples.half_width, samples.lateral_spacing = half, half / half_laterals
+    half = samples.half_width
     samples.laterals[: samples.circles] = np.linspace(-half, half, samples.circles)
     return samples

@@ -105,9 +105,9 @@ def _bear_load(servo, wheel, load):
         length_rate = radius / np.sqrt(sinkage * (2.0 * radius - sinkage))
         length_rate *= exponent * sinkage / N
         strength_rate = half * (width * length_rate * soil[COHESION] + soil[TAN_PHI])
-    reach = soil[SHEAR_MODULUS]
+    modulus = soil[SHEAR_MODULUS]
     return (
-        (strength, strength_rate * weight, length / reach, length_rate * weight / reach),
+        (strength, strength_rate * weight, length / modulus, length_rate * weight / modulus),
         (resistance / weight, resistance_rate),
     )
 

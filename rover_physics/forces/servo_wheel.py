@@ -24,8 +24,8 @@ SLIP_PRECISION = 1e-9
 T, S, D = range(3)
 """Forces of a wheel: traction, lateral force, and the difference of the two points' tractions."""
 ALONG, ACROSS, SPIN, GRIP = range(4)
-"""What they depend on: velocity of the contact along and across the wheel, half the difference of
-the two points' velocities, and mu N."""
+"""Inputs of these forces: velocity of the contact along and across the wheel, half the difference
+of the two points' velocities, and mu N."""
 
 
 @kernel
@@ -92,8 +92,8 @@ def _slip_of_pull(pull, wide, spin):
     """Return the root s of f(s + spin) + f(s - spin) = pull, -2 < pull < 2, f = `_share`."""
     share = 0.5 * pull
     middle = wide * share / np.sqrt(1.0 - share * share)
-    reach = abs(spin)
-    return _find_root((1.0, 0.0, pull), (middle - reach, middle + reach, middle), wide, spin)
+    away = abs(spin)
+    return _find_root((1.0, 0.0, pull), (middle - away, middle + away, middle), wide, spin)
 
 
 @kernel

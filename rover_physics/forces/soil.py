@@ -7,16 +7,15 @@ with Janosi and Hanamoto's shear relation. docs/soil.md has the formulas, symbol
 Source: Wong, Theory of Ground Vehicles, 4th ed., Wiley 2008, chapter 2.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.limits.table import MODERATE_SINKAGE
 from rover_physics.numerics.kernels import kernel
 from rover_physics.terrain.ground import SOIL_NUMBERS
-from rover_physics.terrain.soil_file import COULOMB_MODEL, Soil, load_soils, soil_named
+from rover_physics.terrain.soil_file import COULOMB_MODEL, Soil, soil_named
 
 SOIL_MODEL, SOIL_FRICTION, COHESION, TAN_PHI, K_C, K_PHI, EXPONENT, SHEAR_MODULUS = range(
     SOIL_NUMBERS
@@ -30,19 +29,13 @@ MAX_NEWTON_STEPS = 50
 """Largest number of Newton steps of `find_mobilisation`."""
 
 
-def pack_soils(
-    names: Sequence[str] = (),
-    *,
-    default: str | None = None,
-    soils: Mapping[str, Soil] | None = None,
-) -> NDArray[np.float64]:
-    """Return a table of soils for the kernels.
+def pack_soils(names: Sequence[str] = (), default: str | None = None) -> NDArray[np.float64]:
+    """Return a table of preset soils for the kernels.
 
     Args:
         names: Soils of a terrain's soil layer, ``terrain.soil_names``.
         default: Soil where the layer is -1, or everywhere without a layer (default: Coulomb
             friction with the coefficient of the terrain or the rover).
-        soils: Soils by name (default: the presets).
 
     Returns:
         Table (1 + number of names, SOIL_NUMBERS): row 0 is the default, row 1 + k is
@@ -51,12 +44,11 @@ def pack_soils(
     Raises:
         SoilError: A name that is not among the soils.
     """
-    known = load_soils() if soils is None and (names or default is not None) else soils
     table = np.zeros((1 + len(names), SOIL_NUMBERS))
     table[:, SOIL_FRICTION] = np.nan
     for row, name in enumerate((default, *names)):
         if name is not None:
-            _write_soil(soil_named(name, known), table[row])
+            _write_soil(soil_named(name), table[row])
     return table
 
 
@@ -168,12 +160,6 @@ def effective_friction(soil, wheel, N):
 
 
 @kernel
-def is_sinkage_moderate(sinkage, radius):
-    """Return whether the sinkage formula is valid: z0 <= D / 6. Arguments in [m]."""
-    return sinkage <= MODERATE_SINKAGE * 2.0 * radius
-
-
-@kernel
 def _own_friction(soil, mu):
     """Return the Coulomb coefficient of a soil, or `mu` if it has none."""
     own = soil[SOIL_FRICTION]
@@ -209,21 +195,6 @@ def contact_length(radius, sinkage):
 def shear_strength(soil, area, N):
     """Return the shear force [N] of a fully mobilised contact (Mohr-Coulomb), A c + N tan(phi)."""
     return area * soil[COHESION] + N * soil[TAN_PHI]
-
-
-@kernel
-def thrust_at_slip(soil, radius, width, N, slip):
-    """Return the thrust F [N] at a slip ratio, drawbar pull plus motion resistance.
-
-    F = (A c + N tan(phi)) (1 - K / (i l) (1 - exp(-i l / K))), negative for braking. It is 0 for a
-    wheel sunk to its axle.
-    """
-    sinkage = find_sinkage(soil, radius, width, N)
-    if sinkage >= radius:
-        return 0.0
-    length = contact_length(radius, sinkage)
-    share = mobilised_share(abs(slip) * length / soil[SHEAR_MODULUS])
-    return np.copysign(share * shear_strength(soil, width * length, N), slip)
 
 
 @kernel

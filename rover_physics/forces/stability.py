@@ -40,11 +40,11 @@ def _write_side(linkage, placement, contacts, side, corners):
     ahead = behind + 1
     R = placement.R
     along_x, along_y = R[0, 0], R[1, 0]
-    reach_behind = along_x * (point[behind, 0] - pivot[side, 0])
-    reach_behind += along_y * (point[behind, 1] - pivot[side, 1])
-    reach_ahead = along_x * (point[ahead, 0] - pivot[side, 0])
-    reach_ahead += along_y * (point[ahead, 1] - pivot[side, 1])
-    share = -reach_behind / (reach_ahead - reach_behind)
+    arm_behind = along_x * (point[behind, 0] - pivot[side, 0])
+    arm_behind += along_y * (point[behind, 1] - pivot[side, 1])
+    arm_ahead = along_x * (point[ahead, 0] - pivot[side, 0])
+    arm_ahead += along_y * (point[ahead, 1] - pivot[side, 1])
+    share = -arm_behind / (arm_ahead - arm_behind)
     share = min(max(share, 0.0), 1.0)
     rear = 0 if side == 0 else 3
     front = 1 if side == 0 else 2
@@ -85,11 +85,9 @@ def measure_edge(corners, edge, centre, force, moment):
     `tip_over_angles`.
     """
     start, end = edge, (edge + 1) % corners.shape[0]
-    ax, ay, az = (
-        corners[end, 0] - corners[start, 0],
-        corners[end, 1] - corners[start, 1],
-        corners[end, 2] - corners[start, 2],
-    )
+    ax = corners[end, 0] - corners[start, 0]
+    ay = corners[end, 1] - corners[start, 1]
+    az = corners[end, 2] - corners[start, 2]
     length = np.sqrt(ax * ax + ay * ay + az * az)
     if not length > 0.0:
         return np.inf, np.inf

@@ -46,17 +46,6 @@ class SearchGoal(IntEnum):
     """The largest friction utilisation."""
 
 
-class SearchOutcome(IntEnum):
-    """Result of a search for the best torques."""
-
-    FOUND = 0
-    """Found torques within their limit that keep all wheels on the ground."""
-    LIFTS = 1
-    """No torques keep all wheels on the ground."""
-    SATURATES = 2
-    """All torques that keep the wheels on the ground exceed the limit."""
-
-
 TORQUE_SEARCH = record_type(
     ("y", float, (FREE_FORCES,)),  # the free degrees, in the order of the columns of BALANCE
     ("wheel_loads", float, (6,)),  # N at y
@@ -99,38 +88,36 @@ def minimise_friction(balance, max_traction, search):
     """Find the torques that need the least friction and write their forces into `search`.
 
     The search starts from equal torques. Lateral forces keep their equal shares if these are
-    feasible. Otherwise they are free, and wheels with friction in reserve take over.
+    feasible. Otherwise they are free, and wheels with friction in reserve take over. If no torques
+    within their limit keep all wheels on the ground, the forces are those closest to that.
 
     Args:
         balance: BALANCE with all columns.
         max_traction: Largest torque over wheel radius and rover weight.
         search: TORQUE_SEARCH; reads `mu` and `resistance`.
-
-    Returns:
-        A SearchOutcome. If it is not FOUND, `search` holds the forces closest to the constraint.
     """
-    outcome = _search(balance, np.int64(FREE_TORQUES), max_traction, search)
-    if outcome != SearchOutcome.FOUND or _needed(search, SearchGoal.FRICTION) > 1.0:
-        outcome = _search(balance, np.int64(FREE_FORCES), max_traction, search)
-    return outcome
+    found = _search(balance, np.int64(FREE_TORQUES), max_traction, search)
+    if not found or _needed(search, SearchGoal.FRICTION) > 1.0:
+        _search(balance, np.int64(FREE_FORCES), max_traction, search)
 
 
 @kernel
 def _search(balance, free, max_traction, search):
+    """Search with `free` degrees of freedom; return whether torques keep wheels and limit."""
     search.y[:] = 0.0
     apply_torques(balance, free, search)
     search.max_traction = np.inf
     if _needed(search, SearchGoal.LOAD) > -LOAD_KEPT:
         _lower(balance, free, SearchGoal.LOAD, -LOAD_KEPT, search)
         if _needed(search, SearchGoal.LOAD) > -LOAD_KEPT:
-            return SearchOutcome.LIFTS
+            return False
     if _needed(search, SearchGoal.TORQUE) >= max_traction:
         _lower(balance, free, SearchGoal.TORQUE, 0.999 * max_traction, search)
         if _needed(search, SearchGoal.TORQUE) >= max_traction:
-            return SearchOutcome.SATURATES
+            return False
     search.max_traction = max_traction
     _lower(balance, free, SearchGoal.FRICTION, 1e-6, search)
-    return SearchOutcome.FOUND
+    return True
 
 
 @kernel

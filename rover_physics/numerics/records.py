@@ -36,9 +36,3 @@ def array_of(record: Any) -> np.ndarray:
     array = np.zeros(1, record.dtype)
     array[0] = record
     return array
-
-
-def shared_array_of(record: Any) -> np.ndarray:
-    """Return the array (1,) that holds a record of `new_record`; for other records, a copy."""
-    base = record.base
-    return base if isinstance(base, np.ndarray) and base.shape == (1,) else array_of(record)

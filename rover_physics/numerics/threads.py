@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 import numba
@@ -43,13 +44,8 @@ def run_chunks(sweep: Callable[..., Any], inputs: tuple, chunks: int, threads: i
     if threads == 1 or chunks == 1:
         sweep(*inputs, (0, chunks))
         return
-    pool = ThreadPoolExecutor(min(threads, chunks))
-    try:
-        for done in [pool.submit(sweep, *inputs, (k, k + 1)) for k in range(chunks)]:
-            done.result()
-    finally:
-        # An interrupted sweep ends with the chunks at work: they write into its arrays.
-        pool.shutdown(cancel_futures=True)
+    parts = (partial(sweep, *inputs, (k, k + 1)) for k in range(chunks))
+    run_in_turn(parts, min(threads, chunks))
 
 
 def run_in_turn(calls: Iterable[Callable[[], object]], threads: int) -> None:
@@ -74,4 +70,5 @@ def run_in_turn(calls: Iterable[Callable[[], object]], threads: int) -> None:
         for one in waiting:
             one.result()
     finally:
+        # An interrupted sweep ends with the calls at work: they write into its arrays.
         pool.shutdown(cancel_futures=True)

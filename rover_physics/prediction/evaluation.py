@@ -10,8 +10,8 @@ from rover_physics.contact.contact_record import CELL_SEARCH, CONTACTS, hold_whe
 from rover_physics.contact.settling import settle
 from rover_physics.contact.wheel_samples import WHEEL_SAMPLES
 from rover_physics.forces.equilibrium import BALANCE, FREE_FORCES, balance_forces
-from rover_physics.forces.servo_pose import balance_servos, write_servo_forces
-from rover_physics.forces.servo_record import SERVO
+from rover_physics.forces.servo import balance_servos, write_servo_forces
+from rover_physics.forces.servo_motion import SERVO
 from rover_physics.forces.soil import SoilWheel, coulomb_slip, effective_friction, solve_wheel
 from rover_physics.forces.soil_sharing import rolling_direction, share_forces_on_soil
 from rover_physics.forces.stability import CORNERS

@@ -21,8 +21,12 @@ from rover_physics.terrain.checks import (
     as_soil,
     as_soil_names,
 )
-from rover_physics.terrain.presets import find_terrain_file
-from rover_physics.terrain.terrain_file import MAX_CELLS, read_entries, write_entries
+from rover_physics.terrain.terrain_file import (
+    MAX_CELLS,
+    find_terrain_file,
+    read_entries,
+    write_entries,
+)
 
 _EDGE_TOLERANCE = 1e-9  # cells; for rounding of (x - origin) / resolution at the map's edge
 

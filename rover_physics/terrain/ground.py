@@ -7,7 +7,8 @@ addresses, and a `Ground` keeps the arrays alive. All code that makes or reads a
 file.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -31,14 +32,12 @@ NO_SOILS = np.zeros((1, SOIL_NUMBERS))
 
 GROUND = record_type(
     ("elevation", np.int64),  # address of (rows, columns) elevation [m], NaN where unknown
-    (
-        "block_max",
-        np.int64,
-    ),  # address of (block_rows, block_columns) highest elevation of each block
-    # [m], infinite if any cell of it is unknown
+    # address of (block_rows, block_columns) highest elevation of each block [m], infinite if any
+    # cell of it is unknown
+    ("block_max", np.int64),
     ("known_block_max", np.int64),  # address of the same, over known cells; -inf if there are none
     ("friction", np.int64),  # address of (rows, columns) friction coefficient, 0 without layer
-    ("soil", np.int64),  # address of (rows, columns) rows in the table of soils, 0 without layer
+    ("soil", np.int64),  # address of (rows, columns) int32 rows in the table of soils, 0 without
     ("soils", np.int64),  # address of the table of soils, (1 + k, SOIL_NUMBERS)
     ("rows", np.int64),  # rows of cells
     ("columns", np.int64),  # columns of cells
@@ -60,19 +59,8 @@ class Ground:
 
     records: np.ndarray
     """(1,) GROUND."""
-    elevation: np.ndarray
-    """(ny, nx) elevation [m], NaN where unknown."""
-    block_max: np.ndarray
-    """Highest elevation of each block of BLOCK x BLOCK cells [m], infinite if any cell of it is
-    unknown."""
-    known_block_max: np.ndarray
-    """Highest known elevation of each block [m], -inf if none is known."""
-    friction: np.ndarray | None
-    """(ny, nx) friction coefficient, NaN for the rover's default."""
-    soil: np.ndarray | None
-    """(ny, nx) int32 rows in the table of soils, 0 for the default."""
-    soils: np.ndarray
-    """(1 + k, SOIL_NUMBERS) table of `pack_soils`: the default soil, then those of the layer."""
+    arrays: Mapping[str, np.ndarray | None]
+    """The arrays by the names of the fields with their addresses; None without such a layer."""
 
     def __reduce__(self) -> str:
         raise TypeError(
@@ -117,62 +105,44 @@ read_float: Any = intrinsic(_reader(types.float64, types.float64))
 read_int: Any = intrinsic(_reader(types.int32, types.int64))
 """Return element `index` of the int32 array at `address`."""
 
-ELEMENTS = {
-    "elevation": np.float64,
-    "block_max": np.float64,
-    "known_block_max": np.float64,
-    "friction": np.float64,
-    "soil": np.int32,
-    "soils": np.float64,
-}
-"""Arrays of a Ground that kernels read by address, and their element types."""
-
 
 @lru_cache(maxsize=4)
 def pack_ground(terrain: Terrain) -> Ground:
     """Return a terrain as a Ground, without soils; the last 4 are cached."""
-    elevation = np.ascontiguousarray(terrain.elevation, dtype=np.float64)
+    elevation, friction, soil = terrain.elevation, terrain.friction, terrain.soil
     highest = _reduce_blocks(elevation, np.fmax)
     some_unknown = _reduce_blocks(np.isnan(elevation), np.logical_or)
-    return _point_to(
-        terrain,
-        elevation=elevation,
-        block_max=np.where(some_unknown, np.inf, highest),
-        known_block_max=np.where(np.isnan(highest), -np.inf, highest),
-        friction=None
-        if terrain.friction is None
-        else np.ascontiguousarray(terrain.friction, dtype=np.float64),
-        soil=None if terrain.soil is None else terrain.soil + np.int32(1),
-        soils=NO_SOILS,
-    )
-
-
-def _point_to(terrain: Terrain, **arrays: np.ndarray | None) -> Ground:
-    """Return a Ground of these arrays, with a record that points to them."""
-    elevation, block_max = arrays["elevation"], arrays["block_max"]
-    assert elevation is not None and block_max is not None
+    arrays = {
+        "elevation": elevation,
+        "block_max": np.where(some_unknown, np.inf, highest),
+        "known_block_max": np.where(np.isnan(highest), -np.inf, highest),
+        "friction": friction,
+        "soil": None if soil is None else soil + np.int32(1),
+        "soils": NO_SOILS,
+    }
     record = new_record(
         GROUND,
-        **{
-            name: 0 if array is None else address_of(array, ELEMENTS[name])
-            for name, array in arrays.items()
-        },
+        **{name: _address_of_layer(name, array) for name, array in arrays.items()},
         rows=elevation.shape[0],
         columns=elevation.shape[1],
-        block_rows=block_max.shape[0],
-        block_columns=block_max.shape[1],
+        block_rows=highest.shape[0],
+        block_columns=highest.shape[1],
         x0=float(terrain.origin[0]),
         y0=float(terrain.origin[1]),
         inverse_resolution=1.0 / float(terrain.resolution),
     )
-    return Ground(array_of(record), **arrays)  # type: ignore[arg-type]
+    return Ground(array_of(record), arrays)
+
+
+def _address_of_layer(name: str, array: np.ndarray | None) -> int:
+    return 0 if array is None else address_of(array, np.int32 if name == "soil" else np.float64)
 
 
 def with_soils(ground: Ground, soils: np.ndarray) -> Ground:
     """Return `ground` with another table of soils (1 + k, SOIL_NUMBERS)."""
     records = ground.records.copy()
-    records["soils"] = address_of(soils, ELEMENTS["soils"])
-    return replace(ground, records=records, soils=soils)
+    records["soils"] = address_of(soils, np.float64)
+    return Ground(records, {**ground.arrays, "soils": soils})
 
 
 def _reduce_blocks(cells: np.ndarray, reduce: np.ufunc) -> np.ndarray:
@@ -201,13 +171,13 @@ def known_max_of_block(ground, bi, bj):
 
 
 @kernel
-def find_block_max(ground, gx, gy, reach_x, reach_y):
-    """Return the highest elevation [m] in a box around (gx, gy), whose reach is also in cells.
+def find_block_max(ground, gx, gy, half_x, half_y):
+    """Return the highest elevation [m] in a box around (gx, gy); half sides are in cells, too.
 
     It is infinite if the box contains unknown ground or leaves the map. The search takes whole
     blocks, so it covers slightly more than the box.
     """
-    low_x, high_x, low_y, high_y = gx - reach_x, gx + reach_x, gy - reach_y, gy + reach_y
+    low_x, high_x, low_y, high_y = gx - half_x, gx + half_x, gy - half_y, gy + half_y
     if not (
         low_x >= 0.0 and low_y >= 0.0 and high_x < ground.columns - 1 and high_y < ground.rows - 1
     ):

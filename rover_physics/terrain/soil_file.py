@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Soils: parameters, presets and soil files."""
+"""Soils: parameters, presets and their file."""
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, get_type_hints
 
 from rover_physics.errors import RoverFileError, SoilError
@@ -47,21 +47,16 @@ class Soil:
     """Shear displacement modulus K in [m]."""
 
 
-def load_soils(path: str | Path | None = None) -> dict[str, Soil]:
-    """Load the soils of a file, or the presets.
-
-    Args:
-        path: A YAML file with the keys of ``config/soils.yaml`` (default: that file).
-
-    Returns:
-        Soils by name, in the order of the file.
+@cache
+def load_soils() -> Mapping[str, Soil]:
+    """Return the preset soils by name, in the order of ``config/soils.yaml``.
 
     Raises:
         SoilError: Unreadable file, or a soil with a missing, unknown or invalid key.
     """
-    place = find_config("soils.yaml") if path is None else Path(path)
+    place = find_config("soils.yaml")
     try:
-        return soils_from_dict(read_yaml(place), str(place))
+        return MappingProxyType(soils_from_dict(read_yaml(place), str(place)))
     except RoverFileError as error:
         raise SoilError(str(error)) from error
 
@@ -83,17 +78,13 @@ def soils_from_dict(data: object, source: str) -> dict[str, Soil]:
         return {name: _read_soil(name, entry) for name, entry in data.items()}
 
 
-def soil_named(name: str, soils: Mapping[str, Soil] | None = None) -> Soil:
-    """Return one soil.
-
-    Args:
-        name: Its name, e.g. ``"dry_sand"``.
-        soils: Soils by name (default: the presets).
+def soil_named(name: str) -> Soil:
+    """Return the preset soil of a name such as ``"dry_sand"``.
 
     Raises:
         SoilError: No soil of that name; the text lists the names.
     """
-    known = load_soils() if soils is None else soils
+    known = load_soils()
     if name in known:
         return known[name]
     hint = suggest(str(name), tuple(known))

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads and writes the entries of terrain files (.npz), within a limit of cells."""
+"""Finds terrain files (.npz), and reads and writes their entries, within a limit of cells."""
 
 import math
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -9,8 +10,9 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from rover_physics.errors import RoverFileError, TerrainError
+from rover_physics.files.config_files import find_config
 from rover_physics.files.npz_file import NpzReader, write_npz
-from rover_physics.files.validation import errors_of
+from rover_physics.files.validation import errors_of, show_file
 from rover_physics.numerics.read_only import seal_array
 
 MAX_CELLS = 25_000_000
@@ -28,6 +30,33 @@ GRIDS: dict[str, type | None] = {
 file."""
 SMALL = {"resolution": 1000, "origin": 1000, "soil_names": 1_000_000}
 """Other entries, and their largest sizes [bytes]."""
+
+
+def terrain_presets() -> dict[str, Path]:
+    """Return the files of the preset terrains by name, which is the first word of the file's."""
+    files = sorted(find_config("terrain").glob("*.npz"))
+    return {path.stem.partition("_")[0]: path for path in files}
+
+
+def find_terrain_file(name_or_path: str | Path) -> Path:
+    """Return the file of a preset terrain, or the given path.
+
+    Args:
+        name_or_path: A preset's name such as ``"spirit"``, or the path of an ``.npz`` file.
+
+    Raises:
+        TerrainError: Neither a preset nor a file; the text lists the presets.
+    """
+    presets = terrain_presets()
+    if not isinstance(name_or_path, Path) and name_or_path in presets:
+        return presets[name_or_path]
+    path = Path(name_or_path)
+    if not os.path.exists(path):
+        raise TerrainError(
+            f"no terrain {show_file(name_or_path)!r}: there is no such file, and the presets are "
+            f"{', '.join(presets)}"
+        )
+    return path
 
 
 def read_entries(file: BinaryIO, source: str | Path, max_cells: int) -> dict[str, Any]:

@@ -3,13 +3,13 @@
 
 import numpy as np
 
-from rover_physics.compilation import Step
+from rover_physics.compilation import CompilationStep
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.pose_classes import RoverOnMap, classify_poses
-from rover_physics.warm_up import EXACT, SCORES, UNCERTAIN
+from rover_physics.warm_up import EXACT, SCORES, SINGLE, UNCERTAIN
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.planning.candidates import generate_candidates
 from rover_planner.planning.path_query import PathQueryOptions
@@ -18,16 +18,19 @@ from rover_planner.planning.ways.way_search import LatticeSettings, find_way
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
 from rover_planner.traction.traction_service import TractionService
 
-CANDIDATES = (Step("candidate paths", "rover_planner.nodes.warm_up:plan_candidates"),)
+CANDIDATES = (CompilationStep("candidate paths", "rover_planner.nodes.warm_up:plan_candidates"),)
 """All that candidates of a question need."""
-WAYS = (Step("search of ways", "rover_planner.nodes.warm_up:search_ways"),)
+WAYS = (CompilationStep("search of ways", "rover_planner.nodes.warm_up:search_ways"),)
 """All that searches around obstacles need."""
-HAZARDS = (Step("classes of poses", "rover_planner.nodes.warm_up:classify_pose"),)
+HAZARDS = (CompilationStep("classes of poses", "rover_planner.nodes.warm_up:classify_pose"),)
 """All that the hazard map needs."""
-TRACTION = (Step("traction controller", "rover_planner.nodes.warm_up:control_traction"),)
+TRACTION = (
+    CompilationStep("traction controller", "rover_planner.nodes.warm_up:control_traction"),
+)
 """All that updates of the traction controller need."""
-GROUPS = (EXACT, UNCERTAIN, SCORES, (*TRACTION, *CANDIDATES), WAYS, HAZARDS)
-"""All kernels; groups have hardly any in common."""
+GROUPS = ((*EXACT, *SCORES, *SINGLE, *HAZARDS, *WAYS), (*UNCERTAIN, *TRACTION, *CANDIDATES))
+"""All kernels in two groups that take about the same time to compile: the first compiles the model
+of a pose once for all that use it."""
 
 JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS, *STEERING_JOINTS)
 

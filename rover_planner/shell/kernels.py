@@ -3,7 +3,7 @@
 
 from collections.abc import Callable, Sequence
 
-from rover_physics.compilation import BackgroundCompilation, Compilation, Step
+from rover_physics.compilation import BackgroundCompilation, Compilation, CompilationStep
 
 LOADING_DELAY = 1.0
 """Time that a program has to itself before it loads what it needs later [s]."""
@@ -13,7 +13,7 @@ Report = Callable[[str], object]
 
 
 def load_kernels(
-    first: Sequence[Step], behind: Sequence[Step], report: Report
+    first: Sequence[CompilationStep], behind: Sequence[CompilationStep], report: Report
 ) -> BackgroundCompilation:
     """Load kernels, and begin to load others while the program works.
 

@@ -49,18 +49,28 @@ def draw(rover, terrain, paths, cases):
     return counts
 
 
-@pytest.mark.parametrize("rover", [LSR1, M2020], ids=["lsr1", "m2020"])
-@pytest.mark.parametrize("ground", ["level", "slope", "rocks", "relief", "step"])
-def test_at_most_one_map_in_a_thousand_leaves_the_bounds(rover, ground):
+@pytest.mark.parametrize(
+    ("rover", "ground", "count"),
+    [
+        (LSR1, "relief", 1),
+        *[
+            pytest.param(rover, ground, 4, marks=pytest.mark.long)
+            for rover in (LSR1, M2020)
+            for ground in ("level", "slope", "rocks", "relief", "step")
+        ],
+    ],
+)
+def test_at_most_one_map_in_a_thousand_leaves_the_bounds(rover, ground, count):
     """Errors of each cell on its own, over a wheel and over the rover."""
-    cases = [(0.0, 0.001), (0.0, 0.005), (rover.wheel.radius, 0.003), (0.8, 0.005)]
+    cases = [(0.0, 0.005), (0.0, 0.001), (rover.wheel.radius, 0.003), (0.8, 0.005)]
     terrain = uncertain_grounds(rover)[ground]
-    waypoints, outside, unbounded = draw(rover, terrain, path_across, cases)
-    assert waypoints > 1500
+    waypoints, outside, unbounded = draw(rover, terrain, path_across, cases[:count])
+    assert waypoints > 375 * count
     assert unbounded <= 0.03 * len(PATH) * 8
     assert outside <= 1e-3 * waypoints
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rover", [LSR1, M2020], ids=["lsr1", "m2020"])
 def test_at_most_one_map_in_a_thousand_leaves_the_bounds_of_turned_wheels(rover):
     size = rover.wheel.radius / LSR1.wheel.radius
@@ -73,11 +83,11 @@ def test_at_most_one_map_in_a_thousand_leaves_the_bounds_of_turned_wheels(rover)
     assert outside <= 1e-3 * waypoints
 
 
-@pytest.mark.parametrize("length", [0.0, 0.1, 0.8])
+@pytest.mark.parametrize("length", [0.1, 0.8])
 def test_bounds_are_of_the_size_of_what_happens(length):
     """Not infinitely wide: that would be conservative, too."""
-    outcome = draw_path(LSR1, with_std(fractal(2), 0.003), PATH, length, 40, 1)
-    widest = {0.0: 8.0, 0.1: 8.0, 0.8: 40.0}[length]
+    outcome = draw_path(LSR1, with_std(fractal(2), 0.003), PATH, length, 20, 1)
+    widest = {0.1: 8.0, 0.8: 40.0}[length]
     for name in ("roll", "pitch", "friction_utilisation", "torque_saturation"):
         assert 1.0 < outcome.widths[name] < widest, name
 
@@ -100,8 +110,7 @@ def test_bounds_hold_the_prediction(terrain, poses, policy):
         assert np.all(limits[rows, ..., 1] >= value[rows]), name
 
 
-@pytest.mark.parametrize("rover", [LSR1, M2020], ids=["lsr1", "m2020"])
-@pytest.mark.parametrize("terrain", [SLOPE, fractal(2)], ids=["slope", "relief"])
+@pytest.mark.parametrize(("rover", "terrain"), [(LSR1, fractal(2)), (M2020, SLOPE)])
 def test_certain_heights_have_bounds_of_no_width(rover, terrain):
     prediction, bounds = bounds_on(rover, with_std(terrain, 0.0))
     assert bounds.bounded.all()
@@ -112,19 +121,6 @@ def test_certain_heights_have_bounds_of_no_width(rover, terrain):
     for name in ("friction_utilisation", "torque_saturation"):
         highest = getattr(bounds, name)[..., 1]
         np.testing.assert_allclose(highest, getattr(prediction, name), atol=1e-6)
-
-
-def test_more_sigmas_mean_wider_bounds():
-    terrain = with_std(fractal(2), 0.002)
-    narrow = bounds_on(LSR1, terrain, sigmas=1.0)[1]
-    wide = bounds_on(LSR1, terrain, sigmas=3.0)[1]
-    assert narrow.bounded.all()
-    assert wide.bounded.all()
-    for name in BOUNDED_VALUES:
-        inner, outer = getattr(narrow, name), getattr(wide, name)
-        slack = 1e-6 + 0.01 * np.ptp(outer, axis=-1)
-        assert np.all(outer[..., 0] <= inner[..., 0] + slack), name
-        assert np.all(outer[..., 1] >= inner[..., 1] - slack), name
 
 
 def test_a_uniform_shift_of_wheels_gives_the_height_of_geometry():
@@ -147,7 +143,7 @@ def test_only_errors_under_the_rover_matter():
     assert np.ptp(near.roll) > 0.02
 
 
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(
     seed=st.integers(0, 10_000),
     std=st.floats(0.0, 0.02),
@@ -271,7 +267,7 @@ def test_soil_and_its_sinkage_are_bounded(policy):
     assert bounds.bounded.all()
     assert np.all(bounds.sinkage[..., 1] > prediction.sinkage)
     assert np.all(bounds.friction_utilisation[..., 1] > prediction.friction_utilisation)
-    for seed in range(5):
+    for seed in range(2):
         rng = np.random.default_rng(seed)
         error = 0.001 * rng.standard_normal(terrain.elevation.shape)
         sample = replace(terrain, elevation=terrain.elevation + error)

@@ -14,8 +14,7 @@ from rover_physics.rover.linkage import pack_linkage, place, place_masses
 from rover_physics.rover.model import Rover, Steering
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traversability.judge import judge_path, judge_poses
-from support.rough_grounds import plane, random_poses, smooth
-from support.rover_geometry import contact_frames
+from support.rough_grounds import plane, smooth
 
 LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
 curvatures = st.one_of(st.floats(-20.0, 20.0), st.sampled_from([np.inf, -np.inf, 1 / 0.31]))
@@ -82,12 +81,6 @@ def test_wheels_that_are_hardly_turned_share_as_straight_ones(turn):
         assert there == pytest.approx(here, abs=1e-5)
 
 
-def test_in_a_turn_on_the_spot_the_tractions_drive_the_turn():
-    prediction = judge_poses(LSR1, smooth(3), [[0.1, 0.2, 0.3]], [np.inf])[0]
-    T = prediction.tangential[0]
-    assert T[:3] == pytest.approx(np.full(3, T[0])) and T[3:] == pytest.approx(-T[:3])
-
-
 def test_in_a_crab_up_a_slope_the_tractions_carry_the_weight_along_it():
     crab = replace(LSR1, steering=Steering(("rear", "middle", "front"), np.pi / 2, 0.35))
     y = np.linspace(-0.2, 0.2, 9)
@@ -97,14 +90,3 @@ def test_in_a_crab_up_a_slope_the_tractions_carry_the_weight_along_it():
     expected = np.full((9, 6), LSR1.weight * np.sin(0.2) / 6.0)
     assert prediction.tangential == pytest.approx(expected, rel=1e-4)
     assert np.abs(prediction.lateral).max() <= 1e-3 * LSR1.weight
-
-
-def test_contact_frames_are_those_of_the_turned_wheels():
-    poses, ground = random_poses(4, 10, 0.5), smooth(5)
-    prediction = judge_poses(LSR1, ground, poses, np.linspace(-2.0, 2.0, 10))[0]
-    for i in np.flatnonzero(prediction.settled):
-        radial = prediction.wheel_centres[i] - prediction.contact_points[i]
-        n, t, a = contact_frames(LSR1, prediction, i).swapaxes(0, 1)
-        along = np.einsum("wk,wk->w", radial, a)
-        assert radial - along[:, None] * a == pytest.approx(0.1 * n, abs=1e-9)
-        assert np.abs(np.einsum("wk,wk->w", radial, t)).max() <= 1e-9

@@ -24,15 +24,6 @@ def test_the_unit_square_has_the_check_value():
     assert measure == pytest.approx(2.27419, abs=5e-6)
 
 
-def test_the_nearest_edge_counts_and_weight_adds_to_the_measure_but_not_to_the_angle():
-    centre = np.array([0.5, 0.2, 1.0])
-    angle, measure = tip_over_angles(SQUARE, centre, DOWN, NONE)
-    assert angle == pytest.approx(np.arctan(0.2))
-    assert tip_over_angles(SQUARE, centre, 3.0 * DOWN, NONE) == pytest.approx(
-        (angle, 3.0 * measure)
-    )
-
-
 @few
 @given(st.floats(-np.pi, np.pi), st.floats(0.2, 3.0))
 def test_a_force_that_points_out_of_the_polygon_is_negative_by_both(direction, height):
@@ -67,29 +58,6 @@ def test_on_flat_ground_both_measures_are_one(preset):
     assert prediction.tip_over_force_angle == pytest.approx([1.0, 1.0], abs=1e-9)
 
 
-def margins_on_slopes(degrees: range, direction: float) -> np.ndarray:
-    """Return ratio and force-angle measure (k, 2) on planes that rise in a direction."""
-    rises = np.tan(np.radians(degrees))
-    predictions = [
-        judge_path(
-            LSR1, plane(rise * np.cos(direction), rise * np.sin(direction)), [[0.0, 0.0, 0.0]]
-        )[0]
-        for rise in rises
-    ]
-    return np.array([(p.tip_over_ratio[0], p.tip_over_force_angle[0]) for p in predictions])
-
-
-@pytest.mark.parametrize(
-    ("direction", "flat"), [(np.pi / 2, 5), (-np.pi / 2, 5), (np.pi, 0)], ids=str
-)
-def test_both_measures_fall_with_every_degree_of_slope(direction, flat):
-    """Aside, on the first 15 degrees, the front edge stays the nearest by the ratio."""
-    ratio, measure = margins_on_slopes(range(0, 48 if flat else 56, 3), direction).T
-    assert (np.diff(measure) < 0.0).all()
-    assert (np.diff(ratio[flat:]) < -0.01).all()
-    assert ratio[:flat] == pytest.approx(np.ones(flat), abs=1e-9)
-
-
 @pytest.mark.parametrize(
     ("rise", "yaw", "upper", "apart"),
     [
@@ -100,7 +68,7 @@ def test_both_measures_fall_with_every_degree_of_slope(direction, flat):
     ids=["downhill", "left side up", "right side up"],
 )
 def test_the_ratio_is_zero_about_where_the_upper_wheels_lift(rise, yaw, upper, apart):
-    angles = np.arange(40.0, 70.0, 0.1)
+    angles = np.arange(40.0, 66.0, 0.2)
     margins, loads = [], []
     for slope in np.tan(np.radians(angles)):
         ground = plane(slope * rise[0], slope * rise[1])

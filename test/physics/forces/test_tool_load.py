@@ -89,16 +89,6 @@ def test_the_margin_is_gone_when_a_load_empties_one_side(kind, share):
         assert hold_against_limits(LSR1, prediction).code == "tip_over"
 
 
-@pytest.mark.parametrize("policy", ["equal", "optimal"])
-def test_no_load_is_as_a_load_of_zero(policy):
-    without, zero = (
-        judge_path(LSR1, plane(0.2, 0.1), POSE, SweepOptions(policy=policy, **loads))[0]
-        for loads in ({}, {"tool_force": np.zeros(3), "tool_moment": np.zeros(3)})
-    )
-    assert without.wheel_loads.tobytes() == zero.wheel_loads.tobytes()
-    assert without.tip_over_ratio.tobytes() == zero.tip_over_ratio.tobytes()
-
-
 @pytest.mark.parametrize("name", ["tool_force", "tool_moment"])
 def test_a_load_without_an_arm_or_that_is_no_vector_is_refused_by_name(name):
     with pytest.raises(ModelError, match=f"{name}.*m2020.*no manipulator"):

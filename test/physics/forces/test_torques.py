@@ -46,15 +46,6 @@ def test_no_torques_within_the_limit_need_less_friction(ground, poses, max_torqu
     assert compared >= 4
 
 
-@pytest.mark.parametrize("yaw", [0.0, np.pi])
-@pytest.mark.parametrize("slope", [0.1, 0.3, 0.5])
-def test_straight_up_or_down_a_plane_the_least_friction_is_the_slope(slope, yaw):
-    optimal = judge_path(
-        LSR1, plane(slope, 0.0), [[0.0, 0.0, yaw]], SweepOptions(policy="optimal", friction=1.0)
-    )[0]
-    assert optimal.friction_utilisation[0] == pytest.approx(np.full(6, slope), rel=2e-3)
-
-
 @pytest.mark.parametrize(
     ("limits", "equal", "optimal"),
     [

@@ -52,22 +52,8 @@ def test_a_turn_about_y_is_a_pitch_and_a_yaw_a_turn_about_z(angle):
     np.testing.assert_allclose(xyzw_from_yaw(angle), xyzw_from_rpy(0.0, 0.0, angle), atol=ROUNDING)
 
 
-def test_no_turn_is_1_at_w():
-    assert xyzw_from_rpy(0.0, 0.0, 0.0).tolist() == [0.0, 0.0, 0.0, 1.0]
-    assert xyzw_from_yaw(0.0) == (0.0, 0.0, 0.0, 1.0)
-    assert wxyz_from_rpy(0.0, 0.0, 0.0).tolist() == [1.0, 0.0, 0.0, 0.0]
-
-
 def test_both_orders_hold_the_same_numbers():
     xyzw = np.array([[1.0, 2.0, 3.0, 4.0], [5.0, 6.0, 7.0, 8.0]])
     wxyz = wxyz_from_xyzw(xyzw)
     assert wxyz.tolist() == [[4.0, 1.0, 2.0, 3.0], [8.0, 5.0, 6.0, 7.0]]
     assert xyzw_from_wxyz(wxyz).tolist() == xyzw.tolist()
-
-
-def test_many_angles_at_once_give_what_they_give_one_by_one():
-    angles = np.random.default_rng(4).uniform(-math.pi, math.pi, (100, 3))
-    many = xyzw_from_rpy(*angles.T)
-    assert many.shape == (100, 4)
-    one_by_one = [xyzw_from_rpy(*row) for row in angles]
-    np.testing.assert_allclose(many, one_by_one, atol=ROUNDING)

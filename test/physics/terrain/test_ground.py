@@ -34,9 +34,10 @@ def test_blocks_hold_the_highest_ground(shape):
         for j in range(-(-shape[1] // BLOCK)):
             block = elevation[i * BLOCK : (i + 1) * BLOCK, j * BLOCK : (j + 1) * BLOCK]
             unknown = np.isnan(block)
-            assert packed.block_max[i, j] == (np.inf if unknown.any() else block.max())
-            assert packed.known_block_max[i, j] == block[~unknown].max(initial=-np.inf)
-    assert packed.block_max.shape == packed.known_block_max.shape == (i + 1, j + 1)
+            assert packed.arrays["block_max"][i, j] == (np.inf if unknown.any() else block.max())
+            assert packed.arrays["known_block_max"][i, j] == block[~unknown].max(initial=-np.inf)
+    for name in ("block_max", "known_block_max"):
+        assert packed.arrays[name].shape == (i + 1, j + 1)
 
 
 def test_an_edit_of_the_array_that_was_given_does_not_reach_the_ground():
@@ -45,7 +46,7 @@ def test_an_edit_of_the_array_that_was_given_does_not_reach_the_ground():
     terrain = Terrain(heights, 0.1)
     packed = pack_ground(terrain)
     heights[4, 4] = 5.0
-    assert terrain.elevation[4, 4] == packed.elevation[4, 4] == 0.0
+    assert terrain.elevation[4, 4] == packed.arrays["elevation"][4, 4] == 0.0
     with pytest.raises(ValueError, match="read-only"):
         terrain.elevation[4, 4] = 5.0
     with pytest.raises(ValueError, match="read-only"):

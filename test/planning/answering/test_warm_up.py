@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rover_physics.numerics.kernel_compiler import Kernel
+from rover_physics.numerics.kernels import Kernel
 from rover_planner.nodes.warm_up import GROUPS
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.service_settings import load_service_settings
