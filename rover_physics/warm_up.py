@@ -11,7 +11,7 @@ import numpy as np
 
 from rover_physics.bounds.kernel import NOMINAL, UncertainGround, find_bounds
 from rover_physics.compilation import Step, compile_groups
-from rover_physics.prediction.evaluation import AHEAD, evaluate
+from rover_physics.prediction.evaluation import AHEAD
 from rover_physics.prediction.map_sweep import score_poses
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.sweep_options import SweepOptions
@@ -47,7 +47,7 @@ def pack_rover() -> None:
 def evaluate_poses() -> None:
     """Evaluate the model at a pose."""
     model = pack_model(*_rover_and_step())
-    evaluate(model.records, model.limits.records, np.zeros((1, 3)))
+    model.evaluate(np.zeros((1, 3)))
 
 
 def judge_paths() -> None:

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from rover_physics.prediction.packed_model import pack_model
-from rover_physics.prediction.parts import predict_in_parts
 from rover_physics.prediction.servo_path import add_up_rate
-from rover_physics.prediction.sweep import predict_paths
+from rover_physics.prediction.sweep import predict_in_parts, predict_paths
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traversability.judge import judge_path
@@ -107,11 +106,11 @@ def test_stopping_at_the_first_failure_finds_the_same_failure():
 
 
 def test_a_path_in_parts_is_the_whole_path(monkeypatch):
-    monkeypatch.setattr("rover_physics.prediction.parts.PART", 50)
+    monkeypatch.setattr("rover_physics.prediction.sweep.PART", 50)
     rover, ground = unlimited(LSR1), drive_ground("bump_one_side", 0.18)
     options = replace(SERVO, friction=1.0, max_torque=2.44)
     whole = judge_path(rover, ground, drive_path(), options)[0]
-    for part in predict_in_parts(rover, ground, drive_path(), options):
+    for part in predict_in_parts(pack_model(rover, ground, options), drive_path()):
         rows = slice(part.context, None)
         here = part.first + np.arange(len(part.prediction.poses) - part.context)
         for name in ("wheel_loads", "torque", "speed_share", "time", "energy"):
@@ -143,14 +142,15 @@ def test_energy_and_time_over_steps_hardly_depend_on_the_spacing_of_waypoints():
 def test_the_sum_of_a_rate_counts_poses_between_waypoints_with_their_time():
     options = SweepOptions(policy="servo", friction=0.8)
     ground, path = drive_ground("step", 0.13), drive_path()
-    (swept,) = predict_paths(ground, pack_model(ROVER, ground, options), [path], False)
+    (swept,) = predict_paths(pack_model(ROVER, ground, options), [path], False)
+    results = swept.prediction.results
     time = swept.prediction.time
-    ones = swept.results.copy()
-    crossings = replace(swept.crossings, results=swept.crossings.results.copy())
+    ones = results.copy()
+    crossings = swept.crossings._replace(results=swept.crossings.results.copy())
     ones["power"] = crossings.results["power"] = 1.0
     np.testing.assert_allclose(add_up_rate("power", time, ones, crossings), time - time[0])
-    slid = add_up_rate("slip_speed", time, swept.results, swept.crossings)
-    at_waypoints = swept.results["slip_speed"]
+    slid = add_up_rate("slip_speed", time, results, swept.crossings)
+    at_waypoints = results["slip_speed"]
     apart = 0.5 * (at_waypoints[1:] + at_waypoints[:-1]) * np.diff(time)[:, None]
     # While the front wheels climb the face, the rear ones push and slide.
     assert slid.shape == (len(path), 6)

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rover_physics.prediction import crossing, sweep
-from rover_physics.prediction.packed_model import pack_model
-from rover_physics.prediction.path_kernels import Wheels
+from rover_physics.prediction import sweep
+from rover_physics.prediction.packed_model import PackedModel, pack_model
+from rover_physics.prediction.path_kernels import Crossings
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.record import QUANTITIES, new_results
@@ -68,7 +68,7 @@ def test_a_stopped_sweep_is_the_beginning_of_the_whole_one_to_the_last_bit(cours
     whole = judge_path(ROVER, ground, poses, OPTIONS[option])[0]
     verdict = hold_against_limits(ROVER, whole)
     model = pack_model(ROVER, ground, OPTIONS[option])
-    swept = sweep.predict_paths(ground, model, [poses], stop_at_failure=True)[0]
+    swept = sweep.predict_paths(model, [poses], stop_at_failure=True)[0]
     stopped = hold_against_limits(ROVER, swept.prediction)
     assert first_refusal(stopped) == first_refusal(verdict)
     count = len(poses) if verdict.traversable else verdict.first_failure + 1
@@ -115,16 +115,13 @@ def test_nothing_is_evaluated_or_searched_far_beyond_a_failure_at_the_start(monk
     unknown = np.where(np.arange(ground.elevation.shape[1]) < 60, np.nan, ground.elevation)
     poses = straight(0.0, -3.0, 9.0, 0.0, 0.02)
     evaluated = []
-    evaluate = sweep.evaluator
+    evaluate = PackedModel.evaluate
 
-    def counting(model):
-        def call(at, *held, **motions):
-            evaluated.append(len(at))
-            return evaluate(model)(at, *held, **motions)
+    def counting(model, at, *held, **motions):
+        evaluated.append(len(at))
+        return evaluate(model, at, *held, **motions)
 
-        return call
-
-    monkeypatch.setattr(sweep, "evaluator", counting)
+    monkeypatch.setattr(PackedModel, "evaluate", counting)
     _, verdict = judge_path(ROVER, replace(ground, elevation=unknown), poses, stop_at_failure=True)
     assert verdict.first_failure == 0
     assert sum(evaluated) == sweep.FIRST_BLOCK
@@ -144,14 +141,7 @@ def test_bounds_refuse_the_same_waypoint_with_and_without_stopping(policy):
 
 def test_crossings_end_where_a_stretch_ends():
     """Rows of a stretch that ends at a waypoint come before those of the next one."""
-    rows = np.array([2, 1])
-    rest = crossing.find_crossings(
-        bouldered(3),
-        Wheels(0.1, 0.5, 1.0, 1.0, 0.1, False),
-        np.zeros((1, 3)),
-        new_results(1),
-        lambda at: None,
+    tied = Crossings(
+        np.ones(2), np.array([2, 1]), np.ones(2, bool), np.zeros((2, 3)), new_results(2)
     )
-    tied = replace(rest, place=np.ones(2), waypoint=rows, climbing=np.ones(2, bool),
-                   poses=np.zeros((2, 3)), results=new_results(2))  # fmt: skip
     assert tied.in_order().waypoint.tolist() == [1, 2]
