@@ -36,10 +36,10 @@ from rover_physics.results.record import (
     unwritten_results,
 )
 from rover_physics.results.uses import RoverLimits, SameObject, limits_of
+from rover_physics.rover.checks import check_plausible
 from rover_physics.rover.linkage import pack_linkage, place, place_masses
 from rover_physics.rover.manipulator import body_mass_and_com, pack_tool
 from rover_physics.rover.model import Rover
-from rover_physics.rover.plausible import check_plausible
 from rover_physics.status import TorquePolicy
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import Ground, pack_ground, with_soils

@@ -11,7 +11,7 @@ from rover_physics.numerics.records import new_record
 from rover_physics.rover.linkage import LINKAGE, pack_linkage
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steering import steer_wheels
-from rover_physics.rover.turning import can_turn_on_the_spot, swing_radius, tightest_radius
+from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
 
 
 def with_limit(name, limit):

@@ -17,8 +17,7 @@ from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.sweep import predict_poses
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.record import QUANTITIES
-from rover_physics.rover.rover_contents import rover_to_dict
-from rover_physics.rover.rover_file import load_rover, rover_from_dict
+from rover_physics.rover.rover_file import load_rover, rover_from_dict, rover_to_dict
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.bounded_verdict import refuse_worst_case
