@@ -81,7 +81,7 @@ def assert_computed(prediction, verdict):
     )
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(
     places=st.lists(st.sampled_from(NUMBERS), min_size=1, max_size=3),
     number=st.sampled_from(EXTREMES),
