@@ -11,10 +11,10 @@ import numpy as np
 
 from rover_physics.bounds.kernel import NOMINAL, find_bounds
 from rover_physics.compilation import CompilationStep, compile_groups
-from rover_physics.prediction.evaluation import AHEAD, evaluate
+from rover_physics.prediction.evaluation import AHEAD
 from rover_physics.prediction.map_sweep import score_poses
 from rover_physics.prediction.packed_model import pack_model
-from rover_physics.prediction.steered_step import predict_steered
+from rover_physics.prediction.sweep import predict_steered
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
@@ -51,7 +51,7 @@ def pack_rover() -> None:
 def evaluate_poses() -> None:
     """Evaluate the model at a pose."""
     model = pack_model(*_rover_and_step())
-    evaluate(model.records, model.limits.records, np.zeros((1, 3)))
+    model.evaluate(np.zeros((1, 3)))
 
 
 def judge_paths() -> None:
@@ -82,7 +82,7 @@ def evaluate_single_poses() -> None:
     rover, step = _rover_and_step()
     poses = np.array([[0.0, 0.0, 0.0], [0.01, 0.0, 0.0]])
     find_torque_ranges(rover, step, poses)
-    predict_steered(rover, step, poses, (np.array([0.05, 0.0, 0.0]), np.zeros(6)))
+    predict_steered(pack_model(rover, step), poses, np.array([0.05, 0.0, 0.0]), np.zeros(6))
 
 
 def _rover_and_step() -> tuple[Rover, Terrain]:

@@ -26,7 +26,7 @@ from rover_physics.forces.torques import (
 )
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import record_type
-from rover_physics.prediction.tip_over import find_tip_over
+from rover_physics.prediction.evaluation import find_tip_over
 from rover_physics.rover.linkage import place, place_masses
 from rover_physics.status import TorquePolicy
 from rover_physics.terrain.ground import SOIL_NUMBERS, copy_soil, friction_at, soil_row_at

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads and writes .npz files; of those that may be hostile, sizes are known before unpacking."""
+"""Reads and writes .npz files, at once or part by part; sizes are known before unpacking."""
 
 import math
 import warnings
@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.lib import format as npy_format
 from numpy.typing import DTypeLike, NDArray
 
 from rover_physics.errors import RoverFileError
-from rover_physics.files.user_file import open_regular_file, open_without_waiting
+from rover_physics.files.user_file import open_regular_file, open_without_waiting, writing
 
 METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 """Compression methods of numpy.savez and numpy.savez_compressed; zipfile unpacks others without a
@@ -151,15 +152,12 @@ def create_npz(path: str | Path) -> Iterator[zipfile.ZipFile]:
     Raises:
         RoverFileError: It cannot be written; the text does not name the file.
     """
-    try:
-        with (
-            open(path, "wb", opener=open_without_waiting) as file,
-            zipfile.ZipFile(file, "w") as archive,
-        ):
-            yield archive
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise RoverFileError(f"cannot be written: {reason}") from error
+    with (
+        writing(),
+        open(path, "wb", opener=open_without_waiting) as file,
+        zipfile.ZipFile(file, "w") as archive,
+    ):
+        yield archive
 
 
 def write_npz(path: str | Path, arrays: Mapping[str, Any], *, compressed: bool = True) -> None:
@@ -186,6 +184,69 @@ def write_npz(path: str | Path, arrays: Mapping[str, Any], *, compressed: bool =
 def method_for(dtype: np.dtype[Any]) -> int:
     """Return the compression method for an array: texts are long and much alike."""
     return zipfile.ZIP_DEFLATED if dtype.kind == "U" else zipfile.ZIP_STORED
+
+
+class NpzParts:
+    """Arrays of many rows that are kept in temporary files until all rows are there.
+
+    Use it as a context; its files are removed at the end. All methods raise a RoverFileError,
+    which does not name the file, if a file cannot be written.
+    """
+
+    def __init__(self, folder: Path, rows: int):
+        """Begin without arrays.
+
+        Args:
+            folder: Where the temporary files are made.
+            rows: Number of rows that each array will have.
+        """
+        self._rows = rows
+        self._streams: dict[str, BinaryIO] = {}
+        self._types: dict[str, np.dtype[Any]] = {}
+        with writing():
+            self._folder = TemporaryDirectory(dir=folder, prefix=".rover_planner-")
+
+    def __enter__(self) -> "NpzParts":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for stream in self._streams.values():
+            stream.close()
+        self._folder.cleanup()
+
+    def add(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Add the next rows of some arrays; type and row shape are those of the first ones."""
+        with writing():
+            for name, rows in arrays.items():
+                if name not in self._streams:
+                    self._begin(name, rows)
+                self._streams[name].write(np.ascontiguousarray(rows, self._types[name]).data)
+
+    def _begin(self, name: str, rows: np.ndarray) -> None:
+        """Open the file of an array and write its header."""
+        self._types[name] = rows.dtype
+        self._streams[name] = self._path_of(name).open("wb")
+        header = {
+            "descr": npy_format.dtype_to_descr(rows.dtype),
+            "fortran_order": False,
+            "shape": (self._rows, *rows.shape[1:]),
+        }
+        npy_format.write_array_header_1_0(self._streams[name], header)
+
+    def _path_of(self, name: str) -> Path:
+        return Path(self._folder.name, f"{name}.npy")
+
+    def write(self, path: Path, more: Mapping[str, Any]) -> None:
+        """Write the archive with these arrays and with `more`, whole ones."""
+        with writing():
+            for name, value in more.items():
+                np.save(self._path_of(name), value, allow_pickle=False)
+                self._types[name] = np.asarray(value).dtype
+            for stream in self._streams.values():
+                stream.close()
+            with create_npz(path) as archive:
+                for name, dtype in self._types.items():
+                    archive.write(self._path_of(name), f"{name}.npy", method_for(dtype), 1)
 
 
 def _reason(error: Exception) -> str:

@@ -78,12 +78,8 @@ def write_file(path: str | Path, content: bytes) -> None:
     Raises:
         RoverFileError: It cannot be written; the text does not name the file.
     """
-    try:
-        with open(path, "wb", opener=open_without_waiting) as file:
-            file.write(content)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise RoverFileError(f"cannot be written: {reason}") from error
+    with writing(), open(path, "wb", opener=open_without_waiting) as file:
+        file.write(content)
 
 
 def open_without_waiting(path: str, flags: int) -> int:
@@ -103,6 +99,16 @@ def check_regular(status: os.stat_result) -> None:
         return
     kind = next((kind for holds, kind in _KINDS if holds(status.st_mode)), "no file")
     raise RoverFileError(f"cannot be read: it is {kind}; it must be a regular file")
+
+
+@contextmanager
+def writing() -> Iterator[None]:
+    """Turn the errors of the system into a RoverFileError that does not name the file."""
+    try:
+        yield
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise RoverFileError(f"cannot be written: {reason}") from error
 
 
 @contextmanager

@@ -234,9 +234,3 @@ LIMITS: tuple[Limit, ...] = (
 def optional_keys() -> tuple[str, ...]:
     """Return the keys below `limits:` of a rover file that rows of the table read."""
     return tuple(limit.key for limit in LIMITS if limit.key)
-
-
-def list_codes(status_codes: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the codes of a verdict: those of unsettled rows, of the limits, and TRAPPED."""
-    codes = (limit.code for limit in LIMITS)
-    return (*status_codes, *dict.fromkeys(codes), TRAPPED)

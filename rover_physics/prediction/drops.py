@@ -17,8 +17,16 @@ import numpy as np
 
 from rover_physics.numerics.kernels import allocating_kernel, exact_kernel
 from rover_physics.numerics.read_only import view_read_only
-from rover_physics.prediction.crossing import HEIGHT_JUMP, MIN_SPACING, Crossings
-from rover_physics.prediction.path_kernels import FACE, ROUNDING, Wheels, force_limit, way_between
+from rover_physics.prediction.path_kernels import (
+    FACE,
+    HEIGHT_JUMP,
+    MIN_SPACING,
+    ROUNDING,
+    Crossings,
+    Wheels,
+    force_limit,
+    way_between,
+)
 
 MIN_ANGLE = np.radians(15.0)
 """Least steepness [rad] of a contact behind a wheel from which it falls."""
@@ -45,12 +53,7 @@ class Falls:
     there is none."""
 
 
-def find_falls(
-    wheels: Wheels,
-    poses: np.ndarray,
-    results: Any,
-    crossings: Crossings,
-) -> Falls:
+def find_falls(wheels: Wheels, poses: np.ndarray, results: Any, crossings: Crossings) -> Falls:
     """Find where wheels fall along a path, and how far they drop.
 
     Args:
@@ -60,13 +63,12 @@ def find_falls(
         crossings: Poses between the waypoints.
     """
     path = view_read_only(poses), view_read_only(results)
-    found = _find_falls(wheels, *path, crossings.points)
-    return Falls(*found)
+    return Falls(*_find_falls(wheels, *path, crossings.views))
 
 
 @allocating_kernel
 def _find_falls(wheels, poses, results, between):
-    """Return the fields of `Falls`; `wheels` are Wheels, `between` holds PathPoints."""
+    """Return the fields of `Falls`; `wheels` are Wheels, `between` Crossings."""
     n, m = len(poses), len(between.place)
     order = np.empty(n + m, np.int64)
     _merge(n, between.place, order)

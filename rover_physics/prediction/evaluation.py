@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The full model at one pose, and the compiled sweep of it over many poses."""
+"""The full model at one pose, as kernels; `PackedModel.evaluate` sweeps it over many poses."""
 
 from typing import Any
 
@@ -9,28 +9,19 @@ from rover_physics.contact.clearance import belly_clearance
 from rover_physics.contact.contact_record import CELL_SEARCH, CONTACTS, hold_wheels
 from rover_physics.contact.settling import settle
 from rover_physics.contact.wheel_samples import WHEEL_SAMPLES
-from rover_physics.forces.equilibrium import BALANCE, FREE_FORCES, balance_forces
+from rover_physics.forces.equilibrium import BALANCE, FREE_FORCES, balance_forces, tool_load
 from rover_physics.forces.servo import balance_servos, write_servo_forces
 from rover_physics.forces.servo_motion import SERVO
 from rover_physics.forces.soil import SoilWheel, coulomb_slip, effective_friction, solve_wheel
 from rover_physics.forces.soil_sharing import rolling_direction, share_forces_on_soil
-from rover_physics.forces.stability import CORNERS
+from rover_physics.forces.stability import CORNERS, find_support, tip_over_angles
 from rover_physics.forces.torques import (
     TORQUE_SEARCH,
     minimise_friction,
     take_equal_torques,
 )
-from rover_physics.numerics.interruption import slices
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import new_record, record_type
-from rover_physics.numerics.threads import limit_threads, run_chunks
-from rover_physics.prediction.tip_over import find_tip_over
-from rover_physics.results.record import (
-    clear_results,
-    forget_uncomputable,
-    numbers_of,
-    unwritten_results,
-)
 from rover_physics.results.uses import passes
 from rover_physics.rover.linkage import LINKAGE, PLACEMENT, place_masses
 from rover_physics.rover.steering import steer_wheels
@@ -40,8 +31,6 @@ from rover_physics.terrain.ground import GROUND, SOIL_NUMBERS, friction_at
 CHUNK, MAX_CHUNKS = 16, 64
 """Least number of poses per chunk, and largest number of chunks, enough to keep all cores busy.
 The poses of a chunk share one work space."""
-EFFORT = {TorquePolicy.EQUAL: 1, TorquePolicy.OPTIMAL: 5, TorquePolicy.SERVO: 2}
-"""Time of a pose with a policy over that of a pose with equal torques."""
 NONE_HELD = np.empty((0, 6, 2))
 """Value of `held` if no wheel climbs a face."""
 AHEAD = np.empty((0, 3))
@@ -61,6 +50,7 @@ SETTINGS = record_type(
     ("friction_share", float),  # share of the friction that policy SERVO may use
     ("on_soil", np.bool_),  # whether the terrain or the options name soils; else Coulomb friction
     ("direction", float),  # 1 if the rover drives forwards, -1 if backwards
+    ("held_steering", float, (6,)),  # angles of the wheels [rad]; NaN: those of the motion
     ("speed", float),  # speed of the wheels over the ground [m/s]
     ("max_wheel_speed", float),  # largest wheel speed [rad/s]
     ("flat_angle", float),  # tip-over angle on flat ground [rad]
@@ -114,46 +104,10 @@ _NEW_WORK = np.array([new_work()], WORK).view(np.float64)
 """Empty WORK as floats, which numpy copies faster than records."""
 
 
-def evaluate(
-    models: Any,
-    limits: Any,
-    poses: np.ndarray,
-    held: np.ndarray = NONE_HELD,
-    motions: np.ndarray = AHEAD,
-) -> Any:
-    """Evaluate the model at poses and return RESULTs (n,).
-
-    Args:
-        models: (1,) MODEL, or (3,) with a control margin, see `evaluate_row`.
-        limits: (k,) LIMIT.
-        poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
-        held: (n, 6, 2) height [m] and contact angle [rad] of wheels that climb a face, NaN for
-            those that rest on the ground; (0, 6, 2) if none climbs.
-        motions: (n, 3) vx, vy [m/s] and yaw rate [rad/s] of the body origin, as `path_motions`
-            returns them; (0, 3) if all are straight ahead.
-    """
-    results = unwritten_results(len(poses))
-    with limit_threads(effort(models["settings"][0], len(poses))) as threads:
-        works = new_works(threads, len(poses))
-        for part in slices(len(poses)):
-            clear_results(results[part])
-            places = poses[part], motions[part], held[part]
-            written = results[part], numbers_of(results[part])
-            sweep = models, limits, places, works, written
-            run_chunks(evaluate_poses, sweep, len(works), threads)
-            forget_uncomputable(results[part])
-    return results
-
-
 def new_works(threads: int, poses: int) -> Any:
     """Return empty WORKs for a sweep, one for each chunk of poses."""
     chunks = 1 if threads == 1 else min(MAX_CHUNKS, -(-poses // CHUNK))
     return _NEW_WORK[None].repeat(chunks, axis=0).view(WORK)[:, 0]
-
-
-def effort(settings, poses: int) -> int:
-    """Return the time of a sweep over `poses` poses, relative to one pose with equal torques."""
-    return poses * EFFORT[TorquePolicy(int(settings["policy"]))]
 
 
 @kernel
@@ -163,7 +117,7 @@ def evaluate_poses(models, limits, places, works, written, part):
     Args:
         models: (1,) or (3,) MODEL.
         limits: (k,) LIMIT.
-        places: `poses`, `motions` and `held` of `evaluate`.
+        places: `poses`, `motions` and `held` of `PackedModel.evaluate`.
         works: (chunks,) WORK.
         written: (n,) RESULT and the same as numbers (n, NUMBERS), written.
         part: The first chunk and the one after the last.
@@ -181,7 +135,7 @@ def evaluate_poses(models, limits, places, works, written, part):
 def set_pose(model, poses, motions, i, work):
     """Write pose i, its motion and the steering of the wheels into the work space.
 
-    `poses` and `motions` are as for `evaluate`.
+    `poses` and `motions` are as for `PackedModel.evaluate`.
     """
     motion = work.motion
     motion[0], motion[1], motion[2] = model.settings.direction * model.settings.speed, 0.0, 0.0
@@ -191,6 +145,11 @@ def set_pose(model, poses, motions, i, work):
             motion[k] = motions[i, k]
     angles, rolling = work.placement.steering, work.rolling
     work.can_follow = steer_wheels(model.linkage, motion, angles, rolling)
+    held = model.settings.held_steering
+    if held[0] == held[0]:
+        work.can_follow = True
+        for wheel in range(6):
+            angles[wheel] = held[wheel]
 
 
 @kernel
@@ -268,6 +227,47 @@ def evaluate_stance(model, work, status, result):
     if not _is_computable(result):
         result.status = PoseStatus.NOT_COMPUTABLE
         result.time = result.energy = np.nan
+
+
+@kernel
+def find_tip_over(linkage, work):
+    """Return tip-over angle [rad] and force-angle measure [N m] from placement and contacts."""
+    centre, force, moment = work.centre, work.force, work.moment
+    _write_centre_of_mass(linkage, work.placement, centre)
+    force[0], force[1], force[2] = 0.0, 0.0, -linkage.mass * linkage.gravity
+    moment[:] = 0.0
+    if linkage.has_tool_load:
+        _add_tool_load(linkage, work.placement, centre, force, moment)
+    find_support(linkage, work.placement, work.contacts, work.corners)
+    return tip_over_angles(work.corners, centre, force, moment)
+
+
+@kernel
+def _add_tool_load(linkage, placement, centre, force, moment):
+    """Add the tool's force [N] and its moment [N m] about `centre` to `force` and `moment`."""
+    origin, tool = placement.origin, linkage.tool
+    fx, moment_x = tool_load(placement.R, tool, np.int64(0))
+    fy, moment_y = tool_load(placement.R, tool, np.int64(1))
+    fz, moment_z = tool_load(placement.R, tool, np.int64(2))
+    rx, ry, rz = origin[0] - centre[0], origin[1] - centre[1], origin[2] - centre[2]
+    force[0] += fx
+    force[1] += fy
+    force[2] += fz
+    moment[0] += moment_x + ry * fz - rz * fy
+    moment[1] += moment_y + rz * fx - rx * fz
+    moment[2] += moment_z + rx * fy - ry * fx
+
+
+@kernel
+def _write_centre_of_mass(linkage, placement, centre):
+    coms, centres = placement.part_coms, placement.centres
+    for k in range(3):
+        total = linkage.body_mass * coms[0, k]
+        total += linkage.rocker_mass * (coms[1, k] + coms[2, k])
+        total += linkage.bogie_mass * (coms[3, k] + coms[4, k])
+        for wheel in range(6):
+            total += linkage.wheel_mass * centres[wheel, k]
+        centre[k] = total / linkage.mass
 
 
 @kernel

@@ -7,32 +7,26 @@ headings. Here each pose keeps only the uses of the limits, and the numbers that
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rover_physics.numerics.arrays import SingleFloats
-from rover_physics.numerics.kernels import kernel
+from rover_physics.numerics.arrays import Floats, SingleFloats
 from rover_physics.numerics.read_only import freeze_fields
-from rover_physics.numerics.threads import limit_threads, run_chunks
-from rover_physics.prediction.evaluation import (
-    AHEAD,
-    effort,
-    evaluate_row,
-    new_works,
-    set_pose,
-)
+from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.sweep import check_poses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
-from rover_physics.results.record import numbers_of, unwritten_results
-from rover_physics.results.uses import RoverLimits, find_use
+from rover_physics.results.uses import RoverLimits, find_uses
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 
 BATCH = 32_768
 """Approximate number of poses of a map that are scored at a time."""
+PART = 4096
+"""Number of poses whose results are in memory at a time."""
 NUMBERS = 6
 """Numbers in a score, without the status and the uses."""
 
@@ -128,59 +122,24 @@ def score(model: PackedModel, poses: np.ndarray, shape: tuple[int, ...]) -> Pose
     n, limits = len(poses), model.limits
     status, numbers = np.empty(n, np.int8), np.empty((NUMBERS, n), np.float32)
     uses = np.empty((n, len(limits)), np.float32)
-    with limit_threads(effort(model.settings, n)) as threads:
-        works = new_works(threads, n)
-        results = unwritten_results(len(works))
-        spaces = works, results, numbers_of(results)
-        scores = status, numbers, uses
-        sweep = model.records, limits.records, (poses, AHEAD), spaces, scores
-        run_chunks(score_all, sweep, len(works), threads)
+    with limit_threads(model.relative_cost(n)):
+        for first in range(0, n, PART):
+            part = slice(first, first + PART)
+            results = model.evaluate(poses[part])
+            status[part], numbers[:, part] = results["status"], find_scores(results)
+            uses[part] = find_uses(limits, results).use
     values = (row.reshape(shape) for row in numbers)
     return PoseScores(limits, status.reshape(shape), uses.reshape(*shape, -1), *values)
 
 
-@kernel
-def score_all(models, limits, places, spaces, scores, part):
-    """Score the poses of some chunks, one chunk per work space.
-
-    Args:
-        models: (1,) or (3,) MODEL.
-        limits: (k,) LIMIT.
-        places: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame, and their motions, as
-            for `evaluate`.
-        spaces: (chunks,) WORK and RESULT, and the results as numbers.
-        scores: (n,) PoseStatus, (NUMBERS, n) numbers in the order of `PoseScores` and (n, k) uses,
-            written.
-        part: The first chunk and the one after the last.
-    """
-    (poses, motions), (works, results, rows), (status, numbers, uses) = places, spaces, scores
-    n, chunks = poses.shape[0], works.size
-    for chunk in range(part[0], part[1]):
-        for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
-            set_pose(models[0], poses, motions, i, works[chunk])
-            evaluate_row(models, limits, works[chunk], (results, rows), chunk)
-            status[i] = results[chunk].status
-            write_score(results[chunk], i, numbers)
-            for k in range(limits.size):
-                uses[i, k] = np.inf
-                if status[i] == PoseStatus.SETTLED:
-                    uses[i, k] = find_use(rows, chunk, limits[k], False)[0]
-
-
-@kernel
-def write_score(result, i, numbers):
-    """Write the score of a RESULT into column i of numbers (NUMBERS, n), as in `PoseScores`."""
-    if result.status != PoseStatus.SETTLED:
-        for k in range(NUMBERS):
-            numbers[k, i] = np.nan
-        return
-    use, saturation, least = 0.0, 0.0, np.inf
-    if not result.speed_share > 0.0:
-        use = np.inf
-    for wheel in range(6):
-        use = max(use, result.friction_utilisation[wheel])
-        saturation = max(saturation, result.torque_saturation[wheel])
-        least = min(least, result.wheel_loads[wheel])
-    numbers[0, i], numbers[1, i], numbers[2, i] = use, saturation, least
-    numbers[3, i], numbers[4, i] = result.tip_over_ratio, result.tilt
-    numbers[5, i] = result.belly_clearance
+def find_scores(results: Any) -> Floats:
+    """Return the numbers (NUMBERS, n) of RESULTs (n,), in the order of `PoseScores`."""
+    settled = results["status"] == PoseStatus.SETTLED
+    use = results["friction_utilisation"].max(axis=1)
+    use[~(results["speed_share"] > 0.0)] = np.inf
+    saturation, least = (
+        results["torque_saturation"].max(axis=1),
+        results["wheel_loads"].min(axis=1),
+    )
+    single = (results[name] for name in ("tip_over_ratio", "tilt", "belly_clearance"))
+    return np.where(settled, np.stack([use, saturation, least, *single]), np.nan)

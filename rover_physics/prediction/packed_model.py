@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rover, terrain and options, checked and packed into the records that kernels read."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -12,31 +12,58 @@ from rover_physics.errors import ModelError
 from rover_physics.forces.soil import pack_soils
 from rover_physics.limits import table
 from rover_physics.limits.table import Limit
+from rover_physics.names import SERVO
+from rover_physics.numerics.interruption import slices
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.records import new_record
-from rover_physics.prediction.evaluation import MODEL, SETTINGS, new_work
+from rover_physics.numerics.threads import limit_threads, run_chunks
+from rover_physics.prediction.evaluation import (
+    AHEAD,
+    MODEL,
+    NONE_HELD,
+    SETTINGS,
+    evaluate_poses,
+    find_tip_over,
+    new_work,
+    new_works,
+)
+from rover_physics.prediction.path_kernels import Wheels
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, POLICIES, SweepOptions
-from rover_physics.prediction.tip_over import find_tip_over
+from rover_physics.results.record import (
+    clear_results,
+    forget_uncomputable,
+    numbers_of,
+    unwritten_results,
+)
 from rover_physics.results.uses import RoverLimits, SameObject, limits_of
+from rover_physics.rover.checks import check_plausible
 from rover_physics.rover.linkage import pack_linkage, place, place_masses
 from rover_physics.rover.manipulator import body_mass_and_com, pack_tool
 from rover_physics.rover.model import Rover
-from rover_physics.rover.plausible import check_plausible
 from rover_physics.status import TorquePolicy
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import Ground, pack_ground, with_soils
 
+RELATIVE_COST = {TorquePolicy.EQUAL: 1, TorquePolicy.OPTIMAL: 5, TorquePolicy.SERVO: 2}
+"""Time of a pose with a policy over that of a pose with equal torques."""
+
 
 @dataclass(frozen=True, eq=False)
 class PackedModel:
-    """A rover on a terrain with options, in the form that the kernels read."""
+    """A rover on a terrain with options, and the same in the form that the kernels read."""
 
+    rover: Rover
+    """The rover."""
+    terrain: Terrain
+    """The ground."""
+    options: SweepOptions
+    """Torque policy, friction, soil, arm and direction."""
     records: np.ndarray
     """(1,) MODEL; with a control margin (3,), see `evaluate_row`."""
     limits: RoverLimits
     """The limits that are asked of it."""
     ground: Ground
-    """The terrain. The MODEL holds its addresses, so it must live as long as this object."""
+    """The packed terrain. The MODEL holds its addresses, so it must live as long as this one."""
 
     def __reduce__(self) -> str:
         raise TypeError(
@@ -53,6 +80,57 @@ class PackedModel:
     def settings(self) -> Any:
         """SETTINGS of the MODEL."""
         return self.record.settings
+
+    @cached_property
+    def wheels(self) -> Wheels:
+        """Size and limits of the rover's wheels."""
+        linkage, settings = self.record.linkage, self.settings
+        return Wheels(
+            float(linkage.radius),
+            float(linkage.reach),
+            float(settings.allowed_friction),
+            float(settings.allowed_saturation),
+            float(settings.allowed_drop),
+            self.options.policy == SERVO,
+        )
+
+    def change(self, **options: Any) -> "PackedModel":
+        """Return the rover on its terrain with other values of some options."""
+        return pack_model(self.rover, self.terrain, replace(self.options, **options))
+
+    def hold_steering(self, angles: np.ndarray) -> "PackedModel":
+        """Return the model with wheels at these angles (6,) [rad], whatever the motion."""
+        records = self.records[:1].copy()
+        records["settings"]["held_steering"] = angles
+        return replace(self, records=records)
+
+    def evaluate(
+        self, poses: np.ndarray, held: np.ndarray = NONE_HELD, motions: np.ndarray = AHEAD
+    ) -> Any:
+        """Evaluate the model at poses and return RESULTs (n,).
+
+        Args:
+            poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
+            held: (n, 6, 2) height [m] and contact angle [rad] of wheels that climb a face, NaN for
+                those that rest on the ground; (0, 6, 2) if none climbs.
+            motions: (n, 3) vx, vy [m/s] and yaw rate [rad/s] of the body origin, as `path_motions`
+                returns them; (0, 3) if all are straight ahead.
+        """
+        results = unwritten_results(len(poses))
+        with limit_threads(self.relative_cost(len(poses))) as threads:
+            works = new_works(threads, len(poses))
+            for part in slices(len(poses)):
+                clear_results(results[part])
+                places = poses[part], motions[part], held[part]
+                written = results[part], numbers_of(results[part])
+                sweep = self.records, self.limits.records, places, works, written
+                run_chunks(evaluate_poses, sweep, len(works), threads)
+                forget_uncomputable(results[part])
+        return results
+
+    def relative_cost(self, poses: int) -> int:
+        """Return the time of a sweep over poses, relative to one pose with equal torques."""
+        return poses * RELATIVE_COST[POLICIES[self.options.policy]]
 
 
 @quiet
@@ -83,7 +161,8 @@ def _pack_model(
     for record, one in zip(records, settings, strict=True):
         record["ground"], record["linkage"] = ground.records[0], linkage
         record["samples"], record["settings"] = samples, one
-    return PackedModel(records, limits_of(rover, options.policy), ground)
+    limits = limits_of(rover, options.policy)
+    return PackedModel(rover, terrain, options, records, limits, ground)
 
 
 def forget_models() -> None:
@@ -120,6 +199,7 @@ def _pack_request(
         friction_share=float(rover.limits.friction_utilisation),
         on_soil=on_soil,
         direction=options.direction,
+        held_steering=np.nan,
         speed=float(min(rover.nominal_speed, rover.wheel.max_speed * rover.wheel.radius)),
         max_wheel_speed=float(rover.wheel.max_speed),
         flat_angle=flat_angle,

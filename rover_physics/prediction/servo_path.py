@@ -20,8 +20,7 @@ from typing import Any
 import numpy as np
 
 from rover_physics.numerics.arrays import Floats
-from rover_physics.prediction.crossing import Crossings
-from rover_physics.prediction.path_kernels import Wheels
+from rover_physics.prediction.path_kernels import Crossings, Wheels
 from rover_physics.status import PoseStatus, Stall
 
 WEDGED = np.radians(140.0)

@@ -3,12 +3,13 @@
 
 A path can be swept up to its first failure. It is then swept in blocks, each longer than the one
 before; rows that may break a limit are found by a kernel that errs on the safe side, and only if
-there is one is the path so far held against all limits.
+there is one is the path so far held against all limits. A long path can be swept in parts, so that
+the memory is that of a part.
 """
 
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,18 +19,13 @@ from rover_physics.errors import PoseError
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.numerics.plausible import MAX_COORDINATE
+from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import view_read_only
 from rover_physics.numerics.threads import limit_threads
-from rover_physics.prediction.crossing import (
-    Crossings,
-    Evaluate,
-    find_crossings,
-    join_crossings,
-)
+from rover_physics.prediction.crossing import find_crossings
 from rover_physics.prediction.drops import MIN_ANGLE, Falls, find_falls
-from rover_physics.prediction.evaluation import AHEAD, NONE_HELD, effort, evaluate
 from rover_physics.prediction.packed_model import PackedModel
-from rover_physics.prediction.path_kernels import Wheels, add_up
+from rover_physics.prediction.path_kernels import Crossings, add_up, join_crossings
 from rover_physics.prediction.path_motion import path_motions
 from rover_physics.prediction.servo_path import (
     climb_costs,
@@ -37,14 +33,11 @@ from rover_physics.prediction.servo_path import (
     find_lift_heights,
     stop_in_slots,
 )
-from rover_physics.prediction.sweep_options import POLICIES
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.record import join_results, place_results, unwritten_results
 from rover_physics.results.uses import RoverLimits, find_broken, find_uses, readable
-from rover_physics.status import PoseStatus, TorquePolicy
-from rover_physics.terrain.grid import Terrain
+from rover_physics.status import PoseStatus
 
-POLICY_NAMES = {int(policy): name for name, policy in POLICIES.items()}
 FIRST_BLOCK = 32
 """Number of waypoints of a path that are evaluated first."""
 MIN_GROWTH, MAX_GROWTH = 2.0, 16.0
@@ -52,6 +45,8 @@ MIN_GROWTH, MAX_GROWTH = 2.0, 16.0
 BLOCK_TIME = 3e-3
 """Time [s] that a block aims at, about ten times what a block costs beside its poses. What is
 found does not depend on the blocks."""
+PART = 8192
+"""Number of waypoints that are swept at a time in parts."""
 
 Sums = tuple[float, float, float]
 """Distance [m], time [s] and energy [J] since the start of a path."""
@@ -60,44 +55,54 @@ NO_SUMS = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, eq=False)
 class SweptPath:
-    """A prediction along a path with the results that it is made of."""
+    """A prediction along a path with the poses between its waypoints."""
 
     path: np.ndarray
-    """(k, 3) all poses of the path; the rest is about the first n of them."""
+    """(k, 3) all poses that were swept; the rest is about the first n of them."""
     prediction: PathPrediction
     """The prediction."""
-    results: Any
-    """(n,) RESULT of each waypoint."""
     crossings: Crossings
     """Poses between the waypoints."""
 
     def cut(self, waypoints: int) -> "SweptPath":
         """Return what is about the first waypoints."""
         crossings = self.crossings.select(self.crossings.waypoint < waypoints)
-        prediction = self.prediction.cut(waypoints)
-        return SweptPath(self.path, prediction, self.results[:waypoints], crossings)
+        return SweptPath(self.path, self.prediction.cut(waypoints), crossings)
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """The prediction of consecutive waypoints of a path, as that of the whole path has them."""
+
+    first: int
+    """Index of the first waypoint that no earlier part has."""
+    context: int
+    """Number of waypoints at the beginning of the prediction that earlier parts have."""
+    prediction: PathPrediction
+    """The waypoints from `first - context` on, with `between`. Its indices of waypoints count from
+    there."""
 
 
 def predict_paths(
-    terrain: Terrain, model: PackedModel, paths: Sequence[np.ndarray], stop_at_failure: bool
+    model: PackedModel, paths: Sequence[np.ndarray], stop_at_failure: bool
 ) -> list[SweptPath]:
     """Sweep several paths at once, each in full or up to its first failure.
 
     Args:
-        terrain: The ground.
-        model: The rover on it, with options.
+        model: The rover on its ground, with options.
         paths: Poses of each path, as `check_poses` returns them.
         stop_at_failure: Whether a path ends with the first waypoint that fails; up to there its
             prediction is that of the whole path.
     """
     started = [_StartedPath(model, poses, stop_at_failure) for poses in paths]
     going, block = started, FIRST_BLOCK if stop_at_failure else max(map(len, paths), default=0)
-    with limit_threads(effort(model.settings, sum(map(len, paths)))):  # set once, not per round
+    cost = model.relative_cost(sum(map(len, paths)))
+    with limit_threads(cost):  # set once, not per round
         while going:
             check_interruption()
             began = time.perf_counter()
             _evaluate_block(model, going, block)
-            _search_crossings(terrain, model, going)
+            _search_crossings(model, going)
             for path in going:
                 check_interruption()
                 path.look_for_failure()
@@ -105,6 +110,62 @@ def predict_paths(
             growth = BLOCK_TIME / max(time.perf_counter() - began, 1e-9)
             block = round(block * min(max(growth, MIN_GROWTH), MAX_GROWTH))
     return [path.swept for path in started if path.swept is not None]
+
+
+def predict_in_parts(model: PackedModel, path: np.ndarray) -> Iterator[Part]:
+    """Sweep a path (n, 3), as `check_poses` returns it, part by part.
+
+    A part ends before wheels whose fall depends on poses that are not yet swept. The next one
+    begins before it, at a waypoint where no wheel falls.
+    """
+    motions = path_motions(model, path)
+    start, done, size, sums = 0, 0, PART, NO_SUMS
+    while done < len(path):
+        check_interruption()
+        end = min(start + size, len(path))
+        here = path[start:end]
+        with limit_threads(model.relative_cost(len(here))):
+            results = model.evaluate(here, motions=motions[start:end])
+            crossings = find_crossings(model, here, results)
+        swept, falls = make_prediction(model, here, results, crossings, sums)
+        decided = end - start if end == len(path) else falls.decided
+        if start + decided > done:
+            yield Part(done, done - start, swept.prediction.cut(decided))
+            done = start + decided
+        if falls.restart:
+            first = slice(falls.restart + 1)
+            sums = _sum_up(model, here[first], results[first], crossings, sums)
+            start, size = start + falls.restart, PART
+        else:
+            size *= 2  # no waypoint to begin from: the next part is longer
+
+
+@quiet
+def predict_steered(
+    model: PackedModel, poses: ArrayLike, motion: np.ndarray, angles: np.ndarray
+) -> PathPrediction:
+    """Predict the rover at the poses of a short path with measured steering angles.
+
+    Args:
+        model: The model.
+        poses: (n, 3) x, y [m] and yaw [rad] of base_link, map frame.
+        motion: (3,) motion of base_link on the path, vx, vy [m/s] and yaw rate [rad/s], body
+            frame.
+        angles: (6,) steering angles of the wheels [rad], which need not fit the motion.
+
+    Raises:
+        PoseError: As `judge_path`.
+    """
+    places, steered = check_poses(poses), model.hold_steering(angles)
+    results = steered.evaluate(places, motions=np.tile(motion, (len(places), 1)))
+    crossings = find_crossings(steered, places, results)
+    return make_prediction(model, places, results, crossings)[0].prediction
+
+
+def predict_poses(model: PackedModel, places: np.ndarray, motions: np.ndarray) -> PathPrediction:
+    """Return the prediction of single poses (n, 3) that form no path, with motions (n, 3)."""
+    results = model.evaluate(places, motions=motions)
+    return _collect(model, places, results, np.arange(len(places)))
 
 
 class _StartedPath:
@@ -161,7 +222,7 @@ class _StartedPath:
         if not (complete or self._suspicious):
             if not len(crossings.place):
                 return
-            falls = find_falls(wheels_of(self._model), here, results, crossings)
+            falls = find_falls(self._model.wheels, here, results, crossings)
             if not falls.drops.max() > self._model.settings.allowed_drop:
                 return
         swept, falls = make_prediction(self._model, here, results, crossings)
@@ -225,28 +286,23 @@ def _evaluate_block(model: PackedModel, paths: Sequence[_StartedPath], size: int
     if not len(at):
         return
     motions = np.concatenate([path.motions[block] for path, block in pairs])
-    results, first = evaluator(model)(at, motions=motions), 0
+    results, first = model.evaluate(at, motions=motions), 0
     for path, block in pairs:
         end = first + block.stop - block.start
         place_results(results[first:end], path.results, block)
         path.evaluated, first = block.stop, end
 
 
-def _search_crossings(terrain: Terrain, model: PackedModel, paths: Sequence[_StartedPath]) -> None:
+def _search_crossings(model: PackedModel, paths: Sequence[_StartedPath]) -> None:
     """Search the crossings of the next stretches of all paths together."""
     stretches = [path.stretch() for path in paths]
     pairs = list(zip(paths, stretches, strict=True))
     ends = np.cumsum([stretch.stop - stretch.start for stretch in stretches])
-    crossings = find_crossings(
-        terrain,
-        wheels_of(model),
-        np.concatenate([path.poses[stretch] for path, stretch in pairs]),
-        join_results([path.results[stretch] for path, stretch in pairs]),
-        evaluator(model),
-        joined_paths(ends),
-    )
+    poses = np.concatenate([path.poses[stretch] for path, stretch in pairs])
+    results = join_results([path.results[stretch] for path, stretch in pairs])
+    crossings = find_crossings(model, poses, results, joined_paths(ends))
     for (path, stretch), first, end in zip(pairs, [0, *ends[:-1]], ends, strict=True):
-        path.take_crossings(crossings.between(first, end).moved(stretch.start))
+        path.take_crossings(crossings.between(first, end, stretch.start))
 
 
 def joined_paths(ends: np.ndarray) -> np.ndarray:
@@ -257,35 +313,6 @@ def joined_paths(ends: np.ndarray) -> np.ndarray:
     joined = np.ones(ends[-1] - 1, bool)
     joined[ends[:-1] - 1] = False
     return joined
-
-
-def evaluator(model: PackedModel) -> Evaluate:
-    """Return the function that evaluates a model at poses, as `find_crossings` takes it."""
-
-    def evaluate_at(
-        at: np.ndarray, held: np.ndarray = NONE_HELD, motions: np.ndarray = AHEAD
-    ) -> Any:
-        return evaluate(model.records, model.limits.records, at, held, motions)
-
-    return evaluate_at
-
-
-def wheels_of(model: PackedModel) -> Wheels:
-    """Return size and limits of the rover's wheels."""
-    linkage, settings = model.record.linkage, model.record.settings
-    return Wheels(
-        float(linkage.radius),
-        float(linkage.reach),
-        float(settings.allowed_friction),
-        float(settings.allowed_saturation),
-        float(settings.allowed_drop),
-        bool(settings.policy == TorquePolicy.SERVO),
-    )
-
-
-def predict_poses(model: PackedModel, places: np.ndarray, results: Any) -> PathPrediction:
-    """Return the prediction of single poses (n, 3) that form no path from their RESULTs (n,)."""
-    return _collect(model, places, results, np.arange(len(places)))
 
 
 def make_prediction(
@@ -300,17 +327,18 @@ def make_prediction(
     What the path decides is written into the results. Distance, time and energy at the first pose
     are `start`.
     """
-    wheels, on_servos = wheels_of(model), model.settings["policy"] == TorquePolicy.SERVO
+    wheels = model.wheels
     falls = find_falls(wheels, poses, results, crossings)
-    if on_servos:
-        results, crossings = results.copy(), replace(crossings, results=crossings.results.copy())
+    if wheels.on_servos:
+        results = results.copy()
+        crossings = crossings._replace(results=crossings.results.copy())
         stop_in_slots(poses, results, crossings)
     between = crossings.results
     results["wheel_drop"] = falls.drops
     results["falling"], between["falling"] = falls.at_waypoints, falls.between
     _write_sums(model, crossings.poses, between, NO_SUMS)
     _write_sums(model, poses, results, start)
-    if on_servos:
+    if wheels.on_servos:
         window = float(model.record.linkage.length)
         results["drift"] = find_drift(wheels, window, poses, results, crossings)
         heights = find_lift_heights(wheels, poses, results, crossings)
@@ -320,7 +348,7 @@ def make_prediction(
         results["energy"] += energy
     on_the_way = _collect(model, crossings.poses, between, crossings.waypoint)
     prediction = _collect(model, poses, results, np.arange(len(poses)), on_the_way)
-    return SweptPath(poses, prediction, results, crossings), falls
+    return SweptPath(poses, prediction, crossings), falls
 
 
 def check_poses(poses: ArrayLike) -> np.ndarray:
@@ -345,11 +373,11 @@ def check_poses(poses: ArrayLike) -> np.ndarray:
     return array
 
 
-def sum_up(
+def _sum_up(
     model: PackedModel, poses: np.ndarray, results: Any, crossings: Crossings, start: Sums
 ) -> Sums:
     """Return distance [m], time [s] and energy [J] at the last pose from those at the first."""
-    if model.settings["policy"] == TorquePolicy.SERVO:
+    if model.wheels.on_servos:
         before = crossings.select(crossings.waypoint < len(poses))
         time, energy = climb_costs(poses, results, before)[-1]
         start = (start[0], start[1] + time, start[2] + energy)
@@ -375,7 +403,7 @@ def _collect(
         poses=poses,
         results=results,
         waypoint=waypoint,
-        policy=POLICY_NAMES[int(model.settings["policy"])],
+        policy=model.options.policy,
         control_margin=float(model.settings["control_margin"]),
         between=between,
     )

@@ -9,30 +9,24 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.prediction.crossing import (
-    Crossings,
-    climb_faces,
-    join_crossings,
-    limits_of,
-)
+from rover_physics.prediction.crossing import climb_faces
 from rover_physics.prediction.packed_model import PackedModel
-from rover_physics.prediction.path_kernels import find_remaining_jumps
-from rover_physics.prediction.sweep import SweptPath, evaluator, make_prediction, wheels_of
+from rover_physics.prediction.path_kernels import (
+    Crossings,
+    find_remaining_jumps,
+    join_crossings,
+)
+from rover_physics.prediction.sweep import SweptPath, make_prediction
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.record import select_results
-from rover_physics.rover.model import Rover
-from rover_physics.terrain.grid import Terrain
 
 
-def predict_way_back(
-    rover: Rover, terrain: Terrain, model: PackedModel, swept: SweptPath, waypoints: slice
-) -> PathPrediction:
+def predict_way_back(model: PackedModel, swept: SweptPath, waypoints: slice) -> PathPrediction:
     """Predict the way back over waypoints of a path; only climbs of faces are evaluated.
 
     Args:
-        rover: The rover.
-        terrain: The ground, without soils.
-        model: The model of the way back: the options of the path, driven the other way.
+        model: The model of the way back, on ground without soils: that of the path, driven the
+            other way.
         swept: The path.
         waypoints: The waypoints of the way back, in the order of the way in.
 
@@ -41,22 +35,19 @@ def predict_way_back(
         and `energy` are those of the way in.
     """
     first, end = waypoints.start, waypoints.stop
-    n = end - first
+    n, wheels = end - first, model.wheels
     poses = np.ascontiguousarray(swept.prediction.poses[first:end][::-1])
-    results = _reverse(select_results(swept.results, np.arange(first, end)[::-1]))
-    rest = swept.crossings.select(~swept.crossings.climbing).between(first, end - 1)
-    rest = rest.reversed(n)
-    _reverse(rest.results)
+    results = _reverse(select_results(swept.prediction.results, np.arange(first, end)[::-1]))
+    crossings = swept.crossings.select(~swept.crossings.climbing).between(first, end - 1)
+    crossings = crossings.reversed(n)
+    _reverse(crossings.results)
     path = Crossings(np.arange(float(n)), np.arange(n) + 1, np.zeros(n, bool), poses, results)
-    pairs = np.empty((n + len(rest.place), 2), np.int64)
-    limits = limits_of(wheels_of(model))
-    pairs = pairs[: find_remaining_jumps(path.points, rest.points, limits, pairs)]
-    crossings = rest
-    if len(pairs):
-        ends = _pick(path, rest, pairs.ravel())
-        rows = np.arange(len(ends.place)).reshape(-1, 2)
-        climbs = climb_faces(terrain, rover.wheel.radius, ends, rows, evaluator(model))
-        crossings = join_crossings([rest, climbs]).in_order()
+    pairs = np.empty((n + len(crossings.place), 2), np.int64)
+    count = find_remaining_jumps(path.views, crossings.views, wheels, pairs)
+    if count:
+        ends = join_crossings([path, crossings]).select(pairs[:count].ravel())
+        climbs = climb_faces(model, ends, np.arange(2 * count).reshape(-1, 2))
+        crossings = join_crossings([crossings, climbs]).in_order()
     return make_prediction(model, poses, results, crossings)[0].prediction
 
 
@@ -65,14 +56,3 @@ def _reverse(results: Any) -> Any:
     results["motion"] *= -1.0
     results["wheel_speed"] *= -1.0
     return results
-
-
-def _pick(path: Crossings, rest: Crossings, rows: np.ndarray) -> Crossings:
-    """Return the rows of path and rest, numbered one after the other."""
-    n = len(path.place)
-    on_path = rows < n
-    parts = [path.select(rows[on_path]), rest.select(rows[~on_path] - n)]
-    order = np.empty(len(rows), np.intp)
-    order[np.flatnonzero(on_path)] = np.arange(on_path.sum())
-    order[np.flatnonzero(~on_path)] = on_path.sum() + np.arange((~on_path).sum())
-    return join_crossings(parts).select(order)

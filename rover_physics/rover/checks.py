@@ -1,13 +1,33 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks that the parameters of a rover agree and that it can stand on flat ground."""
+"""Checks of a rover: parameters that agree, a stand on flat ground, numbers that are plausible."""
 
 import math
+from collections.abc import Iterator, Sequence
+from dataclasses import fields, is_dataclass
+from typing import Any
 
+from rover_physics.errors import ModelError
 from rover_physics.files.validation import refuse
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS, WHEEL_POSITIONS
+from rover_physics.numerics import plausible as known
 from rover_physics.rover.model import Rover, Suspension
 
 _LEVEL_TOLERANCE = 1e-3  # m, largest height difference of level wheels
+
+
+RANGES = {
+    "gravity": (known.MIN_GRAVITY, known.MAX_GRAVITY),
+    "friction": (known.MIN_FRICTION, known.MAX_FRICTION),
+    "nominal_speed": (known.MIN_SPEED, known.MAX_SPEED),
+    "wheel.radius": (known.MIN_LENGTH, known.MAX_LENGTH),
+    "wheel.width": (known.MIN_LENGTH, known.MAX_LENGTH),
+    "wheel.max_torque": (known.MIN_TORQUE, known.MAX_TORQUE),
+    "wheel.max_speed": (known.MIN_SPEED, known.MAX_SPEED),
+    "wheel.servo_droop": (0.0, known.MAX_DROOP),
+    "steering.limit": (known.MIN_STEERING, math.pi),
+    "steering.rate": (known.MIN_SPEED, known.MAX_SPEED),
+}
+"""Smallest and largest values by dotted key, in SI units."""
 
 
 def check_rover(rover: Rover) -> None:
@@ -166,3 +186,34 @@ def _check_manipulator(rover: Rover) -> None:
             arm.joints,
             f"names of the arm's own: {', '.join(sorted(taken))} belongs to the suspension",
         )
+
+
+def check_plausible(rover: Rover) -> None:
+    """Check that each number of a rover, which need not come from a file, is in a plausible range.
+
+    Raises:
+        ModelError: A number that is not; the text names its key in a rover file and the range.
+    """
+    for key, number in _numbers_of(rover):
+        least, most = RANGES.get(key, (-known.MAX_COORDINATE, known.MAX_COORDINATE))
+        if key.endswith("mass"):
+            least, most = 0.0, known.MAX_MASS
+        if not least <= number <= most:
+            raise ModelError(
+                f"rover {rover.name!r}: {key} is {number}; it must be from {least:g} to {most:g}"
+            )
+
+
+def _numbers_of(value: Any, key: str = "") -> Iterator[tuple[str, float]]:
+    """Yield dotted keys and numbers of nested dataclasses, dicts and tuples."""
+    parts: Sequence[tuple[str | int, Any]] = ()
+    if is_dataclass(value):
+        parts = [(field.name, getattr(value, field.name)) for field in fields(value)]
+    elif isinstance(value, dict):
+        parts = list(value.items())
+    elif isinstance(value, tuple):
+        parts = list(enumerate(value))
+    elif isinstance(value, int | float):
+        yield key, value
+    for name, inner in parts:
+        yield from _numbers_of(inner, f"{key}.{name}" if key else str(name))

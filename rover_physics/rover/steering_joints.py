@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The steered wheels of a rover and the joints that turn them: names, sign and limit."""
+"""The steered wheels of a rover: their joints, sign and limit, and how tightly it turns."""
 
 import math
 
@@ -16,6 +16,10 @@ STEERING_SIGNS = {LEFT: 1.0, RIGHT: -1.0}
 REP-103 has them positive to the left; some rovers have it the other way round."""
 MARGIN = 1e-3
 """Angle by which a limit may be rounded [rad]."""
+
+
+UPRIGHT = 1e-2
+"""Steering limit below a quarter turn [rad] that still counts as one, as 1.57 for pi / 2."""
 
 
 def steered_wheels(rover: Rover) -> NDArray[np.intp]:
@@ -49,3 +53,36 @@ def check_joint_limit(rover: Rover, joint_limit: float) -> None:
             f"the spot are planned with up to {asked:.4g} rad; steering.limit of the rover file "
             f"must be at most {joint_limit:g}"
         )
+
+
+def tightest_radius(rover: Rover) -> float:
+    """Return the smallest radius [m] of a curve of the body origin that the rover drives.
+
+    The inner steered wheels reach their limit there, or stand still. A rover with fixed wheels
+    skids in curves; its smallest radius is its wheelbase.
+    """
+    if rover.steering is None:
+        return rover.wheelbase
+    limit = rover.steering.limit
+    slope = math.inf if limit > 0.5 * math.pi - UPRIGHT else math.tan(limit)
+    return max(abs(y) + abs(x) / slope for x, y in _steered_places(rover))
+
+
+def can_turn_on_the_spot(rover: Rover) -> bool:
+    """Return whether the steered wheels can point along a turn about the body origin."""
+    if rover.steering is None:
+        return False
+    needed = max(math.atan2(abs(x), abs(y)) for x, y in _steered_places(rover))
+    return needed <= rover.steering.limit
+
+
+def swing_radius(rover: Rover) -> float:
+    """Return the distance of the outermost wheel from the body origin, seen from above [m]."""
+    return max(float(np.hypot(x, y)) for x, y, _ in rover.suspension.wheels.values())
+
+
+def _steered_places(rover: Rover) -> list[tuple[float, float]]:
+    """Return x, y [m] of the steered wheels of the left side."""
+    assert rover.steering is not None
+    wheels = rover.suspension.wheels
+    return [(wheels[name][0], wheels[name][1]) for name in rover.steering.wheels]

@@ -2,6 +2,7 @@
 """Refusals that follow from the worst case within the bounds of an uncertain map."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,8 @@ from rover_physics.results.uses import find_uses, limits_of
 from rover_physics.rover.model import Rover
 from rover_physics.status import BoundStatus
 from rover_physics.traversability.verdict import (
+    BOUNDS,
+    REST_IN_A_FALL,
     Verdict,
     explain_rows,
     find_largest_risk,
@@ -64,21 +67,15 @@ def refuse_worst_case(
             if not codes[i]:
                 codes[i] = NOT_COMPUTABLE
                 reasons[i] = f"{name} cannot be computed {within}: a bound is not a number"
-    return replace(
-        with_refusals(verdict, codes, reasons),
-        risk=max(verdict.risk, risk),
-        map_sigmas=bounds.sigmas,
-        tip_over_ratio_bound=_extreme(np.min, bounds.tip_over_ratio[bounds.bounded, 0]),
-        friction_utilisation_bound=_extreme(np.max, bounds.friction_utilisation[needed, :, 1]),
-        torque_saturation_bound=_extreme(np.max, bounds.torque_saturation[needed, :, 1]),
-        tilt_bound=_extreme(np.max, bounds.tilt[bounds.bounded, 1]),
-        belly_clearance_bound=_extreme(np.min, bounds.belly_clearance[bounds.bounded, 0]),
-    )
-
-
-def _extreme(choose, values: Floats) -> float:
-    known = values[~np.isnan(values)]
-    return float(choose(known)) if known.size else float("nan")
+    extremes: dict[str, Any] = {}
+    for name, worse in BOUNDS.items():
+        quantity, end = name.removesuffix("_bound"), 0 if worse is np.fmin else 1
+        rows = needed if quantity in REST_IN_A_FALL else bounds.bounded
+        values = getattr(bounds, quantity)[rows][..., end]
+        extremes[name] = float(worse.reduce(values, axis=None)) if values.size else np.nan
+    refused = with_refusals(verdict, codes, reasons)
+    risk = max(verdict.risk, risk)
+    return replace(refused, risk=risk, map_sigmas=bounds.sigmas, **extremes)
 
 
 def _find_worst(
@@ -86,25 +83,22 @@ def _find_worst(
 ) -> tuple[dict[int, tuple[str, str]], float]:
     """Return code and reason of the rows that break a limit in the worst case, and their risk."""
 
-    def at(name: str, end: int) -> Floats:
-        values = getattr(bounds, name)[..., end]
-        return np.where(np.isnan(values), getattr(prediction, name), values)
+    def at(end: int, *names: str) -> dict[str, Floats]:
+        found = {}
+        for name in names:
+            values = getattr(bounds, name)[..., end]
+            found[name] = np.where(np.isnan(values), getattr(prediction, name), values)
+        return found
 
+    joints = "rocker_angle", "bogie_angle"
     worst = prediction.change(
         roll=_largest(prediction.roll, bounds.roll),
         pitch=_largest(prediction.pitch, bounds.pitch),
-        rocker_angle=at("rocker_angle", 0),
-        bogie_angle=at("bogie_angle", 0),
-        belly_clearance=at("belly_clearance", 0),
-        tip_over_ratio=at("tip_over_ratio", 0),
-        wheel_loads=at("wheel_loads", 0),
-        friction_utilisation=at("friction_utilisation", 1),
-        torque_saturation=at("torque_saturation", 1),
-        sinkage=at("sinkage", 1),
+        **at(0, *joints, "belly_clearance", "tip_over_ratio", "wheel_loads"),
+        **at(1, "friction_utilisation", "torque_saturation", "sinkage"),
     )
-    other = worst.change(rocker_angle=at("rocker_angle", 1), bogie_angle=at("bogie_angle", 1))
     limits, found, risk = limits_of(rover, prediction.policy), dict[int, tuple[str, str]](), 0.0
-    for part in (worst, other):
+    for part in (worst, worst.change(**at(1, *joints))):
         uses = find_uses(limits, part.results)
         for row, refusal in explain_rows(rover, part, uses).items():
             if row not in found or refusal[0] == "suspension":

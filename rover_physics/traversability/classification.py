@@ -3,7 +3,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -121,29 +120,21 @@ def classify_judged(
         PoseError, ModelError, SoilError: As `judge_path`.
     """
     judged = {prediction.policy: (prediction, verdict)}
-    decided: dict[str, list[_Decision]] = {}
-    for policy in _policies_on(terrain, sigmas):
+    decided: list[list[ClassifiedWaypoint]] = []
+    is_uncertain = sigmas and terrain.elevation_std is not None
+    for policy in CONTROL_POLICIES if is_uncertain else TORQUE_POLICIES:
         if policy not in judged:
-            asked = replace(options, policy=policy)
-            poses = prediction.poses
+            asked, poses = replace(options, policy=policy), prediction.poses
             if curvature is None:
                 judged[policy] = judge_path(rover, terrain, poses, asked, sigmas=sigmas)
             else:
                 judged[policy] = judge_poses(
                     rover, terrain, poses, curvature, asked, sigmas=sigmas
                 )
-        decided[policy] = _decide(rover, *judged[policy])
+        decided.append(_decide(rover, *judged[policy]))
         if judged[policy][1].traversable:
             break
-    rows = zip(*decided.values(), strict=True)
-    return tuple(_classify(dict(zip(decided, row, strict=True))) for row in rows)
-
-
-def _policies_on(terrain: Terrain, sigmas: float | None) -> tuple[str, ...]:
-    """Return the policies that can be asked for on a terrain, in the order of the classes."""
-    if sigmas and terrain.elevation_std is not None:
-        return CONTROL_POLICIES
-    return TORQUE_POLICIES
+    return tuple(map(_choose, zip(*decided, strict=True)))
 
 
 def deciding_waypoint(classes: Sequence[ClassifiedWaypoint]) -> int:
@@ -152,108 +143,83 @@ def deciding_waypoint(classes: Sequence[ClassifiedWaypoint]) -> int:
     If the worst class is IMPASSABLE, it is the first such waypoint. Otherwise it is the waypoint
     of the worst class with the smallest margin.
     """
-    worst = max(
-        TRAVERSABILITY_CLASSES.index(waypoint.traversability_class) for waypoint in classes
-    )
-    among = [
-        i
-        for i, waypoint in enumerate(classes)
-        if TRAVERSABILITY_CLASSES.index(waypoint.traversability_class) == worst
-    ]
-    if worst == TRAVERSABILITY_CLASSES.index(IMPASSABLE):
+    ranks = np.array([TRAVERSABILITY_CLASSES.index(one.traversability_class) for one in classes])
+    among = np.flatnonzero(ranks == ranks.max()).tolist()
+    if classes[among[0]].traversability_class == IMPASSABLE:
         return among[0]
     margins = np.array([classes[i].margin for i in among])
     return among[int(np.argmin(np.where(np.isnan(margins), np.inf, margins)))]
-
-
-class _Decision(NamedTuple):
-    """Constraint that decides a waypoint under one policy; its reason is empty if passable."""
-
-    constraint: str
-    wheel: int
-    margin: float
-    reason: str
-
-
-_NOTHING_ASKED = _Decision("", -1, float("nan"), "")
-"""Decision while a wheel rolls off an edge: no wheel constraint counts, see UNNEEDED_IN_A_FALL."""
 
 
 _CLASS_OF = {EQUAL: PASSABLE, SERVO: WITH_SPEED_SERVOS, OPTIMAL: WITH_TRACTION_CONTROL}
 """Class of a waypoint that is passable under a policy, and under none before it."""
 
 
-def _classify(decisions: dict[str, _Decision]) -> ClassifiedWaypoint:
+def _choose(decisions: Sequence[ClassifiedWaypoint]) -> ClassifiedWaypoint:
     """Return the class of a waypoint from its decisions by policy, in TORQUE_POLICIES order."""
-    traversability_class, reason = IMPASSABLE, ""
-    for policy, decision in decisions.items():
+    why_not = ""
+    for decision in decisions:
         if not decision.reason:
-            traversability_class = _CLASS_OF[policy]
-            break
-        reason = decision.reason
-    wheel = WHEELS[decision.wheel] if decision.wheel >= 0 else ""
-    return ClassifiedWaypoint(
-        traversability_class, policy, decision.constraint, wheel, decision.margin, reason
-    )
+            return replace(decision, reason=why_not)
+        why_not = decision.reason
+    return decision
 
 
-def _decide(rover: Rover, prediction: PathPrediction, verdict: Verdict) -> list[_Decision]:
-    """Return the decision of each waypoint, including the way to it."""
+def _decide(
+    rover: Rover, prediction: PathPrediction, verdict: Verdict
+) -> list[ClassifiedWaypoint]:
+    """Return the decision of each waypoint under one policy; its reason is empty if it passes.
+
+    Where the way to it is worse than the waypoint, that counts.
+    """
     decisions = list(_decide_rows(rover, prediction))
-    _look_between(rover, prediction, decisions)
+    between = prediction.between
+    if between is not None and len(between.poses):
+        on_the_way = zip(between.waypoint.tolist(), _decide_rows(rover, between), strict=True)
+        for i, other in on_the_way:
+            own = decisions[i]
+            if own.reason:
+                continue
+            if other.reason:
+                decisions[i] = replace(other, reason=f"on the way here: {other.reason}")
+            elif other.margin < own.margin or np.isnan(own.margin):
+                decisions[i] = other
     for i, (code, reason) in enumerate(zip(verdict.codes, verdict.reasons, strict=True)):
         if code != (decisions[i].constraint if decisions[i].reason else ""):
             # The verdict knows more than the waypoint alone, such as entrapment or bounds.
-            decisions[i] = _Decision(code, -1, float("nan"), reason)
+            decisions[i] = _decision(prediction.policy, code, reason)
     return decisions
 
 
-def _look_between(rover: Rover, prediction: PathPrediction, decisions: list[_Decision]) -> None:
-    """Replace the decision of a waypoint where the way to it is worse."""
-    between = prediction.between
-    if between is None or not len(between.poses):
-        return
-    on_the_way = zip(between.waypoint.tolist(), _decide_rows(rover, between), strict=True)
-    for i, other in on_the_way:
-        own = decisions[i]
-        if own.reason:
-            continue
-        if other.reason:
-            reason = f"on the way here: {other.reason}"
-            decisions[i] = _Decision(other.constraint, other.wheel, other.margin, reason)
-        elif other.margin < own.margin or np.isnan(own.margin):
-            decisions[i] = other
+def _decide_rows(rover: Rover, prediction: PathPrediction) -> Iterator[ClassifiedWaypoint]:
+    """Yield the decision of each row: its first broken limit, else its tightest constraint.
 
-
-def _decide_rows(rover: Rover, prediction: PathPrediction) -> Iterator[_Decision]:
-    """Yield the decision of each row: its first broken limit, else its tightest constraint."""
+    While a wheel rolls off an edge no wheel constraint counts.
+    """
     uses = find_uses(limits_of(rover, prediction.policy), prediction.results)
     reasons, first = explain_rows(rover, prediction, uses), uses.find_first()
     is_constraint = np.array([row.code in WHEEL_CONSTRAINTS for row in uses.limits.rows])
     asked = np.where(is_constraint & ~np.isnan(uses.use), uses.use, -np.inf)
-    tightest = asked.argmax(axis=1)
     for i in range(len(prediction.poses)):
         check_interruption()
         code, reason = reasons.get(i, ("", ""))
-        if not prediction.settled[i]:
-            yield _Decision(code, -1, float("nan"), reason)
-        elif reason:
-            yield _decision(prediction, uses, (i, int(first[i])), code, reason)
-        elif asked[i].max() > -np.inf:
-            k = int(tightest[i])
-            yield _decision(prediction, uses, (i, k), uses.limits.rows[k].code, "")
-        else:
-            yield _NOTHING_ASKED
+        k = int(first[i] if reason else asked[i].argmax())
+        if not prediction.settled[i] or not (reason or asked[i, k] > -np.inf):
+            yield _decision(prediction.policy, code, reason)
+            continue
+        limit, use = uses.limits.rows[k], float(uses.use[i, k])
+        margin = 1.0 - use if limit.has_number or use <= 1.0 else np.nan
+        wheel = find_wheel(prediction, uses, i, k)
+        yield _decision(prediction.policy, code or limit.code, reason, wheel, margin)
 
 
 def _decision(
-    prediction: PathPrediction, uses: Uses, at: tuple[int, int], code: str, reason: str
-) -> _Decision:
-    """Return the decision by the use `at` a row and a limit."""
-    row, k = at
-    limit, use = uses.limits.rows[k], float(uses.use[row, k])
-    margin = 1.0 - use if limit.has_number or use <= 1.0 else float("nan")
-    return _Decision(code, find_wheel(prediction, uses, row, k), margin, reason)
+    policy: str, code: str, reason: str, wheel: int = -1, margin: float = np.nan
+) -> ClassifiedWaypoint:
+    """Return what decides a waypoint under one policy."""
+    name = WHEELS[wheel] if wheel >= 0 else ""
+    found = IMPASSABLE if reason else _CLASS_OF[policy]
+    return ClassifiedWaypoint(found, policy, code, name, margin, reason)
 
 
 def find_wheel(prediction: PathPrediction, uses: Uses, row: int, k: int) -> int:

@@ -21,16 +21,13 @@ import numpy as np
 from rover_physics.forces.soil import use_of_shear
 from rover_physics.limits.table import TRAPPED
 from rover_physics.names import EQUAL, OPTIMAL, SERVO
-from rover_physics.prediction.packed_model import pack_model
-from rover_physics.prediction.parts import PART, predict_in_parts
-from rover_physics.prediction.sweep import SweptPath, predict_paths
+from rover_physics.prediction.packed_model import PackedModel
+from rover_physics.prediction.sweep import PART, SweptPath, predict_in_parts, predict_paths
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.prediction.way_back import predict_way_back
 from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.results.uses import find_uses, limits_of
-from rover_physics.rover.model import Rover
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.verdict import Verdict, hold_against_limits
+from rover_physics.results.uses import find_uses
+from rover_physics.traversability.verdict import Verdict, hold_against_limits, with_refusals
 
 LOOK_AHEAD = 1.5
 """Length of a way on [wheelbases], in addition to the distance from the point of no return."""
@@ -67,72 +64,68 @@ class Course:
     """What the way in was judged by; None if it was not kept."""
 
 
-def course_of(rover: Rover, swept: SweptPath, options: SweepOptions) -> Course:
-    """Return the course of a swept path; `options` are those of the sweep."""
+def course_of(model: PackedModel, swept: SweptPath) -> Course:
+    """Return the course of a path that the model has swept."""
     prediction = swept.prediction
-    return Course(
-        swept.path,
-        prediction.distance,
-        find_one_way(rover, prediction, options),
-        prediction.wheel_drop.max(axis=1),
-        swept,
-    )
+    drop = prediction.wheel_drop.max(axis=1)
+    return Course(swept.path, prediction.distance, find_one_way(model, prediction), drop, swept)
 
 
-def refuse_if_trapped(
-    rover: Rover, terrain: Terrain, course: Course, verdict: Verdict, options: SweepOptions
-) -> Verdict:
+def refuse_if_trapped(model: PackedModel, course: Course, verdict: Verdict) -> Verdict:
     """Return the verdict, refused as "trapped" if there is neither a way on nor a way back.
 
     Args:
-        rover: The rover.
-        terrain: The ground.
+        model: The model of the sweep.
         course: The path.
         verdict: The verdict on it.
-        options: The options of the sweep.
     """
-    distance = course.distance
+    rover, distance = model.rover, course.distance
     end = len(distance) if verdict.first_failure < 0 else verdict.first_failure
     one_way = np.flatnonzero(course.one_way[:end])
     if not one_way.size:
         return verdict
     run_up = distance[one_way[0]] - RUN_UP * rover.wheelbase
     inside = slice(int(np.searchsorted(distance, max(run_up, 0.0))), end)
-    back = _judge_way_back(rover, terrain, course, inside, options)
+    back = _judge_way_back(model, course, inside)
     if back.traversable:
         return verdict
     stop = end - 1 - back.first_failure  # the way back is blocked here
-    on = _find_way_on(rover, terrain, course, slice(stop, end), options)
+    on = _find_way_on(model, course, slice(stop, end))
     if not on:
         return verdict
     drop = course.drop[stop:end].max(initial=0.0)
+    fell = drop > DROP * rover.wheel.radius
+    what = f"a wheel drops {drop:.3f} m" if fell else "from here the rover goes in but not out"
     ways = f"no way on: {verdict.reason or on}; no way back: {back.reason}"
-    return _refuse(rover, verdict, stop, drop, ways)
+    codes, reasons = list(verdict.codes), list(verdict.reasons)
+    codes[stop], reasons[stop] = TRAPPED, f"trapped: {what}; {ways}"
+    return with_refusals(verdict, codes, reasons)
 
 
-def find_one_way(rover: Rover, prediction: PathPrediction, options: SweepOptions) -> np.ndarray:
+def find_one_way(model: PackedModel, prediction: PathPrediction) -> np.ndarray:
     """Return (n,) True at or just after places where the forces of the way in allow no return.
 
     Under policy "optimal" other torques may allow it; these are only the places to check.
     """
-    one_way = np.any(prediction.wheel_drop > DROP * rover.wheel.radius, axis=1)
+    one_way = np.any(prediction.wheel_drop > DROP * model.rover.wheel.radius, axis=1)
     for part in (prediction, prediction.between):
         if part is not None:
-            rows = _resists_way_back(rover, part, options)
-            one_way[part.waypoint[rows]] = True
+            one_way[part.waypoint[_resists_way_back(model, part)]] = True
     return np.asarray(one_way)
 
 
-def _resists_way_back(
-    rover: Rover, prediction: PathPrediction, options: SweepOptions
-) -> np.ndarray:
+def _resists_way_back(model: PackedModel, prediction: PathPrediction) -> np.ndarray:
     """Return (n,) True where driving back needs more than it did to drive in.
 
     On yielding soil, this is where the same forces, reversed, break a limit. Speed servos pull
-    with other forces on the way back, so that it is where they used much on the way in.
+    with other forces on the way back, so that it is where they used more than SERVO_USE of what
+    friction and motors can give on the way in.
     """
-    if prediction.policy == SERVO:
-        return _uses_much(rover, prediction, options)
+    radius, most = model.rover.wheel.radius, float(model.settings.max_torque)
+    if model.options.policy == SERVO:
+        grip = prediction.friction * np.maximum(prediction.wheel_loads, 0.0)
+        used = np.abs(prediction.tangential).sum(axis=1)
+        return np.asarray(used > SERVO_USE * np.minimum(grip, most / radius).sum(axis=1))
     resistance = prediction.motion_resistance
     if not np.any(resistance > 0.0):
         return np.zeros(len(resistance), dtype=bool)
@@ -141,61 +134,43 @@ def _resists_way_back(
     R, N = resistance[wheels], prediction.wheel_loads[wheels]
     T, S = -direction * prediction.tangential[wheels], prediction.lateral[wheels]
     largest = prediction.friction[wheels] * N + R
-    most = options.max_torque or rover.wheel.max_torque
     friction, torque = np.zeros(resistance.shape), np.zeros(resistance.shape)
     friction[wheels] = np.vectorize(use_of_shear, otypes=[float])(T, S, R, largest)
-    torque[wheels] = rover.wheel.radius * np.abs(T + R) / most
+    torque[wheels] = radius * np.abs(T + R) / most
     back = prediction.change(friction_utilisation=friction, torque_saturation=torque)
-    uses = find_uses(limits_of(rover, prediction.policy), back.results)
+    uses = find_uses(model.limits, back.results)
     by_forces = [row.code in ("friction", "torque") for row in uses.limits.rows]
     return np.asarray(prediction.settled & (uses.use[:, by_forces] > 1.0).any(axis=1))
 
 
-def _uses_much(rover: Rover, prediction: PathPrediction, options: SweepOptions) -> np.ndarray:
-    """Return (n,) True where the wheels pull with more than SERVO_USE of what they can give."""
-    most = (options.max_torque or rover.wheel.max_torque) / rover.wheel.radius
-    grip = prediction.friction * np.maximum(prediction.wheel_loads, 0.0)
-    used = np.abs(prediction.tangential).sum(axis=1)
-    return np.asarray(used > SERVO_USE * np.minimum(grip, most).sum(axis=1))
-
-
-def _judge_way_back(
-    rover: Rover, terrain: Terrain, course: Course, waypoints: slice, options: SweepOptions
-) -> Verdict:
+def _judge_way_back(model: PackedModel, course: Course, waypoints: slice) -> Verdict:
     """Judge the way back over waypoints; from the results of the way in where they do not differ.
 
     They do on soil and with speed servos.
     """
-    reverse = replace(options, backward=not options.backward)
-    model = pack_model(rover, terrain, reverse)
-    if course.swept is None or model.settings.on_soil or reverse.policy == SERVO:
-        return _judge_way(rover, terrain, course.path[waypoints][::-1], reverse)
-    back = predict_way_back(rover, terrain, model, course.swept, waypoints)
-    return hold_against_limits(rover, back)
+    reverse = model.change(backward=not model.options.backward)
+    if course.swept is None or reverse.settings.on_soil or reverse.options.policy == SERVO:
+        return _judge_way(reverse, course.path[waypoints][::-1])
+    back = predict_way_back(reverse, course.swept, waypoints)
+    return hold_against_limits(model.rover, back)
 
 
-def _judge_way(
-    rover: Rover, terrain: Terrain, poses: np.ndarray, options: SweepOptions
-) -> Verdict:
+def _judge_way(model: PackedModel, poses: np.ndarray) -> Verdict:
     """Judge a way under the first of `policies_of_ways` that passes it, else under the last."""
-    for policy in policies_of_ways(options):
-        asked = replace(options, policy=policy)
-        verdict = _judge_to_failure(rover, terrain, np.ascontiguousarray(poses), asked)
+    for policy in policies_of_ways(model.options):
+        verdict = _judge_to_failure(model.change(policy=policy), np.ascontiguousarray(poses))
         if verdict.traversable:
             break
     return verdict
 
 
-def _judge_to_failure(
-    rover: Rover, terrain: Terrain, poses: np.ndarray, options: SweepOptions
-) -> Verdict:
+def _judge_to_failure(model: PackedModel, poses: np.ndarray) -> Verdict:
     """Judge a way up to its first failure; long ones in parts, to keep little in memory."""
     if len(poses) <= PART:
-        model = pack_model(rover, terrain, options)
-        swept = predict_paths(terrain, model, [poses], stop_at_failure=True)[0]
-        return hold_against_limits(rover, swept.prediction)
-    for part in predict_in_parts(rover, terrain, poses, options):
-        verdict = hold_against_limits(rover, part.prediction)
+        swept = predict_paths(model, [poses], stop_at_failure=True)[0]
+        return hold_against_limits(model.rover, swept.prediction)
+    for part in predict_in_parts(model, poses):
+        verdict = hold_against_limits(model.rover, part.prediction)
         if not verdict.traversable:
             at = part.first - part.context + verdict.first_failure
             return replace(verdict, first_failure=at)
@@ -211,14 +186,12 @@ def policies_of_ways(options: SweepOptions) -> tuple[str, ...]:
     return (EQUAL, OPTIMAL) if options.policy == OPTIMAL else (options.policy,)
 
 
-def _find_way_on(
-    rover: Rover, terrain: Terrain, course: Course, inside: slice, options: SweepOptions
-) -> str:
+def _find_way_on(model: PackedModel, course: Course, inside: slice) -> str:
     """Return why the first way on, straight ahead from the end, is closed; empty if any is open.
 
     The rover can move within the waypoints `inside`.
     """
-    wheelbase, distance = rover.wheelbase, course.distance
+    wheelbase, distance = model.rover.wheelbase, course.distance
     end = inside.stop - 1
     room = distance[end] - distance[inside.start]
     length = min(LOOK_AHEAD * wheelbase + room, MAX_LOOK_AHEAD * wheelbase)
@@ -227,16 +200,16 @@ def _find_way_on(
         behind = distance[inside.start] + 0.5 * wheelbase
         starts.append(int(np.searchsorted(distance, behind)))
     steps = count_steps(course.path, length)
-    spacing = length / steps
+    ahead = np.linspace(0.0, length, steps + 1)
     closed = ""
     for start in starts:
-        for way in _ways_ahead(course.path[start], wheelbase, length, steps, options):
+        for way in _ways_ahead(course.path[start], wheelbase, ahead, model.options.direction):
             # From the pose before it, so that the wheels of a curve are turned on the ground.
             poses = np.vstack([course.path[max(start - 1, 0)], way])
-            verdict = _judge_way(rover, terrain, poses, options)
+            verdict = _judge_way(model, poses)
             if verdict.traversable:
                 return ""
-            far = verdict.first_failure * spacing > LOOK_AHEAD * wheelbase
+            far = verdict.first_failure * (length / steps) > LOOK_AHEAD * wheelbase
             if verdict.code in UNKNOWN_CODES and far:
                 return ""
             closed = closed or verdict.reason
@@ -244,12 +217,14 @@ def _find_way_on(
 
 
 def _ways_ahead(
-    pose: np.ndarray, wheelbase: float, length: float, steps: int, options: SweepOptions
+    pose: np.ndarray, wheelbase: float, ahead: np.ndarray, direction: float
 ) -> Iterator[np.ndarray]:
-    """Yield ways on (steps + 1, 3) from a pose (3,): straight, then curves that end straight."""
-    direction, spacing = options.direction, length / steps
-    ahead = np.linspace(0.0, length, steps + 1)
+    """Yield ways on (n, 3) from a pose (3,): straight, then curves that end straight.
+
+    `ahead` (n,) are the distances of their poses [m], from 0 on.
+    """
     turning = np.minimum(ahead, LOOK_AHEAD * wheelbase) / wheelbase
+    spacing = ahead[-1] / (len(ahead) - 1)
     for curve in CURVES:
         yaw = pose[2] + curve * turning
         middle = yaw[:-1] + 0.5 * np.diff(yaw)
@@ -267,21 +242,3 @@ def count_steps(path: np.ndarray, length: float) -> int:
     steps = steps[steps > 0.0]
     spacing = float(np.median(steps)) if steps.size else 0.02
     return min(int(np.ceil(length / spacing - 1e-6)), MAX_WAY_POSES)
-
-
-def _refuse(rover: Rover, verdict: Verdict, stop: int, drop: float, ways: str) -> Verdict:
-    """Return the verdict, refused as trapped at waypoint `stop` after a drop [m]."""
-    fell = drop > DROP * rover.wheel.radius
-    what = f"a wheel drops {drop:.3f} m" if fell else "from here the rover goes in but not out"
-    reason = f"trapped: {what}; {ways}"
-    codes, reasons = list(verdict.codes), list(verdict.reasons)
-    codes[stop], reasons[stop] = TRAPPED, reason
-    return replace(
-        verdict,
-        traversable=False,
-        codes=tuple(codes),
-        reasons=tuple(reasons),
-        first_failure=stop,
-        code=TRAPPED,
-        reason=reason,
-    )

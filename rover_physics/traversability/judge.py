@@ -11,9 +11,9 @@ from rover_physics.bounds.path import SIGMAS, bound_path, check_sigmas
 from rover_physics.names import EQUAL
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.quiet import quiet
-from rover_physics.prediction.packed_model import pack_model
+from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_motion import motions_of
-from rover_physics.prediction.sweep import check_poses, evaluator, predict_paths, predict_poses
+from rover_physics.prediction.sweep import check_poses, predict_paths, predict_poses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
@@ -87,13 +87,12 @@ def judge_paths(
     model = pack_model(rover, terrain, options)
     checked = [check_poses(poses) for poses in paths]
     judged = []
-    for swept in predict_paths(terrain, model, checked, stop_at_failure):
+    for swept in predict_paths(model, checked, stop_at_failure):
         check_interruption()
         verdict = hold_against_limits(rover, swept.prediction)
         if check_entrapment and verdict.code != "wheel_drop":
-            course = course_of(rover, swept, options)
-            verdict = refuse_if_trapped(rover, terrain, course, verdict, options)
-        judged.append(add_bounds(rover, terrain, swept.prediction, verdict, options, sigmas))
+            verdict = refuse_if_trapped(model, course_of(model, swept), verdict)
+        judged.append(add_bounds(model, swept.prediction, verdict, sigmas))
     return judged
 
 
@@ -128,53 +127,35 @@ def judge_poses(
     check_sigmas(sigmas)
     model, places = pack_model(rover, terrain, options), check_poses(poses)
     bends = np.zeros(len(places)) if curvature is None else curvature
-    motions = motions_of(model, places, bends)
-    return _judge_in_motion(rover, terrain, places, motions, options, sigmas)
+    return _judge_in_motion(model, places, motions_of(model, places, bends), sigmas)
 
 
 def _judge_in_motion(
-    rover: Rover,
-    terrain: Terrain,
-    places: np.ndarray,
-    motions: np.ndarray,
-    options: SweepOptions,
-    sigmas: float | None,
+    model: PackedModel, places: np.ndarray, motions: np.ndarray, sigmas: float | None
 ) -> tuple[PathPrediction, Verdict]:
     """Judge single poses (n, 3) with motions (n, 3) as of `path_motions`."""
-    model = pack_model(rover, terrain, options)
-    prediction = predict_poses(model, places, evaluator(model)(places, motions=motions))
-    verdict = hold_against_limits(rover, prediction)
-    return add_bounds(rover, terrain, prediction, verdict, options, sigmas)
+    prediction = predict_poses(model, places, motions)
+    return add_bounds(model, prediction, hold_against_limits(model.rover, prediction), sigmas)
 
 
 def add_bounds(
-    rover: Rover,
-    terrain: Terrain,
-    prediction: PathPrediction,
-    verdict: Verdict,
-    options: SweepOptions,
-    sigmas: float | None,
+    model: PackedModel, prediction: PathPrediction, verdict: Verdict, sigmas: float | None
 ) -> tuple[PathPrediction, Verdict]:
     """Return a prediction with its bounds and the verdict with their refusals.
 
     On a map with exact heights both stay as they are.
     """
-    bounds = bound_path(rover, terrain, prediction, options, sigmas)
+    bounds = bound_path(model.rover, model.terrain, prediction, model.options, sigmas)
     if bounds is None:
         return prediction, verdict
-    worst = refuse_worst_case(rover, prediction, bounds, verdict)
-    if options.kept_margin > 0.0:
-        worst = _pass_with_equal_torques(rover, terrain, prediction, verdict, worst, options)
+    worst = refuse_worst_case(model.rover, prediction, bounds, verdict)
+    if model.options.kept_margin > 0.0:
+        worst = _pass_with_equal_torques(model, prediction, verdict, worst)
     return replace(prediction, bounds=bounds), worst
 
 
 def _pass_with_equal_torques(
-    rover: Rover,
-    terrain: Terrain,
-    prediction: PathPrediction,
-    verdict: Verdict,
-    worst: Verdict,
-    options: SweepOptions,
+    model: PackedModel, prediction: PathPrediction, verdict: Verdict, worst: Verdict
 ) -> Verdict:
     """Return the worst case without refusals of waypoints that equal torques pass in theirs.
 
@@ -184,9 +165,8 @@ def _pass_with_equal_torques(
     rows = [i for i, code in enumerate(codes) if code and not verdict.codes[i]]
     if not rows:
         return worst
-    equal = replace(options, policy=EQUAL)
     places, motions = prediction.poses[rows], np.ascontiguousarray(prediction.motion[rows])
-    _, other = _judge_in_motion(rover, terrain, places, motions, equal, worst.map_sigmas)
+    _, other = _judge_in_motion(model.change(policy=EQUAL), places, motions, worst.map_sigmas)
     for i, code in zip(rows, other.codes, strict=True):
         if not code:
             codes[i] = reasons[i] = ""

@@ -2,7 +2,7 @@
 """Judgement of long paths in parts: predictions are handed over and not kept."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,18 +10,14 @@ from numpy.typing import ArrayLike
 from rover_physics.bounds.path import SIGMAS, check_sigmas
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.quiet import quiet
-from rover_physics.prediction.parts import PART, Part, predict_in_parts
+from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import check_curvature
-from rover_physics.prediction.sweep import check_poses
+from rover_physics.prediction.sweep import PART, check_poses, predict_in_parts
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.entrapment import (
-    Course,
-    find_one_way,
-    refuse_if_trapped,
-)
+from rover_physics.traversability.entrapment import Course, find_one_way, refuse_if_trapped
 from rover_physics.traversability.judge import add_bounds, judge_poses
 from rover_physics.traversability.verdict import (
     Verdict,
@@ -53,98 +49,73 @@ class PartwiseJudge:
         With a `curvature` (n,), as for `judge_poses`, the poses form no path.
         """
         check_sigmas(sigmas)
-        self._rover, self._terrain, self._options = rover, terrain, options
-        self._poses, self._sigmas = check_poses(poses), sigmas
+        self._model, self._sigmas = pack_model(rover, terrain, options), sigmas
+        self._poses = check_poses(poses)
         self._bends = None if curvature is None else check_curvature(curvature, len(self._poses))
-        self._found = _Findings()
+        self._courses: list[Course] = []
+        """Of each part."""
+        self._codes: list[str] = []
+        self._reasons: list[str] = []
+        self._failure = (-1, "", "")
+        """First failure of the prediction itself, whatever its bounds: waypoint, code, reason."""
+        self._verdict: Verdict | None = None
+        """The verdict on the last part, with the extremes of all parts so far."""
 
     def parts(self) -> Iterator[PathPrediction]:
         """Yield the predictions of consecutive waypoints, with bounds, without what is between."""
-        return self._judge_path() if self._bends is None else self._judge_poses(self._bends)
+        judged = self._judge_path() if self._bends is None else self._judge_poses(self._bends)
+        for prediction, verdict in judged:
+            self._codes += verdict.codes
+            self._reasons += verdict.reasons
+            worst = worst_of(self._verdict or verdict, verdict)
+            self._verdict = replace(worst, codes=(), reasons=())
+            yield prediction
 
     @quiet
     def verdict(self) -> Verdict:
         """Return the verdict on all waypoints."""
-        found = self._found
-        assert found.verdict is not None
-        verdict = with_refusals(found.verdict, found.codes, found.reasons)
-        waypoint, code, reason = found.failure
+        assert self._verdict is not None
+        verdict = with_refusals(self._verdict, self._codes, self._reasons)
+        waypoint, code, reason = self._failure
         if self._bends is not None or code == "wheel_drop":
             return verdict
         course = Course(
             self._poses,
-            np.concatenate(found.distance),
-            np.concatenate(found.one_way),
-            np.concatenate(found.drop),
+            np.concatenate([one.distance for one in self._courses]),
+            np.concatenate([one.one_way for one in self._courses]),
+            np.concatenate([one.drop for one in self._courses]),
             None,
         )
         nominal = replace(verdict, first_failure=waypoint, code=code, reason=reason)
-        asked = refuse_if_trapped(self._rover, self._terrain, course, nominal, self._options)
-        return verdict if asked is nominal else with_refusals(verdict, asked.codes, asked.reasons)
+        asked = refuse_if_trapped(self._model, course, nominal)
+        return verdict if asked is nominal else asked
 
-    def _judge_path(self) -> Iterator[PathPrediction]:
-        rover, options = self._rover, self._options
-        for part in predict_in_parts(rover, self._terrain, self._poses, options):
-            verdict = hold_against_limits(rover, part.prediction)
-            one_way = find_one_way(rover, part.prediction, options)
-            self._found.add_course(part, verdict, one_way)
-            prediction = part.prediction.select(slice(part.context, None))
-            verdict = with_refusals(
-                verdict, verdict.codes[part.context :], verdict.reasons[part.context :]
+    def _judge_path(self) -> Iterator[tuple[PathPrediction, Verdict]]:
+        model = self._model
+        for part in predict_in_parts(model, self._poses):
+            verdict = hold_against_limits(model.rover, part.prediction)
+            one_way, new = find_one_way(model, part.prediction), slice(part.context, None)
+            if self._failure[0] < 0 <= verdict.first_failure:
+                waypoint = part.first - part.context + verdict.first_failure
+                self._failure = (waypoint, verdict.code, verdict.reason)
+            prediction = part.prediction.select(new)
+            drop = prediction.wheel_drop.max(axis=1)
+            self._courses.append(
+                Course(prediction.poses, prediction.distance.copy(), one_way[new], drop, None)
             )
-            yield self._add(prediction, verdict)
+            verdict = with_refusals(verdict, verdict.codes[new], verdict.reasons[new])
+            yield add_bounds(model, prediction, verdict, self._sigmas)
 
-    def _add(self, prediction: PathPrediction, verdict: Verdict) -> PathPrediction:
-        """Add the bounds of a part and take its verdict; return it with the bounds."""
-        prediction, verdict = add_bounds(
-            self._rover, self._terrain, prediction, verdict, self._options, self._sigmas
-        )
-        self._found.add_verdict(verdict)
-        return prediction
-
-    def _judge_poses(self, bends: np.ndarray) -> Iterator[PathPrediction]:
+    def _judge_poses(self, bends: np.ndarray) -> Iterator[tuple[PathPrediction, Verdict]]:
+        model = self._model
         for first in range(0, len(self._poses), PART):
             check_interruption()
             part = slice(first, first + PART)
-            prediction, verdict = judge_poses(
-                self._rover,
-                self._terrain,
+            yield judge_poses(
+                model.rover,
+                model.terrain,
                 self._poses[part],
                 bends[part],
-                self._options,
+                model.options,
                 sigmas=self._sigmas,
             )
-            self._found.add_verdict(verdict)
-            yield prediction
-
-
-@dataclass
-class _Findings:
-    """What is kept of the parts of a path."""
-
-    codes: list[str] = field(default_factory=list)
-    reasons: list[str] = field(default_factory=list)
-    distance: list[np.ndarray] = field(default_factory=list)
-    one_way: list[np.ndarray] = field(default_factory=list)
-    drop: list[np.ndarray] = field(default_factory=list)
-    failure: tuple[int, str, str] = (-1, "", "")
-    """First failure of the prediction itself, whatever its bounds: waypoint, code and reason."""
-    verdict: Verdict | None = None
-    """The verdict on the last part, with the extremes of all parts so far."""
-
-    def add_course(self, part: Part, verdict: Verdict, one_way: np.ndarray) -> None:
-        """Take a part, the verdict on it and where its way back has to be judged."""
-        new = slice(part.context, None)
-        self.distance.append(part.prediction.distance[new].copy())
-        self.one_way.append(one_way[new].copy())
-        self.drop.append(part.prediction.wheel_drop[new].max(axis=1))
-        if self.failure[0] < 0 <= verdict.first_failure:
-            waypoint = part.first - part.context + verdict.first_failure
-            self.failure = (waypoint, verdict.code, verdict.reason)
-
-    def add_verdict(self, verdict: Verdict) -> None:
-        """Take the verdict on the new waypoints of a part."""
-        self.codes += verdict.codes
-        self.reasons += verdict.reasons
-        worst = worst_of(self.verdict or verdict, verdict)
-        self.verdict = replace(worst, codes=(), reasons=())

@@ -19,7 +19,6 @@ from rover_physics.limits.table import MAX_SLIDE, MAX_TURN_OFF
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import view_read_only
-from rover_physics.prediction.crossing import limits_of as jump_limits_of
 from rover_physics.prediction.crossing import turn_wheels
 from rover_physics.prediction.drops import MIN_ANGLE
 from rover_physics.prediction.packed_model import pack_model
@@ -31,13 +30,7 @@ from rover_physics.prediction.path_kernels import (
     way_between,
 )
 from rover_physics.prediction.path_motion import path_motions
-from rover_physics.prediction.sweep import (
-    check_poses,
-    evaluator,
-    find_suspects,
-    joined_paths,
-    wheels_of,
-)
+from rover_physics.prediction.sweep import check_poses, find_suspects, joined_paths
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.record import (
     place_results,
@@ -46,7 +39,6 @@ from rover_physics.results.record import (
 )
 from rover_physics.results.uses import find_codes, readable
 from rover_physics.rover.model import Rover
-from rover_physics.status import TorquePolicy
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.exposure import add_exposure, find_exposure
 from rover_physics.traversability.judge import judge_paths
@@ -166,7 +158,7 @@ class _Sweep:
             rows = np.flatnonzero(chosen & self._is_open[piece])
             if not len(rows):
                 continue
-            results = evaluator(self._model)(self._poses[rows], motions=self._motions[rows])
+            results = self._model.evaluate(self._poses[rows], motions=self._motions[rows])
             place_results(results, self._results, rows)
             fails = np.zeros(len(rows), bool)
             mark_failures(*readable(results), self._model.limits.records, fails)
@@ -189,11 +181,11 @@ class _Sweep:
         ends = np.cumsum(self._counts[indices])
         poses, results = self._poses[rows], select_results(self._results, rows)
         joined = joined_paths(ends)
-        turned = turn_wheels(poses, results, joined, evaluator(self._model))
-        jumps, wheels = np.empty((len(poses), 2), np.int64), wheels_of(self._model)
-        limits, far = jump_limits_of(wheels), np.empty_like(jumps)
-        jumps = jumps[: find_jumps(results, poses, joined, limits, jumps)]
-        far = far[: find_turns(results, poses, joined, limits, far)]
+        turned = turn_wheels(self._model, poses, results, joined)
+        jumps, wheels = np.empty((len(poses), 2), np.int64), self._model.wheels
+        far = np.empty_like(jumps)
+        jumps = jumps[: find_jumps(results, poses, joined, wheels, jumps)]
+        far = far[: find_turns(results, poses, joined, wheels, far)]
         found, sums = np.full((len(indices), 3), np.nan), np.empty((3, len(poses)))
         path = view_read_only(poses), readable(results), ends
         turns = readable(turned.results), np.searchsorted(turned.waypoint, ends)
@@ -208,8 +200,7 @@ class _Sweep:
 
     def _close_look(self) -> CloseLook:
         """Return what a piece must keep to pass without a closer look."""
-        on_servos = bool(self._model.settings.policy == TorquePolicy.SERVO)
-        linkage = self._model.record.linkage
+        on_servos, linkage = self._model.wheels.on_servos, self._model.record.linkage
         return CloseLook(
             self._model.limits.records,
             -MIN_ANGLE if on_servos else -FACE,

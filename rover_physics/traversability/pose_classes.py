@@ -20,7 +20,6 @@ from rover_physics.prediction.evaluation import (
     AHEAD,
     CHUNK,
     MODEL,
-    effort,
     evaluate_stance,
     new_works,
     set_pose,
@@ -150,7 +149,7 @@ def _find_classes(
             asked = models, limits, ranks
             yield partial(classify_all, asked, (poses[part], AHEAD), spaces, classes[part])
 
-    with limit_threads(effort(packed[0].settings, len(poses))) as threads:
+    with limit_threads(packed[0].relative_cost(len(poses))) as threads:
         run_in_turn(parts(new_works(threads, CHUNK * CALLS_IN_WORK * threads)), threads)
 
 

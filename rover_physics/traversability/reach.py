@@ -2,7 +2,7 @@
 """Reach query: whether the arm of the standing rover can reach a point and push there."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -49,17 +49,17 @@ class ReachAnswer:
     """Empty if possible; "too_far", "too_near" or "joint_limits", else a code of a verdict."""
     reason: str
     """The reason in words, with values; empty if possible."""
-    target: np.ndarray
+    target: np.ndarray = field(default_factory=lambda: np.full(3, np.nan))
     """(3,) the point in the body frame [m], NaN where the rover does not settle."""
-    out_of_reach: float
+    out_of_reach: float = np.nan
     """Distance of the point from the arm's reach [m]: above 0 too far, below 0 too near, NaN
     unknown."""
-    joint_angles: Mapping[str, float] | None
+    joint_angles: Mapping[str, float] | None = None
     """Arm angles [rad] by joint name, the safer of the two solutions; None if out of reach."""
-    verdict: Verdict | None
+    verdict: Verdict | None = None
     """The verdict with the arm at the point, or without it if the rover does not settle; None if
     the point is out of reach."""
-    prediction: PathPrediction | None
+    prediction: PathPrediction | None = None
     """Loads, utilisations and margins with the arm at the point, one row; else None."""
 
     def to_dict(self) -> dict[str, Any]:
@@ -125,14 +125,11 @@ def judge_reach(
     )
     standing, verdict = judge_poses(rover, terrain, poses, None, at_rest, sigmas=0)
     if not standing.settled[0]:
-        return _refuse_to_stand(verdict)
+        return ReachAnswer(False, False, verdict.code, verdict.reason, verdict=verdict)
     to_map = _attitude(standing)
     local = to_map.T @ (point - standing.position[0])
-    solutions = inverse_kinematics(arm, local)
-    if not solutions:
-        return _refuse_reach(arm, local)
     answers = []
-    for angles in solutions:
+    for angles in inverse_kinematics(arm, local):
         reaching = replace(
             at_rest,
             joint_angles=dict(zip(arm.joints, angles.tolist(), strict=True)),
@@ -140,38 +137,9 @@ def judge_reach(
             tool_moment=to_map.T @ load[1],
         )
         prediction, verdict = judge_poses(rover, terrain, poses, None, reaching, sigmas=0)
-        answers.append(_answer(verdict, local, reaching, prediction))
-    return max(answers, key=_safety)
-
-
-def _answer(
-    verdict: Verdict, local: np.ndarray, reaching: SweepOptions, prediction: PathPrediction
-) -> ReachAnswer:
-    return ReachAnswer(
-        possible=verdict.traversable,
-        reachable=True,
-        code=verdict.code,
-        reason=verdict.reason,
-        target=local,
-        out_of_reach=0.0,
-        joint_angles=reaching.arm_angles,
-        verdict=verdict,
-        prediction=prediction,
-    )
-
-
-def _refuse_to_stand(verdict: Verdict) -> ReachAnswer:
-    return ReachAnswer(
-        possible=False,
-        reachable=False,
-        code=verdict.code,
-        reason=verdict.reason,
-        target=np.full(3, np.nan),
-        out_of_reach=np.nan,
-        joint_angles=None,
-        verdict=verdict,
-        prediction=None,
-    )
+        found = verdict.traversable, True, verdict.code, verdict.reason, local, 0.0
+        answers.append(ReachAnswer(*found, reaching.arm_angles, verdict, prediction))
+    return max(answers, key=_safety) if answers else _refuse_reach(arm, local)
 
 
 def _safety(answer: ReachAnswer) -> tuple[bool, float]:
@@ -193,7 +161,7 @@ def _refuse_reach(arm: Manipulator, local: np.ndarray) -> ReachAnswer:
         code = "too_near"
         reason = f"target is {-gap:.3f} m too near: {least + gap:.3f} m from the arm's shoulder, "
         reason += f"which reaches no nearer than {least:.3f} m"
-    return ReachAnswer(False, False, code, reason, local, gap, None, None, None)
+    return ReachAnswer(False, False, code, reason, local, gap)
 
 
 def _describe_limits(arm: Manipulator, local: np.ndarray) -> str:

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.limits.table import DEGREES, NOT_COMPUTABLE, Sense, list_codes
+from rover_physics.limits import table
+from rover_physics.limits.table import DEGREES, NOT_COMPUTABLE, TRAPPED, Sense
 from rover_physics.names import WHEEL_POSITIONS, WHEELS
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.plain_values import to_plain
@@ -53,7 +54,8 @@ BOUNDS = {
     "belly_clearance_bound": np.fmin,
 }
 """Fields of a verdict that are the worst case on an uncertain map."""
-_REST_IN_A_FALL = ("friction_utilisation", "torque_saturation")
+REST_IN_A_FALL = ("friction_utilisation", "torque_saturation")
+"""Quantities that do not count while a wheel rolls off an edge."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +113,8 @@ class Verdict:
 
 def codes_of_verdicts() -> tuple[str, ...]:
     """Return the codes of a verdict; the first that applies is the reason of a waypoint."""
-    return list_codes(tuple(code for code, _ in UNSETTLED.values()))
+    of_limits = dict.fromkeys(limit.code for limit in table.LIMITS)
+    return (*(code for code, _ in UNSETTLED.values()), *of_limits, TRAPPED)
 
 
 def hold_against_limits(rover: Rover, prediction: PathPrediction) -> Verdict:
@@ -122,7 +125,7 @@ def hold_against_limits(rover: Rover, prediction: PathPrediction) -> Verdict:
     """
     limits = limits_of(rover, prediction.policy)
     n = len(prediction.poses)
-    codes, reasons, extremes, risk = [""] * n, [""] * n, dict[str, float](), 0.0
+    codes, reasons, extremes, risk = [""] * n, [""] * n, dict[str, Any](), 0.0
     for part in (prediction, prediction.between):
         if part is None or not len(part.poses):
             continue
@@ -135,18 +138,7 @@ def hold_against_limits(rover: Rover, prediction: PathPrediction) -> Verdict:
         for name, value in _find_extremes(part).items():
             extremes[name] = float(EXTREMES[name][1](value, extremes.get(name, np.nan)))
         risk = max(risk, find_largest_risk(uses, part.settled))
-    first = next((i for i, code in enumerate(codes) if code), -1)
-    return Verdict(
-        traversable=first < 0,
-        reasons=tuple(reasons),
-        codes=tuple(codes),
-        first_failure=first,
-        code=codes[first] if first >= 0 else "",
-        reason=reasons[first] if first >= 0 else "",
-        policy=prediction.policy,
-        risk=risk,
-        **extremes,
-    )
+    return Verdict(**_sum_up(codes, reasons), policy=prediction.policy, risk=risk, **extremes)
 
 
 def explain_rows(
@@ -197,16 +189,20 @@ def find_largest_risk(uses: Uses, settled: np.ndarray) -> float:
 
 def with_refusals(verdict: Verdict, codes: Sequence[str], reasons: Sequence[str]) -> Verdict:
     """Return a verdict with other codes and reasons of its waypoints."""
+    return replace(verdict, **_sum_up(codes, reasons))
+
+
+def _sum_up(codes: Sequence[str], reasons: Sequence[str]) -> dict[str, Any]:
+    """Return the fields of a verdict that follow from codes and reasons of its waypoints."""
     first = next((i for i, code in enumerate(codes) if code), -1)
-    return replace(
-        verdict,
-        traversable=first < 0,
-        codes=tuple(codes),
-        reasons=tuple(reasons),
-        first_failure=first,
-        code=codes[first] if first >= 0 else "",
-        reason=reasons[first] if first >= 0 else "",
-    )
+    return {
+        "traversable": first < 0,
+        "reasons": tuple(reasons),
+        "codes": tuple(codes),
+        "first_failure": first,
+        "code": codes[first] if first >= 0 else "",
+        "reason": reasons[first] if first >= 0 else "",
+    }
 
 
 def worst_of(verdict: Verdict, other: Verdict) -> Verdict:
@@ -225,7 +221,7 @@ def _find_extremes(prediction: PathPrediction) -> dict[str, float]:
     found = {}
     for name, (quantity, worse) in EXTREMES.items():
         values = getattr(prediction, quantity)
-        if quantity in _REST_IN_A_FALL and falls.any():
+        if quantity in REST_IN_A_FALL and falls.any():
             values = values[~falls]
         found[name] = float(worse.reduce(values, axis=None)) if values.size else np.nan
     return found

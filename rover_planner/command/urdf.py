@@ -18,8 +18,7 @@ def urdf(
     ] = None,
 ) -> None:
     """Write a rover as URDF, with inertias, joint limits and collision cylinders."""
-    from rover_physics.rover.rover_contents import save_yaml
-    from rover_physics.rover.rover_file import load_rover
+    from rover_physics.rover.rover_file import load_rover, save_yaml
     from rover_physics.rover.urdf.joint_map import map_of
     from rover_physics.rover.urdf.write_urdf import write_urdf
 
@@ -46,7 +45,7 @@ def rover(
     ],
 ) -> None:
     """Write a rover file from a URDF and a joint map."""
-    from rover_physics.rover.rover_contents import save_rover
+    from rover_physics.rover.rover_file import save_rover
     from rover_physics.rover.urdf.read_rover import rover_from_urdf
 
     read = rover_from_urdf(from_urdf, joint_map)

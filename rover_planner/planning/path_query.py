@@ -12,7 +12,7 @@ from rover_physics.bounds.path import SIGMAS
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
-from rover_physics.rover.turning import can_turn_on_the_spot, swing_radius, tightest_radius
+from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path, judge_paths
 from rover_physics.traversability.verdict import Verdict

@@ -15,7 +15,8 @@ from rover_physics.forces.soil import coulomb_slip
 from rover_physics.names import EQUAL, OPTIMAL, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import xyzw_from_rpy
-from rover_physics.prediction.steered_step import predict_steered
+from rover_physics.prediction.packed_model import pack_model
+from rover_physics.prediction.sweep import predict_steered
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.uses import find_uses, limits_of
@@ -224,8 +225,8 @@ class QuasiStaticPlant:
         """Return the model's prediction at poses (n, 3); if `pulled`, with optimal torques."""
         policy = OPTIMAL if pulled else self._policy
         options = SweepOptions(friction=self._friction, policy=policy, soil=self._soil)
-        course = self._motion, angles
-        return predict_steered(self._rover, self._terrain, poses, course, options)
+        model = pack_model(self._rover, self._terrain, options)
+        return predict_steered(model, poses, self._motion, angles)
 
     def _why_not(self, prediction: PathPrediction, pulled: bool = False) -> str:
         """Return the reason why the last pose cannot be reached; empty if it can.

@@ -8,8 +8,7 @@ from typing import Any
 from rover_physics.errors import RoverFileError
 from rover_physics.files.validation import Key, describe, find_unit
 from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_contents import rover_to_dict
-from rover_physics.rover.rover_file import rover_from_dict
+from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 
 AXES = ("x", "y", "z")
 """Names of the three numbers of a point."""

@@ -12,8 +12,7 @@ import yaml
 from rover_physics.files.validation import Key, errors_of
 from rover_physics.files.yaml_file import parse_yaml
 from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_contents import rover_to_dict
-from rover_physics.rover.rover_file import rover_from_dict
+from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 
 
 @dataclass(frozen=True)

@@ -23,8 +23,7 @@ from rover_physics.files.rules import (
 from rover_physics.files.validation import Key, errors_of, read_as, refuse, show_file
 from rover_physics.files.yaml_file import read_yaml
 from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_contents import rover_to_dict
-from rover_physics.rover.rover_file import load_rover
+from rover_physics.rover.rover_file import load_rover, rover_to_dict
 from rover_physics.terrain.soil_file import soil_named
 from rover_planner.studies.rover_keys import find_key
 from rover_planner.studies.rover_values import get_value

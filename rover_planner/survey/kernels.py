@@ -4,15 +4,7 @@
 import numpy as np
 
 from rover_physics.numerics.kernels import exact_kernel
-from rover_physics.prediction.map_sweep import write_score
 from rover_physics.terrain.ground import elevation_of, find_block_max
-
-
-@exact_kernel
-def write_scores(results, numbers):
-    """Write the scores of RESULTs (n,) into numbers (NUMBERS, n), as in `PoseScores`."""
-    for row in range(results.size):
-        write_score(results[row], row, numbers)
 
 
 @exact_kernel

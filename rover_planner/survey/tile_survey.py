@@ -9,11 +9,9 @@ import numpy as np
 
 from rover_physics.names import TORQUE_POLICIES
 from rover_physics.numerics.quiet import quiet
-from rover_physics.numerics.read_only import view_read_only
-from rover_physics.prediction.map_sweep import NUMBERS
+from rover_physics.prediction.map_sweep import find_scores
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
-from rover_physics.prediction.sweep import evaluator
 from rover_physics.results.uses import find_codes
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
@@ -24,7 +22,7 @@ from rover_physics.traversability.pose_classes import (
     classify_poses,
     hopeless_codes,
 )
-from rover_planner.survey.kernels import mark_unknown_below, write_scores
+from rover_planner.survey.kernels import mark_unknown_below
 from rover_planner.survey.layers import (
     CLASS_NUMBERS,
     NO_LIMIT,
@@ -123,8 +121,7 @@ class TileJudge:
         refused = self._find_unknown_below(poses)
         results, limits = self.judge(self._policy, poses, STRAIGHT)
         limits = _refuse_unknown(limits, refused)
-        numbers = np.empty((NUMBERS, len(poses)), np.float32)
-        write_scores(view_read_only(results), numbers)
+        numbers = find_scores(results).astype(np.float32)
         classes = self._classify(poses, limits, refused)
         layers = _sum_up(numbers, limits, classes, headings)
         if self._request.turns:
@@ -147,7 +144,7 @@ class TileJudge:
         options = replace(self._request.options, policy=policy)
         model = pack_model(self._rover, self._terrain, options)
         bends = np.full(len(poses), bend)
-        results = evaluator(model)(poses, motions=motions_of(model, poses, bends))
+        results = model.evaluate(poses, motions=motions_of(model, poses, bends))
         codes = find_codes(model.limits, results)
         limits = np.array([self._numbers[code] for code in codes], np.uint8)
         if self._on_map.is_uncertain:

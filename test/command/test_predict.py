@@ -187,7 +187,7 @@ def test_a_long_path_that_is_written_in_parts_gives_the_same_file(files, monkeyp
     assert main([*predict_words(files), *words]) == 0
     monkeypatch.setattr("rover_planner.command.predict.MAX_IN_MEMORY", 0)
     monkeypatch.setattr("rover_planner.command.prediction_files.BLOCK", 7)
-    monkeypatch.setattr("rover_physics.prediction.parts.PART", 10)
+    monkeypatch.setattr("rover_physics.prediction.sweep.PART", 10)
     assert main([*predict_words(files, out="parts.npz"), *words]) == 0
     with np.load(files / "out.npz") as whole, np.load(files / "parts.npz") as parts:
         assert set(parts.files) == set(whole.files)

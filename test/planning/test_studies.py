@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from rover_physics.errors import RoverFileError
-from rover_physics.rover.rover_contents import rover_to_dict
-from rover_physics.rover.rover_file import load_rover
+from rover_physics.rover.rover_file import load_rover, rover_to_dict
 from rover_planner.cli import main
 from rover_planner.studies.objectives import climbs, tallest_step
 from rover_planner.studies.rover_keys import find_key, vary

@@ -9,8 +9,7 @@ import pytest
 
 from rover_physics.names import WHEELS
 from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.rover_contents import rover_to_dict
-from rover_physics.rover.rover_file import load_rover, preset_names
+from rover_physics.rover.rover_file import load_rover, preset_names, rover_to_dict
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.traversability.judge import judge_path
 from rover_planner.command.prediction_files import (

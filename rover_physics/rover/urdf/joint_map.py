@@ -14,7 +14,7 @@ from rover_physics.files.yaml_file import read_yaml
 from rover_physics.names import SIDES, STEERING_JOINTS, WHEEL_JOINTS, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_contents import rover_to_dict
+from rover_physics.rover.rover_file import rover_to_dict
 from rover_physics.rover.steering_joints import steered_wheels
 
 DIRECTIONS = ("x", "-x", "y", "-y", "z", "-z")

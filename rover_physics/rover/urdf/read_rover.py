@@ -12,13 +12,11 @@ from rover_physics.errors import RoverFileError
 from rover_physics.files.validation import describe, errors_of
 from rover_physics.names import SIDES, WHEEL_POSITIONS, WHEELS
 from rover_physics.numerics.arrays import Floats
-from rover_physics.rover.model import Rover
+from rover_physics.rover.manipulator import link_points
+from rover_physics.rover.model import Manipulator, Rover
 from rover_physics.rover.rover_file import rover_from_dict
-from rover_physics.rover.urdf.arm import read_arm
-from rover_physics.rover.urdf.joint_map import JointMap, load_joint_map
-from rover_physics.rover.urdf.levelling import Levelling, level_wheels
-from rover_physics.rover.urdf.robot import Joint, Robot, Solid, read_robot
-from rover_physics.rover.urdf.tree import Lump, Tree
+from rover_physics.rover.urdf.joint_map import ArmMap, JointMap, load_joint_map
+from rover_physics.rover.urdf.robot import Joint, Lump, Robot, Solid, Tree, read_robot
 
 MAX_TILT = 0.02
 """Largest angle between a pivot or axle and the body's y axis [rad]."""
@@ -26,8 +24,29 @@ MAX_ASYMMETRY = 0.01
 """Largest distance between a point of the left side and the mirrored one of the right side [m]."""
 DECIMALS = 12
 """Decimals of the numbers that are read, so that 0.1 in a URDF is 0.1 in a rover file."""
-NOT_LEVELLED = Levelling()
 MIRROR = np.array([1.0, -1.0, 1.0])
+ARM_TOLERANCE = 1e-3
+"""Largest distance of a joint from where the arm's model has it [m]."""
+LEVEL = 1e-6
+"""Height difference of wheels that counts as none [m]."""
+MAX_ANGLE = 0.1
+"""Largest pitch or bogie angle that is made up for [rad]."""
+STEP = 1e-6
+"""Step of the differences that replace derivatives [rad]."""
+ROUNDS = 20
+
+
+@dataclass(frozen=True)
+class Levelling:
+    """How the axes and the bogies of a URDF stand on level ground."""
+
+    pitch: float = 0.0
+    """Pitch of the axes of the URDF [rad], positive nose down; that of the body frame is 0."""
+    bogie: float = 0.0
+    """Angle of both bogies about y, beyond that of the map [rad]."""
+
+
+NOT_LEVELLED = Levelling()
 
 
 @dataclass(frozen=True)
@@ -56,7 +75,7 @@ def rover_from_urdf(urdf: Path, joint_map: Path) -> ReadRover:
     robot, joints = read_robot(urdf), load_joint_map(joint_map)
     with errors_of(joint_map):
         _Reading(robot, joints).check()
-        levelling = level_wheels(lambda angles: _Reading(robot, joints, angles).wheel_heights())
+        levelling = level_wheels(robot, joints)
         reading = _Reading(robot, joints, levelling)
         reading.check()
         contents = _merge(_rounded(reading.contents()), joints.rover)
@@ -106,7 +125,7 @@ class _Reading:
         if self._steering:
             found["steering"] = self._steered()
         if self._joints.arm is not None:
-            found["manipulator"] = read_arm(self._tree, self._joints.arm)
+            found["manipulator"] = _read_arm(self._tree, self._joints.arm)
         return found
 
     def wheel_heights(self) -> list[float]:
@@ -330,6 +349,90 @@ class _Reading:
             return {}
         low, high = min(boxes, key=lambda box: box[0][2])
         return {"z": low[2], "x": [low[0], high[0]], "y": [low[1], high[1]]}
+
+
+def level_wheels(robot: Robot, joints: JointMap) -> Levelling:
+    """Find the pitch and the bogie angle at which all wheels are level.
+
+    Returns:
+        No angles where the wheels are level as the URDF has them.
+
+    Raises:
+        RoverFileError: There are none within MAX_ANGLE.
+    """
+
+    def find_heights(angles: Floats) -> list[float]:
+        return _Reading(robot, joints, Levelling(*angles.tolist())).wheel_heights()
+
+    def differ(angles: Floats) -> Floats:
+        rear, middle, front = find_heights(angles)
+        return np.array([middle - rear, front - rear])
+
+    angles = np.zeros(2)
+    for _ in range(ROUNDS):
+        off = differ(angles)
+        if np.abs(off).max() <= LEVEL * 1e-3:
+            break
+        if not angles.any() and np.abs(off).max() <= LEVEL:
+            return NOT_LEVELLED
+        matrix = np.column_stack(
+            [(differ(angles + step) - off) / STEP for step in STEP * np.eye(2)]
+        )
+        if abs(np.linalg.det(matrix)) < 1e-12:
+            break
+        angles = angles - np.linalg.solve(matrix, off)
+        if np.abs(angles).max() > MAX_ANGLE:
+            break
+    if np.abs(angles).max() > MAX_ANGLE or np.abs(differ(angles)).max() > LEVEL:
+        rear, middle, front = find_heights(np.zeros(2))
+        raise RoverFileError(
+            f"wheels at angle 0 are not level: rear {rear:.4g}, middle {middle:.4g}, front "
+            f"{front:.4g} m; give the angles of joints on flat ground, or correct axes"
+        )
+    return Levelling(*angles.tolist())
+
+
+def _read_arm(tree: Tree, arm: ArmMap) -> dict[str, Any]:
+    """Return the contents of `manipulator` of a rover file.
+
+    Args:
+        tree: The robot in the body frame, the arm stowed.
+        arm: Its joints.
+
+    Raises:
+        RoverFileError: A joint or link is missing, or the arm is no column with two links that
+            point forward at 0.
+    """
+    joints = [tree.joint(name) for name in arm.joints]
+    if arm.tip not in tree.links_on(joints[2]):
+        raise RoverFileError(f"arm.tip: link {arm.tip!r} does not hang on joint {arm.joints[2]}")
+    points = np.array([*(tree.origin(joint) for joint in joints), tree.place(arm.tip)[:3, 3]])
+    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    masses = []
+    groups = [tree.links_on(joint) for joint in joints]
+    for group, inner in zip(groups, [*groups[1:], {arm.tip}], strict=True):
+        masses.append(tree.lump(group - inner).mass)
+    found: dict[str, Any] = {
+        "base": points[0].tolist(),
+        "joints": list(arm.joints),
+        "link_lengths": lengths.tolist(),
+        "link_masses": masses,
+        "stowed": list(arm.stowed),
+        "payload": tree.lump({arm.tip}).mass,
+    }
+    limits = [[joint.limit.lower, joint.limit.upper] for joint in joints]
+    if np.isfinite(limits).all():
+        found["joint_limits"] = limits
+    model = Manipulator(
+        tuple(points[0]), arm.joints, tuple(lengths), (0.0, 0.0, 0.0), arm.stowed
+    )  # fmt: skip
+    off = np.abs(link_points(model, np.array(arm.stowed)) - points).max()
+    if off > ARM_TOLERANCE:
+        raise RoverFileError(
+            f"arm: its joints are {off:.3g} m off a column along z with two links that point "
+            "along x at 0 and turn about y; leave arm out, so that the arm is part of the body"
+        )
+    return found
 
 
 def _pose(rotation: Floats) -> Floats:

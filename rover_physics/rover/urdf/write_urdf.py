@@ -4,6 +4,7 @@
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from pathlib import Path
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from rover_physics.files.validation import errors_of
 from rover_physics.names import SIDES, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.manipulator import link_points
-from rover_physics.rover.model import Manipulator, Rover
+from rover_physics.rover.model import Manipulator, Part, Rover
 from rover_physics.rover.steering_joints import steering_joints
 from rover_physics.rover.urdf.joint_map import ARM_TIP
 
@@ -62,149 +63,142 @@ def write_urdf(path: Path, rover: Rover) -> None:
             f"manipulator.joints has {taken!r}, which is a link of the URDF; its links have the "
             "names of their joints: give this one another name"
         )
-    top = ElementTree.Element("robot", name=rover.name)
+    links = [_body(rover), *(_side(rover, side) for side in SIDES)]
+    if arm is not None:
+        links.append(_arm(arm))
     # MuJoCo: keeps links that are fixed to another one, and what is only seen.
-    extension = ElementTree.SubElement(top, "mujoco")
-    ElementTree.SubElement(extension, "compiler", fusestatic="false", discardvisual="false")
-    _Writer(top, rover).write()
+    extension = '<mujoco><compiler fusestatic="false" discardvisual="false"/></mujoco>'
+    name = quoteattr(rover.name)
+    top = ElementTree.fromstring(f"<robot name={name}>{extension}{''.join(links)}</robot>")
     ElementTree.indent(top)
     text = ElementTree.tostring(top, encoding="unicode", xml_declaration=False)
     with errors_of(path):
         write_file(path, f'<?xml version="1.0"?>\n{text}\n'.encode())
 
 
-class _Writer:
-    """Appends the links and joints of a rover to a robot element."""
+def _body(rover: Rover) -> str:
+    """Return the body without its arm, with the belly as a box."""
+    mass, com, belly = rover.masses.body.mass, np.array(rover.masses.body.com), rover.belly
+    if rover.manipulator is not None:
+        mass, com = _without_arm(mass, com, rover.manipulator)
+    low = np.array([belly.x[0], belly.y[0], belly.z])
+    height = max(BAR, 2.0 * (com[2] - belly.z))
+    high = np.array([belly.x[1], belly.y[1], belly.z + height])
+    box = f'<box size="{_text(high - low)}"/>'
+    shapes = _shape("visual", 0.5 * (low + high), box) + _shape(
+        "collision", 0.5 * (low + high), box
+    )
+    return _link(ROOT, mass, com, high - low, shapes)
 
-    def __init__(self, top: ElementTree.Element, rover: Rover):
-        self._top, self._rover = top, rover
 
-    def write(self) -> None:
-        """Append everything."""
-        self._body()
-        for side in SIDES:
-            self._side(side)
-        if self._rover.manipulator is not None:
-            self._arm(self._rover.manipulator)
+def _side(rover: Rover, side: str) -> str:
+    """Return rocker, bogie and wheels of a side."""
+    mirror = np.array([1.0, 1.0 if side == "left" else -1.0, 1.0])
+    suspension, masses = rover.suspension, rover.masses
+    rocker, bogie = mirror * suspension.rocker_pivot, mirror * suspension.bogie_pivot
+    wheels = {name: mirror * place for name, place in suspension.wheels.items()}
+    hung = [wheels[name] for name in suspension.bogie_wheels]
+    alone = suspension.rocker_wheel
+    rocker_name, bogie_name = f"rocker_{side}", f"bogie_{side}"
+    mimic = '<mimic joint="rocker_right" multiplier="-1" offset="0"/>' if side == "left" else ""
+    passive = PASSIVE, PIVOT_SPEED
+    parts = [
+        _frame(rocker_name, masses.rocker, mirror, rocker, [bogie, wheels[alone]]),
+        _frame(bogie_name, masses.bogie, mirror, bogie, hung),
+        _joint(rocker_name, (ROOT, rocker_name), rocker, Y,
+               _limit(suspension.rocker_limits, *passive) + mimic),
+        _joint(bogie_name, (rocker_name, bogie_name), bogie - rocker, Y,
+               _limit(suspension.bogie_limits, *passive)),
+        _wheel(rover, f"{alone}_{side}", rocker_name, wheels[alone] - rocker),
+    ]  # fmt: skip
+    for name in suspension.bogie_wheels:
+        parts.append(_wheel(rover, f"{name}_{side}", bogie_name, wheels[name] - bogie))
+    return "".join(parts)
 
-    def _body(self) -> None:
-        """Append the body without its arm, with the belly as a box."""
-        rover = self._rover
-        mass, com = rover.masses.body.mass, np.array(rover.masses.body.com)
-        if rover.manipulator is not None:
-            mass, com = _without_arm(mass, com, rover.manipulator)
-        belly = rover.belly
-        low = np.array([belly.x[0], belly.y[0], belly.z])
-        height = max(BAR, 2.0 * (com[2] - belly.z))
-        high = np.array([belly.x[1], belly.y[1], belly.z + height])
-        link = self._link(ROOT, mass, com, high - low)
-        for use in ("visual", "collision"):
-            _box(link, use, low, high)
 
-    def _side(self, side: str) -> None:
-        """Append rocker, bogie and wheels of a side."""
-        rover, mirror = self._rover, np.array([1.0, 1.0 if side == "left" else -1.0, 1.0])
-        suspension, masses = rover.suspension, rover.masses
-        rocker, bogie = mirror * suspension.rocker_pivot, mirror * suspension.bogie_pivot
-        wheels = {name: mirror * place for name, place in suspension.wheels.items()}
-        hung = [wheels[name] for name in suspension.bogie_wheels]
-        alone = suspension.rocker_wheel
-        rocker_name, bogie_name = f"rocker_{side}", f"bogie_{side}"
-        self._frame(rocker_name, masses.rocker.mass, mirror * masses.rocker.com, rocker,
-                    [bogie, wheels[alone]])  # fmt: skip
-        self._frame(bogie_name, masses.bogie.mass, mirror * masses.bogie.com, bogie, hung)
-        joint = self._joint(rocker_name, ROOT, rocker_name, rocker, Y)
-        _limit(joint, suspension.rocker_limits, PASSIVE, PIVOT_SPEED)
-        if side == "left":
-            ElementTree.SubElement(
-                joint, "mimic", joint="rocker_right", multiplier="-1", offset="0"
-            )
-        joint = self._joint(bogie_name, rocker_name, bogie_name, bogie - rocker, Y)
-        _limit(joint, suspension.bogie_limits, PASSIVE, PIVOT_SPEED)
-        self._wheel(f"{alone}_{side}", rocker_name, wheels[alone] - rocker)
-        for name in suspension.bogie_wheels:
-            self._wheel(f"{name}_{side}", bogie_name, wheels[name] - bogie)
+def _frame(name: str, part: Part, mirror: Floats, pivot: Floats, ends: Sequence[Floats]) -> str:
+    """Return a rocker or bogie: a bar from its pivot to each end; positions in the body."""
+    size = np.ptp(np.array([pivot, *ends]), axis=0)
+    bars = "".join(_bar(end - pivot) for end in ends)
+    return _link(name, part.mass, mirror * part.com - pivot, size, bars)
 
-    def _frame(
-        self, name: str, mass: float, com: Floats, pivot: Floats, ends: Sequence[Floats]
-    ) -> None:
-        """Append a rocker or bogie: a bar from its pivot to each end; positions in the body."""
-        points = np.array([pivot, *ends])
-        link = self._link(name, mass, com - pivot, np.ptp(points, axis=0))
-        for end in ends:
-            _bar(link, np.zeros(3), end - pivot, 0.5 * BAR)
 
-    def _wheel(self, name: str, parent: str, place: Floats) -> None:
-        """Append a wheel, with the link that steers it if it steers."""
-        wheel, steering = self._rover.wheel, self._rover.steering
-        mass, joint_name = wheel.mass, f"{name}_steering"
-        size = np.array([2.0 * wheel.radius, wheel.width, 2.0 * wheel.radius])
-        if steering is not None and joint_name in steering_joints(self._rover):
-            self._link(joint_name, STEERING_SHARE * mass, np.zeros(3), size)
-            joint = self._joint(joint_name, parent, joint_name, place, Z)
-            # The rover file has no torque of the steering drives: that of the wheels stands here.
-            _limit(joint, (-steering.limit, steering.limit), wheel.max_torque, steering.rate)
-            parent, place, mass = joint_name, np.zeros(3), mass - STEERING_SHARE * mass
-        across = max(mass, MIN_LINK_MASS) * (3.0 * wheel.radius**2 + wheel.width**2) / 12.0
-        along = 0.5 * max(mass, MIN_LINK_MASS) * wheel.radius**2
-        link = self._link(name, mass, np.zeros(3), size, np.array([across, along, across]))
-        for use in ("visual", "collision"):
-            _cylinder(link, use, wheel.radius, wheel.width, ("0 0 0", ALONG_Y))
-        joint = self._joint(f"{name}_wheel", parent, name, place, Y, "continuous")
-        _limit(joint, None, wheel.max_torque, wheel.max_speed)
+def _wheel(rover: Rover, name: str, parent: str, place: Floats) -> str:
+    """Return a wheel, with the link that steers it if it steers."""
+    wheel, steering, steered = rover.wheel, rover.steering, ""
+    mass, joint_name = wheel.mass, f"{name}_steering"
+    size = np.array([2.0 * wheel.radius, wheel.width, 2.0 * wheel.radius])
+    if steering is not None and joint_name in steering_joints(rover):
+        # The rover file has no torque of the steering drives: that of the wheels stands here.
+        limit = _limit((-steering.limit, steering.limit), wheel.max_torque, steering.rate)
+        steered = _link(joint_name, STEERING_SHARE * mass, np.zeros(3), size)
+        steered += _joint(joint_name, (parent, joint_name), place, Z, limit)
+        parent, place, mass = joint_name, np.zeros(3), mass - STEERING_SHARE * mass
+    across = max(mass, MIN_LINK_MASS) * (3.0 * wheel.radius**2 + wheel.width**2) / 12.0
+    along = 0.5 * max(mass, MIN_LINK_MASS) * wheel.radius**2
+    inertia = np.array([across, along, across])
+    cylinder = _cylinder(wheel.radius, wheel.width)
+    shapes = "".join(_shape(use, "0 0 0", cylinder, ALONG_Y) for use in ("visual", "collision"))
+    limit = _limit(None, wheel.max_torque, wheel.max_speed)
+    link = _link(name, mass, np.zeros(3), size, shapes, inertia)
+    return steered + link + _joint(f"{name}_wheel", (parent, name), place, Y, limit, "continuous")
 
-    def _arm(self, arm: Manipulator) -> None:
-        """Append the arm: column, two links along x, and the tip with its payload."""
-        points = link_points(arm, np.zeros(3))
-        parent, place = ROOT, points[0]
-        for k, (joint_name, axis) in enumerate(zip(arm.joints, (Z, Y, Y), strict=True)):
-            step = points[k + 1] - points[k]
-            link = self._link(joint_name, arm.link_masses[k], 0.5 * step, np.abs(step))
-            _bar(link, np.zeros(3), step, 0.5 * BAR)
-            kind = "continuous" if arm.joint_limits is None else "revolute"
-            joint = self._joint(joint_name, parent, joint_name, place, axis, kind)
-            limits = None if arm.joint_limits is None else arm.joint_limits[k]
-            _limit(joint, limits, PASSIVE, PIVOT_SPEED)
-            parent, place = joint_name, step
-        if arm.payload > 0.0:
-            self._link(ARM_TIP, arm.payload, np.zeros(3), np.zeros(3))
-        else:
-            ElementTree.SubElement(self._top, "link", name=ARM_TIP)
-        self._joint(ARM_TIP, parent, ARM_TIP, place, X, "fixed")
 
-    def _link(
-        self, name: str, mass: float, com: Floats, size: Floats, inertia: Floats | None = None
-    ) -> ElementTree.Element:
-        """Append a link; without `inertia` (3,) [kg m^2], that of a solid box of `size` [m]."""
-        mass = max(mass, MIN_LINK_MASS)
-        if inertia is None:
-            squares = np.maximum(size, BAR) ** 2
-            inertia = mass * (squares.sum() - squares) / 12.0
-        link = ElementTree.SubElement(self._top, "link", name=name)
-        inertial = ElementTree.SubElement(link, "inertial")
-        ElementTree.SubElement(inertial, "origin", xyz=_text(com), rpy="0 0 0")
-        ElementTree.SubElement(inertial, "mass", value=_text([mass]))
-        moments = dict(zip(("ixx", "iyy", "izz"), map(repr, inertia.tolist()), strict=True))
-        ElementTree.SubElement(inertial, "inertia", moments, ixy="0", ixz="0", iyz="0")
-        return link
+def _arm(arm: Manipulator) -> str:
+    """Return the arm: column, two links along x, and the tip with its payload."""
+    points, parts = link_points(arm, np.zeros(3)), ""
+    parent, place = ROOT, points[0]
+    for k, (name, axis) in enumerate(zip(arm.joints, (Z, Y, Y), strict=True)):
+        step = points[k + 1] - points[k]
+        parts += _link(name, arm.link_masses[k], 0.5 * step, np.abs(step), _bar(step))
+        kind = "continuous" if arm.joint_limits is None else "revolute"
+        limits = None if arm.joint_limits is None else arm.joint_limits[k]
+        limit = _limit(limits, PASSIVE, PIVOT_SPEED)
+        parts += _joint(name, (parent, name), place, axis, limit, kind)
+        parent, place = name, step
+    if arm.payload > 0.0:
+        parts += _link(ARM_TIP, arm.payload, np.zeros(3), np.zeros(3))
+    else:
+        parts += f'<link name="{ARM_TIP}"/>'
+    return parts + _joint(ARM_TIP, (parent, ARM_TIP), place, None, "", "fixed")
 
-    def _joint(
-        self,
-        name: str,
-        parent: str,
-        child: str,
-        place: Floats,
-        axis: Floats,
-        kind: str = "revolute",
-    ) -> ElementTree.Element:
-        """Append a joint without its limits."""
-        joint = ElementTree.SubElement(self._top, "joint", name=name, type=kind)
-        ElementTree.SubElement(joint, "origin", xyz=_text(place), rpy="0 0 0")
-        ElementTree.SubElement(joint, "parent", link=parent)
-        ElementTree.SubElement(joint, "child", link=child)
-        if kind != "fixed":
-            ElementTree.SubElement(joint, "axis", xyz=_text(axis))
-        return joint
+
+def _link(
+    name: str,
+    mass: float,
+    com: Floats,
+    size: Floats,
+    shapes: str = "",
+    inertia: Floats | None = None,
+) -> str:
+    """Return a link; without `inertia` (3,) [kg m^2], that of a solid box of `size` [m]."""
+    mass = max(mass, MIN_LINK_MASS)
+    if inertia is None:
+        squares = np.maximum(size, BAR) ** 2
+        inertia = mass * (squares.sum() - squares) / 12.0
+    ixx, iyy, izz = inertia.tolist()
+    moments = f'ixx="{ixx!r}" iyy="{iyy!r}" izz="{izz!r}" ixy="0" ixz="0" iyz="0"'
+    return (
+        f'<link name={quoteattr(name)}><inertial><origin xyz="{_text(com)}" rpy="0 0 0"/>'
+        f'<mass value="{_text([mass])}"/><inertia {moments}/></inertial>{shapes}</link>'
+    )
+
+
+def _joint(
+    name: str,
+    ends: tuple[str, str],
+    place: Floats,
+    axis: Floats | None,
+    limit: str,
+    kind: str = "revolute",
+) -> str:
+    """Return a joint between a parent and a child link."""
+    parent, child = map(quoteattr, ends)
+    about = "" if axis is None else f'<axis xyz="{_text(axis)}"/>'
+    return (
+        f'<joint name={quoteattr(name)} type="{kind}"><origin xyz="{_text(place)}" rpy="0 0 0"/>'
+        f"<parent link={parent}/><child link={child}/>{about}{limit}</joint>"
+    )
 
 
 def _without_arm(mass: float, com: Floats, arm: Manipulator) -> tuple[float, Floats]:
@@ -216,42 +210,31 @@ def _without_arm(mass: float, com: Floats, arm: Manipulator) -> tuple[float, Flo
     return rest, moment / rest
 
 
-def _limit(
-    joint: ElementTree.Element, limits: tuple[float, float] | None, effort: float, velocity: float
-) -> None:
-    """Append the limits of a joint."""
-    ends = {} if limits is None else {"lower": _text(limits[:1]), "upper": _text(limits[1:])}
-    ElementTree.SubElement(
-        joint, "limit", ends, effort=_text([effort]), velocity=_text([velocity])
-    )
+def _limit(limits: tuple[float, float] | None, effort: float, velocity: float) -> str:
+    """Return the limits of a joint."""
+    ends = "" if limits is None else f'lower="{_text(limits[:1])}" upper="{_text(limits[1:])}" '
+    return f'<limit {ends}effort="{_text([effort])}" velocity="{_text([velocity])}"/>'
 
 
-def _box(link: ElementTree.Element, use: str, low: Floats, high: Floats) -> None:
-    """Append a box between two corners, in the link's frame."""
-    part = ElementTree.SubElement(link, use)
-    ElementTree.SubElement(part, "origin", xyz=_text(0.5 * (low + high)), rpy="0 0 0")
-    ElementTree.SubElement(ElementTree.SubElement(part, "geometry"), "box", size=_text(high - low))
+def _shape(use: str, place: Floats | str, geometry: str, rpy: Floats | str = "0 0 0") -> str:
+    """Return what is seen or collides, at a place in the link's frame."""
+    xyz, turn = (one if isinstance(one, str) else _text(one) for one in (place, rpy))
+    origin = f'<origin xyz="{xyz}" rpy="{turn}"/>'
+    return f"<{use}>{origin}<geometry>{geometry}</geometry></{use}>"
 
 
-def _cylinder(
-    link: ElementTree.Element, use: str, radius: float, length: float, place: tuple[str, str]
-) -> None:
-    """Append a cylinder at a place: xyz and rpy."""
-    part = ElementTree.SubElement(link, use)
-    ElementTree.SubElement(part, "origin", xyz=place[0], rpy=place[1])
-    geometry = ElementTree.SubElement(part, "geometry")
-    ElementTree.SubElement(geometry, "cylinder", radius=_text([radius]), length=_text([length]))
+def _cylinder(radius: float, length: float) -> str:
+    return f'<cylinder radius="{_text([radius])}" length="{_text([length])}"/>'
 
 
-def _bar(link: ElementTree.Element, start: Floats, end: Floats, radius: float) -> None:
-    """Append a round bar that is only seen, between two points of the link's frame."""
-    step = end - start
-    length = float(np.linalg.norm(step))
+def _bar(step: Floats) -> str:
+    """Return a round bar that is only seen, from the origin of the link; nothing if short."""
+    length, radius = float(np.linalg.norm(step)), 0.5 * BAR
     if length < radius:
-        return
+        return ""
     pitch = np.arctan2(np.hypot(step[0], step[1]), step[2])
     rpy = np.array([0.0, pitch, np.arctan2(step[1], step[0])])
-    _cylinder(link, "visual", radius, length, (_text(0.5 * (start + end)), _text(rpy)))
+    return _shape("visual", 0.5 * step, _cylinder(radius, length), rpy)
 
 
 def _text(numbers: Sequence[float] | Floats) -> str:

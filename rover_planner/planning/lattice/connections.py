@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.rover.model import Rover
-from rover_physics.rover.turning import can_turn_on_the_spot, swing_radius, tightest_radius
+from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
 from rover_planner.planning.angles import wrap
 from rover_planner.planning.dubins import dubins_length, dubins_paths
 from rover_planner.planning.lattice.costs import PRICES

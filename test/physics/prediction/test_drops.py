@@ -41,7 +41,7 @@ def with_drop_limit(limit: float) -> Rover:
     return replace(FREE, limits=replace(FREE.limits, wheel_drop=limit))
 
 
-@pytest.mark.parametrize("height", [0.05, 0.08, 0.1, 0.15, 0.2])
+@pytest.mark.parametrize("height", [0.05, 0.1, 0.2])
 def test_a_wheel_rolls_over_an_edge_and_drops_by_the_rest_of_its_height(height):
     """It rolls until the forces do not balance, at most until the edge is a face below it."""
     rolled = RADIUS * (1.0 - np.cos(FACE))
@@ -60,7 +60,7 @@ def test_with_more_friction_a_wheel_never_drops_deeper(height):
     assert (np.diff(drops, axis=0) <= 1e-9).all()
 
 
-@pytest.mark.parametrize("friction", [0.2, 0.4, 0.8, 1.5])
+@pytest.mark.parametrize("friction", [0.2, 1.5])
 @pytest.mark.parametrize("policy", ["equal", "servo", "optimal"])
 def test_no_friction_hides_a_fall_from_a_wall_that_is_too_high(friction, policy):
     """Too high is the limit and what a wheel rolls over the edge before it falls."""
@@ -82,7 +82,7 @@ def test_a_drop_does_not_depend_on_where_waypoints_are():
     assert np.ptp(drops, axis=0).max() < 1e-3
 
 
-@pytest.mark.parametrize("friction", [0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.8])
+@pytest.mark.parametrize("friction", [0.2, 0.3, 0.6])
 @pytest.mark.parametrize("policy", ["equal", "optimal"])
 def test_a_wheel_rolls_down_a_smooth_bump_however_slippery_if_the_others_hold_it(friction, policy):
     ground = plane(0.0, 0.0, half=3.0)
@@ -91,13 +91,6 @@ def test_a_wheel_rolls_down_a_smooth_bump_however_slippery_if_the_others_hold_it
     bump = replace(ground, elevation=(y > 0.0)[:, None] * wave)
     _, verdict = drive(bump, LSR1, friction=friction, policy=policy)
     assert verdict.traversable and verdict.max_wheel_drop == 0.0
-
-
-def test_the_higher_the_edge_the_deeper_the_drop():
-    drops = [
-        drive(edge_down(height))[0].wheel_drop.max() for height in (0.05, 0.1, 0.15, 0.2, 0.25)
-    ]
-    assert (np.diff(drops) > 0.03).all()
 
 
 def test_a_drop_is_told_where_the_wheel_lands():
@@ -117,11 +110,6 @@ def test_a_drop_beyond_the_limit_is_refused_by_its_own_code():
     assert refused.max_wheel_drop == allowed.max_wheel_drop
 
 
-def test_the_preset_refuses_to_fall_by_more_than_it_says():
-    codes = {height: drive(edge_down(height), LSR1)[1].code for height in (0.05, 0.15)}
-    assert codes[0.05] == "" and codes[0.15] == "wheel_drop"
-
-
 def test_while_a_wheel_falls_neither_friction_nor_torque_are_asked_for():
     prediction, verdict = drive(edge_down(0.2), friction=0.4)
     needed = prediction.friction_utilisation[prediction.falling.any(axis=1)]
@@ -133,12 +121,6 @@ def test_up_a_step_no_wheel_drops():
     for height in (0.05, 0.15):
         prediction, _ = drive(drive_ground("step", height))
         assert not prediction.wheel_drop.any() and not prediction.falling.any()
-
-
-def test_backwards_up_an_edge_is_a_climb_and_no_fall():
-    backwards = drive_path()[::-1]
-    prediction = judge_path(FREE, edge_down(0.1), backwards)[0]
-    assert not prediction.wheel_drop[1:].max() > 0.0
 
 
 def test_into_a_ditch_the_wheels_drop_and_have_to_climb_out():
@@ -166,11 +148,3 @@ def test_the_crest_of_a_slope_is_not_an_edge(degrees):
 def test_a_slope_too_slippery_to_stand_on_is_refused_for_friction_and_not_a_fall():
     prediction, verdict = drive(plane(-0.5, 0.0, half=2.0), friction=0.3)
     assert verdict.code == "friction" and not prediction.wheel_drop.any()
-
-
-@pytest.mark.parametrize("height", [0.08, 0.15])
-def test_a_drop_is_as_deep_with_waypoints_twice_as_far_apart(height):
-    fine, coarse = (
-        drive(edge_down(height), spacing=spacing)[0].wheel_drop.max() for spacing in (0.01, 0.02)
-    )
-    assert fine == pytest.approx(coarse, abs=0.01)

@@ -37,16 +37,6 @@ def test_another_request_is_packed_anew(change, field):
     assert pack_model(ROVER, GROUND).settings[field] == usual
 
 
-def test_another_load_or_cell_size_is_packed_anew():
-    usual = pack_model(ROVER, GROUND)
-    assert (
-        pack_model(ROVER, GROUND, SweepOptions(payload=3.0)).record.linkage["mass"]
-        != usual.record.linkage["mass"]
-    )
-    fine = pack_model(ROVER, Terrain(GROUND.elevation, 0.005)).record.samples
-    assert fine["rows"] != usual.record.samples["rows"]
-
-
 def test_a_load_on_the_tool_is_not_kept():
     loaded = pack_model(ROVER, GROUND, SweepOptions(tool_force=np.array([0.0, 0.0, 5.0])))
     assert loaded.record.linkage["has_tool_load"]

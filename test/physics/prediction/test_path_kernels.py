@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from rover_physics.prediction.path_kernels import (
-    JumpLimits,
-    PathPoints,
+    Crossings,
+    Wheels,
     add_up,
     divide_stretches,
     find_jumps,
@@ -15,17 +15,7 @@ from rover_physics.prediction.path_kernels import (
 from rover_physics.results.record import new_results
 from rover_physics.status import PoseStatus
 
-LIMITS = JumpLimits(
-    max_spacing=0.1,
-    min_spacing=1e-4,
-    height=0.025,
-    reach=0.5,
-    on_servos=False,
-    friction=1.0,
-    torque=1.0,
-    peak_spacing=0.004,
-    fall_spacing=0.006,
-)
+WHEELS = Wheels(0.1, 0.5, 1.0, 1.0, 0.1, False)
 
 
 def results_with(contact_angles, statuses=PoseStatus.SETTLED, heights=0.0):
@@ -47,20 +37,24 @@ def along_x(xs):
     return poses
 
 
+def crossings_of(place, waypoint, poses, results):
+    return Crossings(place, waypoint, np.zeros(len(place), bool), poses, results).views
+
+
 def jumps_of(results, spacing=0.02, joined=None):
     n = len(results)
     ends = np.empty((n, 2), np.int64)
     joined = np.ones(n - 1, bool) if joined is None else np.array(joined)
     poses = along_x(spacing * np.arange(n))
-    count = find_jumps(results, poses, joined, LIMITS, ends)
+    count = find_jumps(results, poses, joined, WHEELS, ends)
     return ends[:count].tolist()
 
 
 def sorted_pieces(results, xs, pieces=4):
     """Return open and closed pieces of one stretch: its ends, then the rows between them."""
     spare = np.empty((2, pieces, 2), np.int64)
-    known = PathPoints(np.empty(0), np.empty(0, np.int64), along_x(xs), results)
-    n_open, n_closed = sort_pieces(np.array([[0, 1]]), pieces, known, LIMITS, spare)
+    known = crossings_of(np.empty(0), np.empty(0, np.int64), along_x(xs), results)
+    n_open, n_closed = sort_pieces(np.array([[0, 1]]), pieces, known, WHEELS, spare)
     return spare[0, :n_open].tolist(), spare[1, :n_closed].tolist()
 
 
@@ -113,7 +107,7 @@ def test_stretches_are_divided_evenly_and_turned_the_shorter_way():
     new_place, new_waypoint, new_poses = np.empty(3), np.empty(3, np.int64), np.empty((3, 3))
     motions, results = np.empty((3, 3)), new_results(2)
     results["motion"] = [[0.03, 0.0, 0.0], [0.02, 0.0, 0.1]]
-    known = PathPoints(place, np.array([4, 4]), poses, results)
+    known = crossings_of(place, np.array([4, 4]), poses, results)
     divide_stretches(ends, 4, known, (new_place, new_waypoint, new_poses, motions))
     assert motions.tolist() == [[0.02, 0.0, 0.1]] * 3
     assert new_place.tolist() == [3.25, 3.5, 3.75] and new_waypoint.tolist() == [4, 4, 4]
@@ -137,16 +131,25 @@ def test_a_piece_is_closed_only_where_it_is_short_or_holds_a_pose_that_does_not_
 
 
 def open_pieces_of_a_peak(friction):
-    """Return how many pieces 5 mm long stay open, with this friction and contacts that turn."""
+    """Return how many pieces 1.5 mm long stay open, with this friction and contacts that turn."""
     results = results_with([0.0, 0.8, 0.2, 0.4, 0.6])
     results["contact_angle"] *= 0.5
     results["friction_utilisation"], results["torque_saturation"] = friction, 0.0
-    return len(sorted_pieces(results, np.array([0.0, 0.02, 0.005, 0.01, 0.015]))[0])
+    return len(sorted_pieces(results, 0.3 * np.array([0.0, 0.02, 0.005, 0.01, 0.015]))[0])
 
 
 def test_peaks_close_to_a_limit_are_searched_more_closely_than_others():
     assert open_pieces_of_a_peak(0.96) == 4
     assert open_pieces_of_a_peak(0.94) == 0
+
+
+@pytest.mark.parametrize(("inside", "count"), [("SETTLED", 1), ("NOT_SETTLED", 0)])
+def test_the_end_of_a_fall_is_searched_unless_no_pose_settles_there(inside, count):
+    results = results_with([-0.9, -0.75, -0.75, -0.75, -0.75])
+    results["friction_utilisation"] = results["torque_saturation"] = 0.0
+    results["wheel_speed"], results["status"][2:] = 0.3, PoseStatus[inside]
+    xs = 0.02 * np.array([0.0, 1.0, 0.25, 0.5, 0.75])
+    assert len(sorted_pieces(results, xs)[0]) == count
 
 
 def test_way_time_and_energy_are_summed_over_settled_stretches():

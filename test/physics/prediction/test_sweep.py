@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sweep: bad arguments, waypoints that stand for themselves, time and energy, several callers."""
 
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import FrozenInstanceError, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rover_physics.errors import ModelError, PoseError, RoverError
+from rover_physics.errors import ModelError, PoseError
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.record import QUANTITIES
 from rover_physics.rover.rover_file import load_rover
@@ -49,14 +48,11 @@ def assert_identical(prediction, expected, rows=slice(None)):
     ("poses", "words"),
     [
         ([0.0, 0.0, 0.0], r"shape \(3,\).*\(n, 3\)"),
-        ([[0.0, 0.0]], r"shape \(1, 2\).*\(n, 3\)"),
-        (np.zeros((2, 4)), r"shape \(2, 4\).*\(n, 3\)"),
         (np.zeros((1, 2, 3)), r"shape \(1, 2, 3\).*\(n, 3\)"),
         (np.zeros((0, 3)), r"shape \(0, 3\).*n >= 1"),
         ([[0.0, 0.0, 0.0], [0.0, NAN, 0.0]], r"y of pose 1 is nan.*finite"),
         ([[INF, 0.0, 0.0]], r"x of pose 0 is inf.*finite"),
         ([[0.0, 0.0, -INF]], r"yaw of pose 0 is -inf.*finite"),
-        ([["here", 0.0, 0.0]], "not numbers"),
         ([[0.0, 0.0, 0.0], [0.0, 0.0]], "not numbers"),
         (None, "poses"),
     ],
@@ -71,11 +67,7 @@ def test_bad_poses_are_refused_by_what_is_wrong_with_them(poses, words):
     [
         ({"policy": "best"}, "'best'.*equal, servo, optimal"),
         ({"friction": 0.0}, r"friction is 0.0.*above 0"),
-        ({"friction": -0.5}, r"friction is -0.5.*above 0"),
-        ({"friction": NAN}, r"friction is nan.*above 0"),
         ({"friction": INF}, r"friction is inf"),
-        ({"max_torque": 0.0}, r"max_torque is 0.0.*above 0"),
-        ({"max_torque": -1.0}, r"max_torque is -1.0.*above 0"),
         ({"max_torque": NAN}, r"max_torque is nan.*above 0"),
         ({"payload": -1.0}, r"payload is -1.0"),
         ({"joint_angles": {"arm_yaw": NAN}}, "arm_yaw"),
@@ -86,36 +78,7 @@ def test_bad_arguments_are_refused_by_name_and_value(arguments, words):
         judge_path(LSR1, LEVEL, POSE, SweepOptions(**arguments))[0]
 
 
-def test_refusals_have_one_root():
-    assert issubclass(PoseError, RoverError)
-    assert issubclass(ModelError, RoverError)
-
-
 # What comes back
-
-
-def test_a_prediction_has_a_row_per_waypoint():
-    prediction = judge_path(LSR1, LEVEL, line(-0.2, 0.2, 7))[0]
-    for name, values in columns(prediction).items():
-        assert len(values) == 7, name
-    for name in GROWING:
-        assert getattr(prediction, name).shape == (7,), name
-    for name in ("wheel_loads", "tangential", "lateral", "torque", "friction_utilisation"):
-        assert getattr(prediction, name).shape == (7, 6), name
-    assert prediction.wheel_centres.shape == (7, 6, 3)
-    assert prediction.rocker_angle.shape == prediction.bogie_angle.shape == (7, 2)
-
-
-def test_a_prediction_cannot_be_reassigned():
-    with pytest.raises(FrozenInstanceError):
-        judge_path(LSR1, LEVEL, POSE)[0].policy = "optimal"
-
-
-def test_whole_numbers_and_lists_are_poses_too():
-    assert_identical(
-        judge_path(LSR1, LEVEL, [[0, 0, 1]])[0],
-        judge_path(LSR1, LEVEL, np.array([[0.0, 0, 1]]))[0],
-    )
 
 
 def test_the_poses_of_the_caller_are_left_alone():
@@ -124,12 +87,6 @@ def test_the_poses_of_the_caller_are_left_alone():
     prediction = judge_path(LSR1, LEVEL, poses)[0]
     assert np.array_equal(poses, before)
     assert np.array_equal(prediction.poses, before)
-
-
-def test_x_and_y_of_the_body_are_those_asked_for():
-    poses = random_poses(3, 50, 2.0)
-    prediction = judge_path(LSR1, fractal(3), poses)[0]
-    assert np.array_equal(prediction.position[:, :2], poses[:, :2])
 
 
 def test_a_full_turn_of_the_heading_changes_nothing():
@@ -172,23 +129,6 @@ def test_no_path_gives_no_prediction():
     assert [one for one, _ in judge_paths(LSR1, LEVEL, [])] == []
 
 
-def test_two_callers_at_once_get_what_each_gets_alone():
-    grounds = [fractal(1), rocky(2)]
-    paths = [random_poses(k, 1500, 2.0) for k in range(2)]
-    alone = [judge_path(LSR1, *pair)[0] for pair in zip(grounds, paths, strict=True)]
-    with ThreadPoolExecutor(4) as callers:
-        together = [
-            callers.submit(judge_path, LSR1, grounds[k % 2], paths[k % 2]) for k in range(8)
-        ]
-        for k, future in enumerate(together):
-            assert_identical(future.result()[0], alone[k % 2])
-
-
-def test_the_same_question_gets_the_same_answer():
-    ground, poses = rocky(3), random_poses(3, 200, 2.0)
-    assert_identical(judge_path(LSR1, ground, poses)[0], judge_path(LSR1, ground, poses)[0])
-
-
 # Time, distance, energy
 
 
@@ -209,10 +149,6 @@ def test_wheels_too_slow_for_the_nominal_speed_set_the_time():
     slow = replace(LSR1, wheel=replace(LSR1.wheel, max_speed=0.1))
     prediction = judge_path(slow, LEVEL, line(-0.3, 0.3))[0]
     assert prediction.time[-1] == pytest.approx(0.6 / (0.1 * 0.10))
-
-
-def test_level_ground_costs_no_energy():
-    assert judge_path(LSR1, LEVEL, line(-0.3, 0.3))[0].energy[-1] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_energy_uphill_is_the_weight_lifted():

@@ -17,7 +17,7 @@ ROVER = load_rover("lsr1")
 ARRAYS = ("position", "wheel_loads", "tangential", "friction_utilisation", "rocker_angle")
 
 
-def path_along(y, count=400):
+def path_along(y, count=150):
     return np.column_stack([np.linspace(-2.5, 2.5, count), np.full(count, y), np.zeros(count)])
 
 
@@ -34,7 +34,7 @@ def test_sweeps_at_once_have_the_bits_of_sweeps_alone():
     found: dict[int, list] = {k: [] for k in range(len(asked))}
 
     def sweep(k):
-        for _ in range(3):
+        for _ in range(2):
             found[k].append(judge_path(ROVER, *asked[k][:2], asked[k][2]))
 
     threads = [threading.Thread(target=sweep, args=(k,)) for k in found]
@@ -43,7 +43,7 @@ def test_sweeps_at_once_have_the_bits_of_sweeps_alone():
     for thread in threads:
         thread.join()
     for k, (prediction, verdict) in enumerate(alone):
-        assert len(found[k]) == 3
+        assert len(found[k]) == 2
         for other, other_verdict in found[k]:
             assert other_verdict == verdict or other_verdict.codes == verdict.codes
             for name in ARRAYS:

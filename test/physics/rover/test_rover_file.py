@@ -116,13 +116,6 @@ def test_an_unknown_key_is_named(key):
     assert refusal(key, 1.0).startswith(f"unknown key {key};")
 
 
-def test_a_misspelt_key_gets_a_suggestion():
-    data = changed("wheel.radius")
-    data["wheel"]["radus"] = 0.1
-    with pytest.raises(RoverFileError, match=r"unknown key wheel\.radus; did you mean radius\?"):
-        rover_from_dict(data, "test")
-
-
 def below(section: str, *keys: str) -> list[str]:
     return [f"{section}.{key}" for key in keys]
 
@@ -247,14 +240,6 @@ def test_a_file_without_the_contents_of_a_rover_is_refused_in_one_line(tmp_path,
         load_rover(path)
     assert "\n" not in str(raised.value)
     assert "<unicode string>" not in str(raised.value)
-
-
-@pytest.mark.parametrize("text", ["1e-1", "'0.1'"])
-def test_a_number_that_yaml_reads_as_text_gets_a_hint(text):
-    value = yaml.safe_load(text)
-    assert isinstance(value, str)
-    said = refusal("wheel.radius", value)
-    assert said.startswith("wheel.radius ") and "as text" in said and "1.0e-3" in said
 
 
 def test_an_unknown_name_lists_the_presets_or_where_was_searched(tmp_path):

@@ -91,8 +91,3 @@ def test_fixed_wheels_of_a_steered_rover_cannot_go_sideways():
     assert not can_follow
     assert angles == pytest.approx([np.pi / 4] * 6)
     assert steer(ALL_STEER, 0.03, 0.03, 0.0)[0]
-
-
-def test_a_wheel_at_the_centre_of_rotation_stands_still_and_ahead():
-    _, angles, rolling = steer(ALL_STEER, 0.031, 0.0, 0.1)  # about the middle left wheel
-    assert angles[4] == 0.0 and rolling[4] == pytest.approx(0.0, abs=1e-15)

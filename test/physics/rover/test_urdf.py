@@ -13,13 +13,16 @@ import yaml
 
 from rover_physics.errors import RoverFileError
 from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_contents import rover_to_dict, save_rover, save_yaml
-from rover_physics.rover.rover_file import load_rover, preset_names
+from rover_physics.rover.rover_file import (
+    load_rover,
+    preset_names,
+    rover_to_dict,
+    save_rover,
+    save_yaml,
+)
 from rover_physics.rover.urdf.joint_map import map_of
-from rover_physics.rover.urdf.levelling import Levelling
-from rover_physics.rover.urdf.read_rover import rover_from_urdf
-from rover_physics.rover.urdf.robot import parse_robot, read_robot
-from rover_physics.rover.urdf.tree import Tree
+from rover_physics.rover.urdf.read_rover import Levelling, rover_from_urdf
+from rover_physics.rover.urdf.robot import Tree, parse_robot, read_robot
 from rover_physics.rover.urdf.write_urdf import write_urdf
 
 

@@ -81,15 +81,6 @@ def test_a_climb_that_stalls_servos_needs_traction_control_and_its_margin_is_tha
     assert "motors stall" in found[2].reason
 
 
-def test_weak_motors_make_torque_the_constraint():
-    found = classify_path(
-        LSR1, plane(0.45, 0.0), POSE, SweepOptions(friction=5.0, max_torque=0.3)
-    )[0]
-    assert (found.traversability_class, found.constraint) == (IMPASSABLE, "torque")
-    assert found.margin < 0.0
-    assert found.wheel in WHEELS
-
-
 def test_limits_that_are_no_wheels_name_no_wheel():
     careful = replace(LSR1, limits=replace(LSR1.limits, tilt=0.1))
     found = classify_path(careful, plane(0.2, 0.0), POSE)[0]
@@ -131,23 +122,6 @@ def test_classes_agree_with_the_verdicts_of_all_policies():
             assert waypoint.constraint in WHEEL_CONSTRAINTS
             assert waypoint.margin >= -1e-9
     assert len(seen) >= 3
-
-
-def test_what_breaks_on_the_way_counts_at_the_waypoint_that_follows():
-    x = np.arange(-1.2, 1.2001, 0.02)
-    ground = plane(0.0, 0.0)
-    step = replace(ground, elevation=np.where(ground.elevation + xs(ground) > 0.6, 0.12, 0.0))
-    poses = np.column_stack([x[15:60], np.zeros(45), np.zeros(45)])
-    classes = classify_path(LSR1, step, poses)
-    optimal = hold_against_limits(
-        LSR1, judge_path(LSR1, step, poses, SweepOptions(policy="optimal"))[0]
-    )
-    for waypoint, reason in zip(classes, optimal.reasons, strict=True):
-        if waypoint.traversability_class == IMPASSABLE:
-            assert waypoint.reason == reason
-    assert any(waypoint.traversability_class == IMPASSABLE for waypoint in classes) == (
-        not optimal.traversable
-    )
 
 
 def xs(ground) -> np.ndarray:

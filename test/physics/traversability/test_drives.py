@@ -27,7 +27,7 @@ def test_there_are_60_drives_of_five_kinds():
     assert {drive.outcome for drive in drives} == {PASSED, "stuck", "tipped"}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_under_optimal_torques_at_least_54_drives_end_as_judged():
     judged = verdicts("optimal")
     assert sum(verdict.traversable == (drive.outcome == PASSED) for drive, verdict in judged) >= 54
@@ -40,7 +40,7 @@ def test_nothing_passable_under_equal_torques_got_stuck_or_tipped():
     assert [drive.label for drive in passable if drive.outcome != PASSED] == []
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_whatever_passed_is_passable_with_traction_control():
     refused = [
         f"{drive.label}: {verdict.reason}"
@@ -50,17 +50,20 @@ def test_whatever_passed_is_passable_with_traction_control():
     assert refused == []
 
 
+@pytest.mark.long
 def test_what_equal_torques_pass_the_best_torques_pass_too():
     pairs = zip(verdicts("equal"), verdicts("optimal"), strict=True)
     assert all(best.traversable for (_, equal), (_, best) in pairs if equal.traversable)
 
 
+@pytest.mark.long
 def test_what_is_refused_is_refused_for_its_forces():
     for drive, verdict in verdicts("optimal"):
         if not verdict.traversable:
             assert verdict.code in {"friction", "torque", "wheel_lift", "tip_over"}, drive.label
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ["slope", "cross_slope", "step"])
 def test_on_slopes_and_steps_every_drive_ends_as_judged(kind):
     for drive, verdict in verdicts("optimal"):

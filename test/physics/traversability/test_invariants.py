@@ -11,15 +11,14 @@ MAY_CHANGE = {"passes", "refining changes it"}
 
 
 @pytest.mark.parametrize("name", ["lsr1", "m2020"])
-@pytest.mark.parametrize("seed", [4, 7, 19, 49, 73, 78, 87, 156])
+@pytest.mark.parametrize("seed", [4, 49, 78])
 def test_more_friction_or_torque_splitting_or_shifting_never_makes_a_verdict_worse(name, seed):
     assert set(changes_of(load_rover(name), seed)) <= MAY_CHANGE
 
 
 @pytest.mark.parametrize(
     "name, seed",
-    [("lsr1", seed) for seed in (34, 73, 215, 245, 292, 488, 830, 845)]
-    + [("m2020", seed) for seed in (57, 158, 198, 230, 564, 695)],
+    [("lsr1", seed) for seed in (34, 215, 830)] + [("m2020", seed) for seed in (57, 230, 695)],
 )
 def test_twice_as_many_waypoints_change_no_verdict(name, seed):
     """Each of them hid a peak of friction, or the begin of a fall, between its waypoints."""

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rover_physics.bounds.path import BOUNDED_VALUES
-from rover_physics.prediction import parts
+from rover_physics.prediction import sweep
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.record import QUANTITIES
@@ -73,10 +73,9 @@ def assert_same(whole: PathPrediction, taken: list[PathPrediction]) -> None:
         np.testing.assert_array_equal(found, getattr(whole, name), err_msg=name)
 
 
-@pytest.mark.parametrize("size", [7, 100])
 @pytest.mark.parametrize("case", CASES)
-def test_all_numbers_and_the_verdict_are_those_of_the_whole_path(case, size, monkeypatch):
-    monkeypatch.setattr(parts, "PART", size)
+def test_all_numbers_and_the_verdict_are_those_of_the_whole_path(case, monkeypatch):
+    monkeypatch.setattr(sweep, "PART", 17)
     terrain, poses, options = CASES[case]
     whole, verdict = judge_path(ROVER, terrain, poses, options)
     taken, found = judge_in_parts(terrain, poses, options)
@@ -84,13 +83,8 @@ def test_all_numbers_and_the_verdict_are_those_of_the_whole_path(case, size, mon
     assert found.to_dict() == verdict.to_dict()
 
 
-def test_the_cases_differ_in_their_verdicts():
-    codes = {judge_path(ROVER, *case)[1].code for case in CASES.values()}
-    assert codes >= {"", "friction", "unknown_ground"} and len(codes) > 3
-
-
 def test_bounds_are_those_of_the_whole_path(monkeypatch):
-    monkeypatch.setattr(parts, "PART", 16)
+    monkeypatch.setattr(sweep, "PART", 16)
     ground = replace(GROUND, elevation_std=np.full_like(GROUND.elevation, 0.003))
     options, poses = SweepOptions(friction=0.7), line(length=2.0)
     whole, verdict = judge_path(ROVER, ground, poses, options, sigmas=2.0)
@@ -102,7 +96,7 @@ def test_bounds_are_those_of_the_whole_path(monkeypatch):
 
 
 def test_a_trap_at_the_end_of_a_long_path_is_found(monkeypatch):
-    monkeypatch.setattr(parts, "PART", 32)
+    monkeypatch.setattr(sweep, "PART", 32)
     x, y = np.meshgrid(np.arange(-6.0, 6.001, 0.05), np.arange(-6.0, 6.001, 0.05))
     radius = np.hypot(x, y)
     bowl = Terrain(np.clip(radius - 1.5, 0.0, 1.0) * np.tan(0.35), 0.05, (-6.0, -6.0))
@@ -115,7 +109,7 @@ def test_a_trap_at_the_end_of_a_long_path_is_found(monkeypatch):
 
 
 def test_no_part_is_much_longer_than_asked_even_where_nothing_settles(monkeypatch):
-    monkeypatch.setattr(parts, "PART", 50)
+    monkeypatch.setattr(sweep, "PART", 50)
     taken, verdict = judge_in_parts(unknown(0.0), line(), SweepOptions())
     assert verdict.code == "unknown_ground"
     assert max(len(part.poses) for part in taken) <= 50

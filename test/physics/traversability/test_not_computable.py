@@ -11,14 +11,13 @@ from hypothesis import strategies as st
 
 from rover_physics.errors import ModelError, RoverError
 from rover_physics.names import EQUAL, OPTIMAL
-from rover_physics.prediction.evaluation import evaluate
 from rover_physics.prediction.map_sweep import score, score_poses
 from rover_physics.prediction.packed_model import pack_model
+from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.sweep import predict_poses
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.record import QUANTITIES
-from rover_physics.rover.rover_contents import rover_to_dict
-from rover_physics.rover.rover_file import load_rover, rover_from_dict
+from rover_physics.rover.rover_file import load_rover, rover_from_dict, rover_to_dict
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.bounded_verdict import refuse_worst_case
@@ -82,7 +81,7 @@ def assert_computed(prediction, verdict):
     )
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(
     places=st.lists(st.sampled_from(NUMBERS), min_size=1, max_size=3),
     number=st.sampled_from(EXTREMES),
@@ -132,7 +131,7 @@ def model_of_infinite_weight():
 
 def test_a_pose_without_numbers_says_so_and_has_none():
     model = model_of_infinite_weight()
-    results = evaluate(model.records, model.limits.records, POSES)
+    results = model.evaluate(POSES)
     assert (results["status"] == PoseStatus.NOT_COMPUTABLE).all()
     for one in QUANTITIES:
         if not (one.of_motion or one.of_path):
@@ -143,8 +142,8 @@ def test_a_pose_without_numbers_says_so_and_has_none():
 def test_a_pose_without_numbers_is_within_no_limits_and_a_reason_of_its_own():
     model = model_of_infinite_weight()
     assert not score(model, POSES, (5,)).passable.any()
-    results = evaluate(model.records, model.limits.records, POSES)
-    verdict = hold_against_limits(LSR1, predict_poses(model, POSES, results))
+    motions = motions_of(model, POSES, np.zeros(5))
+    verdict = hold_against_limits(LSR1, predict_poses(model, POSES, motions))
     assert verdict.code == "not_computable" and "not a finite number" in verdict.reason
 
 

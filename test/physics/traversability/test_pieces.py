@@ -71,7 +71,3 @@ def test_exposure_is_zero_up_to_half_of_all_limits_and_the_whole_time_at_one():
     at_limit = type(LSR1)(**{**LSR1.__dict__, "limits": tight})
     exposure = find_exposure(at_limit, judge_paths(at_limit, ground, [way])[0][0])
     assert exposure == pytest.approx(prediction.time[-1], rel=0.01)
-
-
-def test_no_pieces_have_no_verdicts():
-    assert judge_pieces(LSR1, fractal(1), []) == []

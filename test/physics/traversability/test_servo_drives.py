@@ -58,20 +58,21 @@ def along_traces(*modes: str) -> list[tuple[Curve, np.ndarray, np.ndarray]]:
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_at_least_57_of_60_drives_end_as_judged():
     assert (
         sum(verdict.traversable == (drive.outcome == PASSED) for drive, verdict in drives()) >= 57
     )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_nothing_passable_with_servos_got_stuck_or_tipped():
     passable = [drive for drive, verdict in drives() if verdict.traversable]
     assert len(passable) >= 25
     assert [drive.label for drive in passable if drive.outcome != PASSED] == []
 
 
+@pytest.mark.long
 def test_servos_pass_what_equal_torques_pass_and_optimal_torques_what_servos_pass():
     verdicts = [
         [verdict.traversable for _, _, verdict in judge_drives(policy)]

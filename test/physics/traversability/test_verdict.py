@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from rover_physics.numerics.interruption import interruptible
-from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.path_prediction import tilt_of
 from rover_physics.results.record import numbers_of
 from rover_physics.rover.rover_file import load_rover
@@ -96,12 +95,6 @@ def test_a_value_at_its_limit_is_allowed(fine, name, column, value):
     assert hold_against_limits(LSR1, with_value(fine, name, 2, value, column)).traversable
 
 
-def test_the_limits_are_those_of_the_rover(fine):
-    shy = replace(LSR1, limits=replace(LSR1.limits, belly_clearance=0.25))
-    assert hold_against_limits(LSR1, fine).traversable
-    assert hold_against_limits(shy, fine).code == "belly"
-
-
 @pytest.mark.parametrize(
     ("status", "code", "word"),
     [
@@ -158,14 +151,6 @@ def test_margins_are_the_worst_along_the_settled_part(fine):
     assert verdict.max_tilt == pytest.approx(0.2)
 
 
-def test_margins_of_a_path_that_settles_nowhere_are_nan():
-    nowhere = judge_path(LSR1, plane(0.0, 0.0), POSES + np.array([50.0, 0.0, 0.0]))[0]
-    verdict = hold_against_limits(LSR1, nowhere)
-    assert (verdict.code, verdict.first_failure) == ("off_map", 0)
-    assert np.isnan(verdict.min_tip_over_ratio)
-    assert np.isnan(verdict.min_belly_clearance)
-
-
 def test_tilt_joins_roll_and_pitch(fine):
     assert tilt_of(0.3, 0.4) == pytest.approx(np.arccos(np.cos(0.3) * np.cos(0.4)))
     assert fine.tilt == pytest.approx(tilt_of(fine.roll, fine.pitch), abs=1e-6)
@@ -179,34 +164,6 @@ def test_a_verdict_is_json_with_none_for_what_is_not_finite(fine):
     assert back["code"] == "friction"
     assert back["max_friction_utilisation"] is None
     assert back["codes"] == ["", "", "friction", "", ""]
-
-
-@pytest.mark.parametrize(
-    ("slope", "yaw", "arguments", "code"),
-    [
-        (0.65, 0.0, {}, "tilt"),
-        (0.45, 0.0, {"friction": 0.3}, "friction"),
-        (0.30, 0.0, {"max_torque": 0.3}, "torque"),
-        (0.30, 0.0, {}, ""),
-        (0.45, 0.0, {}, "friction"),
-        (-0.45, 0.0, {"friction": 0.3}, "friction"),
-        (0.45, np.pi / 2, {"friction": 0.3}, "friction"),
-    ],
-)
-def test_slopes_are_refused_for_the_physical_reason(slope, yaw, arguments, code):
-    prediction = judge_path(LSR1, plane(slope, 0.0), [[0.0, 0.0, yaw]], SweepOptions(**arguments))[
-        0
-    ]
-    assert hold_against_limits(LSR1, prediction).code == code
-
-
-def test_a_stone_higher_than_the_belly_is_refused():
-    level = plane(0.0, 0.0)
-    heights = level.elevation.copy()
-    heights[30, 30] = 0.235
-    ground = replace(level, elevation=heights)
-    prediction = judge_path(LSR1, ground, [[0.0, 0.0, 0.0]])[0]
-    assert hold_against_limits(LSR1, prediction).code == "belly"
 
 
 def test_the_reasons_of_many_waypoints_can_be_interrupted(fine):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.rover.turning import tightest_radius
+from rover_physics.rover.steering_joints import tightest_radius
 from rover_planner.planning.angles import wrap
 from rover_planner.planning.lattice.headings import HEADINGS, STEPS, YAWS, opposite
 from rover_planner.planning.lattice.primitives import Gear, make_primitives

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rover_physics.rover.rover_contents import rover_to_dict
+from rover_physics.rover.rover_file import rover_to_dict
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.traversability.judge import judge_path
 from rover_planner.command.view import choose_ends

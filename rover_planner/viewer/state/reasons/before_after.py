@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_contents import rover_to_dict
+from rover_physics.rover.rover_file import rover_to_dict
 from rover_planner.studies.rover_values import get_value, list_values
 from rover_planner.viewer.state.scenario import Judgement, Scenario
 from rover_planner.viewer.state.trajectory import Trajectory
