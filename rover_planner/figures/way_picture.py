@@ -13,13 +13,13 @@ from matplotlib.patheffects import withStroke
 
 from rover_planner.figures.pictures import STYLE, save_figure
 from rover_planner.figures.plots import PASSABLE, REFUSED, hill_shade
-from rover_planner.planning.ways.question import WayQuestion
-from rover_planner.planning.ways.way_search import WayAnswer
+from rover_planner.planning.search.path_search import SearchResult
+from rover_planner.planning.search.query import SearchQuery
 
 _INK = "#222222"
 
 
-def draw_way(path: Path, question: WayQuestion, answer: WayAnswer) -> None:
+def draw_way(path: Path, question: SearchQuery, answer: SearchResult) -> None:
     """Draw the map with start and goal, and the way or the area that is closed in.
 
     Args:
@@ -52,7 +52,7 @@ def draw_way(path: Path, question: WayQuestion, answer: WayAnswer) -> None:
         save_figure(path, figure)
 
 
-def _draw_ground(axes: Axes, question: WayQuestion) -> None:
+def _draw_ground(axes: Axes, question: SearchQuery) -> None:
     terrain = question.terrain
     xmin, xmax, ymin, ymax = terrain.bounds
     half = 0.5 * terrain.resolution
@@ -68,7 +68,7 @@ def _draw_ground(axes: Axes, question: WayQuestion) -> None:
     )
 
 
-def _draw_area(axes: Axes, answer: WayAnswer) -> None:
+def _draw_area(axes: Axes, answer: SearchResult) -> None:
     assert answer.closed is not None
     nodes = answer.nodes
     x, y = (nodes.cell * (first - 0.5) for first in nodes.first)
@@ -93,7 +93,7 @@ def _draw_end(axes: Axes, name: str, pose: np.ndarray, colour: str) -> None:
     )
 
 
-def _title(answer: WayAnswer) -> str:
+def _title(answer: SearchResult) -> str:
     if answer.path is None:
         return answer.reason
     prediction = answer.path.prediction

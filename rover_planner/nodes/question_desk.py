@@ -9,7 +9,7 @@ makes messages of it.
 import contextlib
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -20,14 +20,9 @@ from rclpy.node import Node
 from msg_adapters.results.server_status import search_diagnostics
 from rover_planner.nodes.maps.map_topics import MapTopics
 from rover_planner.planning.answering.budget import STOPPING, Budget, QuestionStoppedError
-from rover_planner.planning.answering.identity import Register
-from rover_planner.planning.answering.question_queue import Asked, Judged, QuestionQueue
-from rover_planner.planning.answering.questions import Answer, Question
-from rover_planner.planning.answering.search_watch import (
-    NewerMapError,
-    SearchReport,
-    SearchWatch,
-)
+from rover_planner.planning.answering.question_queue import Answered, Asked, QuestionQueue
+from rover_planner.planning.answering.questions import Answer, Question, Register
+from rover_planner.planning.answering.search_watch import NewerMapError, SearchWatch
 from rover_planner.planning.answering.server_health import ServerHealth
 from rover_planner.planning.answering.situation import Situation
 from rover_planner.planning.answering.traverse_service import TraverseService
@@ -129,9 +124,9 @@ class QuestionDesk:
         except Exception as error:
             return refuse_error(self._guard, question.service, error, question.refuse)
 
-    def _send(self, judged: list[Judged]) -> None:
+    def _send(self, answered: list[Answered]) -> None:
         """Send the answers to questions."""
-        for inquiry, judgement in judged:
+        for inquiry, judgement in answered:
             assert isinstance(inquiry, Inquiry)
             question, done = inquiry.question, time.monotonic()
             told = f"{inquiry.number}, {question.service}"
@@ -148,16 +143,18 @@ class QuestionDesk:
         """Return a watch that publishes the progress of a question's searches."""
         patience = self._service.settings.lattice.budget
 
-        def tell(report: SearchReport) -> None:
+        def tell(report: dict[str, Any]) -> None:
             self._handover.call(lambda: self._publish_progress(report))
 
         return SearchWatch(lambda: self._service.known_map, tell, patience)
 
-    def _publish_progress(self, report: SearchReport) -> None:
-        text = "a way is found, a better one is searched" if report.found else "no way found yet"
+    def _publish_progress(self, report: dict[str, Any]) -> None:
+        text = (
+            "a way is found, a better one is searched" if report["found"] else "no way found yet"
+        )
         name = self._service.settings.rover.name
         stamp = self._node.get_clock().now().to_msg()
-        self._progress.publish(search_diagnostics(asdict(report), text, name, stamp))
+        self._progress.publish(search_diagnostics(report, text, name, stamp))
 
     def identify(self, service: str, path_hash: str, situation: Situation) -> IdentityReport:
         """Return a new number with what a judgement that nobody asked for is about."""

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Topics and service of the arm in the traverse server: tool target, wrench, `~/check_reach`."""
 
+from dataclasses import replace
+
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from rclpy.node import Node
 from std_srvs.srv import Trigger
@@ -20,7 +22,8 @@ class ReachTopics:
 
     def __init__(self, node: Node, desk: QuestionDesk, map_frame: str, reliability: str):
         self._node, self._desk, self._map_frame = node, desk, map_frame
-        self._query = ReachQuery()
+        self.query = ReachQuery()
+        """The query, with the last target and wrench."""
         for kind, name, take in (
             (PoseStamped, "~/tool_target", self._take_target),
             (WrenchStamped, "~/tool_wrench", self._take_wrench),
@@ -28,24 +31,23 @@ class ReachTopics:
             subscribe_to_requests(node, kind, name, take, reliability)
         serve_later(node, Trigger, "~/check_reach", self._check_reach)
 
-    @property
-    def query(self) -> ReachQuery:
-        """The query, with the last target and wrench."""
-        return self._query
-
     def _take_target(self, message: PoseStamped) -> None:
         try:
-            self._query.take_target(target_to_point(message, self._map_frame))
+            self.query = replace(self.query, target=target_to_point(message, self._map_frame))
         except MessageError as error:
-            self._query.refuse_target(str(error))
+            refusal = f"the last target was refused: {error}"
+            self.query = replace(self.query, target=None, target_refusal=refusal)
             self._node.get_logger().error(f"~/tool_target refused: {error}")
 
     def _take_wrench(self, message: WrenchStamped) -> None:
+        force = moment = None
+        refusal = ""
         try:
-            self._query.take_wrench(*wrench_to_force_and_moment(message, self._map_frame))
+            force, moment = wrench_to_force_and_moment(message, self._map_frame)
         except MessageError as error:
-            self._query.refuse_wrench(str(error))
+            refusal = f"the last wrench was refused: {error}"
             self._node.get_logger().error(f"~/tool_wrench refused: {error}")
+        self.query = replace(self.query, force=force, moment=moment, wrench_refusal=refusal)
 
     def _check_reach(
         self, _request: Trigger.Request, response: Trigger.Response, reply: Reply
@@ -56,7 +58,7 @@ class ReachTopics:
             reply(response)
             self._log(answer.judgement)
 
-        self._desk.ask(ReachCheck("check_reach", "", self._query.copy()), send)
+        self._desk.ask(ReachCheck("check_reach", "", self.query), send)
 
     def _log(self, answer: ReachJudgement) -> None:
         logger = self._node.get_logger()

@@ -51,7 +51,6 @@ from rover_planner.parameters.unknown import warn_of_unknown_parameters
 from rover_planner.planning.answering.budget import CANCELLED
 from rover_planner.planning.answering.judgement import Judgement
 from rover_planner.planning.answering.known_map import stamp_text
-from rover_planner.planning.answering.map_status import MapStatus
 from rover_planner.planning.answering.questions import (
     Answer,
     BadQuestion,
@@ -63,7 +62,7 @@ from rover_planner.planning.answering.server_health import MEMORY
 from rover_planner.planning.answering.service_settings import load_service_settings, map_limits
 from rover_planner.planning.answering.situation import Situation
 from rover_planner.planning.answering.traverse_service import TraverseService
-from rover_planner.planning.path_planner import Pose
+from rover_planner.planning.path_query import Pose
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.deferred_work import DeferredWork
@@ -136,7 +135,6 @@ class TraverseServer(Node):
         )
         self._reach = ReachTopics(self, self.desk, frame, reliability)
         self._map_cloud = MapCloud(self, self._service, frame)
-        self._map_status = MapStatus()
         self.watch = PathWatch(
             self, self._service, self._values, self.guard, self._find_watched, self._tell_stop
         )
@@ -337,9 +335,9 @@ class TraverseServer(Node):
         self._maps.retry()
         now = self.get_clock().now()
         situation = self._service.situation(now.nanoseconds)
-        missing = situation.refuse_map()
+        missing, known = situation.refuse_map(), situation.known_map
         counts = {
-            **self._map_status.describe(situation),
+            **({"map": "none"} if known is None else known.describe(situation.map_age)),
             "open questions": self.desk.open_count,
             "internal errors": self.guard.total,
             **self._hazards.describe(),

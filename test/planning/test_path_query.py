@@ -45,7 +45,7 @@ def test_level_ground_is_traversable_on_the_straight_connection(rover):
     # all are equally safe; the straight one needs the least energy
     assert answer.best == answer.nearest == 0
     assert answer.chosen.length == pytest.approx(4.0)
-    assert answer.chosen.reach == 1.0
+    assert answer.chosen.passable_share == 1.0
     assert "5 of 5" in answer.explain()
 
 
@@ -68,8 +68,10 @@ def test_a_ridge_across_all_candidates_is_refused_with_its_reason(rover):
     assert not answer.traversable
     assert answer.chosen.verdict.reason
     assert answer.chosen.verdict.reason in answer.explain()
-    assert answer.chosen.reach == max(candidate.reach for candidate in answer.candidates)
-    assert 0 < answer.chosen.reach < 1
+    assert answer.chosen.passable_share == max(
+        candidate.passable_share for candidate in answer.candidates
+    )
+    assert 0 < answer.chosen.passable_share < 1
 
 
 def test_the_goal_at_the_start_is_a_single_pose_that_is_judged(rover):
@@ -78,7 +80,7 @@ def test_the_goal_at_the_start_is_a_single_pose_that_is_judged(rover):
     assert answer.chosen.poses.shape == (1, 3)
     outside = answer_path_query(rover, flat(), (99, 0, 0), (99, 0, 0), COARSE)
     assert not outside.traversable
-    assert outside.chosen.reach == 0.0 and outside.chosen.verdict.code == "off_map"
+    assert outside.chosen.passable_share == 0.0 and outside.chosen.verdict.code == "off_map"
     hole = with_heights(flat(), lambda x, y: np.where(x > 2, np.nan, 0.0))
     unknown = answer_path_query(rover, hole, (-2, 0, 0), (4, 0, 0), COARSE)
     assert unknown.chosen.verdict.code == "unknown_ground"

@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The questions of the services as plain values, and their answers."""
+"""The questions of the services as plain values, their answers, and what each is about."""
 
+import secrets
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from rover_planner.planning.answering.judgement import refusal
+from rover_planner.planning.answering.known_map import stamp_text
 from rover_planner.planning.answering.reach_query import ReachQuery, refuse_reach
 from rover_planner.planning.answering.situation import GivenPath, Situation
-from rover_planner.planning.path_planner import Pose
+from rover_planner.planning.path_query import Pose
 from rover_planner.planning.verdict_report import IdentityReport
 
 
@@ -102,3 +104,36 @@ class Answer:
     """What it was judged by."""
     identity: IdentityReport
     """What it is about."""
+
+
+@dataclass
+class Register:
+    """Numbers the questions of a server, and says what each answer is about."""
+
+    server: str = field(default_factory=lambda: secrets.token_hex(4))
+    """Random text of this run of the server."""
+    count: int = 0
+    """Number of the last question."""
+
+    def next_number(self) -> int:
+        """Return the number of a new question, one above the last."""
+        self.count += 1
+        return self.count
+
+    def identify(
+        self, number: int, service: str, question_hash: str, situation: Situation
+    ) -> IdentityReport:
+        """Return what the answer to a question is about, without its path.
+
+        Args:
+            number: Number of the question.
+            service: Name of the service that was called.
+            question_hash: Hash of the request.
+            situation: What was known when it was asked.
+        """
+        known = situation.known_map
+        content, stamp = (
+            ("", "") if known is None else (known.fingerprint, stamp_text(known.stamp))
+        )
+        about = number, service, self.server, question_hash
+        return IdentityReport(*about, "", "", content, stamp, situation.map_age)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Queries whether the arm can reach a target and hold a load there, without ROS."""
 
-import copy
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,55 +29,24 @@ class ReachJudgement:
         """Return the answer in JSON types; unknown values are None or left out."""
         if self.answer is not None:
             return self.answer.to_dict()
-        return {
-            "possible": self.possible,
-            "reachable": False,
-            "code": self.code,
-            "reason": self.reason,
-        }
+        said = {"code": self.code, "reason": self.reason}
+        return {"possible": self.possible, "reachable": False, **said}
 
 
+@dataclass(frozen=True, eq=False)
 class ReachQuery:
-    """Keeps the last target and wrench of the tool and answers queries about them."""
+    """The last target and wrench of the tool, or the reasons why they were refused."""
 
-    def __init__(self) -> None:
-        self._target: NDArray[np.float64] | None = None
-        self._target_refusal = "no target was received yet; publish one on ~/tool_target"
-        self._force: NDArray[np.float64] | None = None
-        self._moment: NDArray[np.float64] | None = None
-        self._wrench_refusal = ""
-
-    @property
-    def target(self) -> NDArray[np.float64] | None:
-        """Target (3,) of the tip [m], map frame; None if there is none or it was refused."""
-        return self._target
-
-    @property
-    def force(self) -> NDArray[np.float64] | None:
-        """Force (3,) [N] on the tip, map frame; None if there is none."""
-        return self._force
-
-    def take_target(self, point: NDArray[np.float64]) -> None:
-        """Keep the target (3,) [m] of the arm's tip, map frame."""
-        self._target = point
-
-    def refuse_target(self, reason: str) -> None:
-        """Discard the target and keep the reason; later queries must not use an outdated one."""
-        self._target = None
-        self._target_refusal = f"the last target was refused: {reason}"
-
-    def take_wrench(self, force: NDArray[np.float64], moment: NDArray[np.float64]) -> None:
-        """Keep force (3,) [N] and moment (3,) [N m] on the tip, map frame."""
-        self._force, self._moment, self._wrench_refusal = force, moment, ""
-
-    def refuse_wrench(self, reason: str) -> None:
-        """Discard the wrench; queries are refused until a valid one arrives."""
-        self._force = self._moment = None
-        self._wrench_refusal = f"the last wrench was refused: {reason}"
-
-    def copy(self) -> "ReachQuery":
-        """Return a query that later targets and wrenches do not change."""
-        return copy.copy(self)
+    target: NDArray[np.float64] | None = None
+    """Target (3,) of the tip [m], map frame; None if there is none or it was refused."""
+    target_refusal: str = "no target was received yet; publish one on ~/tool_target"
+    """Why there is no target: a later query must not use an outdated one."""
+    force: NDArray[np.float64] | None = None
+    """Force (3,) [N] on the tip, map frame; None if there is none."""
+    moment: NDArray[np.float64] | None = None
+    """Moment (3,) [N m] on the tip, map frame; None if there is none."""
+    wrench_refusal: str = ""
+    """Why the last wrench was refused; queries are refused until a valid one arrives."""
 
     def ask(self, situation: Situation) -> ReachJudgement:
         """Judge the rover at the last pose of the last path with its tool at the target.
@@ -92,10 +60,10 @@ class ReachQuery:
         missing = situation.refuse_if_missing()
         if missing is not None:
             return refuse_reach(missing.code, missing.reason)
-        if self._target is None:
-            return refuse_reach("no_target", self._target_refusal)
-        if self._wrench_refusal:
-            return refuse_reach("no_wrench", self._wrench_refusal)
+        if self.target is None:
+            return refuse_reach("no_target", self.target_refusal)
+        if self.wrench_refusal:
+            return refuse_reach("no_wrench", self.wrench_refusal)
         settings = situation.settings
         arm = settings.rover.manipulator
         if arm is None:
@@ -110,10 +78,10 @@ class ReachQuery:
             settings.rover,
             situation.terrain,
             situation.path.poses[-1],
-            self._target,
+            self.target,
             settings.query.model,
-            force=self._force,
-            moment=self._moment,
+            force=self.force,
+            moment=self.moment,
         )
         return ReachJudgement(answer.possible, answer.code, answer.reason, answer)
 

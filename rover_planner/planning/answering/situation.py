@@ -2,14 +2,13 @@
 """All that a traverse server knows when a question is asked, and the answers from it."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rover_physics.results.path_prediction import PathPrediction
+from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.traverse_server import FAN, LATTICE
@@ -17,17 +16,15 @@ from rover_planner.planning.answering.judgement import Judgement, refusal
 from rover_planner.planning.answering.known_map import KnownMap
 from rover_planner.planning.answering.search_watch import SearchWatch
 from rover_planner.planning.answering.service_settings import ServiceSettings
-from rover_planner.planning.answering.suspension_check import compare_suspension
-from rover_planner.planning.lattice.blind_check import BlindCheck, physical
-from rover_planner.planning.lattice.search import Progress
 from rover_planner.planning.path_geometry import densify
-from rover_planner.planning.path_planner import PathPlanner, PathSearch, Pose, add_way
-from rover_planner.planning.path_query import Candidate
+from rover_planner.planning.path_query import Candidate, PathSearch, Pose, add_path
+from rover_planner.planning.search.blind_check import BlindCheck
+from rover_planner.planning.search.edge_memory import EdgeMemory
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.lattice_search import Progress
+from rover_planner.planning.search.path_search import GOAL_REFUSED, START_REFUSED, find_path
+from rover_planner.planning.search.query import SearchQuery
 from rover_planner.planning.verdict_report import SuspensionReport
-from rover_planner.planning.ways.memory import EdgeMemory
-from rover_planner.planning.ways.question import WayQuestion
-from rover_planner.planning.ways.way_search import GOAL_REFUSED, START_REFUSED, find_way
-from rover_planner.worlds.maps.blind_ground import ALLOW
 from rover_planner.worlds.maps.blind_ground import CODE as BLIND
 
 NO_PATH = "no path was received yet; publish one on ~/path"
@@ -97,51 +94,41 @@ class Situation:
         refused = self.refuse_map()
         if refused is not None:
             return refused
-        ends = np.asarray(start, np.float64), np.asarray(goal, np.float64)
+        judge, ends = self._judge(), (np.asarray(start, float), np.asarray(goal, float))
         if self.settings.planner == LATTICE:
-            return self._search_way(ends, None)
-        planner = self._planner()
-        search = planner.search(*ends, tolerance)
-        suspension = self._compare_suspension(planner.predict_standing)
-        search = self._blind.choose(search)
-        judged = _judgement(planner, search.answer.chosen, self._blind, suspension, search)
-        are_on_map = all(planner.terrain.contains(*end[:2]) for end in ends)
+            return self._search_around(judge, ends, None)
+        search = judge.search(*ends, tolerance)
+        judged = self._describe(judge, search.answer.chosen, search)
+        are_on_map = all(judge.terrain.contains(*end[:2]) for end in ends)
         starts_blind = judged.code == BLIND and search.answer.chosen.verdict.first_failure == 0
         is_final = judged.traversable or starts_blind or not are_on_map
         if is_final or self.settings.planner == FAN:
             return judged
-        return self._search_way(ends, judged)
+        return self._search_around(judge, ends, judged)
 
-    def _search_way(self, ends: tuple[Pose, Pose], refused: Judgement | None) -> Judgement:
-        """Search a way around obstacles.
+    def _search_around(
+        self, judge: PathJudge, ends: tuple[Pose, Pose], refused: Judgement | None
+    ) -> Judgement:
+        """Search a path around obstacles.
 
         Args:
+            judge: The model.
             ends: Start and goal.
             refused: The judgement on the candidates; None if none were tried.
         """
-        planner = self._planner()
-        question = WayQuestion(
-            planner.rover,
-            planner.terrain,
-            *ends,
-            planner.options,
-            self._blind if self.settings.blind_ground != ALLOW else None,
-        )
-        answer = find_way(question, self.settings.lattice, self.edge_memory, self._look)
-        if answer.path is not None:
-            candidates = None if refused is None else refused.search
-            way = answer.path
-            search = add_way(candidates, way, ends[1])
-            suspension = self._compare_suspension(planner.predict_standing)
-            return replace(_judgement(planner, way, self._blind, suspension, search), way=answer)
-        if answer.outcome in (START_REFUSED, GOAL_REFUSED) and refused is not None:
-            reason = f"{answer.reason}; the best candidate: {refused.reason}"
-            return replace(refused, reason=reason, way=answer)
-        why = "; ".join(filter(None, (answer.reason, answer.warning)))
+        query = SearchQuery(judge.rover, judge.terrain, *ends, judge.options, judge.blind)
+        found = find_path(query, self.settings.lattice, self.edge_memory, self._look)
+        if found.path is not None:
+            search = add_path(None if refused is None else refused.search, found.path, ends[1])
+            return replace(self._describe(judge, found.path, search), way=found)
+        is_end = found.outcome in (START_REFUSED, GOAL_REFUSED)
+        warning = found.warning if refused is None or not is_end else ""
+        why = "; ".join(filter(None, (found.reason, warning)))
         if refused is None:
-            return replace(refusal(answer.outcome, why), way=answer)
+            return replace(refusal(found.outcome, why), way=found)
+        code = refused.code if is_end else found.outcome
         reason = f"{why}; the best candidate: {refused.reason}"
-        return replace(refused, code=answer.outcome, reason=reason, way=answer)
+        return replace(refused, code=code, reason=reason, way=found)
 
     def _look(self, progress: Progress) -> None:
         """Let the watch look at a search."""
@@ -159,11 +146,9 @@ class Situation:
         if missing is not None:
             return missing
         assert self.path.poses is not None
-        planner = self._planner()
+        judge = self._judge()
         poses = densify(self.path.poses, self.settings.query.waypoint_spacing)
-        candidate = self._blind.hold(planner.check(poses))
-        suspension = self._compare_suspension(planner.predict_standing)
-        return _judgement(planner, candidate, self._blind, suspension)
+        return self._describe(judge, judge.check(poses))
 
     def refuse_if_missing(self) -> Judgement | None:
         """Return a refusal if there is no path or no map to use, else None."""
@@ -180,12 +165,6 @@ class Situation:
             )
         return refusal("stale_map", self.stale_map) if self.stale_map else None
 
-    @property
-    def _blind(self) -> BlindCheck:
-        """Holds paths against what was seen of the map."""
-        assert self.known_map is not None
-        return BlindCheck(self.settings.rover, self.known_map.seen, self.settings.blind_ground)
-
     def compare_standing(self) -> SuspensionReport | None:
         """Compare measured and predicted suspension where the rover stands, if that is known.
 
@@ -194,22 +173,42 @@ class Situation:
         """
         if self.known_map is None:
             return None
-        return self._compare_suspension(self._planner().predict_standing)
+        return self._compare_suspension(self._judge())
 
-    def _planner(self) -> PathPlanner:
-        """Return a planner for the map, the settings and the measured arm angles."""
-        assert self.terrain is not None
-        options = self.settings.query.change(joint_angles=self._manipulator_angles())
-        return PathPlanner(self.settings.rover, self.terrain, options)
+    def _judge(self) -> PathJudge:
+        """Return the model on the map, with the settings and the measured arm angles."""
+        assert self.known_map is not None
+        settings = self.settings
+        options = settings.query.change(joint_angles=self._manipulator_angles())
+        blind = BlindCheck(settings.rover, self.known_map.seen, settings.blind_ground)
+        return PathJudge(settings.rover, self.known_map.terrain, options, blind)
 
-    def _compare_suspension(
-        self, predict: Callable[[NDArray[np.float64]], PathPrediction]
-    ) -> SuspensionReport | None:
-        """Compare measured and predicted suspension where the rover stands, if that is known."""
+    def _describe(
+        self, judge: PathJudge, candidate: Candidate, search: PathSearch | None = None
+    ) -> Judgement:
+        """Return the judgement of a judged path; classes and the rest of it follow on demand."""
+        code, reason = candidate.verdict.code, candidate.verdict.reason
+        suspension = self._compare_suspension(judge)
+        return Judgement(code, reason, candidate, judge, suspension, search)
+
+    def _compare_suspension(self, judge: PathJudge) -> SuspensionReport | None:
+        """Compare measured and predicted suspension where the rover stands.
+
+        None: it is not known where that is, nothing was measured, or the rover does not settle.
+        """
         if self.measured_pose is None:
             return None
-        tolerance = self.settings.suspension_tolerance
-        return compare_suspension(predict(self.measured_pose), self.joints, tolerance)
+        prediction = judge.predict_standing(self.measured_pose)
+        predicted = (*prediction.rocker_angle[0].tolist(), *prediction.bogie_angle[0].tolist())
+        mismatch = {
+            name: self.joints[name] - angle
+            for name, angle in zip(SUSPENSION_JOINTS, predicted, strict=True)
+            if name in self.joints
+        }
+        if not mismatch or not prediction.settled[0]:
+            return None
+        largest = max(abs(difference) for difference in mismatch.values())
+        return SuspensionReport(mismatch, largest <= self.settings.suspension_tolerance)
 
     def _manipulator_angles(self) -> dict[str, float] | None:
         """Return the measured manipulator angles [rad], None (stowed) until all are known."""
@@ -217,27 +216,3 @@ class Situation:
         if not names or any(name not in self.joints for name in names):
             return None
         return {name: self.joints[name] for name in names}
-
-
-def _judgement(
-    planner: PathPlanner,
-    candidate: Candidate,
-    blind: BlindCheck,
-    suspension: SuspensionReport | None,
-    search: PathSearch | None = None,
-) -> Judgement:
-    """Return the judgement of a judged path; classes and the rest of it follow on demand."""
-
-    def judge_rest() -> Judgement:
-        return _judgement(planner, planner.check(candidate.poses), blind, suspension, search)
-
-    return Judgement(
-        candidate.verdict.code,
-        candidate.verdict.reason,
-        candidate,
-        partial(planner.classify, physical(candidate)),
-        suspension,
-        search,
-        find_ground=partial(blind.report, candidate),
-        judge_rest=None if candidate.is_complete else judge_rest,
-    )

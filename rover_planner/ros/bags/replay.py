@@ -20,10 +20,10 @@ from rover_physics.errors import RoverError
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.identity import Register
 from rover_planner.planning.answering.judgement import Judgement, refusal
 from rover_planner.planning.answering.known_map import stamp_text
 from rover_planner.planning.answering.measurements import Measurements
+from rover_planner.planning.answering.questions import Register
 from rover_planner.planning.answering.service_settings import (
     keeper_settings,
     load_service_settings,

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rover_physics.rover.model import Rover
 from rover_physics.rover.turning import can_turn_on_the_spot, swing_radius, tightest_radius
 from rover_planner.planning.angles import wrap
-from rover_planner.planning.lattice.headings import HEADINGS, STEPS, YAWS, opposite
+from rover_planner.planning.search.nodes import HEADINGS, STEPS, YAWS, opposite
 
 CURVES = {1: 2, 2: 1}
 """Number of curves to either side that turn by so many headings."""
@@ -34,6 +34,22 @@ class Gear(IntEnum):
     ON_THE_SPOT = 2
 
 
+PRICES = {Gear.FORWARD: 1.0, Gear.BACKWARD: 1.5, Gear.ON_THE_SPOT: 1.5}
+"""Price of time in each gear: sensors look ahead, and turning on the spot wears the wheels."""
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A piece of path that is driven in one gear."""
+
+    poses: NDArray[np.float64]
+    """(n, 3) waypoints in the order of the drive, x, y [m], yaw [rad], map frame."""
+    gear: Gear
+    """How it is driven."""
+    cost: float = np.nan
+    """Its cost [m of level ground], NaN if it is not judged."""
+
+
 @dataclass(frozen=True, eq=False)
 class Primitive:
     """One piece of path between two nodes."""
@@ -45,13 +61,18 @@ class Primitive:
     gear: Gear
     """How it is driven."""
     length: float
-    """Way of the body origin, or of the outermost wheel on the spot [m]."""
+    """Distance driven by the body origin, or by the outermost wheel on the spot [m]."""
     poses: NDArray[np.float64]
     """(n, 3) waypoints from the first node to the last, x, y [m] from the first node, yaw [rad];
     yaw goes on beyond pi. Read-only: all searches share it."""
 
     def __post_init__(self) -> None:
         self.poses.setflags(write=False)
+
+    @property
+    def least_cost(self) -> float:
+        """Its cost on level ground [m], a bound from below on any ground."""
+        return PRICES[self.gear] * self.length
 
 
 def make_primitives(

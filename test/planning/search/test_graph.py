@@ -6,22 +6,21 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from rover_physics.rover.rover_file import load_rover
-from rover_planner.planning.lattice.difficulty import Difficulty
-from rover_planner.planning.lattice.edges import FAILS, PASSES, Edges, JudgedEdges
-from rover_planner.planning.lattice.graph import Seeds, edge_cost
-from rover_planner.planning.lattice.nodes import nodes_within
-from rover_planner.planning.lattice.primitives import make_primitives
-from rover_planner.planning.lattice.shortest import ShortestPaths
+from rover_planner.planning.search.difficulty import Difficulty
+from rover_planner.planning.search.edges import FAILS, PASSES, Edges
+from rover_planner.planning.search.graph import Seeds, ShortestPaths, edge_cost
+from rover_planner.planning.search.nodes import nodes_within
+from rover_planner.planning.search.primitives import make_primitives
 
-EDGES = Edges(
-    nodes_within(0.2, (0.0, 0.0), (2.4, 2.0)), make_primitives(load_rover("lsr1"), 0.2, 0.1)
-)
+NODES = nodes_within(0.2, (0.0, 0.0), (2.4, 2.0))
+PRIMITIVES = make_primitives(load_rover("lsr1"), 0.2, 0.1)
+EDGES = Edges(NODES, PRIMITIVES)
 
 
 def random_knowledge(seed):
     """Return edges of which half is judged, some refused, and nodes with doubts."""
     rng = np.random.default_rng(seed)
-    known = JudgedEdges(EDGES)
+    known = Edges(NODES, PRIMITIVES)
     judged = rng.random(known.state.shape) < 0.5
     known.state[judged] = rng.choice([PASSES, PASSES, FAILS], judged.sum())
     least = np.tile(EDGES.table.least_cost, (EDGES.nodes.count // 16, 1))

@@ -5,19 +5,18 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rover_physics.rover.model import Rover
 from rover_physics.rover.turning import can_turn_on_the_spot, swing_radius, tightest_radius
 from rover_planner.planning.angles import wrap
 from rover_planner.planning.dubins import dubins_length, dubins_paths
-from rover_planner.planning.lattice.costs import PRICES
-from rover_planner.planning.lattice.headings import HEADINGS, YAWS, nearest_heading
-from rover_planner.planning.lattice.nodes import Nodes
-from rover_planner.planning.lattice.primitives import Gear
+from rover_planner.planning.path_query import Pose
 from rover_planner.planning.point_turn import turn_and_drive
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.nodes import HEADINGS, YAWS, Nodes, nearest_heading
+from rover_planner.planning.search.primitives import PRICES, Gear, Piece
 
-REACH = 3.0
+MAX_DISTANCE = 3.0
 """Largest distance of a node that a curve leads to [cells]."""
 MOST_CURVES = 16
 """Largest number of curves in each gear."""
@@ -28,23 +27,26 @@ LARGEST_TURN = 3
 DETOUR = 1.3
 """Largest length of a curve over the distance of its ends."""
 
-Pose = NDArray[np.float64]
+FRONTIER_PLACES = 48
+"""Number of places at the frontier that are offered to the search."""
+FRONTIER_PRICE = 10.0
+"""Cost of each metre that is left from there to the goal [m of level ground]."""
+FRONTIER_BATCH = 1000
+"""Number of poses at the frontier that the model is asked about at once."""
+
 Ends = Callable[[Pose], tuple[Pose, Pose]]
 """Function of a node's pose that returns the first and the last pose of a piece of path."""
 
 
-@dataclass(frozen=True, eq=False)
-class Connection:
-    """A piece of path between the start or the goal and a node."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Connection(Piece):
+    """A piece of path between the start or the goal and a node; its cost is that on level ground.
+
+    At the frontier of the known ground it is a single pose.
+    """
 
     node: int
     """The node."""
-    gear: Gear
-    """How it is driven."""
-    poses: NDArray[np.float64]
-    """(n, 3) waypoints in the order of the drive, x, y [m], yaw [rad], map frame."""
-    least_cost: float
-    """Cost on level ground [m]."""
     surcharge: float = 0.0
     """Cost that comes to that of driving [m]."""
 
@@ -89,7 +91,7 @@ class _Maker:
                 found.append((PRICES[gear] * length, node, there))
         found.sort(key=lambda one: one[:2])
         return [
-            Connection(node, gear, self._drive(*ends(there), gear), cost)
+            Connection(self._drive(*ends(there), gear), gear, cost, node=node)
             for cost, node, there in found[:MOST_CURVES]
         ]
 
@@ -101,22 +103,22 @@ class _Maker:
         return poses - (0.0, 0.0, np.pi if gear == Gear.BACKWARD else 0.0)
 
     def turns(self, pose: Pose, side: float, ends: Ends) -> list[Connection]:
-        """Return ways that turn, drive straight and turn, if the rover turns on the spot."""
+        """Return paths that turn, drive straight and turn, if the rover turns on the spot."""
         if not can_turn_on_the_spot(self.rover):
             return []
         swing, found = swing_radius(self.rover), []
         for node, there in _turned_nodes(self.nodes, pose, side):
             poses, length = turn_and_drive(*ends(there), swing, self.waypoint_spacing)
             cost = PRICES[Gear.ON_THE_SPOT] * length
-            found.append(Connection(node, Gear.ON_THE_SPOT, poses, cost))
+            found.append(Connection(poses, Gear.ON_THE_SPOT, cost, node=node))
         return found
 
 
 def _nodes_beside(nodes: Nodes, pose: Pose, side: float) -> Iterator[tuple[int, Pose]]:
-    """Yield the nodes within REACH, ahead of a pose (side 1) or behind it (-1), hardly turned."""
+    """Yield the nodes near a pose, ahead of it (side 1) or behind it (-1), hardly turned."""
     ahead = side * np.array([np.cos(pose[2]), np.sin(pose[2])])
     nearest = nearest_heading(pose[2])
-    for place in nodes.places_near(pose, REACH * nodes.cell):
+    for place in nodes.places_near(pose, MAX_DISTANCE * nodes.cell):
         away = nodes.cell * (place + nodes.first) - pose[:2]
         distance = float(np.hypot(*away))
         if distance < 1e-6 or away @ ahead < 0.5 * distance:
@@ -128,7 +130,7 @@ def _nodes_beside(nodes: Nodes, pose: Pose, side: float) -> Iterator[tuple[int, 
 
 def _turned_nodes(nodes: Nodes, pose: Pose, side: float) -> Iterator[tuple[int, Pose]]:
     """Yield the nearest nodes that head away from a pose (side 1) or towards it (-1)."""
-    places = nodes.places_near(pose, REACH * nodes.cell)
+    places = nodes.places_near(pose, MAX_DISTANCE * nodes.cell)
     aways = nodes.cell * (places + nodes.first) - pose[:2]
     for row in np.argsort(np.hypot(*aways.T), kind="stable")[:TURNED_PLACES]:
         x, y = side * aways[row]
@@ -145,3 +147,34 @@ def _node(nodes: Nodes, place: np.ndarray, heading: int) -> tuple[int, Pose]:
 def _about(pose: Pose) -> Pose:
     """Return the pose (3,) that heads the other way."""
     return np.array([pose[0], pose[1], wrap(pose[2] + np.pi)])
+
+
+def connect_frontier(judge: PathJudge, nodes: Nodes, goal: Pose) -> list[Connection]:
+    """Return the nodes nearest to a goal on which the rover can stand, as ends of a path.
+
+    They lie at least a quarter of the wheelbase apart. What is left to the goal has a price.
+    """
+    everywhere = np.arange(0, nodes.count, HEADINGS)
+    away = np.hypot(*(nodes.poses(everywhere)[:, :2] - goal[:2]).T)
+    by_distance = everywhere[np.argsort(away, kind="stable")]
+    found: list[Connection] = []
+    chosen: list[np.ndarray] = []
+    apart, places = 0.25 * judge.rover.wheelbase, max(1, FRONTIER_BATCH // HEADINGS)
+    for first in range(0, len(by_distance), places):
+        some = by_distance[first : first + places]
+        asked = (some[:, None] + np.arange(HEADINGS)).ravel()
+        poses = nodes.poses(asked)
+        stands = np.array([code == "" for code in judge.stand(poses)])
+        for node, pose in zip(asked[stands], poses[stands], strict=True):
+            near = min((np.hypot(*(pose - other)[:2]) for other in chosen), default=np.inf)
+            if 1e-9 < near < apart:
+                continue
+            if near > 1e-9:
+                if len(chosen) == FRONTIER_PLACES:
+                    return found
+                chosen.append(pose)
+            price = FRONTIER_PRICE * float(np.hypot(*(pose - goal)[:2]))
+            found.append(
+                Connection(pose[None, :], Gear.FORWARD, 0.0, node=int(node), surcharge=price)
+            )
+    return found

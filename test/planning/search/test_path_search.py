@@ -11,22 +11,25 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.traversability.judge import judge_path
 from rover_planner.errors import PlanningError
-from rover_planner.planning.lattice.ground_estimate import FULL_DOUBT, estimate_ground
-from rover_planner.planning.lattice.judge import Judge
-from rover_planner.planning.lattice.nodes import nodes_within
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
-from rover_planner.planning.ways.memory import EdgeMemory
-from rover_planner.planning.ways.question import WayQuestion
-from rover_planner.planning.ways.way_search import (
+from rover_planner.planning.search.edge_memory import EdgeMemory
+from rover_planner.planning.search.ground_estimate import FULL_DOUBT, estimate_ground
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.nodes import nodes_within
+from rover_planner.planning.search.path_search import (
     FOUND,
     GOAL_REFUSED,
     NO_WAY,
     OUT_OF_TIME,
     START_REFUSED,
-    LatticeSettings,
-    find_way,
+    find_path,
 )
-from rover_planner.planning.ways.window import choose_window, cut_out
+from rover_planner.planning.search.query import (
+    LatticeSettings,
+    SearchQuery,
+    choose_window,
+    cut_out,
+)
 from support.grounds import make_terrain, waves
 from support.rough_grounds import rocky
 
@@ -48,14 +51,14 @@ def pen(x, y):
 
 
 def ask(terrain, start=START, goal=GOAL, rover=LSR1, **options):
-    return WayQuestion(rover, terrain, start, goal, OPTIONS.change(**options))
+    return SearchQuery(rover, terrain, start, goal, OPTIONS.change(**options))
 
 
 @pytest.fixture(scope="module")
 def around():
     """Return question and answer of a way around a wall."""
     question = ask(make_terrain(wall_with_gap))
-    return question, find_way(question, LONG)
+    return question, find_path(question, LONG)
 
 
 def test_a_way_leads_around_a_wall_that_refuses_all_candidates(around):
@@ -87,7 +90,7 @@ def test_the_same_question_has_the_same_way_to_the_bit_with_any_number_of_thread
     threads = numba.get_num_threads()
     try:
         numba.set_num_threads(1)
-        again = find_way(question, LONG)
+        again = find_path(question, LONG)
     finally:
         numba.set_num_threads(threads)
     np.testing.assert_array_equal(again.path.poses, answer.path.poses)
@@ -95,7 +98,7 @@ def test_the_same_question_has_the_same_way_to_the_bit_with_any_number_of_thread
 
 
 def test_of_a_closed_pen_the_answer_tells_its_area_and_what_closes_it():
-    answer = find_way(ask(make_terrain(pen), (0.0, 0.0, 0.0), (3.0, 0.0, 0.0)), LONG)
+    answer = find_path(ask(make_terrain(pen), (0.0, 0.0, 0.0), (3.0, 0.0, 0.0)), LONG)
     assert answer.outcome == NO_WAY and answer.path is None
     closed = answer.closed
     assert not closed.around_goal and 0.0 < closed.area < 16.0
@@ -106,13 +109,13 @@ def test_of_a_closed_pen_the_answer_tells_its_area_and_what_closes_it():
     cell, (column, row) = answer.nodes.cell, answer.nodes.first
     assert np.abs(cell * (columns + column)).max() < 2.1
     assert np.abs(cell * (rows + row)).max() < 2.1
-    answer = find_way(ask(make_terrain(pen), (3.0, 0.0, 0.0), (0.0, 0.0, 0.0)), LONG)
+    answer = find_path(ask(make_terrain(pen), (3.0, 0.0, 0.0), (0.0, 0.0, 0.0)), LONG)
     assert answer.outcome == NO_WAY and answer.closed.around_goal
 
 
 def test_out_of_time_is_not_no_way():
     question = ask(make_terrain(pen), (0.0, 0.0, 0.0), (3.0, 0.0, 0.0))
-    answer = find_way(question, LatticeSettings(budget=1e-3))
+    answer = find_path(question, LatticeSettings(budget=1e-3))
     assert answer.outcome == OUT_OF_TIME and answer.closed is None
     assert "0.001 s" in answer.reason
 
@@ -122,10 +125,10 @@ def test_ends_where_the_rover_cannot_stand_are_named_with_the_reason():
         return np.where(np.hypot(x - 2.5, y) < 1.0, np.nan, waves(x, y))
 
     ground = make_terrain(holes)
-    answer = find_way(ask(ground))
+    answer = find_path(ask(ground))
     assert answer.outcome == GOAL_REFUSED
     assert answer.reason == "the rover cannot stand at the goal: unknown ground under a wheel"
-    answer = find_way(ask(ground, GOAL, START))
+    answer = find_path(ask(ground, GOAL, START))
     assert answer.outcome == START_REFUSED and "at the start" in answer.reason
 
 
@@ -140,7 +143,7 @@ def test_ends_where_the_rover_cannot_stand_are_named_with_the_reason():
 )
 def test_impossible_ends_are_refused_by_name(start, goal, said):
     with pytest.raises(PlanningError, match=said):
-        find_way(ask(make_terrain(waves), start, goal))
+        find_path(ask(make_terrain(waves), start, goal))
 
 
 @pytest.mark.parametrize("name", ["budget", "cell"])
@@ -152,7 +155,7 @@ def test_impossible_settings_are_refused_by_name(name, value):
 
 def test_a_rover_with_fixed_wheels_finds_a_way_too():
     fixed = replace(LSR1, steering=None)
-    answer = find_way(ask(make_terrain(wall_with_gap), rover=fixed), LONG)
+    answer = find_path(ask(make_terrain(wall_with_gap), rover=fixed), LONG)
     assert answer.outcome == FOUND
     steps = np.diff(answer.path.poses, axis=0)
     assert np.hypot(steps[:, 0], steps[:, 1]).min() > 0.0
@@ -165,8 +168,8 @@ def test_after_a_change_of_the_map_what_is_remembered_gives_the_way_of_a_new_sea
     elevation[np.ix_((x > 1.9) & (x < 2.3), np.abs(x) < 0.1)] += 1.0  # a longer wall
     after = Terrain(elevation, before.resolution, before.origin)
     memory = EdgeMemory()
-    first = find_way(ask(before), LONG, memory)
-    warm, cold = find_way(ask(after), LONG, memory), find_way(ask(after), LONG)
+    first = find_path(ask(before), LONG, memory)
+    warm, cold = find_path(ask(after), LONG, memory), find_path(ask(after), LONG)
     assert not np.array_equal(first.path.poses, cold.path.poses)
     assert warm.outcome == cold.outcome == FOUND
     assert warm.cost == pytest.approx(cold.cost, rel=0.03)
@@ -177,10 +180,10 @@ def test_after_a_change_of_the_map_what_is_remembered_gives_the_way_of_a_new_sea
 
 def test_with_the_same_map_hardly_anything_is_judged_again_but_for_another_friction():
     question, memory = ask(make_terrain(wall_with_gap)), EdgeMemory()
-    first, again = find_way(question, LONG, memory), find_way(question, LONG, memory)
+    first, again = find_path(question, LONG, memory), find_path(question, LONG, memory)
     assert again.edges_judged < 0.5 * first.edges_judged
     assert again.bound <= 1.0201 and again.cost == pytest.approx(first.cost, rel=0.03)
-    assert find_way(ask(question.terrain, friction=0.5), LONG, memory).edges_judged > 0
+    assert find_path(ask(question.terrain, friction=0.5), LONG, memory).edges_judged > 0
 
 
 def test_nodes_without_ground_are_none_on_which_the_rover_can_stand():
@@ -195,7 +198,7 @@ def test_nodes_without_ground_are_none_on_which_the_rover_can_stand():
     groundless = np.flatnonzero(estimate.groundless)
     assert 0.1 * nodes.count < len(groundless) < nodes.count
     chosen = rng.choice(groundless, 2000, replace=False)
-    codes = Judge(LSR1, ground, OPTIONS).stand(nodes.poses(chosen))
+    codes = PathJudge(LSR1, ground, OPTIONS).stand(nodes.poses(chosen))
     assert set(codes) <= {"unknown_ground", "off_map"}
 
 
@@ -203,7 +206,7 @@ def test_nodes_where_tilt_moves_a_wheel_off_unknown_ground_are_only_doubted():
     spirit = load_terrain("spirit")
     nodes = nodes_within(0.04, (-47.12, -19.92), (-45.88, -19.2))
     estimate = estimate_ground(LSR1, spirit, nodes)
-    codes = Judge(LSR1, spirit, OPTIONS).stand(nodes.poses(np.arange(nodes.count)))
+    codes = PathJudge(LSR1, spirit, OPTIONS).stand(nodes.poses(np.arange(nodes.count)))
     stands = np.array([code == "" for code in codes])
     assert not (stands & estimate.groundless).any()
     assert (stands & (estimate.doubt == FULL_DOUBT)).any()
@@ -221,11 +224,11 @@ def test_only_the_heights_around_the_window_are_looked_at():
     assert part.elevation.size < 0.05 * wide.elevation.size
     estimate = estimate_ground(LSR1, part, nodes)
     assert not estimate.groundless.any() and not estimate.doubt.any()
-    assert find_way(question, LONG).outcome == FOUND
+    assert find_path(question, LONG).outcome == FOUND
     wall = np.array(wide.elevation)
     wall[:, 2550] = 3.0
     enclosed = replace(wide, elevation=wall)
-    refused = find_way(replace(question, terrain=enclosed), LatticeSettings(budget=0.3))
+    refused = find_path(replace(question, terrain=enclosed), LatticeSettings(budget=0.3))
     assert refused.outcome in (OUT_OF_TIME, NO_WAY)
     assert "m around start and goal" in refused.reason
 
@@ -240,8 +243,8 @@ def half_known(goal):
 
 def test_a_way_to_unknown_ground_ends_at_the_frontier_only_if_that_is_wanted():
     question = half_known(GOAL)
-    assert find_way(question, LONG).outcome == GOAL_REFUSED
-    answer = find_way(question, replace(LONG, frontier=True))
+    assert find_path(question, LONG).outcome == GOAL_REFUSED
+    answer = find_path(question, replace(LONG, frontier=True))
     assert answer.outcome == FOUND and answer.path.verdict.traversable
     end = answer.path.poses[-1]
     left = np.hypot(*(end[:2] - GOAL[:2]))
@@ -249,12 +252,12 @@ def test_a_way_to_unknown_ground_ends_at_the_frontier_only_if_that_is_wanted():
     # On level ground, a wheel of the rover that stands across the edge is 0.4 m from its middle.
     assert 1.0 < left < 1.7
     known = half_known((0.5, 0.0, 0.0))
-    plain, frontier = find_way(known, LONG), find_way(known, replace(LONG, frontier=True))
+    plain, frontier = find_path(known, LONG), find_path(known, replace(LONG, frontier=True))
     np.testing.assert_array_equal(plain.path.poses, frontier.path.poses)
 
 
 def test_a_lattice_coarser_than_obstacles_is_warned_of():
     question = ask(make_terrain(waves))
-    assert find_way(question, LONG).warning == ""
-    coarse = find_way(question, replace(LONG, cell=0.5))
+    assert find_path(question, LONG).warning == ""
+    coarse = find_path(question, replace(LONG, cell=0.5))
     assert "cell of 0.5 m is larger than 0.40 m" in coarse.warning

@@ -17,9 +17,8 @@ from scipy import ndimage
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.planning.lattice.headings import HEADINGS, YAWS
-from rover_planner.planning.lattice.nodes import Nodes
-from rover_planner.planning.lattice.primitives import Primitive
+from rover_planner.planning.search.nodes import HEADINGS, YAWS, Nodes
+from rover_planner.planning.search.primitives import Primitive
 
 SHARE = 0.25
 """Distance of the places that are looked at [cells of the lattice], at least one of the map."""

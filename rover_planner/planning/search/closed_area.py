@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Why there is no way: the closed area around the start or the goal, and what closes it in."""
+"""Why there is no path: the closed area around the start or the goal, and what closes it in."""
 
-import itertools
 from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_planner.planning.lattice.edges import JudgedEdges
-from rover_planner.planning.lattice.graph import spread
-from rover_planner.planning.lattice.headings import HEADINGS
-from rover_planner.planning.lattice.search import LatticeSearch
+from rover_planner.planning.search.edges import Edges
+from rover_planner.planning.search.graph import spread
+from rover_planner.planning.search.lattice_search import LatticeSearch
+from rover_planner.planning.search.nodes import HEADINGS
 
 _WORDS = {
     "off_map": "the edge of the map",
@@ -52,29 +51,28 @@ def find_closed_area(search: LatticeSearch) -> ClosedArea:
 
     Edges that were not judged count as open, so that the areas are bounds from above.
     """
-    known = search.known
-    for code in itertools.chain(*search.refused_ends()):
-        known.state_of(code)
+    edges = search.edges
+    for ends in search.ends:
+        for code in ends.codes:
+            edges.state_of(code)
     graph, areas = search.shortest.graph(0.0), []
-    for around_goal, seeds, refused in zip(
-        (False, True), search.open_ends(), search.refused_ends(), strict=True
-    ):
-        inside = np.zeros(known.edges.nodes.count, bool)
-        crossing = np.zeros(len(known.codes) + 1, np.int64)
-        spread(graph, seeds, around_goal, inside, crossing)
-        for code in refused:
-            crossing[known.codes.index(code)] += 1
-        areas.append(_describe_area(known, inside, crossing, around_goal))
+    for around_goal, ends in enumerate(search.ends):
+        inside = np.zeros(edges.nodes.count, bool)
+        crossing = np.zeros(len(edges.codes) + 1, np.int64)
+        spread(graph, ends.open_nodes, bool(around_goal), inside, crossing)
+        for code in ends.codes:
+            crossing[edges.codes.index(code)] += 1
+        areas.append(_describe_area(edges, inside, crossing, bool(around_goal)))
     return min(areas, key=lambda one: one.area)
 
 
 def _describe_area(
-    known: JudgedEdges, inside: np.ndarray, crossing: np.ndarray, around_goal: bool
+    edges: Edges, inside: np.ndarray, crossing: np.ndarray, around_goal: bool
 ) -> ClosedArea:
-    nodes = known.edges.nodes
+    nodes = edges.nodes
     places = np.asarray(inside.reshape(*nodes.shape, HEADINGS).any(axis=2))
     counts: Counter[str] = Counter()
-    for code, count in zip([*known.codes, "off_map"], crossing.tolist(), strict=True):
+    for code, count in zip([*edges.codes, "off_map"], crossing.tolist(), strict=True):
         counts[code] += count
     total = max(sum(counts.values()), 1)
     causes = {code: count / total for code, count in counts.most_common() if count}

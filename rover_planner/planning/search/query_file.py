@@ -16,8 +16,7 @@ from rover_physics.terrain.grid import load_terrain, save_terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.errors import PlanningError
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.planning.ways.question import WayQuestion
-from rover_planner.planning.ways.way_search import LatticeSettings
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 
 _ENTRY, _MOST = "way_question", 1_000_000
 
@@ -50,7 +49,7 @@ class _Content:
     settings: LatticeSettings
 
 
-def write_question(path: Path, question: WayQuestion, settings: LatticeSettings) -> None:
+def write_query(path: Path, question: SearchQuery, settings: LatticeSettings) -> None:
     """Write a question to a terrain file (.npz) with one more entry; an old file is replaced.
 
     Raises:
@@ -71,8 +70,8 @@ def write_question(path: Path, question: WayQuestion, settings: LatticeSettings)
     save_terrain(path, question.terrain, **{_ENTRY: text})
 
 
-def read_question(path: Path, max_cells: int = MAX_CELLS) -> tuple[WayQuestion, LatticeSettings]:
-    """Read a question that `write_question` has written.
+def read_query(path: Path, max_cells: int = MAX_CELLS) -> tuple[SearchQuery, LatticeSettings]:
+    """Read a question that `write_query` has written.
 
     Args:
         path: The file.
@@ -91,7 +90,7 @@ def read_question(path: Path, max_cells: int = MAX_CELLS) -> tuple[WayQuestion, 
         raise PlanningError(f"{path} holds no question for a way: {error}") from None
     with errors_of(path):
         asked: _Content = read_as(_Content, content, "a question for a way")
-    question = WayQuestion(
+    question = SearchQuery(
         rover=rover_from_dict(asked.rover, str(path)),
         terrain=terrain,
         start=asked.start,

@@ -16,8 +16,7 @@ from scipy import ndimage
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.planning.lattice.headings import HEADINGS, YAWS
-from rover_planner.planning.lattice.nodes import Nodes
+from rover_planner.planning.search.nodes import HEADINGS, YAWS, Nodes
 
 FULL_DOUBT = 4.0
 """Doubt of nodes near unknown ground: edges that lead there cost 1 + that as much while the search

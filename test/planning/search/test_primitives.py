@@ -9,8 +9,8 @@ import pytest
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.turning import tightest_radius
 from rover_planner.planning.angles import wrap
-from rover_planner.planning.lattice.headings import HEADINGS, STEPS, YAWS, opposite
-from rover_planner.planning.lattice.primitives import Gear, make_primitives
+from rover_planner.planning.search.nodes import HEADINGS, STEPS, YAWS, opposite
+from rover_planner.planning.search.primitives import Gear, make_primitives
 
 SPACING = 0.02
 LSR1 = load_rover("lsr1")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Refuses ways over never seen ground under the belly, as the settings say, and reports it."""
+"""Refuses paths over never seen ground under the belly, as the settings say, and reports it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 
 from rover_physics.rover.model import Rover
 from rover_physics.traversability.verdict import with_refusals
-from rover_planner.planning.path_planner import PathSearch
-from rover_planner.planning.path_query import Candidate, choose
-from rover_planner.planning.verdict_report import GroundReport
+from rover_planner.planning.path_query import Candidate, PathAnswer, choose
 from rover_planner.worlds.maps.blind_ground import ALLOW, CODE, REFUSE, BlindShare, SeenGround
 
 _REFUSED_COST = (float("inf"), float("inf"))
@@ -28,16 +26,15 @@ class BlindCheck:
     rule: str
     """One of BLIND_GROUND."""
 
-    def report(self, candidate: Candidate) -> GroundReport:
+    def share(self, candidate: Candidate) -> BlindShare:
         """Return how much of the ground under the belly was never seen along a path."""
-        share = self._share(candidate)
-        return GroundReport(share.blind_share, share.footprint_share)
+        return self.seen.share(self.rover, candidate.poses)
 
     def hold(self, candidate: Candidate) -> Candidate:
         """Return a traversable path with a refusal where the rule refuses its ground."""
         if self.rule == ALLOW or not candidate.verdict.traversable:
             return candidate
-        share = self._share(candidate)
+        share = self.share(candidate)
         first = share.first_refused(self.rule)
         if first < 0:
             return candidate
@@ -68,24 +65,18 @@ class BlindCheck:
         """Return why the rover may not stand at a pose that `refuses` refuses, in words."""
         return f"ground under the belly that was never seen {self._name_rule()}"
 
-    def choose(self, search: PathSearch) -> PathSearch:
-        """Return a search whose choice is among the candidates that the rule does not refuse.
+    def choose(self, answer: PathAnswer) -> PathAnswer:
+        """Return an answer whose choice is among the candidates that the rule does not refuse.
 
         If it refuses all that are traversable, the best of them is explained.
         """
-        if self.rule == ALLOW or not search.answer.traversable:
-            return search
-        held = tuple(self.hold(candidate) for candidate in search.answer.candidates)
-        answer = choose(held)
-        if not answer.traversable:
-            answer = replace(answer, nearest=search.answer.best)
-        return replace(search, answer=answer)
+        if self.rule == ALLOW or not answer.traversable:
+            return answer
+        held = choose(tuple(self.hold(candidate) for candidate in answer.candidates))
+        return held if held.traversable else replace(held, nearest=answer.best)
 
     def _name_rule(self) -> str:
         return f"(blind_ground is {self.rule})"
-
-    def _share(self, candidate: Candidate) -> BlindShare:
-        return self.seen.share(self.rover, candidate.poses)
 
 
 def physical(candidate: Candidate) -> Candidate:

@@ -12,20 +12,18 @@ that the cost of the shortest path is a bound from below on that of any path on 
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.numerics.interruption import check_interruption
-from rover_planner.planning.lattice.connections import Connection
-from rover_planner.planning.lattice.difficulty import Difficulty, difficulty_of
-from rover_planner.planning.lattice.edges import PASSES, UNJUDGED, JudgedEdges
-from rover_planner.planning.lattice.graph import Seeds
-from rover_planner.planning.lattice.judge import Judge
-from rover_planner.planning.lattice.primitives import Gear
-from rover_planner.planning.lattice.shortest import Route, ShortestPaths
 from rover_planner.planning.path_query import Candidate
+from rover_planner.planning.search.connections import Connection
+from rover_planner.planning.search.difficulty import Difficulty, difficulty_of
+from rover_planner.planning.search.edges import PASSES, UNJUDGED, Edges
+from rover_planner.planning.search.graph import Route, Seeds, ShortestPaths
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.primitives import Piece
 
 CAUTIONS = (1.0, 0.5, 0.0)
 """Weights of the doubts, one after the other; with 0 the search is exact."""
@@ -44,18 +42,6 @@ NEAR_OPTIMAL = 0.02
 """A path is good enough if no path of the lattice costs less by more than this share."""
 
 
-@dataclass(frozen=True, eq=False)
-class Stretch:
-    """A piece of a path."""
-
-    poses: NDArray[np.float64]
-    """(n, 3) waypoints, x, y [m], yaw [rad], map frame."""
-    gear: Gear
-    """How it is driven."""
-    cost: float = np.nan
-    """Its cost [m], NaN if it is not judged."""
-
-
 @dataclass
 class Progress:
     """What a search has found so far."""
@@ -72,7 +58,7 @@ class Progress:
     """Number of edges that the model has judged."""
     first_time: float = np.nan
     """Time of the monotonic clock when the first path was found [s]."""
-    stretches: list[Stretch] = field(default_factory=list)
+    pieces: list[Piece] = field(default_factory=list)
     """The pieces of the best path."""
 
 
@@ -82,9 +68,15 @@ class _Ends:
     def __init__(self, connections: list[Connection]):
         self.connections = connections
         self.nodes = np.array([one.node for one in connections], np.int64)
-        self.costs = np.array([one.least_cost + one.surcharge for one in connections])
+        self.costs = np.array([one.cost + one.surcharge for one in connections])
         self.judged = np.zeros(len(connections), bool)
         self.codes: list[str] = []
+        """Codes of the connections that were refused."""
+
+    @property
+    def open_nodes(self) -> NDArray[np.int64]:
+        """The nodes (k,) of the connections that may pass."""
+        return self.nodes[np.isfinite(self.costs)]
 
     @property
     def seeds(self) -> Seeds:
@@ -92,25 +84,19 @@ class _Ends:
         return Seeds(self.nodes, self.costs)
 
 
-class _Piece(NamedTuple):
-    """A piece of a route that is not judged."""
-
-    poses: NDArray[np.float64]
-    """(n, 3) waypoints."""
-    gear: Gear
-    """How it is driven."""
-    place: tuple[_Ends | None, int]
-    """The end of the search that it connects and its index there, or None and the edge."""
+Open = tuple[Piece, _Ends | None, int]
+"""A piece that is not judged; the ends that it belongs to and its index there, or None and its
+edge."""
 
 
 @dataclass
 class LatticeSearch:
     """A search between two poses over the edges of a lattice."""
 
-    judge: Judge
+    judge: PathJudge
     """The model."""
-    known: JudgedEdges
-    """What is known of the edges; grows with the search."""
+    edges: Edges
+    """The edges; what is known of them grows with the search."""
     starts: list[Connection]
     """Connections from the start to nodes."""
     goals: list[Connection]
@@ -123,25 +109,17 @@ class LatticeSearch:
     """What it has found."""
 
     def __post_init__(self) -> None:
-        self._ends = _Ends(self.starts), _Ends(self.goals)
-        self.shortest = ShortestPaths(self.known, self.doubt, self.difficulty, self._ends[0].seeds)
+        self.ends = _Ends(self.starts), _Ends(self.goals)
+        """What is known of the connections of the start and of the goal."""
+        self.shortest = ShortestPaths(self.edges, self.doubt, self.difficulty, self.ends[0].seeds)
         self._refused: list[tuple[int, int, float]] = []
 
-    def open_ends(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """Return the nodes of the start's and of the goal's connections that may pass."""
-        starts, goals = (ends.nodes[np.isfinite(ends.costs)] for ends in self._ends)
-        return starts, goals
-
-    def refused_ends(self) -> tuple[list[str], list[str]]:
-        """Return the codes of the connections of the start and of the goal that were refused."""
-        starts, goals = self._ends
-        return starts.codes, goals.codes
-
-    def offer(self, stretch: Stretch) -> None:
+    def offer(self, piece: Piece) -> None:
         """Judge a path from start to goal; keep it if it passes and is the best."""
-        cost = self.judge.judge([stretch.poses], [stretch.gear])[0].cost
+        cost = self.judge.judge_pieces([piece])[0].cost
         if cost < self.progress.cost:
-            self._keep([replace(stretch, cost=cost)], self.judge.check(stretch.poses))
+            checked = self.judge.check(piece.poses, stop_at_failure=True)
+            self._keep([replace(piece, cost=cost)], checked)
 
     def run(self, allowed: Callable[["LatticeSearch"], bool]) -> Progress:
         """Search until the best path is found, no path is left, or it is not allowed to go on."""
@@ -157,7 +135,7 @@ class LatticeSearch:
 
     def _step(self, caution: float) -> bool:
         """Find the shortest path and ask the model about it; return whether this phase is over."""
-        starts, goals = (ends.seeds for ends in self._ends)
+        starts, goals = (ends.seeds for ends in self.ends)
         route, progress = self.shortest.find(starts, goals, caution), self.progress
         if route is None:
             progress.exhausted, progress.bound = True, progress.cost
@@ -171,30 +149,25 @@ class LatticeSearch:
         return self._take(route) and caution > 0.0
 
     def _stand_along(self, route: Route) -> bool:
-        """Ask about the nodes of a route; return whether the rover can stand at all new ones.
-
-        Where it cannot, nodes around are asked about too: obstacles are larger than a node.
-        """
-        known, edges = self.known, self.known.edges
+        """Ask about the nodes of a route; return whether the rover can stand at all new ones."""
         ends = self.starts[route.start].node, self.goals[route.goal].node
-        passed = np.unique(np.concatenate([edges.ends(route.edges), ends]))
-        new = passed[known.standing[passed] == UNJUDGED]
-        if not len(new):
-            return True
+        new = self._unjudged(np.unique(np.concatenate([self.edges.ends(route.edges), ends])))
         refused = new[~self._stand(new)]
         self._explore(refused)
         return not len(refused)
+
+    def _unjudged(self, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return those of nodes (n,) at which the model was not asked whether the rover stands."""
+        return nodes[self.edges.standing[nodes] == UNJUDGED]
 
     def _explore(self, refused: NDArray[np.int64]) -> None:
         """Ask about the nodes around refused ones, and around those refused in turn.
 
         Obstacles are larger than a node. The work is in proportion to that of the last search.
         """
-        known, nodes = self.known, self.known.edges.nodes
         allowed = FEW_NODES + round(NODES_ASKED * self.shortest.last_expanded)
         while len(refused) and allowed > 0:
-            around = nodes.around(refused)
-            around = around[known.standing[around] == UNJUDGED][:allowed]
+            around = self._unjudged(self.edges.nodes.around(refused))[:allowed]
             allowed -= len(around)
             refused = around[~self._stand(around)]
 
@@ -202,9 +175,9 @@ class LatticeSearch:
         """Ask whether the rover can stand at nodes (n,)."""
         if not len(nodes):
             return np.ones(0, bool)
-        codes = self.judge.stand(self.known.edges.nodes.poses(nodes))
-        self.known.standing[nodes] = [self.known.state_of(code) for code in codes]
-        return self.known.standing[nodes] == PASSES
+        codes = self.judge.stand(self.edges.nodes.poses(nodes))
+        self.edges.standing[nodes] = [self.edges.state_of(code) for code in codes]
+        return self.edges.standing[nodes] == PASSES
 
     def _judge_route(self, route: Route) -> bool:
         """Judge what is open of a route, the hardest first; return whether all of it passes.
@@ -220,135 +193,117 @@ class LatticeSearch:
             pieces, size = pieces[size:], 2 * size
         return True
 
-    def _hardness(self, piece: "_Piece") -> float:
+    def _hardness(self, piece: Open) -> float:
         """Return how likely a piece is refused; the connections of the ends come first."""
-        side, index = piece.place
-        if side is not None:
+        _, ends, index = piece
+        if ends is not None:
             return np.inf
-        node, k = divmod(index, self.known.edges.width)
-        return float(difficulty_of(self.difficulty, self.known.edges.nodes.shape[1], node, k))
+        node, k = divmod(index, self.edges.width)
+        return float(difficulty_of(self.difficulty, self.edges.nodes.shape[1], node, k))
 
     def _judge_ends(self) -> None:
         """Judge all connections of start or goal if many are refused."""
-        for side in self._ends:
-            if len(side.codes) < MOST_REFUSED or side.judged.all():
+        for ends in self.ends:
+            if len(ends.codes) < MOST_REFUSED or ends.judged.all():
                 continue
-            open_ = np.flatnonzero(~side.judged)
-            stands = self.known.standing[side.nodes[open_]]
-            self._stand(np.unique(side.nodes[open_[stands == UNJUDGED]]))
-            stands = self.known.standing[side.nodes[open_]]
-            pieces = []
-            for k in open_[stands == PASSES]:
-                one = side.connections[k]
-                pieces.append(_Piece(one.poses, one.gear, (side, int(k))))
-            self._judge(pieces)
-            side.judged[:] = True
+            rows = np.flatnonzero(~ends.judged)
+            self._stand(np.unique(self._unjudged(ends.nodes[rows])))
+            stands = self.edges.standing[ends.nodes[rows]] == PASSES
+            self._judge([(ends.connections[k], ends, k) for k in rows[stands].tolist()])
+            ends.judged[:] = True
 
-    def _open_pieces(self, route: Route) -> list["_Piece"]:
+    def _open_pieces(self, route: Route) -> list[Open]:
         """Return the pieces of a route that are not judged, in the order of the drive."""
-        (starts, goals), edges = self._ends, self.known.edges
-        first, last = starts.connections[route.start], goals.connections[route.goal]
-        found = []
-        if not starts.judged[route.start]:
-            found.append(_Piece(first.poses, first.gear, (starts, route.start)))
-        for edge in route.edges[self.known.state.flat[route.edges] == UNJUDGED]:
-            found.append(_Piece(edges.poses(edge), edges.primitive(edge).gear, (None, int(edge))))
-        if not goals.judged[route.goal]:
-            found.append(_Piece(last.poses, last.gear, (goals, route.goal)))
-        return found
+        starts, goals = self.ends
+        open_edges = route.edges[self.edges.state.flat[route.edges] == UNJUDGED]
+        found: list[Open] = [
+            (starts.connections[route.start], starts, route.start),
+            *((self.edges.piece(edge), None, edge) for edge in open_edges.tolist()),
+            (goals.connections[route.goal], goals, route.goal),
+        ]
+        return [one for one in found if one[1] is None or not one[1].judged[one[2]]]
 
-    def _judge(self, pieces: Sequence["_Piece"]) -> list[bool]:
+    def _judge(self, pieces: Sequence[Open]) -> list[bool]:
         """Judge pieces, keep what is found, and return whether they pass."""
         if not pieces:
             return []
-        found = self.judge.judge([one.poses for one in pieces], [one.gear for one in pieces])
-        for piece, judged in zip(pieces, found, strict=True):
-            side, index = piece.place
-            if side is None:
+        found = self.judge.judge_pieces([piece for piece, _, _ in pieces])
+        for (_, ends, index), judged in zip(pieces, found, strict=True):
+            if ends is None:
                 self.progress.judged += 1
-                self.known.write(index, judged.code, judged.cost)
+                self.edges.write(index, judged.code, judged.cost)
                 if judged.code:
                     self._doubt_around(index)
             else:
-                cost = judged.cost + side.connections[index].surcharge
-                side.judged[index], side.costs[index] = True, cost
-                side.codes += [judged.code] if judged.code else []
+                cost = judged.cost + ends.connections[index].surcharge
+                ends.judged[index], ends.costs[index] = True, cost
+                ends.codes += [judged.code] if judged.code else []
         return [not judged.code for judged in found]
 
     def _doubt_around(self, edge: int) -> None:
         """Doubt the edges that lead where a refused edge does."""
-        edges = self.known.edges
-        end = edges.ends(np.array([edge]))
-        self.doubt[edges.nodes.around(end)] += DOUBT
+        end = self.edges.ends(np.array([edge]))
+        self.doubt[self.edges.nodes.around(end)] += DOUBT
 
     def _take(self, route: Route) -> bool:
         """Judge a route as a whole and keep it if it is the best; return whether it passes."""
-        stretches = self._stretches(route)
-        if sum(one.cost for one in stretches) >= self.progress.cost:
+        pieces = self._pieces(route)
+        if sum(one.cost for one in pieces) >= self.progress.cost:
             return True
-        poses, owners = join_pieces([one.poses for one in stretches])
-        candidate = self.judge.check(poses)
-        if not self._keep(stretches, candidate):
+        poses, owners = join_pieces(pieces)
+        candidate = self.judge.check(poses, stop_at_failure=True)
+        if not self._keep(pieces, candidate):
             owner = owners[candidate.verdict.first_failure]
             self._refuse(route, int(owner), candidate.verdict.code)
             return False
         return True
 
-    def _keep(self, stretches: list[Stretch], candidate: Candidate) -> bool:
+    def _keep(self, pieces: list[Piece], candidate: Candidate) -> bool:
         """Keep a path as the best if it passes; return whether it does."""
         if not candidate.verdict.traversable:
             return False
         progress = self.progress
-        progress.best, progress.stretches = candidate, stretches
-        progress.cost = sum(one.cost for one in stretches)
+        progress.best, progress.pieces = candidate, pieces
+        progress.cost = sum(one.cost for one in pieces)
         if np.isnan(progress.first_time):
             progress.first_time = time.perf_counter()
         return True
 
-    def _stretches(self, route: Route) -> list[Stretch]:
+    def _pieces(self, route: Route) -> list[Piece]:
         """Return the pieces of a route that is judged."""
-        (starts, goals), edges = self._ends, self.known.edges
+        starts, goals = self.ends
         first, last = starts.connections[route.start], goals.connections[route.goal]
         return [
-            Stretch(first.poses, first.gear, float(starts.costs[route.start])),
-            *(
-                Stretch(
-                    edges.poses(edge),
-                    edges.primitive(edge).gear,
-                    float(self.known.cost.flat[edge]),
-                )
-                for edge in route.edges
-            ),
-            Stretch(last.poses, last.gear, float(goals.costs[route.goal])),
+            replace(first, cost=float(starts.costs[route.start])),
+            *(self.edges.piece(edge) for edge in route.edges),
+            replace(last, cost=float(goals.costs[route.goal])),
         ]
 
     def _refuse(self, route: Route, piece: int, code: str) -> None:
         """Close a piece of a route for this search: it passes, but the whole path does not."""
-        start_ends, goal_ends = self._ends
+        start_ends, goal_ends = self.ends
         if piece == 0:
             start_ends.costs[route.start] = np.inf
         elif piece == len(route.edges) + 1:
             goal_ends.costs[route.goal] = np.inf
         else:
             edge = int(route.edges[piece - 1])
-            self._refused.append((edge, PASSES, float(self.known.cost.flat[edge])))
-            self.known.write(edge, code, np.inf)
+            self._refused.append((edge, PASSES, float(self.edges.cost.flat[edge])))
+            self.edges.write(edge, code, np.inf)
 
     def _forget_refusals(self) -> None:
         """Let the edges pass again that were closed for this search only."""
         for edge, state, cost in self._refused:
-            self.known.state.flat[edge], self.known.cost.flat[edge] = state, cost
+            self.edges.state.flat[edge], self.edges.cost.flat[edge] = state, cost
         self._refused.clear()
 
 
-def join_pieces(
-    pieces: list[NDArray[np.float64]],
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def join_pieces(pieces: Sequence[Piece]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return the waypoints (n, 3) of pieces that follow each other, and the piece of each (n,)."""
-    parts, owners = [pieces[0][:1]], [np.zeros(1, np.int64)]
+    parts, owners = [pieces[0].poses[:1]], [np.zeros(1, np.int64)]
     for index, piece in enumerate(pieces):
-        parts.append(piece[1:])
-        owners.append(np.full(len(piece) - 1, index))
+        parts.append(piece.poses[1:])
+        owners.append(np.full(len(piece.poses) - 1, index))
     poses = np.concatenate(parts)
     poses[:, 2] = np.arctan2(np.sin(poses[:, 2]), np.cos(poses[:, 2]))
     return poses, np.concatenate(owners)

@@ -11,15 +11,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_planner.planning.lattice.costs import least_cost
-from rover_planner.planning.lattice.difficulty import SAMPLE_SHARE, sample_primitives
-from rover_planner.planning.lattice.headings import HEADINGS
-from rover_planner.planning.lattice.nodes import Nodes
-from rover_planner.planning.lattice.primitives import Primitive
+from rover_planner.planning.search.difficulty import SAMPLE_SHARE, sample_primitives
+from rover_planner.planning.search.nodes import HEADINGS, Nodes
+from rover_planner.planning.search.primitives import Piece, Primitive
 
 UNJUDGED, PASSES, FAILS = 0, 1, 2
 """States of an edge or node; states from FAILS on tell the limit that fails, see
-`JudgedEdges.codes`."""
+`Edges.codes`."""
 
 
 class PrimitiveTable(NamedTuple):
@@ -36,26 +34,44 @@ class PrimitiveTable(NamedTuple):
     where there are fewer."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Edges:
-    """The edges of the nodes of a window; edge `node * P + k` is primitive k of the node."""
+    """The edges of the nodes of a window, with what the model found of them.
+
+    Edge `node * P + k` is primitive k of the node; P is the largest number of primitives.
+    """
 
     nodes: Nodes
     """The nodes."""
     primitives: tuple[tuple[Primitive, ...], ...]
     """The primitives of each heading."""
 
+    def __post_init__(self) -> None:
+        self.width = max(len(own) for own in self.primitives)
+        """Largest number of primitives of a heading, P."""
+        shape = (self.nodes.count, self.width)
+        self.state = np.zeros(shape, np.int8)
+        """(nodes, P) UNJUDGED, PASSES, or FAILS + i for the failure `codes[i]`."""
+        self.cost = np.zeros(shape, np.float32)
+        """(nodes, P) cost [m] where the edge passes."""
+        self.standing = np.zeros(self.nodes.count, np.int8)
+        """(nodes,) as `state`: whether the rover can stand at a node with its wheels ahead."""
+        self.difficulty = np.zeros(shape, np.uint8)
+        """(nodes, P) as `Difficulty.known`."""
+        self.codes: list[str] = []
+        """Codes of the limits that failed so far."""
+
     @cached_property
     def table(self) -> PrimitiveTable:
         """The primitives as arrays."""
-        width = max(len(own) for own in self.primitives)
-        step = np.zeros((HEADINGS, width, 2), np.int64)
-        end, cost = np.full((HEADINGS, width), -1), np.full((HEADINGS, width), np.inf)
+        shape = HEADINGS, self.width
+        step = np.zeros((*shape, 2), np.int64)
+        end, cost = np.full(shape, -1), np.full(shape, np.inf)
         leading: list[list[tuple[int, int]]] = [[] for _ in range(HEADINGS)]
         for heading, own in enumerate(self.primitives):
             for k, primitive in enumerate(own):
                 step[heading, k], end[heading, k] = primitive.step, primitive.end_heading
-                cost[heading, k] = least_cost(primitive)
+                cost[heading, k] = primitive.least_cost
                 leading[primitive.end_heading].append((heading, k))
         back = np.full((HEADINGS, max(map(len, leading)), 2), -1)
         for heading, pairs in enumerate(leading):
@@ -68,11 +84,6 @@ class Edges:
         return sample_primitives(self.primitives, SAMPLE_SHARE * self.nodes.cell)
 
     @property
-    def width(self) -> int:
-        """Largest number of primitives of a heading, P."""
-        return self.table.end_heading.shape[1]
-
-    @property
     def count(self) -> int:
         """Number of edges, those counted that leave the window."""
         return self.nodes.count * self.width
@@ -82,11 +93,12 @@ class Edges:
         node, k = divmod(int(edge), self.width)
         return self.primitives[node % HEADINGS][k]
 
-    def poses(self, edge: int) -> NDArray[np.float64]:
-        """Return the waypoints (n, 3) of an edge, map frame."""
-        node = int(edge) // self.width
+    def piece(self, edge: int) -> Piece:
+        """Return an edge as a piece of path, with its cost if it was judged."""
+        node, primitive = int(edge) // self.width, self.primitive(edge)
         x, y, _ = self.nodes.poses(np.array([node]))[0]
-        return self.primitive(edge).poses + np.array([x, y, 0.0])
+        cost = float(self.cost.flat[edge])
+        return Piece(primitive.poses + np.array([x, y, 0.0]), primitive.gear, cost)
 
     def ends(self, edges: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the nodes (n,) where edges (n,) end; they must be in the window."""
@@ -95,24 +107,6 @@ class Edges:
         step = self.table.step[heading, k]
         place = place + step[:, 1] * self.nodes.shape[1] + step[:, 0]
         return place * HEADINGS + self.table.end_heading[heading, k]
-
-
-class JudgedEdges:
-    """What is known of the edges of a window."""
-
-    def __init__(self, edges: Edges):
-        self.edges = edges
-        shape = (edges.nodes.count, edges.width)
-        self.state = np.zeros(shape, np.int8)
-        """(nodes, P) UNJUDGED, PASSES, or FAILS + i for the failure `codes[i]`."""
-        self.cost = np.zeros(shape, np.float32)
-        """(nodes, P) cost [m] where the edge passes."""
-        self.standing = np.zeros(edges.nodes.count, np.int8)
-        """(nodes,) as `state`: whether the rover can stand at a node with its wheels ahead."""
-        self.difficulty = np.zeros(shape, np.uint8)
-        """(nodes, P) as `Difficulty.known`."""
-        self.codes: list[str] = []
-        """Codes of the limits that failed so far."""
 
     def write(self, edge: int, code: str, cost: float) -> None:
         """Keep what was found of an edge: the code of its failure, "" for none, and its cost."""
@@ -128,8 +122,3 @@ class JudgedEdges:
         """Forget what is known of the nodes at places (k,) and of the edges that begin there."""
         for values in (self.state, self.standing, self.difficulty):
             values.reshape(-1, HEADINGS, *values.shape[1:])[places] = UNJUDGED
-
-    @property
-    def judged(self) -> int:
-        """Number of edges that the model has judged."""
-        return int(np.count_nonzero(self.state))

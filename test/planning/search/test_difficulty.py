@@ -6,16 +6,16 @@ import pytest
 
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.planning.lattice.difficulty import (
+from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.search.difficulty import (
     difficulty_of,
     estimate_difficulty,
     steepest_climb,
 )
-from rover_planner.planning.lattice.edges import Edges, JudgedEdges
-from rover_planner.planning.lattice.judge import Judge
-from rover_planner.planning.lattice.nodes import nodes_within
-from rover_planner.planning.lattice.primitives import Gear, make_primitives
-from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.search.edges import Edges
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.nodes import nodes_within
+from rover_planner.planning.search.primitives import Gear, make_primitives
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.grounds import make_terrain
 
@@ -27,8 +27,7 @@ EDGES = Edges(NODES, make_primitives(LSR1, NODES.cell, 0.04))
 
 def difficulties(ground):
     """Return the difficulties (n,) of the edges that stay in the window, and the edges."""
-    known = JudgedEdges(EDGES)
-    lists = EDGES.samples, known.difficulty
+    lists = EDGES.samples, np.zeros_like(EDGES.difficulty)
     estimate = estimate_difficulty(LSR1, ground, NODES, CLIMB, lists)
     edges = []
     for node in range(NODES.count):
@@ -47,11 +46,11 @@ def test_edges_that_the_model_refuses_are_the_more_difficult_ones(seed):
     ground = make_mars_terrain(seed, rock_cover=0.15, crater_density=0.0, size=6.0)
     estimate, edges = difficulties(ground)
     chosen = np.random.default_rng(seed).choice(len(edges), 500, replace=False)
-    judge = Judge(LSR1, ground, PathQueryOptions(waypoint_spacing=0.04).change(control_margin=0.0))
-    asked = edges[chosen]
-    verdicts = judge.judge(
-        [EDGES.poses(edge) for edge in asked], [EDGES.primitive(edge).gear for edge in asked]
+    judge = PathJudge(
+        LSR1, ground, PathQueryOptions(waypoint_spacing=0.04).change(control_margin=0.0)
     )
+    asked = edges[chosen]
+    verdicts = judge.judge_pieces([EDGES.piece(edge) for edge in asked])
     refused = np.array([verdict.code != "" for verdict in verdicts])
     assert 20 < refused.sum() < 480
     passed, failed = estimate[chosen][~refused], estimate[chosen][refused]

@@ -7,17 +7,23 @@ PRICE x its difficulty more.
 """
 
 import heapq
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rover_physics.numerics.kernels import allocating_kernel, exact_kernel
-from rover_planner.planning.lattice.difficulty import Difficulty, difficulty_of
-from rover_planner.planning.lattice.edges import FAILS, PASSES, PrimitiveTable
-from rover_planner.planning.lattice.headings import HEADINGS
+from rover_planner.planning.search.difficulty import Difficulty, difficulty_of
+from rover_planner.planning.search.edges import FAILS, PASSES, Edges, PrimitiveTable
+from rover_planner.planning.search.nodes import HEADINGS
 
 PRICE = 4.0
 """Price of a unit of difficulty with a caution of 1 [cells]."""
+SLACK = 1.1
+"""Costs to the goal are measured up to this multiple of the cost from start to goal."""
+FEW = 500
+"""Number of nodes that a search may expand beside those of its path before it counts as misled."""
 
 
 class Graph(NamedTuple):
@@ -26,11 +32,11 @@ class Graph(NamedTuple):
     table: PrimitiveTable
     """The primitives."""
     state: np.ndarray
-    """(nodes, P) states of the edges, see `JudgedEdges`."""
+    """(nodes, P) states of the edges, see `Edges`."""
     cost: np.ndarray
     """(nodes, P) costs [m] of the edges that pass."""
     standing: np.ndarray
-    """(nodes,) states of the nodes, see `JudgedEdges`."""
+    """(nodes,) states of the nodes, see `Edges`."""
     doubt: np.ndarray
     """(nodes,) doubt that edges to a node pass, 0 for none."""
     difficulty: Difficulty
@@ -319,3 +325,82 @@ def _neighbour(graph, node, i, backwards):
     if other < 0:
         return np.int64(-1), np.int64(2**30)
     return np.int64(other), np.int64(max(graph.state[edge_node, k], graph.standing[other]))
+
+
+@dataclass(frozen=True)
+class Route:
+    """A path over the lattice, from one of the start's connections to one of the goal's."""
+
+    start: int
+    """Index of the connection at the start."""
+    edges: NDArray[np.int64]
+    """(k,) edges from there."""
+    goal: int
+    """Index of the connection at the goal."""
+    cost: float
+    """Its cost [m] by what is known."""
+
+
+class ShortestPaths:
+    """Searches one lattice between fixed ends again and again, while edges are judged."""
+
+    def __init__(
+        self,
+        edges: Edges,
+        doubt: NDArray[np.float32],
+        difficulty: Difficulty,
+        starts: Seeds,
+    ):
+        """Search from about the nodes of the first seeds; later ones must be among them."""
+        self._edges, self._doubt, self._difficulty = edges, doubt, difficulty
+        nodes, count = edges.nodes, edges.nodes.count
+        self._to_goal = ToGoal(np.empty(count), *nodes.surround(starts.nodes), nodes.cell)
+        self._limit, self._measured = np.inf, 0
+        self._tree = Tree(np.empty(count), np.empty(count, np.int64))
+        self._caution, self._misled = -1.0, 0
+        self.expanded = 0
+        """Number of nodes expanded by all searches."""
+        self.last_expanded = 0
+        """Number of nodes expanded by the last search."""
+
+    def find(self, starts: Seeds, goals: Seeds, caution: float) -> Route | None:
+        """Return the shortest path, None if there is none.
+
+        Args:
+            starts: Nodes of the start's connections and their costs [m].
+            goals: Nodes of the goal's connections and their costs [m].
+            caution: Weight of the doubts.
+        """
+        graph = self.graph(caution)
+        if caution != self._caution:
+            self._measure(graph, starts, goals)
+            self._caution = caution
+        to_goal = self._to_goal, self._limit
+        goal, cost, expanded = find_shortest(graph, starts, goals, to_goal, self._tree)
+        self.expanded, self.last_expanded = self.expanded + expanded, expanded
+        self._misled += max(0, expanded - FEW)
+        if self._misled > self._measured:  # the costs to the goal are worn out
+            self._measure(graph, starts, goals)
+        if goal < 0:
+            return None
+        start, edges = self._follow_back(int(goals.nodes[goal]))
+        return Route(start, edges, int(goal), float(cost))
+
+    def graph(self, caution: float) -> Graph:
+        """Return the lattice as kernels read it."""
+        edges = self._edges
+        known = edges.state, edges.cost, edges.standing, self._doubt, self._difficulty
+        return Graph(edges.table, *known, caution, *edges.nodes.shape)
+
+    def _measure(self, graph: Graph, starts: Seeds, goals: Seeds) -> None:
+        """Measure the costs to the goal again."""
+        self._misled = 0
+        self._limit, self._measured = measure_to_goal(graph, goals, starts, SLACK, self._to_goal)
+
+    def _follow_back(self, node: int) -> tuple[int, NDArray[np.int64]]:
+        """Return the start's connection and the edges (k,) that lead to a node."""
+        edges, width = [], self._edges.width
+        while (edge := int(self._tree.parent[node])) >= 0:
+            edges.append(edge)
+            node = edge // width
+        return -1 - edge, np.array(edges[::-1], np.int64)

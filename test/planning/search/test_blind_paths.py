@@ -9,13 +9,13 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.parameters.traverse_server import LATTICE, TraverseServerParameters
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
-from rover_planner.planning.lattice.blind_check import BlindCheck
-from rover_planner.planning.lattice.judge import Judge
-from rover_planner.planning.lattice.primitives import Gear
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.planning.ways.memory import EdgeMemory
-from rover_planner.planning.ways.question import WayQuestion
-from rover_planner.planning.ways.way_search import FOUND, START_REFUSED, LatticeSettings, find_way
+from rover_planner.planning.search.blind_check import BlindCheck
+from rover_planner.planning.search.edge_memory import EdgeMemory
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.path_search import FOUND, START_REFUSED, find_path
+from rover_planner.planning.search.primitives import Gear, Piece
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from rover_planner.worlds.maps.blind_ground import (
     ALLOW_FOOTPRINT,
     ASSUMED,
@@ -38,10 +38,10 @@ def flat_with_hole() -> Terrain:
     return Terrain(np.where(hole, np.nan, 0.0), 0.05, (-1.0, -2.0))
 
 
-def ask(rule: str, seen: SeenGround | None = None, start=START) -> WayQuestion:
+def ask(rule: str, seen: SeenGround | None = None, start=START) -> SearchQuery:
     ground = flat_with_hole()
     check = BlindCheck(LSR1, seen or seen_ground(ground, None), rule)
-    return WayQuestion(LSR1, ground, start, GOAL, OPTIONS, check)
+    return SearchQuery(LSR1, ground, start, GOAL, OPTIONS, check)
 
 
 @pytest.mark.parametrize("rule", [REFUSE, ALLOW_FOOTPRINT])
@@ -64,11 +64,12 @@ def test_a_search_leads_around_what_the_rule_refuses(rule):
 
 def test_pieces_and_single_poses_are_refused_by_the_rule_as_paths_are():
     question = ask(REFUSE)
-    judge = Judge(LSR1, question.terrain, OPTIONS, blind=question.blind)
+    judge = PathJudge(LSR1, question.terrain, OPTIONS, blind=question.blind)
     straight = np.zeros((40, 3))
     straight[:, 0] = np.linspace(0.0, 1.5, 40)
     aside = straight + np.array([0.0, 1.0, 0.0])
-    over, beside = judge.judge([straight, aside], [Gear.FORWARD] * 2)
+    pieces = [Piece(poses, Gear.FORWARD) for poses in (straight, aside)]
+    over, beside = judge.judge_pieces(pieces)
     assert (over.code, over.cost) == (CODE, np.inf) and beside.code == ""
     codes = judge.stand(np.array([(1.5, 0.0, 0.0), (1.5, 1.0, 0.0), (-0.9, 1.0, 0.0)]))
     assert codes == (CODE, "", "off_map")
@@ -77,20 +78,20 @@ def test_pieces_and_single_poses_are_refused_by_the_rule_as_paths_are():
 
 
 def test_a_start_on_refused_ground_is_refused_with_the_rule():
-    answer = find_way(ask(REFUSE, start=(1.5, 0.0, 0.0)), LONG)
+    answer = find_path(ask(REFUSE, start=(1.5, 0.0, 0.0)), LONG)
     assert answer.outcome == START_REFUSED
     assert "never seen (blind_ground is refuse)" in answer.reason
 
 
 def test_what_is_seen_later_is_judged_anew():
-    plain = find_way(WayQuestion(LSR1, flat_with_hole(), START, GOAL, OPTIONS), LONG)
+    plain = find_path(SearchQuery(LSR1, flat_with_hole(), START, GOAL, OPTIONS), LONG)
     assert plain.outcome == FOUND and np.abs(plain.path.poses[:, 1]).max() < 0.05
     memory, seen = EdgeMemory(), seen_ground(flat_with_hole(), None)
-    around = find_way(ask(ALLOW_FOOTPRINT), LONG, memory)
+    around = find_path(ask(ALLOW_FOOTPRINT), LONG, memory)
     kinds = np.where(seen.kinds == 0, 0, ASSUMED).astype(np.uint8)
     filled = SeenGround(seen.terrain, kinds)
-    warm = find_way(ask(ALLOW_FOOTPRINT, filled), LONG, memory)
+    warm = find_path(ask(ALLOW_FOOTPRINT, filled), LONG, memory)
     assert np.abs(around.path.poses[:, 1]).max() > 0.2
     assert np.abs(warm.path.poses[:, 1]).max() < 0.05
-    other = find_way(ask(REFUSE, filled), LONG, memory)
+    other = find_path(ask(REFUSE, filled), LONG, memory)
     assert np.abs(other.path.poses[:, 1]).max() > 0.2

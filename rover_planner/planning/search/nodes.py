@@ -2,7 +2,9 @@
 """The nodes of the lattice: places on a square grid, each with sixteen headings.
 
 Nodes lie at whole multiples of the cell in the map frame, wherever the map begins, so that what
-is known of them stays valid when the map rolls with the rover.
+is known of them stays valid when the map rolls with the rover. Each heading points from a node to
+another one at most two cells away, so that straight lines hit nodes (the set of Nav2's Smac
+planner).
 """
 
 from dataclasses import dataclass
@@ -10,7 +12,30 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_planner.planning.lattice.headings import HEADINGS, YAWS
+from rover_planner.planning.angles import wrap
+
+HEADINGS = 16
+"""Number of headings; the first points along x, the others follow to the left."""
+_QUARTER = ((1, 0), (2, 1), (1, 1), (1, 2))
+STEPS: tuple[tuple[int, int], ...] = (
+    *_QUARTER,
+    *((-y, x) for x, y in _QUARTER),
+    *((-x, -y) for x, y in _QUARTER),
+    *((y, -x) for x, y in _QUARTER),
+)
+"""Step (x, y) [cells] from a node to the next one straight ahead, for each heading."""
+YAWS = np.arctan2(*np.array(STEPS, float).T[::-1])
+"""(16,) yaw of each heading [rad, in -pi to pi]."""
+
+
+def opposite(heading: int) -> int:
+    """Return the heading that points the other way."""
+    return (heading + HEADINGS // 2) % HEADINGS
+
+
+def nearest_heading(yaw: float) -> int:
+    """Return the heading nearest to a yaw [rad]."""
+    return int(np.argmin(np.abs(wrap(YAWS - yaw))))
 
 
 @dataclass(frozen=True)
