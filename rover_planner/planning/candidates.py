@@ -77,15 +77,20 @@ def generate_candidates(
     Raises:
         PlanningError: An argument is NaN or out of range, or the path has more than MAX_WAYPOINTS.
     """
-    start = _check_pose("start", start)
-    goal = _check_pose("goal", goal)
-    _check_count(count)
-    _check_positive("spacing", spacing)
-    _check_positive("waypoint_spacing", waypoint_spacing)
-    _check_positive("min_radius", min_radius)
-    _check_length(start, goal, waypoint_spacing)
-
-    chord = float(np.hypot(*(goal[:2] - start[:2])))
+    start, goal = check_pose("start", start), check_pose("goal", goal)
+    if not (isinstance(count, int | np.integer) and count >= 1):
+        raise PlanningError(f"count is {count!r}; it must be a whole number of at least 1")
+    lengths = {"spacing": spacing, "waypoint_spacing": waypoint_spacing, "min_radius": min_radius}
+    for name, value in lengths.items():
+        if not (np.isfinite(value) and value > 0.0):
+            raise PlanningError(f"{name} is {value!r}; it must be a finite number above 0")
+    with np.errstate(over="ignore"):
+        chord = float(np.hypot(*(goal[:2] - start[:2])))
+    if not chord / waypoint_spacing < MAX_WAYPOINTS:
+        raise PlanningError(
+            f"the goal is {chord:.4g} m from the start: in steps of {waypoint_spacing} m that is "
+            f"more than {MAX_WAYPOINTS} waypoints"
+        )
     turn = abs(wrap(goal[2] - start[2]))
     if chord <= _SAME_PLACE and turn <= _SAME_PLACE:
         return [goal[None, :].copy()]
@@ -196,35 +201,18 @@ def _pin_ends(path: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarr
     return path
 
 
-def _check_pose(name: str, pose) -> np.ndarray:
+def check_pose(name: str, pose) -> np.ndarray:
+    """Return a pose (3,) x, y [m] and yaw [rad, in -pi to pi], checked.
+
+    Raises:
+        PlanningError: It is something else, or not finite.
+    """
     try:
         values = np.array(pose, dtype=float)
     except (TypeError, ValueError):
-        raise PlanningError(f"{name} is {pose!r}; it is three numbers x, y, yaw") from None
-    if values.shape != (3,):
-        raise PlanningError(f"{name} has shape {values.shape}; it is three numbers x, y, yaw")
-    if not np.isfinite(values).all():
-        raise PlanningError(f"{name} is {values.tolist()}; x, y and yaw must be finite")
+        values = np.empty(0)
+    if values.shape != (3,) or not np.isfinite(values).all():
+        given = values.tolist() if values.size else repr(pose)
+        raise PlanningError(f"{name} is {given}; it must be three finite numbers x, y, yaw")
     values[2] = wrap(values[2])
     return values
-
-
-def _check_count(count) -> None:
-    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
-        raise PlanningError(f"count is {count!r}; it must be a whole number of at least 1")
-
-
-def _check_positive(name: str, value) -> None:
-    number = isinstance(value, int | float | np.integer | np.floating)
-    if not number or not np.isfinite(value) or value <= 0:
-        raise PlanningError(f"{name} is {value!r}; it must be a finite number above 0")
-
-
-def _check_length(start: np.ndarray, goal: np.ndarray, waypoint_spacing: float) -> None:
-    with np.errstate(over="ignore"):
-        chord = float(np.hypot(*(goal[:2] - start[:2])))
-    if not chord / waypoint_spacing < MAX_WAYPOINTS:
-        raise PlanningError(
-            f"the goal is {chord:.4g} m from the start: in steps of {waypoint_spacing} m that is "
-            f"more than {MAX_WAYPOINTS} waypoints"
-        )

@@ -8,16 +8,10 @@ from hypothesis import strategies as st
 
 from rover_planner.planning.dubins import dubins_paths
 
-METRES = st.floats(-20.0, 20.0)
-ANGLES = st.floats(-2 * np.pi, 2 * np.pi)
-POSES = st.tuples(METRES, METRES, ANGLES)
+POSES = st.tuples(st.floats(-20.0, 20.0), st.floats(-20.0, 20.0), st.floats(-6.3, 6.3))
 
 
-def angle_between(a, b):
-    return np.abs(np.angle(np.exp(1j * (np.asarray(a) - np.asarray(b)))))
-
-
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=50, deadline=None)
 @given(POSES, POSES, st.floats(0.2, 3.0))
 def test_every_dubins_word_ends_at_the_goal(start, goal, radius):
     start, goal = np.array(start), np.array(goal)
@@ -26,7 +20,7 @@ def test_every_dubins_word_ends_at_the_goal(start, goal, radius):
     for x, y, yaw in paths:
         assert x[-1] == pytest.approx(goal[0], abs=1e-6)
         assert y[-1] == pytest.approx(goal[1], abs=1e-6)
-        assert angle_between(yaw[-1], goal[2]) < 1e-6
+        assert np.cos(yaw[-1] - goal[2]) == pytest.approx(1.0, abs=1e-12)
 
 
 def test_the_shortest_dubins_path_of_a_known_case_has_the_known_length():

@@ -81,9 +81,6 @@ def test_the_goal_at_the_start_is_a_single_pose_that_is_judged(rover):
     outside = answer_path_query(rover, flat(), (99, 0, 0), (99, 0, 0), COARSE)
     assert not outside.traversable
     assert outside.chosen.passable_share == 0.0 and outside.chosen.verdict.code == "off_map"
-    hole = with_heights(flat(), lambda x, y: np.where(x > 2, np.nan, 0.0))
-    unknown = answer_path_query(rover, hole, (-2, 0, 0), (4, 0, 0), COARSE)
-    assert unknown.chosen.verdict.code == "unknown_ground"
 
 
 def test_options_reach_the_model(rover):
@@ -93,10 +90,6 @@ def test_options_reach_the_model(rover):
     assert answer_path_query(rover, slope, (-2, 0, 0), (2, 0, 0), grippy).traversable
     refused = answer_path_query(rover, slope, (-2, 0, 0), (2, 0, 0), slippery)
     assert refused.chosen.verdict.code == "friction"
-    weak = COARSE.change(max_torque=0.05)
-    assert answer_path_query(rover, slope, (-2, 0, 0), (2, 0, 0), weak).chosen.verdict.code == (
-        "torque"
-    )
 
 
 def test_the_safer_path_wins_and_energy_decides_between_equals(rover):
@@ -110,17 +103,6 @@ def test_the_safer_path_wins_and_energy_decides_between_equals(rover):
         thrifty, verdict=dataclasses.replace(thrifty.verdict, traversable=False)
     )
     assert choose((risky, safe, refused)).best == 1
-
-
-def test_risk_is_one_at_a_limit(rover):
-    pose = np.array([[0.0, 0.0, 0.0]])
-    assert 0 < check_path(rover, flat(), pose, COARSE).verdict.risk < 1
-    clearance = check_path(rover, flat(), pose, COARSE).verdict.min_belly_clearance
-    for limit in ({"tip_over_ratio": 1.0 - 1e-9}, {"belly_clearance": clearance - 1e-9}):
-        limits = dataclasses.replace(rover.limits, **limit)
-        at_limit = dataclasses.replace(rover, limits=limits)
-        verdict = check_path(at_limit, flat(), pose, COARSE).verdict
-        assert verdict.traversable and verdict.risk == pytest.approx(1.0)
 
 
 def test_on_an_uncertain_map_the_bounds_are_the_risk(rover):

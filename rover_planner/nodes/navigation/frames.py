@@ -15,11 +15,13 @@ from msg_adapters.errors import MessageError
 from msg_adapters.frames import read_transform
 from msg_adapters.paths import pose_to_array
 from msg_adapters.stamps import stamp_to_ns
-from rover_planner.planning.navigation.rigid_poses import move_path, read_pose, write_pose
 from rover_planner.planning.navigation.transforms import (
     Rigid,
     TransformError,
     TransformTree,
+    move_path,
+    read_pose,
+    write_pose,
 )
 
 TF_DEPTH = 100

@@ -26,8 +26,8 @@ from rover_planner.planning.navigation.monitor import (
     PathMonitor,
     Sight,
     WatchSettings,
+    describe_watch,
 )
-from rover_planner.planning.navigation.monitor_health import describe_watch
 from rover_planner.planning.navigation.watched_path import WatchedPath
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.handover import Handover

@@ -7,9 +7,8 @@ from rclpy.node import Node
 from msg_adapters.stamps import stamp_to_ns
 from rover_planner.nodes.navigation.frames import Frames
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.navigation.rigid_poses import read_pose
 from rover_planner.planning.navigation.sensor_mounts import sensor_poses
-from rover_planner.planning.navigation.transforms import Rigid, TransformError
+from rover_planner.planning.navigation.transforms import Rigid, TransformError, read_pose
 
 
 class SensorFrames(Frames):

@@ -1,18 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Watches a drive: judges the rest of the accepted path again, and says when to stop."""
+"""Watches a drive: judges the rest of the accepted path again, and says when to stop and why."""
 
+import math
 import time
+from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.answering.judgement import Judgement, refusal
+from rover_planner.planning.answering.server_health import ERROR, OK, WARN, Health
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.situation import GivenPath, Situation
-from rover_planner.planning.navigation.drift import SuspensionDrift
 from rover_planner.planning.navigation.watched_path import Place, WatchedPath
+from rover_planner.planning.verdict_report import SuspensionReport
 
 IDLE, WATCHING, STOPPED, ARRIVED = "idle", "watching", "stopped", "arrived"
 """States of a monitor."""
@@ -74,7 +79,38 @@ class Finding:
     @property
     def drift(self) -> float:
         """The largest difference of a suspension angle [rad], NaN if it is not known."""
-        return max((abs(value) for value in self.mismatch.values()), default=float("nan"))
+        return max((abs(value) for value in self.mismatch.values()), default=math.nan)
+
+
+class SuspensionDrift:
+    """The differences of measured and predicted suspension angles in the last seconds."""
+
+    def __init__(self, seconds: float):
+        """Keep the differences of so many seconds."""
+        self._seconds = seconds
+        self._kept: deque[tuple[float, Mapping[str, float]]] = deque()
+
+    def take(self, report: SuspensionReport | None, now: float) -> None:
+        """Keep a comparison made at time `now` [s]; None if there was none."""
+        if report is not None:
+            self._kept.append((now, report.suspension_mismatch))
+        while self._kept and now - self._kept[0][0] > self._seconds:
+            self._kept.popleft()
+
+    def forget(self) -> None:
+        """Forget all differences."""
+        self._kept.clear()
+
+    @property
+    def latest(self) -> Mapping[str, float]:
+        """The last difference, measured minus predicted, by joint [rad]; empty without one."""
+        return self._kept[-1][1] if self._kept else {}
+
+    def lasting(self) -> float:
+        """Return the size that was exceeded all the time [rad]; 0 before the time is over."""
+        if not self._kept or self._kept[-1][0] - self._kept[0][0] < 0.8 * self._seconds:
+            return 0.0
+        return min(max(abs(value) for value in kept.values()) for _, kept in self._kept)
 
 
 class PathMonitor:
@@ -218,3 +254,42 @@ class PathMonitor:
 
 def _check(situation: Situation, poses: NDArray[np.float64]) -> Judgement:
     return replace(situation, path=GivenPath(poses, "")).check_path()
+
+
+def describe_watch(finding: Finding, enabled: bool, tolerance: float) -> Health:
+    """Return level, text and values of a finding.
+
+    Args:
+        finding: What was found last.
+        enabled: Whether accepted paths are watched.
+        tolerance: Difference of measured and predicted suspension angles [rad] that is no warning.
+    """
+    values = {"monitor": enabled, **_values_of(finding)}
+    drifts = finding.drift > tolerance
+    drift = (
+        f"measured and predicted suspension differ by {finding.drift:.3f} rad, "
+        f"tolerance {tolerance:.3f} rad"
+    )
+    if enabled and finding.state == STOPPED and finding.judgement is not None:
+        return Health(
+            ERROR, f"stop ({finding.judgement.code}): {finding.judgement.reason}", values
+        )
+    if drifts:
+        return Health(WARN, drift, values)
+    if not enabled:
+        return Health(OK, "no path is watched: the parameter monitor is false", values)
+    return Health(OK, "no path to watch" if finding.state == IDLE else finding.state, values)
+
+
+def _values_of(finding: Finding) -> dict[str, Any]:
+    place = finding.place
+    values: dict[str, Any] = {"state": finding.state, "path_hash": finding.path_hash}
+    values["judgements"] = finding.judged
+    if place is not None:
+        values["remaining"] = f"{place.remaining:.3f} m"
+        values["offset"] = f"{place.offset:.3f} m"
+    if finding.mismatch:
+        values["suspension_drift"] = f"{finding.drift:.4f} rad"
+    for joint, difference in finding.mismatch.items():
+        values[f"mismatch {joint}"] = f"{difference:+.4f} rad"
+    return values

@@ -14,8 +14,7 @@ from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.plain_values import to_plain
 from rover_physics.rover.turning import tightest_radius
 from rover_planner.errors import PlanningError
-from rover_planner.planning.angles import wrap
-from rover_planner.planning.candidates import generate_candidates, path_length
+from rover_planner.planning.candidates import check_pose, generate_candidates, path_length
 from rover_planner.planning.dubins import dubins_paths
 from rover_planner.planning.path_query import Candidate
 from rover_planner.planning.search.closed_area import ClosedArea, find_closed_area
@@ -322,18 +321,13 @@ class _PathFinder:
 
 def _check_end(name: str, query: SearchQuery, *, may_be_off_map: bool) -> NDArray[np.float64]:
     """Return the start or the goal (3,), checked."""
-    pose = np.array(getattr(query, name), dtype=float)
-    if pose.shape != (3,) or not np.isfinite(pose).all():
-        raise PlanningError(
-            f"{name} is {pose.tolist()}; it must be three finite numbers x, y, yaw"
-        )
+    pose = check_pose(name, getattr(query, name))
     if not (may_be_off_map or query.terrain.contains(pose[0], pose[1])):
         xmin, xmax, ymin, ymax = query.terrain.bounds
         raise PlanningError(
             f"{name} is at ({pose[0]:g}, {pose[1]:g}), off the map, which goes from x {xmin:g} to "
             f"{xmax:g} and y {ymin:g} to {ymax:g} m"
         )
-    pose[2] = wrap(pose[2])
     return pose
 
 

@@ -12,9 +12,8 @@ from msg_adapters.odometry import odometry_to_pose, odometry_to_tilt
 from msg_adapters.paths import path_to_poses
 from msg_adapters.stamps import stamp_to_ns
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.navigation.rigid_poses import move_path, read_pose
 from rover_planner.planning.navigation.sensor_mounts import sensor_poses
-from rover_planner.planning.navigation.transforms import Rigid, TransformTree
+from rover_planner.planning.navigation.transforms import Rigid, TransformTree, move_path, read_pose
 
 
 class RecordedFrames:

@@ -61,7 +61,7 @@ def test_gaps_are_filled_or_not_as_the_settings_say_even_afterwards():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("tolerance", [0.05, 0.3, 0.9])
+@pytest.mark.parametrize("tolerance", [0.3, 0.9])
 def test_no_goal_beyond_the_tolerance_is_taken(tolerance):
     wall = make_terrain(wall_at(2.0))
     goal = np.array([1.9, 0.0, 0.0])
@@ -72,10 +72,10 @@ def test_no_goal_beyond_the_tolerance_is_taken(tolerance):
     assert judgement.traversable == (tolerance == 0.9)
 
 
-@pytest.mark.parametrize("tolerance", [-0.1, math.nan, math.inf])
-def test_an_impossible_tolerance_is_refused(tolerance):
-    with pytest.raises(PlanningError, match="tolerance is"):
-        make_service(make_terrain(waves)).answer((0, 0, 0), (1, 0, 0), tolerance)
+def test_an_impossible_tolerance_is_refused():
+    for tolerance in (-0.1, math.nan, math.inf):
+        with pytest.raises(PlanningError, match="tolerance is"):
+            make_service().answer((0, 0, 0), (1, 0, 0), tolerance)
 
 
 def test_a_refused_path_is_forgotten():

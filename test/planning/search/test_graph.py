@@ -61,7 +61,7 @@ def explicit_costs(known, graph):
 
 def test_the_shortest_path_is_that_of_dijkstra_whatever_is_known():
     found = 0
-    for seed in range(12):
+    for seed in range(6):
         known, *estimates = random_knowledge(seed)
         rng = np.random.default_rng(seed + 100)
         free = np.flatnonzero(known.standing == 0)
@@ -81,7 +81,7 @@ def test_the_shortest_path_is_that_of_dijkstra_whatever_is_known():
             firsts = route.edges // EDGES.width
             np.testing.assert_array_equal(ends[:-1], firsts[1:])
             assert firsts[0] == starts.nodes[route.start] and ends[-1] == goals.nodes[route.goal]
-    assert found > 10
+    assert found > 4
 
 
 def test_a_search_goes_on_after_edges_are_refused_and_is_exact_again():
@@ -92,7 +92,7 @@ def test_a_search_goes_on_after_edges_are_refused_and_is_exact_again():
         Seeds(np.array([16 * 100]), np.zeros(1)),
     )
     search, before = ShortestPaths(known, *estimates, starts), 0.0
-    for _ in range(60):
+    for _ in range(30):
         route = search.find(starts, goals, 0.0)
         assert route is not None and route.cost >= before - 1e-9
         before = route.cost

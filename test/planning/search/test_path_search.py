@@ -45,9 +45,9 @@ def wall_with_gap(x, y):
 
 
 def pen(x, y):
-    """Return waves with a wall of 1 m around a square of 4 m."""
+    """Return waves with a wall of 1 m around a square of 3 m."""
     edge = np.maximum(np.abs(x), np.abs(y))
-    return waves(x, y) + np.where(np.abs(edge - 2.0) < 0.1, 1.0, 0.0)
+    return waves(x, y) + np.where(np.abs(edge - 1.5) < 0.1, 1.0, 0.0)
 
 
 def ask(terrain, start=START, goal=GOAL, rover=LSR1, **options):
@@ -82,33 +82,37 @@ def test_the_way_passes_as_any_path_does_and_ends_where_it_was_asked_to(around):
 def test_a_search_that_ends_by_itself_is_near_the_best_and_judges_few_edges(around):
     _, answer = around
     assert answer.repeatable and 1.0 <= answer.bound <= 1.0201
-    assert 0 < answer.edges_judged < 0.1 * answer.edges
+    assert 0 < answer.edges_judged < 0.1 * answer.edges and answer.warning == ""
 
 
-def test_the_same_question_has_the_same_way_to_the_bit_with_any_number_of_threads(around):
-    question, answer = around
-    threads = numba.get_num_threads()
+def test_the_same_query_has_the_same_path_to_the_bit_with_any_number_of_threads(around):
+    query, answer = around
+    threads, memory = numba.get_num_threads(), EdgeMemory()
     try:
         numba.set_num_threads(1)
-        again = find_path(question, LONG)
+        again = find_path(query, LONG, memory)
     finally:
         numba.set_num_threads(threads)
     np.testing.assert_array_equal(again.path.poses, answer.path.poses)
     assert (again.edges_judged, again.cost) == (answer.edges_judged, answer.cost)
+    known = find_path(query, LONG, memory)  # hardly anything is judged again
+    assert known.edges_judged < 0.5 * answer.edges_judged
+    assert known.bound <= 1.0201 and known.cost == pytest.approx(answer.cost, rel=0.03)
+    assert find_path(ask(query.terrain, friction=0.5), LONG, memory).edges_judged > 0
 
 
 def test_of_a_closed_pen_the_answer_tells_its_area_and_what_closes_it():
     answer = find_path(ask(make_terrain(pen), (0.0, 0.0, 0.0), (3.0, 0.0, 0.0)), LONG)
     assert answer.outcome == NO_WAY and answer.path is None
     closed = answer.closed
-    assert not closed.around_goal and 0.0 < closed.area < 16.0
+    assert not closed.around_goal and 0.0 < closed.area < 9.0
     assert sum(closed.causes.values()) == pytest.approx(1.0)
     assert not {"off_map", "unknown_ground"} & set(closed.causes)
     assert f"{closed.area:.1f} m2" in answer.reason
     rows, columns = np.nonzero(closed.places)
     cell, (column, row) = answer.nodes.cell, answer.nodes.first
-    assert np.abs(cell * (columns + column)).max() < 2.1
-    assert np.abs(cell * (rows + row)).max() < 2.1
+    assert np.abs(cell * (columns + column)).max() < 1.6
+    assert np.abs(cell * (rows + row)).max() < 1.6
     answer = find_path(ask(make_terrain(pen), (3.0, 0.0, 0.0), (0.0, 0.0, 0.0)), LONG)
     assert answer.outcome == NO_WAY and answer.closed.around_goal
 
@@ -136,21 +140,15 @@ def test_ends_where_the_rover_cannot_stand_are_named_with_the_reason():
     ("start", "goal", "said"),
     [
         ((-9.0, 0.0, 0.0), GOAL, "start is at .-9, 0., off the map, which goes from x -4"),
-        (START, (0.0, 4.5, 0.0), "goal is at .0, 4.5., off the map"),
-        ((np.nan, 0.0, 0.0), GOAL, "start is .nan, 0.0, 0.0.; it must be three finite"),
         (START, (0.0, 0.0), "goal is .0.0, 0.0.; it must be three finite numbers x, y, yaw"),
     ],
 )
-def test_impossible_ends_are_refused_by_name(start, goal, said):
+def test_impossible_ends_and_settings_are_refused_by_name(start, goal, said):
     with pytest.raises(PlanningError, match=said):
         find_path(ask(make_terrain(waves), start, goal))
-
-
-@pytest.mark.parametrize("name", ["budget", "cell"])
-@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
-def test_impossible_settings_are_refused_by_name(name, value):
-    with pytest.raises(PlanningError, match=f"{name} is {value}; it must be a finite number"):
-        LatticeSettings(**{name: value})
+    for name, value in (("budget", np.nan), ("cell", 0.0)):
+        with pytest.raises(PlanningError, match=f"{name} is {value}; it must be a finite number"):
+            LatticeSettings(**{name: value})
 
 
 def test_a_rover_with_fixed_wheels_finds_a_way_too():
@@ -176,14 +174,6 @@ def test_after_a_change_of_the_map_what_is_remembered_gives_the_way_of_a_new_sea
     assert 0 < warm.edges_judged < cold.edges_judged
     _, verdict = judge_path(LSR1, after, warm.path.poses, OPTIONS.model)
     assert verdict.traversable
-
-
-def test_with_the_same_map_hardly_anything_is_judged_again_but_for_another_friction():
-    question, memory = ask(make_terrain(wall_with_gap)), EdgeMemory()
-    first, again = find_path(question, LONG, memory), find_path(question, LONG, memory)
-    assert again.edges_judged < 0.5 * first.edges_judged
-    assert again.bound <= 1.0201 and again.cost == pytest.approx(first.cost, rel=0.03)
-    assert find_path(ask(question.terrain, friction=0.5), LONG, memory).edges_judged > 0
 
 
 def test_nodes_without_ground_are_none_on_which_the_rover_can_stand():
@@ -251,13 +241,8 @@ def test_a_way_to_unknown_ground_ends_at_the_frontier_only_if_that_is_wanted():
     assert f"{left:.1f} m before it" in answer.reason
     # On level ground, a wheel of the rover that stands across the edge is 0.4 m from its middle.
     assert 1.0 < left < 1.7
-    known = half_known((0.5, 0.0, 0.0))
-    plain, frontier = find_path(known, LONG), find_path(known, replace(LONG, frontier=True))
-    np.testing.assert_array_equal(plain.path.poses, frontier.path.poses)
 
 
 def test_a_lattice_coarser_than_obstacles_is_warned_of():
-    question = ask(make_terrain(waves))
-    assert find_path(question, LONG).warning == ""
-    coarse = find_path(question, replace(LONG, cell=0.5))
+    coarse = find_path(ask(make_terrain(waves)), replace(LONG, cell=0.5))
     assert "cell of 0.5 m is larger than 0.40 m" in coarse.warning
