@@ -105,8 +105,8 @@ def _felt_surface(terrain: Terrain, radius: float) -> NDArray[np.float32]:
             unknown, return_distances=False, return_indices=True
         )
         elevation = elevation[tuple(nearest)]
-    reach = int(radius / terrain.resolution)
-    offset = terrain.resolution * np.arange(-reach, reach + 1)
+    cells = int(radius / terrain.resolution)
+    offset = terrain.resolution * np.arange(-cells, cells + 1)
     below = radius**2 - offset[:, None] ** 2 - offset**2
     shape = np.where(below >= 0.0, np.sqrt(np.maximum(below, 0.0)) - radius, 0.0)
     felt: NDArray[np.float32] = ndimage.grey_dilation(
@@ -152,10 +152,10 @@ def _below_wheels(
         along: (ny, nx) slopes along the drive, absolute values.
         shifts: (6, 2) cells in x and y from the body origin to the wheels.
     """
-    (ny, nx), reach = steepness.shape, int(np.abs(shifts).max())
-    steepness, along = (np.pad(values, reach, mode="edge") for values in (steepness, along))
+    (ny, nx), margin = steepness.shape, int(np.abs(shifts).max())
+    steepness, along = (np.pad(values, margin, mode="edge") for values in (steepness, along))
     mean, most = np.zeros((ny, nx), np.float32), np.zeros((ny, nx), np.float32)
-    for column, row in shifts + reach:
+    for column, row in shifts + margin:
         place = slice(row, row + ny), slice(column, column + nx)
         mean += steepness[place]
         np.maximum(most, along[place], out=most)

@@ -65,7 +65,7 @@ class ToGoal(NamedTuple):
     """(nodes,) cost to the goal [m], too high or infinite where it is not known."""
     focus: np.ndarray
     """(2,) row and column of the place that was measured towards, the start."""
-    reach: float
+    radius: float
     """Distance of the start's connections from there [m]."""
     cell: float
     """Distance of neighbouring nodes [m]."""
@@ -100,11 +100,35 @@ def edge_cost(graph, node, k, end):
 
 
 @exact_kernel
-def node_at(graph, row, column, heading):
-    """Return the node at a place, -1 if it is outside the window."""
+def _neighbour(graph, node, i, backwards):
+    """Return the other node of an edge, the node where the edge begins, and its number there.
+
+    The other node is -1 if it is outside the window; all are -1 if there is no such edge.
+
+    Args:
+        graph: Graph.
+        node: A node.
+        i: Number of the edge among those that begin, or end, at the node.
+        backwards: Whether those that end there are meant.
+    """
+    none = np.int64(-1)
+    heading, place = node % HEADINGS, node // HEADINGS
+    if backwards:
+        other_heading, k = graph.table.back[heading, i, 0], graph.table.back[heading, i, 1]
+        if other_heading < 0:
+            return none, none, none
+        step, sign = graph.table.step[other_heading, k], -1
+    else:
+        other_heading, k = graph.table.end_heading[heading, i], np.int64(i)
+        if other_heading < 0:
+            return none, none, none
+        step, sign = graph.table.step[heading, k], 1
+    row = place // graph.columns + sign * step[1]
+    column = place % graph.columns + sign * step[0]
+    other = none
     if 0 <= row < graph.rows and 0 <= column < graph.columns:
-        return (row * graph.columns + column) * HEADINGS + heading
-    return -1
+        other = np.int64((row * graph.columns + column) * HEADINGS + other_heading)
+    return other, other if backwards else np.int64(node), k
 
 
 @exact_kernel
@@ -113,7 +137,7 @@ def _from_start(to_goal, columns, node):
     place = node // HEADINGS
     rows = place // columns - to_goal.focus[0]
     along = place % columns - to_goal.focus[1]
-    return max(to_goal.cell * np.hypot(rows, along) - to_goal.reach, 0.0)
+    return max(to_goal.cell * np.hypot(rows, along) - to_goal.radius, 0.0)
 
 
 @exact_kernel
@@ -173,14 +197,10 @@ def measure_to_goal(graph, goals, starts, slack, to_goal):
 def _enter_before(graph, node, to_goal, heap):
     """Enter the nodes from which an edge leads to a node."""
     distance = to_goal.cost
-    heading, place = node % HEADINGS, node // HEADINGS
-    row, column = place // graph.columns, place % graph.columns
     for i in range(graph.table.back.shape[1]):
-        first, k = graph.table.back[heading, i, 0], graph.table.back[heading, i, 1]
-        if first < 0:
+        before, _, k = _neighbour(graph, node, i, True)
+        if k < 0:
             break
-        step = graph.table.step[first, k]
-        before = node_at(graph, row - step[1], column - step[0], first)
         if before < 0:
             continue
         cost = distance[node] + edge_cost(graph, before, k, node)
@@ -239,15 +259,11 @@ def find_shortest(graph, starts, goals, to_goal, tree):
 def _enter_after(graph, node, to_goal, tree, heap):
     """Enter the nodes to which the edges of a node lead."""
     measured, limit = to_goal
-    heading, place = node % HEADINGS, node // HEADINGS
-    row, column = place // graph.columns, place % graph.columns
     width = graph.table.end_heading.shape[1]
     for k in range(width):
-        end_heading = graph.table.end_heading[heading, k]
-        if end_heading < 0:
+        end, _, number = _neighbour(graph, node, k, False)
+        if number < 0:
             break
-        step = graph.table.step[heading, k]
-        end = node_at(graph, row + step[1], column + step[0], end_heading)
         if end < 0:
             continue
         bound = _bound_to_goal(measured, limit, graph.columns, end)
@@ -282,49 +298,30 @@ def spread(graph, seeds, backwards, inside, crossing):
         node = stack.pop()
         visited.append(node)
         for i in range(most):
-            other, state = _neighbour(graph, node, i, backwards)
+            other, state = _look_across(graph, node, i, backwards)
             if other >= 0 and state < FAILS and not inside[other]:
                 inside[other] = True
                 stack.append(other)
     for node in visited:
         for i in range(most):
-            other, state = _neighbour(graph, node, i, backwards)
+            other, state = _look_across(graph, node, i, backwards)
             if state >= FAILS and (other < 0 or not inside[other]):
                 crossing[min(state - FAILS, crossing.size - 1)] += 1
 
 
 @exact_kernel
-def _neighbour(graph, node, i, backwards):
+def _look_across(graph, node, i, backwards):
     """Return the node at the other end of an edge, and the edge's state; -1, -1 if there is none.
 
     The state is that of the edge or, if that does not fail, of the other node. If the edge leaves
-    the window, the node is -1 and the state is larger than all.
-
-    Args:
-        graph: Graph.
-        node: A node.
-        i: Number of the edge among those that begin, or end, at the node.
-        backwards: Whether those that end there are meant.
+    the window, the node is -1 and the state is larger than all. Arguments as for `_neighbour`.
     """
-    heading, place = node % HEADINGS, node // HEADINGS
-    row, column = place // graph.columns, place % graph.columns
-    if backwards:
-        first, k = graph.table.back[heading, i, 0], graph.table.back[heading, i, 1]
-        if first < 0:
-            return np.int64(-1), np.int64(-1)
-        step = graph.table.step[first, k]
-        other = node_at(graph, row - step[1], column - step[0], first)
-        edge_node = other
-    else:
-        k, end_heading = np.int64(i), graph.table.end_heading[heading, i]
-        if end_heading < 0:
-            return np.int64(-1), np.int64(-1)
-        step = graph.table.step[heading, k]
-        other = node_at(graph, row + step[1], column + step[0], end_heading)
-        edge_node = node
+    other, first, k = _neighbour(graph, node, i, backwards)
+    if k < 0:
+        return other, np.int64(-1)
     if other < 0:
-        return np.int64(-1), np.int64(2**30)
-    return np.int64(other), np.int64(max(graph.state[edge_node, k], graph.standing[other]))
+        return other, np.int64(2**30)
+    return other, np.int64(max(graph.state[first, k], graph.standing[other]))
 
 
 @dataclass(frozen=True)

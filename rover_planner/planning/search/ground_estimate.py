@@ -51,7 +51,7 @@ class _Wheels(NamedTuple):
     offsets: np.ndarray
     """(HEADINGS, 6, 2) wheel centres at a node at the map frame's origin, from the centre of the
     map's first cell [m]."""
-    reach: float
+    shift: float
     """Largest distance of a wheel centre from its place on level ground [m], seen from above."""
 
 
@@ -68,7 +68,7 @@ def estimate_ground(rover: Rover, terrain: Terrain, nodes: Nodes) -> GroundEstim
     c, s = np.cos(YAWS)[:, None], np.sin(YAWS)[:, None]
     x, y = c * places[:, 0] - s * places[:, 1], s * places[:, 0] + c * places[:, 1]
     offsets = np.stack([x, y], axis=-1) - terrain.origin
-    wheels = _Wheels(offsets, reach_of_wheels(rover))
+    wheels = _Wheels(offsets, largest_wheel_shift(rover))
     elevation = np.asarray(terrain.elevation)
     ground = _Map(
         elevation,
@@ -81,7 +81,7 @@ def estimate_ground(rover: Rover, terrain: Terrain, nodes: Nodes) -> GroundEstim
     return found
 
 
-def reach_of_wheels(rover: Rover) -> float:
+def largest_wheel_shift(rover: Rover) -> float:
     """Return how far a wheel centre may be from its place on level ground [m], seen from above.
 
     Body, rocker and bogie each turn by what their limits allow at most.
@@ -140,7 +140,7 @@ def estimate_nodes(ground, wheels, window, found):
             v = (y + wheels.offsets[heading, wheel, 1]) / ground.resolution
             if not _is_known(ground.elevation, u, v):
                 found.doubt[node] = FULL_DOUBT
-                if _distance(ground, u, v) > wheels.reach:
+                if _distance(ground, u, v) > wheels.shift:
                     found.groundless[node] = True
                     break
 

@@ -69,13 +69,12 @@ class Nodes:
     def places_near(self, position: NDArray[np.float64], radius: float) -> NDArray[np.int64]:
         """Return the places (n, 2), column and row in the window, within a radius [m]."""
         centre = np.asarray(position[:2]) / self.cell - self.first
-        reach = radius / self.cell
-        low = np.maximum(np.ceil(centre - reach), 0).astype(int)
-        high = np.minimum(np.floor(centre + reach), np.array(self.shape[::-1]) - 1).astype(int)
+        cells = radius / self.cell
+        low = np.maximum(np.ceil(centre - cells), 0).astype(int)
+        high = np.minimum(np.floor(centre + cells), np.array(self.shape[::-1]) - 1).astype(int)
         columns, rows = (np.arange(a, b + 1) for a, b in zip(low, high, strict=True))
         found = np.stack(np.meshgrid(columns, rows, indexing="ij"), axis=-1).reshape(-1, 2)
-        apart = np.hypot(*(found - centre).T)
-        return found[apart <= reach]
+        return found[np.hypot(*(found - centre).T) <= cells]
 
     def surround(self, nodes: NDArray[np.int64]) -> tuple[NDArray[np.float64], float]:
         """Return row and column (2,) amid nodes (n,), and their largest distance from it [m]."""

@@ -136,8 +136,8 @@ def _curves(
     end = (heading + turn) % HEADINGS
     ahead = np.array([_unit(YAWS[heading]), _unit(YAWS[end])]).T
     angle = float(wrap(YAWS[end] - YAWS[heading]))
-    reach = np.arange(-_SEARCH_RADIUS, _SEARCH_RADIUS + 1)
-    steps = np.stack(np.meshgrid(reach, reach, indexing="ij"), axis=-1).reshape(-1, 2)
+    cells = np.arange(-_SEARCH_RADIUS, _SEARCH_RADIUS + 1)
+    steps = np.stack(np.meshgrid(cells, cells, indexing="ij"), axis=-1).reshape(-1, 2)
     legs = np.linalg.solve(ahead, cell * steps.T).T  # from either end to where the lines meet
     arc_legs = legs.min(axis=1)
     fits = arc_legs >= radius * np.tan(0.5 * abs(angle)) - 1e-9

@@ -78,16 +78,6 @@ def test_an_impossible_tolerance_is_refused():
             make_service().answer((0, 0, 0), (1, 0, 0), tolerance)
 
 
-def test_a_refused_path_is_forgotten():
-    service = make_service(make_terrain(waves))
-    service.take_path(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
-    assert service.check_last_path().traversable
-    service.refuse_path("bad quaternion")
-    judgement = service.check_last_path()
-    assert judgement.code == "no_path"
-    assert judgement.reason == "the last path was refused: bad quaternion"
-
-
 def test_the_measured_suspension_is_compared_with_the_predicted_one():
     service = make_service(make_terrain(rocky))
     service.take_path(np.array([[0.0, 0.0, 0.3], [1.0, 0.3, 0.3]]))
