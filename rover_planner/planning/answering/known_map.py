@@ -7,12 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from msg_adapters.stamps import NANOSECONDS
 from rover_physics.terrain.grid import Terrain
 from rover_planner.worlds.maps.blind_ground import SeenGround, seen_ground
 from rover_planner.worlds.maps.sources import CellSources
-
-NANOSECONDS = 1_000_000_000
-"""Nanoseconds in a second."""
 
 
 @dataclass(frozen=True, eq=False)

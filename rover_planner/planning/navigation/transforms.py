@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
 from msg_adapters.frames import FrameTransform
+from msg_adapters.stamps import NANOSECONDS
 from rover_planner.errors import PlanningError
 
 MEMORY = 10_000_000_000
 """Time for which transforms are kept [ns], as in tf2."""
-NANOSECONDS = 1_000_000_000
 
 
 class TransformError(PlanningError):
