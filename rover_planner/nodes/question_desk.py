@@ -24,7 +24,7 @@ from rover_planner.planning.answering.question_queue import Answered, Asked, Que
 from rover_planner.planning.answering.questions import Answer, Question, Register
 from rover_planner.planning.answering.search_watch import NewerMapError, SearchWatch
 from rover_planner.planning.answering.server_health import ServerHealth
-from rover_planner.planning.answering.situation import Situation
+from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.guard import Guard
@@ -51,7 +51,7 @@ class Inquiry(Asked):
 
     reply: Reply
     """Takes the answer."""
-    situation: Situation
+    snapshot: Snapshot
     """What is known; its map is that of the time of judging."""
     number: int
     """Number of the question."""
@@ -100,7 +100,7 @@ class QuestionDesk:
             question,
             Budget(self._time_budget),
             reply=reply,
-            situation=replace(self._service.situation(now), watch=self._watch()),
+            snapshot=replace(self._service.snapshot(now), watch=self._watch()),
             number=self._register.next_number(),
             ros_time=now,
             arrival=time.monotonic(),
@@ -116,9 +116,9 @@ class QuestionDesk:
         try:
             self._maps.wait(inquiry.ticket, inquiry.budget.check)
             while True:
-                inquiry.situation = self._service.add_map(inquiry.situation, inquiry.ros_time)
+                inquiry.snapshot = self._service.add_map(inquiry.snapshot, inquiry.ros_time)
                 with contextlib.suppress(NewerMapError):
-                    return question.judge(inquiry.situation)
+                    return question.judge(inquiry.snapshot)
         except QuestionStoppedError:
             raise
         except Exception as error:
@@ -132,9 +132,9 @@ class QuestionDesk:
             told = f"{inquiry.number}, {question.service}"
             self.health.take_answer(judgement.code, done, told, done - inquiry.arrival)
             identity = self._register.identify(
-                inquiry.number, question.service, question.hash, inquiry.situation
+                inquiry.number, question.service, question.hash, inquiry.snapshot
             )
-            answer = Answer(judgement, inquiry.situation, identity)
+            answer = Answer(judgement, inquiry.snapshot, identity)
             self._sender.send(partial(inquiry.reply, answer))
         if not self._queue.open_count:
             self._patrol.cancel()
@@ -156,10 +156,10 @@ class QuestionDesk:
         stamp = self._node.get_clock().now().to_msg()
         self._progress.publish(search_diagnostics(report, text, name, stamp))
 
-    def identify(self, service: str, path_hash: str, situation: Situation) -> IdentityReport:
+    def identify(self, service: str, path_hash: str, snapshot: Snapshot) -> IdentityReport:
         """Return a new number with what a judgement that nobody asked for is about."""
         identity = self._register.identify(
-            self._register.next_number(), service, path_hash, situation
+            self._register.next_number(), service, path_hash, snapshot
         )
         return replace(identity, path_hash=path_hash)
 

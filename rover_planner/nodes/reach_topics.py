@@ -12,7 +12,7 @@ from msg_adapters.results.verdicts import report_to_json
 from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.planning.answering.questions import Answer, ReachCheck
-from rover_planner.planning.answering.reach_query import ReachJudgement, ReachQuery
+from rover_planner.planning.answering.reach_query import ArmJudgement, ReachQuery
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.requests import subscribe_to_requests
 
@@ -60,7 +60,7 @@ class ReachTopics:
 
         self._desk.ask(ReachCheck("check_reach", "", self.query), send)
 
-    def _log(self, answer: ReachJudgement) -> None:
+    def _log(self, answer: ArmJudgement) -> None:
         logger = self._node.get_logger()
         if answer.possible:
             logger.info("check_reach: possible")

@@ -49,7 +49,7 @@ from rover_planner.parameters.declare import declare_parameters, follow_changes
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
 from rover_planner.parameters.unknown import warn_of_unknown_parameters
 from rover_planner.planning.answering.budget import CANCELLED
-from rover_planner.planning.answering.judgement import Judgement
+from rover_planner.planning.answering.judgement import PathJudgement
 from rover_planner.planning.answering.known_map import stamp_text
 from rover_planner.planning.answering.questions import (
     Answer,
@@ -60,7 +60,7 @@ from rover_planner.planning.answering.questions import (
 )
 from rover_planner.planning.answering.server_health import MEMORY
 from rover_planner.planning.answering.service_settings import load_service_settings, map_limits
-from rover_planner.planning.answering.situation import Situation
+from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.path_query import Pose
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
@@ -250,7 +250,7 @@ class TraverseServer(Node):
             service: Name of the service.
             begin: Start; an empty one is where the rover is.
             end: Goal.
-            tolerance: As in `Situation.answer` [m].
+            tolerance: As in `Snapshot.answer` [m].
         """
         about = plan_request_hash(begin, end, tolerance)
         try:
@@ -304,7 +304,7 @@ class TraverseServer(Node):
         self.desk.ask(PathCheck("check_path", path.hash, path), send)
 
     def publish(
-        self, judgement: Judgement, identity: IdentityReport
+        self, judgement: PathJudgement, identity: IdentityReport
     ) -> tuple[Path, Callable[[], VerdictReport]]:
         """Return plan and report of a judgement; its results are published after the answer."""
         rover, spacing = self._service.settings.rover, self._values.plan_spacing
@@ -314,9 +314,9 @@ class TraverseServer(Node):
             self.watch.accept(poses, identity.path_hash or path_hash(plan))
         return plan, report
 
-    def _tell_stop(self, judgement: Judgement, watched: str, situation: Situation) -> None:
+    def _tell_stop(self, judgement: PathJudgement, watched: str, snapshot: Snapshot) -> None:
         """Publish why the rover is to stop, as the results of a judged path."""
-        self.publish(judgement, self.desk.identify("monitor", watched, situation))
+        self.publish(judgement, self.desk.identify("monitor", watched, snapshot))
 
     def _cancel(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         count = self.desk.cancel(CANCELLED, "the question was cancelled by ~/cancel")
@@ -334,10 +334,10 @@ class TraverseServer(Node):
         self._map_cloud.update()
         self._maps.retry()
         now = self.get_clock().now()
-        situation = self._service.situation(now.nanoseconds)
-        missing, known = situation.refuse_map(), situation.known_map
+        snapshot = self._service.snapshot(now.nanoseconds)
+        missing, known = snapshot.refuse_map(), snapshot.known_map
         counts = {
-            **({"map": "none"} if known is None else known.describe(situation.map_age)),
+            **({"map": "none"} if known is None else known.describe(snapshot.map_age)),
             "open questions": self.desk.open_count,
             "internal errors": self.guard.total,
             **self._hazards.describe(),

@@ -38,7 +38,7 @@ def service():
 def sight(service, pose, time=0.0, ground=waves):
     service.take_terrain(make_terrain(ground))
     pose = None if pose is None else np.array(pose)
-    return Sight(service.situation(), pose, time)
+    return Sight(service.snapshot(), pose, time)
 
 
 def watching(service, **limits):

@@ -23,7 +23,7 @@ from rover_planner.worlds.maps.blind_ground import BlindShare
 
 
 @dataclass(frozen=True, eq=False)
-class Judgement:
+class PathJudgement:
     """A judged path, or a refusal before any path was judged."""
 
     code: str
@@ -38,7 +38,7 @@ class Judgement:
     """Comparison with the measured suspension; None without measurements."""
     search: PathSearch | None = None
     """The search that found the path; None if the path was given."""
-    way: SearchResult | None = None
+    around: SearchResult | None = None
     """The search around obstacles; None if there was none."""
     is_brief: bool = False
     """Whether there was no time for classes and for waypoints beyond the first failure."""
@@ -55,7 +55,7 @@ class Judgement:
             return ()
         return self.judge.classify(self.candidate)
 
-    def complete(self) -> "Judgement":
+    def complete(self) -> "PathJudgement":
         """Return the judgement with all done that needs the model; later calls are quick.
 
         If there is no time for the waypoints beyond the first failure, or for classes, the
@@ -71,7 +71,7 @@ class Judgement:
             return replace(whole, is_brief=True)
         return whole
 
-    def _with_rest(self) -> "Judgement":
+    def _with_rest(self) -> "PathJudgement":
         """Return the judgement with the waypoints beyond the first failure."""
         candidate, judge = self.candidate, self.judge
         if candidate is None or judge is None or candidate.is_complete or self.is_brief:
@@ -118,6 +118,6 @@ class Judgement:
         )
 
 
-def refusal(code: str, reason: str) -> Judgement:
+def refusal(code: str, reason: str) -> PathJudgement:
     """Return the refusal of a request without a judged path."""
-    return Judgement(code, reason)
+    return PathJudgement(code, reason)

@@ -9,7 +9,7 @@ from typing import Any
 from rover_planner.planning.answering.judgement import refusal
 from rover_planner.planning.answering.known_map import stamp_text
 from rover_planner.planning.answering.reach_query import ReachQuery, refuse_reach
-from rover_planner.planning.answering.situation import GivenPath, Situation
+from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
 from rover_planner.planning.path_query import Pose
 from rover_planner.planning.verdict_report import IdentityReport
 
@@ -24,7 +24,7 @@ class Question(ABC):
     """Hash of the request; empty if it has none."""
 
     @abstractmethod
-    def judge(self, situation: Situation) -> Any:
+    def judge(self, snapshot: Snapshot) -> Any:
         """Return the judgement, which has a `code`.
 
         Raises:
@@ -47,11 +47,11 @@ class PathQuestion(Question):
     goal: Pose
     """The same."""
     tolerance: float = 0.0
-    """As in `Situation.answer` [m]."""
+    """As in `Snapshot.answer` [m]."""
 
-    def judge(self, situation: Situation) -> Any:
+    def judge(self, snapshot: Snapshot) -> Any:
         """Return the judgement of the best path."""
-        return situation.answer(self.start, self.goal, self.tolerance).complete()
+        return snapshot.answer(self.start, self.goal, self.tolerance).complete()
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +61,9 @@ class PathCheck(Question):
     path: GivenPath
     """The path."""
 
-    def judge(self, situation: Situation) -> Any:
+    def judge(self, snapshot: Snapshot) -> Any:
         """Return the judgement of the path."""
-        return replace(situation, path=self.path).check_path().complete()
+        return replace(snapshot, path=self.path).check_path().complete()
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,9 +73,9 @@ class ReachCheck(Question):
     query: ReachQuery
     """Target and wrench, which do not change."""
 
-    def judge(self, situation: Situation) -> Any:
+    def judge(self, snapshot: Snapshot) -> Any:
         """Return the judgement of the arm."""
-        return self.query.ask(situation)
+        return self.query.ask(snapshot)
 
     def refuse(self, code: str, reason: str) -> Any:
         """Return a judgement that refuses the question."""
@@ -89,7 +89,7 @@ class BadQuestion(Question):
     reason: str
     """Why not."""
 
-    def judge(self, _situation: Situation) -> Any:
+    def judge(self, _situation: Snapshot) -> Any:
         """Return the refusal."""
         return self.refuse("bad_request", self.reason)
 
@@ -99,8 +99,8 @@ class Answer:
     """The answer to a question."""
 
     judgement: Any
-    """A `Judgement` or `ReachJudgement`."""
-    situation: Situation
+    """A `PathJudgement` or `ArmJudgement`."""
+    snapshot: Snapshot
     """What it was judged by."""
     identity: IdentityReport
     """What it is about."""
@@ -121,7 +121,7 @@ class Register:
         return self.count
 
     def identify(
-        self, number: int, service: str, question_hash: str, situation: Situation
+        self, number: int, service: str, question_hash: str, snapshot: Snapshot
     ) -> IdentityReport:
         """Return what the answer to a question is about, without its path.
 
@@ -129,11 +129,11 @@ class Register:
             number: Number of the question.
             service: Name of the service that was called.
             question_hash: Hash of the request.
-            situation: What was known when it was asked.
+            snapshot: What was known when it was asked.
         """
-        known = situation.known_map
+        known = snapshot.known_map
         content, stamp = (
             ("", "") if known is None else (known.fingerprint, stamp_text(known.stamp))
         )
         about = number, service, self.server, question_hash
-        return IdentityReport(*about, "", "", content, stamp, situation.map_age)
+        return IdentityReport(*about, "", "", content, stamp, snapshot.map_age)

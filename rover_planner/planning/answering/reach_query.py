@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from rover_physics.errors import ModelError
 from rover_physics.traversability.reach import ReachAnswer, judge_reach
-from rover_planner.planning.answering.situation import Situation
+from rover_planner.planning.answering.snapshot import Snapshot
 
 
 @dataclass(frozen=True, eq=False)
-class ReachJudgement:
+class ArmJudgement:
     """The answer of the model, or a refusal before the model was used."""
 
     possible: bool
@@ -48,44 +48,44 @@ class ReachQuery:
     wrench_refusal: str = ""
     """Why the last wrench was refused; queries are refused until a valid one arrives."""
 
-    def ask(self, situation: Situation) -> ReachJudgement:
+    def ask(self, snapshot: Snapshot) -> ArmJudgement:
         """Judge the rover at the last pose of the last path with its tool at the target.
 
         Args:
-            situation: What is known of rover, map and path.
+            snapshot: What is known of rover, map and path.
 
         Raises:
             RoverError: The rover has no arm, or the model refuses an option.
         """
-        missing = situation.refuse_if_missing()
+        missing = snapshot.refuse_if_missing()
         if missing is not None:
             return refuse_reach(missing.code, missing.reason)
         if self.target is None:
             return refuse_reach("no_target", self.target_refusal)
         if self.wrench_refusal:
             return refuse_reach("no_wrench", self.wrench_refusal)
-        settings = situation.settings
+        settings = snapshot.settings
         arm = settings.rover.manipulator
         if arm is None:
             raise ModelError(f"rover {settings.rover.name!r} has no manipulator to reach with")
-        unknown = [name for name in arm.joints if name not in situation.joints]
+        unknown = [name for name in arm.joints if name not in snapshot.joints]
         if 0 < len(unknown) < len(arm.joints):
             text = f"joint_states has never had {', '.join(unknown)}, but other joints of the arm"
             return refuse_reach("missing_joints", f"{text}; it must have all of them, or none")
-        assert situation.path.poses is not None
-        assert situation.terrain is not None
+        assert snapshot.path.poses is not None
+        assert snapshot.terrain is not None
         answer = judge_reach(
             settings.rover,
-            situation.terrain,
-            situation.path.poses[-1],
+            snapshot.terrain,
+            snapshot.path.poses[-1],
             self.target,
             settings.query.model,
             force=self.force,
             moment=self.moment,
         )
-        return ReachJudgement(answer.possible, answer.code, answer.reason, answer)
+        return ArmJudgement(answer.possible, answer.code, answer.reason, answer)
 
 
-def refuse_reach(code: str, reason: str) -> ReachJudgement:
+def refuse_reach(code: str, reason: str) -> ArmJudgement:
     """Return the refusal of a query without using the model."""
-    return ReachJudgement(False, code, reason)
+    return ArmJudgement(False, code, reason)

@@ -14,11 +14,11 @@ from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import pack_ground
-from rover_planner.planning.answering.judgement import Judgement
+from rover_planner.planning.answering.judgement import PathJudgement
 from rover_planner.planning.answering.known_map import KnownMap
 from rover_planner.planning.answering.measurements import MAX_AGE, Measurements
 from rover_planner.planning.answering.service_settings import ServiceSettings
-from rover_planner.planning.answering.situation import GivenPath, Situation
+from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
 from rover_planner.planning.candidates import generate_candidates
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.worlds.maps.ground_beneath import Standing
@@ -147,7 +147,7 @@ class TraverseService:
         """Return the measured pose (3,) x, y [m], yaw [rad] if it is not older [s], else None."""
         return self._measurements.fresh_pose(time.monotonic(), max_age)
 
-    def situation(self, ros_time: int | None = None) -> Situation:
+    def snapshot(self, ros_time: int | None = None) -> Snapshot:
         """Return all that is known now.
 
         Args:
@@ -155,7 +155,7 @@ class TraverseService:
         """
         now = time.monotonic()
         standing = self._measurements.pose_with_suspension(now)
-        known = Situation(
+        known = Snapshot(
             self.settings,
             self.given_path,
             self._measurements.joints,
@@ -164,27 +164,27 @@ class TraverseService:
         )
         return self.add_map(known, ros_time)
 
-    def add_map(self, situation: Situation, ros_time: int | None = None) -> Situation:
-        """Return a situation with the present map; `ros_time` as for `situation`."""
+    def add_map(self, snapshot: Snapshot, ros_time: int | None = None) -> Snapshot:
+        """Return a snapshot with the present map; `ros_time` as for `snapshot`."""
         ros_time = time.time_ns() if ros_time is None else ros_time
-        known, most = self.known_map, situation.settings.max_map_age
+        known, most = self.known_map, snapshot.settings.max_map_age
         if known is None:
-            return replace(situation, known_map=None)
+            return replace(snapshot, known_map=None)
         steady = time.monotonic()
         return replace(
-            situation,
+            snapshot,
             known_map=known,
             map_age=known.age(ros_time, steady),
             stale_map=known.describe_age(ros_time, steady, most) if most > 0.0 else "",
         )
 
-    def answer(self, start: ArrayLike, goal: ArrayLike, tolerance: float = 0.0) -> Judgement:
-        """Find a path from start to goal; see `Situation.answer`."""
-        return self.situation().answer(start, goal, tolerance)
+    def answer(self, start: ArrayLike, goal: ArrayLike, tolerance: float = 0.0) -> PathJudgement:
+        """Find a path from start to goal; see `Snapshot.answer`."""
+        return self.snapshot().answer(start, goal, tolerance)
 
-    def check_last_path(self) -> Judgement:
-        """Judge the last path that was received; see `Situation.check_path`."""
-        return self.situation().check_path()
+    def check_last_path(self) -> PathJudgement:
+        """Judge the last path that was received; see `Snapshot.check_path`."""
+        return self.snapshot().check_path()
 
     def _keep_map(self, about: KnownMap) -> bool:
         """Keep a map, of which only terrain and fingerprint are missing; return whether it is new.

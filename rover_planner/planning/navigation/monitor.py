@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.terrain.grid import Terrain
-from rover_planner.planning.answering.judgement import Judgement, refusal
+from rover_planner.planning.answering.judgement import PathJudgement, refusal
 from rover_planner.planning.answering.server_health import ERROR, OK, WARN, Health
 from rover_planner.planning.answering.service_settings import ServiceSettings
-from rover_planner.planning.answering.situation import GivenPath, Situation
+from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
 from rover_planner.planning.navigation.watched_path import Place, WatchedPath
 from rover_planner.planning.verdict_report import SuspensionReport
 
@@ -51,7 +51,7 @@ class WatchSettings:
 class Sight:
     """What a monitor looks at."""
 
-    situation: Situation
+    snapshot: Snapshot
     """Settings, map and measured suspension."""
     pose: NDArray[np.float64] | None
     """(3,) x, y [m] and yaw [rad] of the body, measured just now; None if it is not known."""
@@ -67,7 +67,7 @@ class Finding:
     """IDLE, WATCHING, STOPPED or ARRIVED."""
     path_hash: str = ""
     """Hash of the watched path."""
-    judgement: Judgement | None = None
+    judgement: PathJudgement | None = None
     """Why the rover is to stop, or the last judgement on the rest of the path."""
     place: Place | None = None
     """Where the rover is on the path."""
@@ -153,7 +153,7 @@ class PathMonitor:
         """Watch nothing until the next path."""
         self._path, self._finding = None, Finding(IDLE, mismatch=self._finding.mismatch)
 
-    def stop(self, reason: Judgement) -> Finding:
+    def stop(self, reason: PathJudgement) -> Finding:
         """Stop the rover for a reason that was found elsewhere."""
         self._finding = replace(self._finding, state=STOPPED, judgement=reason)
         return self._finding
@@ -176,7 +176,7 @@ class PathMonitor:
             self._finding = replace(self._finding, state=ARRIVED)
         return self._finding
 
-    def _find_place(self, path: WatchedPath, sight: Sight) -> Judgement | None:
+    def _find_place(self, path: WatchedPath, sight: Sight) -> PathJudgement | None:
         """Find the place of the rover; return a refusal if it is unknown or off the path."""
         if sight.pose is None:
             missing = sight.time - self._pose_time
@@ -195,10 +195,10 @@ class PathMonitor:
 
     def _compare_suspension(self, sight: Sight) -> None:
         """Compare measured and predicted suspension where the rover stands."""
-        self._drift.take(sight.situation.compare_standing(), sight.time)
+        self._drift.take(sight.snapshot.compare_standing(), sight.time)
         self._finding = replace(self._finding, mismatch=dict(self._drift.latest))
 
-    def _refuse_drift(self) -> Judgement | None:
+    def _refuse_drift(self) -> PathJudgement | None:
         """Return a refusal if the suspension has differed too much for some time."""
         lasting, most = self._drift.lasting(), self.settings.max_mismatch
         if not 0.0 < most < lasting:
@@ -211,20 +211,20 @@ class PathMonitor:
         )
         return refusal(SUSPENSION, reason)
 
-    def _judge_rest(self, path: WatchedPath, sight: Sight) -> Judgement | None:
+    def _judge_rest(self, path: WatchedPath, sight: Sight) -> PathJudgement | None:
         """Judge the rest of the path if map or settings are new; return it if it is refused."""
-        situation = sight.situation
-        missing = situation.refuse_map()
+        snapshot = sight.snapshot
+        missing = snapshot.refuse_map()
         if missing is not None:
             return missing
-        judged_on = situation.terrain, situation.settings
+        judged_on = snapshot.terrain, snapshot.settings
         before = self._judged_on
         if before is not None and all(a is b for a, b in zip(before, judged_on, strict=True)):
             return None
         if before is not None and sight.time < self._pause_end:
             return None
         begin = time.monotonic()
-        judgement = self._check_rest(path, situation)
+        judgement = self._check_rest(path, snapshot)
         taken = time.monotonic() - begin
         self._pause_end = sight.time + taken + min(taken * (1.0 / SHARE - 1.0), MAX_PAUSE)
         self._judged_on = judged_on
@@ -237,23 +237,23 @@ class PathMonitor:
         away = judgement.candidate.passable_share * judgement.candidate.length
         return replace(judgement, reason=f"{away:.2f} m ahead: {judgement.reason}")
 
-    def _check_rest(self, path: WatchedPath, situation: Situation) -> Judgement:
+    def _check_rest(self, path: WatchedPath, snapshot: Snapshot) -> PathJudgement:
         """Judge the part of the path just ahead, and the rest if that may be driven."""
         first = 0 if self._finding.place is None else self._finding.place.index
         near = int(np.searchsorted(path.distances, path.distances[first] + NEAR)) + 1
         if near < len(path.poses):
-            judgement = _check(situation, path.poses[first:near])
+            judgement = _check(snapshot, path.poses[first:near])
             if not judgement.traversable:
                 return judgement
-        return _check(situation, path.poses[first:])
+        return _check(snapshot, path.poses[first:])
 
     def _has_arrived(self, path: WatchedPath) -> bool:
         place = self._finding.place
         return place is not None and path.is_end(place.index)
 
 
-def _check(situation: Situation, poses: NDArray[np.float64]) -> Judgement:
-    return replace(situation, path=GivenPath(poses, "")).check_path()
+def _check(snapshot: Snapshot, poses: NDArray[np.float64]) -> PathJudgement:
+    return replace(snapshot, path=GivenPath(poses, "")).check_path()
 
 
 def describe_watch(finding: Finding, enabled: bool, tolerance: float) -> Health:

@@ -170,7 +170,7 @@ def test_a_changed_map_ends_a_search_while_there_is_patience():
         maps.append(service.known_map)
 
     watched = replace(
-        service.situation(), watch=SearchWatch(lambda: maps[-1], look_and_change, 60.0)
+        service.snapshot(), watch=SearchWatch(lambda: maps[-1], look_and_change, 60.0)
     )
     with pytest.raises(NewerMapError):
         watched.answer(start, goal)

@@ -12,7 +12,7 @@ from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.traverse_server import FAN, LATTICE
-from rover_planner.planning.answering.judgement import Judgement, refusal
+from rover_planner.planning.answering.judgement import PathJudgement, refusal
 from rover_planner.planning.answering.known_map import KnownMap
 from rover_planner.planning.answering.search_watch import SearchWatch
 from rover_planner.planning.answering.service_settings import ServiceSettings
@@ -45,7 +45,7 @@ class GivenPath:
 
 
 @dataclass(frozen=True, eq=False)
-class Situation:
+class Snapshot:
     """Settings, map, path and measurements at one time; answers do not change with later ones."""
 
     settings: ServiceSettings
@@ -74,7 +74,7 @@ class Situation:
         """The map to plan on; None if there is none."""
         return None if self.known_map is None else self.known_map.terrain
 
-    def answer(self, start: ArrayLike, goal: ArrayLike, tolerance: float = 0.0) -> Judgement:
+    def answer(self, start: ArrayLike, goal: ArrayLike, tolerance: float = 0.0) -> PathJudgement:
         """Find a path from start to goal, or the reason why there is none.
 
         Args:
@@ -107,8 +107,8 @@ class Situation:
         return self._search_around(judge, ends, judged)
 
     def _search_around(
-        self, judge: PathJudge, ends: tuple[Pose, Pose], refused: Judgement | None
-    ) -> Judgement:
+        self, judge: PathJudge, ends: tuple[Pose, Pose], refused: PathJudgement | None
+    ) -> PathJudgement:
         """Search a path around obstacles.
 
         Args:
@@ -120,22 +120,22 @@ class Situation:
         found = find_path(query, self.settings.lattice, self.edge_memory, self._look)
         if found.path is not None:
             search = add_path(None if refused is None else refused.search, found.path, ends[1])
-            return replace(self._describe(judge, found.path, search), way=found)
+            return replace(self._describe(judge, found.path, search), around=found)
         is_end = found.outcome in (START_REFUSED, GOAL_REFUSED)
         warning = found.warning if refused is None or not is_end else ""
         why = "; ".join(filter(None, (found.reason, warning)))
         if refused is None:
-            return replace(refusal(found.outcome, why), way=found)
+            return replace(refusal(found.outcome, why), around=found)
         code = refused.code if is_end else found.outcome
         reason = f"{why}; the best candidate: {refused.reason}"
-        return replace(refused, code=code, reason=reason, way=found)
+        return replace(refused, code=code, reason=reason, around=found)
 
     def _look(self, progress: Progress) -> None:
         """Let the watch look at a search."""
         if self.watch is not None and self.known_map is not None:
             self.watch.look(self.known_map, progress)
 
-    def check_path(self) -> Judgement:
+    def check_path(self) -> PathJudgement:
         """Judge the last path.
 
         Raises:
@@ -150,13 +150,13 @@ class Situation:
         poses = densify(self.path.poses, self.settings.query.waypoint_spacing)
         return self._describe(judge, judge.check(poses))
 
-    def refuse_if_missing(self) -> Judgement | None:
+    def refuse_if_missing(self) -> PathJudgement | None:
         """Return a refusal if there is no path or no map to use, else None."""
         if self.path.poses is None:
             return refusal("no_path", self.path.refusal)
         return self.refuse_map()
 
-    def refuse_map(self) -> Judgement | None:
+    def refuse_map(self) -> PathJudgement | None:
         """Return a refusal if there is no map, or if it is too old, else None."""
         if self.known_map is None:
             return refusal(
@@ -185,11 +185,11 @@ class Situation:
 
     def _describe(
         self, judge: PathJudge, candidate: Candidate, search: PathSearch | None = None
-    ) -> Judgement:
+    ) -> PathJudgement:
         """Return the judgement of a judged path; classes and the rest of it follow on demand."""
         code, reason = candidate.verdict.code, candidate.verdict.reason
         suspension = self._compare_suspension(judge)
-        return Judgement(code, reason, candidate, judge, suspension, search)
+        return PathJudgement(code, reason, candidate, judge, suspension, search)
 
     def _compare_suspension(self, judge: PathJudge) -> SuspensionReport | None:
         """Compare measured and predicted suspension where the rover stands.
