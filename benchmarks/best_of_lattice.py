@@ -15,12 +15,12 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
 from benchmarks.ways import Case, Pair
-from rover_planner.planning.lattice.connections import Connection, connect_goal, connect_start
-from rover_planner.planning.lattice.edges import Edges
-from rover_planner.planning.lattice.headings import HEADINGS
-from rover_planner.planning.lattice.judge import Judge
-from rover_planner.planning.lattice.primitives import make_primitives
-from rover_planner.planning.ways.window import choose_window
+from rover_planner.planning.search.connections import Connection, connect_goal, connect_start
+from rover_planner.planning.search.edges import Edges
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.nodes import HEADINGS
+from rover_planner.planning.search.primitives import make_primitives
+from rover_planner.planning.search.query import choose_window
 
 BATCH = 500
 """Edges judged in one call."""
@@ -38,7 +38,7 @@ class Truth:
 
     case: Case
     """The rover on its ground."""
-    judge: Judge = field(init=False)
+    judge: PathJudge = field(init=False)
     """The model."""
     edges: Edges = field(init=False)
     """All edges."""
@@ -110,7 +110,7 @@ class Truth:
     def _enter(self, connections: list[Connection]) -> dict[int, float]:
         """Return the costs [m] of the connections that pass, the least of each node."""
         chosen = [one for one in connections if self._stands[one.node]]
-        judged = self.judge.judge([one.poses for one in chosen], [one.gear for one in chosen])
+        judged = self.judge.judge_pieces(chosen)
         found: dict[int, float] = {}
         for one, verdict in zip(chosen, judged, strict=True):
             if not verdict.code:
@@ -138,8 +138,5 @@ class Truth:
                 raise NoTruthError
             some = rows[first : first + BATCH]
             edges = self._edge[some].tolist()
-            found = self.judge.judge(
-                [self.edges.poses(edge) for edge in edges],
-                [self.edges.primitive(edge).gear for edge in edges],
-            )
+            found = self.judge.judge_pieces([self.edges.piece(edge) for edge in edges])
             self._cost[some], self._judged[some] = [one.cost for one in found], True

@@ -20,11 +20,11 @@ from benchmarks.grounds import real_maps
 from benchmarks.measure import console, print_table, quantile, write_rows
 from rover_physics import Rover, Terrain, judge_path, load_rover
 from rover_physics.names import EQUAL
-from rover_planner.planning.lattice.judge import Judge
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.planning.ways.memory import EdgeMemory
-from rover_planner.planning.ways.question import WayQuestion
-from rover_planner.planning.ways.way_search import FOUND, LatticeSettings, WayAnswer, find_way
+from rover_planner.planning.search.edge_memory import EdgeMemory
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.path_search import FOUND, SearchResult, find_path
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 Pair = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -63,13 +63,13 @@ class Case:
         return PathQueryOptions().change(policy=self.policy, control_margin=0.0)
 
     @property
-    def judge(self) -> Judge:
+    def judge(self) -> PathJudge:
         """A new judge."""
-        return Judge(self.rover, self.terrain, self.options)
+        return PathJudge(self.rover, self.terrain, self.options)
 
-    def question(self, pair: Pair, terrain: Terrain | None = None) -> WayQuestion:
+    def question(self, pair: Pair, terrain: Terrain | None = None) -> SearchQuery:
         """Return the question for a way between two poses."""
-        return WayQuestion(self.rover, terrain or self.terrain, *pair, self.options)
+        return SearchQuery(self.rover, terrain or self.terrain, *pair, self.options)
 
     def search(
         self,
@@ -77,11 +77,11 @@ class Case:
         budget: float,
         memory: EdgeMemory | None = None,
         terrain: Terrain | None = None,
-    ) -> WayAnswer:
+    ) -> SearchResult:
         """Search a way; CPU time is its clock, so that other programs do not cut its budget."""
         with mock.patch("time.perf_counter", time.process_time):
             question, settings = self.question(pair, terrain), LatticeSettings(budget=budget)
-            return find_way(question, settings, memory)
+            return find_path(question, settings, memory)
 
     def pairs(self, count: int, seed: int) -> list[Pair]:
         """Return random pairs of poses on which the rover can stand, NEAREST to FURTHEST apart."""
@@ -153,7 +153,7 @@ def try_pair(case: Case, pair: Pair, budget: float) -> dict[str, Any]:
     }
 
 
-def try_warm(case: Case, pair: Pair, budget: float, seed: int) -> WayAnswer:
+def try_warm(case: Case, pair: Pair, budget: float, seed: int) -> SearchResult:
     """Return the answer after a change of the map near a way.
 
     The way is searched first, then heights in a square on it change, and it is searched again with

@@ -87,18 +87,18 @@ def start_server(ros):
 @pytest.fixture
 def endless():
     """Return a context in which the work on plans goes on until it is stopped."""
-    from rover_planner.planning.answering.situation import Situation
+    from rover_planner.planning.answering.snapshot import Snapshot
 
-    find = Situation.answer
+    find = Snapshot.answer
 
-    def find_for_ever(situation, *asked):
+    def find_for_ever(snapshot, *asked):
         while True:
-            find(situation, *asked)
+            find(snapshot, *asked)
 
     @contextlib.contextmanager
     def work_for_ever():
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(Situation, "answer", find_for_ever)
+            patch.setattr(Snapshot, "answer", find_for_ever)
             yield
 
     return work_for_ever

@@ -22,8 +22,7 @@ from rover_planner.command.options import (
 from rover_planner.shell.poses import GOAL, START, Pose
 
 if TYPE_CHECKING:
-    from rover_planner.planning.ways.question import WayQuestion
-    from rover_planner.planning.ways.way_search import LatticeSettings
+    from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 
 Out = Annotated[
     Path,
@@ -72,12 +71,11 @@ def plan(
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.terrain.grid import load_terrain
     from rover_planner.planning.path_query import PathQueryOptions
-    from rover_planner.planning.ways.question import WayQuestion
-    from rover_planner.planning.ways.question_file import write_question
-    from rover_planner.planning.ways.way_search import LatticeSettings
+    from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+    from rover_planner.planning.search.query_file import write_query
 
     settings = LatticeSettings(budget=budget, cell=cell, frontier=frontier)
-    question = WayQuestion(
+    question = SearchQuery(
         load_rover(rover),
         load_terrain(terrain, max_cells),
         start,
@@ -94,7 +92,7 @@ def plan(
         ),
     )
     if dump is not None:
-        write_question(dump, question, settings)
+        write_query(dump, question, settings)
     _ask(question, settings, out, picture)
 
 
@@ -107,28 +105,27 @@ def replay_plan(
     max_cells: MaxCells = MAX_CELLS,
 ) -> None:
     """Search the way of a question again that `plan --dump` has written."""
-    from rover_planner.planning.ways.question_file import read_question
+    from rover_planner.planning.search.query_file import read_query
 
-    asked, settings = read_question(question, max_cells)
+    asked, settings = read_query(question, max_cells)
     _ask(asked, settings, out, picture)
 
 
 def _ask(
-    question: "WayQuestion", settings: "LatticeSettings", out: Path, picture: Path | None
+    question: "SearchQuery", settings: "LatticeSettings", out: Path, picture: Path | None
 ) -> None:
     """Search the way, write it and print the report."""
     from rover_planner.command.prediction_files import write_prediction
     from rover_planner.nodes.warm_up import search_ways
     from rover_planner.planning.assumptions import assume
-    from rover_planner.planning.ways.way_report import report_way
-    from rover_planner.planning.ways.way_search import find_way
+    from rover_planner.planning.search.path_search import find_path
     from rover_planner.shell.progress import show_progress
 
     with show_progress() as progress:
         progress("load the model (the first run compiles it)")
         search_ways()  # so that the budget is not spent on it
         progress(f"search a way for {question.rover.name}")
-        answer = find_way(question, settings)
+        answer = find_path(question, settings)
     if answer.path is not None:
         options = question.options.model
         on_soil = options.soil is not None or bool(question.terrain.soil_names)
@@ -146,4 +143,4 @@ def _ask(
         draw_path(picture, question, answer)
     if answer.warning:
         typer.echo(f"warning: {answer.warning}", err=True)
-    typer.echo(json.dumps(report_way(answer), allow_nan=False))
+    typer.echo(json.dumps(answer.report(), allow_nan=False))

@@ -16,11 +16,11 @@ from rover_planner.figures.pictures import (
     drawing,
     find_extent,
 )
-from rover_planner.planning.ways.question import WayQuestion
-from rover_planner.planning.ways.way_search import WayAnswer
+from rover_planner.planning.search.path_search import SearchResult
+from rover_planner.planning.search.query import SearchQuery
 
 
-def draw_path(path: Path, question: WayQuestion, answer: WayAnswer) -> None:
+def draw_path(path: Path, question: SearchQuery, answer: SearchResult) -> None:
     """Draw the map with start and goal, and the path or the area that is closed in.
 
     Args:
@@ -49,7 +49,7 @@ def draw_path(path: Path, question: WayQuestion, answer: WayAnswer) -> None:
         axes.legend(loc="upper left", frameon=True, framealpha=0.85)
 
 
-def _draw_area(axes: Axes, answer: WayAnswer) -> None:
+def _draw_area(axes: Axes, answer: SearchResult) -> None:
     assert answer.closed is not None
     nodes = answer.nodes
     left, low = (nodes.cell * first for first in nodes.first)
@@ -73,7 +73,7 @@ def _draw_end(axes: Axes, name: str, pose: np.ndarray, colour: str) -> None:
     )
 
 
-def _title(answer: WayAnswer) -> str:
+def _title(answer: SearchResult) -> str:
     if answer.path is None:
         return answer.reason
     prediction = answer.path.prediction

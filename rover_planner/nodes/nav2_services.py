@@ -20,17 +20,17 @@ from msg_adapters.identity import path_hash
 from msg_adapters.paths import path_to_poses
 from msg_adapters.stamps import stamp_to_ns
 from rover_planner.nodes.question_desk import QuestionDesk
-from rover_planner.planning.answering.judgement import Judgement
+from rover_planner.planning.answering.judgement import PathJudgement
 from rover_planner.planning.answering.known_map import stamp_text
 from rover_planner.planning.answering.questions import Answer, BadQuestion, PathCheck, Question
-from rover_planner.planning.answering.situation import GivenPath
+from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.path_geometry import next_given_poses
 from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.guard import INPUT_ERRORS
 from rover_planner.ros.optional_types import find_type
 
-Publish = Callable[[Judgement, IdentityReport], Any]
+Publish = Callable[[PathJudgement, IdentityReport], Any]
 ReadQuestion = Callable[[str, PoseStamped, PoseStamped], Question]
 
 
@@ -82,7 +82,7 @@ class PathValidity:
             response.is_valid = judged.traversable
             response.invalid_pose_indices = list(range(len(path.poses)))
             if judged.candidate is not None:
-                spacing = answer.situation.settings.query.waypoint_spacing
+                spacing = answer.snapshot.settings.query.waypoint_spacing
                 given = next_given_poses(poses, spacing)
                 response.invalid_pose_indices = find_invalid_poses(
                     judged.candidate.verdict.codes, given

@@ -9,7 +9,7 @@ makes messages of it.
 import contextlib
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -20,16 +20,11 @@ from rclpy.node import Node
 from msg_adapters.results.diagnostics import search_diagnostics
 from rover_planner.nodes.maps.map_topics import MapTopics
 from rover_planner.planning.answering.budget import STOPPING, Budget, QuestionStoppedError
-from rover_planner.planning.answering.identity import Register
-from rover_planner.planning.answering.question_queue import Asked, Judged, QuestionQueue
-from rover_planner.planning.answering.questions import Answer, Question
-from rover_planner.planning.answering.search_watch import (
-    NewerMapError,
-    SearchReport,
-    SearchWatch,
-)
+from rover_planner.planning.answering.question_queue import Answered, Asked, QuestionQueue
+from rover_planner.planning.answering.questions import Answer, Question, Register
+from rover_planner.planning.answering.search_watch import NewerMapError, SearchWatch
 from rover_planner.planning.answering.server_health import ServerHealth
-from rover_planner.planning.answering.situation import Situation
+from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.guard import Guard, refuse_error
@@ -55,7 +50,7 @@ class Inquiry(Asked):
 
     reply: Reply
     """Takes the answer."""
-    situation: Situation
+    snapshot: Snapshot
     """What is known; its map is that of the time of judging."""
     number: int
     """Number of the question."""
@@ -104,7 +99,7 @@ class QuestionDesk:
             question,
             Budget(self._time_budget),
             reply=reply,
-            situation=replace(self._service.situation(now), watch=self._watch()),
+            snapshot=replace(self._service.snapshot(now), watch=self._watch()),
             number=self._register.next_number(),
             ros_time=now,
             arrival=time.monotonic(),
@@ -120,25 +115,25 @@ class QuestionDesk:
         try:
             self._maps.wait(inquiry.ticket, inquiry.budget.check)
             while True:
-                inquiry.situation = self._service.add_map(inquiry.situation, inquiry.ros_time)
+                inquiry.snapshot = self._service.add_map(inquiry.snapshot, inquiry.ros_time)
                 with contextlib.suppress(NewerMapError):
-                    return question.judge(inquiry.situation)
+                    return question.judge(inquiry.snapshot)
         except QuestionStoppedError:
             raise
         except Exception as error:
             return refuse_error(self._guard, question.service, error, question.refuse)
 
-    def _send(self, judged: list[Judged]) -> None:
+    def _send(self, answered: list[Answered]) -> None:
         """Send the answers to questions."""
-        for inquiry, judgement in judged:
+        for inquiry, judgement in answered:
             assert isinstance(inquiry, Inquiry)
             question, done = inquiry.question, time.monotonic()
             told = f"{inquiry.number}, {question.service}"
             self.health.take_answer(judgement.code, done, told, done - inquiry.arrival)
             identity = self._register.identify(
-                inquiry.number, question.service, question.hash, inquiry.situation
+                inquiry.number, question.service, question.hash, inquiry.snapshot
             )
-            answer = Answer(judgement, inquiry.situation, identity)
+            answer = Answer(judgement, inquiry.snapshot, identity)
             self._sender.send(partial(inquiry.reply, answer))
         if not self._queue.open_count:
             self._patrol.cancel()
@@ -147,21 +142,23 @@ class QuestionDesk:
         """Return a watch that publishes the progress of a question's searches."""
         patience = self._service.settings.lattice.budget
 
-        def tell(report: SearchReport) -> None:
+        def tell(report: dict[str, Any]) -> None:
             self._handover.call(lambda: self._publish_progress(report))
 
         return SearchWatch(lambda: self._service.known_map, tell, patience)
 
-    def _publish_progress(self, report: SearchReport) -> None:
-        text = "a way is found, a better one is searched" if report.found else "no way found yet"
+    def _publish_progress(self, report: dict[str, Any]) -> None:
+        text = (
+            "a way is found, a better one is searched" if report["found"] else "no way found yet"
+        )
         name = self._service.settings.rover.name
         stamp = self._node.get_clock().now().to_msg()
-        self._progress.publish(search_diagnostics(asdict(report), text, name, stamp))
+        self._progress.publish(search_diagnostics(report, text, name, stamp))
 
-    def identify(self, service: str, path_hash: str, situation: Situation) -> IdentityReport:
+    def identify(self, service: str, path_hash: str, snapshot: Snapshot) -> IdentityReport:
         """Return a new number with what a judgement that nobody asked for is about."""
         identity = self._register.identify(
-            self._register.next_number(), service, path_hash, situation
+            self._register.next_number(), service, path_hash, snapshot
         )
         return replace(identity, path_hash=path_hash)
 

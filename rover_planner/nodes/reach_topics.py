@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Topics and service of the arm in the traverse server: tool target, wrench, `~/check_reach`."""
 
+from dataclasses import replace
+
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from rclpy.node import Node
 from std_srvs.srv import Trigger
@@ -10,7 +12,7 @@ from msg_adapters.results.diagnostics import to_json
 from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.planning.answering.questions import Answer, ReachCheck
-from rover_planner.planning.answering.reach_query import ReachJudgement, ReachQuery
+from rover_planner.planning.answering.reach_query import ArmJudgement, ReachQuery
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.subscriptions import subscribe_to_requests
 
@@ -31,17 +33,21 @@ class ReachTopics:
 
     def _take_target(self, message: PoseStamped) -> None:
         try:
-            self.query.take_target(target_to_point(message, self._map_frame))
+            self.query = replace(self.query, target=target_to_point(message, self._map_frame))
         except MessageError as error:
-            self.query.refuse_target(str(error))
+            refusal = f"the last target was refused: {error}"
+            self.query = replace(self.query, target=None, target_refusal=refusal)
             self._node.get_logger().error(f"~/tool_target refused: {error}")
 
     def _take_wrench(self, message: WrenchStamped) -> None:
+        force = moment = None
+        refusal = ""
         try:
-            self.query.take_wrench(*wrench_to_force_and_moment(message, self._map_frame))
+            force, moment = wrench_to_force_and_moment(message, self._map_frame)
         except MessageError as error:
-            self.query.refuse_wrench(str(error))
+            refusal = f"the last wrench was refused: {error}"
             self._node.get_logger().error(f"~/tool_wrench refused: {error}")
+        self.query = replace(self.query, force=force, moment=moment, wrench_refusal=refusal)
 
     def _check_reach(
         self, _request: Trigger.Request, response: Trigger.Response, reply: Reply
@@ -52,9 +58,9 @@ class ReachTopics:
             reply(response)
             self._log(answer.judgement)
 
-        self._desk.ask(ReachCheck("check_reach", "", self.query.copy()), send)
+        self._desk.ask(ReachCheck("check_reach", "", self.query), send)
 
-    def _log(self, answer: ReachJudgement) -> None:
+    def _log(self, answer: ArmJudgement) -> None:
         logger = self._node.get_logger()
         if answer.possible:
             logger.info("check_reach: possible")

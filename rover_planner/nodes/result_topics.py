@@ -32,7 +32,7 @@ from msg_adapters.results.predictions import (
 from msg_adapters.stamps import ns_to_stamp, stamp_to_ns
 from rover_physics.names import WHEELS
 from rover_physics.rover.model import Rover
-from rover_planner.planning.answering.judgement import Judgement
+from rover_planner.planning.answering.judgement import PathJudgement
 from rover_planner.planning.answering.known_map import stamp_text
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
 from rover_planner.ros.deferred_work import DeferredWork
@@ -99,7 +99,7 @@ class ResultTopics:
 
     def take(
         self,
-        judgement: Judgement,
+        judgement: PathJudgement,
         identity: IdentityReport,
         rover: Rover,
         plan_spacing: float,
@@ -179,7 +179,7 @@ def _add_plan(identity: IdentityReport, plan: Path) -> IdentityReport:
 class ResultMessages:
     """The messages of one judgement; each is made on demand."""
 
-    judgement: Judgement
+    judgement: PathJudgement
     identity: IdentityReport
     rover: Rover
     plan_spacing: float
@@ -229,12 +229,12 @@ class ResultMessages:
 
     def _closed_area(self) -> OccupancyGrid:
         """Return the area that start or goal are closed in; without places if they are not."""
-        way = self.judgement.way
-        if way is None or way.closed is None:
+        around = self.judgement.around
+        if around is None or around.closed is None:
             return empty_grid(self.frame, self.stamp)
-        cell, (column, row) = way.nodes.cell, way.nodes.first
+        cell, (column, row) = around.nodes.cell, around.nodes.first
         first = cell * column, cell * row
-        return area_to_grid(way.closed.places, cell, first, self.frame, self.stamp)
+        return area_to_grid(around.closed.places, cell, first, self.frame, self.stamp)
 
     def _nothing(self, topic: str) -> object:
         """Return the empty message that is published if no path was judged."""

@@ -50,9 +50,8 @@ from rover_planner.parameters.declare import (
 )
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
 from rover_planner.planning.answering.budget import CANCELLED
-from rover_planner.planning.answering.judgement import Judgement
+from rover_planner.planning.answering.judgement import PathJudgement
 from rover_planner.planning.answering.known_map import stamp_text
-from rover_planner.planning.answering.map_status import MapStatus
 from rover_planner.planning.answering.questions import (
     Answer,
     BadQuestion,
@@ -62,10 +61,10 @@ from rover_planner.planning.answering.questions import (
 )
 from rover_planner.planning.answering.server_health import MEMORY
 from rover_planner.planning.answering.service_settings import load_service_settings, map_limits
-from rover_planner.planning.answering.situation import Situation
+from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.sensor_mounts import sensor_poses
-from rover_planner.planning.path_planner import Pose
+from rover_planner.planning.path_query import Pose
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.deferred_work import DeferredWork
@@ -137,7 +136,6 @@ class TraverseServer(Node):
         self.reach = ReachTopics(self, self.desk, frame, reliability)
         """The topics and the service of the arm."""
         self._map_cloud = MapCloud(self, self.service, frame)
-        self._map_status = MapStatus()
         self.watch = PathWatch(
             self, self.service, self._values, self.guard, self._find_watched, self._tell_stop
         )
@@ -238,7 +236,7 @@ class TraverseServer(Node):
             service: Name of the service.
             begin: Start; an empty one is where the rover is.
             end: Goal.
-            tolerance: As in `Situation.answer` [m].
+            tolerance: As in `Snapshot.answer` [m].
         """
         about = plan_request_hash(begin, end, tolerance)
         try:
@@ -292,7 +290,7 @@ class TraverseServer(Node):
         self.desk.ask(PathCheck("check_path", path.hash, path), send)
 
     def publish(
-        self, judgement: Judgement, identity: IdentityReport
+        self, judgement: PathJudgement, identity: IdentityReport
     ) -> tuple[Path, Callable[[], VerdictReport]]:
         """Return plan and report of a judgement; its results are published after the answer."""
         rover, spacing = self.service.settings.rover, self._values.plan_spacing
@@ -302,9 +300,9 @@ class TraverseServer(Node):
             self.watch.accept(poses, identity.path_hash or path_hash(plan))
         return plan, report
 
-    def _tell_stop(self, judgement: Judgement, watched: str, situation: Situation) -> None:
+    def _tell_stop(self, judgement: PathJudgement, watched: str, snapshot: Snapshot) -> None:
         """Publish why the rover is to stop, as the results of a judged path."""
-        self.publish(judgement, self.desk.identify("monitor", watched, situation))
+        self.publish(judgement, self.desk.identify("monitor", watched, snapshot))
 
     def _cancel(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         count = self.desk.cancel(CANCELLED, "the question was cancelled by ~/cancel")
@@ -322,10 +320,10 @@ class TraverseServer(Node):
         self._map_cloud.update()
         self._maps.retry()
         now = self.get_clock().now()
-        situation = self.service.situation(now.nanoseconds)
-        missing = situation.refuse_map()
+        snapshot = self.service.snapshot(now.nanoseconds)
+        missing, known = snapshot.refuse_map(), snapshot.known_map
         counts = {
-            **self._map_status.describe(situation),
+            **({"map": "none"} if known is None else known.describe(snapshot.map_age)),
             "open questions": self.desk.open_count,
             "internal errors": self.guard.total,
             **self._hazards.describe(),

@@ -13,8 +13,8 @@ from rover_physics.warm_up import EXACT, SCORES, SINGLE, UNCERTAIN
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.planning.candidates import generate_candidates
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.planning.ways.question import WayQuestion
-from rover_planner.planning.ways.way_search import LatticeSettings, find_way
+from rover_planner.planning.search.path_search import find_path
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
 from rover_planner.traction.traction_service import TractionService
 
@@ -47,8 +47,8 @@ def search_ways() -> None:
         elevation = np.zeros((60, 60))
         elevation[:rows, 30] = 1.0
         ground = Terrain(elevation, 0.05, (0.0, 0.0))
-        question = WayQuestion(load_rover("lsr1"), ground, *ends, PathQueryOptions())
-        find_way(question, LatticeSettings(budget=60.0))
+        question = SearchQuery(load_rover("lsr1"), ground, *ends, PathQueryOptions())
+        find_path(question, LatticeSettings(budget=60.0))
 
 
 def classify_pose() -> None:

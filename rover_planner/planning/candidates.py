@@ -42,6 +42,12 @@ _FINE_SAMPLES = 501
 """Samples of a curve from which its waypoints are interpolated."""
 _FINE = np.linspace(0.0, 1.0, 2 * _FINE_SAMPLES - 1)
 """Curve parameters of the fine samples and half-way between them."""
+_FINE_WEIGHTS = np.array(
+    [6 * _FINE * (1 - _FINE), (1 - _FINE) * (1 - 3 * _FINE), _FINE * (3 * _FINE - 2)]
+)
+"""Weights (3, n) of chord, start and end tangent in the derivative at the fine samples."""
+_FINE_BUMP = np.pi * np.sin(2 * np.pi * _FINE)
+"""First derivative at the fine samples of a bump of one metre."""
 _TANGENT_SCALES = (1.0, 1.6, 2.4)
 """Lengths of the end tangents in chords; the first one whose direct curve is drivable is used."""
 
@@ -77,15 +83,20 @@ def generate_candidates(
     Raises:
         PlanningError: An argument is NaN or out of range, or the path has more than MAX_WAYPOINTS.
     """
-    start = _check_pose("start", start)
-    goal = _check_pose("goal", goal)
-    _check_count(count)
-    _check_positive("spacing", spacing)
-    _check_positive("waypoint_spacing", waypoint_spacing)
-    _check_positive("min_radius", min_radius)
-    _check_length(start, goal, waypoint_spacing)
-
-    chord = float(np.hypot(*(goal[:2] - start[:2])))
+    start, goal = check_pose("start", start), check_pose("goal", goal)
+    if not (isinstance(count, int | np.integer) and count >= 1):
+        raise PlanningError(f"count is {count!r}; it must be a whole number of at least 1")
+    lengths = {"spacing": spacing, "waypoint_spacing": waypoint_spacing, "min_radius": min_radius}
+    for name, value in lengths.items():
+        if not (np.isfinite(value) and value > 0.0):
+            raise PlanningError(f"{name} is {value!r}; it must be a finite number above 0")
+    with np.errstate(over="ignore"):
+        chord = float(np.hypot(*(goal[:2] - start[:2])))
+    if not chord / waypoint_spacing < MAX_WAYPOINTS:
+        raise PlanningError(
+            f"the goal is {chord:.4g} m from the start: in steps of {waypoint_spacing} m that is "
+            f"more than {MAX_WAYPOINTS} waypoints"
+        )
     turn = abs(wrap(goal[2] - start[2]))
     if chord <= _SAME_PLACE and turn <= _SAME_PLACE:
         return [goal[None, :].copy()]
@@ -115,13 +126,73 @@ def path_length(poses: np.ndarray) -> float:
 def _build_fan(start, goal, count, spacing, waypoint_spacing, min_radius) -> list[np.ndarray]:
     """Sample the direct curve and its neighbours; return [] if the direct one is too tight."""
     for scale in _TANGENT_SCALES:
-        fan = _Fan(start, goal, scale)
-        curves = (_Curve(fan, offset) for offset in lateral_offsets(count, spacing))
-        direct = next(curves)
-        if direct.is_drivable(min_radius):
-            others = [curve for curve in curves if curve.is_drivable(min_radius)]
-            return [curve.sample(waypoint_spacing) for curve in [direct, *others]]
+        direct = _connect(start, goal, scale)
+        slopes = _fine_slopes(direct)
+        curves = [
+            direct._replace(offset=float(offset)) for offset in lateral_offsets(count, spacing)
+        ]
+        paths = []
+        for curve in curves:
+            slope = slopes + _FINE_BUMP * (curve.offset * curve.left)[:, None]
+            speed = np.hypot(slope[0], slope[1])
+            if _is_drivable(slope, speed, min_radius):
+                paths.append(_sample(curve, speed, waypoint_spacing))
+            elif curve.offset == 0.0:
+                break
+        if paths:
+            return paths
     return []
+
+
+def _connect(start: np.ndarray, goal: np.ndarray, scale: float) -> BumpedCurve:
+    """Return the curve without bump whose end tangents are `scale` times the chord long."""
+    chord = goal[:2] - start[:2]
+    length = np.hypot(*chord)
+    return BumpedCurve(
+        start=start[:2],
+        chord=chord,
+        m0=scale * length * np.array([np.cos(start[2]), np.sin(start[2])]),
+        m1=scale * length * np.array([np.cos(goal[2]), np.sin(goal[2])]),
+        left=np.array([-chord[1], chord[0]]) / length,
+        offset=0.0,
+    )
+
+
+def _fine_slopes(curve: BumpedCurve) -> np.ndarray:
+    """Return the derivative (2, n) of a curve without bump at the fine samples."""
+    along_chord, along_m0, along_m1 = _FINE_WEIGHTS
+    slopes = along_chord * curve.chord[:, None] + along_m0 * curve.m0[:, None]
+    slopes += along_m1 * curve.m1[:, None]
+    return slopes
+
+
+def _is_drivable(slope: np.ndarray, speed: np.ndarray, min_radius: float) -> bool:
+    """Return whether no radius of a curve is smaller than `min_radius` [m].
+
+    Args:
+        slope: (2, n) its derivative at the fine samples.
+        speed: (n,) the size of the derivative.
+        min_radius: Smallest radius [m].
+    """
+    ends = speed[::2]
+    if ends.min() <= 1e-6 * ends.max():
+        return False
+    return bool(turns_within(slope, speed, float(min_radius)))
+
+
+def _sample(curve: BumpedCurve, speed: np.ndarray, waypoint_spacing: float) -> np.ndarray:
+    """Sample equidistant poses (n, 3) of a curve, at most `waypoint_spacing` [m] apart."""
+    check_interruption()  # a question may have many long candidates
+    ends, middles = speed[::2], speed[1::2]
+    pieces = (ends[:-1] + 4 * middles + ends[1:]) / 6 / len(middles)
+    driven = np.concatenate([[0.0], np.cumsum(pieces)])
+    steps = max(1, int(np.ceil(driven[-1] / waypoint_spacing - 1e-9)))
+    marks = np.linspace(0.0, driven[-1], steps + 1)
+    t, poses, slope = np.empty(steps + 1), np.empty((steps + 1, 3)), np.empty((2, steps + 1))
+    interpolate(marks, driven, _FINE[::2], 1 / ends, t)
+    follow_curve(t, curve, poses, slope)
+    poses[:, 2] = np.arctan2(slope[1], slope[0])
+    return poses
 
 
 def _build_arcs(start, goal, count, waypoint_spacing, min_radius) -> list[np.ndarray]:
@@ -132,63 +203,6 @@ def _build_arcs(start, goal, count, waypoint_spacing, min_radius) -> list[np.nda
     return [path for path in paths if path_length(path) <= longest]
 
 
-_FINE_WEIGHTS = np.array(
-    [6 * _FINE * (1 - _FINE), (1 - _FINE) * (1 - 3 * _FINE), _FINE * (3 * _FINE - 2)]
-)
-"""Weights (3, n) of chord, start and end tangent in the derivative at the fine samples."""
-_FINE_BUMP = np.pi * np.sin(2 * np.pi * _FINE)
-"""First derivative at the fine samples of a bump of one metre."""
-
-
-class _Fan:
-    """Parametric curves over 0 to 1: the Hermite cubic plus bumps of given height.
-
-    The length of the end tangents is `scale` times the chord.
-    """
-
-    def __init__(self, start: np.ndarray, goal: np.ndarray, scale: float):
-        self.start, self.chord = start[:2], goal[:2] - start[:2]
-        length = np.hypot(*self.chord)
-        self.left = np.array([-self.chord[1], self.chord[0]]) / length
-        self.m0 = scale * length * np.array([np.cos(start[2]), np.sin(start[2])])
-        self.m1 = scale * length * np.array([np.cos(goal[2]), np.sin(goal[2])])
-        along_chord, along_m0, along_m1 = _FINE_WEIGHTS
-        self.fine_slope = along_chord * self.chord[:, None] + along_m0 * self.m0[:, None]
-        self.fine_slope += along_m1 * self.m1[:, None]
-
-
-class _Curve:
-    """One curve of a fan with its derivative at the fine samples and between them."""
-
-    def __init__(self, fan: _Fan, offset: float):
-        self._fan, self._offset = fan, float(offset)
-        self._slope = fan.fine_slope + _FINE_BUMP * (offset * fan.left)[:, None]
-        self._speed = np.hypot(self._slope[0], self._slope[1])
-
-    def is_drivable(self, min_radius: float) -> bool:
-        """Return whether no radius of the curve is smaller than `min_radius` [m]."""
-        ends = self._speed[::2]
-        if ends.min() <= 1e-6 * ends.max():
-            return False
-        return bool(turns_within(self._slope, self._speed, float(min_radius)))
-
-    def sample(self, waypoint_spacing: float) -> np.ndarray:
-        """Sample equidistant poses (n, 3), at most `waypoint_spacing` [m] apart."""
-        check_interruption()  # a question may have many long candidates
-        ends, middles = self._speed[::2], self._speed[1::2]
-        pieces = (ends[:-1] + 4 * middles + ends[1:]) / 6 / len(middles)
-        driven = np.concatenate([[0.0], np.cumsum(pieces)])
-        steps = max(1, int(np.ceil(driven[-1] / waypoint_spacing - 1e-9)))
-        marks = np.linspace(0.0, driven[-1], steps + 1)
-        t, poses, slope = np.empty(steps + 1), np.empty((steps + 1, 3)), np.empty((2, steps + 1))
-        interpolate(marks, driven, _FINE[::2], 1 / ends, t)
-        fan = self._fan
-        curve = BumpedCurve(fan.start, fan.chord, fan.m0, fan.m1, fan.left, self._offset)
-        follow_curve(t, curve, poses, slope)
-        poses[:, 2] = np.arctan2(slope[1], slope[0])
-        return poses
-
-
 def _pin_ends(path: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarray:
     """Replace the ends of a path by the exact start and goal, which removes rounding errors."""
     path[0], path[-1] = start, goal
@@ -196,35 +210,18 @@ def _pin_ends(path: np.ndarray, start: np.ndarray, goal: np.ndarray) -> np.ndarr
     return path
 
 
-def _check_pose(name: str, pose) -> np.ndarray:
+def check_pose(name: str, pose) -> np.ndarray:
+    """Return a pose (3,) x, y [m] and yaw [rad, in -pi to pi], checked.
+
+    Raises:
+        PlanningError: It is something else, or not finite.
+    """
     try:
         values = np.array(pose, dtype=float)
     except (TypeError, ValueError):
-        raise PlanningError(f"{name} is {pose!r}; it is three numbers x, y, yaw") from None
-    if values.shape != (3,):
-        raise PlanningError(f"{name} has shape {values.shape}; it is three numbers x, y, yaw")
-    if not np.isfinite(values).all():
-        raise PlanningError(f"{name} is {values.tolist()}; x, y and yaw must be finite")
+        values = np.empty(0)
+    if values.shape != (3,) or not np.isfinite(values).all():
+        given = values.tolist() if values.size else repr(pose)
+        raise PlanningError(f"{name} is {given}; it must be three finite numbers x, y, yaw")
     values[2] = wrap(values[2])
     return values
-
-
-def _check_count(count) -> None:
-    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
-        raise PlanningError(f"count is {count!r}; it must be a whole number of at least 1")
-
-
-def _check_positive(name: str, value) -> None:
-    number = isinstance(value, int | float | np.integer | np.floating)
-    if not number or not np.isfinite(value) or value <= 0:
-        raise PlanningError(f"{name} is {value!r}; it must be a finite number above 0")
-
-
-def _check_length(start: np.ndarray, goal: np.ndarray, waypoint_spacing: float) -> None:
-    with np.errstate(over="ignore"):
-        chord = float(np.hypot(*(goal[:2] - start[:2])))
-    if not chord / waypoint_spacing < MAX_WAYPOINTS:
-        raise PlanningError(
-            f"the goal is {chord:.4g} m from the start: in steps of {waypoint_spacing} m that is "
-            f"more than {MAX_WAYPOINTS} waypoints"
-        )

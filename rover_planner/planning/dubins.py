@@ -12,6 +12,8 @@ import numpy as np
 
 _TURN = {"L": 1.0, "S": 0.0, "R": -1.0}
 """Curvature of each letter of a word, in 1 / radius, positive to the left."""
+_WORDS = ("LSL", "RSR", "LSR", "RSL", "RLR", "LRL")
+"""All words; of two of the same length the first is preferred."""
 
 
 def dubins_paths(
@@ -60,38 +62,31 @@ def _solve_words(a: float, b: float, d: float) -> list[tuple[str, tuple[float, f
 
     Return each word that exists, with the lengths of its three pieces [radii; rad on arcs].
     """
-    sa, ca, sb, cb, cab = math.sin(a), math.cos(a), math.sin(b), math.cos(b), math.cos(a - b)
-    words = []
+    found = _solve_left(a, b, d, "LSL", "LSR", "LRL") | _solve_left(-a, -b, d, "RSR", "RSL", "RLR")
+    return [(word, found[word]) for word in _WORDS if word in found]
 
+
+def _solve_left(
+    a: float, b: float, d: float, same: str, crossed: str, curved: str
+) -> dict[str, tuple[float, float, float]]:
+    """Solve the words that begin to the left; with mirrored headings those to the right."""
+    sa, ca, sb, cb, cab = math.sin(a), math.cos(a), math.sin(b), math.cos(b), math.cos(a - b)
+    found = {}
     square = 2 + d * d - 2 * cab + 2 * d * (sa - sb)
     if square >= 0:
         line = math.atan2(cb - ca, d + sa - sb)
-        words.append(("LSL", (_turn(line - a), math.sqrt(square), _turn(b - line))))
-    square = 2 + d * d - 2 * cab + 2 * d * (sb - sa)
-    if square >= 0:
-        line = math.atan2(ca - cb, d - sa + sb)
-        words.append(("RSR", (_turn(a - line), math.sqrt(square), _turn(line - b))))
+        found[same] = _turn(line - a), math.sqrt(square), _turn(b - line)
     square = -2 + d * d + 2 * cab + 2 * d * (sa + sb)
     if square >= 0:
         p = math.sqrt(square)
         line = math.atan2(-ca - cb, d + sa + sb) - math.atan2(-2.0, p)
-        words.append(("LSR", (_turn(line - a), p, _turn(line - b))))
-    square = -2 + d * d + 2 * cab - 2 * d * (sa + sb)
-    if square >= 0:
-        p = math.sqrt(square)
-        line = math.atan2(ca + cb, d - sa - sb) - math.atan2(2.0, p)
-        words.append(("RSL", (_turn(a - line), p, _turn(b - line))))
-    cosine = (6 - d * d + 2 * cab + 2 * d * (sa - sb)) / 8
-    if abs(cosine) <= 1:
-        p = 2 * math.pi - math.acos(cosine)
-        t = _turn(a - math.atan2(ca - cb, d - sa + sb) + p / 2)
-        words.append(("RLR", (t, p, _turn(a - b - t + p))))
+        found[crossed] = _turn(line - a), p, _turn(line - b)
     cosine = (6 - d * d + 2 * cab + 2 * d * (sb - sa)) / 8
     if abs(cosine) <= 1:
         p = 2 * math.pi - math.acos(cosine)
         t = _turn(-a - math.atan2(ca - cb, d + sa - sb) + p / 2)
-        words.append(("LRL", (t, p, _turn(b - a - t + p))))
-    return words
+        found[curved] = t, p, _turn(b - a - t + p)
+    return found
 
 
 def _drive(start, word, pieces, radius, waypoint_spacing):

@@ -2,6 +2,7 @@
 """Chooses a start and goals on a map for demos: goals on plain ground and difficult goals."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +59,7 @@ class _Ground:
     """Mask (ny, nx): the footprint is known and its slope is at most half of the tilt limit."""
     difficulty: NDArray[np.float64]
     """Slopes and steps (ny, nx) relative to the rover's capability; NaN as in `slope`."""
-    reach: float
+    far: float
     """Largest distance of a goal from the start [m]."""
     near: float
     """Smallest distance of a goal from the start [m]."""
@@ -82,6 +83,17 @@ class _Ground:
         return x, y
 
 
+class _View(NamedTuple):
+    """Where the cells (ny, nx) of a map are as seen from the start."""
+
+    distance: NDArray[np.float64]
+    """Distance [m]."""
+    bearing: NDArray[np.float64]
+    """Direction [rad], map frame."""
+    turn: NDArray[np.float64]
+    """Angle off the start's heading [rad], to either side."""
+
+
 def choose_mission(terrain: Terrain, rover: Rover, seed: int = 1, plain_goals: int = 4) -> Mission:
     """Choose a start and goals by the heights of a map; the model is not used.
 
@@ -103,15 +115,16 @@ def choose_mission(terrain: Terrain, rover: Rover, seed: int = 1, plain_goals: i
     ground = _survey(terrain, rover)
     start = _choose_start(ground, rng)
     found = [("plain", pose) for pose in _choose_plain(ground, start, plain_goals, rng)]
-    for intent, choose in (
-        ("rough", _choose_rough),
-        ("steep", _choose_steep),
-        ("unknown ground", _choose_unknown),
-        ("off the map", _choose_off_map),
+    view = _look_from(ground, start)
+    for intent, score in (
+        ("rough", _score_rough(ground, start, view)),
+        ("steep", _score_steep(ground, view)),
+        ("unknown ground", _score_unknown(ground, view)),
     ):
-        pose = choose(ground, start)
+        pose = _choose_cell(ground, start, view, score)
         if pose is not None:
             found.append((intent, pose))
+    found.append(("off the map", _choose_off_map(ground, start)))
     goals = (Goal(chr(ord("A") + k), intent, pose) for k, (intent, pose) in enumerate(found))
     return Mission(start, tuple(goals))
 
@@ -152,7 +165,7 @@ def _survey(terrain: Terrain, rover: Rover) -> _Ground:
         np.where(whole, slope, np.nan),
         whole & (slope <= gentle_slope),
         np.where(whole, difficulty, np.nan),
-        reach=8 * wheelbase,
+        far=8 * wheelbase,
         near=1.5 * wheelbase,
     )
 
@@ -177,12 +190,21 @@ def _sight(ground: _Ground, clear: NDArray[np.bool_], x, y, bearings) -> NDArray
 
     `clear` is a mask (ny, nx) of the cells.
     """
-    step = max(2 * ground.terrain.resolution, ground.reach / 60)
-    distances = np.arange(0.0, ground.reach, step)
+    step = max(2 * ground.terrain.resolution, ground.far / 60)
+    distances = np.arange(0.0, ground.far, step)
     px = x[:, None, None] + distances * np.cos(bearings)[:, None]
     py = y[:, None, None] + distances * np.sin(bearings)[:, None]
     row, column, inside = ground.cells(px, py)
     return step * np.cumprod(inside & clear[row, column], axis=2).sum(axis=2)
+
+
+def _look_from(ground: _Ground, start: Pose) -> _View:
+    """Return where the cells of a map are as seen from a start."""
+    ny, nx = ground.slope.shape
+    x, y = ground.place(np.arange(ny)[:, None], np.arange(nx)[None, :])
+    bearing = np.arctan2(y - start[1], x - start[0])
+    turn = np.abs(np.angle(np.exp(1j * (bearing - start[2]))))
+    return _View(np.hypot(x - start[0], y - start[1]), bearing, turn)
 
 
 def _choose_plain(ground: _Ground, start: Pose, count: int, rng) -> list[Pose]:
@@ -207,7 +229,7 @@ def _choose_plain(ground: _Ground, start: Pose, count: int, rng) -> list[Pose]:
 def _gentlest_near(ground: _Ground, x: float, y: float) -> tuple[float, float]:
     """Return the place with the least difficulty around a point."""
     row, column, _ = ground.cells(x, y)
-    around = max(1, round(0.06 * ground.reach / ground.terrain.resolution))
+    around = max(1, round(0.06 * ground.far / ground.terrain.resolution))
     j, i = max(0, int(row) - around), max(0, int(column) - around)
     window = ground.difficulty[j : int(row) + around + 1, i : int(column) + around + 1]
     window = np.where(np.isfinite(window), window, np.inf)
@@ -216,36 +238,32 @@ def _gentlest_near(ground: _Ground, x: float, y: float) -> tuple[float, float]:
     return float(px), float(py)
 
 
-def _choose_rough(ground: _Ground, start: Pose) -> Pose | None:
-    """Choose the most difficult place with known ground all the way, preferably ahead."""
-    distance, turn = _polar(ground, start)
+def _score_rough(ground: _Ground, start: Pose, view: _View) -> NDArray[np.float64]:
+    """Prefer difficult places with known ground all the way, ahead of the start."""
     bearings = np.linspace(-np.pi, np.pi, _VIEWS)
     known = np.isfinite(ground.slope)
     sight = _sight(ground, known, np.array([start[0]]), np.array([start[1]]), bearings)[0]
-    in_view = known & (distance < np.interp(_bearing(ground, start), bearings, sight))
-    score = ground.difficulty * (1 - turn / (2 * np.pi))
-    return _choose_cell(ground, start, np.where(in_view, score, -np.inf))
+    in_view = known & (view.distance < np.interp(view.bearing, bearings, sight))
+    return np.where(in_view, ground.difficulty * (1 - view.turn / (2 * np.pi)), -np.inf)
 
 
-def _choose_steep(ground: _Ground, start: Pose) -> Pose | None:
-    """Choose the steepest known ground, preferably ahead."""
-    distance, turn = _polar(ground, start)
-    score = ground.slope * (1 - turn / (2 * np.pi))
-    score = np.where(distance <= 1.2 * ground.reach, score, -np.inf)
-    return _choose_cell(ground, start, np.where(np.isfinite(score), score, -np.inf))
+def _score_steep(ground: _Ground, view: _View) -> NDArray[np.float64]:
+    """Prefer steep known ground ahead."""
+    score = ground.slope * (1 - view.turn / (2 * np.pi))
+    score = np.where(view.distance <= 1.2 * ground.far, score, -np.inf)
+    return np.where(np.isfinite(score), score, -np.inf)
 
 
-def _choose_unknown(ground: _Ground, start: Pose) -> Pose | None:
-    """Choose the nearest place ahead that is well inside unknown ground."""
+def _score_unknown(ground: _Ground, view: _View) -> NDArray[np.float64]:
+    """Prefer near places ahead that are well inside unknown ground."""
     unknown = np.isnan(ground.terrain.elevation)
     depth = ndimage.distance_transform_edt(np.pad(unknown, 1))[1:-1, 1:-1]
     depth *= ground.terrain.resolution
-    distance, turn = _polar(ground, start)
-    score = np.where(depth > 0.1 * ground.near, -distance * (1 + 2 * turn), -np.inf)
-    return _choose_cell(ground, start, score)
+    preferred = -view.distance * (1 + 2 * view.turn)
+    return np.where(depth > 0.1 * ground.near, preferred, -np.inf)
 
 
-def _choose_off_map(ground: _Ground, start: Pose) -> Pose | None:
+def _choose_off_map(ground: _Ground, start: Pose) -> Pose:
     """Choose a point beyond the nearest edge of the map ahead."""
     bearings = start[2] + np.linspace(-_WIDE_CONE, _WIDE_CONE, 61)
     xmin, xmax, ymin, ymax = ground.terrain.bounds
@@ -260,30 +278,16 @@ def _choose_off_map(ground: _Ground, start: Pose) -> Pose | None:
     return _facing(start, float(x), float(y))
 
 
-def _choose_cell(ground: _Ground, start: Pose, score: NDArray[np.float64]) -> Pose | None:
+def _choose_cell(
+    ground: _Ground, start: Pose, view: _View, score: NDArray[np.float64]
+) -> Pose | None:
     """Return the cell with the highest score (ny, nx) beyond `near`, None if all are -inf."""
-    distance, _ = _polar(ground, start)
-    allowed = np.where(distance >= ground.near, score, -np.inf)
+    allowed = np.where(view.distance >= ground.near, score, -np.inf)
     best = np.unravel_index(np.argmax(allowed), allowed.shape)
     if not np.isfinite(allowed[best]):
         return None
     x, y = ground.place(*best)
     return _facing(start, float(x), float(y))
-
-
-def _polar(ground: _Ground, start: Pose) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return distance [m] and angle off the start's heading [rad] of every cell (ny, nx)."""
-    ny, nx = ground.slope.shape
-    x, y = ground.place(np.arange(ny)[:, None], np.arange(nx)[None, :])
-    turn = np.abs(np.angle(np.exp(1j * (_bearing(ground, start) - start[2]))))
-    return np.hypot(x - start[0], y - start[1]), turn
-
-
-def _bearing(ground: _Ground, start: Pose) -> NDArray[np.float64]:
-    """Return the direction [rad] of every cell (ny, nx) from the start, map frame."""
-    ny, nx = ground.slope.shape
-    x, y = ground.place(np.arange(ny)[:, None], np.arange(nx)[None, :])
-    return np.arctan2(y - start[1], x - start[0])
 
 
 def _facing(start: Pose, x: float, y: float) -> Pose:

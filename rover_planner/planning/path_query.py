@@ -19,6 +19,8 @@ from rover_physics.traversability.verdict import Verdict
 from rover_planner.parameters.shared import CONTROL_MARGIN
 from rover_planner.planning.candidates import generate_candidates, path_length
 
+Pose = NDArray[np.float64]
+"""(3,) x, y [m] and yaw [rad] of the body origin, map frame."""
 RISK_STEP = 0.05
 """Rounding step of risks [share of a limit]: paths of equal rounded risk differ by energy."""
 MODEL_OPTIONS = SweepOptions(control_margin=CONTROL_MARGIN)
@@ -77,7 +79,7 @@ class Candidate:
         return path_length(self.poses)
 
     @property
-    def reach(self) -> float:
+    def passable_share(self) -> float:
         """Share of the path before the first failure, 0 to 1; 1 without a failure."""
         failure = self.verdict.first_failure
         if failure < 0:
@@ -122,11 +124,41 @@ class PathAnswer:
                 f"{passable} of {total} candidate paths traversable; chose {self.number}: "
                 f"{chosen.length:.2f} m, {energy:.1f} J, risk {risk:.2f}"
             )
-        driven = chosen.reach * chosen.length
+        driven = chosen.passable_share * chosen.length
         return (
             f"none of {total} candidate paths is traversable; number {self.number} gets furthest, "
             f"{driven:.2f} m of {chosen.length:.2f} m: {chosen.verdict.reason}"
         )
+
+
+@dataclass(frozen=True, eq=False)
+class PathSearch:
+    """The answer to a query and the goal of its paths."""
+
+    answer: PathAnswer
+    """The candidate paths to the goal."""
+    asked_goal: Pose
+    """The requested goal."""
+    goal: Pose
+    """The goal of the candidates: the requested one or another one near it."""
+    alternatives_tried: int
+    """Number of other goals that were tried."""
+
+    @property
+    def goal_offset(self) -> float:
+        """Distance between `goal` and the requested goal [m]."""
+        return float(np.hypot(*(self.goal - self.asked_goal)[:2]))
+
+
+def add_path(search: PathSearch | None, path: Candidate, goal: Pose) -> PathSearch:
+    """Return the search with a traversable path as the chosen one, after its own candidates.
+
+    The path may end elsewhere than at the requested `goal`.
+    """
+    candidates = (path,) if search is None else (*search.answer.candidates, path)
+    last = len(candidates) - 1
+    tried = 0 if search is None else search.alternatives_tried
+    return PathSearch(PathAnswer(candidates, last, last), goal, path.poses[-1], tried)
 
 
 def answer_path_query(
@@ -224,7 +256,7 @@ def choose(candidates: tuple[Candidate, ...]) -> PathAnswer:
     if passable:
         best = min(passable, key=lambda k: candidates[k].cost)
         return PathAnswer(candidates, best, best)
-    return PathAnswer(candidates, -1, max(indices, key=lambda k: candidates[k].reach))
+    return PathAnswer(candidates, -1, max(indices, key=lambda k: candidates[k].passable_share))
 
 
 def path_cost(prediction: PathPrediction, verdict: Verdict) -> tuple[float, float]:

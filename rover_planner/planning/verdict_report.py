@@ -1,58 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a request: the verdict and its details as dataclasses and as flat JSON."""
+"""The report of a request: the verdict with all its details, as flat JSON."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass, replace
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from rover_physics.numerics.plain_values import to_plain
+from rover_physics.traversability.classification import ClassifiedWaypoint, deciding_waypoint
+from rover_physics.traversability.verdict import BOUNDS, EXTREMES
+from rover_planner.planning.path_query import Candidate, PathSearch
+from rover_planner.worlds.maps.blind_ground import BlindShare
 
-
-@dataclass(frozen=True)
-class FailureReport:
-    """The first failure of a path."""
-
-    failure_pose: tuple[float, ...]
-    """x, y [m] and yaw [rad] of the first waypoint that is not passable, map frame."""
-    failure_distance: float
-    """Distance along the path from its start to that waypoint [m]."""
-
-
-@dataclass(frozen=True)
-class PathReport:
-    """Length, time and energy of a judged path, and extremes over the waypoints that settled."""
-
-    policy: str
-    """Torque policy that was assumed."""
-    extremes: Mapping[str, float]
-    """Extremes of the verdict, its risk, and the bounds of them on an uncertain map, by the names
-    of its fields; each is a key of its own."""
-    waypoints: int
-    """Number of waypoints."""
-    length: float
-    """Length of the path [m]."""
-    time: float
-    """Driving time [s]; NaN if the last waypoint did not settle or was not judged."""
-    energy: float
-    """Energy of the wheel motors [J]; NaN as for the time."""
-
-
-@dataclass(frozen=True)
-class ClassReport:
-    """Traversability class of a path, and the waypoint that decides it."""
-
-    traversability_class: str
-    """One of `TRAVERSABILITY_CLASSES`, that of the worst waypoint; does not depend on `policy`."""
-    class_waypoint: int
-    """Index of the waypoint that decides the class."""
-    class_constraint: str
-    """Code of the limit that is violated there, else of the tightest limit."""
-    class_wheel: str
-    """Name of the wheel; empty if the limit does not concern a single wheel."""
-    class_margin: float
-    """Remaining share of that limit, negative if violated; NaN if the limit has no number."""
-    class_reason: str
-    """Reason why the waypoint is not passable, or not with equal torques; empty if passable."""
+REPORTED = (*EXTREMES, "risk", "map_sigmas", *BOUNDS)
+"""Fields of a verdict that a report has."""
 
 
 @dataclass(frozen=True)
@@ -63,36 +24,6 @@ class SuspensionReport:
     """Measured minus predicted angle [rad] by joint, for the joints that were measured."""
     suspension_agrees: bool
     """Whether all of them are within the tolerance."""
-
-
-@dataclass(frozen=True)
-class GroundReport:
-    """How much of the ground under the belly was never seen along the judged path."""
-
-    blind_share: float
-    """Share of the cells under the belly that were never seen, 0 to 1; with the next one."""
-    footprint_share: float
-    """Share of the cells under the belly that were filled in around the standing rover."""
-
-
-@dataclass(frozen=True)
-class SearchReport:
-    """What was tried to find a path to the goal."""
-
-    goal: tuple[float, ...]
-    """x, y [m] and yaw [rad] of the goal of the judged path, map frame."""
-    goal_offset: float
-    """Distance between that goal and the requested one [m]."""
-    alternative_goals_tried: int
-    """Number of alternative goals that were tried."""
-    candidates: int
-    """Number of candidate paths to that goal."""
-    traversable_candidates: int
-    """Number of them that are traversable."""
-    chosen_candidate: int
-    """Number of the judged candidate, counted from 1: the best, or the one that gets furthest."""
-    explanation: str
-    """One sentence that explains the choice."""
 
 
 @dataclass(frozen=True)
@@ -122,80 +53,135 @@ class IdentityReport:
 
 
 @dataclass(frozen=True)
-class WaypointLists:
-    """Verdict and class of each waypoint; only in the JSON, because they are long.
-
-    If there was no time for the waypoints beyond the first failure, the lists are without them.
-    """
-
-    codes: tuple[str, ...]
-    """Code of the violated limit; empty if passable under `policy`."""
-    reasons: tuple[str, ...]
-    """Reason in words; empty if passable."""
-    traversability_classes: tuple[str, ...]
-    """Traversability class of each waypoint."""
-    class_constraints: tuple[str, ...]
-    """Per waypoint, as `ClassReport.class_constraint`."""
-    class_wheels: tuple[str, ...]
-    """As `class_wheel`."""
-    class_margins: tuple[float, ...]
-    """As `class_margin`."""
-
-
-@dataclass(frozen=True)
 class VerdictReport:
-    """The answer to a request with all its details; parts that do not apply are None.
+    """The answer to a request with all its details; docs/traverse_server.md explains its keys."""
 
-    The JSON has one level: the fields of the parts become keys beside those of this class. Names
-    and order of the keys are those of the fields.
-    """
-
-    traversable: bool
-    """Whether the rover may drive the path."""
-    code: str
-    """Code of the reason why not, as in a verdict or refusal; empty if traversable."""
-    reason: str
-    """Reason why not, in words; empty if traversable."""
-    first_failure: int = -1
-    """Index of the first waypoint that is not passable, -1 if none."""
-    failure: FailureReport | None = None
-    """The first failure of the path."""
-    path: PathReport | None = None
-    """The judged path; this and all fields below are None if no path was judged."""
-    classes: ClassReport | None = None
-    """Traversability class of the path."""
-    suspension: SuspensionReport | None = None
-    """Comparison with the measured suspension; None without measured joints."""
-    ground: GroundReport | None = None
-    """Never seen ground under the belly."""
-    search: SearchReport | None = None
-    """The search for the path; None if the path was given."""
+    entries: Mapping[str, Any]
+    """Verdict, code and reason; the judged path, if there is one, and the search for it."""
+    per_waypoint: Mapping[str, Sequence[Any]] = field(default_factory=dict)
+    """Verdict and class of each waypoint. If there was no time for the waypoints beyond the first
+    failure, the lists are without them."""
     identity: IdentityReport | None = None
     """What the answer is about; None if it was not asked for over ROS."""
-    waypoint_lists: WaypointLists | None = None
-    """Values per waypoint."""
+
+    @property
+    def traversable(self) -> bool:
+        """Whether the rover may drive the path."""
+        return bool(self.entries["traversable"])
+
+    @property
+    def reason(self) -> str:
+        """Reason why not, in words; empty if traversable."""
+        return str(self.entries["reason"])
 
     @property
     def has_warning(self) -> bool:
         """Whether the measured suspension disagrees with the prediction."""
-        return self.suspension is not None and not self.suspension.suspension_agrees
+        return not self.entries.get("suspension_agrees", True)
 
     def to_dict(self) -> dict[str, Any]:
         """Return all entries in JSON types: one level, None for NaN and infinity."""
-        return to_plain(dict(_entries(self)))
+        return self.summary() | to_plain(dict(self.per_waypoint))
 
     def summary(self) -> dict[str, Any]:
         """Return the entries of `to_dict` without those that have a value per waypoint."""
-        return replace(self, waypoint_lists=None).to_dict()
+        about = {} if self.identity is None else asdict(self.identity)
+        plain: dict[str, Any] = to_plain({**self.entries, **about})
+        return plain
 
 
-def _entries(part: Any) -> Iterator[tuple[str, Any]]:
-    """Yield names and values of the fields of a part; nested parts are expanded in place."""
-    for field in fields(part):
-        value = getattr(part, field.name)
-        if is_dataclass(value):
-            yield from _entries(value)
-        elif field.name == "extremes":
-            yield from value.items()
-        elif value is not None:
-            yield field.name, value
+def report_refusal(code: str, reason: str) -> VerdictReport:
+    """Return the report of a request that was refused before a path was judged."""
+    return VerdictReport(
+        {"traversable": False, "code": code, "reason": reason, "first_failure": -1}
+    )
+
+
+def report_path(
+    candidate: Candidate,
+    why: tuple[str, str],
+    classes: Sequence[ClassifiedWaypoint],
+    suspension: SuspensionReport | None = None,
+    ground: BlindShare | None = None,
+    search: PathSearch | None = None,
+) -> VerdictReport:
+    """Return the full report of a judged path.
+
+    Args:
+        candidate: The path.
+        why: Code and reason of the answer; both are empty if the path is traversable.
+        classes: The classes of its waypoints; empty if there was no time to find them.
+        suspension: The comparison with the measured suspension; None without measurements.
+        ground: Never seen ground under the belly; None if it is not known.
+        search: The search that found the path; None if the path was given.
+    """
+    verdict = candidate.verdict
+    entries = {"traversable": verdict.traversable, "code": why[0], "reason": why[1]}
+    entries |= _report_drive(candidate)
+    if classes:
+        entries |= _report_class(classes)
+    if suspension is not None:
+        entries |= asdict(suspension)
+    if ground is not None:
+        entries["blind_share"] = ground.blind_share
+        entries["footprint_share"] = ground.footprint_share
+    if search is not None:
+        entries |= _report_search(search)
+    return VerdictReport(
+        entries,
+        {
+            "codes": verdict.codes,
+            "reasons": verdict.reasons,
+            "traversability_classes": [one.traversability_class for one in classes],
+            "class_constraints": [one.constraint for one in classes],
+            "class_wheels": [one.wheel for one in classes],
+            "class_margins": [one.margin for one in classes],
+        },
+    )
+
+
+def _report_drive(candidate: Candidate) -> dict[str, Any]:
+    """Return the first failure of a path, its extremes, length, time [s] and energy [J]."""
+    verdict, prediction = candidate.verdict, candidate.prediction
+    failure = verdict.first_failure
+    entries: dict[str, Any] = {"first_failure": failure}
+    if failure >= 0:
+        entries["failure_pose"] = prediction.poses[failure]
+        entries["failure_distance"] = candidate.passable_share * candidate.length
+    return {
+        **entries,
+        "policy": verdict.policy,
+        **{name: getattr(verdict, name) for name in REPORTED},
+        "waypoints": len(candidate.poses),
+        "length": candidate.length,
+        "time": prediction.time[-1] if candidate.is_complete else math.nan,
+        "energy": prediction.energy[-1] if candidate.is_complete else math.nan,
+    }
+
+
+def _report_class(classes: Sequence[ClassifiedWaypoint]) -> dict[str, Any]:
+    """Return the class of a path and the waypoint that decides it."""
+    waypoint = deciding_waypoint(classes)
+    worst = classes[waypoint]
+    return {
+        "traversability_class": worst.traversability_class,
+        "class_waypoint": waypoint,
+        "class_constraint": worst.constraint,
+        "class_wheel": worst.wheel,
+        "class_margin": worst.margin,
+        "class_reason": worst.reason,
+    }
+
+
+def _report_search(search: PathSearch) -> dict[str, Any]:
+    """Return what was tried to find a path to a goal."""
+    candidates = search.answer.candidates
+    return {
+        "goal": search.goal,
+        "goal_offset": search.goal_offset,
+        "alternative_goals_tried": search.alternatives_tried,
+        "candidates": len(candidates),
+        "traversable_candidates": sum(one.verdict.traversable for one in candidates),
+        "chosen_candidate": search.answer.number,
+        "explanation": search.answer.explain(),
+    }

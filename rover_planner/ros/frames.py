@@ -13,9 +13,15 @@ from numpy.typing import NDArray
 from msg_adapters.frames import check_frame, read_transform
 from msg_adapters.paths import pose_to_array
 from msg_adapters.stamps import stamp_to_ns
-from rover_planner.planning.navigation.rigid_poses import move_path, read_pose, write_pose
 from rover_planner.planning.navigation.sensor_mounts import SensorPoses
-from rover_planner.planning.navigation.transforms import Rigid, TransformError, TransformTree
+from rover_planner.planning.navigation.transforms import (
+    Rigid,
+    TransformError,
+    TransformTree,
+    move_path,
+    read_pose,
+    write_pose,
+)
 
 
 class FrameParameters(Protocol):

@@ -13,7 +13,7 @@ from benchmarks.grounds import made_reef
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.planning.ways.way_search import LatticeSettings
+from rover_planner.planning.search.query import LatticeSettings
 from rover_planner.viewer.state.scenario import Scenario
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, waves

@@ -10,7 +10,6 @@ from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.server_health import ERROR, OK, WARN
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
-from rover_planner.planning.navigation.drift import SuspensionDrift
 from rover_planner.planning.navigation.monitor import (
     ARRIVED,
     IDLE,
@@ -18,9 +17,10 @@ from rover_planner.planning.navigation.monitor import (
     WATCHING,
     PathMonitor,
     Sight,
+    SuspensionDrift,
     WatchSettings,
+    describe_watch,
 )
-from rover_planner.planning.navigation.monitor_health import describe_watch
 from rover_planner.planning.navigation.watched_path import WatchedPath
 from rover_planner.planning.verdict_report import SuspensionReport
 from support.grounds import make_terrain, wall_at, waves
@@ -38,7 +38,7 @@ def service():
 def sight(service, pose, time=0.0, ground=waves):
     service.take_terrain(make_terrain(ground))
     pose = None if pose is None else np.array(pose)
-    return Sight(service.situation(), pose, time)
+    return Sight(service.snapshot(), pose, time)
 
 
 def watching(service, **limits):
@@ -137,14 +137,14 @@ def test_a_rover_off_its_path_or_lost_is_to_stop(service):
 
 def test_a_difference_counts_once_it_has_lasted():
     drift = SuspensionDrift(1.0)
-    assert np.isnan(drift.size) and drift.lasting() == 0.0
+    assert drift.latest == {} and drift.lasting() == 0.0
     for k in range(11):
         size = 0.4 if k != 5 else 0.1
         drift.take(SuspensionReport({"bogie_left": -size, "bogie_right": 0.0}, False), 0.1 * k)
     assert drift.lasting() == pytest.approx(0.1)
     for k in range(11, 18):
         drift.take(SuspensionReport({"bogie_left": -0.4}, False), 0.1 * k)
-    assert drift.lasting() == pytest.approx(0.4) and drift.size == pytest.approx(0.4)
+    assert drift.lasting() == pytest.approx(0.4) and drift.latest == {"bogie_left": -0.4}
     drift.take(None, 9.0)
     assert drift.latest == {} and drift.lasting() == 0.0
 
@@ -159,3 +159,22 @@ def test_health_tells_a_stop_then_drift_with_its_size(service):
     assert describe_watch(found, False, 0.3).level == OK
     stopped = monitor.look(sight(service, None, 9.0))
     assert describe_watch(stopped, True, 0.1).level == ERROR
+
+
+def test_a_path_is_over_near_its_end_but_not_before_it_was_driven_to_the_last_turn():
+    def is_over(path, poses):
+        found, index = [], 0
+        for pose in np.asarray(poses, float):
+            index = path.find_place(pose, index).index
+            found.append(path.is_over(pose, index, 0.2))
+        return found
+
+    there = [(x, 0.0, 0.0) for x in np.arange(0.0, 3.01, 0.1)]
+    back = there[::-1]
+    turn = [(3.0, 0.0, yaw) for yaw in np.arange(0.0, 2.01, 0.2)]
+    beside = [(x, 0.04, 0.05) for x, _, _ in there]
+    over = is_over(WatchedPath(np.array(there)), beside)
+    assert over == [np.hypot(3.0 - x, y) < 0.2 for x, y, _ in beside]
+    for rest in (back, turn):
+        over = is_over(WatchedPath(np.array([*there, *rest[1:]])), [*there, *rest])
+        assert over[-1] and not any(over[: len(there)])

@@ -24,16 +24,12 @@ def matrix(rigid):
     return whole
 
 
-def stamped(parent, child, rigid, stamp=NOW):
-    return parent, child, stamp, rigid
-
-
 @pytest.fixture
 def tree():
     tree = TransformTree(0.5)
-    tree.take(*stamped("map", "odom", MAP_ODOM))
-    tree.take(*stamped("odom", "base_link", ODOM_BASE))
-    tree.take(*stamped("base_link", "camera", BASE_CAMERA, 5), is_static=True)
+    tree.take("map", "odom", NOW, MAP_ODOM)
+    tree.take("odom", "base_link", NOW, ODOM_BASE)
+    tree.take("base_link", "camera", 5, BASE_CAMERA, is_static=True)
     return tree
 
 
@@ -42,7 +38,7 @@ def test_chains_up_and_down_are_products_of_their_matrices(tree):
     np.testing.assert_allclose(matrix(tree.find("map", "camera", None, NOW)), whole, atol=1e-12)
     back = tree.find("camera", "map", None, NOW)
     np.testing.assert_allclose(matrix(back) @ whole, np.eye(4), atol=1e-12)
-    tree.take(*stamped("base_link", "wheel", ODOM_BASE, 7), is_static=True)
+    tree.take("base_link", "wheel", 7, ODOM_BASE, is_static=True)
     side = np.linalg.inv(matrix(BASE_CAMERA)) @ matrix(ODOM_BASE)
     found = matrix(tree.find("camera", "wheel", None, NOW + 9 * SECOND))
     np.testing.assert_allclose(found, side, atol=1e-12)  # static ones never age
@@ -51,7 +47,7 @@ def test_chains_up_and_down_are_products_of_their_matrices(tree):
 
 def test_a_time_between_two_stamps_is_interpolated(tree):
     later = Rigid.from_rpy(3.0, 1.0, 0.1, 0.0, 0.1, -0.2)
-    tree.take(*stamped("odom", "base_link", later, NOW + SECOND // 10))
+    tree.take("odom", "base_link", NOW + SECOND // 10, later)
     half = tree.find("odom", "base_link", NOW + SECOND // 20, NOW + SECOND // 10)
     np.testing.assert_allclose(half.translation, (2.5, 1.0, 0.1), atol=1e-12)
     turn = (half.rotation * ODOM_BASE.rotation.inv()).magnitude()
@@ -73,17 +69,17 @@ def test_frames_without_a_connection_or_in_a_circle_are_refused(tree):
     with pytest.raises(TransformError, match="no transforms connect the frames 'moon' and 'map'"):
         tree.find("map", "moon", None, NOW)
     assert tree.knows("map") and tree.knows("camera") and not tree.knows("moon")
-    tree.take(*stamped("camera", "map", MAP_ODOM))
+    tree.take("camera", "map", NOW, MAP_ODOM)
     with pytest.raises(TransformError, match="circle"):
         tree.find("map", "camera", None, NOW)
 
 
 def test_old_transforms_are_dropped_and_a_clock_set_back_starts_anew(tree):
     for k in range(400):
-        tree.take(*stamped("map", "odom", MAP_ODOM, NOW + k * SECOND // 10))
+        tree.take("map", "odom", NOW + k * SECOND // 10, MAP_ODOM)
     with pytest.raises(TransformError, match="before the oldest"):
         tree.find("map", "odom", NOW + SECOND, NOW + 40 * SECOND)
-    tree.take(*stamped("map", "odom", ODOM_BASE, 3 * SECOND))
+    tree.take("map", "odom", 3 * SECOND, ODOM_BASE)
     found = tree.find("map", "odom", None, 3 * SECOND)
     np.testing.assert_allclose(found.translation, ODOM_BASE.translation)
 

@@ -22,7 +22,7 @@ from support.waiting import start_watch, wait_until
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
-from rover_planner.planning.ways.way_search import LatticeSettings
+from rover_planner.planning.search.query import LatticeSettings
 from rover_planner.viewer.pages import page as page_module
 from rover_planner.viewer.pages.drawings import Drawings
 from rover_planner.viewer.pages.page import Page

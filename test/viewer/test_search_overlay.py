@@ -13,7 +13,7 @@ from support.waiting import wait_until
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
 
-from rover_planner.planning.lattice.nodes import nodes_within
+from rover_planner.planning.search.nodes import nodes_within
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.scene.search_overlay import ASKED, CLOSED, cover_places
 from rover_planner.viewer.state.colours import PASSABLE, REFUSED, SEARCHED, UNKNOWN

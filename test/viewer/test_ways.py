@@ -11,7 +11,7 @@ import pytest
 
 from rover_physics.names import TORQUE_POLICIES
 from rover_physics.traversability.judge import judge_path
-from rover_planner.planning.ways.way_search import FOUND, NO_WAY, OUT_OF_TIME
+from rover_planner.planning.search.path_search import FOUND, NO_WAY, OUT_OF_TIME
 from rover_planner.viewer.state.judging import (
     BETTER,
     PATH,

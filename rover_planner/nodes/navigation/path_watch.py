@@ -16,9 +16,9 @@ from std_srvs.srv import SetBool
 from rover_physics.numerics.interruption import interruptible
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.budget import STOPPING, QuestionStoppedError
-from rover_planner.planning.answering.judgement import Judgement, refusal
+from rover_planner.planning.answering.judgement import PathJudgement, refusal
 from rover_planner.planning.answering.server_health import Health
-from rover_planner.planning.answering.situation import Situation
+from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.monitor import (
     STOPPED,
@@ -26,8 +26,8 @@ from rover_planner.planning.navigation.monitor import (
     PathMonitor,
     Sight,
     WatchSettings,
+    describe_watch,
 )
-from rover_planner.planning.navigation.monitor_health import describe_watch
 from rover_planner.planning.navigation.watched_path import WatchedPath
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.handover import Handover
@@ -46,7 +46,7 @@ END_TIME = 2.0
 
 FindPose = Callable[[], NDArray[np.float64] | None]
 """Returns the pose (3,) x, y [m] and yaw [rad] of the body of just now, map frame."""
-Tell = Callable[[Judgement, str, Situation], None]
+Tell = Callable[[PathJudgement, str, Snapshot], None]
 """Publishes why the rover is to stop, with the hash of its path and what was known."""
 
 
@@ -79,7 +79,7 @@ class PathWatch:
         """What was found last; belongs to the executor's thread."""
         self.enabled = False
         """Whether accepted paths are watched."""
-        self._told: Judgement | None = None
+        self._told: PathJudgement | None = None
         self._last_path: WatchedPath | None = None
         self._stop = node.create_publisher(Bool, "~/stop", latched_qos())
         self._handover = Handover(node, guard)
@@ -148,9 +148,9 @@ class PathWatch:
     def _offer_sight(self) -> None:
         """Hand what is known now to the thread; a look that still waits is replaced."""
         now = self._node.get_clock().now().nanoseconds
-        situation, pose = self._service.situation(now), self._find_pose()
+        snapshot, pose = self._service.snapshot(now), self._find_pose()
         with self._changed:
-            self._sight = Sight(situation, pose, time.monotonic())
+            self._sight = Sight(snapshot, pose, time.monotonic())
             self._changed.notify_all()
 
     def _run(self) -> None:
@@ -197,7 +197,7 @@ class PathWatch:
         self._told = judgement
         with interruptible(self._check_end):
             told = judgement.complete()
-        self._handover.call(lambda: self._tell(told, finding.path_hash, sight.situation))
+        self._handover.call(lambda: self._tell(told, finding.path_hash, sight.snapshot))
 
     def _take(self, finding: Finding) -> None:
         """Publish ~/stop where it has changed; called in the executor's thread."""

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The answer to one request: the verdict at once, its report on demand."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,19 +10,20 @@ from numpy.typing import NDArray
 from rover_physics.names import EQUAL
 from rover_physics.traversability.classification import ClassifiedWaypoint
 from rover_planner.planning.answering.budget import QuestionStoppedError
-from rover_planner.planning.path_planner import PathSearch
-from rover_planner.planning.path_query import Candidate
-from rover_planner.planning.path_report import report_path
+from rover_planner.planning.path_query import Candidate, PathSearch
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.path_search import SearchResult
 from rover_planner.planning.verdict_report import (
-    GroundReport,
     SuspensionReport,
     VerdictReport,
+    report_path,
+    report_refusal,
 )
-from rover_planner.planning.ways.way_search import WayAnswer
+from rover_planner.worlds.maps.blind_ground import BlindShare
 
 
 @dataclass(frozen=True, eq=False)
-class Judgement:
+class PathJudgement:
     """A judged path, or a refusal before any path was judged."""
 
     code: str
@@ -32,19 +32,16 @@ class Judgement:
     """Reason why not, in words; empty if traversable."""
     candidate: Candidate | None = None
     """The judged path; None if the request was refused before."""
-    classify: Callable[[], tuple[ClassifiedWaypoint, ...]] = tuple
-    """Classifies the waypoints; may sweep the path once more."""
+    judge: PathJudge | None = None
+    """The model that has judged it; None if the request was refused before."""
     suspension: SuspensionReport | None = None
     """Comparison with the measured suspension; None without measurements."""
     search: PathSearch | None = None
     """The search that found the path; None if the path was given."""
-    way: WayAnswer | None = None
+    around: SearchResult | None = None
     """The search around obstacles; None if there was none."""
-    find_ground: Callable[[], GroundReport] | None = None
-    """Finds the share of never seen ground under the belly; None without a judged path."""
-    judge_rest: Callable[[], "Judgement"] | None = None
-    """Judges the waypoints beyond the first failure and returns the judgement with them; None if
-    they are judged."""
+    is_brief: bool = False
+    """Whether there was no time for classes and for waypoints beyond the first failure."""
 
     @property
     def traversable(self) -> bool:
@@ -54,9 +51,11 @@ class Judgement:
     @cached_property
     def classes(self) -> tuple[ClassifiedWaypoint, ...]:
         """The class of each waypoint; empty if no path was judged. Computed on first use."""
-        return self.classify()
+        if self.candidate is None or self.judge is None or self.is_brief:
+            return ()
+        return self.judge.classify(self.candidate)
 
-    def complete(self) -> "Judgement":
+    def complete(self) -> "PathJudgement":
         """Return the judgement with all done that needs the model; later calls are quick.
 
         If there is no time for the waypoints beyond the first failure, or for classes, the
@@ -65,17 +64,19 @@ class Judgement:
         whole = self
         try:
             whole = self._with_rest()
-            _ = whole.changes() if whole._is_equal_and_traversable else whole.classes
+            if not whole._is_equal_and_traversable:
+                _ = whole.classes
             _ = whole.ground
         except QuestionStoppedError:
-            return replace(whole, classify=tuple, judge_rest=None)
+            return replace(whole, is_brief=True)
         return whole
 
-    def _with_rest(self) -> "Judgement":
+    def _with_rest(self) -> "PathJudgement":
         """Return the judgement with the waypoints beyond the first failure."""
-        if self.judge_rest is None:
+        candidate, judge = self.candidate, self.judge
+        if candidate is None or judge is None or candidate.is_complete or self.is_brief:
             return self
-        return replace(self.judge_rest(), code=self.code, reason=self.reason, way=self.way)
+        return replace(self, candidate=judge.check(candidate.poses))
 
     @property
     def _is_equal_and_traversable(self) -> bool:
@@ -86,17 +87,18 @@ class Judgement:
     @cached_property
     def report(self) -> VerdictReport:
         """The full report of the request. Computed on first use, with the classes and the rest."""
-        if self.judge_rest is not None:
-            return self._with_rest().report
-        if self.candidate is None:
-            return VerdictReport(False, self.code, self.reason)
-        report = report_path(self.candidate, self.classes, self.suspension, self.search)
-        return replace(report, code=self.code, reason=self.reason, ground=self.ground)
+        whole, why = self._with_rest(), (self.code, self.reason)
+        if whole.candidate is None:
+            return report_refusal(*why)
+        details = whole.classes, whole.suspension, whole.ground, whole.search
+        return report_path(whole.candidate, why, *details)
 
     @cached_property
-    def ground(self) -> GroundReport | None:
+    def ground(self) -> BlindShare | None:
         """Never seen ground under the belly; None without a judged path. Computed on first use."""
-        return None if self.find_ground is None else self.find_ground()
+        if self.candidate is None or self.judge is None or self.judge.blind is None:
+            return None
+        return self.judge.blind.share(self.candidate)
 
     def changes(self) -> NDArray[np.intp]:
         """Return the indices (m,) of waypoints whose class differs from that of the one before."""
@@ -116,6 +118,6 @@ class Judgement:
         )
 
 
-def refusal(code: str, reason: str) -> Judgement:
+def refusal(code: str, reason: str) -> PathJudgement:
     """Return the refusal of a request without a judged path."""
-    return Judgement(code, reason)
+    return PathJudgement(code, reason)

@@ -3,13 +3,14 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
+import numpy as np
+
+from msg_adapters.stamps import NANOSECONDS
 from rover_physics.terrain.grid import Terrain
 from rover_planner.worlds.maps.blind_ground import SeenGround, seen_ground
 from rover_planner.worlds.maps.layers import CellSources
-
-NANOSECONDS = 1_000_000_000
-"""Nanoseconds in a second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +39,22 @@ class KnownMap:
     def seen(self) -> SeenGround:
         """What was seen of the map; interpolated gaps were not. Computed on first use."""
         return seen_ground(self.received, self.cells)
+
+    @cached_property
+    def coverage(self) -> float:
+        """Share of the cells whose height is known, 0 to 1. Computed on first use."""
+        return float(np.isfinite(self.terrain.elevation).mean())
+
+    def describe(self, age: float) -> dict[str, Any]:
+        """Return source, age [s], cells, cell size [m] and coverage [%] by name."""
+        rows, columns = self.terrain.elevation.shape
+        return {
+            "map": self.source or "unnamed",
+            "map age [s]": f"{age:.1f}",
+            "map cells": f"{columns} x {rows}",
+            "map resolution [m]": f"{self.terrain.resolution:g}",
+            "map coverage [%]": f"{100.0 * self.coverage:.1f}",
+        }
 
     def age(self, ros_time: int, steady_time: float) -> float:
         """Return the age [s]: the longer of the times since its stamp and since its arrival.

@@ -2,9 +2,9 @@
 """Judges questions one after another in a thread, each within its time budget."""
 
 import threading
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
+from queue import SimpleQueue
 from typing import Any
 
 from rover_physics.numerics.interruption import interruptible
@@ -36,15 +36,15 @@ class Asked:
     """Whether it has its judgement."""
 
 
-Judged = tuple[Asked, Any]
+Answered = tuple[Asked, Any]
 """A question and its judgement."""
 
 
 class QuestionQueue:
     """Judges questions in their order; refuses those that it has no place or no time for.
 
-    Its methods belong to one thread, the owner's. They return the judgements that are to be sent;
-    each question has one.
+    Its methods belong to one thread, the owner's. They return the questions that are to be
+    answered, with their judgements; each question has one.
     """
 
     def __init__(self, max_waiting: int, judge: Callable[[Any], Any], wake: Callable[[], object]):
@@ -58,11 +58,9 @@ class QuestionQueue:
         """
         self.max_waiting = max_waiting
         self._judge, self._wake = judge, wake
-        self._waiting: deque[Asked] = deque()
-        self._judged: deque[Judged] = deque()
+        self._waiting: SimpleQueue[Asked | None] = SimpleQueue()
+        self._judged: SimpleQueue[Answered] = SimpleQueue()
         self._open: list[Asked] = []
-        self._changed = threading.Condition()
-        self._ending = False
         self._thread = threading.Thread(target=self._run, name="questions", daemon=True)
         self._thread.start()
 
@@ -71,22 +69,20 @@ class QuestionQueue:
         """Number of questions without an answer."""
         return len(self._open)
 
-    def ask(self, asked: Asked) -> list[Judged]:
+    def ask(self, asked: Asked) -> list[Answered]:
         """Queue a question, or refuse it as BUSY."""
         if len(self._open) > self.max_waiting:
             reason = f"{len(self._open)} questions are open already; ask again later"
             return [(asked, asked.question.refuse(BUSY, reason))]
         self._open.append(asked)
-        with self._changed:
-            self._waiting.append(asked)
-            self._changed.notify()
+        self._waiting.put(asked)
         return []
 
-    def finished(self) -> list[Judged]:
+    def finished(self) -> list[Answered]:
         """Take what the thread has judged."""
-        return self._close([self._judged.popleft() for _ in range(len(self._judged))])
+        return self._close([self._judged.get() for _ in range(self._judged.qsize())])
 
-    def overdue(self, grace: float) -> list[Judged]:
+    def overdue(self, grace: float) -> list[Answered]:
         """Refuse waiting questions just before their deadline, one in work `grace` [s] after."""
         refused = []
         for asked in self._open:
@@ -97,7 +93,7 @@ class QuestionQueue:
                 refused.append((asked, _refuse_waiting(asked)))
         return self._close(refused)
 
-    def stop_all(self, code: str, reason: str) -> list[Judged]:
+    def stop_all(self, code: str, reason: str) -> list[Answered]:
         """Stop all open questions with a code and reason."""
         for asked in self._open:
             asked.budget.stop(code, reason)
@@ -105,28 +101,21 @@ class QuestionQueue:
 
     def close(self) -> None:
         """End the thread; stop all questions before."""
-        with self._changed:
-            self._ending = True
-            self._changed.notify()
+        self._waiting.put(None)
         self._thread.join(END_TIME)
 
-    def _close(self, judged: list[Judged]) -> list[Judged]:
+    def _close(self, answered: list[Answered]) -> list[Answered]:
         """Take questions from the open ones; return those that were open."""
-        closed = [(asked, judgement) for asked, judgement in judged if not asked.is_closed]
+        closed = [(asked, judgement) for asked, judgement in answered if not asked.is_closed]
         for asked, _ in closed:
             asked.is_closed = True
             self._open.remove(asked)
         return closed
 
     def _run(self) -> None:
-        while True:
-            with self._changed:
-                self._changed.wait_for(lambda: self._waiting or self._ending)
-                if self._ending:
-                    return
-                asked = self._waiting.popleft()
+        while (asked := self._waiting.get()) is not None:
             if not asked.is_closed:
-                self._judged.append((asked, self._find(asked)))
+                self._judged.put((asked, self._find(asked)))
                 self._wake()
 
     def _find(self, asked: Asked) -> Any:

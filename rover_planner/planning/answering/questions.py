@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The questions of the services as plain values, and their answers."""
+"""The questions of the services as plain values, their answers, and what each is about."""
 
+import secrets
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from rover_planner.planning.answering.judgement import refusal
+from rover_planner.planning.answering.known_map import stamp_text
 from rover_planner.planning.answering.reach_query import ReachQuery, refuse_reach
-from rover_planner.planning.answering.situation import GivenPath, Situation
-from rover_planner.planning.path_planner import Pose
+from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
+from rover_planner.planning.path_query import Pose
 from rover_planner.planning.verdict_report import IdentityReport
 
 
@@ -22,7 +24,7 @@ class Question(ABC):
     """Hash of the request; empty if it has none."""
 
     @abstractmethod
-    def judge(self, situation: Situation) -> Any:
+    def judge(self, snapshot: Snapshot) -> Any:
         """Return the judgement, which has a `code`.
 
         Raises:
@@ -45,11 +47,11 @@ class PathQuestion(Question):
     goal: Pose
     """The same."""
     tolerance: float = 0.0
-    """As in `Situation.answer` [m]."""
+    """As in `Snapshot.answer` [m]."""
 
-    def judge(self, situation: Situation) -> Any:
+    def judge(self, snapshot: Snapshot) -> Any:
         """Return the judgement of the best path."""
-        return situation.answer(self.start, self.goal, self.tolerance).complete()
+        return snapshot.answer(self.start, self.goal, self.tolerance).complete()
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +61,9 @@ class PathCheck(Question):
     path: GivenPath
     """The path."""
 
-    def judge(self, situation: Situation) -> Any:
+    def judge(self, snapshot: Snapshot) -> Any:
         """Return the judgement of the path."""
-        return replace(situation, path=self.path).check_path().complete()
+        return replace(snapshot, path=self.path).check_path().complete()
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +73,9 @@ class ReachCheck(Question):
     query: ReachQuery
     """Target and wrench, which do not change."""
 
-    def judge(self, situation: Situation) -> Any:
+    def judge(self, snapshot: Snapshot) -> Any:
         """Return the judgement of the arm."""
-        return self.query.ask(situation)
+        return self.query.ask(snapshot)
 
     def refuse(self, code: str, reason: str) -> Any:
         """Return a judgement that refuses the question."""
@@ -87,7 +89,7 @@ class BadQuestion(Question):
     reason: str
     """Why not."""
 
-    def judge(self, _situation: Situation) -> Any:
+    def judge(self, _snapshot: Snapshot) -> Any:
         """Return the refusal."""
         return self.refuse("bad_request", self.reason)
 
@@ -97,8 +99,41 @@ class Answer:
     """The answer to a question."""
 
     judgement: Any
-    """A `Judgement` or `ReachJudgement`."""
-    situation: Situation
+    """A `PathJudgement` or `ArmJudgement`."""
+    snapshot: Snapshot
     """What it was judged by."""
     identity: IdentityReport
     """What it is about."""
+
+
+@dataclass
+class Register:
+    """Numbers the questions of a server, and says what each answer is about."""
+
+    server: str = field(default_factory=lambda: secrets.token_hex(4))
+    """Random text of this run of the server."""
+    count: int = 0
+    """Number of the last question."""
+
+    def next_number(self) -> int:
+        """Return the number of a new question, one above the last."""
+        self.count += 1
+        return self.count
+
+    def identify(
+        self, number: int, service: str, question_hash: str, snapshot: Snapshot
+    ) -> IdentityReport:
+        """Return what the answer to a question is about, without its path.
+
+        Args:
+            number: Number of the question.
+            service: Name of the service that was called.
+            question_hash: Hash of the request.
+            snapshot: What was known when it was asked.
+        """
+        known = snapshot.known_map
+        content, stamp = (
+            ("", "") if known is None else (known.fingerprint, stamp_text(known.stamp))
+        )
+        about = number, service, self.server, question_hash
+        return IdentityReport(*about, "", "", content, stamp, snapshot.map_age)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Queries whether the arm can reach a target and hold a load there, without ROS."""
 
-import copy
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,11 +9,11 @@ from numpy.typing import NDArray
 
 from rover_physics.errors import ModelError
 from rover_physics.traversability.reach import ReachAnswer, judge_reach
-from rover_planner.planning.answering.situation import Situation
+from rover_planner.planning.answering.snapshot import Snapshot
 
 
 @dataclass(frozen=True, eq=False)
-class ReachJudgement:
+class ArmJudgement:
     """The answer of the model, or a refusal before the model was used."""
 
     possible: bool
@@ -30,94 +29,63 @@ class ReachJudgement:
         """Return the answer in JSON types; unknown values are None or left out."""
         if self.answer is not None:
             return self.answer.to_dict()
-        return {
-            "possible": self.possible,
-            "reachable": False,
-            "code": self.code,
-            "reason": self.reason,
-        }
+        said = {"code": self.code, "reason": self.reason}
+        return {"possible": self.possible, "reachable": False, **said}
 
 
+@dataclass(frozen=True, eq=False)
 class ReachQuery:
-    """Keeps the last target and wrench of the tool and answers queries about them."""
+    """The last target and wrench of the tool, or the reasons why they were refused."""
 
-    def __init__(self) -> None:
-        self._target: NDArray[np.float64] | None = None
-        self._target_refusal = "no target was received yet; publish one on ~/tool_target"
-        self._force: NDArray[np.float64] | None = None
-        self._moment: NDArray[np.float64] | None = None
-        self._wrench_refusal = ""
+    target: NDArray[np.float64] | None = None
+    """Target (3,) of the tip [m], map frame; None if there is none or it was refused."""
+    target_refusal: str = "no target was received yet; publish one on ~/tool_target"
+    """Why there is no target: a later query must not use an outdated one."""
+    force: NDArray[np.float64] | None = None
+    """Force (3,) [N] on the tip, map frame; None if there is none."""
+    moment: NDArray[np.float64] | None = None
+    """Moment (3,) [N m] on the tip, map frame; None if there is none."""
+    wrench_refusal: str = ""
+    """Why the last wrench was refused; queries are refused until a valid one arrives."""
 
-    @property
-    def target(self) -> NDArray[np.float64] | None:
-        """Target (3,) of the tip [m], map frame; None if there is none or it was refused."""
-        return self._target
-
-    @property
-    def force(self) -> NDArray[np.float64] | None:
-        """Force (3,) [N] on the tip, map frame; None if there is none."""
-        return self._force
-
-    def take_target(self, point: NDArray[np.float64]) -> None:
-        """Keep the target (3,) [m] of the arm's tip, map frame."""
-        self._target = point
-
-    def refuse_target(self, reason: str) -> None:
-        """Discard the target and keep the reason; later queries must not use an outdated one."""
-        self._target = None
-        self._target_refusal = f"the last target was refused: {reason}"
-
-    def take_wrench(self, force: NDArray[np.float64], moment: NDArray[np.float64]) -> None:
-        """Keep force (3,) [N] and moment (3,) [N m] on the tip, map frame."""
-        self._force, self._moment, self._wrench_refusal = force, moment, ""
-
-    def refuse_wrench(self, reason: str) -> None:
-        """Discard the wrench; queries are refused until a valid one arrives."""
-        self._force = self._moment = None
-        self._wrench_refusal = f"the last wrench was refused: {reason}"
-
-    def copy(self) -> "ReachQuery":
-        """Return a query that later targets and wrenches do not change."""
-        return copy.copy(self)
-
-    def ask(self, situation: Situation) -> ReachJudgement:
+    def ask(self, snapshot: Snapshot) -> ArmJudgement:
         """Judge the rover at the last pose of the last path with its tool at the target.
 
         Args:
-            situation: What is known of rover, map and path.
+            snapshot: What is known of rover, map and path.
 
         Raises:
             RoverError: The rover has no arm, or the model refuses an option.
         """
-        missing = situation.refuse_if_missing()
+        missing = snapshot.refuse_if_missing()
         if missing is not None:
             return refuse_reach(missing.code, missing.reason)
-        if self._target is None:
-            return refuse_reach("no_target", self._target_refusal)
-        if self._wrench_refusal:
-            return refuse_reach("no_wrench", self._wrench_refusal)
-        settings = situation.settings
+        if self.target is None:
+            return refuse_reach("no_target", self.target_refusal)
+        if self.wrench_refusal:
+            return refuse_reach("no_wrench", self.wrench_refusal)
+        settings = snapshot.settings
         arm = settings.rover.manipulator
         if arm is None:
             raise ModelError(f"rover {settings.rover.name!r} has no manipulator to reach with")
-        unknown = [name for name in arm.joints if name not in situation.joints]
+        unknown = [name for name in arm.joints if name not in snapshot.joints]
         if 0 < len(unknown) < len(arm.joints):
             text = f"joint_states has never had {', '.join(unknown)}, but other joints of the arm"
             return refuse_reach("missing_joints", f"{text}; it must have all of them, or none")
-        assert situation.path.poses is not None
-        assert situation.terrain is not None
+        assert snapshot.path.poses is not None
+        assert snapshot.terrain is not None
         answer = judge_reach(
             settings.rover,
-            situation.terrain,
-            situation.path.poses[-1],
-            self._target,
+            snapshot.terrain,
+            snapshot.path.poses[-1],
+            self.target,
             settings.query.model,
-            force=self._force,
-            moment=self._moment,
+            force=self.force,
+            moment=self.moment,
         )
-        return ReachJudgement(answer.possible, answer.code, answer.reason, answer)
+        return ArmJudgement(answer.possible, answer.code, answer.reason, answer)
 
 
-def refuse_reach(code: str, reason: str) -> ReachJudgement:
+def refuse_reach(code: str, reason: str) -> ArmJudgement:
     """Return the refusal of a query without using the model."""
-    return ReachJudgement(False, code, reason)
+    return ArmJudgement(False, code, reason)

@@ -1,36 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Watches a search for a way: tells of its progress, and ends it when the map has changed."""
+"""Watches a search for a path: tells of its progress, and ends it when the map has changed."""
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import Any
 
 from rover_planner.errors import PlanningError
 from rover_planner.planning.answering.known_map import KnownMap
-from rover_planner.planning.lattice.search import Progress
+from rover_planner.planning.search.lattice_search import Progress
 
 PERIOD = 0.2
 """Least time between two reports [s]."""
 
 
 class NewerMapError(PlanningError):
-    """The map has changed while a way was searched on it."""
-
-
-@dataclass(frozen=True)
-class SearchReport:
-    """How far a search is."""
-
-    found: bool
-    """Whether a way is known."""
-    cost: float
-    """Cost of the best one [m of level ground]; infinite without one."""
-    bound: float
-    """Bound from below on the cost of any way on the lattice [m]; 0 while it is not known."""
-    edges_judged: int
-    """Number of edges that the model has judged."""
-    seconds: float
-    """Time since the question's first search began [s]."""
+    """The map has changed while a path was searched on it."""
 
 
 class SearchWatch:
@@ -44,14 +28,17 @@ class SearchWatch:
     def __init__(
         self,
         newest_map: Callable[[], KnownMap | None],
-        tell: Callable[[SearchReport], object],
+        tell: Callable[[dict[str, Any]], object],
         patience: float,
     ):
         """Watch the searches of a question.
 
         Args:
             newest_map: Returns the newest map.
-            tell: Takes a report, in the thread of the search.
+            tell: Takes a report, in the thread of the search: whether a path is `found`, its
+                `cost` (infinite without one) and the `bound` from below on that of any path of
+                the lattice (0 while it is not known) in metres of level ground, the number of
+                `edges_judged`, and the `seconds` since the question's first search began.
             patience: Time from the first search on in which a changed map ends a search [s].
         """
         self._newest_map, self._tell, self._patience = newest_map, tell, patience
@@ -71,15 +58,15 @@ class SearchWatch:
         if now - self._told >= PERIOD:
             self._told = now
             self._tell(
-                SearchReport(
-                    progress.best is not None,
-                    progress.cost,
-                    progress.bound,
-                    progress.judged,
-                    seconds,
-                )
+                {
+                    "found": progress.best is not None,
+                    "cost": progress.cost,
+                    "bound": progress.bound,
+                    "edges_judged": progress.judged,
+                    "seconds": seconds,
+                }
             )
         newest = self._newest_map()
         has_changed = newest is not None and newest.fingerprint != searched.fingerprint
         if has_changed and seconds < self._patience:
-            raise NewerMapError("the map has changed while a way was searched on it")
+            raise NewerMapError("the map has changed while a path was searched on it")

@@ -12,7 +12,7 @@ from rover_physics.terrain.soil_file import soil_named
 from rover_planner.parameters.shared import payload_or_none
 from rover_planner.parameters.traverse_server import INTERPOLATE, TraverseServerParameters
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.planning.ways.way_search import LatticeSettings
+from rover_planner.planning.search.query import LatticeSettings
 from rover_planner.worlds.map_file import MapLimits
 from rover_planner.worlds.maps.blind_ground import ALLOW
 from rover_planner.worlds.maps.living_map import MergeRules

@@ -14,13 +14,13 @@ from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import pack_ground
-from rover_planner.planning.answering.judgement import Judgement
+from rover_planner.planning.answering.judgement import PathJudgement
 from rover_planner.planning.answering.known_map import KnownMap
 from rover_planner.planning.answering.measurements import MAX_AGE, Measurements
 from rover_planner.planning.answering.service_settings import ServiceSettings
-from rover_planner.planning.answering.situation import GivenPath, Situation
+from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
 from rover_planner.planning.candidates import generate_candidates
-from rover_planner.planning.ways.memory import EdgeMemory
+from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.worlds.maps.ground_beneath import Standing
 from rover_planner.worlds.maps.layers import CellSources
 
@@ -32,43 +32,27 @@ class TraverseService:
     """
 
     def __init__(self, settings: ServiceSettings):
-        self._settings = settings
-        self._map: KnownMap | None = None
+        self.settings = settings
+        """The current settings; after a change of `largest_gap` call `refresh_map`."""
+        self.known_map: KnownMap | None = None
+        """The last valid map; None if there is none."""
+        self.given_path = GivenPath()
+        """The last path, or the reason why it was refused."""
         self._map_lock = threading.Lock()
-        self._path = GivenPath()
         self._measurements = Measurements()
         self._edge_memory = EdgeMemory()
         # Compiles or loads the kernels, so that the first query is fast.
         generate_candidates((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
 
     @property
-    def settings(self) -> ServiceSettings:
-        """The current settings; after a change of `largest_gap` call `refresh_map`."""
-        return self._settings
-
-    @settings.setter
-    def settings(self, settings: ServiceSettings) -> None:
-        self._settings = settings
-
-    @property
-    def known_map(self) -> KnownMap | None:
-        """The last valid map; None if there is none."""
-        return self._map
-
-    @property
     def terrain(self) -> Terrain | None:
         """The last valid map, with small gaps interpolated if so set; None if there is none."""
-        return None if self._map is None else self._map.terrain
+        return None if self.known_map is None else self.known_map.terrain
 
     @property
     def path(self) -> NDArray[np.float64] | None:
         """Poses (n, 3) of the last path; None if there is none or it was refused."""
-        return self._path.poses
-
-    @property
-    def given_path(self) -> GivenPath:
-        """The last path, or the reason why it was refused."""
-        return self._path
+        return self.given_path.poses
 
     @property
     def joints(self) -> dict[str, float]:
@@ -78,13 +62,13 @@ class TraverseService:
     @property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the joints whose angles are used: those of suspension and manipulator."""
-        return SUSPENSION_JOINTS + self._settings.manipulator_joints
+        return SUSPENSION_JOINTS + self.settings.manipulator_joints
 
     @property
     def all_joint_names(self) -> tuple[str, ...]:
         """Names of all joints of the model: suspension, wheels, steering and manipulator."""
         drive = SUSPENSION_JOINTS + WHEEL_JOINTS + STEERING_JOINTS
-        return drive + self._settings.manipulator_joints
+        return drive + self.settings.manipulator_joints
 
     def take_terrain(
         self,
@@ -108,19 +92,19 @@ class TraverseService:
 
     def amend_map(self, terrain: Terrain, cells: CellSources) -> None:
         """Keep a map with more known cells than the present one, of the same age."""
-        known = self._map
+        known = self.known_map
         if known is not None:
             self._keep_map(replace(known, received=terrain, cells=cells))
 
     def renew_map(self) -> None:
         """Note that the present map has arrived once more."""
-        known = self._map
+        known = self.known_map
         if known is not None:
-            self._map = replace(known, arrival=time.monotonic())
+            self.known_map = replace(known, arrival=time.monotonic())
 
     def refresh_map(self) -> None:
         """Interpolate the gaps of the received map again, with the present settings."""
-        known = self._map
+        known = self.known_map
         if known is not None:
             self._keep_map(known)
 
@@ -132,11 +116,11 @@ class TraverseService:
             path_hash: `msg_adapters.identity.path_hash` of the message.
             stamp: Its stamp, "seconds.nanoseconds".
         """
-        self._path = GivenPath(poses, "", path_hash, stamp)
+        self.given_path = GivenPath(poses, "", path_hash, stamp)
 
     def refuse_path(self, reason: str, path_hash: str = "", stamp: str = "") -> None:
         """Discard the path and keep the reason; later queries must not use an outdated one."""
-        self._path = GivenPath(None, f"the last path was refused: {reason}", path_hash, stamp)
+        self.given_path = GivenPath(None, f"the last path was refused: {reason}", path_hash, stamp)
 
     def take_joints(self, positions: Mapping[str, float]) -> None:
         """Keep measured joint angles [rad] by name; angles of other joints stay."""
@@ -163,7 +147,7 @@ class TraverseService:
         """Return the measured pose (3,) x, y [m], yaw [rad] if it is not older [s], else None."""
         return self._measurements.fresh_pose(time.monotonic(), max_age)
 
-    def situation(self, ros_time: int | None = None) -> Situation:
+    def snapshot(self, ros_time: int | None = None) -> Snapshot:
         """Return all that is known now.
 
         Args:
@@ -171,36 +155,36 @@ class TraverseService:
         """
         now = time.monotonic()
         standing = self._measurements.pose_with_suspension(now)
-        known = Situation(
-            self._settings,
-            self._path,
+        known = Snapshot(
+            self.settings,
+            self.given_path,
             self._measurements.joints,
             measured_pose=standing,
             edge_memory=self._edge_memory,
         )
         return self.add_map(known, ros_time)
 
-    def add_map(self, situation: Situation, ros_time: int | None = None) -> Situation:
-        """Return a situation with the present map; `ros_time` as for `situation`."""
+    def add_map(self, snapshot: Snapshot, ros_time: int | None = None) -> Snapshot:
+        """Return a snapshot with the present map; `ros_time` as for `snapshot`."""
         ros_time = time.time_ns() if ros_time is None else ros_time
-        known, most = self._map, situation.settings.max_map_age
+        known, most = self.known_map, snapshot.settings.max_map_age
         if known is None:
-            return replace(situation, known_map=None)
+            return replace(snapshot, known_map=None)
         steady = time.monotonic()
         return replace(
-            situation,
+            snapshot,
             known_map=known,
             map_age=known.age(ros_time, steady),
             stale_map=known.describe_age(ros_time, steady, most) if most > 0.0 else "",
         )
 
-    def answer(self, start: ArrayLike, goal: ArrayLike, tolerance: float = 0.0) -> Judgement:
-        """Find a path from start to goal; see `Situation.answer`."""
-        return self.situation().answer(start, goal, tolerance)
+    def answer(self, start: ArrayLike, goal: ArrayLike, tolerance: float = 0.0) -> PathJudgement:
+        """Find a path from start to goal; see `Snapshot.answer`."""
+        return self.snapshot().answer(start, goal, tolerance)
 
-    def check_last_path(self) -> Judgement:
-        """Judge the last path that was received; see `Situation.check_path`."""
-        return self.situation().check_path()
+    def check_last_path(self) -> PathJudgement:
+        """Judge the last path that was received; see `Snapshot.check_path`."""
+        return self.snapshot().check_path()
 
     def _keep_map(self, about: KnownMap) -> bool:
         """Keep a map, of which only terrain and fingerprint are missing; return whether it is new.
@@ -208,12 +192,12 @@ class TraverseService:
         Everything that takes time is done here, so that the first question about it is fast.
         """
         with self._map_lock:
-            received, gap = about.received, self._settings.largest_gap
+            received, gap = about.received, self.settings.largest_gap
             terrain = received.fill_gaps(gap) if gap > 0.0 else received
             forget_terrains()
             pack_ground(terrain)
-            prepare_bounds(terrain, self._settings.query.map_sigmas)
-            before = self._map
+            prepare_bounds(terrain, self.settings.query.map_sigmas)
+            before = self.known_map
             content = fingerprint(received)
-            self._map = replace(about, terrain=terrain, fingerprint=content)
+            self.known_map = replace(about, terrain=terrain, fingerprint=content)
             return before is None or before.fingerprint != content

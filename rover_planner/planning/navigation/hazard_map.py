@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Traversability class of each cell of a map and each heading, judged anew where it changed."""
 
+import itertools
 import math
 import time
 from collections.abc import Iterator
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.pose_classes import (
     IMPASSABLE,
@@ -17,7 +19,6 @@ from rover_physics.traversability.pose_classes import (
     RoverOnMap,
     classify_poses,
 )
-from rover_planner.planning.navigation.footprint import find_footprint
 from rover_planner.worlds.maps.changes import (
     Shift,
     Window,
@@ -35,6 +36,8 @@ MARGIN = 2
 other one is for safety."""
 SHIFT_TOLERANCE = 1e-3
 """Share of a cell by which the grids of two maps may differ and still count as the same."""
+MAX_ROLL = 1.0
+"""Roll of a body that still stands [rad]; limits of tilt are far below it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,13 +88,12 @@ class HazardMap:
         classes, stale = np.full(shape, UNKNOWN, np.int8), np.ones(shape, bool)
         if before is not None and shift is not None:
             if before.terrain is on_map.terrain:
-                self._on_map = on_map
                 return
             changed = find_changes(before.terrain, on_map.terrain, shift)
             old, new = find_overlap(before.terrain, on_map.terrain, shift)
             classes[:, *new] = self._classes[:, *old]
             stale[:, *new] = self._stale[:, *old]
-            stale |= self._within_reach(on_map, changed)
+            stale |= self._touch_changes(on_map, changed)
         self._on_map, self._classes, self._stale = on_map, classes, stale
 
     def work(self, seconds: float, near: tuple[float, float] | None = None) -> bool:
@@ -122,19 +124,21 @@ class HazardMap:
         x, y = terrain.origin
         return HazardView(classes, float(terrain.resolution), (float(x), float(y)))
 
-    def _within_reach(self, on_map: RoverOnMap, changed: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Return (headings, ny, nx) whether a changed cell is below the rover.
+    def _touch_changes(self, on_map: RoverOnMap, changed: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return (headings, ny, nx) True where a changed cell is below the rover.
 
         `changed` (ny + 2, nx + 2) has one more cell at each side of the map.
         """
-        footprint, cell = find_footprint(on_map.rover), on_map.terrain.resolution
+        (ahead, aside), cell = find_footprint(on_map.rover), on_map.terrain.resolution
         ny, nx = changed.shape
         found = np.zeros((self.headings, ny - 2, nx - 2), bool)
         if not changed.any():
             return found
         grown: dict[tuple[int, int], NDArray[np.bool_]] = {}
         for heading, yaw in enumerate(self._yaw.tolist()):
-            x, y = (math.ceil(half / cell) + MARGIN for half in footprint.half_sides(yaw))
+            c, s = abs(math.cos(yaw)), abs(math.sin(yaw))
+            halves = c * ahead + s * aside, s * ahead + c * aside
+            x, y = (math.ceil(half / cell) + MARGIN for half in halves)
             if (y, x) not in grown:
                 grown[y, x] = _grow(changed, (y, x))
             found[heading] = grown[y, x][1:-1, 1:-1]
@@ -182,14 +186,14 @@ class HazardMap:
         self._stale[heading, row, column] = False
 
 
-def _grow(cells: NDArray[np.bool_], reach: tuple[int, int]) -> NDArray[np.bool_]:
-    """Return cells that have a True cell within `reach` rows and columns."""
+def _grow(cells: NDArray[np.bool_], widths: tuple[int, int]) -> NDArray[np.bool_]:
+    """Return cells that have a True cell within `widths` rows and columns."""
     where = ndimage.find_objects(cells.astype(np.int8))[0]
     box = tuple(
         slice(max(0, one.start - width), one.stop + width)
-        for one, width in zip(where, reach, strict=True)
+        for one, width in zip(where, widths, strict=True)
     )
-    size = 2 * reach[0] + 1, 2 * reach[1] + 1
+    size = 2 * widths[0] + 1, 2 * widths[1] + 1
     grown = np.zeros(cells.shape, bool)
     grown[box] = ndimage.maximum_filter(cells[box].astype(np.uint8), size, mode="constant")
     return grown
@@ -213,3 +217,27 @@ def _find_shift(before: RoverOnMap, now: RoverOnMap) -> Shift | None:
     if old.origin != new.origin and np.abs(moved - cells).max() > SHIFT_TOLERANCE:
         return None
     return int(cells[1]), int(cells[0])
+
+
+def find_footprint(rover: Rover) -> tuple[float, float]:
+    """Return how far a rover extends from its body origin along and across its heading [m].
+
+    It never leaves this rectangle, whatever the angles of its suspension: a wheel is never further
+    from its pivots than its links are long. A body that rolls by up to MAX_ROLL moves it sideways
+    by that length times the sine.
+    """
+    suspension, wheel = rover.suspension, rover.wheel
+    rocker, bogie = suspension.rocker_pivot, suspension.bogie_pivot
+    ahead = aside = 0.0
+    steep = math.sin(MAX_ROLL)
+    for name, centre in suspension.wheels.items():
+        chain = [(0.0, 0.0, 0.0), rocker, centre]
+        if name != suspension.rocker_wheel:
+            chain.insert(2, bogie)
+        links = itertools.pairwise(chain)
+        along = sum(math.hypot(b[0] - a[0], b[2] - a[2]) for a, b in links)
+        across = abs(centre[1]) + 0.5 * wheel.width
+        along += wheel.radius
+        ahead, aside = max(ahead, along), max(aside, math.hypot(across, steep * along))
+    x, y, z = (max(map(abs, side)) for side in (rover.belly.x, rover.belly.y, (rover.belly.z,)))
+    return (max(ahead, math.hypot(x, z)), max(aside, math.hypot(y, z)))

@@ -1,18 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Watches a drive: judges the rest of the accepted path again, and says when to stop."""
+"""Watches a drive: judges the rest of the accepted path again, and says when to stop and why."""
 
+import math
 import time
+from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.terrain.grid import Terrain
-from rover_planner.planning.answering.judgement import Judgement, refusal
+from rover_planner.planning.answering.judgement import PathJudgement, refusal
+from rover_planner.planning.answering.server_health import ERROR, OK, WARN, Health
 from rover_planner.planning.answering.service_settings import ServiceSettings
-from rover_planner.planning.answering.situation import GivenPath, Situation
-from rover_planner.planning.navigation.drift import SuspensionDrift
+from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
 from rover_planner.planning.navigation.watched_path import Place, WatchedPath
+from rover_planner.planning.verdict_report import SuspensionReport
 
 IDLE, WATCHING, STOPPED, ARRIVED = "idle", "watching", "stopped", "arrived"
 """States of a monitor."""
@@ -46,7 +51,7 @@ class WatchSettings:
 class Sight:
     """What a monitor looks at."""
 
-    situation: Situation
+    snapshot: Snapshot
     """Settings, map and measured suspension."""
     pose: NDArray[np.float64] | None
     """(3,) x, y [m] and yaw [rad] of the body, measured just now; None if it is not known."""
@@ -62,7 +67,7 @@ class Finding:
     """IDLE, WATCHING, STOPPED or ARRIVED."""
     path_hash: str = ""
     """Hash of the watched path."""
-    judgement: Judgement | None = None
+    judgement: PathJudgement | None = None
     """Why the rover is to stop, or the last judgement on the rest of the path."""
     place: Place | None = None
     """Where the rover is on the path."""
@@ -74,7 +79,38 @@ class Finding:
     @property
     def drift(self) -> float:
         """The largest difference of a suspension angle [rad], NaN if it is not known."""
-        return max((abs(value) for value in self.mismatch.values()), default=float("nan"))
+        return max((abs(value) for value in self.mismatch.values()), default=math.nan)
+
+
+class SuspensionDrift:
+    """The differences of measured and predicted suspension angles in the last seconds."""
+
+    def __init__(self, seconds: float):
+        """Keep the differences of so many seconds."""
+        self._seconds = seconds
+        self._kept: deque[tuple[float, Mapping[str, float]]] = deque()
+
+    def take(self, report: SuspensionReport | None, now: float) -> None:
+        """Keep a comparison made at time `now` [s]; None if there was none."""
+        if report is not None:
+            self._kept.append((now, report.suspension_mismatch))
+        while self._kept and now - self._kept[0][0] > self._seconds:
+            self._kept.popleft()
+
+    def forget(self) -> None:
+        """Forget all differences."""
+        self._kept.clear()
+
+    @property
+    def latest(self) -> Mapping[str, float]:
+        """The last difference, measured minus predicted, by joint [rad]; empty without one."""
+        return self._kept[-1][1] if self._kept else {}
+
+    def lasting(self) -> float:
+        """Return the size that was exceeded all the time [rad]; 0 before the time is over."""
+        if not self._kept or self._kept[-1][0] - self._kept[0][0] < 0.8 * self._seconds:
+            return 0.0
+        return min(max(abs(value) for value in kept.values()) for _, kept in self._kept)
 
 
 class PathMonitor:
@@ -117,7 +153,7 @@ class PathMonitor:
         """Watch nothing until the next path."""
         self._path, self._finding = None, Finding(IDLE, mismatch=self._finding.mismatch)
 
-    def stop(self, reason: Judgement) -> Finding:
+    def stop(self, reason: PathJudgement) -> Finding:
         """Stop the rover for a reason that was found elsewhere."""
         self._finding = replace(self._finding, state=STOPPED, judgement=reason)
         return self._finding
@@ -140,7 +176,7 @@ class PathMonitor:
             self._finding = replace(self._finding, state=ARRIVED)
         return self._finding
 
-    def _find_place(self, path: WatchedPath, sight: Sight) -> Judgement | None:
+    def _find_place(self, path: WatchedPath, sight: Sight) -> PathJudgement | None:
         """Find the place of the rover; return a refusal if it is unknown or off the path."""
         if sight.pose is None:
             missing = sight.time - self._pose_time
@@ -159,10 +195,10 @@ class PathMonitor:
 
     def _compare_suspension(self, sight: Sight) -> None:
         """Compare measured and predicted suspension where the rover stands."""
-        self._drift.take(sight.situation.compare_standing(), sight.time)
+        self._drift.take(sight.snapshot.compare_standing(), sight.time)
         self._finding = replace(self._finding, mismatch=dict(self._drift.latest))
 
-    def _refuse_drift(self) -> Judgement | None:
+    def _refuse_drift(self) -> PathJudgement | None:
         """Return a refusal if the suspension has differed too much for some time."""
         lasting, most = self._drift.lasting(), self.settings.max_mismatch
         if not 0.0 < most < lasting:
@@ -175,20 +211,20 @@ class PathMonitor:
         )
         return refusal(SUSPENSION, reason)
 
-    def _judge_rest(self, path: WatchedPath, sight: Sight) -> Judgement | None:
+    def _judge_rest(self, path: WatchedPath, sight: Sight) -> PathJudgement | None:
         """Judge the rest of the path if map or settings are new; return it if it is refused."""
-        situation = sight.situation
-        missing = situation.refuse_map()
+        snapshot = sight.snapshot
+        missing = snapshot.refuse_map()
         if missing is not None:
             return missing
-        judged_on = situation.terrain, situation.settings
+        judged_on = snapshot.terrain, snapshot.settings
         before = self._judged_on
         if before is not None and all(a is b for a, b in zip(before, judged_on, strict=True)):
             return None
         if before is not None and sight.time < self._pause_end:
             return None
         begin = time.monotonic()
-        judgement = self._check_rest(path, situation)
+        judgement = self._check_rest(path, snapshot)
         taken = time.monotonic() - begin
         self._pause_end = sight.time + taken + min(taken * (1.0 / SHARE - 1.0), MAX_PAUSE)
         self._judged_on = judged_on
@@ -198,23 +234,62 @@ class PathMonitor:
         if judgement.traversable:
             return None
         assert judgement.candidate is not None
-        away = judgement.candidate.reach * judgement.candidate.length
+        away = judgement.candidate.passable_share * judgement.candidate.length
         return replace(judgement, reason=f"{away:.2f} m ahead: {judgement.reason}")
 
-    def _check_rest(self, path: WatchedPath, situation: Situation) -> Judgement:
+    def _check_rest(self, path: WatchedPath, snapshot: Snapshot) -> PathJudgement:
         """Judge the part of the path just ahead, and the rest if that may be driven."""
         first = 0 if self._finding.place is None else self._finding.place.index
         near = int(np.searchsorted(path.distances, path.distances[first] + NEAR)) + 1
         if near < len(path.poses):
-            judgement = _check(situation, path.poses[first:near])
+            judgement = _check(snapshot, path.poses[first:near])
             if not judgement.traversable:
                 return judgement
-        return _check(situation, path.poses[first:])
+        return _check(snapshot, path.poses[first:])
 
     def _has_arrived(self, path: WatchedPath) -> bool:
         place = self._finding.place
         return place is not None and path.is_end(place.index)
 
 
-def _check(situation: Situation, poses: NDArray[np.float64]) -> Judgement:
-    return replace(situation, path=GivenPath(poses, "")).check_path()
+def _check(snapshot: Snapshot, poses: NDArray[np.float64]) -> PathJudgement:
+    return replace(snapshot, path=GivenPath(poses, "")).check_path()
+
+
+def describe_watch(finding: Finding, enabled: bool, tolerance: float) -> Health:
+    """Return level, text and values of a finding.
+
+    Args:
+        finding: What was found last.
+        enabled: Whether accepted paths are watched.
+        tolerance: Difference of measured and predicted suspension angles [rad] that is no warning.
+    """
+    values = {"monitor": enabled, **_values_of(finding)}
+    drifts = finding.drift > tolerance
+    drift = (
+        f"measured and predicted suspension differ by {finding.drift:.3f} rad, "
+        f"tolerance {tolerance:.3f} rad"
+    )
+    if enabled and finding.state == STOPPED and finding.judgement is not None:
+        return Health(
+            ERROR, f"stop ({finding.judgement.code}): {finding.judgement.reason}", values
+        )
+    if drifts:
+        return Health(WARN, drift, values)
+    if not enabled:
+        return Health(OK, "no path is watched: the parameter monitor is false", values)
+    return Health(OK, "no path to watch" if finding.state == IDLE else finding.state, values)
+
+
+def _values_of(finding: Finding) -> dict[str, Any]:
+    place = finding.place
+    values: dict[str, Any] = {"state": finding.state, "path_hash": finding.path_hash}
+    values["judgements"] = finding.judged
+    if place is not None:
+        values["remaining"] = f"{place.remaining:.3f} m"
+        values["offset"] = f"{place.offset:.3f} m"
+    if finding.mismatch:
+        values["suspension_drift"] = f"{finding.drift:.4f} rad"
+    for joint, difference in finding.mismatch.items():
+        values[f"mismatch {joint}"] = f"{difference:+.4f} rad"
+    return values

@@ -3,18 +3,19 @@
 
 import bisect
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
 from msg_adapters.frames import FrameTransform
+from msg_adapters.stamps import NANOSECONDS
 from rover_planner.errors import PlanningError
 
 MEMORY = 10_000_000_000
 """Time for which transforms are kept [ns], as in tf2."""
-NANOSECONDS = 1_000_000_000
 
 
 class TransformError(PlanningError):
@@ -69,45 +70,62 @@ class Rigid:
         return np.array([*self.translation[:2], np.arctan2(ahead[1], ahead[0])])
 
 
+def read_pose(pose: Any) -> Rigid:
+    """Return the transform of a pose from the frame that it is in."""
+    place, turn = pose.position, pose.orientation
+    return Rigid(
+        np.array([place.x, place.y, place.z]),
+        Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]),
+    )
+
+
+def write_pose(rigid: Rigid, pose: Any) -> None:
+    """Set the numbers of a pose; its parts stay, as they may be known elsewhere."""
+    place, turn = pose.position, pose.orientation
+    place.x, place.y, place.z = rigid.translation.tolist()
+    turn.x, turn.y, turn.z, turn.w = rigid.rotation.as_quat().tolist()
+
+
+def move_path(path: Any, inner: Rigid | None) -> Any:
+    """Change each pose of a path into that of a frame fixed to it, in place, and return the path.
+
+    Args:
+        path: The path.
+        inner: Pose of the other frame in that of the path's poses; None is the same frame.
+    """
+    if inner is not None:
+        for stamped in path.poses:
+            write_pose(read_pose(stamped.pose).then(inner), stamped.pose)
+    return path
+
+
+@dataclass
 class _Edge:
     """The transforms of one child frame in the last time, in the order of their stamps."""
 
-    def __init__(self, parent: str, is_static: bool):
-        self.parent, self.is_static = parent, is_static
-        self._stamps: list[int] = []
-        self._rigids: list[Rigid] = []
+    parent: str
+    is_static: bool
+    stamps: list[int] = field(default_factory=list)
+    rigids: list[Rigid] = field(default_factory=list)
 
     def add(self, stamp: int, rigid: Rigid) -> None:
-        if self.is_static:
-            self._stamps, self._rigids = [stamp], [rigid]
-            return
-        at = bisect.bisect_left(self._stamps, stamp)
-        if at < len(self._stamps) and self._stamps[at] == stamp:
-            self._rigids[at] = rigid
-            return
-        self._stamps.insert(at, stamp)
-        self._rigids.insert(at, rigid)
-        old = bisect.bisect_left(self._stamps, self._stamps[-1] - MEMORY)
-        del self._stamps[:old], self._rigids[:old]
-
-    @property
-    def newest(self) -> int:
-        return self._stamps[-1]
-
-    @property
-    def oldest(self) -> int:
-        return self._stamps[0]
+        """Keep a transform; of a static one only the last."""
+        at = 0 if self.is_static else bisect.bisect_left(self.stamps, stamp)
+        known = self.is_static or stamp in self.stamps[at : at + 1]
+        self.stamps[at : at + known], self.rigids[at : at + known] = [stamp], [rigid]
+        old = bisect.bisect_left(self.stamps, self.stamps[-1] - MEMORY)
+        del self.stamps[:old], self.rigids[:old]
 
     def at(self, time: int) -> Rigid:
         """Return the transform at a time; beyond the ends that of the nearest stamp."""
-        after = bisect.bisect_left(self._stamps, time)
+        after = bisect.bisect_left(self.stamps, time)
         if self.is_static or after == 0:
-            return self._rigids[0]
-        if after == len(self._stamps):
-            return self._rigids[-1]
-        first, last = self._stamps[after - 1], self._stamps[after]
+            return self.rigids[0]
+        if after == len(self.stamps):
+            return self.rigids[-1]
+        first, last = self.stamps[after - 1], self.stamps[after]
         share = (time - first) / (last - first)
-        a, b = self._rigids[after - 1], self._rigids[after]
+        a, b = self.rigids[after - 1], self.rigids[after]
         turn = Slerp([0.0, 1.0], Rotation.concatenate([a.rotation, b.rotation]))
         return Rigid((1.0 - share) * a.translation + share * b.translation, turn(share))
 
@@ -133,7 +151,7 @@ class TransformTree:
         """
         with self._lock:
             edge = self._edges.get(child)
-            stale = edge is not None and edge.newest - stamp > MEMORY
+            stale = edge is not None and edge.stamps[-1] - stamp > MEMORY
             if edge is None or edge.parent != parent or edge.is_static != is_static or stale:
                 edge = self._edges[child] = _Edge(parent, is_static)
             edge.add(stamp, rigid)
@@ -185,7 +203,9 @@ class TransformTree:
             raise TransformError(f"no transforms connect the frames {source!r} and {target!r}")
         steps = up[: up.index(shared)], down[: down.index(shared)]
         moving = [c for part in steps for c in part if not self._edges[c].is_static]
-        at = min((self._edges[c].newest for c in moving), default=now) if time is None else time
+        at = (
+            min((self._edges[c].stamps[-1] for c in moving), default=now) if time is None else time
+        )
         for child in moving:
             self._check(child, at, now)
         found = [Rigid.none(), Rigid.none()]
@@ -210,12 +230,12 @@ class TransformTree:
         """Raise if the transform of a child frame is stale, or not known at a time."""
         edge = self._edges[child]
         names = f"the transform from {child!r} to {edge.parent!r}"
-        age = (max(now, time) - edge.newest) / NANOSECONDS
+        age = (max(now, time) - edge.stamps[-1]) / NANOSECONDS
         if age > self.timeout:
             raise TransformError(
                 f"{names} is stale: it is {age:.3f} s old, transform_timeout is {self.timeout:g} s"
             )
-        early = (edge.oldest - time) / NANOSECONDS
+        early = (edge.stamps[0] - time) / NANOSECONDS
         if early > self.timeout:
             raise TransformError(
                 f"{names} is not known {early:.3f} s before the oldest that is kept; use stamp 0 "

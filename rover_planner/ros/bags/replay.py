@@ -19,15 +19,15 @@ from rover_physics.errors import RoverError
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.identity import Register
-from rover_planner.planning.answering.judgement import Judgement, refusal
+from rover_planner.planning.answering.judgement import PathJudgement, refusal
 from rover_planner.planning.answering.known_map import stamp_text
 from rover_planner.planning.answering.measurements import Measurements
+from rover_planner.planning.answering.questions import Register
 from rover_planner.planning.answering.service_settings import (
     keeper_settings,
     load_service_settings,
 )
-from rover_planner.planning.answering.situation import Situation
+from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.sensor_mounts import sensor_poses
 from rover_planner.planning.verdict_report import IdentityReport
@@ -73,7 +73,7 @@ class Answer:
     """DRIVEN, CHECKED or PLANNED."""
     stamp: int
     """Time of the question [ns], as recorded."""
-    judgement: Judgement
+    judgement: PathJudgement
     """The answer."""
     identity: IdentityReport
     """What it is about."""
@@ -107,7 +107,7 @@ class Replay:
             terrain = load_terrain(values.terrain_file, values.max_map_cells)
             self._keep(self._keeper.load(terrain, 0.0, None), values.terrain_file, None)
         self._register = Register("replay")
-        self._drive, self._begun = RecordedDrive(), self._service.situation()
+        self._drive, self._begun = RecordedDrive(), self._service.snapshot()
         self._pose: NDArray[np.float64] | None = None
         self._measured = Measurements()  # by the times of the recording
         self._looked = -float("inf")
@@ -196,11 +196,11 @@ class Replay:
         if self._service.known_map is None:
             return  # what is driven before the first map cannot be judged
         if not self._drive.poses or self._begun.known_map is None:
-            self._begun = self._service.situation(recorded.stamp)
+            self._begun = self._service.snapshot(recorded.stamp)
         self._drive.add(self._pose, recorded.stamp, self._service.joints)
         if self._drive.length >= self.questions.stretch:
             yield self._judge_drive()
-            self._begun = self._service.situation(recorded.stamp)
+            self._begun = self._service.snapshot(recorded.stamp)
 
     def _look_under_rover(self, now: float) -> None:
         """Fill unknown ground under the rover, at most every LOOK_PERIOD."""
@@ -218,7 +218,7 @@ class Replay:
         poses = path_to_poses(there, self.parameters.map_frame)
         about = path_hash(recorded.message), stamp_text(stamp_to_ns(recorded.message.header.stamp))
         self._service.take_path(poses, *about)
-        yield self._ask(CHECKED, recorded.stamp, Situation.check_path)
+        yield self._ask(CHECKED, recorded.stamp, Snapshot.check_path)
 
     def _judge_drive(self) -> Answer:
         """Judge the drive on the map that was known when it began; begin the next stretch."""
@@ -226,7 +226,7 @@ class Replay:
         self._service.take_path(np.array(drive.poses))
         path = self._service.given_path
         begun = replace(self._begun, path=path, measured_pose=None)
-        answer = self._ask(DRIVEN, drive.stamps[0], Situation.check_path, begun)
+        answer = self._ask(DRIVEN, drive.stamps[0], Snapshot.check_path, begun)
         candidate = answer.judgement.candidate
         if candidate is None:
             return answer
@@ -236,11 +236,11 @@ class Replay:
         self,
         kind: str,
         stamp: int,
-        ask: Callable[[Situation], Judgement],
-        situation: Situation | None = None,
+        ask: Callable[[Snapshot], PathJudgement],
+        snapshot: Snapshot | None = None,
     ) -> Answer:
         """Ask a question; an invalid one is refused with its reason."""
-        now = self._service.situation(stamp) if situation is None else situation
+        now = self._service.snapshot(stamp) if snapshot is None else snapshot
         number = self._register.next_number()
         try:
             judgement = ask(now).complete()

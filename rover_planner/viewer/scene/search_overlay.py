@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.planning.lattice.nodes import Nodes
-from rover_planner.planning.ways.way_search import WayAnswer
+from rover_planner.planning.search.nodes import Nodes
+from rover_planner.planning.search.path_search import SearchResult
 from rover_planner.viewer.scene.ground_mesh import join_cells, subsample
 from rover_planner.viewer.scene.local_frame import LocalFrame
 from rover_planner.viewer.state.colours import PASSABLE, REFUSED, SEARCHED, UNKNOWN, Colour
@@ -34,7 +34,7 @@ class SearchOverlay:
         """The layers by name, with their colours."""
         self._asked_shown = False
 
-    def show(self, rover: Rover, terrain: Terrain, way: WayAnswer | None) -> None:
+    def show(self, rover: Rover, terrain: Terrain, way: SearchResult | None) -> None:
         """Draw what a search has found instead of what was drawn before; None draws nothing.
 
         The closed area is blue around the start and vermillion around the goal.

@@ -15,9 +15,9 @@ from rover_planner.planning.path_query import (
     choose,
     generate_paths,
 )
-from rover_planner.planning.ways.memory import EdgeMemory
-from rover_planner.planning.ways.question import WayQuestion
-from rover_planner.planning.ways.way_search import WayAnswer, find_way
+from rover_planner.planning.search.edge_memory import EdgeMemory
+from rover_planner.planning.search.path_search import SearchResult, find_path
+from rover_planner.planning.search.query import SearchQuery
 from rover_planner.viewer.state.background_work import Report
 from rover_planner.viewer.state.comparison import PolicyVerdict
 from rover_planner.viewer.state.scenario import Judgement, Scenario, ShownPath
@@ -148,20 +148,20 @@ def _search_ways(judgement: Judgement, report: Report, memory: EdgeMemory) -> It
     report(WAY, 1, 1)
     asked = judgement.scenario
     ends = asked.start, asked.goal
-    question = WayQuestion(asked.rover, asked.terrain, *ends, asked.asked_options)
-    first = find_way(question, replace(asked.search, ends_at_first=True), memory)
+    question = SearchQuery(asked.rover, asked.terrain, *ends, asked.asked_options)
+    first = find_path(question, replace(asked.search, ends_at_first=True), memory)
     yield _add_way(judgement, first)
     left = asked.search.budget - first.seconds
     if first.path is None or left <= 0.0:
         return
     report(BETTER, 1, 1)
-    better = find_way(question, replace(asked.search, budget=left), memory)
+    better = find_path(question, replace(asked.search, budget=left), memory)
     if better.cost < first.cost:
         seconds = first.seconds + better.seconds
         yield _add_way(judgement, replace(better, seconds=seconds))
 
 
-def _add_way(judgement: Judgement, way: WayAnswer) -> Judgement:
+def _add_way(judgement: Judgement, way: SearchResult) -> Judgement:
     """Return a judgement of refused candidates with a way as one more, or why there is none.
 
     The way is shown unless a visitor has chosen another path than the best.

@@ -9,7 +9,8 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.planning.path_query import Candidate, PathAnswer, PathQueryOptions
-from rover_planner.planning.ways.way_search import LatticeSettings, WayAnswer
+from rover_planner.planning.search.path_search import SearchResult
+from rover_planner.planning.search.query import LatticeSettings
 from rover_planner.viewer.state.comparison import PolicyVerdict
 from rover_planner.viewer.state.trajectory import Trajectory
 
@@ -88,7 +89,7 @@ class Judgement:
     """What they were judged for."""
     shown: ShownPath
     """The shown path."""
-    way: WayAnswer | None = None
+    way: SearchResult | None = None
     """What a search around obstacles has found for `answered`; None if none was made."""
 
     @property

@@ -19,8 +19,8 @@ from rover_physics.traversability.verdict import hold_against_limits
 from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import Assumptions
 from rover_planner.planning.path_query import Candidate, PathAnswer, PathQueryOptions
-from rover_planner.planning.ways.memory import EdgeMemory
-from rover_planner.planning.ways.way_search import LatticeSettings
+from rover_planner.planning.search.edge_memory import EdgeMemory
+from rover_planner.planning.search.query import LatticeSettings
 from rover_planner.studies.rover_values import with_value
 from rover_planner.viewer.state.background_work import BackgroundWork, Progress
 from rover_planner.viewer.state.context import name_ground

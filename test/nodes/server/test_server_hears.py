@@ -15,7 +15,6 @@ from std_srvs.srv import Trigger
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.identity import path_hash, plan_request_hash
 from msg_adapters.paths import stamped_pose
-from rover_planner.planning.answering.situation import Situation
 from support.grounds import gap, make_terrain, wall_at, waves
 from support.planner_client import GOAL, SERVER, START, verdict_of
 from support.ros_fixtures import call
@@ -122,14 +121,14 @@ def test_a_question_keeps_the_map_it_was_asked_about(shared, monkeypatch):
     server, client = shared.server, shared.client
     client.heard["verdict"].clear()
     first = server.service.known_map.fingerprint
-    find, begun, go_on = Situation.answer, threading.Event(), threading.Event()
+    find, begun, go_on = Snapshot.answer, threading.Event(), threading.Event()
 
-    def find_later(situation, *asked):
+    def find_later(snapshot, *asked):
         begun.set()
         assert go_on.wait(60.0)
-        return find(situation, *asked)
+        return find(snapshot, *asked)
 
-    monkeypatch.setattr(Situation, "answer", find_later)
+    monkeypatch.setattr(Snapshot, "answer", find_later)
     _, future = begin(shared.ros)
     assert begun.wait(20.0), "the work on the question"
     client.send_terrain(make_terrain(wall_at(0.5)))

@@ -11,7 +11,7 @@ from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.paths import poses_path
 from rover_physics.terrain.grid import save_terrain
-from rover_planner.planning.answering.situation import Situation
+from rover_planner.planning.answering.snapshot import Snapshot
 from support.grounds import make_terrain, waves
 from support.planner_client import GOAL, START, ask, verdict_of
 from support.waiting import wait_until
@@ -131,6 +131,6 @@ def test_a_fault_of_the_program_is_a_refusal_and_not_the_end(shared):
 
     client, text = shared.client, "internal error: ZeroDivisionError: a fault"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Situation, "answer", fail)
+        patch.setattr(Snapshot, "answer", fail)
         assert_refused(client, "internal_error", text, lambda: client.can_traverse(START, GOAL))
     assert client.can_traverse(START, GOAL).poses and shared.ros.is_alive(shared.server)

@@ -29,7 +29,6 @@ def known(stamp, arrival=0.0):
     [
         (None, 50 * SECOND, 3.0, 3.0),
         (10 * SECOND, 15 * SECOND, 3.0, 5.0),
-        (14 * SECOND, 15 * SECOND, 3.0, 3.0),
         (3600 * SECOND, 15 * SECOND, 3.0, 3.0),
     ],
 )

@@ -14,7 +14,7 @@ from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.traversability.judge import judge_path
 from rover_planner.command.view import choose_ends
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.planning.ways.way_search import LatticeSettings
+from rover_planner.planning.search.query import LatticeSettings
 from rover_planner.studies.rover_values import get_value, list_values
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.panel.controls import on_visitor_input

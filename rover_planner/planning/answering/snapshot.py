@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: Apache-2.0
+"""All that a traverse server knows when a question is asked, and the answers from it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rover_physics.names import SUSPENSION_JOINTS
+from rover_physics.terrain.grid import Terrain
+from rover_planner.errors import PlanningError
+from rover_planner.parameters.traverse_server import FAN, LATTICE
+from rover_planner.planning.answering.judgement import PathJudgement, refusal
+from rover_planner.planning.answering.known_map import KnownMap
+from rover_planner.planning.answering.search_watch import SearchWatch
+from rover_planner.planning.answering.service_settings import ServiceSettings
+from rover_planner.planning.path_geometry import densify
+from rover_planner.planning.path_query import Candidate, PathSearch, Pose, add_path
+from rover_planner.planning.search.blind_check import BlindCheck
+from rover_planner.planning.search.edge_memory import EdgeMemory
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.lattice_search import Progress
+from rover_planner.planning.search.path_search import GOAL_REFUSED, START_REFUSED, find_path
+from rover_planner.planning.search.query import SearchQuery
+from rover_planner.planning.verdict_report import SuspensionReport
+from rover_planner.worlds.maps.blind_ground import CODE as BLIND
+
+NO_PATH = "no path was received yet; publish one on ~/path"
+
+
+@dataclass(frozen=True, eq=False)
+class GivenPath:
+    """The path of the topic ~/path, or the reason why it was refused."""
+
+    poses: NDArray[np.float64] | None = None
+    """(n, 3) x, y [m] and yaw [rad], map frame; None if there is none or it was refused."""
+    refusal: str = NO_PATH
+    """Reason why there is none."""
+    hash: str = ""
+    """`msg_adapters.identity.path_hash` of the message."""
+    stamp: str = ""
+    """Stamp of the message, "seconds.nanoseconds"."""
+
+
+@dataclass(frozen=True, eq=False)
+class Snapshot:
+    """Settings, map, path and measurements at one time; answers do not change with later ones."""
+
+    settings: ServiceSettings
+    """The settings."""
+    path: GivenPath = field(default_factory=GivenPath)
+    """The last path."""
+    joints: Mapping[str, float] = field(default_factory=dict)
+    """Measured joint angles [rad] by name."""
+    known_map: KnownMap | None = None
+    """The map; None before the first one."""
+    map_age: float = math.nan
+    """Age of the map [s]; NaN without map."""
+    measured_pose: NDArray[np.float64] | None = None
+    """(3,) x, y [m] and yaw [rad] of the body, map frame, measured just now together with the
+    suspension; None if it is not known."""
+    stale_map: str = ""
+    """Why the map is too old to be used; empty if it is not."""
+
+    edge_memory: EdgeMemory = field(default_factory=EdgeMemory)
+    """What earlier searches have found of the ground; grows with each search."""
+    watch: SearchWatch | None = None
+    """Watches searches for a way."""
+
+    @property
+    def terrain(self) -> Terrain | None:
+        """The map to plan on; None if there is none."""
+        return None if self.known_map is None else self.known_map.terrain
+
+    def answer(self, start: ArrayLike, goal: ArrayLike, tolerance: float = 0.0) -> PathJudgement:
+        """Find a path from start to goal, or the reason why there is none.
+
+        Args:
+            start: (3,) x, y [m], yaw [rad] of the body origin, map frame.
+            goal: (3,) x, y [m], yaw [rad] of the body origin, map frame.
+            tolerance: Largest distance from the goal's position [m] at which the path may end
+                if the goal cannot be reached; the heading stays. 0 tries the goal only.
+
+        Raises:
+            PlanningError: The request is invalid.
+            RoverError: The model refuses the request.
+            NewerMapError: The map has changed while a way was searched, see `SearchWatch`.
+        """
+        if not (math.isfinite(tolerance) and tolerance >= 0.0):
+            raise PlanningError(f"tolerance is {tolerance}; it must be a distance of at least 0 m")
+
+        refused = self.refuse_map()
+        if refused is not None:
+            return refused
+        judge, ends = self._judge(), (np.asarray(start, float), np.asarray(goal, float))
+        if self.settings.planner == LATTICE:
+            return self._search_around(judge, ends, None)
+        search = judge.search(*ends, tolerance)
+        judged = self._describe(judge, search.answer.chosen, search)
+        are_on_map = all(judge.terrain.contains(*end[:2]) for end in ends)
+        starts_blind = judged.code == BLIND and search.answer.chosen.verdict.first_failure == 0
+        is_final = judged.traversable or starts_blind or not are_on_map
+        if is_final or self.settings.planner == FAN:
+            return judged
+        return self._search_around(judge, ends, judged)
+
+    def _search_around(
+        self, judge: PathJudge, ends: tuple[Pose, Pose], refused: PathJudgement | None
+    ) -> PathJudgement:
+        """Search a path around obstacles.
+
+        Args:
+            judge: The model.
+            ends: Start and goal.
+            refused: The judgement on the candidates; None if none were tried.
+        """
+        query = SearchQuery(judge.rover, judge.terrain, *ends, judge.options, judge.blind)
+        found = find_path(query, self.settings.lattice, self.edge_memory, self._look)
+        if found.path is not None:
+            search = add_path(None if refused is None else refused.search, found.path, ends[1])
+            return replace(self._describe(judge, found.path, search), around=found)
+        is_end = found.outcome in (START_REFUSED, GOAL_REFUSED)
+        warning = found.warning if refused is None or not is_end else ""
+        why = "; ".join(filter(None, (found.reason, warning)))
+        if refused is None:
+            return replace(refusal(found.outcome, why), around=found)
+        code = refused.code if is_end else found.outcome
+        reason = f"{why}; the best candidate: {refused.reason}"
+        return replace(refused, code=code, reason=reason, around=found)
+
+    def _look(self, progress: Progress) -> None:
+        """Let the watch look at a search."""
+        if self.watch is not None and self.known_map is not None:
+            self.watch.look(self.known_map, progress)
+
+    def check_path(self) -> PathJudgement:
+        """Judge the last path.
+
+        Raises:
+            PlanningError: The path is too long.
+            RoverError: The model refuses the path.
+        """
+        missing = self.refuse_if_missing()
+        if missing is not None:
+            return missing
+        assert self.path.poses is not None
+        judge = self._judge()
+        poses = densify(self.path.poses, self.settings.query.waypoint_spacing)
+        return self._describe(judge, judge.check(poses))
+
+    def refuse_if_missing(self) -> PathJudgement | None:
+        """Return a refusal if there is no path or no map to use, else None."""
+        if self.path.poses is None:
+            return refusal("no_path", self.path.refusal)
+        return self.refuse_map()
+
+    def refuse_map(self) -> PathJudgement | None:
+        """Return a refusal if there is no map, or if it is too old, else None."""
+        if self.known_map is None:
+            return refusal(
+                "no_map",
+                "no map was received yet; publish one on elevation_cloud or call ~/load_map",
+            )
+        return refusal("stale_map", self.stale_map) if self.stale_map else None
+
+    def compare_standing(self) -> SuspensionReport | None:
+        """Compare measured and predicted suspension where the rover stands, if that is known.
+
+        Raises:
+            RoverError: The model refuses a setting.
+        """
+        if self.known_map is None:
+            return None
+        return self._compare_suspension(self._judge())
+
+    def _judge(self) -> PathJudge:
+        """Return the model on the map, with the settings and the measured arm angles."""
+        assert self.known_map is not None
+        settings = self.settings
+        options = settings.query.change(joint_angles=self._manipulator_angles())
+        blind = BlindCheck(settings.rover, self.known_map.seen, settings.blind_ground)
+        return PathJudge(settings.rover, self.known_map.terrain, options, blind)
+
+    def _describe(
+        self, judge: PathJudge, candidate: Candidate, search: PathSearch | None = None
+    ) -> PathJudgement:
+        """Return the judgement of a judged path; classes and the rest of it follow on demand."""
+        code, reason = candidate.verdict.code, candidate.verdict.reason
+        suspension = self._compare_suspension(judge)
+        return PathJudgement(code, reason, candidate, judge, suspension, search)
+
+    def _compare_suspension(self, judge: PathJudge) -> SuspensionReport | None:
+        """Compare measured and predicted suspension where the rover stands.
+
+        None: it is not known where that is, nothing was measured, or the rover does not settle.
+        """
+        if self.measured_pose is None:
+            return None
+        prediction = judge.predict_standing(self.measured_pose)
+        predicted = (*prediction.rocker_angle[0].tolist(), *prediction.bogie_angle[0].tolist())
+        mismatch = {
+            name: self.joints[name] - angle
+            for name, angle in zip(SUSPENSION_JOINTS, predicted, strict=True)
+            if name in self.joints
+        }
+        if not mismatch or not prediction.settled[0]:
+            return None
+        largest = max(abs(difference) for difference in mismatch.values())
+        return SuspensionReport(mismatch, largest <= self.settings.suspension_tolerance)
+
+    def _manipulator_angles(self) -> dict[str, float] | None:
+        """Return the measured manipulator angles [rad], None (stowed) until all are known."""
+        names = self.settings.manipulator_joints
+        if not names or any(name not in self.joints for name in names):
+            return None
+        return {name: self.joints[name] for name in names}

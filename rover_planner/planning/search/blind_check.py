@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Refuses paths over never seen ground under the belly, as the settings say, and reports it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.rover.model import Rover
+from rover_physics.traversability.verdict import with_refusals
+from rover_planner.planning.path_query import Candidate, PathAnswer, choose
+from rover_planner.worlds.maps.blind_ground import ALLOW, CODE, REFUSE, BlindShare, SeenGround
+
+_REFUSED_COST = (float("inf"), float("inf"))
+
+
+@dataclass(frozen=True, eq=False)
+class BlindCheck:
+    """Holds paths of one rover against what was seen of one map."""
+
+    rover: Rover
+    """The rover."""
+    seen: SeenGround
+    """What was seen of the map."""
+    rule: str
+    """One of BLIND_GROUND."""
+
+    def share(self, candidate: Candidate) -> BlindShare:
+        """Return how much of the ground under the belly was never seen along a path."""
+        return self.seen.share(self.rover, candidate.poses)
+
+    def hold(self, candidate: Candidate) -> Candidate:
+        """Return a traversable path with a refusal where the rule refuses its ground."""
+        if self.rule == ALLOW or not candidate.verdict.traversable:
+            return candidate
+        share = self.share(candidate)
+        first = share.first_refused(self.rule)
+        if first < 0:
+            return candidate
+        counted = share.blind_share - (0.0 if self.rule == REFUSE else share.footprint_share)
+        codes, reasons = [""] * len(candidate.poses), [""] * len(candidate.poses)
+        codes[first] = CODE
+        reasons[first] = (
+            f"ground under the belly that was never seen: {100.0 * counted:.1f} % of that along "
+            f"the path {self._name_rule()}"
+        )
+        verdict = with_refusals(candidate.verdict, codes, reasons)
+        return replace(candidate, verdict=verdict, cost=_REFUSED_COST)
+
+    def refuses(self, pieces: Sequence[NDArray[np.float64]]) -> NDArray[np.bool_]:
+        """Return (k,) whether the rule refuses pieces of path, each of poses (n, 3).
+
+        Each pose counts. `hold` looks at a path where the belly has moved on by a cell, so a path
+        of pieces that are not refused passes there.
+        """
+        refused = np.zeros(len(pieces), bool)
+        if self.rule == ALLOW or not pieces:
+            return refused
+        below = self.seen.refused_below(self.rover, np.concatenate(pieces), self.rule)
+        firsts = np.cumsum([0, *(len(piece) for piece in pieces[:-1])])
+        return np.logical_or.reduceat(below, firsts)
+
+    def describe(self) -> str:
+        """Return why the rover may not stand at a pose that `refuses` refuses, in words."""
+        return f"ground under the belly that was never seen {self._name_rule()}"
+
+    def choose(self, answer: PathAnswer) -> PathAnswer:
+        """Return an answer whose choice is among the candidates that the rule does not refuse.
+
+        If it refuses all that are traversable, the best of them is explained.
+        """
+        if self.rule == ALLOW or not answer.traversable:
+            return answer
+        held = choose(tuple(self.hold(candidate) for candidate in answer.candidates))
+        return held if held.traversable else replace(held, nearest=answer.best)
+
+    def _name_rule(self) -> str:
+        return f"(blind_ground is {self.rule})"
+
+
+def physical(candidate: Candidate) -> Candidate:
+    """Return a path as the model judged it, without a refusal by `BlindCheck.hold`."""
+    if CODE not in candidate.verdict.codes:
+        return candidate
+    none = [""] * len(candidate.poses)
+    return replace(candidate, verdict=with_refusals(candidate.verdict, none, none))

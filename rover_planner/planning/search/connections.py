@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Connections of the start and the goal, which lie anywhere, to nodes of the lattice."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from rover_physics.rover.model import Rover
+from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
+from rover_planner.planning.angles import wrap
+from rover_planner.planning.dubins import dubins_length, dubins_paths
+from rover_planner.planning.path_query import Pose
+from rover_planner.planning.point_turn import turn_and_drive
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.nodes import HEADINGS, YAWS, Nodes, nearest_heading
+from rover_planner.planning.search.primitives import PRICES, Gear, Piece
+
+MAX_DISTANCE = 3.0
+"""Largest distance of a node that a curve leads to [cells]."""
+MOST_CURVES = 16
+"""Largest number of curves in each gear."""
+TURNED_PLACES = 4
+"""Number of nearest places to which the rover turns on the spot and drives straight."""
+LARGEST_TURN = 3
+"""Largest turn of a curve [headings]."""
+DETOUR = 1.3
+"""Largest length of a curve over the distance of its ends."""
+
+FRONTIER_PLACES = 48
+"""Number of places at the frontier that are offered to the search."""
+FRONTIER_PRICE = 10.0
+"""Cost of each metre that is left from there to the goal [m of level ground]."""
+FRONTIER_BATCH = 1000
+"""Number of poses at the frontier that the model is asked about at once."""
+
+Ends = Callable[[Pose], tuple[Pose, Pose]]
+"""Function of a node's pose that returns the first and the last pose of a piece of path."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Connection(Piece):
+    """A piece of path between the start or the goal and a node; its cost is that on level ground.
+
+    At the frontier of the known ground it is a single pose.
+    """
+
+    node: int
+    """The node."""
+    surcharge: float = 0.0
+    """Cost that comes to that of driving [m]."""
+
+
+def connect_start(
+    rover: Rover, nodes: Nodes, start: Pose, waypoint_spacing: float
+) -> list[Connection]:
+    """Return connections from a start pose (3,) to nodes, at most `waypoint_spacing` [m] apart."""
+    maker = _Maker(rover, nodes, waypoint_spacing)
+    found = maker.curves(start, 1.0, Gear.FORWARD, lambda node: (start, node))
+    found += maker.curves(start, -1.0, Gear.BACKWARD, lambda node: (_about(start), _about(node)))
+    return found + maker.turns(start, 1.0, lambda node: (start, node))
+
+
+def connect_goal(
+    rover: Rover, nodes: Nodes, goal: Pose, waypoint_spacing: float
+) -> list[Connection]:
+    """Return connections from nodes to a goal pose (3,), at most `waypoint_spacing` [m] apart."""
+    maker = _Maker(rover, nodes, waypoint_spacing)
+    found = maker.curves(goal, -1.0, Gear.FORWARD, lambda node: (node, goal))
+    found += maker.curves(goal, 1.0, Gear.BACKWARD, lambda node: (_about(node), _about(goal)))
+    return found + maker.turns(goal, -1.0, lambda node: (node, goal))
+
+
+@dataclass(frozen=True)
+class _Maker:
+    """Makes the connections of one rover and lattice."""
+
+    rover: Rover
+    nodes: Nodes
+    waypoint_spacing: float
+
+    def curves(self, pose: Pose, side: float, gear: Gear, ends: Ends) -> list[Connection]:
+        """Return the shortest curves between a pose and the nodes ahead (side 1) or behind (-1).
+
+        `ends` gives first and last pose of the curve to or from a node, as if driven forwards.
+        """
+        radius, found = tightest_radius(self.rover), []
+        for node, there in _nodes_beside(self.nodes, pose, side):
+            length = dubins_length(*ends(there), radius)
+            if length <= DETOUR * np.hypot(*(there - pose)[:2]) + 1e-9:
+                found.append((PRICES[gear] * length, node, there))
+        found.sort(key=lambda one: one[:2])
+        return [
+            Connection(self._drive(*ends(there), gear), gear, cost, node=node)
+            for cost, node, there in found[:MOST_CURVES]
+        ]
+
+    def _drive(self, here: Pose, there: Pose, gear: Gear) -> np.ndarray:
+        """Return the waypoints (n, 3) of the shortest Dubins path between two poses."""
+        radius = tightest_radius(self.rover)
+        poses = np.column_stack(dubins_paths(here, there, radius, self.waypoint_spacing, 1)[0])
+        poses[0], poses[-1, :2] = here, there[:2]
+        return poses - (0.0, 0.0, np.pi if gear == Gear.BACKWARD else 0.0)
+
+    def turns(self, pose: Pose, side: float, ends: Ends) -> list[Connection]:
+        """Return paths that turn, drive straight and turn, if the rover turns on the spot."""
+        if not can_turn_on_the_spot(self.rover):
+            return []
+        swing, found = swing_radius(self.rover), []
+        for node, there in _turned_nodes(self.nodes, pose, side):
+            poses, length = turn_and_drive(*ends(there), swing, self.waypoint_spacing)
+            cost = PRICES[Gear.ON_THE_SPOT] * length
+            found.append(Connection(poses, Gear.ON_THE_SPOT, cost, node=node))
+        return found
+
+
+def _nodes_beside(nodes: Nodes, pose: Pose, side: float) -> Iterator[tuple[int, Pose]]:
+    """Yield the nodes near a pose, ahead of it (side 1) or behind it (-1), hardly turned."""
+    ahead = side * np.array([np.cos(pose[2]), np.sin(pose[2])])
+    nearest = nearest_heading(pose[2])
+    for place in nodes.places_near(pose, MAX_DISTANCE * nodes.cell):
+        away = nodes.cell * (place + nodes.first) - pose[:2]
+        distance = float(np.hypot(*away))
+        if distance < 1e-6 or away @ ahead < 0.5 * distance:
+            continue
+        for turn in range(-LARGEST_TURN, LARGEST_TURN + 1):
+            heading = (nearest + turn) % HEADINGS
+            yield _node(nodes, place, heading)
+
+
+def _turned_nodes(nodes: Nodes, pose: Pose, side: float) -> Iterator[tuple[int, Pose]]:
+    """Yield the nearest nodes that head away from a pose (side 1) or towards it (-1)."""
+    places = nodes.places_near(pose, MAX_DISTANCE * nodes.cell)
+    aways = nodes.cell * (places + nodes.first) - pose[:2]
+    for row in np.argsort(np.hypot(*aways.T), kind="stable")[:TURNED_PLACES]:
+        x, y = side * aways[row]
+        heading = nearest_heading(np.arctan2(y, x) if np.hypot(x, y) > 1e-6 else pose[2])
+        yield _node(nodes, places[row], heading)
+
+
+def _node(nodes: Nodes, place: np.ndarray, heading: int) -> tuple[int, Pose]:
+    node = int(nodes.index(place[None, :], np.array([heading]))[0])
+    position = nodes.cell * (place + nodes.first)
+    return node, np.array([*position, YAWS[heading]])
+
+
+def _about(pose: Pose) -> Pose:
+    """Return the pose (3,) that heads the other way."""
+    return np.array([pose[0], pose[1], wrap(pose[2] + np.pi)])
+
+
+def connect_frontier(judge: PathJudge, nodes: Nodes, goal: Pose) -> list[Connection]:
+    """Return the nodes nearest to a goal on which the rover can stand, as ends of a path.
+
+    They lie at least a quarter of the wheelbase apart. What is left to the goal has a price.
+    """
+    everywhere = np.arange(0, nodes.count, HEADINGS)
+    away = np.hypot(*(nodes.poses(everywhere)[:, :2] - goal[:2]).T)
+    by_distance = everywhere[np.argsort(away, kind="stable")]
+    found: list[Connection] = []
+    chosen: list[np.ndarray] = []
+    apart, places = 0.25 * judge.rover.wheelbase, max(1, FRONTIER_BATCH // HEADINGS)
+    for first in range(0, len(by_distance), places):
+        some = by_distance[first : first + places]
+        asked = (some[:, None] + np.arange(HEADINGS)).ravel()
+        poses = nodes.poses(asked)
+        stands = np.array([code == "" for code in judge.stand(poses)])
+        for node, pose in zip(asked[stands], poses[stands], strict=True):
+            near = min((np.hypot(*(pose - other)[:2]) for other in chosen), default=np.inf)
+            if 1e-9 < near < apart:
+                continue
+            if near > 1e-9:
+                if len(chosen) == FRONTIER_PLACES:
+                    return found
+                chosen.append(pose)
+            price = FRONTIER_PRICE * float(np.hypot(*(pose - goal)[:2]))
+            found.append(
+                Connection(pose[None, :], Gear.FORWARD, 0.0, node=int(node), surcharge=price)
+            )
+    return found

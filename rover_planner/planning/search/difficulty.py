@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Estimates how likely the model refuses an edge, from the steepness below the wheels.
+
+The ground is taken as the wheels feel it: the surface on which the lowest points of spheres with
+the wheel's radius move. An edge is the more likely refused, the steeper that surface is below all
+six wheels together, and the steeper it is along the drive below one of them. The estimate orders
+the questions to the model and decides nothing.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from rover_physics.numerics.kernels import exact_kernel
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.planning.search.nodes import HEADINGS, YAWS, Nodes
+from rover_planner.planning.search.primitives import Primitive
+
+SHARE = 0.25
+"""Distance of the places that are looked at [cells of the lattice], at least one of the map."""
+SAMPLE_SHARE = 0.5
+"""Distance of the samples along an edge [cells of the lattice]."""
+LEVEL, ALL_WHEELS, ONE_WHEEL = -4.6, 3.0, 1.1
+"""Logit of a refusal: on level ground, and what is added for the mean steepness below the wheels
+and for the largest one along the drive, both in shares of what the rover can climb. Fitted to the
+verdicts on random edges of made and real maps, two rovers."""
+STEPS_PER_UNIT = 30
+"""Steps per unit in which difficulties are kept."""
+
+
+class Difficulty(NamedTuple):
+    """The estimate for all edges of a window, as kernels read it."""
+
+    logit: np.ndarray
+    """(HEADINGS, ny, nx) float32 logit of a refusal with the body origin at a place."""
+    first: np.ndarray
+    """(2,) x and y of the first place, from the first place of the lattice [m]."""
+    spacing: float
+    """Distance of neighbouring places [m]."""
+    cell: float
+    """Distance of neighbouring nodes [m]."""
+    samples: np.ndarray
+    """(HEADINGS, P, S, 3) places along the primitives: x, y [m] from the first node, and heading;
+    -1 as heading ends a list."""
+    known: np.ndarray
+    """(nodes, P) uint8 difficulties of edges in steps, 0 where not estimated yet; written."""
+
+
+def estimate_difficulty(
+    rover: Rover,
+    terrain: Terrain,
+    nodes: Nodes,
+    climb: float,
+    edges: tuple[NDArray[np.float64], NDArray[np.uint8]],
+) -> Difficulty:
+    """Return the estimate.
+
+    Args:
+        rover: The rover.
+        terrain: The ground.
+        nodes: The nodes.
+        climb: Slope at which a climb ends [rise over run].
+        edges: `samples` and `known` of Difficulty.
+    """
+    blocks = round(SHARE * nodes.cell / terrain.resolution)
+    stride = max(1, min(blocks, *terrain.elevation.shape))
+    slopes = _slopes(_felt_surface(terrain, rover.wheel.radius), terrain.resolution, stride)
+    spacing = stride * terrain.resolution
+    steepness = np.hypot(*slopes)
+    own = np.array([place[:2] for place in rover.suspension.wheels.values()])
+    wheels = np.concatenate([own, own * (1.0, -1.0)])
+    logit = np.empty((HEADINGS, *steepness.shape), np.float32)
+    for heading, yaw in enumerate(YAWS):
+        c, s = np.cos(yaw), np.sin(yaw)
+        along = np.abs(np.float32(c) * slopes[0] + np.float32(s) * slopes[1])
+        shifts = np.rint(wheels @ np.array([[c, s], [-s, c]]) / spacing).astype(int)
+        mean, most = _below_wheels(steepness, along, shifts)
+        logit[heading] = LEVEL + (ALL_WHEELS / climb) * mean + (ONE_WHEEL / climb) * most
+    first = np.asarray(terrain.origin) - nodes.cell * np.array(nodes.first)
+    first += 0.5 * (stride - 1) * terrain.resolution
+    return Difficulty(logit, first, spacing, nodes.cell, *edges)
+
+
+def steepest_climb(rover: Rover, friction: float) -> float:
+    """Return the slope [rise over run] at which friction, torque or tilt end a climb."""
+    limits = rover.limits
+    pull = 6.0 * rover.wheel.max_torque * limits.torque_saturation / rover.wheel.radius
+    by_torque = math.tan(math.asin(min(pull / rover.weight, 0.99)))
+    return min(friction * limits.friction_utilisation, by_torque, math.tan(limits.tilt))
+
+
+def _felt_surface(terrain: Terrain, radius: float) -> NDArray[np.float32]:
+    """Return (ny, nx) heights [m] of the lowest points of spheres that lie on the ground.
+
+    Unknown cells have the height of the nearest known one.
+    """
+    elevation = np.asarray(terrain.elevation, np.float32)
+    unknown = np.isnan(elevation)
+    if unknown.any():
+        nearest = ndimage.distance_transform_edt(
+            unknown, return_distances=False, return_indices=True
+        )
+        elevation = elevation[tuple(nearest)]
+    cells = int(radius / terrain.resolution)
+    offset = terrain.resolution * np.arange(-cells, cells + 1)
+    below = radius**2 - offset[:, None] ** 2 - offset**2
+    shape = np.where(below >= 0.0, np.sqrt(np.maximum(below, 0.0)) - radius, 0.0)
+    felt: NDArray[np.float32] = ndimage.grey_dilation(
+        elevation, footprint=below >= 0.0, structure=shape, mode="nearest"
+    )
+    return felt
+
+
+def _slopes(
+    heights: NDArray[np.float32], resolution: float, stride: int
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return the slopes along x and y, of blocks of `stride` x `stride` cells the steepest."""
+    if min(heights.shape) < 2:
+        flat = np.zeros(heights.shape, np.float32)
+        return flat, flat
+    along_y, along_x = (
+        np.asarray(np.gradient(heights, resolution, axis=axis), np.float32) for axis in (0, 1)
+    )
+    if stride == 1:
+        return along_x, along_y
+    along_x, along_y = _blocks(along_x, stride), _blocks(along_y, stride)
+    steepest = np.argmax(along_x**2 + along_y**2, axis=2)[..., None]
+    return (
+        np.take_along_axis(along_x, steepest, axis=2)[..., 0],
+        np.take_along_axis(along_y, steepest, axis=2)[..., 0],
+    )
+
+
+def _blocks(values: NDArray[np.float32], stride: int) -> NDArray[np.float32]:
+    """Return the values (ny, nx, stride^2) of each block of a grid; incomplete blocks are left."""
+    ny, nx = (max(1, size // stride) for size in values.shape)
+    cut = values[: ny * stride, : nx * stride].reshape(ny, stride, nx, stride)
+    return cut.swapaxes(1, 2).reshape(ny, nx, -1)
+
+
+def _below_wheels(
+    steepness: NDArray[np.float32], along: NDArray[np.float32], shifts: NDArray[np.int64]
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return (ny, nx) the mean steepness and the largest slope along the drive below the wheels.
+
+    Args:
+        steepness: (ny, nx) slopes.
+        along: (ny, nx) slopes along the drive, absolute values.
+        shifts: (6, 2) cells in x and y from the body origin to the wheels.
+    """
+    (ny, nx), margin = steepness.shape, int(np.abs(shifts).max())
+    steepness, along = (np.pad(values, margin, mode="edge") for values in (steepness, along))
+    mean, most = np.zeros((ny, nx), np.float32), np.zeros((ny, nx), np.float32)
+    for column, row in shifts + margin:
+        place = slice(row, row + ny), slice(column, column + nx)
+        mean += steepness[place]
+        np.maximum(most, along[place], out=most)
+    mean /= len(shifts)
+    return mean, most
+
+
+def sample_primitives(
+    primitives: tuple[tuple[Primitive, ...], ...], spacing: float
+) -> NDArray[np.float64]:
+    """Return (HEADINGS, P, S, 3) places along the primitives, about `spacing` [m] apart.
+
+    Each is x, y [m] from the first node, and the nearest heading; -1 as heading ends a list.
+    """
+    lists = [[_sample(one.poses, one.length, spacing) for one in own] for own in primitives]
+    width = max(len(own) for own in lists)
+    most = 1 + max(len(places) for own in lists for places in own)
+    samples = np.full((HEADINGS, width, most, 3), -1.0)
+    for heading, own in enumerate(lists):
+        for k, places in enumerate(own):
+            samples[heading, k, : len(places)] = places
+    return samples
+
+
+def _sample(poses: NDArray[np.float64], length: float, spacing: float) -> NDArray[np.float64]:
+    """Return places (n, 3), x, y [m] and heading, along the poses of a primitive."""
+    count = 2 + int(length / spacing)
+    places = poses[np.rint(np.linspace(0, len(poses) - 1, count)).astype(int)]
+    turned = np.abs(np.angle(np.exp(1j * (places[:, 2:] - YAWS))))
+    return np.column_stack([places[:, :2], np.argmin(turned, axis=1)])
+
+
+@exact_kernel
+def difficulty_of(difficulty, columns, node, k):
+    """Return the difficulty of edge k of a node: -log of the probability that the model passes it.
+
+    Args:
+        difficulty: Difficulty; `known` is written where it is 0.
+        columns: Number of columns of places of the lattice.
+        node: The node.
+        k: Number of the edge.
+    """
+    step = difficulty.known[node, k]
+    if step == 0:
+        logit = _largest_logit(difficulty, columns, node, k)
+        value = np.log1p(np.exp(min(logit, 8.0)))
+        step = np.uint8(1 + min(int(STEPS_PER_UNIT * value), 254))
+        difficulty.known[node, k] = step
+    return (step - 0.5) / STEPS_PER_UNIT
+
+
+@exact_kernel
+def _largest_logit(difficulty, columns, node, k):
+    """Return the largest logit at the samples of edge k of a node."""
+    heading, place = node % HEADINGS, node // HEADINGS
+    x = (place % columns) * difficulty.cell - difficulty.first[0]
+    y = (place // columns) * difficulty.cell - difficulty.first[1]
+    _, ny, nx = difficulty.logit.shape
+    largest = np.float32(-100.0)
+    for sample in difficulty.samples[heading, k]:
+        if sample[2] < 0.0:
+            break
+        i = min(max(int((x + sample[0]) / difficulty.spacing + 0.5), 0), nx - 1)
+        j = min(max(int((y + sample[1]) / difficulty.spacing + 0.5), 0), ny - 1)
+        largest = max(largest, difficulty.logit[int(sample[2]), j, i])
+    return largest

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Remembers judged edges from one search to the next while the ground under them is the same."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from rover_physics.rover.steering_joints import swing_radius
+from rover_planner.planning.search.edges import Edges
+from rover_planner.planning.search.nodes import HEADINGS, Nodes
+from rover_planner.planning.search.primitives import make_primitives
+from rover_planner.planning.search.query import SearchQuery
+from rover_planner.worlds.maps.blind_ground import ALLOW
+from rover_planner.worlds.maps.changes import find_changes, have_same_layers
+
+
+class EdgeMemory:
+    """The judged edges of the last search.
+
+    They are forgotten as a whole if the rover, the arm, an option, the window or the grid of the
+    map change. If heights or other layers of the map change, those that may touch them are.
+    """
+
+    def __init__(self) -> None:
+        self._last: tuple[SearchQuery, Edges] | None = None
+
+    def recall(self, query: SearchQuery, nodes: Nodes) -> Edges:
+        """Return the edges between nodes with what is known of them; what is added is kept."""
+        if self._last is None or not _is_alike(*self._last, query, nodes):
+            spacing = query.options.waypoint_spacing
+            edges = Edges(nodes, make_primitives(query.rover, nodes.cell, spacing))
+        else:
+            asked, edges = self._last
+            before, now = _seen(asked), _seen(query)
+            if asked.terrain is not query.terrain or before is not now:
+                changed = find_changes(asked.terrain, query.terrain)[1:-1, 1:-1]
+                if before is not None and now is not None:
+                    changed |= before != now
+                edges.forget(_find_touching(query, edges, changed))
+        self._last = query, edges
+        return edges
+
+
+def _is_alike(asked: SearchQuery, edges: Edges, query: SearchQuery, nodes: Nodes) -> bool:
+    """Return whether edges judged for one query hold for another, apart from the heights."""
+    old, new = asked.terrain, query.terrain
+    return (
+        edges.nodes == nodes
+        and asked.rover == query.rover
+        and asked.options == query.options
+        and _rule_of(asked) == _rule_of(query)
+        and old.resolution == new.resolution
+        and old.origin == new.origin
+        and old.elevation.shape == new.elevation.shape
+        and have_same_layers(old, new)
+    )
+
+
+def _rule_of(query: SearchQuery) -> str:
+    """Return the rule of BLIND_GROUND of a query."""
+    return ALLOW if query.blind is None else query.blind.rule
+
+
+def _seen(query: SearchQuery) -> NDArray[np.uint8] | None:
+    """Return (ny, nx) what was seen of each cell; None if the rule does not ask."""
+    return None if query.blind is None or _rule_of(query) == ALLOW else query.blind.seen.kinds
+
+
+def _find_touching(
+    query: SearchQuery, edges: Edges, changed: NDArray[np.bool_]
+) -> NDArray[np.int64]:
+    """Return the places (k,) of nodes from which an edge may lead over changed cells."""
+    if not changed.any():
+        return np.empty(0, np.int64)
+    rover, terrain, nodes = query.rover, query.terrain, edges.nodes
+    longest = max(one.length for own in edges.primitives for one in own)
+    margin = longest + swing_radius(rover) + 2.0 * rover.wheel.radius + 2.0 * terrain.resolution
+    away = terrain.resolution * ndimage.distance_transform_edt(~changed)
+    x, y, _ = nodes.poses(np.arange(0, nodes.count, HEADINGS)).T
+    ny, nx = changed.shape
+    column = np.clip(np.rint((x - terrain.origin[0]) / terrain.resolution), 0, nx - 1)
+    row = np.clip(np.rint((y - terrain.origin[1]) / terrain.resolution), 0, ny - 1)
+    return np.flatnonzero(away[row.astype(int), column.astype(int)] <= margin + nodes.cell)

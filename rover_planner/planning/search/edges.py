@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The edges of the lattice: each is a primitive that begins at a node.
+
+What the model found of an edge is kept until the ground under it changes.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_planner.planning.search.difficulty import SAMPLE_SHARE, sample_primitives
+from rover_planner.planning.search.nodes import HEADINGS, Nodes
+from rover_planner.planning.search.primitives import Piece, Primitive
+
+UNJUDGED, PASSES, FAILS = 0, 1, 2
+"""States of an edge or node; states from FAILS on tell the limit that fails, see
+`Edges.codes`."""
+
+
+class PrimitiveTable(NamedTuple):
+    """The primitives of all headings as arrays, as kernels read them; P is the largest number."""
+
+    step: NDArray[np.int64]
+    """(HEADINGS, P, 2) step in x and y [cells]."""
+    end_heading: NDArray[np.int64]
+    """(HEADINGS, P) heading at the end; -1 where a heading has fewer primitives."""
+    least_cost: NDArray[np.float64]
+    """(HEADINGS, P) cost on level ground [m]."""
+    back: NDArray[np.int64]
+    """(HEADINGS, Q, 2) first heading and number of the primitives that end with a heading; -1
+    where there are fewer."""
+
+
+@dataclass(eq=False)
+class Edges:
+    """The edges of the nodes of a window, with what the model found of them.
+
+    Edge `node * P + k` is primitive k of the node; P is the largest number of primitives.
+    """
+
+    nodes: Nodes
+    """The nodes."""
+    primitives: tuple[tuple[Primitive, ...], ...]
+    """The primitives of each heading."""
+
+    def __post_init__(self) -> None:
+        self.width = max(len(own) for own in self.primitives)
+        """Largest number of primitives of a heading, P."""
+        shape = (self.nodes.count, self.width)
+        self.state = np.zeros(shape, np.int8)
+        """(nodes, P) UNJUDGED, PASSES, or FAILS + i for the failure `codes[i]`."""
+        self.cost = np.zeros(shape, np.float32)
+        """(nodes, P) cost [m] where the edge passes."""
+        self.standing = np.zeros(self.nodes.count, np.int8)
+        """(nodes,) as `state`: whether the rover can stand at a node with its wheels ahead."""
+        self.difficulty = np.zeros(shape, np.uint8)
+        """(nodes, P) as `Difficulty.known`."""
+        self.codes: list[str] = []
+        """Codes of the limits that failed so far."""
+
+    @cached_property
+    def table(self) -> PrimitiveTable:
+        """The primitives as arrays."""
+        shape = HEADINGS, self.width
+        step = np.zeros((*shape, 2), np.int64)
+        end, cost = np.full(shape, -1), np.full(shape, np.inf)
+        leading: list[list[tuple[int, int]]] = [[] for _ in range(HEADINGS)]
+        for heading, own in enumerate(self.primitives):
+            for k, primitive in enumerate(own):
+                step[heading, k], end[heading, k] = primitive.step, primitive.end_heading
+                cost[heading, k] = primitive.least_cost
+                leading[primitive.end_heading].append((heading, k))
+        back = np.full((HEADINGS, max(map(len, leading)), 2), -1)
+        for heading, pairs in enumerate(leading):
+            back[heading, : len(pairs)] = pairs
+        return PrimitiveTable(step, end, cost, back)
+
+    @cached_property
+    def samples(self) -> NDArray[np.float64]:
+        """Places along the primitives, see `sample_primitives`."""
+        return sample_primitives(self.primitives, SAMPLE_SHARE * self.nodes.cell)
+
+    @property
+    def count(self) -> int:
+        """Number of edges, those counted that leave the window."""
+        return self.nodes.count * self.width
+
+    def primitive(self, edge: int) -> Primitive:
+        """Return the primitive of an edge."""
+        node, k = divmod(int(edge), self.width)
+        return self.primitives[node % HEADINGS][k]
+
+    def piece(self, edge: int) -> Piece:
+        """Return an edge as a piece of path, with its cost if it was judged."""
+        node, primitive = int(edge) // self.width, self.primitive(edge)
+        x, y, _ = self.nodes.poses(np.array([node]))[0]
+        cost = float(self.cost.flat[edge])
+        return Piece(primitive.poses + np.array([x, y, 0.0]), primitive.gear, cost)
+
+    def ends(self, edges: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return the nodes (n,) where edges (n,) end; they must be in the window."""
+        node, k = np.divmod(edges, self.width)
+        place, heading = np.divmod(node, HEADINGS)
+        step = self.table.step[heading, k]
+        place = place + step[:, 1] * self.nodes.shape[1] + step[:, 0]
+        return place * HEADINGS + self.table.end_heading[heading, k]
+
+    def write(self, edge: int, code: str, cost: float) -> None:
+        """Keep what was found of an edge: the code of its failure, "" for none, and its cost."""
+        self.state.flat[edge], self.cost.flat[edge] = self.state_of(code), cost
+
+    def state_of(self, code: str) -> int:
+        """Return the state of what fails by a code, or passes if it is empty."""
+        if code and code not in self.codes:
+            self.codes.append(code)
+        return FAILS + self.codes.index(code) if code else PASSES
+
+    def forget(self, places: NDArray[np.int64]) -> None:
+        """Forget what is known of the nodes at places (k,) and of the edges that begin there."""
+        for values in (self.state, self.standing, self.difficulty):
+            values.reshape(-1, HEADINGS, *values.shape[1:])[places] = UNJUDGED

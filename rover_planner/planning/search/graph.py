@@ -1,0 +1,403 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Shortest paths over the edges of a lattice, compiled.
+
+An edge that is judged costs what the model found, or cannot be driven. One that is not judged
+costs what it would on level ground, times 1 + `caution` x the doubt at its end, and `caution` x
+PRICE x its difficulty more.
+"""
+
+import heapq
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.numerics.kernels import allocating_kernel, exact_kernel
+from rover_planner.planning.search.difficulty import Difficulty, difficulty_of
+from rover_planner.planning.search.edges import FAILS, PASSES, Edges, PrimitiveTable
+from rover_planner.planning.search.nodes import HEADINGS
+
+PRICE = 4.0
+"""Price of a unit of difficulty with a caution of 1 [cells]."""
+SLACK = 1.1
+"""Costs to the goal are measured up to this multiple of the cost from start to goal."""
+FEW = 500
+"""Number of nodes that a search may expand beside those of its path before it counts as misled."""
+
+
+class Graph(NamedTuple):
+    """A lattice with what is known of it."""
+
+    table: PrimitiveTable
+    """The primitives."""
+    state: np.ndarray
+    """(nodes, P) states of the edges, see `Edges`."""
+    cost: np.ndarray
+    """(nodes, P) costs [m] of the edges that pass."""
+    standing: np.ndarray
+    """(nodes,) states of the nodes, see `Edges`."""
+    doubt: np.ndarray
+    """(nodes,) doubt that edges to a node pass, 0 for none."""
+    difficulty: Difficulty
+    """Estimates how likely edges are refused."""
+    caution: float
+    """Weight of doubt and difficulty; with 0 no edge is estimated above its true cost."""
+    rows: int
+    """Number of rows of places."""
+    columns: int
+    """Number of columns of places."""
+
+
+class Seeds(NamedTuple):
+    """Nodes where a search begins."""
+
+    nodes: np.ndarray
+    """(k,) nodes."""
+    costs: np.ndarray
+    """(k,) costs [m] at which they are entered."""
+
+
+class ToGoal(NamedTuple):
+    """What is known of the costs from the nodes to the goal."""
+
+    cost: np.ndarray
+    """(nodes,) cost to the goal [m], too high or infinite where it is not known."""
+    focus: np.ndarray
+    """(2,) row and column of the place that was measured towards, the start."""
+    radius: float
+    """Distance of the start's connections from there [m]."""
+    cell: float
+    """Distance of neighbouring nodes [m]."""
+
+
+class Tree(NamedTuple):
+    """What a search has reached."""
+
+    cost: np.ndarray
+    """(nodes,) cost from the start [m], infinite where nothing leads, written."""
+    parent: np.ndarray
+    """(nodes,) edge that leads to a node; -1 - i for seed i. Written where a cost is finite."""
+
+
+@exact_kernel
+def edge_cost(graph, node, k, end):
+    """Return the cost [m] of edge k of a node, which ends at node `end`; infinite if it fails.
+
+    Nodes where the rover cannot stand are never entered.
+    """
+    state = graph.state[node, k]
+    if state >= FAILS or graph.standing[end] >= FAILS:
+        return np.inf
+    if state == PASSES:
+        return float(graph.cost[node, k])
+    least = graph.table.least_cost[node % HEADINGS, k]
+    if graph.caution == 0.0:
+        return least
+    price = PRICE * graph.difficulty.cell
+    difficulty = difficulty_of(graph.difficulty, graph.columns, node, k)
+    return least + graph.caution * (least * graph.doubt[end] + price * difficulty)
+
+
+@exact_kernel
+def _neighbour(graph, node, i, backwards):
+    """Return the other node of an edge, the node where the edge begins, and its number there.
+
+    The other node is -1 if it is outside the window; all are -1 if there is no such edge.
+
+    Args:
+        graph: Graph.
+        node: A node.
+        i: Number of the edge among those that begin, or end, at the node.
+        backwards: Whether those that end there are meant.
+    """
+    none = np.int64(-1)
+    heading, place = node % HEADINGS, node // HEADINGS
+    if backwards:
+        other_heading, k = graph.table.back[heading, i, 0], graph.table.back[heading, i, 1]
+        if other_heading < 0:
+            return none, none, none
+        step, sign = graph.table.step[other_heading, k], -1
+    else:
+        other_heading, k = graph.table.end_heading[heading, i], np.int64(i)
+        if other_heading < 0:
+            return none, none, none
+        step, sign = graph.table.step[heading, k], 1
+    row = place // graph.columns + sign * step[1]
+    column = place % graph.columns + sign * step[0]
+    other = none
+    if 0 <= row < graph.rows and 0 <= column < graph.columns:
+        other = np.int64((row * graph.columns + column) * HEADINGS + other_heading)
+    return other, other if backwards else np.int64(node), k
+
+
+@exact_kernel
+def _from_start(to_goal, columns, node):
+    """Return a bound from below on the cost from the start to a node [m]."""
+    place = node // HEADINGS
+    rows = place // columns - to_goal.focus[0]
+    along = place % columns - to_goal.focus[1]
+    return max(to_goal.cell * np.hypot(rows, along) - to_goal.radius, 0.0)
+
+
+@exact_kernel
+def _bound_to_goal(to_goal, limit, columns, node):
+    """Return a bound from below on the cost from a node to the goal [m].
+
+    All costs are known for which the sum with the bound from the start is at most `limit`.
+    """
+    from_start = _from_start(to_goal, columns, node)
+    if to_goal.cost[node] + from_start <= limit:
+        return to_goal.cost[node]
+    return max(limit - from_start, 0.0)
+
+
+@allocating_kernel
+def measure_to_goal(graph, goals, starts, slack, to_goal):
+    """Measure the costs from the nodes to the goal (A* from the goal towards the start).
+
+    Args:
+        graph: Graph.
+        goals: Seeds with the costs from the nodes to the goal.
+        starts: Seeds with the costs from the start to the nodes.
+        slack: Up to which multiple of the cost from the start to the goal it goes on.
+        to_goal: ToGoal; `cost` is written.
+
+    Returns:
+        The `limit` of `_bound_to_goal`, infinite if all nodes are known that lead to the goal; and
+        the number of nodes expanded.
+    """
+    distance = to_goal.cost
+    distance[:] = np.inf
+    heap = [(0.0, 0.0, np.int64(-1))]
+    heap.clear()
+    for i in range(goals.nodes.size):
+        node, cost = goals.nodes[i], goals.costs[i]
+        if graph.standing[node] < FAILS and cost < distance[node]:
+            distance[node] = cost
+            heapq.heappush(heap, (cost + _from_start(to_goal, graph.columns, node), cost, node))
+    entry = np.full(distance.size, np.inf)
+    for i in range(starts.nodes.size):
+        entry[starts.nodes[i]] = min(entry[starts.nodes[i]], starts.costs[i])
+    limit, expanded = np.inf, 0
+    while len(heap) > 0:
+        estimate, here, node = heapq.heappop(heap)
+        if here > distance[node]:
+            continue
+        if estimate > limit:
+            return limit, expanded
+        expanded += 1
+        if entry[node] < np.inf:
+            limit = min(limit, slack * (here + entry[node]))
+        _enter_before(graph, node, to_goal, heap)
+    return np.inf, expanded
+
+
+@allocating_kernel
+def _enter_before(graph, node, to_goal, heap):
+    """Enter the nodes from which an edge leads to a node."""
+    distance = to_goal.cost
+    for i in range(graph.table.back.shape[1]):
+        before, _, k = _neighbour(graph, node, i, True)
+        if k < 0:
+            break
+        if before < 0:
+            continue
+        cost = distance[node] + edge_cost(graph, before, k, node)
+        if cost < distance[before]:
+            distance[before] = cost
+            bound = _from_start(to_goal, graph.columns, before)
+            heapq.heappush(heap, (cost + bound, cost, before))
+
+
+@allocating_kernel
+def find_shortest(graph, starts, goals, to_goal, tree):
+    """Find the shortest path from the start to the goal (A*).
+
+    Args:
+        graph: Graph.
+        starts: Seeds with the costs from the start to the nodes.
+        goals: Seeds with the costs from the nodes to the goal.
+        to_goal: ToGoal, and the limit up to which it is measured.
+        tree: Tree, written.
+
+    Returns:
+        Index of the goal's seed that the path ends with, -1 if there is no path; its cost [m]; and
+        the number of nodes expanded.
+    """
+    measured, limit = to_goal
+    tree.cost[:] = np.inf
+    leave = np.full(tree.cost.size, np.int64(-1))
+    for i in range(goals.nodes.size):
+        other = leave[goals.nodes[i]]
+        if other < 0 or goals.costs[i] < goals.costs[other]:
+            leave[goals.nodes[i]] = i
+    heap = [(0.0, 0.0, np.int64(-1))]
+    heap.clear()
+    for i in range(starts.nodes.size):
+        node, cost = starts.nodes[i], starts.costs[i]
+        bound = _bound_to_goal(measured, limit, graph.columns, node)
+        standing = graph.standing[node] < FAILS
+        if standing and cost < tree.cost[node] and bound < np.inf:
+            tree.cost[node], tree.parent[node] = cost, -1 - i
+            heapq.heappush(heap, (cost + bound, -cost, node))
+    best, found, expanded = np.inf, np.int64(-1), 0
+    while len(heap) > 0:
+        estimate, negative, node = heapq.heappop(heap)
+        if estimate >= best:
+            break
+        if -negative > tree.cost[node]:
+            continue
+        expanded += 1
+        if leave[node] >= 0 and -negative + goals.costs[leave[node]] < best:
+            best, found = -negative + goals.costs[leave[node]], leave[node]
+        _enter_after(graph, node, to_goal, tree, heap)
+    return found, best, expanded
+
+
+@allocating_kernel
+def _enter_after(graph, node, to_goal, tree, heap):
+    """Enter the nodes to which the edges of a node lead."""
+    measured, limit = to_goal
+    width = graph.table.end_heading.shape[1]
+    for k in range(width):
+        end, _, number = _neighbour(graph, node, k, False)
+        if number < 0:
+            break
+        if end < 0:
+            continue
+        bound = _bound_to_goal(measured, limit, graph.columns, end)
+        cost = tree.cost[node] + edge_cost(graph, node, k, end)
+        if cost < tree.cost[end] and bound < np.inf:
+            tree.cost[end], tree.parent[end] = cost, node * width + k
+            heapq.heappush(heap, (cost + bound, -cost, end))
+
+
+@allocating_kernel
+def spread(graph, seeds, backwards, inside, crossing):
+    """Mark the nodes that edges connect with seeds, and count what closes them in.
+
+    Args:
+        graph: Graph; edges that are not judged count as open.
+        seeds: (k,) nodes.
+        backwards: Whether edges are followed from their ends to their beginnings.
+        inside: (nodes,), written where True.
+        crossing: (codes + 1,) numbers of edges that would cross the border, for each code of a
+            failure, and last of those that leave the window; added to.
+    """
+    stack = [np.int64(-1)]
+    stack.clear()
+    for i in range(seeds.size):
+        if graph.standing[seeds[i]] < FAILS and not inside[seeds[i]]:
+            inside[seeds[i]] = True
+            stack.append(seeds[i])
+    most = graph.table.back.shape[1] if backwards else graph.table.end_heading.shape[1]
+    visited = [np.int64(-1)]
+    visited.clear()
+    while len(stack) > 0:
+        node = stack.pop()
+        visited.append(node)
+        for i in range(most):
+            other, state = _look_across(graph, node, i, backwards)
+            if other >= 0 and state < FAILS and not inside[other]:
+                inside[other] = True
+                stack.append(other)
+    for node in visited:
+        for i in range(most):
+            other, state = _look_across(graph, node, i, backwards)
+            if state >= FAILS and (other < 0 or not inside[other]):
+                crossing[min(state - FAILS, crossing.size - 1)] += 1
+
+
+@exact_kernel
+def _look_across(graph, node, i, backwards):
+    """Return the node at the other end of an edge, and the edge's state; -1, -1 if there is none.
+
+    The state is that of the edge or, if that does not fail, of the other node. If the edge leaves
+    the window, the node is -1 and the state is larger than all. Arguments as for `_neighbour`.
+    """
+    other, first, k = _neighbour(graph, node, i, backwards)
+    if k < 0:
+        return other, np.int64(-1)
+    if other < 0:
+        return other, np.int64(2**30)
+    return other, np.int64(max(graph.state[first, k], graph.standing[other]))
+
+
+@dataclass(frozen=True)
+class Route:
+    """A path over the lattice, from one of the start's connections to one of the goal's."""
+
+    start: int
+    """Index of the connection at the start."""
+    edges: NDArray[np.int64]
+    """(k,) edges from there."""
+    goal: int
+    """Index of the connection at the goal."""
+    cost: float
+    """Its cost [m] by what is known."""
+
+
+class ShortestPaths:
+    """Searches one lattice between fixed ends again and again, while edges are judged."""
+
+    def __init__(
+        self,
+        edges: Edges,
+        doubt: NDArray[np.float32],
+        difficulty: Difficulty,
+        starts: Seeds,
+    ):
+        """Search from about the nodes of the first seeds; later ones must be among them."""
+        self._edges, self._doubt, self._difficulty = edges, doubt, difficulty
+        nodes, count = edges.nodes, edges.nodes.count
+        self._to_goal = ToGoal(np.empty(count), *nodes.surround(starts.nodes), nodes.cell)
+        self._limit, self._measured = np.inf, 0
+        self._tree = Tree(np.empty(count), np.empty(count, np.int64))
+        self._caution, self._misled = -1.0, 0
+        self.expanded = 0
+        """Number of nodes expanded by all searches."""
+        self.last_expanded = 0
+        """Number of nodes expanded by the last search."""
+
+    def find(self, starts: Seeds, goals: Seeds, caution: float) -> Route | None:
+        """Return the shortest path, None if there is none.
+
+        Args:
+            starts: Nodes of the start's connections and their costs [m].
+            goals: Nodes of the goal's connections and their costs [m].
+            caution: Weight of the doubts.
+        """
+        graph = self.graph(caution)
+        if caution != self._caution:
+            self._measure(graph, starts, goals)
+            self._caution = caution
+        to_goal = self._to_goal, self._limit
+        goal, cost, expanded = find_shortest(graph, starts, goals, to_goal, self._tree)
+        self.expanded, self.last_expanded = self.expanded + expanded, expanded
+        self._misled += max(0, expanded - FEW)
+        if self._misled > self._measured:  # the costs to the goal are worn out
+            self._measure(graph, starts, goals)
+        if goal < 0:
+            return None
+        start, edges = self._follow_back(int(goals.nodes[goal]))
+        return Route(start, edges, int(goal), float(cost))
+
+    def graph(self, caution: float) -> Graph:
+        """Return the lattice as kernels read it."""
+        edges = self._edges
+        known = edges.state, edges.cost, edges.standing, self._doubt, self._difficulty
+        return Graph(edges.table, *known, caution, *edges.nodes.shape)
+
+    def _measure(self, graph: Graph, starts: Seeds, goals: Seeds) -> None:
+        """Measure the costs to the goal again."""
+        self._misled = 0
+        self._limit, self._measured = measure_to_goal(graph, goals, starts, SLACK, self._to_goal)
+
+    def _follow_back(self, node: int) -> tuple[int, NDArray[np.int64]]:
+        """Return the start's connection and the edges (k,) that lead to a node."""
+        edges, width = [], self._edges.width
+        while (edge := int(self._tree.parent[node])) >= 0:
+            edges.append(edge)
+            node = edge // width
+        return -1 - edge, np.array(edges[::-1], np.int64)

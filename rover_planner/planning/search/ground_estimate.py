@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Cheap estimates of all nodes, from the heights below the wheels without the model.
+
+Nodes where the centre of a wheel is over unknown ground however the rover tilts are refused, as
+the model does. Nodes with unknown ground below a wheel on level ground are only doubted: the model
+decides, but it is asked about other ways first.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from rover_physics.numerics.kernels import exact_kernel
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.planning.search.nodes import HEADINGS, YAWS, Nodes
+
+FULL_DOUBT = 4.0
+"""Doubt of nodes near unknown ground: edges that lead there cost 1 + that as much while the search
+is cautious."""
+_ROUNDING = 1e-4
+"""Distance from the edge of the map [cells] that counts as on it."""
+
+
+class GroundEstimate(NamedTuple):
+    """Estimates of all nodes."""
+
+    groundless: NDArray[np.bool_]
+    """(nodes,) whether the centre of a wheel is over unknown ground or off the map in any case."""
+    doubt: NDArray[np.float32]
+    """(nodes,) doubt that the rover can be there, 0 or FULL_DOUBT."""
+
+
+class _Map(NamedTuple):
+    """A map as the kernel reads it."""
+
+    elevation: np.ndarray
+    """(ny, nx) heights [m]."""
+    away: np.ndarray
+    """(ny, nx) distance to the next known cell [m]."""
+    resolution: float
+    """Cell size [m]."""
+
+
+class _Wheels(NamedTuple):
+    """Where the wheels of a rover at a node are."""
+
+    offsets: np.ndarray
+    """(HEADINGS, 6, 2) wheel centres at a node at the map frame's origin, from the centre of the
+    map's first cell [m]."""
+    shift: float
+    """Largest distance of a wheel centre from its place on level ground [m], seen from above."""
+
+
+def estimate_ground(rover: Rover, terrain: Terrain, nodes: Nodes) -> GroundEstimate:
+    """Estimate all nodes.
+
+    Args:
+        rover: The rover.
+        terrain: The ground.
+        nodes: The nodes.
+    """
+    own = np.array([place[:2] for place in rover.suspension.wheels.values()])
+    places = np.concatenate([own, own * (1.0, -1.0)])
+    c, s = np.cos(YAWS)[:, None], np.sin(YAWS)[:, None]
+    x, y = c * places[:, 0] - s * places[:, 1], s * places[:, 0] + c * places[:, 1]
+    offsets = np.stack([x, y], axis=-1) - terrain.origin
+    wheels = _Wheels(offsets, largest_wheel_shift(rover))
+    elevation = np.asarray(terrain.elevation)
+    ground = _Map(
+        elevation,
+        _distance_to_known(elevation, terrain.resolution),
+        terrain.resolution,
+    )
+    found = GroundEstimate(np.zeros(nodes.count, bool), np.zeros(nodes.count, np.float32))
+    window = nodes.cell, nodes.first[0], nodes.first[1], nodes.shape[1]
+    estimate_nodes(ground, wheels, window, found)
+    return found
+
+
+def largest_wheel_shift(rover: Rover) -> float:
+    """Return how far a wheel centre may be from its place on level ground [m], seen from above.
+
+    Body, rocker and bogie each turn by what their limits allow at most.
+    """
+    suspension, tilt = rover.suspension, rover.limits.tilt
+    rocking, turning = (
+        min(max(map(abs, limits)), 0.5 * math.pi)
+        for limits in (suspension.rocker_limits, suspension.bogie_limits)
+    )
+    farthest = 0.0
+    for name, wheel in suspension.wheels.items():
+        links = [(suspension.rocker_pivot, wheel, rocking)]
+        if name in suspension.bogie_wheels:
+            both = min(rocking + turning, 0.5 * math.pi)
+            links = [
+                (suspension.rocker_pivot, suspension.bogie_pivot, rocking),
+                (suspension.bogie_pivot, wheel, both),
+            ]
+        along = up = 0.0
+        for pivot, end, angle in links:
+            x, z = abs(end[0] - pivot[0]), abs(end[2] - pivot[2])
+            along += x * (1.0 - math.cos(angle)) + z * math.sin(angle)
+            up += z * (1.0 - math.cos(angle)) + x * math.sin(angle)
+        level = math.hypot(wheel[0], wheel[1]) + along
+        tilted = level * (1.0 - math.cos(tilt)) + (abs(wheel[2]) + up) * math.sin(tilt)
+        farthest = max(farthest, along + tilted)
+    return farthest
+
+
+def _distance_to_known(elevation: NDArray[np.float64], resolution: float) -> NDArray[np.float64]:
+    """Return (ny, nx) distances to the next known cell [m]."""
+    unknown = np.isnan(elevation)
+    if not unknown.any():
+        return np.zeros(elevation.shape)
+    away: NDArray[np.float64] = resolution * ndimage.distance_transform_edt(unknown)
+    return away
+
+
+@exact_kernel
+def estimate_nodes(ground, wheels, window, found):
+    """Write the estimates of all nodes.
+
+    Args:
+        ground: _Map.
+        wheels: _Wheels.
+        window: Cell [m], first column and row, and number of columns of the nodes.
+        found: GroundEstimate of zeros, written where it differs.
+    """
+    cell, first_column, first_row, columns = window
+    for node in range(found.doubt.size):
+        heading, place = node % HEADINGS, node // HEADINGS
+        x = cell * (place % columns + first_column)
+        y = cell * (place // columns + first_row)
+        for wheel in range(6):
+            u = (x + wheels.offsets[heading, wheel, 0]) / ground.resolution
+            v = (y + wheels.offsets[heading, wheel, 1]) / ground.resolution
+            if not _is_known(ground.elevation, u, v):
+                found.doubt[node] = FULL_DOUBT
+                if _distance(ground, u, v) > wheels.shift:
+                    found.groundless[node] = True
+                    break
+
+
+@exact_kernel
+def _distance(ground, u, v):
+    """Return a bound from below on the distance from a place [cells] to known ground [m]."""
+    ny, nx = ground.away.shape
+    i, j = min(max(int(u + 0.5), 0), nx - 1), min(max(int(v + 0.5), 0), ny - 1)
+    beyond = ground.resolution * np.hypot(u - i, v - j)
+    return max(beyond, ground.away[j, i] - beyond) - ground.resolution
+
+
+@exact_kernel
+def _is_known(elevation, u, v):
+    """Return whether a place [cells] is on the map, and known: all corners around it are.
+
+    Within rounding of a line between cells, the corners on one side of it suffice.
+    """
+    ny, nx = elevation.shape
+    if not (-_ROUNDING <= u <= nx - 1 + _ROUNDING and -_ROUNDING <= v <= ny - 1 + _ROUNDING):
+        return False
+    i, j = min(int(u), elevation.shape[1] - 2), min(int(v), elevation.shape[0] - 2)
+    a, b = u - i, v - j
+    known = True
+    for row in range(2):
+        for column in range(2):
+            weight = (a if column else 1.0 - a) * (b if row else 1.0 - b)
+            if weight > 1e-4 and np.isnan(elevation[j + row, i + column]):
+                known = False
+    return known

@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The model of one rover on one map: judges paths, pieces of path and single poses.
+
+What a piece of path costs, in metres of level ground, is made of time, energy and risk:
+
+    cost = gear price x time x nominal speed
+         + CLIMB x energy / weight
+         + RISK x exposure x nominal speed
+
+Energy over weight is the height [m] to which the energy would lift the rover. The exposure [s] is
+the time at the limits: each moment counts by the square of ((used share of the tightest safety
+limit) - 1/2) x 2, which is 0 up to half of a limit and 1 at it.
+"""
+
+import itertools
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.results.path_prediction import PathPrediction
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.classification import ClassifiedWaypoint, classify_judged
+from rover_physics.traversability.judge import judge_poses
+from rover_physics.traversability.pieces import PieceVerdict, judge_pieces
+from rover_physics.traversability.verdict import Verdict
+from rover_planner.planning.path_geometry import rings_within
+from rover_planner.planning.path_query import (
+    Candidate,
+    PathAnswer,
+    PathQueryOptions,
+    PathSearch,
+    Pose,
+    answer_path_query,
+    check_path,
+)
+from rover_planner.planning.search.blind_check import BlindCheck, physical
+from rover_planner.planning.search.primitives import PRICES, Gear, Piece
+from rover_planner.worlds.maps.blind_ground import CODE
+
+CLIMB = 2.0
+"""Metres of level ground that cost as much as the energy that lifts the rover by one metre."""
+RISK = 2.0
+"""Further cost of a metre at the limit, in metres of level ground."""
+_QUERIES_PER_RING = 4
+"""Other goals on a ring around the goal that are tried at most."""
+
+
+class JudgedPiece(NamedTuple):
+    """What the model found of a piece of path."""
+
+    code: str
+    """Code of the limit that fails first, empty if the rover may drive it."""
+    cost: float
+    """Its cost [m], infinite if it fails."""
+
+
+@dataclass
+class PathJudge:
+    """The model of one rover on one map with options."""
+
+    rover: Rover
+    """The rover."""
+    terrain: Terrain
+    """The ground, map frame."""
+    options: PathQueryOptions
+    """How candidates are made and how paths are judged."""
+    blind: BlindCheck | None = None
+    """Refuses ground under the belly that was never seen; None allows it."""
+    poses: int = field(default=0, init=False)
+    """Number of poses that searches have asked for so far, a measure of the work done."""
+
+    def search(self, start: Pose, goal: Pose, tolerance: float = 0.0) -> PathSearch:
+        """Find a path from start to goal, or to a goal near it, among candidate paths.
+
+        Args:
+            start: Start of the path.
+            goal: End of the path.
+            tolerance: Largest distance from the goal's position [m] at which the path may end
+                if the goal cannot be reached; the heading stays. 0 tries the goal only.
+
+        Returns:
+            The answer for the goal, or for the first alternative goal that can be reached.
+
+        Raises:
+            PlanningError: Start, goal or options are invalid.
+            RoverError: The model refuses an option or the poses.
+        """
+        answer, tried = self._query(start, goal), 0
+        if not answer.traversable and self._fails_at(answer, goal, tolerance):
+            for alternative in self._goals_to_stand_on(start, goal, tolerance):
+                tried += 1
+                other = self._query(start, alternative)
+                if other.traversable:
+                    return PathSearch(self._hold(other), goal, alternative, tried)
+        return PathSearch(self._hold(answer), goal, goal, tried)
+
+    def _query(self, start: Pose, goal: Pose) -> PathAnswer:
+        return answer_path_query(self.rover, self.terrain, start, goal, self.options)
+
+    def _hold(self, answer: PathAnswer) -> PathAnswer:
+        return answer if self.blind is None else self.blind.choose(answer)
+
+    def _fails_at(self, answer: PathAnswer, goal: Pose, tolerance: float) -> bool:
+        """Return whether another goal within `tolerance` [m] may help.
+
+        It may if some path fails where the ground under the rover is also ground under a rover
+        at an allowed goal. Other paths fail before, where paths to the other goals lead too.
+        """
+        near = tolerance + self.rover.wheelbase
+        failures = [
+            one.poses[one.verdict.first_failure] - goal
+            for one in answer.candidates
+            if one.verdict.first_failure > 0
+        ]
+        return any(np.hypot(*failure[:2]) <= near for failure in failures)
+
+    def _goals_to_stand_on(self, start: Pose, goal: Pose, tolerance: float) -> Iterator[Pose]:
+        """Yield alternative goals where the rover can stand, nearest first, a few per ring.
+
+        Goals on the start's side of a ring come first. If these cannot be reached, those behind
+        them rarely can, and each goal costs the evaluation of all candidates.
+        """
+        for ring in rings_within(start, goal, tolerance):
+            judged = ((pose, self._judge_path(pose[None, :])) for pose in ring)
+            standing = (pose for pose, one in judged if one.verdict.traversable)
+            yield from itertools.islice(standing, _QUERIES_PER_RING)
+
+    def check(self, poses: NDArray[np.float64], *, stop_at_failure: bool = False) -> Candidate:
+        """Judge one given path of poses (n, 3), if wanted only up to its first failure.
+
+        Raises:
+            RoverError: The model refuses an option or the poses.
+        """
+        self.poses += len(poses)
+        checked = self._judge_path(poses, stop_at_failure=stop_at_failure)
+        return checked if self.blind is None else self.blind.hold(checked)
+
+    def _judge_path(self, poses: Pose, *, stop_at_failure: bool = False) -> Candidate:
+        return check_path(
+            self.rover, self.terrain, poses, self.options, stop_at_failure=stop_at_failure
+        )
+
+    def classify(self, candidate: Candidate) -> tuple[ClassifiedWaypoint, ...]:
+        """Return the class of each waypoint of a judged path; may evaluate the path once more."""
+        judged = physical(candidate)
+        return classify_judged(
+            self.rover,
+            self.terrain,
+            judged.prediction,
+            judged.verdict,
+            self.options.model,
+            sigmas=self.options.map_sigmas,
+        )
+
+    def predict_standing(self, pose: Pose) -> PathPrediction:
+        """Predict the rover standing at a pose.
+
+        Raises:
+            RoverError: The model refuses an option or the pose.
+        """
+        poses, options = pose[None, :], self.options.model
+        return judge_poses(self.rover, self.terrain, poses, None, options, sigmas=0)[0]
+
+    def judge_pieces(self, pieces: Sequence[Piece]) -> list[JudgedPiece]:
+        """Judge pieces of path; whether a path ends in a pit is asked of whole paths only."""
+        poses = [piece.poses for piece in pieces]
+        self.poses += sum(map(len, poses))
+        model, sigmas = self.options.model, self.options.map_sigmas
+        found = judge_pieces(self.rover, self.terrain, poses, model, sigmas=sigmas)
+        judged = [
+            JudgedPiece(verdict.code, find_cost(self.rover, piece.gear, verdict))
+            for piece, verdict in zip(pieces, found, strict=True)
+        ]
+        for row in self._find_blind(poses, [one.code for one in judged]):
+            judged[row] = JudgedPiece(CODE, math.inf)
+        return judged
+
+    def stand(self, poses: NDArray[np.float64]) -> tuple[str, ...]:
+        """Return the codes (n,) of what fails at single poses (n, 3), wheels ahead; "" if none."""
+        codes = list(self._stand(poses).codes)
+        for row in self._find_blind(poses[:, None, :], codes):
+            codes[row] = CODE
+        return tuple(codes)
+
+    def refuse(self, pose: Pose) -> tuple[str, str]:
+        """Return code and reason why the rover cannot stand at a pose, empty if it can."""
+        verdict = self._stand(pose[None, :])
+        if self.blind is not None and self._find_blind([pose[None, :]], verdict.codes):
+            return CODE, self.blind.describe()
+        return verdict.codes[0], verdict.reasons[0]
+
+    def _stand(self, poses: NDArray[np.float64]) -> Verdict:
+        """Judge single poses (n, 3), wheels ahead."""
+        self.poses += len(poses)
+        ahead, model, sigmas = np.zeros(len(poses)), self.options.model, self.options.map_sigmas
+        return judge_poses(self.rover, self.terrain, poses, ahead, model, sigmas=sigmas)[1]
+
+    def _find_blind(
+        self, pieces: Sequence[NDArray[np.float64]] | NDArray[np.float64], codes: Sequence[str]
+    ) -> list[int]:
+        """Return the indices of pieces that pass by their codes, but are over unseen ground."""
+        passing = [row for row, code in enumerate(codes) if not code]
+        if self.blind is None or not passing:
+            return []
+        refused = self.blind.refuses([pieces[row] for row in passing])
+        return [passing[row] for row in np.flatnonzero(refused).tolist()]
+
+
+def find_cost(rover: Rover, gear: Gear, piece: PieceVerdict) -> float:
+    """Return the cost [m] of a piece of path, infinite if it fails."""
+    if piece.code:
+        return math.inf
+    speed, climb = rover.nominal_speed, max(0.0, piece.energy) / rover.weight
+    return PRICES[gear] * piece.time * speed + CLIMB * climb + RISK * piece.exposure * speed

@@ -1,0 +1,309 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Searches a path around obstacles on a lattice of motion primitives, with the full model.
+
+The search is lazy (LazySP; Dellin and Srinivasa 2016, A unifying formalism for shortest path
+problems with expensive edge evaluations): find the shortest path by what is known, ask the model
+about its nodes, then about its edges, and again. A node where the rover cannot stand belongs to no
+path. First the search is cautious: edges near refused ones are dearer, so that a first path is
+found soon. Then it is exact: edges that are not judged cost what they would on level ground, so
+that the cost of the shortest path is a bound from below on that of any path on the lattice.
+"""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.numerics.interruption import check_interruption
+from rover_planner.planning.path_query import Candidate
+from rover_planner.planning.search.connections import Connection
+from rover_planner.planning.search.difficulty import Difficulty, difficulty_of
+from rover_planner.planning.search.edges import PASSES, UNJUDGED, Edges
+from rover_planner.planning.search.graph import Route, Seeds, ShortestPaths
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.primitives import Piece
+
+CAUTIONS = (1.0, 0.5, 0.0)
+"""Weights of the doubts, one after the other; with 0 the search is exact."""
+DOUBT = 0.3
+"""Doubt that a refused edge adds to the nodes around its end: the cost of edges that lead there
+rises by this share."""
+FEW_NODES, NODES_ASKED = 200, 0.05
+"""Number of nodes around refused ones that are asked about at least, and in addition for each node
+that the last search expanded: then both take about as long."""
+FIRST_PIECES = 4
+"""Number of pieces of a path that are judged first."""
+MOST_REFUSED = 3
+"""Number of refused connections of start or goal from which on all of its others are judged: it
+may be closed in, and each of them costs a search."""
+NEAR_OPTIMAL = 0.02
+"""A path is good enough if no path of the lattice costs less by more than this share."""
+
+
+@dataclass
+class Progress:
+    """What a search has found so far."""
+
+    best: Candidate | None = None
+    """The best path that passes as a whole."""
+    cost: float = np.inf
+    """Its cost [m]."""
+    bound: float = 0.0
+    """Bound from below on the cost of any path of the lattice [m]."""
+    exhausted: bool = False
+    """Whether the lattice has no path left to look at."""
+    judged: int = 0
+    """Number of edges that the model has judged."""
+    first_time: float = np.nan
+    """Time of the monotonic clock when the first path was found [s]."""
+    pieces: list[Piece] = field(default_factory=list)
+    """The pieces of the best path."""
+
+
+class _Ends:
+    """The connections of the start or of the goal, with what is known of them."""
+
+    def __init__(self, connections: list[Connection]):
+        self.connections = connections
+        self.nodes = np.array([one.node for one in connections], np.int64)
+        self.costs = np.array([one.cost + one.surcharge for one in connections])
+        self.judged = np.zeros(len(connections), bool)
+        self.codes: list[str] = []
+        """Codes of the connections that were refused."""
+
+    @property
+    def open_nodes(self) -> NDArray[np.int64]:
+        """The nodes (k,) of the connections that may pass."""
+        return self.nodes[np.isfinite(self.costs)]
+
+    @property
+    def seeds(self) -> Seeds:
+        """The nodes with their costs."""
+        return Seeds(self.nodes, self.costs)
+
+
+Open = tuple[Piece, _Ends | None, int]
+"""A piece that is not judged; the ends that it belongs to and its index there, or None and its
+edge."""
+
+
+@dataclass
+class LatticeSearch:
+    """A search between two poses over the edges of a lattice."""
+
+    judge: PathJudge
+    """The model."""
+    edges: Edges
+    """The edges; what is known of them grows with the search."""
+    starts: list[Connection]
+    """Connections from the start to nodes."""
+    goals: list[Connection]
+    """Connections from nodes to the goal."""
+    doubt: NDArray[np.float32]
+    """(nodes,) doubt that the rover can be at a node, 0 for none; grows with the search."""
+    difficulty: Difficulty
+    """Estimates how likely edges are refused."""
+    progress: Progress = field(default_factory=Progress)
+    """What it has found."""
+
+    def __post_init__(self) -> None:
+        self.ends = _Ends(self.starts), _Ends(self.goals)
+        """What is known of the connections of the start and of the goal."""
+        self.shortest = ShortestPaths(self.edges, self.doubt, self.difficulty, self.ends[0].seeds)
+        self._refused: list[tuple[int, int, float]] = []
+
+    def offer(self, piece: Piece) -> None:
+        """Judge a path from start to goal; keep it if it passes and is the best."""
+        cost = self.judge.judge_pieces([piece])[0].cost
+        if cost < self.progress.cost:
+            checked = self.judge.check(piece.poses, stop_at_failure=True)
+            self._keep([replace(piece, cost=cost)], checked)
+
+    def run(self, allowed: Callable[["LatticeSearch"], bool]) -> Progress:
+        """Search until the best path is found, no path is left, or it is not allowed to go on."""
+        try:
+            for caution in CAUTIONS:
+                while allowed(self) and not self._step(caution):
+                    check_interruption()
+                if self.progress.exhausted:
+                    break
+        finally:
+            self._forget_refusals()
+        return self.progress
+
+    def _step(self, caution: float) -> bool:
+        """Find the shortest path and ask the model about it; return whether this phase is over."""
+        starts, goals = (ends.seeds for ends in self.ends)
+        route, progress = self.shortest.find(starts, goals, caution), self.progress
+        if route is None:
+            progress.exhausted, progress.bound = True, progress.cost
+            return True
+        if caution == 0.0:
+            progress.bound = max(progress.bound, min(route.cost, progress.cost))
+        if route.cost * (1.0 + NEAR_OPTIMAL) >= progress.cost:
+            return True
+        if not (self._stand_along(route) and self._judge_route(route)):
+            return False
+        return self._take(route) and caution > 0.0
+
+    def _stand_along(self, route: Route) -> bool:
+        """Ask about the nodes of a route; return whether the rover can stand at all new ones."""
+        ends = self.starts[route.start].node, self.goals[route.goal].node
+        new = self._unjudged(np.unique(np.concatenate([self.edges.ends(route.edges), ends])))
+        refused = new[~self._stand(new)]
+        self._explore(refused)
+        return not len(refused)
+
+    def _unjudged(self, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Return those of nodes (n,) at which the model was not asked whether the rover stands."""
+        return nodes[self.edges.standing[nodes] == UNJUDGED]
+
+    def _explore(self, refused: NDArray[np.int64]) -> None:
+        """Ask about the nodes around refused ones, and around those refused in turn.
+
+        Obstacles are larger than a node. The work is in proportion to that of the last search.
+        """
+        allowed = FEW_NODES + round(NODES_ASKED * self.shortest.last_expanded)
+        while len(refused) and allowed > 0:
+            around = self._unjudged(self.edges.nodes.around(refused))[:allowed]
+            allowed -= len(around)
+            refused = around[~self._stand(around)]
+
+    def _stand(self, nodes: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Ask whether the rover can stand at nodes (n,)."""
+        if not len(nodes):
+            return np.ones(0, bool)
+        codes = self.judge.stand(self.edges.nodes.poses(nodes))
+        self.edges.standing[nodes] = [self.edges.state_of(code) for code in codes]
+        return self.edges.standing[nodes] == PASSES
+
+    def _judge_route(self, route: Route) -> bool:
+        """Judge what is open of a route, the hardest first; return whether all of it passes.
+
+        More and more pieces are judged at a time.
+        """
+        pieces = sorted(self._open_pieces(route), key=self._hardness, reverse=True)
+        size = FIRST_PIECES
+        while pieces:
+            if not all(self._judge(pieces[:size])):
+                self._judge_ends()
+                return False
+            pieces, size = pieces[size:], 2 * size
+        return True
+
+    def _hardness(self, piece: Open) -> float:
+        """Return how likely a piece is refused; the connections of the ends come first."""
+        _, ends, index = piece
+        if ends is not None:
+            return np.inf
+        node, k = divmod(index, self.edges.width)
+        return float(difficulty_of(self.difficulty, self.edges.nodes.shape[1], node, k))
+
+    def _judge_ends(self) -> None:
+        """Judge all connections of start or goal if many are refused."""
+        for ends in self.ends:
+            if len(ends.codes) < MOST_REFUSED or ends.judged.all():
+                continue
+            rows = np.flatnonzero(~ends.judged)
+            self._stand(np.unique(self._unjudged(ends.nodes[rows])))
+            stands = self.edges.standing[ends.nodes[rows]] == PASSES
+            self._judge([(ends.connections[k], ends, k) for k in rows[stands].tolist()])
+            ends.judged[:] = True
+
+    def _open_pieces(self, route: Route) -> list[Open]:
+        """Return the pieces of a route that are not judged, in the order of the drive."""
+        starts, goals = self.ends
+        open_edges = route.edges[self.edges.state.flat[route.edges] == UNJUDGED]
+        found: list[Open] = [
+            (starts.connections[route.start], starts, route.start),
+            *((self.edges.piece(edge), None, edge) for edge in open_edges.tolist()),
+            (goals.connections[route.goal], goals, route.goal),
+        ]
+        return [one for one in found if one[1] is None or not one[1].judged[one[2]]]
+
+    def _judge(self, pieces: Sequence[Open]) -> list[bool]:
+        """Judge pieces, keep what is found, and return whether they pass."""
+        if not pieces:
+            return []
+        found = self.judge.judge_pieces([piece for piece, _, _ in pieces])
+        for (_, ends, index), judged in zip(pieces, found, strict=True):
+            if ends is None:
+                self.progress.judged += 1
+                self.edges.write(index, judged.code, judged.cost)
+                if judged.code:
+                    self._doubt_around(index)
+            else:
+                cost = judged.cost + ends.connections[index].surcharge
+                ends.judged[index], ends.costs[index] = True, cost
+                ends.codes += [judged.code] if judged.code else []
+        return [not judged.code for judged in found]
+
+    def _doubt_around(self, edge: int) -> None:
+        """Doubt the edges that lead where a refused edge does."""
+        end = self.edges.ends(np.array([edge]))
+        self.doubt[self.edges.nodes.around(end)] += DOUBT
+
+    def _take(self, route: Route) -> bool:
+        """Judge a route as a whole and keep it if it is the best; return whether it passes."""
+        pieces = self._pieces(route)
+        if sum(one.cost for one in pieces) >= self.progress.cost:
+            return True
+        poses, owners = join_pieces(pieces)
+        candidate = self.judge.check(poses, stop_at_failure=True)
+        if not self._keep(pieces, candidate):
+            owner = owners[candidate.verdict.first_failure]
+            self._refuse(route, int(owner), candidate.verdict.code)
+            return False
+        return True
+
+    def _keep(self, pieces: list[Piece], candidate: Candidate) -> bool:
+        """Keep a path as the best if it passes; return whether it does."""
+        if not candidate.verdict.traversable:
+            return False
+        progress = self.progress
+        progress.best, progress.pieces = candidate, pieces
+        progress.cost = sum(one.cost for one in pieces)
+        if np.isnan(progress.first_time):
+            progress.first_time = time.perf_counter()
+        return True
+
+    def _pieces(self, route: Route) -> list[Piece]:
+        """Return the pieces of a route that is judged."""
+        starts, goals = self.ends
+        first, last = starts.connections[route.start], goals.connections[route.goal]
+        return [
+            replace(first, cost=float(starts.costs[route.start])),
+            *(self.edges.piece(edge) for edge in route.edges),
+            replace(last, cost=float(goals.costs[route.goal])),
+        ]
+
+    def _refuse(self, route: Route, piece: int, code: str) -> None:
+        """Close a piece of a route for this search: it passes, but the whole path does not."""
+        start_ends, goal_ends = self.ends
+        if piece == 0:
+            start_ends.costs[route.start] = np.inf
+        elif piece == len(route.edges) + 1:
+            goal_ends.costs[route.goal] = np.inf
+        else:
+            edge = int(route.edges[piece - 1])
+            self._refused.append((edge, PASSES, float(self.edges.cost.flat[edge])))
+            self.edges.write(edge, code, np.inf)
+
+    def _forget_refusals(self) -> None:
+        """Let the edges pass again that were closed for this search only."""
+        for edge, state, cost in self._refused:
+            self.edges.state.flat[edge], self.edges.cost.flat[edge] = state, cost
+        self._refused.clear()
+
+
+def join_pieces(pieces: Sequence[Piece]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return the waypoints (n, 3) of pieces that follow each other, and the piece of each (n,)."""
+    parts, owners = [pieces[0].poses[:1]], [np.zeros(1, np.int64)]
+    for index, piece in enumerate(pieces):
+        parts.append(piece.poses[1:])
+        owners.append(np.full(len(piece.poses) - 1, index))
+    poses = np.concatenate(parts)
+    poses[:, 2] = np.arctan2(np.sin(poses[:, 2]), np.cos(poses[:, 2]))
+    return poses, np.concatenate(owners)

@@ -1,0 +1,371 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Searches a path between two poses, smooths it, and explains where there is none."""
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.numerics.interruption import check_interruption
+from rover_physics.numerics.plain_values import to_plain
+from rover_physics.rover.steering_joints import tightest_radius
+from rover_planner.errors import PlanningError
+from rover_planner.planning.candidates import check_pose, generate_candidates, path_length
+from rover_planner.planning.dubins import dubins_paths
+from rover_planner.planning.path_query import Candidate
+from rover_planner.planning.search.closed_area import ClosedArea, find_closed_area
+from rover_planner.planning.search.connections import (
+    connect_frontier,
+    connect_goal,
+    connect_start,
+)
+from rover_planner.planning.search.difficulty import estimate_difficulty, steepest_climb
+from rover_planner.planning.search.edge_memory import EdgeMemory
+from rover_planner.planning.search.edges import UNJUDGED
+from rover_planner.planning.search.ground_estimate import estimate_ground
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.lattice_search import LatticeSearch, Progress, join_pieces
+from rover_planner.planning.search.nodes import HEADINGS, Nodes
+from rover_planner.planning.search.primitives import Gear, Piece
+from rover_planner.planning.search.query import (
+    LatticeSettings,
+    SearchQuery,
+    choose_window,
+    cut_out,
+)
+
+FOUND, NO_WAY, OUT_OF_TIME = "found", "no_way", "out_of_time"
+BEYOND = ("unknown_ground", "off_map")
+"""Codes of goals that lie beyond the frontier of the known ground."""
+START_REFUSED, GOAL_REFUSED = "start_refused", "goal_refused"
+"""Outcomes of a search."""
+
+POSES_PER_SECOND = 20_000
+"""Poses that the model may be asked about per second of the budget."""
+EXPANSIONS_PER_POSE = 40
+"""Expanded nodes that count as much as one pose."""
+COARSE = 0.5
+"""Distance of neighbouring nodes above which obstacles are finer than the lattice [wheelbases]."""
+SMOOTHING = 0.2
+"""Share of the budget for smoothing."""
+SPANS = (4, 8, 16, 8, 4, 3, 2)
+"""Numbers of pieces that one curve replaces, one pass over the path after the other."""
+RADII = (2.0, 1.0)
+"""Radii of the curves that are tried [tightest radii of the rover]."""
+GAIN = 1e-3
+"""Share of its cost that a curve must save."""
+
+
+@dataclass(frozen=True, eq=False)
+class SearchResult:
+    """The path that was found, or why there is none."""
+
+    outcome: str
+    """FOUND, NO_WAY, OUT_OF_TIME, START_REFUSED or GOAL_REFUSED."""
+    reason: str
+    """One sentence for people."""
+    path: Candidate | None
+    """The path with prediction and verdict; None unless it was found."""
+    cost: float
+    """Its cost [m of level ground]; infinite without a path."""
+    bound: float
+    """How much more it cost before smoothing, at most, than the best path of the lattice, as a
+    factor; infinite if that is not known."""
+    expanded: int
+    """Number of expanded nodes."""
+    edges_judged: int
+    """Number of edges that the model has judged."""
+    edges: int
+    """Number of edges of the lattice."""
+    seconds_first: float
+    """Time until the first path was known [s], NaN without one."""
+    seconds: float
+    """Time of the whole search [s]."""
+    repeatable: bool
+    """Whether the same question gives the same answer to the bit: the clock did not end it."""
+    nodes: Nodes
+    """The nodes of the lattice."""
+    closed: ClosedArea | None
+    """What is closed in where no path exists; else None."""
+    warning: str
+    """What may have hidden a path, such as a coarse lattice; empty if nothing has."""
+    asked: NDArray[np.bool_]
+    """(rows, columns) True for the places where the model was asked whether the rover can stand,
+    in this search or in an earlier one that the memory holds; row 0 at the smallest y."""
+
+    def report(self) -> dict[str, Any]:
+        """Return the result as plain values for JSON; numbers that are not known are None.
+
+        Lengths are in m, energy in J, times in s. Risk is the used share of the tightest safety
+        limit.
+        """
+        path, closed = self.path, self.closed
+        found: dict[str, Any] = to_plain(
+            {
+                "found": self.outcome == FOUND,
+                "outcome": self.outcome,
+                "reason": self.reason,
+                "length": None if path is None else path.length,
+                "energy": None if path is None else float(path.prediction.energy[-1]),
+                "time": None if path is None else float(path.prediction.time[-1]),
+                "risk": None if path is None else path.verdict.risk,
+                "cost": self.cost,
+                "expanded": self.expanded,
+                "edges_judged": self.edges_judged,
+                "edges": self.edges,
+                "seconds_first": self.seconds_first,
+                "seconds": self.seconds,
+                "bound": self.bound,
+                "repeatable": self.repeatable,
+                "warning": self.warning,
+                "closed_area": None if closed is None else closed.area,
+                "closed_by": None if closed is None else closed.causes,
+            }
+        )
+        return found
+
+
+def find_path(
+    query: SearchQuery,
+    settings: LatticeSettings | None = None,
+    memory: EdgeMemory | None = None,
+    on_progress: Callable[[Progress], None] | None = None,
+) -> SearchResult:
+    """Search a path from start to goal.
+
+    Args:
+        query: What is asked.
+        settings: How it is searched.
+        memory: What earlier searches have found; None begins anew.
+        on_progress: Called after each step of the search with what is known so far.
+
+    Raises:
+        PlanningError: Start or goal are not finite or not on the map.
+        RoverError: The model refuses an option.
+    """
+    return _PathFinder(query, settings or LatticeSettings(), memory, on_progress).answer()
+
+
+class _PathFinder:
+    """One search with all that belongs to it."""
+
+    def __init__(
+        self,
+        query: SearchQuery,
+        settings: LatticeSettings,
+        memory: EdgeMemory | None,
+        on_progress: Callable[[Progress], None] | None,
+    ):
+        self._began = time.perf_counter()
+        self._query, self._settings, self._on_progress = query, settings, on_progress
+        self._start = _check_end("start", query, may_be_off_map=False)
+        self._goal = _check_end("goal", query, may_be_off_map=settings.frontier)
+        self._judge = PathJudge(query.rover, query.terrain, query.options, query.blind)
+        cell = settings.cell or 0.25 * query.rover.wheelbase
+        self._nodes, self._is_limited = choose_window(query, cell)
+        self._memory = memory or EdgeMemory()
+        self._radius = tightest_radius(query.rover)
+        self._repeatable, self._to_frontier = True, False
+
+    def answer(self) -> SearchResult:
+        """Search the path."""
+        for name, outcome, pose in (
+            ("start", START_REFUSED, self._start),
+            ("goal", GOAL_REFUSED, self._goal),
+        ):
+            code, reason = self._judge.refuse(pose)
+            is_frontier = self._settings.frontier and outcome == GOAL_REFUSED
+            self._to_frontier = is_frontier and code in BEYOND
+            if code and not self._to_frontier:
+                return self._answer(outcome, f"the rover cannot stand at the {name}: {reason}")
+        search = self._prepare()
+        if not self._to_frontier:
+            self._try_directly(search)
+        progress = search.run(self._allowed)
+        if progress.best is not None:
+            path = self._smooth(search)
+            return self._answer(FOUND, self._describe_rest(path[0]), search, path=path)
+        where = self._describe_extent()
+        if not progress.exhausted:
+            budget = self._settings.budget
+            reason = f"no way within {where} was found in the budget of {budget:g} s; "
+            return self._answer(OUT_OF_TIME, f"{reason}there may be one", search)
+        closed = find_closed_area(search)
+        reason = f"no way within {where}: {closed.describe()}"
+        return self._answer(NO_WAY, reason, search, closed=closed)
+
+    def _warn(self) -> str:
+        """Return what is wrong with the lattice, in words."""
+        cell, coarse = self._nodes.cell, COARSE * self._query.rover.wheelbase
+        if cell <= coarse:
+            return ""
+        return (
+            f"the lattice's cell of {cell:g} m is larger than {coarse:.2f} m, half the wheelbase: "
+            "gaps between obstacles may lie between its places"
+        )
+
+    def _describe_rest(self, path: Candidate) -> str:
+        """Return how far before a goal on unknown ground a path ends, in words."""
+        left = np.hypot(*(path.poses[-1] - self._goal)[:2])
+        if not self._to_frontier:
+            return ""
+        return f"the goal is beyond the known ground; the way ends {left:.1f} m before it"
+
+    def _describe_extent(self) -> str:
+        """Return what part of the map is searched, in words."""
+        if not self._is_limited:
+            return "the map"
+        rows, columns = self._nodes.shape
+        cell = self._nodes.cell
+        return f"the {columns * cell:.0f} m x {rows * cell:.0f} m around start and goal"
+
+    def _prepare(self) -> LatticeSearch:
+        """Return the search, with the estimates of the ground and the connections of the ends."""
+        query, nodes = self._query, self._nodes
+        rover, spacing = query.rover, query.options.waypoint_spacing
+        edges = self._memory.recall(query, nodes)
+        climb = steepest_climb(rover, query.options.model.friction or rover.friction)
+        terrain = cut_out(query, nodes)
+        ground = estimate_ground(rover, terrain, nodes)
+        edges.standing[ground.groundless] = edges.state_of("unknown_ground")
+        self._groundless = ground.groundless
+        return LatticeSearch(
+            self._judge,
+            edges,
+            connect_start(rover, nodes, self._start, spacing),
+            connect_frontier(self._judge, nodes, self._goal)
+            if self._to_frontier
+            else connect_goal(rover, nodes, self._goal, spacing),
+            ground.doubt,
+            estimate_difficulty(rover, terrain, nodes, climb, (edges.samples, edges.difficulty)),
+        )
+
+    def _try_directly(self, search: LatticeSearch) -> None:
+        """Let the search begin with the direct curve, if the rover may drive it."""
+        poses = generate_candidates(
+            self._start,
+            self._goal,
+            count=1,
+            waypoint_spacing=self._query.options.waypoint_spacing,
+            min_radius=self._radius,
+        )[0]
+        if len(poses) > 1:
+            search.offer(Piece(poses, Gear.FORWARD))
+
+    def _allowed(self, search: LatticeSearch) -> bool:
+        """Return whether the search may go on; tell of its progress."""
+        if self._on_progress is not None:
+            self._on_progress(search.progress)
+        if self._settings.ends_at_first and search.progress.best is not None:
+            return False
+        budget = self._settings.budget
+        work = self._judge.poses + search.shortest.expanded / EXPANSIONS_PER_POSE
+        if work > POSES_PER_SECOND * budget:
+            return False
+        in_time = time.perf_counter() - self._began < budget
+        self._repeatable &= in_time
+        return in_time
+
+    def _smooth(self, search: LatticeSearch) -> tuple[Candidate, float]:
+        """Return the smoothed path, or the path itself where that does not pass, and its cost."""
+        best, budget = search.progress.best, self._settings.budget
+        assert best is not None
+        spent = time.perf_counter() - self._began
+        share = SMOOTHING if self._repeatable else SMOOTHING * min(1.0, budget / spent)
+        most = round(share * budget * POSES_PER_SECOND)
+        pieces = smooth(self._judge, search.progress.pieces, self._radius, most)
+        smoothed = self._judge.check(join_pieces(pieces)[0], stop_at_failure=True)
+        if not smoothed.verdict.traversable:
+            return best, search.progress.cost
+        return smoothed, sum(one.cost for one in pieces)
+
+    def _answer(
+        self,
+        outcome: str,
+        reason: str,
+        search: LatticeSearch | None = None,
+        path: tuple[Candidate | None, float] = (None, math.inf),
+        closed: ClosedArea | None = None,
+    ) -> SearchResult:
+        progress = Progress() if search is None else search.progress
+        asked = np.zeros(self._nodes.shape, bool) if search is None else self._asked(search)
+        known = progress.best is not None and progress.bound > 0.0
+        bound = progress.cost / progress.bound if known else math.inf
+        return SearchResult(
+            outcome=outcome,
+            reason=reason,
+            path=path[0],
+            cost=path[1],
+            bound=bound,
+            expanded=0 if search is None else search.shortest.expanded,
+            edges_judged=progress.judged,
+            edges=0 if search is None else search.edges.count,
+            seconds_first=progress.first_time - self._began,
+            seconds=time.perf_counter() - self._began,
+            repeatable=self._repeatable,
+            nodes=self._nodes,
+            closed=closed,
+            warning=self._warn(),
+            asked=asked,
+        )
+
+    def _asked(self, search: LatticeSearch) -> NDArray[np.bool_]:
+        """Return the places (rows, columns) where the model was asked about a node."""
+        was_asked = (search.edges.standing != UNJUDGED) & ~self._groundless
+        return np.asarray(was_asked.reshape(*self._nodes.shape, HEADINGS).any(axis=2))
+
+
+def _check_end(name: str, query: SearchQuery, *, may_be_off_map: bool) -> NDArray[np.float64]:
+    """Return the start or the goal (3,), checked."""
+    pose = check_pose(name, getattr(query, name))
+    if not (may_be_off_map or query.terrain.contains(pose[0], pose[1])):
+        xmin, xmax, ymin, ymax = query.terrain.bounds
+        raise PlanningError(
+            f"{name} is at ({pose[0]:g}, {pose[1]:g}), off the map, which goes from x {xmin:g} to "
+            f"{xmax:g} and y {ymin:g} to {ymax:g} m"
+        )
+    return pose
+
+
+def smooth(judge: PathJudge, pieces: list[Piece], radius: float, most_poses: int) -> list[Piece]:
+    """Return the pieces of a path that leads along fewer, wider curves and costs less.
+
+    Args:
+        judge: The model, which judges each new curve.
+        pieces: The path.
+        radius: Tightest radius of the rover [m].
+        most_poses: Number of poses that the model may be asked about.
+    """
+    allowed = judge.poses + most_poses
+    for span in SPANS:
+        first = 0
+        while first + span <= len(pieces) and judge.poses < allowed:
+            check_interruption()
+            found = _replace(judge, pieces[first : first + span], radius)
+            if found is not None:
+                pieces = [*pieces[:first], found, *pieces[first + span :]]
+                first += 1
+            else:
+                first += max(1, span // 2)
+    return pieces
+
+
+def _replace(judge: PathJudge, old: list[Piece], radius: float) -> Piece | None:
+    """Return one curve driven forwards that costs less than some pieces; None if none does."""
+    start, end = old[0].poses[0], old[-1].poses[-1]
+    spacing = judge.options.waypoint_spacing
+    cost = sum(one.cost for one in old) * (1.0 - GAIN)
+    for scale in RADII:
+        poses = np.column_stack(dubins_paths(start, end, scale * radius, spacing, 1)[0])
+        poses[0], poses[-1, :2] = start, end[:2]
+        if path_length(poses) >= cost:
+            continue
+        curve = Piece(poses, Gear.FORWARD)
+        judged = judge.judge_pieces([curve])[0]
+        if judged.cost < cost:
+            return replace(curve, cost=judged.cost)
+    return None

@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Motion primitives of a rover: the pieces of path that join the nodes of a lattice.
+
+A primitive is a straight line, a curve of one arc with a straight line before or behind it, a turn
+on the spot, or one of these driven backwards. Curves are no tighter than the rover's smallest
+radius. Each begins and ends exactly at a node, so that primitives join without gaps.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.rover.model import Rover
+from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
+from rover_planner.planning.angles import wrap
+from rover_planner.planning.search.nodes import HEADINGS, STEPS, YAWS, opposite
+
+CURVES = {1: 2, 2: 1}
+"""Number of curves to either side that turn by so many headings."""
+BACKWARD_CURVES = {1: 1}
+"""As CURVES, driven backwards."""
+_SEARCH_RADIUS = 40
+"""Largest distance of a curve's end [cells]."""
+
+
+class Gear(IntEnum):
+    """How a primitive is driven."""
+
+    FORWARD = 0
+    BACKWARD = 1
+    ON_THE_SPOT = 2
+
+
+PRICES = {Gear.FORWARD: 1.0, Gear.BACKWARD: 1.5, Gear.ON_THE_SPOT: 1.5}
+"""Price of time in each gear: sensors look ahead, and turning on the spot wears the wheels."""
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A piece of path that is driven in one gear."""
+
+    poses: NDArray[np.float64]
+    """(n, 3) waypoints in the order of the drive, x, y [m], yaw [rad], map frame."""
+    gear: Gear
+    """How it is driven."""
+    cost: float = np.nan
+    """Its cost [m of level ground], NaN if it is not judged."""
+
+
+@dataclass(frozen=True, eq=False)
+class Primitive:
+    """One piece of path between two nodes."""
+
+    step: tuple[int, int]
+    """From its first node to its last one, x and y [cells]."""
+    end_heading: int
+    """Heading at its end."""
+    gear: Gear
+    """How it is driven."""
+    length: float
+    """Distance driven by the body origin, or by the outermost wheel on the spot [m]."""
+    poses: NDArray[np.float64]
+    """(n, 3) waypoints from the first node to the last, x, y [m] from the first node, yaw [rad];
+    yaw goes on beyond pi. Read-only: all searches share it."""
+
+    def __post_init__(self) -> None:
+        self.poses.setflags(write=False)
+
+    @property
+    def least_cost(self) -> float:
+        """Its cost on level ground [m], a bound from below on any ground."""
+        return PRICES[self.gear] * self.length
+
+
+def make_primitives(
+    rover: Rover, cell: float, waypoint_spacing: float
+) -> tuple[tuple[Primitive, ...], ...]:
+    """Return the primitives of each heading.
+
+    Args:
+        rover: The rover; its steering sets the smallest radius, and whether it turns on the spot.
+        cell: Distance of neighbouring nodes [m].
+        waypoint_spacing: Largest distance between waypoints [m].
+    """
+    swing = swing_radius(rover) if can_turn_on_the_spot(rover) else None
+    return _make_primitives(tightest_radius(rover), swing, cell, waypoint_spacing)
+
+
+@lru_cache(maxsize=8)
+def _make_primitives(
+    radius: float, swing: float | None, cell: float, waypoint_spacing: float
+) -> tuple[tuple[Primitive, ...], ...]:
+    """Return the primitives of a smallest radius [m] and, to turn on the spot, of a swing [m]."""
+    return tuple(
+        (
+            *_forward(heading, cell, radius, waypoint_spacing, CURVES),
+            *(
+                _reverse(primitive)
+                for primitive in _forward(
+                    opposite(heading), cell, radius, waypoint_spacing, BACKWARD_CURVES
+                )
+            ),
+            *(() if swing is None else _turns(heading, swing, waypoint_spacing)),
+        )
+        for heading in range(HEADINGS)
+    )
+
+
+def _forward(
+    heading: int, cell: float, radius: float, spacing: float, curves: dict[int, int]
+) -> list[Primitive]:
+    """Return the straight line and the curves of a heading."""
+    found = [_straight(heading, cell, spacing)]
+    for turn, count in curves.items():
+        for side in (1, -1):
+            found += _curves(heading, side * turn, cell, radius, spacing)[:count]
+    return found
+
+
+def _straight(heading: int, cell: float, spacing: float) -> Primitive:
+    """Return the straight line to the next node ahead."""
+    step = np.array(STEPS[heading])
+    length = float(np.hypot(*step)) * cell
+    shares = np.linspace(0.0, 1.0, 1 + _pieces(length, spacing))
+    poses = np.column_stack([shares[:, None] * step * cell, np.full(len(shares), YAWS[heading])])
+    return Primitive(STEPS[heading], heading, Gear.FORWARD, length, poses)
+
+
+def _curves(
+    heading: int, turn: int, cell: float, radius: float, spacing: float
+) -> list[Primitive]:
+    """Return the curves that turn by some headings, the shortest first."""
+    end = (heading + turn) % HEADINGS
+    ahead = np.array([_unit(YAWS[heading]), _unit(YAWS[end])]).T
+    angle = float(wrap(YAWS[end] - YAWS[heading]))
+    cells = np.arange(-_SEARCH_RADIUS, _SEARCH_RADIUS + 1)
+    steps = np.stack(np.meshgrid(cells, cells, indexing="ij"), axis=-1).reshape(-1, 2)
+    legs = np.linalg.solve(ahead, cell * steps.T).T  # from either end to where the lines meet
+    arc_legs = legs.min(axis=1)
+    fits = arc_legs >= radius * np.tan(0.5 * abs(angle)) - 1e-9
+    lengths = legs.sum(axis=1) - 2.0 * arc_legs
+    lengths += abs(angle) / np.tan(0.5 * abs(angle)) * arc_legs
+    rows = np.flatnonzero(fits)
+    order = rows[np.lexsort((steps[rows, 1], steps[rows, 0], lengths[rows].round(9)))]
+    found: list[Primitive] = []
+    for row in order:
+        if len(found) == max(CURVES.values()):
+            break
+        poses = _drive_curve(YAWS[heading], angle, legs[row], lengths[row], spacing)
+        step = (int(steps[row, 0]), int(steps[row, 1]))
+        found.append(Primitive(step, end, Gear.FORWARD, float(lengths[row]), poses))
+    return found
+
+
+def _drive_curve(
+    yaw: float, angle: float, legs: np.ndarray, length: float, spacing: float
+) -> np.ndarray:
+    """Return the waypoints (n, 3) of a line of the first leg's excess, an arc, and the second's.
+
+    Args:
+        yaw: First heading [rad].
+        angle: Turn [rad], positive to the left.
+        legs: (2,) distances [m] from the ends to where the lines through them meet.
+        length: Length of the curve [m].
+        spacing: Largest distance between waypoints [m].
+    """
+    arc_leg, side = legs.min(), np.sign(angle)
+    radius = arc_leg / np.tan(0.5 * abs(angle))
+    driven = np.linspace(0.0, length, 1 + _pieces(length, spacing))
+    on_arc = np.clip(driven - (legs[0] - arc_leg), 0.0, radius * abs(angle))
+    before = np.minimum(driven, legs[0] - arc_leg)
+    behind = np.maximum(driven - before - on_arc, 0.0)
+    yaws = yaw + side * on_arc / radius
+    chord = 2.0 * radius * np.sin(0.5 * on_arc / radius)
+    middle = yaw + 0.5 * side * on_arc / radius
+    places = before[:, None] * _unit(yaw) + behind[:, None] * _unit(yaw + angle)
+    places += chord[:, None] * np.column_stack([np.cos(middle), np.sin(middle)])
+    return np.column_stack([places, yaws])
+
+
+def _reverse(forward: Primitive) -> Primitive:
+    """Return a primitive of the opposite heading as it is driven backwards."""
+    poses = forward.poses - (0.0, 0.0, np.pi)
+    return Primitive(
+        forward.step, opposite(forward.end_heading), Gear.BACKWARD, forward.length, poses
+    )
+
+
+def _turns(heading: int, swing: float, spacing: float) -> list[Primitive]:
+    """Return the turns on the spot to the neighbouring headings."""
+    found = []
+    for side in (1, -1):
+        end = (heading + side) % HEADINGS
+        angle = float(wrap(YAWS[end] - YAWS[heading]))
+        length = swing * abs(angle)
+        yaws = YAWS[heading] + np.linspace(0.0, angle, 1 + _pieces(length, spacing))
+        poses = np.column_stack([np.zeros((len(yaws), 2)), yaws])
+        found.append(Primitive((0, 0), end, Gear.ON_THE_SPOT, length, poses))
+    return found
+
+
+def _pieces(length: float, spacing: float) -> int:
+    """Return into how many steps of at most `spacing` [m] a length [m] is divided."""
+    return max(1, int(np.ceil(length / spacing - 1e-9)))
+
+
+def _unit(yaw: float) -> np.ndarray:
+    return np.array([np.cos(yaw), np.sin(yaw)])

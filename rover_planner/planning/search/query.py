@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A query for a path around obstacles, how it is searched, and in which part of the map."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from rover_physics.rover.model import Rover
+from rover_physics.rover.steering_joints import swing_radius
+from rover_physics.terrain.grid import Terrain
+from rover_planner.errors import PlanningError
+from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.search.blind_check import BlindCheck
+from rover_planner.planning.search.nodes import HEADINGS, Nodes, nodes_within
+
+MAX_NODES = 1_500_000
+"""Largest number of nodes of a window; each takes 70 bytes."""
+
+
+@dataclass(frozen=True, eq=False)
+class SearchQuery:
+    """A query for a path between two poses."""
+
+    rover: Rover
+    """The rover."""
+    terrain: Terrain
+    """The ground, map frame."""
+    start: ArrayLike
+    """(3,) x, y [m] and yaw [rad] of the body origin, map frame."""
+    goal: ArrayLike
+    """(3,) as `start`."""
+    options: PathQueryOptions
+    """How paths are judged."""
+    blind: BlindCheck | None = None
+    """Refuses ground under the belly that was never seen; None allows it."""
+
+
+@dataclass(frozen=True)
+class LatticeSettings:
+    """How a path is searched."""
+
+    budget: float = 2.0
+    """Time for the search [s]."""
+    cell: float | None = None
+    """Distance of neighbouring nodes [m]; None: a quarter of the wheelbase."""
+    frontier: bool = False
+    """Whether a path may end at the frontier of the known ground, as near as possible to a goal
+    beyond it."""
+    ends_at_first: bool = False
+    """Whether the first path is the answer; else better ones are searched for the whole budget."""
+
+    def __post_init__(self) -> None:
+        for name in ("budget", "cell"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0.0):
+                raise PlanningError(f"{name} is {value}; it must be a finite number above 0")
+
+
+def choose_window(query: SearchQuery, cell: float) -> tuple[Nodes, bool]:
+    """Return the nodes to search, and whether they are fewer than those of the map.
+
+    A window that must be limited is a square around start and goal.
+    """
+    xmin, xmax, ymin, ymax = query.terrain.bounds
+    nodes = nodes_within(cell, (xmin, ymin), (xmax, ymax))
+    if nodes.count <= MAX_NODES:
+        return nodes, False
+    half = 0.5 * cell * (math.isqrt(MAX_NODES // HEADINGS) - 1)
+    centre = 0.5 * (np.asarray(query.start)[:2] + np.asarray(query.goal)[:2])
+    low = np.maximum(centre - half, (xmin, ymin))
+    high = np.minimum(centre + half, (xmax, ymax))
+    return nodes_within(cell, (low[0], low[1]), (high[0], high[1])), True
+
+
+def cut_out(query: SearchQuery, nodes: Nodes) -> Terrain:
+    """Return the heights of the map that a rover at the nodes may touch, without other layers.
+
+    The map itself comes back where that is all of it, or no height in the part is known.
+    """
+    terrain = query.terrain
+    margin = swing_radius(query.rover) + 2.0 * query.rover.wheel.radius
+    low = nodes.cell * np.array(nodes.first, float) - margin
+    high = low + nodes.cell * (np.array(nodes.shape[::-1]) - 1) + 2.0 * margin
+    size = np.array(terrain.elevation.shape[::-1])
+    first = np.clip(np.floor((low - terrain.origin) / terrain.resolution), 0, size - 2).astype(int)
+    last = np.clip(np.ceil((high - terrain.origin) / terrain.resolution), first + 1, size - 1)
+    columns, rows = (slice(a, int(b) + 1) for a, b in zip(first, last, strict=True))
+    part = terrain.elevation[rows, columns]
+    if part.shape == terrain.elevation.shape or np.isnan(part).all():
+        return terrain
+    x, y = np.asarray(terrain.origin) + terrain.resolution * first
+    # Kernels are compiled for arrays without gaps.
+    return Terrain(np.ascontiguousarray(part), terrain.resolution, (float(x), float(y)))

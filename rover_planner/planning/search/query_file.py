@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Files that hold a question for a way with its map, so that it can be asked again elsewhere."""
+
+import json
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rover_physics.errors import RoverFileError
+from rover_physics.files.npz_file import open_npz
+from rover_physics.files.validation import errors_of, read_as
+from rover_physics.rover.rover_file import rover_from_dict
+from rover_physics.terrain.grid import load_terrain, save_terrain
+from rover_physics.terrain.terrain_file import MAX_CELLS
+from rover_planner.errors import PlanningError
+from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+
+_ENTRY, _MOST = "way_question", 1_000_000
+
+
+@dataclass(frozen=True)
+class _Options:
+    """`PathQueryOptions` as the entry holds them, with the options of the model beside them."""
+
+    count: int
+    spacing: float
+    waypoint_spacing: float
+    policy: str
+    control_margin: float
+    friction: float | None
+    max_torque: float | None
+    soil: str | None
+    payload: float | None
+    map_sigmas: float
+
+
+@dataclass(frozen=True)
+class _Content:
+    """What the entry holds."""
+
+    rover: dict[str, Any]
+    start: tuple[float, float, float]
+    goal: tuple[float, float, float]
+    options: _Options
+    joint_angles: dict[str, float] | None
+    settings: LatticeSettings
+
+
+def write_query(path: Path, question: SearchQuery, settings: LatticeSettings) -> None:
+    """Write a question to a terrain file (.npz) with one more entry; an old file is replaced.
+
+    Raises:
+        TerrainError: The file cannot be written.
+    """
+    options = asdict(question.options)
+    options |= options.pop("model")
+    text = json.dumps(
+        {
+            "rover": asdict(question.rover),
+            "start": np.asarray(question.start).tolist(),
+            "goal": np.asarray(question.goal).tolist(),
+            "options": {field.name: options[field.name] for field in fields(_Options)},
+            "joint_angles": question.options.model.arm_angles,
+            "settings": asdict(settings),
+        }
+    )
+    save_terrain(path, question.terrain, **{_ENTRY: text})
+
+
+def read_query(path: Path, max_cells: int = MAX_CELLS) -> tuple[SearchQuery, LatticeSettings]:
+    """Read a question that `write_query` has written.
+
+    Args:
+        path: The file.
+        max_cells: Largest terrain [cells].
+
+    Raises:
+        TerrainError: The terrain in the file is none, or too large.
+        PlanningError: The file holds no question.
+        RoverError: Something in the question is not what it should be.
+    """
+    terrain = load_terrain(path, max_cells)
+    try:
+        with errors_of(path), open_npz(path) as file:
+            content = json.loads(str(file.read(_ENTRY, most=_MOST)))
+    except (RoverFileError, json.JSONDecodeError) as error:
+        raise PlanningError(f"{path} holds no question for a way: {error}") from None
+    with errors_of(path):
+        asked: _Content = read_as(_Content, content, "a question for a way")
+    question = SearchQuery(
+        rover=rover_from_dict(asked.rover, str(path)),
+        terrain=terrain,
+        start=asked.start,
+        goal=asked.goal,
+        options=PathQueryOptions().change(
+            **asdict(asked.options), joint_angles=asked.joint_angles
+        ),
+    )
+    return question, asked.settings

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The search for ways keeps to the rule about ground under the belly that was never seen."""
+
+import numpy as np
+
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.parameters.traverse_server import LATTICE, TraverseServerParameters
+from rover_planner.planning.answering.service_settings import load_service_settings
+from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.search.blind_check import BlindCheck
+from rover_planner.planning.search.edge_memory import EdgeMemory
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.path_search import START_REFUSED, find_path
+from rover_planner.planning.search.primitives import Gear, Piece
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+from rover_planner.worlds.maps.blind_ground import (
+    ALLOW_FOOTPRINT,
+    ASSUMED,
+    CODE,
+    REFUSE,
+    SeenGround,
+    seen_ground,
+)
+
+LSR1 = load_rover("lsr1")
+OPTIONS = PathQueryOptions(waypoint_spacing=0.04).change(control_margin=0.0)
+LONG = LatticeSettings(budget=60.0)
+START, GOAL = (0.0, 0.0, 0.0), (3.0, 0.0, 0.0)
+
+
+def flat_with_hole() -> Terrain:
+    """Return level ground with unseen cells that pass between the wheels of a straight drive."""
+    x, y = np.meshgrid(np.arange(-1.0, 4.01, 0.05), np.arange(-2.0, 2.01, 0.05))
+    hole = (np.abs(x - 1.5) < 0.31) & (np.abs(y) < 0.06)
+    return Terrain(np.where(hole, np.nan, 0.0), 0.05, (-1.0, -2.0))
+
+
+def ask(rule: str, seen: SeenGround | None = None, start=START) -> SearchQuery:
+    ground = flat_with_hole()
+    check = BlindCheck(LSR1, seen or seen_ground(ground, None), rule)
+    return SearchQuery(LSR1, ground, start, GOAL, OPTIONS, check)
+
+
+def test_a_search_leads_around_what_the_rule_refuses():
+    rule = REFUSE
+    service = TraverseService(
+        load_service_settings(
+            TraverseServerParameters(
+                planner=LATTICE, blind_ground=rule, search_budget=60.0, waypoint_spacing=0.04
+            )
+        )
+    )
+    service.take_terrain(flat_with_hole())
+    judged = service.answer(START, GOAL)
+    assert judged.traversable, judged.reason
+    poses = judged.candidate.poses
+    assert np.abs(poses[:, 1]).max() > 0.2
+    share = seen_ground(flat_with_hole(), None).share(LSR1, poses)
+    assert share.blind_share == 0.0 and share.first_refused(rule) == -1
+
+
+def test_pieces_and_single_poses_are_refused_by_the_rule_as_paths_are():
+    question = ask(REFUSE)
+    judge = PathJudge(LSR1, question.terrain, OPTIONS, blind=question.blind)
+    straight = np.zeros((40, 3))
+    straight[:, 0] = np.linspace(0.0, 1.5, 40)
+    aside = straight + np.array([0.0, 1.0, 0.0])
+    pieces = [Piece(poses, Gear.FORWARD) for poses in (straight, aside)]
+    over, beside = judge.judge_pieces(pieces)
+    assert (over.code, over.cost) == (CODE, np.inf) and beside.code == ""
+    codes = judge.stand(np.array([(1.5, 0.0, 0.0), (1.5, 1.0, 0.0), (-0.9, 1.0, 0.0)]))
+    assert codes == (CODE, "", "off_map")
+    assert judge.check(straight).verdict.code == CODE
+    assert judge.check(aside).verdict.traversable
+
+
+def test_what_is_seen_later_is_judged_anew():
+    memory, seen = EdgeMemory(), seen_ground(flat_with_hole(), None)
+    around = find_path(ask(ALLOW_FOOTPRINT), LONG, memory)
+    kinds = np.where(seen.kinds == 0, 0, ASSUMED).astype(np.uint8)
+    filled = SeenGround(seen.terrain, kinds)
+    warm = find_path(ask(ALLOW_FOOTPRINT, filled), LONG, memory)
+    assert np.abs(around.path.poses[:, 1]).max() > 0.2
+    assert np.abs(warm.path.poses[:, 1]).max() < 0.05
+    refused = find_path(ask(REFUSE, filled, start=(1.5, 0.0, 0.0)), LONG, memory)
+    assert refused.outcome == START_REFUSED
+    assert "never seen (blind_ground is refuse)" in refused.reason

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of the shortest paths on a lattice against scipy's Dijkstra."""
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from rover_physics.rover.rover_file import load_rover
+from rover_planner.planning.search.difficulty import Difficulty
+from rover_planner.planning.search.edges import FAILS, PASSES, Edges
+from rover_planner.planning.search.graph import Seeds, ShortestPaths, edge_cost
+from rover_planner.planning.search.nodes import nodes_within
+from rover_planner.planning.search.primitives import make_primitives
+
+NODES = nodes_within(0.2, (0.0, 0.0), (2.4, 2.0))
+PRIMITIVES = make_primitives(load_rover("lsr1"), 0.2, 0.1)
+EDGES = Edges(NODES, PRIMITIVES)
+
+
+def random_knowledge(seed):
+    """Return edges of which half is judged, some refused, and nodes with doubts."""
+    rng = np.random.default_rng(seed)
+    known = Edges(NODES, PRIMITIVES)
+    judged = rng.random(known.state.shape) < 0.5
+    known.state[judged] = rng.choice([PASSES, PASSES, FAILS], judged.sum())
+    least = np.tile(EDGES.table.least_cost, (EDGES.nodes.count // 16, 1))
+    known.cost[:] = np.where(np.isfinite(least), least, 0.0) * (1.0 + rng.random(least.shape))
+    known.standing[rng.random(EDGES.nodes.count) < 0.3] = FAILS
+    known.difficulty[:] = rng.integers(1, 256, known.state.shape)
+    return known, (2.0 * rng.random(EDGES.nodes.count)).astype(np.float32), hardness(known)
+
+
+def hardness(known):
+    """Return level ground with the difficulties that are known."""
+    flat = np.zeros((16, 2, 2), np.float32)
+    return Difficulty(flat, np.zeros(2), 1.0, EDGES.nodes.cell, EDGES.samples, known.difficulty)
+
+
+def explicit_costs(known, graph):
+    """Return the matrix of the costs of all edges that are not refused."""
+    rows, columns, costs = [], [], []
+    shape, table = EDGES.nodes.shape, EDGES.table
+    for node in range(EDGES.nodes.count):
+        place, heading = divmod(node, 16)
+        row, column = divmod(place, shape[1])
+        for k, end_heading in enumerate(table.end_heading[heading]):
+            x, y = column + table.step[heading, k, 0], row + table.step[heading, k, 1]
+            if end_heading < 0 or not (0 <= x < shape[1] and 0 <= y < shape[0]):
+                continue
+            end = (y * shape[1] + x) * 16 + end_heading
+            cost = edge_cost(graph, node, k, end)
+            if np.isfinite(cost):
+                rows.append(node), columns.append(end), costs.append(cost)
+    count = EDGES.nodes.count
+    best = {}
+    for row, column, cost in zip(rows, columns, costs, strict=True):
+        best[row, column] = min(cost, best.get((row, column), np.inf))
+    ends = np.array(list(best), int).reshape(-1, 2)
+    return csr_array((list(best.values()), (ends[:, 0], ends[:, 1])), shape=(count, count))
+
+
+def test_the_shortest_path_is_that_of_dijkstra_whatever_is_known():
+    found = 0
+    for seed in range(6):
+        known, *estimates = random_knowledge(seed)
+        rng = np.random.default_rng(seed + 100)
+        free = np.flatnonzero(known.standing == 0)
+        starts = Seeds(rng.choice(free, 3, replace=False), rng.random(3))
+        goals = Seeds(rng.choice(free, 3, replace=False), rng.random(3))
+        for caution in (1.0, 0.0):
+            search = ShortestPaths(known, *estimates, starts)
+            route = search.find(starts, goals, caution)
+            costs = dijkstra(explicit_costs(known, search.graph(caution)), indices=starts.nodes)
+            totals = starts.costs[:, None] + costs[:, goals.nodes] + goals.costs
+            if route is None:
+                assert np.isinf(totals.min())
+                continue
+            found += 1
+            assert abs(route.cost - totals.min()) < 1e-5
+            ends = EDGES.ends(route.edges)
+            firsts = route.edges // EDGES.width
+            np.testing.assert_array_equal(ends[:-1], firsts[1:])
+            assert firsts[0] == starts.nodes[route.start] and ends[-1] == goals.nodes[route.goal]
+    assert found > 4
+
+
+def test_a_search_goes_on_after_edges_are_refused_and_is_exact_again():
+    known, *estimates = random_knowledge(7)
+    known.standing[:], known.state[:] = 0, 0
+    starts, goals = (
+        Seeds(np.array([16 * 14]), np.zeros(1)),
+        Seeds(np.array([16 * 100]), np.zeros(1)),
+    )
+    search, before = ShortestPaths(known, *estimates, starts), 0.0
+    for _ in range(30):
+        route = search.find(starts, goals, 0.0)
+        assert route is not None and route.cost >= before - 1e-9
+        before = route.cost
+        known.state.flat[route.edges[len(route.edges) // 2]] = FAILS
+    costs = dijkstra(explicit_costs(known, search.graph(0.0)), indices=starts.nodes)
+    route = search.find(starts, goals, 0.0)
+    assert abs(route.cost - costs[0, goals.nodes[0]]) < 1e-5

@@ -1,0 +1,248 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of the search for ways around obstacles."""
+
+from dataclasses import replace
+
+import numba
+import numpy as np
+import pytest
+
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_physics.traversability.judge import judge_path
+from rover_planner.errors import PlanningError
+from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
+from rover_planner.planning.search.edge_memory import EdgeMemory
+from rover_planner.planning.search.ground_estimate import FULL_DOUBT, estimate_ground
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.nodes import nodes_within
+from rover_planner.planning.search.path_search import (
+    FOUND,
+    GOAL_REFUSED,
+    NO_WAY,
+    OUT_OF_TIME,
+    START_REFUSED,
+    find_path,
+)
+from rover_planner.planning.search.query import (
+    LatticeSettings,
+    SearchQuery,
+    choose_window,
+    cut_out,
+)
+from support.grounds import make_terrain, waves
+from support.rough_grounds import rocky
+
+LSR1 = load_rover("lsr1")
+OPTIONS = PathQueryOptions(waypoint_spacing=0.04).change(control_margin=0.0)
+LONG = LatticeSettings(budget=60.0)
+START, GOAL = (-2.5, 0.0, 0.0), (2.5, 0.0, 0.0)
+
+
+def wall_with_gap(x, y):
+    """Return waves with a wall of 1 m along y at x = 0, open beyond y = 2."""
+    return waves(x, y) + np.where((np.abs(x) < 0.1) & (y < 2.0), 1.0, 0.0)
+
+
+def pen(x, y):
+    """Return waves with a wall of 1 m around a square of 3 m."""
+    edge = np.maximum(np.abs(x), np.abs(y))
+    return waves(x, y) + np.where(np.abs(edge - 1.5) < 0.1, 1.0, 0.0)
+
+
+def ask(terrain, start=START, goal=GOAL, rover=LSR1, **options):
+    return SearchQuery(rover, terrain, start, goal, OPTIONS.change(**options))
+
+
+@pytest.fixture(scope="module")
+def around():
+    """Return question and answer of a way around a wall."""
+    question = ask(make_terrain(wall_with_gap))
+    return question, find_path(question, LONG)
+
+
+def test_a_way_leads_around_a_wall_that_refuses_all_candidates(around):
+    question, answer = around
+    fan = answer_path_query(LSR1, question.terrain, START, GOAL, OPTIONS)
+    assert not fan.traversable
+    assert answer.outcome == FOUND and not answer.reason
+    assert answer.path.poses[:, 1].max() > 2.0
+    assert 0.0 < answer.seconds_first <= answer.seconds < 60.0
+
+
+def test_the_way_passes_as_any_path_does_and_ends_where_it_was_asked_to(around):
+    question, answer = around
+    poses = answer.path.poses
+    np.testing.assert_allclose(poses[[0, -1]], [START, GOAL], atol=1e-12)
+    assert np.hypot(*np.diff(poses[:, :2], axis=0).T).max() <= OPTIONS.waypoint_spacing + 1e-9
+    _, verdict = judge_path(LSR1, question.terrain, poses, OPTIONS.model)
+    assert verdict.traversable, verdict.reason
+
+
+def test_a_search_that_ends_by_itself_is_near_the_best_and_judges_few_edges(around):
+    _, answer = around
+    assert answer.repeatable and 1.0 <= answer.bound <= 1.0201
+    assert 0 < answer.edges_judged < 0.1 * answer.edges and answer.warning == ""
+
+
+def test_the_same_query_has_the_same_path_to_the_bit_with_any_number_of_threads(around):
+    query, answer = around
+    threads, memory = numba.get_num_threads(), EdgeMemory()
+    try:
+        numba.set_num_threads(1)
+        again = find_path(query, LONG, memory)
+    finally:
+        numba.set_num_threads(threads)
+    np.testing.assert_array_equal(again.path.poses, answer.path.poses)
+    assert (again.edges_judged, again.cost) == (answer.edges_judged, answer.cost)
+    known = find_path(query, LONG, memory)  # hardly anything is judged again
+    assert known.edges_judged < 0.5 * answer.edges_judged
+    assert known.bound <= 1.0201 and known.cost == pytest.approx(answer.cost, rel=0.03)
+    assert find_path(ask(query.terrain, friction=0.5), LONG, memory).edges_judged > 0
+
+
+def test_of_a_closed_pen_the_answer_tells_its_area_and_what_closes_it():
+    answer = find_path(ask(make_terrain(pen), (0.0, 0.0, 0.0), (3.0, 0.0, 0.0)), LONG)
+    assert answer.outcome == NO_WAY and answer.path is None
+    closed = answer.closed
+    assert not closed.around_goal and 0.0 < closed.area < 9.0
+    assert sum(closed.causes.values()) == pytest.approx(1.0)
+    assert not {"off_map", "unknown_ground"} & set(closed.causes)
+    assert f"{closed.area:.1f} m2" in answer.reason
+    rows, columns = np.nonzero(closed.places)
+    cell, (column, row) = answer.nodes.cell, answer.nodes.first
+    assert np.abs(cell * (columns + column)).max() < 1.6
+    assert np.abs(cell * (rows + row)).max() < 1.6
+    answer = find_path(ask(make_terrain(pen), (3.0, 0.0, 0.0), (0.0, 0.0, 0.0)), LONG)
+    assert answer.outcome == NO_WAY and answer.closed.around_goal
+
+
+def test_out_of_time_is_not_no_way():
+    question = ask(make_terrain(pen), (0.0, 0.0, 0.0), (3.0, 0.0, 0.0))
+    answer = find_path(question, LatticeSettings(budget=1e-3))
+    assert answer.outcome == OUT_OF_TIME and answer.closed is None
+    assert "0.001 s" in answer.reason
+
+
+def test_ends_where_the_rover_cannot_stand_are_named_with_the_reason():
+    def holes(x, y):
+        return np.where(np.hypot(x - 2.5, y) < 1.0, np.nan, waves(x, y))
+
+    ground = make_terrain(holes)
+    answer = find_path(ask(ground))
+    assert answer.outcome == GOAL_REFUSED
+    assert answer.reason == "the rover cannot stand at the goal: unknown ground under a wheel"
+    answer = find_path(ask(ground, GOAL, START))
+    assert answer.outcome == START_REFUSED and "at the start" in answer.reason
+
+
+@pytest.mark.parametrize(
+    ("start", "goal", "said"),
+    [
+        ((-9.0, 0.0, 0.0), GOAL, "start is at .-9, 0., off the map, which goes from x -4"),
+        (START, (0.0, 0.0), "goal is .0.0, 0.0.; it must be three finite numbers x, y, yaw"),
+    ],
+)
+def test_impossible_ends_and_settings_are_refused_by_name(start, goal, said):
+    with pytest.raises(PlanningError, match=said):
+        find_path(ask(make_terrain(waves), start, goal))
+    for name, value in (("budget", np.nan), ("cell", 0.0)):
+        with pytest.raises(PlanningError, match=f"{name} is {value}; it must be a finite number"):
+            LatticeSettings(**{name: value})
+
+
+def test_a_rover_with_fixed_wheels_finds_a_way_too():
+    fixed = replace(LSR1, steering=None)
+    answer = find_path(ask(make_terrain(wall_with_gap), rover=fixed), LONG)
+    assert answer.outcome == FOUND
+    steps = np.diff(answer.path.poses, axis=0)
+    assert np.hypot(steps[:, 0], steps[:, 1]).min() > 0.0
+
+
+def test_after_a_change_of_the_map_what_is_remembered_gives_the_way_of_a_new_search():
+    before = make_terrain(wall_with_gap)
+    elevation = np.array(before.elevation)
+    x = before.origin[0] + before.resolution * np.arange(elevation.shape[1])
+    elevation[np.ix_((x > 1.9) & (x < 2.3), np.abs(x) < 0.1)] += 1.0  # a longer wall
+    after = Terrain(elevation, before.resolution, before.origin)
+    memory = EdgeMemory()
+    first = find_path(ask(before), LONG, memory)
+    warm, cold = find_path(ask(after), LONG, memory), find_path(ask(after), LONG)
+    assert not np.array_equal(first.path.poses, cold.path.poses)
+    assert warm.outcome == cold.outcome == FOUND
+    assert warm.cost == pytest.approx(cold.cost, rel=0.03)
+    assert 0 < warm.edges_judged < cold.edges_judged
+    _, verdict = judge_path(LSR1, after, warm.path.poses, OPTIONS.model)
+    assert verdict.traversable
+
+
+def test_nodes_without_ground_are_none_on_which_the_rover_can_stand():
+    ground = rocky(3)
+    elevation = np.array(ground.elevation)
+    rng = np.random.default_rng(1)
+    elevation[rng.random(elevation.shape) < 0.02] = np.nan
+    elevation[: len(elevation) // 2] = np.nan
+    ground = Terrain(elevation, ground.resolution, ground.origin)
+    nodes = nodes_within(0.1, (-3.2, -3.2), (3.2, 3.2))
+    estimate = estimate_ground(LSR1, ground, nodes)
+    groundless = np.flatnonzero(estimate.groundless)
+    assert 0.1 * nodes.count < len(groundless) < nodes.count
+    chosen = rng.choice(groundless, 2000, replace=False)
+    codes = PathJudge(LSR1, ground, OPTIONS).stand(nodes.poses(chosen))
+    assert set(codes) <= {"unknown_ground", "off_map"}
+
+
+def test_nodes_where_tilt_moves_a_wheel_off_unknown_ground_are_only_doubted():
+    spirit = load_terrain("spirit")
+    nodes = nodes_within(0.04, (-47.12, -19.92), (-45.88, -19.2))
+    estimate = estimate_ground(LSR1, spirit, nodes)
+    codes = PathJudge(LSR1, spirit, OPTIONS).stand(nodes.poses(np.arange(nodes.count)))
+    stands = np.array([code == "" for code in codes])
+    assert not (stands & estimate.groundless).any()
+    assert (stands & (estimate.doubt == FULL_DOUBT)).any()
+
+
+def test_only_the_heights_around_the_window_are_looked_at():
+    wide = Terrain(np.zeros((4000, 4000), np.float32), 0.1, (-200.0, -200.0))
+    question = ask(wide, (50.0, 60.0, 0.0), (60.0, 60.0, 0.0))
+    nodes, is_limited = choose_window(question, 0.2)
+    assert is_limited and nodes.count <= 1_500_000
+    row, column = np.array(nodes.shape) / 2
+    centre = nodes.cell * (nodes.first[0] + column), nodes.cell * (nodes.first[1] + row)
+    np.testing.assert_allclose(centre, (55.0, 60.0), atol=0.5)
+    part = cut_out(question, nodes)
+    assert part.elevation.size < 0.05 * wide.elevation.size
+    estimate = estimate_ground(LSR1, part, nodes)
+    assert not estimate.groundless.any() and not estimate.doubt.any()
+    assert find_path(question, LONG).outcome == FOUND
+    wall = np.array(wide.elevation)
+    wall[:, 2550] = 3.0
+    enclosed = replace(wide, elevation=wall)
+    refused = find_path(replace(question, terrain=enclosed), LatticeSettings(budget=0.3))
+    assert refused.outcome in (OUT_OF_TIME, NO_WAY)
+    assert "m around start and goal" in refused.reason
+
+
+def half_known(goal):
+    """Return a question for a goal; the ground beyond x = 1.5 m is unknown."""
+    ground = make_terrain(waves)
+    elevation = np.array(ground.elevation)
+    elevation[:, round((1.5 - ground.origin[0]) / ground.resolution) :] = np.nan
+    return ask(Terrain(elevation, ground.resolution, ground.origin), goal=goal)
+
+
+def test_a_way_to_unknown_ground_ends_at_the_frontier_only_if_that_is_wanted():
+    question = half_known(GOAL)
+    assert find_path(question, LONG).outcome == GOAL_REFUSED
+    answer = find_path(question, replace(LONG, frontier=True))
+    assert answer.outcome == FOUND and answer.path.verdict.traversable
+    end = answer.path.poses[-1]
+    left = np.hypot(*(end[:2] - GOAL[:2]))
+    assert f"{left:.1f} m before it" in answer.reason
+    # On level ground, a wheel of the rover that stands across the edge is 0.4 m from its middle.
+    assert 1.0 < left < 1.7
+
+
+def test_a_lattice_coarser_than_obstacles_is_warned_of():
+    coarse = find_path(ask(make_terrain(waves)), replace(LONG, cell=0.5))
+    assert "cell of 0.5 m is larger than 0.40 m" in coarse.warning

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of the files that hold a question for a way."""
+
+import json
+
+import numpy as np
+import pytest
+
+from rover_physics.errors import RoverError
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import load_terrain, save_terrain
+from rover_planner.errors import PlanningError
+from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+from rover_planner.planning.search.query_file import read_query, write_query
+from support.grounds import make_terrain, waves
+
+SETTINGS = LatticeSettings(budget=3.5, cell=0.25)
+
+
+@pytest.fixture
+def written(tmp_path):
+    options = PathQueryOptions().change(policy="servo", friction=0.6, payload=0.5)
+    question = SearchQuery(
+        load_rover("lsr1"), make_terrain(waves), (-1.0, 0.5, 0.2), (1.0, 0.0, 3.0), options
+    )
+    write_query(tmp_path / "question.npz", question, SETTINGS)
+    return tmp_path / "question.npz", question
+
+
+def test_a_question_is_read_as_it_was_written(written):
+    path, question = written
+    read, settings = read_query(path)
+    assert settings == SETTINGS
+    assert (read.rover, read.options) == (question.rover, question.options)
+    assert read.options.model.joint_angles is None
+    np.testing.assert_array_equal(read.start, question.start)
+    np.testing.assert_array_equal(read.goal, question.goal)
+    np.testing.assert_array_equal(read.terrain.elevation, question.terrain.elevation)
+
+
+def test_a_terrain_file_is_no_question(tmp_path):
+    save_terrain(tmp_path / "ground.npz", make_terrain(waves))
+    with pytest.raises(PlanningError, match="ground.npz holds no question for a way"):
+        read_query(tmp_path / "ground.npz")
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("goal", None, "missing key goal"),
+        ("rover", {"name": "x"}, "missing key gravity"),
+    ],
+)
+def test_a_question_with_a_wrong_entry_is_refused_by_name(written, key, value, said):
+    path, question = written
+    with np.load(path) as entries:
+        content = json.loads(str(entries["way_question"]))
+    if value is None:
+        del content[key]
+    else:
+        content[key] = value
+    save_terrain(path, load_terrain(path), way_question=json.dumps(content))
+    with pytest.raises((PlanningError, RoverError), match=said):
+        read_query(path)
