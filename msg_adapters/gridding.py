@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from msg_adapters.errors import MessageError
 from rover_physics.numerics.plausible import MAX_COORDINATE, MIN_RESOLUTION
+from rover_physics.numerics.read_only import seal_array
+from rover_physics.terrain.grid import Terrain
 
 MAX_CELLS = 25_000_000
 """Largest map built from a cloud [cells]; one distant outlier must not exhaust the memory."""
@@ -272,3 +274,15 @@ def _round_within(value: float, tolerance: float) -> float:
         if abs(rounded - value) <= tolerance:
             return rounded
     return value
+
+
+def make_terrain(
+    elevation: NDArray[np.float64],
+    resolution: float,
+    origin: tuple[float, float],
+    friction: NDArray[np.float64] | None,
+    std: NDArray[np.float64] | None,
+) -> Terrain:
+    """Make a terrain of new layers (ny, nx) without copying them; they become read-only."""
+    layers = [None if layer is None else seal_array(layer) for layer in (friction, std)]
+    return Terrain(seal_array(elevation), resolution, origin, layers[0], elevation_std=layers[1])

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node /rover_simulator: simulates a rover on a terrain with the topics of a real rover."""
 
-import contextlib
 import json
 import sys
 import time
@@ -29,6 +28,7 @@ from rover_physics.names import WHEEL_JOINTS
 from rover_planner.nodes.running import run_node
 from rover_planner.parameters.declare import declare_parameters, warn_of_unknown_parameters
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
+from rover_planner.ros.optional_types import find_type
 from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
 from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.simulation import Simulation, load_simulation_settings
@@ -81,7 +81,8 @@ class RoverSimulator(Node):
         self._commands = None
         if self._settings.follow_commands:
             self._commands = self.create_publisher(TwistStamped, "cmd_vel", qos)
-        self._transforms = _make_broadcaster(self)
+        broadcaster: Any = find_type("tf2_ros:TransformBroadcaster")
+        self._transforms = None if broadcaster is None else broadcaster(self)
 
     def _create_subscriptions(self) -> None:
         qos = topic_qos()
@@ -196,15 +197,6 @@ def _transform(state: PlantState, frame_id: str, stamp: Any) -> TransformStamped
     place.x, place.y, place.z = state.position.tolist()
     turn.x, turn.y, turn.z, turn.w = state.orientation.tolist()
     return message
-
-
-def _make_broadcaster(node: Node) -> Any:
-    """Return a transform broadcaster, None without tf2, which PyPI does not offer."""
-    with contextlib.suppress(ImportError):
-        from tf2_ros import TransformBroadcaster
-
-        return TransformBroadcaster(node)
-    return None
 
 
 def main(argv: Sequence[str] | None = None) -> int:

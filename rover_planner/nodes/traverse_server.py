@@ -32,7 +32,6 @@ from msg_adapters.stamps import stamp_to_ns
 from rover_physics.numerics.kernel_cache import kernel_cache_note
 from rover_physics.warm_up import EXACT, UNCERTAIN
 from rover_planner.nodes.maps.map_cloud import MapCloud
-from rover_planner.nodes.maps.map_file_service import MapFileService
 from rover_planner.nodes.maps.map_topics import MapTopics
 from rover_planner.nodes.nav2_services import PathComputation, PathValidity
 from rover_planner.nodes.navigation.frames import NodeFrames
@@ -61,7 +60,7 @@ from rover_planner.planning.answering.questions import (
     Question,
 )
 from rover_planner.planning.answering.server_health import MEMORY
-from rover_planner.planning.answering.service_settings import load_service_settings, map_limits
+from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.situation import Situation
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.sensor_mounts import sensor_poses
@@ -121,6 +120,7 @@ class TraverseServer(Node):
             self._values,
             lambda error: self.desk.health.take_map(error),
             self.frames,
+            self.guard,
         )
         self.desk = QuestionDesk(self, self.service, self._maps, self.guard)
         """Takes the questions of all services."""
@@ -131,9 +131,6 @@ class TraverseServer(Node):
         PathValidity(self.desk, frame, self.publish, self.frames.localise_path).serve(self)
         PathComputation.serve(self, self.desk, self.read_question, self.publish)
         self.create_service(Trigger, "~/cancel", self._cancel)
-        self._files = MapFileService(
-            self, self._maps, frame, self.guard, lambda: map_limits(self._values)
-        )
         self.reach = ReachTopics(self, self.desk, frame, reliability)
         """The topics and the service of the arm."""
         self._map_cloud = MapCloud(self, self.service, frame)
