@@ -14,7 +14,7 @@ from rover_physics.numerics.quaternions import length_of, rpy_from_xyzw
 
 @dataclass(frozen=True, eq=False)
 class FrameTransform:
-    """Where a child frame is in its parent frame at a time."""
+    """Pose of a child frame in its parent frame at a time."""
 
     parent: str
     """Name of the parent frame."""

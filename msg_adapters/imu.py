@@ -34,7 +34,7 @@ class Attitude:
 
 
 class ImuMounting:
-    """How an IMU is mounted on the body."""
+    """Frame of an IMU and its turn against the body."""
 
     def __init__(self, frame_id: str, rpy: Sequence[float] = (0.0, 0.0, 0.0)):
         """Take the frame of the IMU, and roll, pitch, yaw of its axes in the body frame [rad]."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What Nav2 asks a planner: the service ~/is_path_valid, the action ~/compute_path_to_pose.
+"""Services of a planner for Nav2: the service ~/is_path_valid, the action ~/compute_path_to_pose.
 
 Both exist where nav2_msgs is installed.
 """

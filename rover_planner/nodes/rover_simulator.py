@@ -55,7 +55,7 @@ class RoverSimulator(Node):
         self.simulation = Simulation(self._settings)
         """The rover."""
         self._period = 1.0 / parameters.rate
-        self._told = ""
+        self._stopped = ""
         self._own_stamps: deque[tuple[int, int]] = deque(maxlen=64)
         self._create_publishers()
         self._create_subscriptions()
@@ -142,17 +142,17 @@ class RoverSimulator(Node):
             self._commands.publish(twist)
         if self._transforms is not None:
             self._transforms.sendTransform(_transform(state, self._frame, stamp))
-        self._tell(state)
+        self._log_stop(state)
 
     def _arm_angles(self) -> dict[str, float]:
         arm = self._settings.rover.manipulator
         return {} if arm is None else dict(zip(arm.joints, arm.stowed, strict=True))
 
-    def _tell(self, state: PlantState) -> None:
+    def _log_stop(self, state: PlantState) -> None:
         """Log once when the rover stops, with the reason, and once when it moves on."""
-        if state.stopped == self._told:
+        if state.stopped == self._stopped:
             return
-        self._told = state.stopped
+        self._stopped = state.stopped
         if state.stopped:
             self.get_logger().warning(f"stopped: {state.stopped}")
         else:
@@ -167,11 +167,11 @@ class RoverSimulator(Node):
             "wanted_yaw_rate": round(speeds[1], 4),
             "follows_path": self.simulation.follows_path,
         }
-        told = {key: json.dumps(value) for key, value in said.items()}
+        values = {key: json.dumps(value) for key, value in said.items()}
         level, text = (
             ("error", state.stopped) if state.stopped else ("ok", "nothing stops the rover")
         )
-        status = make_status(SIMULATOR, level, text, told, self._settings.rover.name)
+        status = make_status(SIMULATOR, level, text, values, self._settings.rover.name)
         self._diagnostics.publish(diagnostics([status], self.get_clock().now().to_msg()))
 
     def _publish_map(self) -> None:

@@ -31,6 +31,7 @@ from msg_adapters.results.diagnostics import (
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.numerics.kernel_cache import kernel_cache_note
 from rover_physics.warm_up import EXACT, UNCERTAIN
+from rover_planner.nodes.arm_topics import ArmTopics
 from rover_planner.nodes.maps.map_cloud import MapCloud
 from rover_planner.nodes.maps.map_topics import MapTopics
 from rover_planner.nodes.nav2_services import PathComputation, PathValidity
@@ -38,7 +39,6 @@ from rover_planner.nodes.navigation.frames import NodeFrames
 from rover_planner.nodes.navigation.hazard_topics import HazardTopics
 from rover_planner.nodes.navigation.path_watch import MAX_POSE_AGE, PathWatch
 from rover_planner.nodes.question_desk import QuestionDesk
-from rover_planner.nodes.reach_topics import ReachTopics
 from rover_planner.nodes.result_topics import ResultTopics
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.warm_up import HAZARDS, WAYS
@@ -131,12 +131,12 @@ class TraverseServer(Node):
         PathValidity(self.desk, frame, self.publish, self.frames.localise_path).serve(self)
         PathComputation.serve(self, self.desk, self.read_question, self.publish)
         self.create_service(Trigger, "~/cancel", self._cancel)
-        self.reach = ReachTopics(self, self.desk, frame, reliability)
+        self.arm = ArmTopics(self, self.desk, frame, reliability)
         """The topics and the service of the arm."""
         self._map_cloud = MapCloud(self, self.service, frame)
         self._map_status = MapStatus()
         self.watch = PathWatch(
-            self, self.service, self._values, self.guard, self._find_watched, self._tell_stop
+            self, self.service, self._values, self.guard, self._find_watched, self._publish_stop
         )
         """Watches the accepted path."""
         self._hazards = HazardTopics(
@@ -299,7 +299,7 @@ class TraverseServer(Node):
             self.watch.accept(poses, identity.path_hash or path_hash(plan))
         return plan, report
 
-    def _tell_stop(self, judgement: Judgement, watched: str, situation: Situation) -> None:
+    def _publish_stop(self, judgement: Judgement, watched: str, situation: Situation) -> None:
         """Publish why the rover is to stop, as the results of a judged path."""
         self.publish(judgement, self.desk.identify("monitor", watched, situation))
 

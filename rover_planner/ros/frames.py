@@ -28,7 +28,7 @@ class Frames:
     """
 
     silence = ""
-    """Why transforms are not heard, to be added to a refusal."""
+    """Reason why transforms are not heard, to be added to a refusal."""
 
     def __init__(
         self,

@@ -35,12 +35,12 @@ class LazyPublisher:
 
     @property
     def has_listeners(self) -> bool:
-        """Whether there is a subscriber."""
+        """True if there is a subscriber."""
         return self._publisher.get_subscription_count() > 0
 
     @property
     def is_awaited(self) -> bool:
-        """Whether a subscriber has not received the latest message."""
+        """True if a subscriber has not received the latest message."""
         return self._make is not None and self.has_listeners
 
     def publish(self, make: Callable[[], Any]) -> None:

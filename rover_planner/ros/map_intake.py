@@ -83,7 +83,7 @@ class MapIntake(Generic[Map]):
 
     @property
     def waits_for_frame(self) -> bool:
-        """Whether no transform was known for the last message."""
+        """True if no transform was known for the last message."""
         return self._unplaced is not None
 
     def retry(self) -> None:

@@ -39,7 +39,7 @@ from rover_planner.worlds.summary import describe_terrain
 LOG_PERIOD = 10.0
 """Shortest time between two log lines about maps that merge, or come again and again [s]."""
 FIRST_MAPS = 20
-"""Maps that replace each other of which each is told in the log."""
+"""Maps that replace each other of which each has a line in the log."""
 MERGE_WAIT = 0.005
 """Longest wait of a question for a map that is to be merged into the one that is there [s]. A busy
 machine may take 15 ms more to wake the thread until it is 20 ms."""
@@ -53,7 +53,7 @@ class MapTopics:
         node: Node,
         service: TraverseService,
         parameters: TraverseServerParameters,
-        tell: Callable[[str], None],
+        report: Callable[[str], None],
         frames: Frames,
         guard: Guard,
     ):
@@ -63,7 +63,7 @@ class MapTopics:
             node: The node.
             service: Takes the maps.
             parameters: The parameters of the node.
-            tell: Called in the thread after each map: with the reason if it was refused, else
+            report: Called in the thread after each map: with the reason if it was refused, else
                 with an empty text.
             frames: Knows where the frames of messages are on the map; asked in the thread.
             guard: Takes unexpected errors.
@@ -71,13 +71,13 @@ class MapTopics:
         Raises:
             TerrainError: The file of the parameter terrain_file cannot be loaded.
         """
-        self._node, self._service, self._tell = node, service, tell
+        self._node, self._service, self._report = node, service, report
         self._guard, self._handover = guard, Handover(node, guard)
         self._values, self._settings = parameters, MapSettings.of(parameters)
         self._keeper = MapKeeper(service.settings.rover, keeper_settings(parameters))
         self._is_from_topic = False
         self._looked = -float("inf")
-        self._told, self._told_kind = -float("inf"), ("", False)
+        self._logged_at, self._logged_kind = -float("inf"), ("", False)
         self._map_count, self._refusals = 0, RepeatLog()
         if parameters.terrain_file:
             terrain = load_terrain(parameters.terrain_file, parameters.max_map_cells)
@@ -215,15 +215,15 @@ class MapTopics:
 
     def _take(self, snapshot: MapSnapshot, source: str, stamp: int | None) -> None:
         is_new = self._keep(snapshot, source, stamp)
-        self._tell("")
+        self._report("")
         if is_new:
             taken, now = self._service.terrain, time.monotonic()
             assert taken is not None
             kind = source, self._keeper.merges
             self._map_count += not kind[1]
-            is_due = now - self._told >= LOG_PERIOD or kind != self._told_kind
+            is_due = now - self._logged_at >= LOG_PERIOD or kind != self._logged_kind
             if is_due or (not kind[1] and self._map_count <= FIRST_MAPS):
-                self._told, self._told_kind = now, kind
+                self._logged_at, self._logged_kind = now, kind
                 self._node.get_logger().info(f"map from {source}: {describe_terrain(taken)}")
 
     def _keep(self, snapshot: MapSnapshot, source: str, stamp: int | None = None) -> bool:
@@ -244,4 +244,4 @@ class MapTopics:
         )
         if line:
             self._node.get_logger().error(line)
-        self._tell(error)
+        self._report(error)

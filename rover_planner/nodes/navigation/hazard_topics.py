@@ -209,7 +209,7 @@ class HazardTopics:
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """What is published."""
+    """A view of the classes as it is published."""
 
     view: HazardView
     """The classes."""

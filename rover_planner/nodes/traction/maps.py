@@ -38,7 +38,7 @@ class TractionMaps(MapIntake[PreparedMap]):
         self._node, self._rover, self._listen = node, rover, frames.listen
         self._parameters = parameters
         self._refusals = RepeatLog()
-        super().__init__(self._make, self._tell, frames)
+        super().__init__(self._make, self._log_refusal, frames)
 
     def apply(self, parameters: TractionControllerParameters) -> None:
         """Prepare the last map again if a parameter of it has changed."""
@@ -59,7 +59,7 @@ class TractionMaps(MapIntake[PreparedMap]):
         terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height, move)
         return prepare_map(self._rover(), terrain)
 
-    def _tell(self, error: str) -> None:
+    def _log_refusal(self, error: str) -> None:
         line = f"{CLOUD} refused, the last map stays: {error}"
         line = self._refusals.line(line, time.monotonic())
         if line:

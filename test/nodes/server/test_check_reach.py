@@ -40,7 +40,7 @@ class ToolClient:
     def aim(self, place) -> None:
         """Publish a target and wait until the server has it."""
         self.send(make_target(*place))
-        query = self._server.reach.query
+        query = self._server.arm.query
         wait_until(
             lambda: query.target is not None and np.array_equal(query.target, place), "the target"
         )
@@ -48,7 +48,7 @@ class ToolClient:
     def push(self, force, moment=(0.0, 0.0, 0.0)) -> None:
         """Publish a wrench and wait until the server has it."""
         self.send(wrench=make_wrench(force, moment))
-        query = self._server.reach.query
+        query = self._server.arm.query
         wait_until(
             lambda: query.force is not None and np.array_equal(query.force, force), "the wrench"
         )
