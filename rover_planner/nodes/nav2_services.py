@@ -42,7 +42,7 @@ class PathValidity:
         desk: QuestionDesk,
         map_frame: str,
         publish: Publish,
-        localise: Callable[[Path], Path] = lambda path: path,
+        localise: Callable[[Path], Path],
     ):
         """Keep what is needed for answers.
 
