@@ -27,12 +27,12 @@ from msg_adapters.gridding import (
     detect_grid,
     detect_raster,
     lay_out_cells,
+    make_terrain,
     rounding_error,
     typical_spacing,
 )
 from rover_physics.numerics.plausible import MAX_RESOLUTION, MIN_RESOLUTION
 from rover_physics.numerics.quiet import quiet
-from rover_physics.numerics.read_only import seal_array
 from rover_physics.terrain.grid import Terrain
 
 LAYERS = ("friction", "elevation_std")
@@ -149,21 +149,7 @@ def _terrain_of_raster(points: NDArray[np.void], raster: Raster) -> Terrain:
     if "elevation_std" in (points.dtype.names or ()):
         std = raster.arrange(points["elevation_std"])
         std[unknown] = np.nan
-    grid = raster.grid
-    return _make_terrain(grid, elevation, friction, std)
-
-
-def _make_terrain(
-    grid: CellGrid,
-    elevation: NDArray[np.float64],
-    friction: NDArray[np.float64] | None,
-    std: NDArray[np.float64] | None,
-) -> Terrain:
-    """Make a terrain of new layers without copying them; they become read-only."""
-    layers = [None if layer is None else seal_array(layer) for layer in (friction, std)]
-    return Terrain(
-        seal_array(elevation), grid.resolution, grid.origin, layers[0], elevation_std=layers[1]
-    )
+    return make_terrain(elevation, raster.grid.resolution, raster.grid.origin, friction, std)
 
 
 def _terrain_of_scatter(points: CloudPoints, resolution: float, cell_height: str) -> Terrain:
@@ -196,7 +182,7 @@ def _terrain_of_scatter(points: CloudPoints, resolution: float, cell_height: str
     std = None
     if points.elevation_std is not None:
         std = combine(cells, points.elevation_std[known], grid, "max")
-    return _make_terrain(grid, elevation, friction, std)
+    return make_terrain(elevation, grid.resolution, grid.origin, friction, std)
 
 
 def terrain_to_point_cloud(

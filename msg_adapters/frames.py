@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the frame of messages, and reads transforms between frames."""
+"""Checks the frame of messages, and reads orientations and transforms between frames."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from msg_adapters.errors import MessageError
 from msg_adapters.stamps import stamp_to_ns
+from rover_physics.numerics.quaternions import length_of, rpy_from_xyzw
 
 
 @dataclass(frozen=True, eq=False)
 class FrameTransform:
-    """Where a child frame is in its parent frame at a time."""
+    """Pose of a child frame in its parent frame at a time."""
 
     parent: str
     """Name of the parent frame."""
@@ -36,6 +37,31 @@ def check_frame(frame_id: str, map_frame: str, what: str) -> None:
     if frame_id != map_frame:
         given = f"in frame {frame_id!r}" if frame_id else "without a frame_id"
         raise MessageError(f"{what} is {given}; it must be in {map_frame!r}")
+
+
+def read_orientation(turn: Any, what: str) -> tuple[float, float, float]:
+    """Return roll, pitch, yaw [rad] of a geometry_msgs/Quaternion.
+
+    Raises:
+        MessageError: It is not of norm 1; `what` names it.
+    """
+    xyzw = (turn.x, turn.y, turn.z, turn.w)
+    return rpy_from_xyzw(xyzw, squared_norm=check_norm(xyzw, what) ** 2)
+
+
+def check_norm(xyzw: tuple[float, float, float, float], what: str) -> float:
+    """Return the norm of a quaternion, which is about 1.
+
+    Raises:
+        MessageError: It is not; `what` names the message.
+    """
+    norm = length_of(xyzw)
+    if not 0.99 < norm < 1.01:
+        raise MessageError(
+            f"{what} has orientation {list(xyzw)} of norm {norm:g}; it must be a quaternion of "
+            "norm 1"
+        )
+    return norm
 
 
 def read_transform(message: Any) -> FrameTransform:

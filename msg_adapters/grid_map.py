@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msg_adapters.errors import MessageError
-from msg_adapters.gridding import MAX_CELLS
+from msg_adapters.gridding import MAX_CELLS, make_terrain
 from rover_physics.numerics.plausible import MAX_RESOLUTION, MIN_RESOLUTION
 from rover_physics.numerics.quiet import quiet
-from rover_physics.numerics.read_only import seal_array
 from rover_physics.terrain.grid import Terrain
 
 ROW, COLUMN = "row_index", "column_index"
@@ -103,25 +102,12 @@ def terrain_from_grid_map(message: Any, layers: GridMapLayers | None = None) -> 
     if layers.friction in names:
         friction = read(layers.friction)
         friction[unknown | ~np.isfinite(friction)] = np.nan
-    return _make_terrain(message.info, elevation, friction, std)
-
-
-def _make_terrain(
-    info: Any,
-    elevation: NDArray[np.float64],
-    friction: NDArray[np.float64] | None,
-    std: NDArray[np.float64] | None,
-) -> Terrain:
-    rows, columns = elevation.shape
-    centre = info.pose.position
+    place, size = message.info.pose.position, message.info.resolution
     origin = (
-        float(centre.x) - 0.5 * (columns - 1) * info.resolution,
-        float(centre.y) - 0.5 * (rows - 1) * info.resolution,
+        float(place.x) - 0.5 * (elevation.shape[1] - 1) * size,
+        float(place.y) - 0.5 * (elevation.shape[0] - 1) * size,
     )
-    sealed = [None if layer is None else seal_array(layer) for layer in (friction, std)]
-    return Terrain(
-        seal_array(elevation), float(info.resolution), origin, sealed[0], elevation_std=sealed[1]
-    )
+    return make_terrain(elevation, float(size), origin, friction, std)
 
 
 def _shape_of(info: Any) -> tuple[int, int]:

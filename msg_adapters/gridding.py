@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from msg_adapters.errors import MessageError
 from rover_physics.numerics.plausible import MAX_COORDINATE, MIN_RESOLUTION
+from rover_physics.numerics.read_only import seal_array
+from rover_physics.terrain.grid import Terrain
 
 MAX_CELLS = 25_000_000
 """Largest map built from a cloud [cells]; one distant outlier must not exhaust the memory."""
@@ -52,15 +54,15 @@ class Raster:
     shape: tuple[int, int]
     """Shape (h, w) of the points in the message."""
     by_columns: bool
-    """Whether y, not x, changes from one point of a message row to the next."""
-    falling: tuple[bool, bool]
-    """Whether x and y decrease along the points."""
+    """True if y, not x, changes from one point of a message row to the next."""
+    descending: tuple[bool, bool]
+    """True for x, for y where it decreases along the points."""
 
     def arrange(self, values: NDArray[Any]) -> NDArray[np.float64]:
         """Return values (h, w) of the points as (rows, columns), with x and y ascending."""
         values = values.reshape(self.shape)
         values = values.T if self.by_columns else values
-        x_step, y_step = (-1 if falls else 1 for falls in self.falling)
+        x_step, y_step = (-1 if descends else 1 for descends in self.descending)
         return np.array(values[::y_step, ::x_step], dtype=np.float64, order="C")
 
 
@@ -85,13 +87,13 @@ def detect_raster(x: NDArray[Any], y: NDArray[Any]) -> Raster | None:
     grid = _fit_grid(x_axis, y_axis, inner.size, noise)
     if grid is None or (grid.columns, grid.rows) != (len(x_axis), len(y_axis)):
         return None
-    falling = bool(x_axis[0] > x_axis[-1]), bool(y_axis[0] > y_axis[-1])
-    for axis, falls, origin in zip((x_axis, y_axis), falling, grid.origin, strict=True):
+    descending = bool(x_axis[0] > x_axis[-1]), bool(y_axis[0] > y_axis[-1])
+    for axis, descends, origin in zip((x_axis, y_axis), descending, grid.origin, strict=True):
         centres = origin + grid.resolution * np.arange(len(axis))
-        off_centre = np.abs(axis[:: -1 if falls else 1] - centres).max()
+        off_centre = np.abs(axis[:: -1 if descends else 1] - centres).max()
         if not off_centre <= _tolerance(grid.resolution, noise):
             return None
-    return Raster(grid, inner.shape, by_columns, falling)
+    return Raster(grid, inner.shape, by_columns, descending)
 
 
 def detect_grid(xy: NDArray[np.float64], precision: float) -> CellGrid | None:
@@ -272,3 +274,15 @@ def _round_within(value: float, tolerance: float) -> float:
         if abs(rounded - value) <= tolerance:
             return rounded
     return value
+
+
+def make_terrain(
+    elevation: NDArray[np.float64],
+    resolution: float,
+    origin: tuple[float, float],
+    friction: NDArray[np.float64] | None,
+    std: NDArray[np.float64] | None,
+) -> Terrain:
+    """Make a terrain of new layers (ny, nx) without copying them; they become read-only."""
+    layers = [None if layer is None else seal_array(layer) for layer in (friction, std)]
+    return Terrain(seal_array(elevation), resolution, origin, layers[0], elevation_std=layers[1])

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from sensor_msgs.msg import Imu
 
 from msg_adapters.errors import MessageError
+from msg_adapters.frames import check_norm
 from rover_physics.numerics.quaternions import (
-    length_of,
     matrix_from_xyzw,
     rpy_from_xyzw,
     xyzw_from_rpy,
@@ -34,7 +34,7 @@ class Attitude:
 
 
 class ImuMounting:
-    """How an IMU is mounted on the body."""
+    """Frame of an IMU and its turn against the body."""
 
     def __init__(self, frame_id: str, rpy: Sequence[float] = (0.0, 0.0, 0.0)):
         """Take the frame of the IMU, and roll, pitch, yaw of its axes in the body frame [rad]."""
@@ -93,15 +93,10 @@ def imu_to_attitude(imu: Imu, mounting: ImuMounting | None = None) -> Attitude:
             "imu has no orientation (orientation_covariance[0] is -1); roll and pitch are needed"
         )
     q = imu.orientation
-    x, y, z, w = q.x, q.y, q.z, q.w
-    norm = length_of((x, y, z, w))
-    if not 0.99 < norm < 1.01:
-        raise MessageError(
-            f"imu has orientation {[x, y, z, w]} of norm {norm:g}; it must be a quaternion of "
-            "norm 1"
-        )
-    xyzw = (x, y, z, w) if mounting is None else mounting.turn_orientation((x, y, z, w))
-    roll, pitch, _ = rpy_from_xyzw(xyzw, squared_norm=norm**2)
+    xyzw = (q.x, q.y, q.z, q.w)
+    norm = check_norm(xyzw, "imu")
+    body = xyzw if mounting is None else mounting.turn_orientation(xyzw)
+    roll, pitch, _ = rpy_from_xyzw(body, squared_norm=norm**2)
     if imu.angular_velocity_covariance[0] == NOT_MEASURED:
         return Attitude(roll, pitch, None)
     rate = imu.angular_velocity

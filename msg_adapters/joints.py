@@ -18,28 +18,6 @@ FORM = "model_joint:robot_joint, model_joint:robot_joint:-1 or model_joint:robot
 """Form of an entry, for error texts."""
 
 
-def joint_positions(state: JointState, wanted: Collection[str]) -> dict[str, float]:
-    """Return the positions [rad] of the wanted joints in a message, by name.
-
-    Other joints are ignored. The result is empty if the message has no positions, for example
-    only velocities or efforts.
-
-    Raises:
-        MessageError: position has another length than name, a wanted joint occurs twice, or
-            its position is not finite.
-    """
-    return _read_by_name(state, state.position, "position", "angle in rad", wanted)
-
-
-def joint_velocities(state: JointState, wanted: Collection[str]) -> dict[str, float]:
-    """Return the velocities [rad/s] of the wanted joints in a message, by name.
-
-    Raises:
-        MessageError: As in `joint_positions`, about velocity.
-    """
-    return _read_by_name(state, state.velocity, "velocity", "rate in rad/s", wanted)
-
-
 def convert_steering(values: Mapping[str, float], positive: str) -> dict[str, float]:
     """Return angles or rates by joint name with the sign of steering joints of messages or ours.
 
@@ -127,28 +105,30 @@ class JointMap:
     def positions(self, state: JointState, wanted: Collection[str]) -> dict[str, float]:
         """Return the angles [rad] of wanted joints of the model in a message, by name.
 
+        Other joints are ignored. The result is empty if the message has no positions, for example
+        only velocities or efforts.
+
         Raises:
-            MessageError: As `joint_positions`.
+            MessageError: position has another length than name, a wanted joint occurs twice, or
+                its position is not finite.
         """
-        found = joint_positions(state, self.robot_names(wanted))
+        found = _read_by_name(
+            state, state.position, "position", "angle in rad", self.robot_names(wanted)
+        )
+        links = map(self.link, wanted)
         return {
             link.model: link.sign * found[link.robot] + link.offset
-            for link in map(self.link, wanted)
+            for link in links
             if link.robot in found
         }
 
     def velocities(self, state: JointState, wanted: Collection[str]) -> dict[str, float]:
-        """Return the rates [rad/s] of wanted joints of the model in a message, by name.
-
-        Raises:
-            MessageError: As `joint_velocities`.
-        """
-        found = joint_velocities(state, self.robot_names(wanted))
-        return {
-            link.model: link.sign * found[link.robot]
-            for link in map(self.link, wanted)
-            if link.robot in found
-        }
+        """Return the rates [rad/s] of wanted joints of the model; as `positions`."""
+        found = _read_by_name(
+            state, state.velocity, "velocity", "rate in rad/s", self.robot_names(wanted)
+        )
+        links = map(self.link, wanted)
+        return {link.model: link.sign * found[link.robot] for link in links if link.robot in found}
 
     def signs(self, names: Collection[str]) -> NDArray[np.float64]:
         """Return the signs of joints of the model, which rates and efforts have too."""

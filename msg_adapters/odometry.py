@@ -8,8 +8,7 @@ from nav_msgs.msg import Odometry
 from numpy.typing import NDArray
 
 from msg_adapters.errors import MessageError
-from msg_adapters.frames import check_frame
-from rover_physics.numerics.quaternions import length_of, rpy_from_xyzw
+from msg_adapters.frames import check_frame, read_orientation
 
 MAX_COORDINATE = 1e8
 """Largest coordinate of a pose [m]; UTM has 1e7."""
@@ -36,14 +35,8 @@ def odometry_to_pose(
     child = odometry.child_frame_id
     if base_frame and child not in ("", base_frame):
         raise MessageError(f"odometry is of frame {child!r}; it must be of {base_frame!r}")
-    place, q = odometry.pose.pose.position, odometry.pose.pose.orientation
-    norm = length_of((q.x, q.y, q.z, q.w))
-    if not 0.99 < norm < 1.01:
-        raise MessageError(
-            f"odometry has orientation {[q.x, q.y, q.z, q.w]} of norm {norm:g}; it must be a "
-            "quaternion of norm 1"
-        )
-    _, _, yaw = rpy_from_xyzw((q.x, q.y, q.z, q.w), squared_norm=norm**2)
+    place = odometry.pose.pose.position
+    _, _, yaw = read_orientation(odometry.pose.pose.orientation, "odometry")
     pose = np.array([place.x, place.y, place.z, yaw])
     variances = [float(odometry.pose.covariance[index]) for index in (0, 7)]
     possible = (abs(pose[:3]) <= MAX_COORDINATE).all()
@@ -57,7 +50,4 @@ def odometry_to_pose(
 
 def odometry_to_tilt(odometry: Odometry) -> tuple[float, float]:
     """Return roll and pitch [rad] of the body in a message that `odometry_to_pose` accepted."""
-    q = odometry.pose.pose.orientation
-    norm = length_of((q.x, q.y, q.z, q.w))
-    roll, pitch, _ = rpy_from_xyzw((q.x, q.y, q.z, q.w), squared_norm=norm**2)
-    return roll, pitch
+    return read_orientation(odometry.pose.pose.orientation, "odometry")[:2]

@@ -56,8 +56,6 @@ class DrivenRover(Node):
         self.stamp: Stamp = no_stamp
         self.silent: set[str] = set()
         """Topics that are not sent."""
-        self.cmd_vel_divider = 1
-        """cmd_vel is sent with every so many-th message of the sensors."""
         self.commands: list[tuple[float, float, float]] = []
         """Time of arrival [s], largest magnitude and sum of each command's torques [N m]."""
         self.command_stamps: list[int] = []
@@ -68,7 +66,6 @@ class DrivenRover(Node):
         """Time of arrival [s] and status."""
         self.log: list[str] = []
         self._sent_at = 0
-        self._count = 0
         self._senders = {
             "joint_states": self.create_publisher(JointState, "joint_states", sensor_qos()),
             "imu": self.create_publisher(Imu, "imu", sensor_qos()),
@@ -96,7 +93,6 @@ class DrivenRover(Node):
             self.create_subscription(kind, name, hear, qos)
 
     def _send(self) -> None:
-        self._count += 1
         self._sent_at = time.time_ns()
         stamp = self.stamp()
         now = Time(sec=stamp // NANOSECONDS, nanosec=stamp % NANOSECONDS)
@@ -107,9 +103,8 @@ class DrivenRover(Node):
         twist.linear.x = self.speed
         messages = {"joint_states": self.joints, "imu": self.imu, "cmd_vel": self.twist}
         for name, sender in self._senders.items():
-            if name in self.silent or (name == "cmd_vel" and self._count % self.cmd_vel_divider):
-                continue
-            sender.publish(messages[name])
+            if name not in self.silent:
+                sender.publish(messages[name])
 
     def _hear_command(self, message: Float64MultiArray, info: dict[str, int]) -> None:
         self.command_stamps.append(info["source_timestamp"])

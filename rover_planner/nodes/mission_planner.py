@@ -317,9 +317,9 @@ def _carry_out(node: MissionPlanner, terrain: Terrain | None, options: MissionOp
         codes.add(_exit_code(answer))
         if options.drive and answer["traversable"]:
             report({"event": "driving", "goal": number})
-            tell = partial(_report_change, report, number)
+            report_change = partial(_report_change, report, number)
             try:
-                drive_to(node, goal, answer["poses"], DriveSettings(), tell)
+                drive_to(node, goal, answer["poses"], DriveSettings(), report_change)
             except NoAnswerError as error:
                 raise DriveFailedError(str(error)) from error
             report({"event": "arrived", "goal": number})

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What Nav2 asks a planner: the service ~/is_path_valid, the action ~/compute_path_to_pose.
+"""Services of a planner for Nav2: the service ~/is_path_valid, the action ~/compute_path_to_pose.
 
 Both exist where nav2_msgs is installed.
 """
@@ -42,7 +42,7 @@ class PathValidity:
         desk: QuestionDesk,
         map_frame: str,
         publish: Publish,
-        localise: Callable[[Path], Path] = lambda path: path,
+        localise: Callable[[Path], Path],
     ):
         """Keep what is needed for answers.
 

@@ -24,7 +24,7 @@ HELP_WORDS = ("-h", "--help")
 _EXIT_CODES = "Exit code 0 when it was told to stop; 2 for a wrong parameter or missing library."
 
 PLACE_IN_SOURCE = re.compile(r",? at /\S+:\d+")
-"""Where an error of ROS arose in the sources of ROS, which helps nobody."""
+"""Place of an error in the sources of ROS, which helps nobody."""
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from visualization_msgs.msg import MarkerArray
 
 from msg_adapters.identity import path_hash
-from msg_adapters.joints import OWN_NAMES, JointMap
+from msg_adapters.joints import JointMap
 from msg_adapters.paths import PoseStock, decimate, empty_path, settled_path
 from msg_adapters.results.diagnostics import verdict_to_diagnostics
 from msg_adapters.results.grids import area_to_grid, empty_grid
@@ -72,8 +72,8 @@ class ResultTopics:
         deferred_work: DeferredWork,
         map_frame: str,
         positive_steering: str,
-        joint_names: JointMap = OWN_NAMES,
-        to_base: Callable[[Path], Path] = lambda plan: plan,
+        joint_names: JointMap,
+        to_base: Callable[[Path], Path],
     ):
         """Create the topics.
 
@@ -197,16 +197,16 @@ class ResultMessages:
         return replace(self.judgement.report, identity=self.identity)
 
     def message(self, topic: str) -> object:
-        """Return the message for a topic."""
-        if topic == "plan":
-            return self.plan()
-        if topic == "verdict":
-            return self._verdict()
-        if topic == "closed_area":
-            return self._closed_area()
-        if self.judgement.candidate is None:
-            return self._nothing(topic)
-        return self._prediction(topic)
+        """Return the message for a topic; without values if no path was judged."""
+        makers: dict[str, Callable[[], object]] = {
+            "plan": self.plan,
+            "predicted_joints": self._joints,
+            "tip_over_margin": self._margins,
+            "verdict": self._verdict,
+            "closed_area": self._closed_area,
+            "markers": self._markers,
+        }
+        return makers[topic]() if topic in makers else self._wheels(WHEEL_TOPICS[topic])
 
     def plan(self) -> Path:
         """Return the path to drive, without poses if none is traversable."""
@@ -236,33 +236,35 @@ class ResultMessages:
         first = cell * column, cell * row
         return area_to_grid(around.closed.places, cell, first, self.frame, self.stamp)
 
-    def _nothing(self, topic: str) -> object:
-        """Return the empty message that is published if no path was judged."""
-        if topic == "predicted_joints":
-            return empty_trajectory(self.rover, self.frame, self.stamp, self.joint_names)
-        if topic == "markers":
-            return cleared_markers(self.frame, self.stamp)
-        if topic == "tip_over_margin":
-            return waypoint_array(np.empty((0, len(MEASURES))), "measure")
-        return waypoint_array(np.empty((0, len(WHEELS))))
-
-    def _prediction(self, topic: str) -> object:
-        """Return the predicted values along a judged path."""
+    def _joints(self) -> JointTrajectory:
         candidate = self.judgement.candidate
-        assert candidate is not None
-        prediction = candidate.prediction
-        if topic == "predicted_joints":
-            return joint_trajectory(
-                prediction, self.rover, self.frame, self.stamp, self.points,
-                positive_steering=self.positive_steering, names=self.joint_names,
-            )  # fmt: skip
-        if topic == "markers":
-            classes = [waypoint.traversability_class for waypoint in self.judgement.classes]
-            reasons, rows = candidate.verdict.reasons, self._rows_to_show()
-            return path_markers(prediction, reasons, rows, self.frame, self.stamp, classes)
-        if topic == "tip_over_margin":
-            return tip_over_array(prediction)
-        return waypoint_array(getattr(prediction, WHEEL_TOPICS[topic]))
+        if candidate is None:
+            return empty_trajectory(self.rover, self.frame, self.stamp, self.joint_names)
+        return joint_trajectory(
+            candidate.prediction, self.rover, self.frame, self.stamp, self.points,
+            positive_steering=self.positive_steering, names=self.joint_names,
+        )  # fmt: skip
+
+    def _markers(self) -> MarkerArray:
+        candidate = self.judgement.candidate
+        if candidate is None:
+            return cleared_markers(self.frame, self.stamp)
+        classes = [waypoint.traversability_class for waypoint in self.judgement.classes]
+        reasons, rows = candidate.verdict.reasons, self._rows_to_show()
+        return path_markers(candidate.prediction, reasons, rows, self.frame, self.stamp, classes)
+
+    def _margins(self) -> Float64MultiArray:
+        candidate = self.judgement.candidate
+        if candidate is None:
+            return waypoint_array(np.empty((0, len(MEASURES))), "measure")
+        return tip_over_array(candidate.prediction)
+
+    def _wheels(self, field: str) -> Float64MultiArray:
+        """Return a field of the prediction with a value for each waypoint and wheel."""
+        candidate = self.judgement.candidate
+        if candidate is None:
+            return waypoint_array(np.empty((0, len(WHEELS))))
+        return waypoint_array(getattr(candidate.prediction, field))
 
     def _rows_to_show(self) -> NDArray[np.intp]:
         """Return indices of waypoints about `plan_spacing` apart and where the class changes."""

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node /rover_simulator: simulates a rover on a terrain with the topics of a real rover."""
 
-import contextlib
 import json
 import sys
 import time
@@ -29,6 +28,7 @@ from rover_physics.names import WHEEL_JOINTS
 from rover_planner.nodes.running import run_node
 from rover_planner.parameters.declare import declare_parameters, warn_of_unknown_parameters
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
+from rover_planner.ros.optional_types import find_type
 from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
 from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.simulation import Simulation, load_simulation_settings
@@ -55,7 +55,7 @@ class RoverSimulator(Node):
         self.simulation = Simulation(self._settings)
         """The rover."""
         self._period = 1.0 / parameters.rate
-        self._told = ""
+        self._stopped = ""
         self._own_stamps: deque[tuple[int, int]] = deque(maxlen=64)
         self._create_publishers()
         self._create_subscriptions()
@@ -81,7 +81,8 @@ class RoverSimulator(Node):
         self._commands = None
         if self._settings.parameters.follow_commands:
             self._commands = self.create_publisher(TwistStamped, "cmd_vel", qos)
-        self._transforms = _make_broadcaster(self)
+        broadcaster: Any = find_type("tf2_ros:TransformBroadcaster")
+        self._transforms = None if broadcaster is None else broadcaster(self)
 
     def _create_subscriptions(self) -> None:
         qos = topic_qos()
@@ -141,17 +142,17 @@ class RoverSimulator(Node):
             self._commands.publish(twist)
         if self._transforms is not None:
             self._transforms.sendTransform(_transform(state, self._frame, stamp))
-        self._tell(state)
+        self._log_stop(state)
 
     def _arm_angles(self) -> dict[str, float]:
         arm = self._settings.rover.manipulator
         return {} if arm is None else dict(zip(arm.joints, arm.stowed, strict=True))
 
-    def _tell(self, state: PlantState) -> None:
+    def _log_stop(self, state: PlantState) -> None:
         """Log once when the rover stops, with the reason, and once when it moves on."""
-        if state.stopped == self._told:
+        if state.stopped == self._stopped:
             return
-        self._told = state.stopped
+        self._stopped = state.stopped
         if state.stopped:
             self.get_logger().warning(f"stopped: {state.stopped}")
         else:
@@ -166,11 +167,11 @@ class RoverSimulator(Node):
             "wanted_yaw_rate": round(speeds[1], 4),
             "follows_path": self.simulation.follows_path,
         }
-        told = {key: json.dumps(value) for key, value in said.items()}
+        values = {key: json.dumps(value) for key, value in said.items()}
         level, text = (
             ("error", state.stopped) if state.stopped else ("ok", "nothing stops the rover")
         )
-        status = make_status(SIMULATOR, level, text, told, self._settings.rover.name)
+        status = make_status(SIMULATOR, level, text, values, self._settings.rover.name)
         self._diagnostics.publish(diagnostics([status], self.get_clock().now().to_msg()))
 
     def _publish_map(self) -> None:
@@ -196,15 +197,6 @@ def _transform(state: PlantState, frame_id: str, stamp: Any) -> TransformStamped
     place.x, place.y, place.z = state.position.tolist()
     turn.x, turn.y, turn.z, turn.w = state.orientation.tolist()
     return message
-
-
-def _make_broadcaster(node: Node) -> Any:
-    """Return a transform broadcaster, None without tf2, which PyPI does not offer."""
-    with contextlib.suppress(ImportError):
-        from tf2_ros import TransformBroadcaster
-
-        return TransformBroadcaster(node)
-    return None
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -84,7 +84,7 @@ class StopSignals:
 
     def __init__(self) -> None:
         self.wanted = False
-        """Whether the node is to end."""
+        """True once the node is to end."""
         self._wake: Callable[[], object] | None = None
         for number in SIGNALS:
             signal.signal(number, self._ask)

@@ -113,7 +113,7 @@ class TractionController(Node):
 
     @property
     def state(self) -> str:
-        """What the controller does, as on ~/state; empty before the first update."""
+        """The state as on ~/state, such as driving; empty before the first update."""
         return "" if self._command is None else self._command.state
 
     def take_priority(self) -> None:
@@ -209,7 +209,7 @@ class TractionController(Node):
             command = self._supervisor.fail(LOOP_FAULT)
         self._topics.publish_forces(command.update)
         self.statistics.take(command.update, start, time.perf_counter())
-        self._tell(command, now)
+        self._log_changes(command, now)
 
     def _write(self, command: TractionCommand) -> None:
         """Publish torques, and rates and steering angles for drives that hold those."""
@@ -249,7 +249,7 @@ class TractionController(Node):
         """Send zero torques and the brake; called in the thread of the watchdog."""
         self._topics.watchdog_writer.write(np.zeros(WHEEL_COUNT), True, FAULT)
 
-    def _tell(self, command: TractionCommand, now: float) -> None:
+    def _log_changes(self, command: TractionCommand, now: float) -> None:
         """Log the begin and the end of faults and stalls; show a new state in the diagnostics."""
         last, self._command = self._command, command
         update, policy = command.update, self._values.rest_policy

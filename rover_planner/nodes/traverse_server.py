@@ -31,15 +31,14 @@ from msg_adapters.results.diagnostics import (
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.numerics.kernel_cache import kernel_cache_note
 from rover_physics.warm_up import EXACT, UNCERTAIN
+from rover_planner.nodes.arm_topics import ArmTopics
 from rover_planner.nodes.maps.map_cloud import MapCloud
-from rover_planner.nodes.maps.map_file_service import MapFileService
 from rover_planner.nodes.maps.map_topics import MapTopics
 from rover_planner.nodes.nav2_services import PathComputation, PathValidity
 from rover_planner.nodes.navigation.frames import NodeFrames
 from rover_planner.nodes.navigation.hazard_topics import HazardTopics
 from rover_planner.nodes.navigation.path_watch import MAX_POSE_AGE, PathWatch
 from rover_planner.nodes.question_desk import QuestionDesk
-from rover_planner.nodes.reach_topics import ReachTopics
 from rover_planner.nodes.result_topics import ResultTopics
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.warm_up import HAZARDS, WAYS
@@ -60,7 +59,7 @@ from rover_planner.planning.answering.questions import (
     Question,
 )
 from rover_planner.planning.answering.server_health import MEMORY
-from rover_planner.planning.answering.service_settings import load_service_settings, map_limits
+from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.sensor_mounts import sensor_poses
@@ -120,6 +119,7 @@ class TraverseServer(Node):
             self._values,
             lambda error: self.desk.health.take_map(error),
             self.frames,
+            self.guard,
         )
         self.desk = QuestionDesk(self, self.service, self._maps, self.guard)
         """Takes the questions of all services."""
@@ -130,14 +130,11 @@ class TraverseServer(Node):
         PathValidity(self.desk, frame, self.publish, self.frames.localise_path).serve(self)
         PathComputation.serve(self, self.desk, self.read_question, self.publish)
         self.create_service(Trigger, "~/cancel", self._cancel)
-        self._files = MapFileService(
-            self, self._maps, frame, self.guard, lambda: map_limits(self._values)
-        )
-        self.reach = ReachTopics(self, self.desk, frame, reliability)
+        self.arm = ArmTopics(self, self.desk, frame, reliability)
         """The topics and the service of the arm."""
         self._map_cloud = MapCloud(self, self.service, frame)
         self.watch = PathWatch(
-            self, self.service, self._values, self.guard, self._find_watched, self._tell_stop
+            self, self.service, self._values, self.guard, self._find_watched, self._publish_stop
         )
         """Watches the accepted path."""
         self._hazards = HazardTopics(
@@ -300,7 +297,7 @@ class TraverseServer(Node):
             self.watch.accept(poses, identity.path_hash or path_hash(plan))
         return plan, report
 
-    def _tell_stop(self, judgement: PathJudgement, watched: str, snapshot: Snapshot) -> None:
+    def _publish_stop(self, judgement: PathJudgement, watched: str, snapshot: Snapshot) -> None:
         """Publish why the rover is to stop, as the results of a judged path."""
         self.publish(judgement, self.desk.identify("monitor", watched, snapshot))
 

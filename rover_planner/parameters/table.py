@@ -65,7 +65,7 @@ class ParameterSpec:
     choices: tuple[str, ...]
     """Allowed texts; empty allows any."""
     read_only: bool
-    """Whether the value is fixed after the start of the node."""
+    """True if the value is fixed after the start of the node."""
 
     @property
     def ros_default(self) -> Any:

@@ -5,7 +5,6 @@ from collections.abc import Callable
 from typing import Any
 
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
 
 from rover_planner.ros.qos import service_qos
 
@@ -18,7 +17,6 @@ def serve_later(
     kind: type,
     name: str,
     take: Callable[[Any, Any, Reply], None],
-    qos: QoSProfile | None = None,
 ) -> None:
     """Create a service that takes requests without a response.
 
@@ -28,13 +26,12 @@ def serve_later(
         name: Name of the service.
         take: Called with the request, an empty response, and the function that sends it when it
             is filled.
-        qos: Quality of service; None is that of services with a long queue.
     """
 
     def hand_on(request: Any, response: Any) -> tuple[Any, Any]:
         return request, response
 
-    service = node.create_service(kind, name, hand_on, qos_profile=qos or service_qos())
+    service = node.create_service(kind, name, hand_on, qos_profile=service_qos())
     send_response = service.send_response
 
     def receive(exchange: tuple[Any, Any], header: Any) -> None:

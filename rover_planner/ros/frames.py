@@ -3,7 +3,6 @@
 
 import copy
 from collections.abc import Callable
-from typing import Protocol
 
 import numpy as np
 from geometry_msgs.msg import Pose, PoseStamped, TransformStamped
@@ -13,6 +12,8 @@ from numpy.typing import NDArray
 from msg_adapters.frames import check_frame, read_transform
 from msg_adapters.paths import pose_to_array
 from msg_adapters.stamps import stamp_to_ns
+from rover_planner.parameters.traction_controller import TractionControllerParameters
+from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.navigation.sensor_mounts import SensorPoses
 from rover_planner.planning.navigation.transforms import (
     Rigid,
@@ -23,25 +24,7 @@ from rover_planner.planning.navigation.transforms import (
     write_pose,
 )
 
-
-class FrameParameters(Protocol):
-    """What those who know frames have as parameters."""
-
-    @property
-    def map_frame(self) -> str:
-        """Frame of the map."""
-
-    @property
-    def base_frame(self) -> str:
-        """Frame of the robot."""
-
-    @property
-    def base_offset(self) -> tuple[float, ...]:
-        """(6,) x, y, z [m], roll, pitch, yaw [rad] of the body in the frame of the robot."""
-
-    @property
-    def transform_timeout(self) -> float:
-        """Age from which a transform is refused [s]."""
+FrameParameters = TraverseServerParameters | TractionControllerParameters
 
 
 class Frames:
@@ -51,7 +34,7 @@ class Frames:
     """
 
     silence = ""
-    """Why transforms are not heard, to be added to a refusal."""
+    """Reason why transforms are not heard, to be added to a refusal."""
 
     def __init__(
         self,

@@ -8,7 +8,6 @@ from typing import Any
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import QoSProfile
 
 from rover_planner.ros.qos import latched_qos
 
@@ -21,13 +20,13 @@ class LazyPublisher:
     earlier question.
     """
 
-    def __init__(self, node: Node, kind: type, name: str, qos: QoSProfile | None = None):
+    def __init__(self, node: Node, kind: type, name: str):
         # A profile that is transient local and reliable matches every subscription: no mismatch is
         # possible. Its event handler would cost a quarter of a millisecond per request.
         silent = PublisherEventCallbacks(use_default_callbacks=False)
         self._node = node
         self._create = partial(
-            node.create_publisher, kind, name, qos or latched_qos(), event_callbacks=silent
+            node.create_publisher, kind, name, latched_qos(), event_callbacks=silent
         )
         self._publisher: Publisher = self._create()
         self._make: Callable[[], Any] | None = None
@@ -35,12 +34,12 @@ class LazyPublisher:
 
     @property
     def has_listeners(self) -> bool:
-        """Whether there is a subscriber."""
+        """True if there is a subscriber."""
         return self._publisher.get_subscription_count() > 0
 
     @property
     def is_awaited(self) -> bool:
-        """Whether a subscriber has not received the latest message."""
+        """True if a subscriber has not received the latest message."""
         return self._make is not None and self.has_listeners
 
     def publish(self, make: Callable[[], Any]) -> None:

@@ -16,22 +16,22 @@ NUMBER = re.compile(r"\d+(\.\d+)?")
 
 @dataclass
 class _Condition:
-    """What is known about a condition."""
+    """State of a condition."""
 
     holds: bool = False
-    """Whether it held when it was looked at last."""
+    """True if it held at the last look."""
     changed: bool = False
-    """Whether it has changed since the last line."""
-    told_at: float = -math.inf
+    """True if it has changed since the last line."""
+    logged_at: float = -math.inf
     """Time of the last line [s]."""
-    told: bool = False
-    """What the last line said: whether it held."""
+    logged: bool = False
+    """True if the last line said that it held."""
     passed: str = ""
     """The reason why it held last."""
 
 
 class TransitionLog:
-    """Logs changes of conditions; those within QUIET_TIME of a line are told by one line after."""
+    """Logs changes of conditions; those within QUIET_TIME of a line share one line after it."""
 
     def __init__(self, logger: RcutilsLogger):
         """Log to a node's logger."""
@@ -51,13 +51,13 @@ class TransitionLog:
         condition.passed = reason or condition.passed
         if bool(reason) != condition.holds:
             condition.holds, condition.changed = bool(reason), True
-        if not condition.changed or now - condition.told_at < QUIET_TIME:
+        if not condition.changed or now - condition.logged_at < QUIET_TIME:
             return
-        condition.changed, condition.told_at = False, now
-        was_told, condition.told = condition.told, bool(reason)
+        condition.changed, condition.logged_at = False, now
+        was_logged, condition.logged = condition.logged, bool(reason)
         if reason:
             self._logger.warning(reason)
-        elif was_told:
+        elif was_logged:
             self._logger.info(end)
         else:
             self._logger.info(f"{end}; it was for less than {QUIET_TIME:g} s: {condition.passed}")
@@ -67,7 +67,7 @@ class RepeatLog:
     """Knows when each kind of text was logged last; texts that differ in numbers are one kind."""
 
     def __init__(self) -> None:
-        self._told: dict[str, float] = {}
+        self._logged: dict[str, float] = {}
         self._left_out: dict[str, int] = {}
 
     def line(self, text: str, now: float) -> str:
@@ -76,10 +76,10 @@ class RepeatLog:
         The line also counts the texts of its kind that were left out since the one before.
         """
         kind = NUMBER.sub("#", text)
-        if now - self._told.get(kind, -REPEAT_PERIOD) < REPEAT_PERIOD:
+        if now - self._logged.get(kind, -REPEAT_PERIOD) < REPEAT_PERIOD:
             self._left_out[kind] = self._left_out.get(kind, 0) + 1
             return ""
-        self._told = {one: at for one, at in self._told.items() if now - at < REPEAT_PERIOD}
-        self._told[kind] = now
+        self._logged = {one: at for one, at in self._logged.items() if now - at < REPEAT_PERIOD}
+        self._logged[kind] = now
         count = self._left_out.pop(kind, 0)
         return f"{text} ({count} more since the last line)" if count else text

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Prepares maps in a thread of their own, so that a node goes on meanwhile."""
 
+import contextlib
 import math
 import threading
 import time
@@ -11,8 +12,12 @@ from typing import Any, Generic, TypeVar
 
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Header
 
 from msg_adapters.errors import MessageError
+from msg_adapters.stamps import stamp_to_ns
+from rover_planner.planning.navigation.transforms import Rigid, TransformError
+from rover_planner.ros.frames import Frames
 from rover_planner.ros.guard import INPUT_ERRORS
 
 WAIT = 0.02
@@ -20,20 +25,33 @@ WAIT = 0.02
 END_TIME = 2.0
 """Longest wait for the map in work when the intake is closed [s]."""
 
+CLOUD, GRID_MAP = "elevation_cloud", "elevation_map"
+"""Topics of maps: PointCloud2, and GridMap where its package is installed."""
+
 Map = TypeVar("Map")
 
 
 class MapIntake(Generic[Map]):
     """Takes serialised messages, prepares a map of the latest of each type, and returns it."""
 
-    def __init__(self, prepare: Callable[[Any], Map], refuse: Callable[[str], None]):
+    def __init__(
+        self,
+        prepare: Callable[[Any, Rigid | None], Map],
+        refuse: Callable[[str], None],
+        frames: Frames,
+    ):
         """Start the thread.
 
         Args:
-            prepare: Makes a map of a message; called in the thread; may raise INPUT_ERRORS.
+            prepare: Makes a map of a message and of where its frame is in that of the map, None
+                if it is that; called in the thread; may raise INPUT_ERRORS.
             refuse: Called in the thread with the reason why a message cannot be used.
+            frames: Knows where frames are on the map; asked in the thread.
         """
-        self._prepare, self._refuse = prepare, refuse
+        self._prepare, self._refuse, self._frames = prepare, refuse, frames
+        self.topic = CLOUD
+        """Topic of the map in work."""
+        self._unplaced: tuple[str, int | None] | None = None
         self._changed = threading.Condition()
         self._last: dict[type, bytes] = {}
         self._newest: dict[type, int] = {}
@@ -62,6 +80,22 @@ class MapIntake(Generic[Map]):
         if taken:
             kind, message = taken[-1]
             self._do_latest(message, kind)
+
+    @property
+    def waits_for_frame(self) -> bool:
+        """True if no transform was known for the last message."""
+        return self._unplaced is not None
+
+    def retry(self) -> None:
+        """Prepare the last message again if its transform has come meanwhile; call it each second.
+
+        A map that is published once may arrive before the first transform.
+        """
+        if self._unplaced is not None:
+            with contextlib.suppress(TransformError):
+                self._frames.find(*self._unplaced)
+                self._unplaced = None
+                self.repeat()
 
     def forget(self) -> None:
         """Forget the last messages, because another map replaces them."""
@@ -130,10 +164,21 @@ class MapIntake(Generic[Map]):
     def _prepare_map(self, message: bytes, kind: type, number: int) -> None:
         if number < self._newest[kind]:
             return
+        self.topic = CLOUD if kind is PointCloud2 else GRID_MAP
+        self._unplaced = None
         try:
-            self._ready = self._prepare(read_message(message, kind))
+            read = read_message(message, kind)
+            self._ready = self._prepare(read, self._find_source(read.header))
         except INPUT_ERRORS as error:
             self._refuse(str(error))
+
+    def _find_source(self, header: Header) -> Rigid | None:
+        stamp = stamp_to_ns(header.stamp)
+        try:
+            return self._frames.find_source(header.frame_id, stamp, self.topic)
+        except TransformError:
+            self._unplaced = header.frame_id, stamp
+            raise
 
 
 def read_message(message: bytes, kind: type) -> Any:

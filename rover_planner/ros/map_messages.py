@@ -20,7 +20,7 @@ LOOK_PERIOD = 0.5
 
 @dataclass(frozen=True)
 class MapSettings:
-    """How messages become maps."""
+    """Parameters by which messages become maps."""
 
     frame: str
     """Frame of the map."""

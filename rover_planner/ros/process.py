@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a node's process asks of the system: a log file, cached kernels, real-time priority."""
+"""A node's process and the system: a log file, cached kernels, real-time priority."""
 
 import ctypes
 import os
@@ -55,9 +55,9 @@ def log_fault() -> str:
 
 def log_folder() -> Path:
     """Return the folder of ROS's log files: ROS_LOG_DIR, else ROS_HOME/log, else ~/.ros/log."""
-    told = os.environ.get("ROS_LOG_DIR")
-    if told:
-        return Path(told).expanduser()
+    given = os.environ.get("ROS_LOG_DIR")
+    if given:
+        return Path(given).expanduser()
     home = os.environ.get("ROS_HOME") or str(Path(os.environ.get("HOME") or "/", ".ros"))
     return Path(home).expanduser() / "log"
 

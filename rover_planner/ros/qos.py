@@ -14,9 +14,9 @@ from rover_planner.parameters.shared import (
 HEAR_BEST_EFFORT = {
     QoSPolicyKind.RELIABILITY: f"set input_reliability to {BEST_EFFORT}, or publish it reliably"
 }
-"""What to do about best-effort publishers of what is subscribed to reliably."""
+"""Advice about best-effort publishers of what is subscribed to reliably."""
 HEAR_VOLATILE = {QoSPolicyKind.DURABILITY: f"set map_durability to {EITHER} or {VOLATILE}"}
-"""What to do about volatile publishers of what is subscribed to as transient local."""
+"""Advice about volatile publishers of what is subscribed to as transient local."""
 
 
 def topic_qos() -> QoSProfile:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Subscriptions that tell of publishers they cannot hear, with the parameter that mends it."""
+"""Subscriptions that warn of publishers they cannot hear, with the parameter that mends it."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -88,7 +88,7 @@ class PublisherCheck:
             advice: What to do about publishers of other types, by type.
         """
         self._node, self._types, self._advice = node, types, advice
-        self._told: set[str] = set()
+        self._logged: set[str] = set()
         self.problems: tuple[str, ...] = ()
         """The problems found last."""
         node.create_timer(PERIOD, self._check, clock=Clock(clock_type=ClockType.STEADY_TIME))
@@ -98,9 +98,9 @@ class PublisherCheck:
             problem for topic in self._types for problem in self._find_problems(topic)
         )
         for problem in self.problems:
-            if problem not in self._told:
+            if problem not in self._logged:
                 self._node.get_logger().warning(problem)
-        self._told = set(self.problems)
+        self._logged = set(self.problems)
 
     def _find_problems(self, topic: str) -> list[str]:
         """Return the problems of a topic's publishers, each once."""

@@ -17,23 +17,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-GRID_MAP_MSGS = {
-    "GridMapInfo": """
-        float64 resolution
-        float64 length_x
-        float64 length_y
-        geometry_msgs/Pose pose
-    """,
-    "GridMap": """
-        std_msgs/Header header
-        GridMapInfo info
-        string[] layers
-        string[] basic_layers
-        std_msgs/Float32MultiArray[] data
-        uint16 outer_start_index
-        uint16 inner_start_index
-    """,
-}
+from rover_planner.ros.bags.bag_reader import GRID_MAP_FIELDS, GRID_MAP_INFO_FIELDS
+
+GRID_MAP_MSGS = {"GridMapInfo": GRID_MAP_INFO_FIELDS, "GridMap": GRID_MAP_FIELDS}
 """Fields of the messages of grid_map_msgs for ROS 2, by name, those without others first."""
 TF2_MSGS = {"TFMessage": "geometry_msgs/TransformStamped[] transforms"}
 """Fields of the message of /tf."""

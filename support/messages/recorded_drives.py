@@ -3,6 +3,7 @@
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -89,19 +90,23 @@ def path_to(x: float) -> PathMessage:
     return message
 
 
-def record(folder: Path, messages: list[tuple[str, object]], storage: str = "mcap") -> Path:
-    """Write messages 10 ms apart to a new bag."""
+def record(folder: Path, messages: list[tuple[str, Any]], storage: str = "mcap") -> Path:
+    """Write messages 10 ms apart to a new bag: those of ROS, of the bag's library, or GridMaps."""
     types = get_typestore(Stores.ROS2_JAZZY)
+    for name, fields in (("GridMapInfo", GRID_MAP_INFO_FIELDS), ("GridMap", GRID_MAP_FIELDS)):
+        types.register(get_types_from_msg(fields, f"grid_map_msgs/msg/{name}"))
     with Writer(folder, version=9, storage_plugin=STORAGES[storage]) as writer:
         connections = {}
         for k, (topic, message) in enumerate(messages):
+            module, name = type(message).__module__.split(".")[0], type(message).__name__
+            is_grid_map = isinstance(message, SimpleNamespace)
+            kind = GRID_MAP if is_grid_map else getattr(message, "__msgtype__", "")
+            raw = types.serialize_cdr(message, kind) if kind else serialize_message(message)
             if topic not in connections:
-                package, name = type(message).__module__.split(".")[0], type(message).__name__
                 connections[topic] = writer.add_connection(
-                    topic, f"{package}/msg/{name}", typestore=types
+                    topic, kind or f"{module}/msg/{name}", typestore=types
                 )
-            stamp = BEGIN + 10_000_000 * k
-            writer.write(connections[topic], stamp, serialize_message(message))
+            writer.write(connections[topic], BEGIN + 10_000_000 * k, raw)
     return folder
 
 
@@ -110,28 +115,6 @@ def replay(capsys, bag: Path, out: Path, *words: str) -> tuple[list[dict], dict]
     assert main(["replay", str(bag), str(out), *words]) == 0, capsys.readouterr().err
     *answers, total = map(json.loads, capsys.readouterr().out.splitlines())
     return answers, total
-
-
-def record_grid_map(
-    folder: Path, message: object, transforms: dict[str, Any] | None = None
-) -> Path:
-    """Write a GridMap and an odometry to a new bag, as a robot with grid_map_msgs does.
-
-    TFMessages by their topics come before them.
-    """
-    types = get_typestore(Stores.ROS2_JAZZY)
-    for name, fields in (("GridMapInfo", GRID_MAP_INFO_FIELDS), ("GridMap", GRID_MAP_FIELDS)):
-        types.register(get_types_from_msg(fields, f"grid_map_msgs/msg/{name}"))
-    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        for topic, transform in (transforms or {}).items():
-            kind = transform.__msgtype__
-            tf = writer.add_connection(topic, kind, typestore=types)
-            writer.write(tf, BEGIN - 1, types.serialize_cdr(transform, kind))
-        odometry = writer.add_connection("/odometry", "nav_msgs/msg/Odometry", typestore=types)
-        writer.write(odometry, BEGIN, serialize_message(odometry_at(1.0)))
-        grid = writer.add_connection("/elevation_map", GRID_MAP, typestore=types)
-        writer.write(grid, BEGIN + 1, types.serialize_cdr(message, GRID_MAP))
-    return folder
 
 
 def imu_at(roll: float) -> Imu:
@@ -157,18 +140,3 @@ def transforms_of(parent: str, child: str, rigid: Rigid):
     header = types["std_msgs/msg/Header"](time, parent)
     stamped = geometry["TransformStamped"](header, child, transform)
     return types["tf2_msgs/msg/TFMessage"]([stamped])
-
-
-def record_with_transforms(folder: Path, transforms: dict, messages: list) -> Path:
-    """Write transforms by topic and then messages to a new bag, at the time BEGIN."""
-    types = get_typestore(Stores.ROS2_JAZZY)
-    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        for topic, message in transforms.items():
-            connection = writer.add_connection(topic, message.__msgtype__, typestore=types)
-            writer.write(connection, BEGIN, types.serialize_cdr(message, message.__msgtype__))
-        for topic, message in messages:
-            package, name = type(message).__module__.split(".")[0], type(message).__name__
-            kind = f"{package}/msg/{name}"
-            connection = writer.add_connection(topic, kind, typestore=types)
-            writer.write(connection, BEGIN + 1, serialize_message(message))
-    return folder

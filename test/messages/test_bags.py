@@ -12,7 +12,6 @@ from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.grid_map import terrain_from_grid_map
-from rover_physics import judge_path, load_rover
 from support.messages.grid_maps import move_buffer
 
 DATA = Path(__file__).resolve().parents[1] / "data"
@@ -58,18 +57,6 @@ def test_a_grid_map_of_legged_robots_is_read_from_its_bag(recorded_grid_map):
         assert terrain.elevation[row, column] == stored[k]
     moved = terrain_from_grid_map(move_buffer(recorded_grid_map, 11, 97))
     assert moved.elevation.tobytes() == terrain.elevation.tobytes()
-
-
-def test_a_rover_climbs_the_ramp_of_the_recorded_map_and_not_its_wall(recorded_grid_map):
-    """The ramp rises by 0.4 m in 1 m towards +x; beside it is a wall of 0.3 m."""
-    terrain, rover = terrain_from_grid_map(recorded_grid_map), load_rover("lsr1")
-    x = np.arange(-0.6, -0.35, 0.05)
-    on_ramp, _ = judge_path(rover, terrain, np.column_stack([x, 0 * x + 1.0, 0 * x]))
-    assert on_ramp.settled.all()
-    np.testing.assert_allclose(on_ramp.pitch, -np.arctan(0.4), atol=0.04)  # the nose is up
-    x = np.arange(-0.9, -0.2, 0.02)
-    _, verdict = judge_path(rover, terrain, np.column_stack([x, 0 * x - 0.3, 0 * x]))
-    assert verdict.code == "wheel_lift"  # at the wall
 
 
 def test_hazcam_points_of_spirit_become_ground_with_the_height_that_was_asked_for():

@@ -10,7 +10,7 @@ from sensor_msgs.msg import JointState
 
 from msg_adapters.commands import joint_order
 from msg_adapters.errors import MessageError
-from msg_adapters.joints import OWN_NAMES, convert_steering, joint_positions, read_joint_map
+from msg_adapters.joints import OWN_NAMES, convert_steering, read_joint_map
 from msg_adapters.results.predictions import JOINTS, joint_trajectory
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.rover.rover_file import load_rover
@@ -25,7 +25,7 @@ WANTED = ("rocker_left", "bogie_left")
 def test_positions_are_found_by_name_in_any_order_and_others_are_not_looked_at():
     state = JointState(name=["bogie_left", "camera", "camera", "rocker_left"])
     state.position = [0.2, math.nan, 9.0, 0.1]
-    assert joint_positions(state, WANTED) == {"rocker_left": 0.1, "bogie_left": 0.2}
+    assert OWN_NAMES.positions(state, WANTED) == {"rocker_left": 0.1, "bogie_left": 0.2}
 
 
 @pytest.mark.parametrize(
@@ -38,7 +38,7 @@ def test_positions_are_found_by_name_in_any_order_and_others_are_not_looked_at()
     ],
 )
 def test_a_message_without_wanted_positions_says_nothing(state):
-    assert joint_positions(state, WANTED) == {}
+    assert OWN_NAMES.positions(state, WANTED) == {}
 
 
 @pytest.mark.parametrize(
@@ -53,12 +53,12 @@ def test_a_message_without_wanted_positions_says_nothing(state):
 )
 def test_joint_states_that_disagree_or_are_not_finite_are_refused(names, positions, text):
     with pytest.raises(MessageError, match=text):
-        joint_positions(JointState(name=names, position=positions), WANTED)
+        OWN_NAMES.positions(JointState(name=names, position=positions), WANTED)
 
 
 def test_steering_is_converted_to_positive_left_and_back_and_nothing_else_is():
     state = JointState(name=["front_left_steering", "rocker_left"], position=[0.3, 0.1])
-    read = joint_positions(state, ("rocker_left", *STEERING_JOINTS))
+    read = OWN_NAMES.positions(state, ("rocker_left", *STEERING_JOINTS))
     assert convert_steering(read, LEFT) == {"front_left_steering": 0.3, "rocker_left": 0.1}
     turned = convert_steering(read, RIGHT)
     assert turned == {"front_left_steering": -0.3, "rocker_left": 0.1}

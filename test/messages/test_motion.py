@@ -107,9 +107,9 @@ MAST = "in frame 'mast'.*imu_frame and imu_mounting"
     ("read", "message", "text"),
     [
         (read_imu, imu(frame="mast"), MAST),
-        *[(read_imu, imu((x, 0.0, 0.0, 0.0)), "imu has orientation") for x in (1e155, INF, NAN)],
-        *[(read_odometry, odometry(turn=x), "has orientation") for x in (1e155, 1.7e308, NAN)],
-        *[(read_odometry, odometry(y=y), "must be within 1e") for y in (1e200, -1e9, NAN, INF)],
+        *[(read_imu, imu((x, 0.0, 0.0, 0.0)), "imu has orientation") for x in (1e155, NAN)],
+        *[(read_odometry, odometry(turn=x), "has orientation") for x in (1e155, NAN)],
+        *[(read_odometry, odometry(y=y), "must be within 1e") for y in (-1e9, NAN)],
         *[(read_odometry, odometry(variance=v), "variances within") for v in (1e200, NAN)],
         (read_odometry, odometry("mast"), "is of frame 'mast'; it must be of 'base_li"),
         *[

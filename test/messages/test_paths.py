@@ -25,9 +25,7 @@ from msg_adapters.paths import (
     stamped_pose_to_array,
     yaw_from_quaternion,
 )
-from rover_physics.numerics.quaternions import length_of, xyzw_from_rpy
-
-HUGE = (1.1e9, 1e155, 1.7e308, math.inf, math.nan)
+from rover_physics.numerics.quaternions import xyzw_from_rpy
 
 
 @pytest.mark.parametrize("yaw", [-3.0, -math.pi / 2, 0.0, 2.5])
@@ -49,34 +47,15 @@ def test_the_heading_of_a_tilted_body_is_its_yaw():
     ("quaternion", "text"),
     [
         ((0.0, 0.0, 0.0, 0.0), "has length 0; it must be a quaternion of length 1"),
-        ((0.0, 0.0, 1.0, 1.0), "has length 1.41"),
         ((0.0, math.nan, 0.0, 1.0), "is not finite"),
-        ((0.0, 0.0, math.inf, 1.0), "is not finite"),
         ((0.0, -math.sqrt(0.5), 0.0, math.sqrt(0.5)), "it has no heading"),
         ((1e155, 0.0, 0.0, 0.0), r"has length 1e\+155; it must be"),
-        ((0.0, 0.0, 0.0, 1.7e308), r"has length 1.7e\+308; it must be"),
     ],
 )
 def test_a_bad_quaternion_is_refused(quaternion, text):
     x, y, z, w = quaternion
     with pytest.raises(MessageError, match=text):
         yaw_from_quaternion(Quaternion(x=x, y=y, z=z, w=w), "goal orientation")
-
-
-def test_the_length_of_a_quaternion_never_overflows():
-    assert length_of((3e200, 0.0, 4e200, 0.0)) == pytest.approx(5e200)
-    assert length_of((1.7e308, 1.7e308, 0.0, 0.0)) == math.inf
-    assert length_of((3e-200, 0.0, 4e-200, 0.0)) == pytest.approx(5e-200)
-    assert math.isnan(length_of((math.nan, 0.0, 0.0, 1.0)))
-
-
-@pytest.mark.parametrize("huge", HUGE)
-def test_a_position_beyond_any_map_is_refused(huge):
-    for x, y in ((huge, 0.0), (0.0, -huge)):
-        pose = stamped_pose((0.0, 0.0, 0.0), "map")
-        pose.pose.position.x, pose.pose.position.y = x, y
-        with pytest.raises(MessageError, match=r"goal has position x .* finite, in .* 1e\+09"):
-            stamped_pose_to_array(pose, "map", "goal")
 
 
 @pytest.mark.parametrize(

@@ -15,10 +15,8 @@ from msg_adapters.paths import PoseStock, settled_path
 from msg_adapters.results.markers import IMPASSABLE, PASSABLE, path_markers
 from msg_adapters.results.predictions import (
     JOINTS,
-    MEASURES,
     array_values,
     joint_trajectory,
-    tip_over_array,
     waypoint_array,
 )
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
@@ -70,15 +68,6 @@ def test_an_array_whose_length_disagrees_is_refused():
         array_values(message)
     with pytest.raises(MessageError, match=r"dimensions \[\] and 0 values"):
         array_values(Float64MultiArray())
-
-
-def test_tip_over_margins_are_the_measures_by_column(prediction):
-    message = tip_over_array(prediction)
-    assert [dim.label for dim in message.layout.dim] == ["waypoint", "measure"]
-    for column, measure in enumerate(MEASURES):
-        np.testing.assert_array_equal(
-            array_values(message)[:, column], getattr(prediction, measure)
-        )
 
 
 def test_the_trajectory_names_its_joints_and_ends_where_the_rover_cannot_settle(

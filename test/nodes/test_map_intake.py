@@ -8,11 +8,14 @@ from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cl
 from rover_physics.errors import ModelError
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traction.map_contacts import MapContactFinder
+from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.ros.frames import Frames
 from rover_planner.ros.map_intake import MapIntake
 from support.rough_grounds import plane
 from support.waiting import wait_until
 
 LSR1 = load_rover("lsr1")
+FRAMES = Frames(TraverseServerParameters(), lambda: 0)
 
 
 def cloud_of(half):
@@ -22,11 +25,11 @@ def cloud_of(half):
 def test_a_map_is_prepared_once_and_returned_once():
     made = []
 
-    def prepare(cloud):
+    def prepare(cloud, _source):
         made.append(MapContactFinder(LSR1, terrain_from_point_cloud(cloud)))
         return made[-1]
 
-    intake = MapIntake(prepare, made.append)
+    intake = MapIntake(prepare, made.append, FRAMES)
     # Serialised once: the padding between fields is not initialised, so bytes may differ else.
     cloud = cloud_of(1.0)
     intake.offer(cloud)
@@ -43,12 +46,12 @@ def test_a_map_is_prepared_once_and_returned_once():
 def test_a_map_that_cannot_be_used_is_refused_and_the_next_is_taken():
     told = []
 
-    def prepare(cloud):
+    def prepare(cloud, _source):
         if cloud.width < 60:
             raise ModelError("too small")
         return MapContactFinder(LSR1, terrain_from_point_cloud(cloud))
 
-    intake = MapIntake(prepare, told.append)
+    intake = MapIntake(prepare, told.append, FRAMES)
     intake.offer(cloud_of(0.5))
     wait_until(lambda: told, "the refusal")
     assert told == ["too small"] and intake.take() is None
@@ -59,7 +62,7 @@ def test_a_map_that_cannot_be_used_is_refused_and_the_next_is_taken():
 
 def test_damaged_bytes_are_refused_as_no_cloud():
     told = []
-    intake = MapIntake(lambda cloud: cloud, told.append)
+    intake = MapIntake(lambda cloud, _: cloud, told.append, FRAMES)
     intake.offer(b"\x00\x01\x00\x00" + b"\xff" * 40)
     intake.wait(intake.ticket(), lambda: None)
     intake.close()

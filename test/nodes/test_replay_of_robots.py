@@ -21,8 +21,6 @@ from support.messages.recorded_drives import (
     odometry_at,
     path_to,
     record,
-    record_grid_map,
-    record_with_transforms,
     replay,
     transforms_of,
     waves,
@@ -70,7 +68,7 @@ def test_recorded_transforms_place_odometry_and_clouds_on_the_map(tmp_path, caps
         "/tf_static": transforms_of("base_link", "camera", mount),
     }
     messages = [("/odometry", odometry), ("/elevation_cloud", seen)]
-    bag = record_with_transforms(tmp_path / "bag", transforms, messages)
+    bag = record(tmp_path / "bag", [*transforms.items(), *messages])
     words = ["--resolution", "0.04", "--goal", "3,0.2,0"]
     (answer,), total = replay(capsys, bag, tmp_path / "out", *words)
     assert total["refused_messages"] == {} and total["topics"]["tf"] == "/tf"
@@ -90,7 +88,8 @@ def test_a_grid_map_in_odom_is_laid_onto_the_loaded_map(tmp_path, capsys):
     message = grid_map_of({"elevation": 0.05 * np.sin(2.0 * x) * np.cos(y)}, 0.04)
     message.header.frame_id = "odom"
     transforms = {"/tf_static": transforms_of("map", "odom", map_odom)}
-    bag = record_grid_map(tmp_path / "bag", message, transforms)
+    messages = [("/odometry", odometry_at(1.0)), ("/elevation_map", message)]
+    bag = record(tmp_path / "bag", [*transforms.items(), *messages])
     words = ["--parameters", str(file), "--goal", "3,0.2,0"]
     (answer,), total = replay(capsys, bag, tmp_path / "out", *words)
     assert total["refused_messages"] == {}

@@ -1,40 +1,45 @@
 # SPDX-License-Identifier: Apache-2.0
 """The maps of a traverse server: topics, files, and what the rover itself knows."""
 
-import contextlib
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
+from nav_msgs.srv import LoadMap
 from rclpy.node import Node
 from sensor_msgs.msg import Imu, PointCloud2
 
 from msg_adapters.errors import MessageError
 from msg_adapters.imu import ImuMounting, imu_to_attitude
+from msg_adapters.results.grids import terrain_to_occupancy_grid
 from msg_adapters.sensing import BASE_FRAME
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
-from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_physics.files.validation import show_file
+from rover_physics.terrain.grid import load_terrain
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.service_settings import keeper_settings
+from rover_planner.planning.answering.service_settings import keeper_settings, map_limits
 from rover_planner.planning.answering.traverse_service import TraverseService
-from rover_planner.planning.navigation.transforms import TransformError
+from rover_planner.planning.navigation.transforms import Rigid
+from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.frames import Frames
+from rover_planner.ros.guard import INPUT_ERRORS, Guard
+from rover_planner.ros.handover import Handover
 from rover_planner.ros.logs import RepeatLog
-from rover_planner.ros.map_intake import MapIntake
+from rover_planner.ros.map_intake import CLOUD, GRID_MAP, MapIntake
 from rover_planner.ros.map_messages import LOOK_PERIOD, MapSettings, read_map
 from rover_planner.ros.optional_types import find_type
 from rover_planner.ros.qos import sensor_qos
 from rover_planner.ros.subscriptions import subscribe_to_map
+from rover_planner.worlds.map_file import MapFileError, open_map
 from rover_planner.worlds.maps.living_map import MapSnapshot
 from rover_planner.worlds.maps.map_keeper import MapKeeper
 from rover_planner.worlds.summary import describe_terrain
 
-CLOUD, GRID_MAP = "elevation_cloud", "elevation_map"
-"""Topics of maps: PointCloud2, and GridMap where its package is installed."""
 LOG_PERIOD = 10.0
 """Shortest time between two log lines about maps that merge, or come again and again [s]."""
 FIRST_MAPS = 20
-"""Maps that replace each other of which each is told in the log."""
+"""Maps that replace each other of which each has a line in the log."""
 MERGE_WAIT = 0.005
 """Longest wait of a question for a map that is to be merged into the one that is there [s]. A busy
 machine may take 15 ms more to wake the thread until it is 20 ms."""
@@ -48,39 +53,42 @@ class MapTopics:
         node: Node,
         service: TraverseService,
         parameters: TraverseServerParameters,
-        tell: Callable[[str], None],
+        report: Callable[[str], None],
         frames: Frames,
+        guard: Guard,
     ):
-        """Subscribe to the maps and load the first one.
+        """Subscribe to the maps, serve ~/load_map and load the first one.
 
         Args:
             node: The node.
             service: Takes the maps.
             parameters: The parameters of the node.
-            tell: Called in the thread after each map: with the reason if it was refused, else
+            report: Called in the thread after each map: with the reason if it was refused, else
                 with an empty text.
             frames: Knows where the frames of messages are on the map; asked in the thread.
+            guard: Takes unexpected errors.
 
         Raises:
             TerrainError: The file of the parameter terrain_file cannot be loaded.
         """
-        self._node, self._service, self._tell = node, service, tell
-        self._frames = frames
-        self._settings = MapSettings.of(parameters)
-        self._fills = parameters.fill_under_rover
+        self._node, self._service, self._report = node, service, report
+        self._guard, self._handover = guard, Handover(node, guard)
+        self._values, self._settings = parameters, MapSettings.of(parameters)
         self._keeper = MapKeeper(service.settings.rover, keeper_settings(parameters))
         self._is_from_topic = False
-        self._topic, self._looked = CLOUD, -float("inf")
-        self._told, self._told_kind = -float("inf"), ("", False)
+        self._looked = -float("inf")
+        self._logged_at, self._logged_kind = -float("inf"), ("", False)
         self._map_count, self._refusals = 0, RepeatLog()
-        self._unplaced: tuple[str, int | None] | None = None
         if parameters.terrain_file:
             terrain = load_terrain(parameters.terrain_file, parameters.max_map_cells)
             self._keep(self._keeper.load(terrain, self._now(), None), parameters.terrain_file)
-        self._intake: MapIntake[None] = MapIntake(self._take_message, self._refuse)
+        self._intake: MapIntake[None] = MapIntake(self._take_message, self._refuse, frames)
+        self.retry = self._intake.retry
+        """Takes the last message if its transform has come meanwhile; to be called each second."""
         self._subscribe(CLOUD, PointCloud2, parameters)
         if parameters.imu_attitude:
             self._subscribe_to_imu(parameters)
+        serve_later(node, LoadMap, "~/load_map", self._load_map)
         grid_map = find_type("grid_map_msgs.msg:GridMap")
         if grid_map is not None:
             self._subscribe(GRID_MAP, grid_map, parameters)
@@ -125,7 +133,7 @@ class MapTopics:
         Those of merging and filling count from the next map on.
         """
         before, self._settings = self._settings, MapSettings.of(parameters)
-        self._fills = parameters.fill_under_rover
+        self._values = parameters
         settings, rover = keeper_settings(parameters), self._service.settings.rover
         self._intake.do(lambda: self._keeper.apply(rover, settings))
         if self._is_from_topic and before != self._settings:
@@ -133,35 +141,49 @@ class MapTopics:
         else:
             self._intake.do(self._service.refresh_map)
 
-    def do(self, job: Callable[[], None]) -> None:
-        """Call a function in the thread of the maps."""
-        self._intake.do(job)
+    def _load_map(
+        self, request: LoadMap.Request, response: LoadMap.Response, reply: Reply
+    ) -> None:
+        """Load the map of a file in the thread, then reply."""
 
-    def take_file(self, terrain: Terrain, file: str) -> None:
-        """Take the terrain of a file; call it in the thread of the maps."""
+        def load() -> None:
+            try:
+                self._load(request.map_url, response)
+            except Exception as error:
+                self._guard.report("load_map", error)
+                response.result = LoadMap.Response.RESULT_INVALID_MAP_DATA
+            self._handover.call(partial(reply, response))
+
+        self._intake.do(load)
+
+    def _load(self, url: str, response: LoadMap.Response) -> None:
+        """Take the map of a file and fill the response."""
+        try:
+            terrain = open_map(url, map_limits(self._values))
+            snapshot = self._keeper.load(terrain, self._now(), self._service.standing())
+        except INPUT_ERRORS as error:
+            self._node.get_logger().error(f"load_map: {error}")
+            missing = isinstance(error, MapFileError)
+            response.result = (
+                LoadMap.Response.RESULT_MAP_DOES_NOT_EXIST
+                if missing
+                else LoadMap.Response.RESULT_INVALID_MAP_DATA
+            )
+            return
         self._intake.forget()
         self._is_from_topic = False
-        self._take(self._keeper.load(terrain, self._now(), self._service.standing()), file, None)
+        self._take(snapshot, show_file(url), None)
+        stamp = self._node.get_clock().now().to_msg()
+        response.map = terrain_to_occupancy_grid(terrain, self._settings.frame, stamp)
+        response.result = LoadMap.Response.RESULT_SUCCESS
 
     def look_under_rover(self) -> None:
         """Have unknown ground under the rover filled, at most every LOOK_PERIOD."""
         now = time.monotonic()
-        is_due = self._fills and now - self._looked >= LOOK_PERIOD
+        is_due = self._values.fill_under_rover and now - self._looked >= LOOK_PERIOD
         if is_due and self._service.standing() is not None:
             self._looked = now
             self._intake.do(self._fill_under_rover)
-
-    def retry(self) -> None:
-        """Take the last message again if its transform has come meanwhile; call it each second.
-
-        A map that is published once may arrive before the first transform.
-        """
-        if self._unplaced is None:
-            return
-        with contextlib.suppress(TransformError):
-            self._frames.find(*self._unplaced)
-            self._unplaced = None
-            self._intake.repeat()
 
     def close(self) -> None:
         """End the thread."""
@@ -172,19 +194,12 @@ class MapTopics:
         if self._is_from_topic:
             self._service.renew_map()
 
-    def _take_message(self, message: Any) -> None:
-        self._topic = CLOUD if isinstance(message, PointCloud2) else GRID_MAP
-        frame, stamp = message.header.frame_id, stamp_to_ns(message.header.stamp)
-        self._unplaced = None
-        try:
-            source = self._frames.find_source(frame, stamp, self._topic)
-        except TransformError:
-            self._unplaced = frame, stamp
-            raise
+    def _take_message(self, message: Any, source: Rigid | None) -> None:
         terrain = read_map(message, self._settings, source, self._keeper)
+        topic, stamp = self._intake.topic, stamp_to_ns(message.header.stamp)
         since = self._now() if stamp is None else stamp / NANOSECONDS
-        kept = self._keeper.take(terrain, self._topic, since, self._service.standing())
-        self._take(kept, self._topic, stamp)
+        kept = self._keeper.take(terrain, topic, since, self._service.standing())
+        self._take(kept, topic, stamp)
         self._is_from_topic = True
 
     def _fill_under_rover(self) -> None:
@@ -200,15 +215,15 @@ class MapTopics:
 
     def _take(self, snapshot: MapSnapshot, source: str, stamp: int | None) -> None:
         is_new = self._keep(snapshot, source, stamp)
-        self._tell("")
+        self._report("")
         if is_new:
             taken, now = self._service.terrain, time.monotonic()
             assert taken is not None
             kind = source, self._keeper.merges
             self._map_count += not kind[1]
-            is_due = now - self._told >= LOG_PERIOD or kind != self._told_kind
+            is_due = now - self._logged_at >= LOG_PERIOD or kind != self._logged_kind
             if is_due or (not kind[1] and self._map_count <= FIRST_MAPS):
-                self._told, self._told_kind = now, kind
+                self._logged_at, self._logged_kind = now, kind
                 self._node.get_logger().info(f"map from {source}: {describe_terrain(taken)}")
 
     def _keep(self, snapshot: MapSnapshot, source: str, stamp: int | None = None) -> bool:
@@ -224,7 +239,9 @@ class MapTopics:
     def _refuse(self, error: str) -> None:
         there = self._service.known_map is not None
         kept = "the last good map stays" if there else "there is no map yet"
-        line = self._refusals.line(f"{self._topic} refused, {kept}: {error}", time.monotonic())
+        line = self._refusals.line(
+            f"{self._intake.topic} refused, {kept}: {error}", time.monotonic()
+        )
         if line:
             self._node.get_logger().error(line)
-        self._tell(error)
+        self._report(error)

@@ -35,7 +35,7 @@ class DriveFailedError(Exception):
 
 
 class RoverClient(Protocol):
-    """What a drive needs of server and rover."""
+    """The part of server and rover that a drive needs."""
 
     def ask(self, start: Sequence[float], goal: Sequence[float]) -> dict[str, Any]:
         """Return `traversable`, `reason` and the `poses` of a way from start to goal."""
@@ -52,7 +52,7 @@ class RoverClient(Protocol):
 
 @dataclass(frozen=True)
 class DriveSettings:
-    """How a drive is watched."""
+    """Distances and times by which a drive is watched."""
 
     within: float = 0.2
     """Distance from the end of a plan that counts as there [m]."""
@@ -65,12 +65,12 @@ class DriveSettings:
 
 
 class Stretch(NamedTuple):
-    """How far a plan was driven."""
+    """The part of a plan that was driven."""
 
     pose: Poses
     """(3,) where the rover is."""
     hindrance: str
-    """What hinders it there; empty at the end of the plan."""
+    """Reason why it does not go on; empty at the end of the plan."""
     behind: Poses
     """(n, 3) waypoints of the plan up to there."""
 
@@ -80,7 +80,7 @@ def drive_to(
     goal: Sequence[float],
     plan: Sequence[Sequence[float]],
     settings: DriveSettings,
-    tell: Callable[[str], object],
+    report: Callable[[str], object],
 ) -> None:
     """Drive a plan, and ask for another one where it cannot be driven to the goal.
 
@@ -93,13 +93,13 @@ def drive_to(
         goal: Where to, x, y [m] and yaw [rad].
         plan: Poses of the first plan.
         settings: How it is watched.
-        tell: Takes in words what happens.
+        report: Takes events in words.
 
     Raises:
         DriveFailedError: There is no way from where the rover is, it does not get on, or it takes
             too long.
     """
-    _Drive(client, goal, settings, tell).run(np.array(plan))
+    _Drive(client, goal, settings, report).run(np.array(plan))
 
 
 class _Drive:
@@ -110,10 +110,10 @@ class _Drive:
         client: RoverClient,
         goal: Sequence[float],
         settings: DriveSettings,
-        tell: Callable[[str], object],
+        report: Callable[[str], object],
     ):
         """Begin; arguments as for `drive_to`."""
-        self._client, self._goal, self._settings, self._tell = client, goal, settings, tell
+        self._client, self._goal, self._settings, self._report = client, goal, settings, report
         self._deadline = time.monotonic() + settings.timeout
         self._stops = Stops()
         self._trail: Poses = np.zeros((0, 3))
@@ -134,7 +134,7 @@ class _Drive:
             self._trail = stretch.behind
         pose, stops = self._stand(stretch.pose), 0
         if stretch.hindrance:
-            self._tell(stretch.hindrance)
+            self._report(stretch.hindrance)
             stops = self._stops.count(pose)
         if stops > MAX_STOPS:
             raise DriveFailedError(
@@ -148,7 +148,7 @@ class _Drive:
                 answer = self._ask(pose)
         if not answer["traversable"]:
             raise DriveFailedError(f"no way on from {_describe(pose)}: {answer['reason']}")
-        self._tell(f"another plan from {_describe(pose)}")
+        self._report(f"another plan from {_describe(pose)}")
         return np.array(answer["poses"])
 
     def _ask(self, pose: Poses) -> dict[str, Any]:
@@ -196,7 +196,7 @@ class _Drive:
         back, self._trail = self._trail[is_back][::-1], self._trail[~is_back]
         if self._client.check(back):
             return False
-        self._tell(f"back to {_describe(back[-1])}")
+        self._report(f"back to {_describe(back[-1])}")
         return not self._follow(back).hindrance
 
     def _stand(self, pose: Poses) -> Poses:

@@ -16,19 +16,19 @@ class MissionOptions:
     """The options of a mission planner."""
 
     start: Pose
-    """Where the rover stands."""
+    """Pose of the rover, x, y [m], yaw [rad]."""
     goals: tuple[Pose, ...]
     """Its goals; the server is queried once for each."""
     map_name: str | None
     """Preset or file of the map to publish first; None publishes none."""
     drive: bool
-    """Whether to send plans to the rover."""
+    """True sends plans to the rover."""
     map_frame: str
     """Frame of map and poses."""
     timeout: float
     """Longest wait for each answer [s]."""
     json: bool
-    """Whether to print JSON."""
+    """True prints JSON."""
 
 
 def read_mission(

@@ -27,7 +27,6 @@ from rover_planner.ros.guard import INPUT_ERRORS, Guard
 from rover_planner.ros.handover import Handover
 from rover_planner.ros.lazy_publisher import LazyPublisher
 from rover_planner.ros.logs import TransitionLog
-from rover_planner.ros.qos import latched_qos
 
 PERIOD = 0.5
 """Time between two looks for a new map [s]; comparing two large maps takes a tenth of it."""
@@ -104,9 +103,7 @@ class HazardTopics:
     def _create_topics(self) -> None:
         """Create the topics, which a node without a hazard map does not have."""
         for name in ("worst", "best", *(f"heading_{k}" for k in range(self._headings))):
-            self._topics[name] = LazyPublisher(
-                self._node, OccupancyGrid, f"~/hazard_map/{name}", latched_qos()
-            )
+            self._topics[name] = LazyPublisher(self._node, OccupancyGrid, f"~/hazard_map/{name}")
 
     def close(self) -> None:
         """End the thread."""
@@ -209,7 +206,7 @@ class HazardTopics:
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """What is published."""
+    """A view of the classes as it is published."""
 
     view: HazardView
     """The classes."""

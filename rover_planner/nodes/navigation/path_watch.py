@@ -46,7 +46,7 @@ END_TIME = 2.0
 
 FindPose = Callable[[], NDArray[np.float64] | None]
 """Returns the pose (3,) x, y [m] and yaw [rad] of the body of just now, map frame."""
-Tell = Callable[[PathJudgement, str, Snapshot], None]
+ReportStop = Callable[[PathJudgement, str, Snapshot], None]
 """Publishes why the rover is to stop, with the hash of its path and what was known."""
 
 
@@ -60,7 +60,7 @@ class PathWatch:
         parameters: TraverseServerParameters,
         guard: Guard,
         find_pose: FindPose,
-        tell: Tell,
+        report_stop: ReportStop,
     ):
         """Create topic, service and thread.
 
@@ -70,16 +70,16 @@ class PathWatch:
             parameters: The parameters of the node.
             guard: Takes unexpected errors.
             find_pose: Returns where the body is; None if it is not known.
-            tell: Called in the executor's thread when the rover is to stop.
+            report_stop: Called in the executor's thread when the rover is to stop.
         """
-        self._node, self._service, self._guard, self._tell = node, service, guard, tell
-        self._find_pose = find_pose
+        self._node, self._service, self._guard = node, service, guard
+        self._find_pose, self._report_stop = find_pose, report_stop
         self._monitor = PathMonitor(watch_settings(parameters))
         self.finding = self._monitor.finding
-        """What was found last; belongs to the executor's thread."""
+        """The last finding; belongs to the executor's thread."""
         self.enabled = False
-        """Whether accepted paths are watched."""
-        self._told: PathJudgement | None = None
+        """True while accepted paths are watched."""
+        self._reported: PathJudgement | None = None
         self._last_path: WatchedPath | None = None
         self._stop = node.create_publisher(Bool, "~/stop", latched_qos())
         self._handover = Handover(node, guard)
@@ -192,12 +192,14 @@ class PathWatch:
         """Publish a finding at once; classes of a stop's waypoints take longer and follow."""
         self._handover.call(lambda: self._take(finding))
         judgement = finding.judgement
-        if finding.state != STOPPED or judgement is None or judgement is self._told:
+        if finding.state != STOPPED or judgement is None or judgement is self._reported:
             return
-        self._told = judgement
+        self._reported = judgement
         with interruptible(self._check_end):
-            told = judgement.complete()
-        self._handover.call(lambda: self._tell(told, finding.path_hash, sight.snapshot))
+            complete = judgement.complete()
+        self._handover.call(
+            lambda: self._report_stop(complete, finding.path_hash, sight.snapshot)
+        )
 
     def _take(self, finding: Finding) -> None:
         """Publish ~/stop where it has changed; called in the executor's thread."""

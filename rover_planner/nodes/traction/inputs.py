@@ -21,7 +21,7 @@ from rover_planner.nodes.navigation.frames import NodeFrames
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.ros.guard import INPUT_ERRORS, Guard
 from rover_planner.ros.logs import TransitionLog
-from rover_planner.ros.map_intake import MapIntake
+from rover_planner.ros.map_intake import CLOUD, MapIntake
 from rover_planner.ros.qos import sensor_qos
 from rover_planner.ros.subscriptions import PublisherCheck, subscribe_to_map
 from rover_planner.traction.clocks import NANOSECONDS, StampCheck, StampError
@@ -37,7 +37,6 @@ JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
 ANGLES = (*SUSPENSION_JOINTS, *STEERING_JOINTS)
 """Joints whose positions are read; a rover has the steering joints of its steered wheels."""
 TWIST, TWIST_STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
-CLOUD = "elevation_cloud"
 
 
 class TractionInputs:

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The map of the traction controller: clouds of the map's frame, or of one that /tf connects."""
 
-import contextlib
 import time
 from collections.abc import Callable
 
@@ -9,16 +8,13 @@ from rclpy.node import Node
 from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.elevation import terrain_from_point_cloud
-from msg_adapters.stamps import stamp_to_ns
 from rover_physics.rover.model import Rover
 from rover_physics.traction.map_contacts import MapContactFinder
 from rover_planner.nodes.navigation.frames import NodeFrames
 from rover_planner.parameters.traction_controller import TractionControllerParameters
-from rover_planner.planning.navigation.transforms import TransformError
+from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.logs import RepeatLog
-from rover_planner.ros.map_intake import MapIntake
-
-CLOUD = "elevation_cloud"
+from rover_planner.ros.map_intake import CLOUD, MapIntake
 
 
 class TractionMaps(MapIntake[MapContactFinder]):
@@ -39,11 +35,10 @@ class TractionMaps(MapIntake[MapContactFinder]):
             rover: Returns the rover for which maps are prepared.
             frames: Knows where the frames of clouds are on the map.
         """
-        self._node, self._rover, self._frames = node, rover, frames
+        self._node, self._rover, self._listen = node, rover, frames.listen
         self._parameters = parameters
         self._refusals = RepeatLog()
-        self._unplaced: tuple[str, int | None] | None = None
-        super().__init__(self._make, self._tell)
+        super().__init__(self._make, self._log_refusal, frames)
 
     def apply(self, parameters: TractionControllerParameters) -> None:
         """Prepare the last map again if a parameter of it has changed."""
@@ -54,28 +49,17 @@ class TractionMaps(MapIntake[MapContactFinder]):
 
     def look_for_frame(self) -> None:
         """Listen to /tf if a map needs it, and take it when its frame is known; call it often."""
-        if self._unplaced is None:
-            return
-        self._frames.listen()  # only then: /tf of a whole robot costs the loop time
-        with contextlib.suppress(TransformError):
-            self._frames.find(*self._unplaced)
-            self._unplaced = None
-            self.repeat()
+        if self.waits_for_frame:
+            self._listen()  # only then: /tf of a whole robot costs the loop time
+            self.retry()
 
-    def _make(self, cloud: PointCloud2) -> MapContactFinder:
+    def _make(self, cloud: PointCloud2, source: Rigid | None) -> MapContactFinder:
         """Prepare a map from a cloud; called in the thread."""
-        frame, stamp = cloud.header.frame_id, stamp_to_ns(cloud.header.stamp)
-        self._unplaced = None
-        try:
-            source = self._frames.find_source(frame, stamp, CLOUD)
-        except TransformError:
-            self._unplaced = frame, stamp
-            raise
         values, move = self._parameters, None if source is None else source.matrix
         terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height, move)
         return MapContactFinder(self._rover(), terrain)
 
-    def _tell(self, error: str) -> None:
+    def _log_refusal(self, error: str) -> None:
         line = f"{CLOUD} refused, the last map stays: {error}"
         line = self._refusals.line(line, time.monotonic())
         if line:

@@ -46,7 +46,7 @@ USUAL = {
     IMU: ("imu",),
     PATH: ("traverse_server/path",),
 }
-"""How the topic of each input usually ends."""
+"""Usual ends of the topics of each input."""
 GRID_MAP_INFO_FIELDS = """
 float64 resolution
 float64 length_x

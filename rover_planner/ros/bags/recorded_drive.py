@@ -20,7 +20,7 @@ ANGLES = tuple(f"{part}_{side}" for part in ("rocker", "bogie") for side in SIDE
 
 @dataclass(frozen=True)
 class Measured:
-    """What was measured at the waypoints of a prediction."""
+    """Measurements at the waypoints of a prediction."""
 
     stamp: NDArray[np.int64]
     """(n,) time of recording [ns]."""
@@ -74,9 +74,9 @@ class RecordedDrive:
 
     def measured_at(self, poses: NDArray[np.float64]) -> Measured:
         """Return what was measured nearest to each of the waypoints (n, 3) of this drive."""
-        way, places = _progress(np.array(self.poses)), _progress(poses)
-        scale = way[-1] / places[-1] if places[-1] > 0.0 else 1.0
-        rows = np.abs(way[None, :] - scale * places[:, None]).argmin(axis=1)
+        driven, places = _progress(np.array(self.poses)), _progress(poses)
+        scale = driven[-1] / places[-1] if places[-1] > 0.0 else 1.0
+        rows = np.abs(driven[None, :] - scale * places[:, None]).argmin(axis=1)
         angles = np.array(self.angles)[rows]
         return Measured(np.array(self.stamps, np.int64)[rows], angles[:, :2], angles[:, 2:])
 

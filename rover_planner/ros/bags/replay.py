@@ -50,12 +50,12 @@ from rover_planner.worlds.maps.map_keeper import MapKeeper
 DRIVEN, CHECKED, PLANNED = "driven", "check_path", "can_traverse"
 """Kinds of questions: the drive that was recorded, a path that was recorded, a goal."""
 MAX_NOTES = 5
-"""Number of refused messages that are told one by one."""
+"""Number of refused messages with a note of their own."""
 
 
 @dataclass(frozen=True)
 class Questions:
-    """What is asked of a bag."""
+    """Questions that are asked of a bag."""
 
     goal: tuple[float, float, float] | None = None
     """Goal x, y [m], yaw [rad] of a question after each new map; None asks none."""
@@ -76,11 +76,11 @@ class Answer:
     judgement: PathJudgement
     """The answer."""
     identity: IdentityReport
-    """What it is about."""
+    """Hashes and stamps of map, path and question."""
     terrain: Terrain | None
     """The map it is about; None if there was none yet."""
     measured: Measured | None = None
-    """What was measured at its waypoints; for DRIVEN."""
+    """Measurements at its waypoints; for DRIVEN."""
 
 
 @dataclass
@@ -90,13 +90,13 @@ class Replay:
     parameters: TraverseServerParameters
     """Parameters as of the node traverse_server."""
     questions: Questions
-    """What is asked."""
+    """The questions."""
     refused: dict[str, int] = field(default_factory=dict)
     """Number of messages that could not be used, by input."""
     notes: list[str] = field(default_factory=list)
     """Why, for the first MAX_NOTES of them."""
     without_start: int = 0
-    """Number of new maps without a question for the goal, as nothing told where it starts."""
+    """Number of new maps without a question for the goal, for lack of a start."""
 
     def __post_init__(self) -> None:
         self._service = TraverseService(load_service_settings(self.parameters))
@@ -113,7 +113,7 @@ class Replay:
         self._looked = -float("inf")
         self._time = 0
         self.frames = Frames(values, lambda: self._time, sensor_poses(values))
-        """Where things are on the map."""
+        """Places of frames and sensors on the map."""
         self.joint_names = _read_joint_map(values, self._service.all_joint_names)
         """Names of the joints in messages."""
         self._imu = ImuMounting(values.imu_frame or BASE_FRAME, values.imu_mounting)

@@ -8,7 +8,7 @@ import pytest
 from builtin_interfaces.msg import Time
 from nav_msgs.msg import Odometry
 from rclpy.parameter import Parameter
-from sensor_msgs.msg import JointState, PointCloud2
+from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from rover_physics.errors import ModelError
@@ -55,26 +55,6 @@ def test_what_cannot_be_used_stops_the_rover_is_said_once_and_passes_by_itself(
         wait_until(lambda told=told: GOOD in " ".join(rover.log[told:]), "the good news")
         assert rover.count_lines(text) == 1
     assert ros.is_alive(controller)
-
-
-@pytest.mark.parametrize(
-    ("joint", "text"),
-    [("rear_left_wheel", "no velocity of"), ("front_left_steering", "no position of")],
-)
-def test_a_joint_that_is_never_measured_is_named_and_the_rover_rests(
-    rover, start_controller, joint, text
-):
-    kept, whole = [i for i, name in enumerate(JOINTS) if name != joint], rover.joints
-    rover.joints = JointState(name=[JOINTS[i] for i in kept])
-    rover.joints.position = [whole.position[i] for i in kept]
-    rover.joints.velocity = [whole.velocity[i] for i in kept]
-    start_controller()
-    text = f"waiting for joint_states ({text} {joint})"
-    wait_until(lambda: text in rover.status.message, "the joint's name")
-    wait_until(lambda: rover.commands and rover.brakes and rover.states, "command and brake")
-    assert set(rover.states) == {"fault"}
-    if "wheel" in joint:  # nothing can be held without its rate
-        assert rover.torque == 0.0 and rover.brakes[-1]
 
 
 def test_steering_is_read_with_the_sign_of_the_rover(rover, start_controller):

@@ -74,39 +74,15 @@ def test_a_simulated_clock_that_stops_is_a_fault_in_time_though_inputs_come(rove
 
 
 @pytest.mark.timed
-def test_a_step_of_the_clock_and_the_stamps_is_a_fault_that_passes(rover, drive):
-    clock = SimulatedClock(rover)
-    rover.stamp = lambda: clock.time
-    drive(use_sim_time=True)
-    began, shown = time.time_ns(), len(rover.diagnostics)
-    clock.time -= 3600 * NANOSECONDS
-    assert wait_for_rest(rover, began) < BOUND
-    # The log may say only what came after the step: it tells changes once a second at most.
-    wait_until(
-        lambda: any("was stepped" in one.message for _, one in rover.diagnostics[shown:]),
-        "the reason",
-    )
-    wait_until(lambda: rover.state == "driving" and rover.push > 0.0, "driving again")
-
-
-@pytest.mark.timed
-@pytest.mark.parametrize(
-    ("shift", "text"),
-    [
-        (None, "stamps do not advance"),
-        (-1.0, "joint_states stale: none for 300 ms"),
-        (1.0, "stamps are more than 50 ms ahead of this node's clock"),
-    ],
-)
-def test_frozen_delayed_and_future_stamps_are_faults_in_time(rover, drive, shift, text):
+def test_stamps_that_do_not_advance_are_a_fault_in_time(rover, drive):
     rover.stamp = time.time_ns
     drive()
     began = frozen = time.time_ns()
-    rover.stamp = lambda: frozen if shift is None else time.time_ns() + round(shift * NANOSECONDS)
+    rover.stamp = lambda: frozen
     assert wait_for_rest(rover, began) < BOUND
-    wait_until(lambda: text in rover.status.message, "the reason")
+    wait_until(lambda: "stamps do not advance" in rover.status.message, "the reason")
     rover.stamp = time.time_ns
-    wait_until(lambda: rover.state == "driving", "driving again")
+    wait_until(lambda: rover.state == "driving", "driving")
 
 
 @pytest.mark.timed

@@ -92,17 +92,6 @@ def test_a_stop_is_not_delayed_to_the_next_update(rover, start_controller):
     assert run_in_executor(controller, stop) == ("emergency_stop", 1)
 
 
-def test_a_stall_ends_the_push_and_is_reported(rover, start_controller):
-    rover.joints.velocity = [0.0] * len(rover.joints.velocity)
-    start_controller(stall_time=0.5)
-    wait_until(lambda: any(push > 0.1 for *_, push in rover.commands), "the push")
-    wait_until(lambda: rover.state == "stalled", "the stall")
-    wait_until(lambda: rover.torque < 0.01, "the end of the push")
-    wait_until(lambda: rover.status.message.startswith("stalled: no progress"), "the report")
-    rover.speed = 0.0
-    wait_until(lambda: rover.state == "standstill", "the way out")
-
-
 def test_a_node_that_ends_sends_zeros_last(rover, controller):
     run_in_executor(controller, controller.stop)
     wait_until(lambda: rover.torque == 0.0 and rover.brakes[-1], "zeros and the brake")

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A drive goes on where its rover is held up, and ends where nothing helps."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from rover_physics.rover.rover_file import load_rover
+from rover_planner.nodes.mission import drive
 from rover_planner.nodes.mission.drive import DriveFailedError, DriveSettings, drive_to
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query, check_path
 from rover_planner.simulator.path_follower import PathFollower
@@ -15,7 +18,7 @@ from support.rough_grounds import plane
 LSR1 = load_rover("lsr1")
 MAP = plane(0.0, 0.0, half=4.0)
 STEP = 0.1
-COARSE = PathQueryOptions(count=1, waypoint_spacing=0.1)
+COARSE = PathQueryOptions(count=1, waypoint_spacing=0.05)
 SETTINGS = DriveSettings(within=0.1, patience=0.3)
 
 
@@ -25,7 +28,7 @@ class SimulatedRover:
     def __init__(self, ground):
         self.plant = QuasiStaticPlant(LSR1, ground, (-1.0, 0.0, 0.0))
         self.follower = PathFollower(self.plant.pose()[None], 0.3)
-        self.asked = []
+        self.asked, self.now = [], 0.0
 
     def ask(self, start, goal):
         self.asked.append(np.array(start))
@@ -45,15 +48,28 @@ class SimulatedRover:
             if is_wanted(self.plant.pose()):
                 break
             self.plant.drive(*self.follower.steer(self.plant.pose(), 0.1), STEP)
+            self.now += STEP
         return self.plant.pose()
+
+
+@pytest.fixture
+def make_rover(monkeypatch):
+    """Return a function that makes a rover whose time is that of the drive."""
+
+    def make(ground):
+        rover = SimulatedRover(ground)
+        monkeypatch.setattr(drive, "time", SimpleNamespace(monotonic=lambda: rover.now))
+        return rover
+
+    return make
 
 
 def hill(x, y):
     return 0.9 * np.maximum(x, 0.0) + 0.0 * y
 
 
-def test_a_rover_at_a_hill_that_no_map_shows_goes_back_and_gives_up_at_last():
-    rover = SimulatedRover(make_terrain(hill, half=4.0))
+def test_a_rover_at_a_hill_that_no_map_shows_goes_back_and_gives_up_at_last(make_rover):
+    rover = make_rover(make_terrain(hill, half=4.0))
     goal, told = (1.5, 0.0, 0.0), []
     plan = rover.ask(rover.plant.pose(), goal)["poses"]
     with pytest.raises(DriveFailedError, match="3 other ways led nowhere from .* stood for 0.3 s"):
@@ -64,8 +80,8 @@ def test_a_rover_at_a_hill_that_no_map_shows_goes_back_and_gives_up_at_last():
     assert sum("back to" in what for what in told) == 2
 
 
-def test_the_next_plan_begins_where_the_rover_has_come_to_rest():
-    rover = SimulatedRover(MAP)
+def test_the_next_plan_begins_where_the_rover_has_come_to_rest(make_rover):
+    rover = make_rover(MAP)
     half_way = (0.0, 0.0, 0.0)
     plan = rover.ask(rover.plant.pose(), half_way)["poses"]
     resting = []

@@ -40,14 +40,14 @@ class ToolClient:
     def aim(self, place) -> None:
         """Publish a target and wait until the server has it."""
         self.send(make_target(*place))
-        reach = self._server.reach
-        wait_until(lambda: np.array_equal(reach.query.target, place), "the target")
+        arm = self._server.arm
+        wait_until(lambda: np.array_equal(arm.query.target, place), "the target")
 
     def push(self, force, moment=(0.0, 0.0, 0.0)) -> None:
         """Publish a wrench and wait until the server has it."""
         self.send(wrench=make_wrench(force, moment))
-        reach = self._server.reach
-        wait_until(lambda: np.array_equal(reach.query.force, force), "the wrench")
+        arm = self._server.arm
+        wait_until(lambda: np.array_equal(arm.query.force, force), "the wrench")
 
     def ask(self) -> tuple[bool, dict]:
         """Ask; return success and the answer."""

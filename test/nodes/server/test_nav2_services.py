@@ -19,7 +19,7 @@ from support.waiting import wait_until
 def ask(server, poses):
     """Put a request to the handler of the service, as rclpy would; nav2_msgs is not on PyPI."""
     replies = []
-    validity = PathValidity(server.desk, "map", server.publish)
+    validity = PathValidity(server.desk, "map", server.publish, server.frames.localise_path)
     request, response = SimpleNamespace(path=poses_path(poses, "map")), SimpleNamespace()
     validity.take(request, response, replies.append)
     wait_until(lambda: replies, "the reply")

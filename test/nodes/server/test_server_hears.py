@@ -15,6 +15,7 @@ from std_srvs.srv import Trigger
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.identity import path_hash, plan_request_hash
 from msg_adapters.paths import stamped_pose
+from rover_planner.planning.answering.snapshot import Snapshot
 from support.grounds import gap, make_terrain, wall_at, waves
 from support.planner_client import GOAL, SERVER, START, verdict_of
 from support.ros_fixtures import call

@@ -17,7 +17,7 @@ from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.subscriptions import subscribe_to_requests
 
 
-class ReachTopics:
+class ArmTopics:
     """Connects a ReachQuery to the topics and the service of a node."""
 
     def __init__(self, node: Node, desk: QuestionDesk, map_frame: str, reliability: str):
