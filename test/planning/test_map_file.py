@@ -9,8 +9,6 @@ import pytest
 
 from rover_physics.errors import RoverError, TerrainError
 from rover_physics.terrain.grid import save_terrain
-from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.service_settings import map_limits
 from rover_planner.worlds.map_file import MapFileError, MapLimits, open_map
 from support.grounds import make_terrain, waves
 from support.hostile_files import make_oddities
@@ -41,12 +39,6 @@ def test_a_path_and_a_url_below_the_folder_are_read(maps):
         f"{maps}/site 2/c.npz",
     ):
         np.testing.assert_array_equal(load(maps, url).elevation, expected)
-
-
-def test_by_default_any_file_is_read(maps):
-    limits = map_limits(TraverseServerParameters())
-    assert open_map(str(maps / "a.npz"), limits).elevation.size
-    assert open_map(f"file://{maps.parent}/elsewhere/d.npz", limits).elevation.size
 
 
 def test_a_relative_path_starts_at_the_working_directory(maps, monkeypatch):
@@ -101,9 +93,8 @@ def test_a_link_that_replaces_a_part_after_the_check_is_not_followed(maps, monke
 
 @pytest.mark.parametrize(
     "url",
-    ["", " ", "//[", "http://[bad", "http://a/b.npz", "ftp://x", "file://host/a.npz",
-     "file://[::1", "u" * 300, "u" * 5000, "file:///%00", "a\0b", "\n", "é.npz", "file:///%ff",
-     "spirit", ".", "/"],
+    ["", "//[", "http://a/b.npz", "file://host/a.npz", "file://[::1", "u" * 5000, "file:///%00",
+     "\n", "file:///%ff", "spirit", "/"],
     ids=lambda url: ascii(url[:20]),
 )  # fmt: skip
 def test_what_names_no_file_is_refused_in_one_short_line(url):
@@ -130,8 +121,3 @@ def test_a_file_above_a_limit_is_refused_by_the_parameters_name(maps):
     with pytest.raises(TerrainError, match=f"the limit is {cells - 1}"):
         load(maps, f"{maps}/a.npz", max_cells=cells - 1)
     assert load(maps, f"{maps}/a.npz", max_bytes=size, max_cells=cells).elevation.size == cells
-
-
-def test_a_folder_that_does_not_exist_refuses_every_file(maps):
-    with pytest.raises(MapFileError, match="not below"):
-        load(maps / "none", f"{maps}/a.npz")
