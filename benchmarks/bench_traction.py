@@ -9,7 +9,6 @@ time of its updates (estimate, build, solve, publish) and the number of missed c
 import os
 import threading
 import time
-from dataclasses import fields
 
 import numpy as np
 import rclpy
@@ -101,19 +100,20 @@ def measure_alone() -> list[Figure]:
 
 def _blend(before: Motion, after: Motion, share: float) -> Motion:
     """Return a measurement interpolated between two others; `share` is 0 to 1."""
-    pairs = ((getattr(before, f.name), getattr(after, f.name)) for f in fields(Motion))
+    pairs = zip(before, after, strict=True)
     return Motion(*((1.0 - share) * first + share * second for first, second in pairs))
 
 
 def _take(node: TractionController, motion: Motion) -> None:
     """Give a node the measurements of a rover."""
-    now, rocker = time.monotonic(), (motion.rocker_angle, -motion.rocker_angle)
-    positions = dict(zip(SUSPENSION_JOINTS, (*rocker, *motion.bogie_angles), strict=True))
+    now, (rocker, *bogies) = time.monotonic(), motion.joints
+    positions = dict(zip(SUSPENSION_JOINTS, (rocker, -rocker, *bogies), strict=True))
     positions |= dict(zip(STEERING_JOINTS, motion.steering, strict=True))
-    rates = (motion.rocker_rate, -motion.rocker_rate, *motion.bogie_rates, *motion.wheel_rates)
+    rocker, *bogies = motion.joint_rates
+    rates = (rocker, -rocker, *bogies, *motion.wheel_rates)
     velocities = dict(zip((*SUSPENSION_JOINTS, *WHEEL_JOINTS), rates, strict=True))
     node.service.take_joints(positions, velocities, now)
-    node.service.take_attitude(motion.roll, motion.pitch, motion.body_rates, now)
+    node.service.take_attitude(*motion.attitude, motion.body_rates, now)
     node.service.take_command(SPEED, 0.0, now)
 
 

@@ -61,8 +61,10 @@ def drive_states(rover: Rover, ground: Terrain, speed: float = 0.03, start: floa
     links = turning[:, [1]] + rocker[:, sides] + bogie[:, sides] * hung
     motions = [
         Motion(
-            roll[i], pitch[i], prediction.rocker_angle[i, 0], prediction.bogie_angle[i],
-            rocker[i, 0], bogie[i], speeds[i] / rover.wheel.radius - links[i], turning[i],
+            np.array([roll[i], pitch[i]]),
+            np.array([prediction.rocker_angle[i, 0], *prediction.bogie_angle[i]]),
+            np.array([rocker[i, 0], *bogie[i]]),
+            speeds[i] / rover.wheel.radius - links[i], turning[i], np.zeros(6),
         )
         for i in range(len(x))
     ]  # fmt: skip

@@ -170,13 +170,6 @@ class BalanceWriter:
         linkage = pack_linkage(rover, mass, com)
         self._linkages = array_of(linkage)
         self._works = array_of(new_record(BALANCE_WORK, com=_centre_of_mass(linkage)))
-        # Views are kept because looking up a field of a record is as slow as writing it.
-        measured = self._works["measured"]
-        self._q, self._push = measured["q"][0], measured["push"]
-        self._resistance = measured["resistance"]
-        self._contact_angles = measured["contact_angles"][0]
-        self._contact_offsets = measured["contact_offsets"][0]
-        self._steering = measured["steering"][0]
         self.weight = float(linkage.mass * linkage.gravity)
         """Weight of the rover with its payload in [N]."""
         self.on_bogie = np.array(linkage.on_bogie, dtype=bool)
@@ -188,13 +181,11 @@ class BalanceWriter:
         _place_wheels(self._linkages, self._works)
         return self._works["rolling"].copy()[0]
 
-    def _take(self, state: MeasuredState) -> None:
-        q = self._q
-        q[1], q[2], q[3] = state.roll, state.pitch, state.rocker_angle
-        q[4:] = state.bogie_angles
-        self._contact_angles[:] = state.contact_angles
-        self._contact_offsets[:] = state.contact_offsets
-        self._steering[:] = state.steering
+    def _take(self, state: MeasuredState, push: float = 0.0, resistance: float = 0.0) -> None:
+        q = 0.0, state.roll, state.pitch, state.rocker_angle, *state.bogie_angles
+        angles, offsets = state.contact_angles, state.contact_offsets
+        here = (0.0, 0.0, 0.0), q, angles, offsets, state.steering, push, resistance
+        self._works["measured"][0] = here
 
     def write(
         self, state: MeasuredState, net_traction: float, resistance: float = 0.0
@@ -212,8 +203,7 @@ class BalanceWriter:
             ModelError: The equations are singular: the contact angles contradict each other, so
                 that the rover could not roll.
         """
-        self._take(state)
-        self._push[0], self._resistance[0] = net_traction, resistance
+        self._take(state, net_traction, resistance)
         packed = np.zeros(1, MEASURED_BALANCE)
         if not _write_balance(self._linkages, self._works, packed):
             raise ModelError(

@@ -12,7 +12,8 @@ Source: Iagnemma and Dubowsky, "Vehicle wheel-ground contact angle estimation: w
 mobile robot traction control", Advances in Robot Kinematics, 2000.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -59,27 +60,20 @@ class ContactEstimate:
     """"map", "motion" or "zero"."""
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """Measurements of a moving rover."""
+class Motion(NamedTuple):
+    """Measurements of a moving rover, all finite; the fields of MOTION."""
 
-    roll: float
-    """Roll [rad]."""
-    pitch: float
-    """Pitch [rad], positive with the nose down."""
-    rocker_angle: float
-    """Angle of the right rocker [rad]."""
-    bogie_angles: np.ndarray
-    """(2,) angles of right and left bogie [rad]."""
-    rocker_rate: float
-    """Rate of the right rocker [rad/s]."""
-    bogie_rates: np.ndarray
-    """(2,) rates of right and left bogie [rad/s]."""
+    attitude: np.ndarray
+    """(2,) roll and pitch [rad], pitch positive with the nose down."""
+    joints: np.ndarray
+    """(3,) angles of right rocker, right and left bogie [rad]."""
+    joint_rates: np.ndarray
+    """(3,) rates of the same [rad/s]."""
     wheel_rates: np.ndarray
     """(6,) rates of the wheel joints [rad/s]."""
     body_rates: np.ndarray
     """(3,) angular velocity, body frame [rad/s]."""
-    steering: np.ndarray = field(default_factory=lambda: np.zeros(WHEEL_COUNT))
+    steering: np.ndarray
     """(6,) steering angles [rad], positive to the left."""
 
 
@@ -108,12 +102,10 @@ FILTER = record_type(
 """State and work space of the filter."""
 
 MOTION = record_type(
-    ("attitude", float, (2,)),  # roll and pitch [rad]
-    ("joints", float, (3,)),  # right rocker, right and left bogie [rad]
-    ("joint_rates", float, (3,)),  # of the same [rad/s]
-    ("wheel_rates", float, (WHEEL_COUNT,)),  # [rad/s]
-    ("body_rates", float, (3,)),  # [rad/s]
-    ("steering", float, (WHEEL_COUNT,)),  # [rad]
+    *(
+        (name, float, (size,))
+        for name, size in zip(Motion._fields, (2, 3, 3, 6, 3, 6), strict=True)
+    )
 )
 """A `Motion`, for kernels."""
 
@@ -144,20 +136,8 @@ class MotionContactEstimator:
         return ContactEstimate(state.angles.copy(), state.covariance.copy(), "motion")
 
     def update(self, motion: Motion, duration: float) -> ContactEstimate:
-        """Correct the angles by a measurement and return them.
-
-        Args:
-            motion: All values finite.
-            duration: Time since the last measurement [s].
-        """
-        self._motions[0] = (
-            (motion.roll, motion.pitch),
-            (motion.rocker_angle, *motion.bogie_angles),
-            (motion.rocker_rate, *motion.bogie_rates),
-            motion.wheel_rates,
-            motion.body_rates,
-            motion.steering,
-        )
+        """Correct the angles by a measurement, `duration` [s] after the last, and return them."""
+        self._motions[0] = motion
         if not self._started:
             _start(self._linkages, self._motions, self._filters)
             self._started = True

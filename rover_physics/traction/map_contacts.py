@@ -62,12 +62,6 @@ class MapContactFinder:
         self._linkages = array_of(pack_linkage(rover, *body_mass_and_com(rover)))
         self._ground = pack_ground(terrain)
         self._searches = array_of(new_record(MAP_SEARCH))
-        # Views are kept because looking up a field of a record is as slow as writing it.
-        search = self._searches
-        self._pose, self._q = search["pose"][0], search["q"][0]
-        self._directions = search["directions"][0]
-        self._steering = search["placement"]["steering"][0]
-        self._gaps, self._angles = search["gaps"][0], search["angles"][0]
 
     def find(
         self,
@@ -88,19 +82,20 @@ class MapContactFinder:
         Raises:
             ModelError: A wheel is beyond the map, over unknown ground, or not near the ground.
         """
-        self._pose[:] = pose[0], pose[1], pose[3]
-        self._q[:4] = pose[2], state.roll, state.pitch, state.rocker_angle
-        self._q[4:] = state.bogie_angles
-        self._directions[:] = directions
-        self._steering[:] = state.steering
         arrays = self._ground.records, self._linkages, self._searches
+        search = self._searches[0]
+        search.pose[:] = pose[0], pose[1], pose[3]
+        search.q[:4] = pose[2], state.roll, state.pitch, state.rocker_angle
+        search.q[4:] = state.bogie_angles
+        search.directions[:] = directions
+        search.placement.steering[:] = state.steering
         _measure_gaps(*arrays)
-        known = np.isfinite(self._gaps)
+        known = np.isfinite(search.gaps)
         if known.all():
-            lower, upper = np.sort(self._gaps)[WHEEL_COUNT // 2 - 1 : WHEEL_COUNT // 2 + 1]
-            self._q[0] -= 0.5 * (lower + upper)
+            lower, upper = np.sort(search.gaps)[WHEEL_COUNT // 2 - 1 : WHEEL_COUNT // 2 + 1]
+            search.q[0] -= 0.5 * (lower + upper)
             _find_nearest(*arrays)
-            known = np.isfinite(self._angles)
+            known = np.isfinite(search.angles)
         if not known.all():
             raise ModelError(
                 f"{WHEELS[int(np.argmin(known))]} of a rover at {np.round(pose[:2], 2)} m is over "
@@ -109,7 +104,7 @@ class MapContactFinder:
         error = np.hypot(deviation, CELL_DEVIATION * self.terrain.resolution)
         error /= self.rover.wheel.radius
         covariance = (ANGLE_DEVIATION**2 + error**2) * np.eye(WHEEL_COUNT)
-        return ContactEstimate(self._angles.copy(), covariance, MAP_SOURCE)
+        return ContactEstimate(search.angles.copy(), covariance, MAP_SOURCE)
 
 
 @kernel

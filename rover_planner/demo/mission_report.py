@@ -10,6 +10,17 @@ from rich.text import Text
 from rover_physics.rover.model import Rover
 from rover_planner.planning.goals import Mission
 
+NUMBERS = (
+    ("length\n[m]", "length", 2),
+    ("time\n[s]", "time", 0),
+    ("energy\n[J]", "energy", 1),
+    ("smallest\ntip-over\nmargin", "min_tip_over_ratio", 2),
+    ("highest\nfriction\nuse", "max_friction_utilisation", 2),
+    ("highest\ntorque\nuse", "max_torque_saturation", 2),
+    ("highest\nload [N]", "max_wheel_load", 1),
+)
+"""Columns of numbers: heading, key of the answer, digits after the point."""
+
 
 def answer_table(rover: Rover, mission: Mission, answers: list[dict[str, Any]]) -> Table:
     """Return a table of the verdicts of a traverse_server, one row per goal.
@@ -27,15 +38,7 @@ def answer_table(rover: Rover, mission: Mission, answers: list[dict[str, Any]]) 
     )
     for heading in ("goal", "verdict", "reason"):
         table.add_column(heading, overflow="fold")
-    for heading in (
-        "length\n[m]",
-        "time\n[s]",
-        "energy\n[J]",
-        "smallest\ntip-over\nmargin",
-        "highest\nfriction\nuse",
-        "highest\ntorque\nuse",
-        "highest\nload [N]",
-    ):
+    for heading, _, _ in NUMBERS:
         table.add_column(escape(heading), justify="right", no_wrap=True)
     for goal, answer in zip(mission.goals, answers, strict=True):
         passable = answer["traversable"]
@@ -45,13 +48,7 @@ def answer_table(rover: Rover, mission: Mission, answers: list[dict[str, Any]]) 
             if passable
             else Text("refused", style="bold red"),
             "" if passable else answer["reason"],
-            _number(answer.get("length"), 2),
-            _number(answer.get("time"), 0),
-            _number(answer.get("energy"), 1),
-            _number(answer.get("min_tip_over_ratio"), 2),
-            _number(answer.get("max_friction_utilisation"), 2),
-            _number(answer.get("max_torque_saturation"), 2),
-            _number(answer.get("max_wheel_load"), 1),
+            *(_number(answer.get(key), digits) for _, key, digits in NUMBERS),
         )
     return table
 

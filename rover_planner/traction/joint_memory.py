@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Merges joint states of several publishers: each joint keeps its last value and its time."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -10,19 +9,37 @@ from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_planner.traction.input_monitor import NEVER
 
-
-class Reading(NamedTuple):
-    """The last value of a joint."""
-
-    value: float
-    """Angle [rad] or rate [rad/s]."""
-    time: float
-    """Time of the measurement [s]."""
-    stamp: int
-    """Last header stamp [ns]; 0 if no message had one."""
+SUSPENSION, OTHERS = slice(len(SUSPENSION_JOINTS)), slice(len(SUSPENSION_JOINTS), None)
+"""Joints of the suspension, which come first, and the others."""
 
 
-NOT_READ = Reading(0.0, NEVER, 0)
+class Readings:
+    """The last values of some joints, with times [s] and header stamps [ns] of measurement."""
+
+    def __init__(self, names: Sequence[str]):
+        """Start without values; the stamp of messages that have none is 0."""
+        self.names = tuple(names)
+        self._places = {name: place for place, name in enumerate(names)}
+        self.values = np.zeros(len(names))
+        self.times = np.full(len(names), NEVER)
+        self._stamps = [0] * len(names)
+
+    def keep(self, values: Mapping[str, float], time: float, stamp: int) -> bool:
+        """Take values by name whose stamp is after the last one; return whether any was."""
+        taken = False
+        for name, value in values.items():
+            place = self._places.get(name)
+            if place is None or (stamp and stamp <= self._stamps[place]):
+                continue
+            self.values[place], self.times[place] = value, time
+            self._stamps[place] = max(stamp, self._stamps[place])
+            taken = True
+        return taken
+
+    def forget(self) -> None:
+        """Forget times and stamps: each joint must arrive anew."""
+        self.times[:] = NEVER
+        self._stamps = [0] * len(self.names)
 
 
 class JointMemory:
@@ -30,9 +47,8 @@ class JointMemory:
 
     def __init__(self, steering: Sequence[str] = ()) -> None:
         """Start without values; `steering` are the names of the rover's steering joints."""
-        self._steering = tuple(steering)
-        self._positions = dict.fromkeys((*SUSPENSION_JOINTS, *steering), NOT_READ)
-        self._velocities = dict.fromkeys((*SUSPENSION_JOINTS, *WHEEL_JOINTS), NOT_READ)
+        self._positions = Readings((*SUSPENSION_JOINTS, *steering))
+        self._velocities = Readings((*SUSPENSION_JOINTS, *WHEEL_JOINTS))
 
     def take(
         self,
@@ -49,73 +65,60 @@ class JointMemory:
         Returns:
             Whether a joint of the rover got a new value.
         """
-        taken = _keep(self._positions, positions, time, stamp)
-        return _keep(self._velocities, velocities, time, stamp) or taken
+        taken = self._positions.keep(positions, time, stamp)
+        return self._velocities.keep(velocities, time, stamp) or taken
 
     def forget(self) -> None:
         """Forget times and stamps: each joint must arrive anew."""
-        for kept in (self._positions, self._velocities):
-            for name, reading in kept.items():
-                kept[name] = reading._replace(time=NEVER, stamp=0)
+        self._positions.forget()
+        self._velocities.forget()
 
     @property
     def time(self) -> float:
         """Time of the oldest value that is needed [s]; NEVER if one is missing."""
-        angles = min(reading.time for reading in self._positions.values())
-        return min(angles, self.wheel_time)
+        return min(float(self._positions.times.min()), self.wheel_time)
 
     @property
     def wheel_time(self) -> float:
         """Time of the oldest wheel rate [s]; NEVER if one is missing."""
-        return min(self._velocities[name].time for name in WHEEL_JOINTS)
+        return float(self._velocities.times[OTHERS].min())
 
     @property
     def is_empty(self) -> bool:
         """Whether no joint has a value."""
-        readings = (*self._positions.values(), *self._velocities.values())
-        return all(reading.time == NEVER for reading in readings)
+        return max(self._positions.times.max(), self._velocities.times.max()) == NEVER
 
     @property
     def suspension_angles(self) -> Floats:
         """Angles (4,) of SUSPENSION_JOINTS [rad]."""
-        return np.array([self._positions[name].value for name in SUSPENSION_JOINTS])
+        return self._positions.values[SUSPENSION].copy()
 
     @property
-    def steering_angles(self) -> list[float]:
+    def steering_angles(self) -> Floats:
         """Angles of the steering joints, in their order [rad]."""
-        return [self._positions[name].value for name in self._steering]
+        return self._positions.values[OTHERS].copy()
 
     @property
     def wheel_rates(self) -> Floats:
         """Rates (6,) of WHEEL_JOINTS [rad/s]."""
-        return np.array([self._velocities[name].value for name in WHEEL_JOINTS])
+        return self._velocities.values[OTHERS].copy()
 
     def find_suspension_rates(self, earliest: float) -> Floats | None:
         """Return the rates (4,) of SUSPENSION_JOINTS [rad/s]; None if one is older [s]."""
-        readings = [self._velocities[name] for name in SUSPENSION_JOINTS]
-        if any(reading.time < earliest for reading in readings):
-            return None
-        return np.array([reading.value for reading in readings])
+        rates = self._velocities
+        is_old = rates.times[SUSPENSION].min() < earliest
+        return None if is_old else rates.values[SUSPENSION].copy()
 
     def describe_older(self, earliest: float) -> str:
         """Return which needed values are older than a time [s]; empty if none or all are."""
-        angles = [name for name, last in self._positions.items() if last.time < earliest]
-        rates = [name for name in WHEEL_JOINTS if self._velocities[name].time < earliest]
-        if len(angles) + len(rates) == len(self._positions) + len(WHEEL_JOINTS):
+        needed = (
+            ("position", self._positions.names, self._positions.times),
+            ("velocity", self._velocities.names[OTHERS], self._velocities.times[OTHERS]),
+        )
+        older = [
+            (kind, [name for name, time in zip(names, times, strict=True) if time < earliest])
+            for kind, names, times in needed
+        ]
+        if sum(len(names) for _, names in older) == sum(len(names) for _, names, _ in needed):
             return ""
-        return ", ".join((*_list("position", angles), *_list("velocity", rates)))
-
-
-def _list(what: str, names: list[str]) -> Iterable[str]:
-    return [f"no {what} of {', '.join(names)}"] if names else []
-
-
-def _keep(kept: dict[str, Reading], values: Mapping[str, float], time: float, stamp: int) -> bool:
-    taken = False
-    for name, value in values.items():
-        last = kept.get(name)
-        if last is None or (stamp and stamp <= last.stamp):
-            continue
-        kept[name] = Reading(value, time, max(stamp, last.stamp))
-        taken = True
-    return taken
+        return ", ".join(f"no {kind} of {', '.join(names)}" for kind, names in older if names)

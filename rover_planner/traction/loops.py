@@ -88,49 +88,23 @@ class PIController:
         return min(max(output, -self._limit), self._limit)
 
 
-class PushLimit:
-    """The largest push that the wheels can give without slip, found by trying.
+class PushLoop(PIController):
+    """The speed loop: the push that the wheels' travel asks for, within what the ground takes.
 
     The program answers a push that is too large with wheels beyond their friction. More push does
-    not help then: the wheels slip, and the one at a face loses the force that presses it on.
+    not help then: the wheels slip, and the one at a face loses the force that presses it on. The
+    largest push that the wheels can give without slip is found by trying.
     """
 
-    def __init__(self, most: float):
-        """Start with the largest push, `most` [N]."""
-        self._most = self._limit = most
-
-    def reset(self) -> None:
-        """Allow the largest push again."""
-        self._limit = self._most
-
-    def apply(self, push: float, peak: float, duration: float) -> float:
-        """Return a push [N] within the limit.
-
-        Args:
-            push: The wanted push [N].
-            peak: The peak friction utilisation with the last push.
-            duration: Time since the last call [s].
-        """
-        change = duration / (-FALL_TIME if peak > MAX_PEAK else REGROWTH_TIME)
-        limit = self._limit * max(1.0 + change, 0.0)
-        self._limit = min(max(limit, MIN_PUSH_SHARE * self._most), self._most)
-        return min(max(push, -self._limit), self._limit)
-
-
-class PushLoop(PIController):
-    """The speed loop: the push that the wheels' travel asks for, within what the ground takes."""
-
-    def __init__(self, gain: float, integral_gain: float, most: float):
-        """Start with an integral of zero; `most` is the largest push [N], else as PIController."""
-        super().__init__(gain, integral_gain, most)
-        self._limit_of_ground = PushLimit(most)
-        self._cut = False
+    def __init__(self, gain: float, integral_gain: float, limit: float):
+        """Start with an integral of zero and the largest push, `limit` [N]."""
+        super().__init__(gain, integral_gain, limit)
+        self._allowed, self._cut = limit, False
 
     def reset(self) -> None:
         """Set the integral to zero and allow the largest push again."""
         super().reset()
-        self._limit_of_ground.reset()
-        self._cut = False
+        self._allowed, self._cut = self._limit, False
 
     def push(self, error: float, duration: float, limited: bool, peak: float) -> float:
         """Return the push [N].
@@ -142,7 +116,10 @@ class PushLoop(PIController):
             peak: Peak friction utilisation with the last push.
         """
         wanted = self.update(error, duration, limited or self._cut)
-        within = self._limit_of_ground.apply(wanted, peak, duration)
+        change = duration / (-FALL_TIME if peak > MAX_PEAK else REGROWTH_TIME)
+        allowed = self._allowed * max(1.0 + change, 0.0)
+        self._allowed = min(max(allowed, MIN_PUSH_SHARE * self._limit), self._limit)
+        within = min(max(wanted, -self._allowed), self._allowed)
         self._cut = within != wanted
         return within
 

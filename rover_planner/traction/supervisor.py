@@ -53,6 +53,30 @@ class TractionCommand:
     """Time at which the first input that the torques need becomes stale [s]."""
 
 
+class DrivePermission:
+    """Keeps enabling and emergency stop; the stop also takes the enabling away."""
+
+    def __init__(self, enabled: bool):
+        """Start enabled or not, without an emergency stop."""
+        self.enabled = enabled
+        """Whether an operator has enabled the rover."""
+        self.emergency_stop = False
+        """Whether the emergency stop is pressed."""
+
+    def set_enabled(self, enabled: bool) -> tuple[bool, str]:
+        """Enable or disable; return whether that was done, and what holds now."""
+        if enabled and self.emergency_stop:
+            return False, "not enabled: ~/emergency_stop is true; it must be false first"
+        self.enabled = enabled
+        return True, "enabled" if enabled else "disabled"
+
+    def take_emergency_stop(self, pressed: bool) -> None:
+        """Take the emergency stop: pressed, or released, which does not enable again."""
+        self.emergency_stop = pressed
+        if pressed:
+            self.enabled = False
+
+
 class TractionSupervisor:
     """Passes on the torques of a TractionService while the rover may drive, else those of rest."""
 
@@ -63,7 +87,7 @@ class TractionSupervisor:
         self.permission = DrivePermission(enabled)
         """Enabling and emergency stop."""
         self._hold = self._create_hold()
-        self._latch = FaultLatch()
+        self._fault, self._fault_end = "", -math.inf
         self._stall = StallWatch()
         self._tripped = ""
         self._last_time: float | None = None
@@ -99,7 +123,7 @@ class TractionSupervisor:
         self._last_time = now
         fault = self._tripped or clock_fault or self.service.find_fault(now)
         self._tripped = ""
-        fault = self._latch.update(fault, now)
+        fault = self._latch(fault, now)
         state = self._find_state(fault, duration)
         if state != DRIVING:
             return self._rest(state, fault, now, duration)
@@ -109,7 +133,7 @@ class TractionSupervisor:
         self._held = False
         update = self.service.update(now)
         if update.fault:
-            self._latch.update(update.fault, now)
+            self._latch(update.fault, now)
             return self._rest(FAULT, update.fault, now, duration)
         return TractionCommand(update.torques, False, DRIVING, update, self.service.expiry)
 
@@ -119,6 +143,14 @@ class TractionSupervisor:
         self.trip(fault)
         update = self.service.rest(fault)
         return TractionCommand(update.torques, True, FAULT, update, float("inf"))
+
+    def _latch(self, fault: str, now: float) -> str:
+        """Return the fault that counts: at once, and until RECOVERY_TIME after its cause."""
+        if fault:
+            self._fault, self._fault_end = fault, now + RECOVERY_TIME
+        elif now >= self._fault_end:
+            self._fault = ""
+        return self._fault
 
     def _find_state(self, fault: str, duration: float) -> str:
         """Return the state; the first of STATES that applies."""
@@ -171,48 +203,3 @@ class TractionSupervisor:
         self._held = True
         torques = self._hold.update(-service.wheel_rates, min(duration, MAX_STEP))
         return np.clip(torques, -most, most)
-
-
-class DrivePermission:
-    """Keeps enabling and emergency stop; the stop also takes the enabling away."""
-
-    def __init__(self, enabled: bool):
-        """Start enabled or not, without an emergency stop."""
-        self.enabled = enabled
-        """Whether an operator has enabled the rover."""
-        self.emergency_stop = False
-        """Whether the emergency stop is pressed."""
-
-    def set_enabled(self, enabled: bool) -> tuple[bool, str]:
-        """Enable or disable; return whether that was done, and what holds now."""
-        if enabled and self.emergency_stop:
-            return False, "not enabled: ~/emergency_stop is true; it must be false first"
-        self.enabled = enabled
-        return True, "enabled" if enabled else "disabled"
-
-    def take_emergency_stop(self, pressed: bool) -> None:
-        """Take the emergency stop: pressed, or released, which does not enable again."""
-        self.emergency_stop = pressed
-        if pressed:
-            self.enabled = False
-
-
-class FaultLatch:
-    """A fault counts at once and passes RECOVERY_TIME after its cause."""
-
-    def __init__(self) -> None:
-        """Start without a fault."""
-        self._fault, self._end = "", -math.inf
-
-    def update(self, fault: str, now: float) -> str:
-        """Return the fault that counts at time `now` [s]; empty if there is none.
-
-        Args:
-            fault: What is wrong now; empty if nothing is.
-            now: Monotonic time [s].
-        """
-        if fault:
-            self._fault, self._end = fault, now + RECOVERY_TIME
-        elif now >= self._end:
-            self._fault = ""
-        return self._fault

@@ -328,19 +328,16 @@ class TractionService:
             if self._suspension_rates is not None:
                 lacking = "imu has no angular velocity"
             return level_estimate(), f"contact angles are taken as zero: {lacking}"
-        rocker = 0.5 * (self._suspension_rates[0] - self._suspension_rates[1])
-        state = self._level_state()
-        motion = Motion(
-            state.roll, state.pitch, state.rocker_angle, state.bogie_angles, rocker,
-            self._suspension_rates[2:], self.wheel_rates, self._body_rates, state.steering,
-        )  # fmt: skip
+        joints, rates = map(_mean_rocker, (self._suspension_angles, self._suspension_rates))
+        attitude = np.array([self.roll, self.pitch])
+        motion = Motion(attitude, joints, rates, self.wheel_rates, self._body_rates, self.steering)
         return self._estimator.update(motion, duration), ""
 
     def _level_state(self) -> MeasuredState:
         """Return the measured state with zero contact angles."""
-        right, left, *bogies = self._suspension_angles
+        joints = _mean_rocker(self._suspension_angles)
         return MeasuredState(
-            self.roll, self.pitch, 0.5 * (right - left), np.array(bogies), np.zeros(WHEEL_COUNT),
+            self.roll, self.pitch, joints[0], joints[1:], np.zeros(WHEEL_COUNT),
             steering=self.steering,
         )  # fmt: skip
 
@@ -403,3 +400,8 @@ class TractionService:
         max_change = settings.torque_rate * duration
         self._torques = limit_rate(torques, self._torques, max_change)
         return self._torques
+
+
+def _mean_rocker(values: Floats) -> Floats:
+    """Return values (3,) of right rocker and bogies from those (4,) of SUSPENSION_JOINTS."""
+    return np.array([0.5 * (values[0] - values[1]), values[2], values[3]])

@@ -6,7 +6,6 @@ delay it. It cannot act while another thread holds Python's interpreter lock, or
 hangs: a rover needs a hardware watchdog as well.
 """
 
-import select
 import threading
 import time
 import traceback
@@ -67,7 +66,7 @@ class Watchdog:
             now = time.monotonic()
             if now < self._deadline:
                 tripped = False
-                _sleep(min(max(self._deadline - now, SHORTEST), POLL))
+                time.sleep(min(max(self._deadline - now, SHORTEST), POLL))
                 continue
             # A thread that hangs while it sends must not keep the watchdog from acting.
             locked = self._lock.acquire(timeout=POLL)
@@ -83,9 +82,4 @@ class Watchdog:
             finally:
                 if locked:
                     self._lock.release()
-            _sleep(POLL)
-
-
-def _sleep(seconds: float) -> None:
-    """Sleep by `select`, whose time is relative on every system and version of Python."""
-    select.select((), (), (), seconds)
+            time.sleep(POLL)

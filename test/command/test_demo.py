@@ -94,31 +94,6 @@ def test_demo_prints_answers_and_writes_a_picture(tmp_path, map_file):
 
 
 @pytest.mark.long
-def test_demo_on_mars_reaches_what_it_sees_and_refuses_what_it_does_not(tmp_path):
-    demo = Demo(tmp_path, "--map", "spirit", "--out", tmp_path / "demo.png")
-    code, out, err = demo.finish()
-    assert (code, err) == (0, "")
-    assert "interpolate gaps of the map up to 0.2 m wide: 47% known" in out
-    rows = [line for line in out.splitlines() if line.startswith("│")]
-    assert sum("traversable" in row for row in rows) >= 3
-    refused = [row for row in rows if "refused" in row]
-    assert any(" unknown ground " in row for row in refused)
-    assert any(" off the map " in row for row in refused)
-    assert_nothing_left(demo)
-
-
-@pytest.mark.long
-def test_a_signal_to_the_demo_alone_ends_everything(tmp_path, map_file):
-    demo = Demo(tmp_path, "--map", map_file, "--out", tmp_path / "demo.png")
-    demo.wait_for("rover_planner.nodes.mission_planner")
-    demo.process.send_signal(signal.SIGINT)
-    returned, _, err = demo.finish()
-    assert returned == 130
-    assert "Traceback" not in err
-    assert_nothing_left(demo)
-
-
-@pytest.mark.long
 def test_a_server_that_dies_fails_the_demo_with_one_line(tmp_path, map_file):
     demo = Demo(tmp_path, "--map", map_file, "--out", tmp_path / "demo.png")
     os.kill(demo.wait_for("rover_planner.nodes.traverse_server"), signal.SIGKILL)

@@ -94,7 +94,7 @@ def test_number_of_rocks_integrates_to_the_area_they_cover(k):
     assert area == pytest.approx(expected, rel=1e-4)
 
 
-@pytest.mark.parametrize("k", [0.03, 0.1])
+@pytest.mark.parametrize("k", [0.1])
 def test_drawn_rocks_follow_the_size_frequency_law(k):
     area, smallest, largest = 20_000.0, 0.1, 2.0
     diameters = rocks.sample_diameters(np.random.default_rng(7), k, area, smallest, largest)
@@ -121,8 +121,3 @@ def test_a_rock_smaller_than_a_cell_or_at_the_edge_does_no_harm():
     rocks.add_rocks(elevation, 1.0, np.array([1.4, 0.0]), np.array([2.4, 0.0]), np.array([0.2, 3]))
     assert np.isfinite(elevation).all()
     assert elevation[0, 0] == pytest.approx(1.5)
-
-
-def test_more_rocks_than_can_be_made_are_refused():
-    with pytest.raises(PlanningError, match=r"rock cover is 0\.9, which are .* rocks"):
-        rocks.sample_diameters(np.random.default_rng(1), 0.9, 1e6, 0.01, 1.5)

@@ -58,15 +58,6 @@ def test_wheels_and_suspension_may_come_in_messages_of_their_own_and_an_arm_chan
     assert memory.wheel_rates == pytest.approx([0.2] * 6)
 
 
-def test_a_wheel_that_is_missing_from_messages_gets_old_by_itself():
-    memory = JointMemory()
-    memory.take(ANGLES, RATES, 1.0)
-    rest = {name: rate for name, rate in RATES.items() if name != "rear_left_wheel"}
-    memory.take(ANGLES, rest, 1.1)
-    assert memory.time == memory.wheel_time == 1.0
-    assert memory.describe_older(1.05) == "no velocity of rear_left_wheel"
-
-
 def test_values_with_a_stamp_that_does_not_advance_are_not_taken():
     memory = JointMemory()
     assert memory.take(ANGLES, RATES, 1.0, stamp=5)
@@ -113,7 +104,7 @@ def test_a_stamp_from_the_future_is_refused_beyond_the_tolerance():
         check.find_time("imu", CLOCK + 60 * MILLISECOND, CLOCK, 7.0)
 
 
-@pytest.mark.parametrize(("step", "text"), [(-3600, "back"), (3600, "ahead"), (-1, "back")])
+@pytest.mark.parametrize(("step", "text"), [(3600, "ahead"), (-1, "back")])
 def test_a_step_of_the_system_clock_is_seen_at_once_and_passes(step, text):
     watch = ClockWatch(0.07)
     for k in range(5):

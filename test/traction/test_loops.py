@@ -8,7 +8,7 @@ from rover_planner.traction.loops import (
     CLIMBING_ANGLE,
     SERVO_TIME,
     PIController,
-    PushLimit,
+    PushLoop,
     StallDetector,
     WheelMotion,
     estimate_rolling_rates,
@@ -74,12 +74,12 @@ def test_servos_in_vain_leave_the_torques_to_the_program_again():
 
 
 def test_a_push_that_makes_wheels_slip_falls_until_they_do_not():
-    limit = PushLimit(50.0)
-    assert limit.apply(10.0, 0.5, 0.02) == 10.0
+    loop = PushLoop(1.0, 0.0, 50.0)
+    assert loop.push(10.0, 0.02, False, 0.5) == 10.0
     for _ in range(20):
-        push = limit.apply(10.0, 1.2, 0.02)
+        push = loop.push(10.0, 0.02, False, 1.2)
     assert push < 1.0
-    assert limit.apply(-10.0, 1.2, 0.02) > -1.0
+    assert loop.push(-10.0, 0.02, False, 1.2) > -1.0
     for _ in range(200):
-        push = limit.apply(10.0, 0.5, 0.02)
+        push = loop.push(10.0, 0.02, False, 0.5)
     assert push == 10.0

@@ -111,7 +111,7 @@ def test_controller_and_simulator_drive_curves_and_turns_on_a_slope(policy, comm
     service = TractionService(with_policy(policy))
     service.take_terrain(plane(0.1, 0.0, half=3.0))
     travelled = 0.0
-    for step in range(round(12.0 / PERIOD)):
+    for step in range(round(8.0 / PERIOD)):
         now, state = step * PERIOD, plant.state()
         service.take_joints(state.joint_positions, state.joint_velocities, now)
         x, y, z, w = state.orientation
@@ -125,6 +125,6 @@ def test_controller_and_simulator_drive_curves_and_turns_on_a_slope(policy, comm
         plant.pull(update.torques, command, PERIOD)
         travelled += PERIOD * np.hypot(*state.velocity[:2])
     # Two seconds go into steering and the start.
-    assert plant.pose()[2] == pytest.approx(command[1] * 11.0, abs=0.2 * abs(command[1] * 11.0))
+    assert plant.pose()[2] == pytest.approx(command[1] * 7.0, abs=0.2 * abs(command[1] * 7.0))
     if command[0] == 0.0:
         assert plant.pose()[:2] == pytest.approx([0.0, 0.0], abs=0.05)

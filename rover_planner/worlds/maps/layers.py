@@ -101,19 +101,13 @@ class Patch:
         old = self.with_layers(names)
         to, own = patch.box.within(old.box), old.box.within(patch.box)
         layers = {name: layer.copy() for name, layer in old.layers.items()}
-        for name, layer in layers.items():
-            if name == "source":
-                layer[to][take] = source
-            elif name == "time":
-                layer[to][take] = time
-            elif name == "friction" and name in patch.layers:
-                values = patch.layers[name][own]
-                known = take & np.isfinite(values)
-                layer[to][known] = values[known]
-            elif name in patch.layers:
-                layer[to][take] = patch.layers[name][own][take]
-            elif name == "elevation_std":
-                layer[to][take] = 0.0
+        values: dict[str, Any] = {"source": source, "time": time, "elevation_std": 0.0}
+        values |= {name: patch.layers[name][own][take] for name in names}
+        if "friction" in names:
+            new, kept = values["friction"], layers["friction"][to][take]
+            values["friction"] = np.where(np.isfinite(new), new, kept)
+        for name in values.keys() & layers.keys():
+            layers[name][to][take] = values[name]
         return replace(old, layers=layers)
 
 

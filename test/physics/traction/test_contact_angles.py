@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Contact angles from simulated motion and from the map, over slopes, steps and rocks."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -11,7 +9,6 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traction.balance import MeasuredState
 from rover_physics.traction.contact_ekf import (
-    Motion,
     MotionContactEstimator,
 )
 from rover_physics.traction.map_contacts import MapContactFinder
@@ -43,7 +40,7 @@ def rms(errors):
 )
 def test_on_an_even_slope_the_angles_are_known_at_rest_and_in_motion(rover, slope):
     prediction, motions, duration = drive_states(rover, plane(*slope, half=4.0))
-    still = replace(motions[0], wheel_rates=np.zeros(6), body_rates=np.zeros(3))
+    still = motions[0]._replace(wheel_rates=np.zeros(6), body_rates=np.zeros(3))
     estimate = MotionContactEstimator(rover).update(still, 0.02)
     assert estimate.angles == pytest.approx(prediction.contact_angle[0], abs=0.01)
     angles, _ = follow(rover, motions, duration)
@@ -82,11 +79,9 @@ def test_at_rest_nothing_is_learnt_or_forgotten():
     estimator = MotionContactEstimator(LSR1)
     for motion in motions[:300]:
         moved = estimator.update(motion, duration)
-    at = motions[300]
-    still = Motion(
-        at.roll, at.pitch, at.rocker_angle, at.bogie_angles, 0.0, np.zeros(2), np.zeros(6),
-        np.zeros(3),
-    )  # fmt: skip
+    still = motions[300]._replace(
+        joint_rates=np.zeros(3), wheel_rates=np.zeros(6), body_rates=np.zeros(3)
+    )
     rested = estimator.update(still, 100.0)
     assert np.array_equal(rested.angles, moved.angles)
     assert np.array_equal(rested.covariance, moved.covariance)

@@ -11,20 +11,13 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.traction.balance import BalanceWriter, MeasuredState
 from rover_physics.traction.layout import (
     CONE_ROWS,
-    EQUATIONS,
-    FORCES,
     LOADS,
-    PEAK,
     PEAK_LIMIT_ROW,
-    TRACTION,
     TRACTIONS,
-    VARIABLES,
 )
 from rover_physics.traction.line_search import measure_peak
 from rover_physics.traction.program import (
     ProgramInputs,
-    Reference,
-    build_traction_qp,
 )
 from rover_physics.traction.solver import TractionWorkspace, solve_traction
 from rover_physics.traversability.judge import judge_path
@@ -52,7 +45,7 @@ def solve(rover, state, net=0.0, friction=FRICTION, torque=None, programs=12, **
 
 def test_the_answer_keeps_the_nine_equations_and_is_within_3_percent_of_the_optimum():
     workspace, writer, short = TractionWorkspace(), BalanceWriter(LSR1), []
-    for prediction, i in rough_states(LSR1, 60):
+    for prediction, i in rough_states(LSR1, 40):
         rows = writer.write(state_of(LSR1, prediction, i), 0.0)
         answer = solve_traction(workspace, rows, INPUTS, max_programs=12)
         assert not answer.fallback and answer.load_slack == answer.torque_slack == 0.0
@@ -64,50 +57,6 @@ def test_the_answer_keeps_the_nine_equations_and_is_within_3_percent_of_the_opti
         if can_stand(LSR1, prediction, i, answer.utilisation.max() / 1.03, 2.0):
             short.append(i)
     assert short == []
-
-
-def test_the_cones_are_the_tangents_of_the_round_cone_at_the_reference():
-    prediction, i = next(rough_states(LSR1, 1))
-    rows = BalanceWriter(LSR1).write(state_of(LSR1, prediction, i), 5.0)
-    x = rows.complete(np.array([0.1, -0.05, 0.0, 0.05, 0.1, 0.2]))
-    reference = Reference(x, 0.4)
-    qp = build_traction_qp(rows, INPUTS, reference)
-
-    def rounded(x, peak):
-        across = np.hypot(x[TRACTIONS], rows.lateral_forces(x))
-        return across - peak * FRICTION * x[LOADS]
-
-    def polygon(x, peak):
-        y = np.zeros(VARIABLES)
-        y[:FORCES] = (x - qp.shift[:FORCES]) / qp.scale[:FORCES]
-        y[PEAK] = peak / qp.scale[PEAK]
-        sides = (qp.A @ y - qp.upper)[CONES].reshape(6, -1)
-        return qp.scale[TRACTION] * sides.max(axis=1)
-
-    assert polygon(x, 0.4) == pytest.approx(rounded(x, 0.4), abs=1e-12)
-    step, rng = 1e-6, np.random.default_rng(1)
-    for _ in range(20):
-        dx, du = rng.standard_normal(FORCES), rng.standard_normal()
-        slopes = [
-            (f(x + step * dx, 0.4 + step * du) - f(x - step * dx, 0.4 - step * du)) / (2 * step)
-            for f in (polygon, rounded)
-        ]
-        assert slopes[0] == pytest.approx(slopes[1], abs=1e-5)
-
-
-@pytest.mark.parametrize(
-    ("torques", "changes"),
-    [((-0.2, 0.2, 0.0), (-0.733, 1.467, -0.733)), ((0.0, -0.2, 0.2), (0.0, 0.0, 0.0))],
-)
-def test_the_rows_of_the_program_have_the_slopes_of_figure_4(torques, changes):
-    rows = BalanceWriter(LSR1).write(level(), 0.0)
-    reference = Reference(rows.complete(np.zeros(6)), 0.1)
-    qp = build_traction_qp(rows, INPUTS, reference)
-    balance = qp.A[:EQUATIONS]
-    determined, pulls = balance[:, TRACTIONS.stop : FORCES], balance[:, TRACTIONS]
-    tractions = np.tile(torques, 2) / LSR1.wheel.radius
-    loads = np.linalg.lstsq(determined, -pulls @ tractions, rcond=None)[0][:6]
-    assert loads == pytest.approx(np.tile(changes, 2), abs=5e-4)
 
 
 def test_a_resistance_is_overcome_by_each_wheel_as_fast_as_it_rolls_and_moves_no_load():

@@ -134,8 +134,8 @@ def test_motion_tells_the_contact_angles_on_an_arc_across_a_slope(rover):
         # A link's rate about the axle; wheel joints turn relative to it.
         about_axle = rates[i, 1] * np.cos(steering) - rates[i, 0] * np.sin(steering)
         motion = Motion(
-            prediction.roll[i], prediction.pitch[i], prediction.rocker_angle[i, 0],
-            prediction.bogie_angle[i], rocker[i, 0], bogie[i],
+            [prediction.roll[i], prediction.pitch[i]],
+            [prediction.rocker_angle[i, 0], *prediction.bogie_angle[i]], [rocker[i, 0], *bogie[i]],
             speeds[i] / rover.wheel.radius - about_axle, rates[i], steering,
         )  # fmt: skip
         found.append(estimator.update(motion, duration).angles)

@@ -24,8 +24,8 @@ def line(start, end, yaw, count=30):
     return np.column_stack([np.linspace(start, end, count), np.full(count, yaw)])
 
 
-@pytest.mark.parametrize("yaw", [0.0, 2.0, -3.0])
-def test_a_path_driven_backwards_is_followed_backwards_from_beside_it(yaw):
+def test_a_path_driven_backwards_is_followed_backwards_from_beside_it():
+    yaw = 2.0
     heading = np.array([np.cos(yaw), np.sin(yaw)])
     aside = 0.1 * np.array([-heading[1], heading[0]])
     poses, commands = follow(line((0.0, 0.0), -2.0 * heading, yaw), [*aside, yaw])

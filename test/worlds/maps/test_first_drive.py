@@ -39,7 +39,7 @@ class Drive:
     """A simulated rover with a camera, and a server that knows no more than it measures."""
 
     def __init__(self, ground: Terrain, **parameters):
-        simulated = RoverSimulatorParameters(start_x=START[0], start_y=START[1], **CAMERA)
+        simulated = RoverSimulatorParameters(start_x=START[0], speed=0.08, **CAMERA)
         settings = replace(load_simulation_settings(simulated), terrain=ground)
         self.simulation = Simulation(settings)
         asked = TraverseServerParameters(map_updates=MERGE, planner=FAN, **parameters)

@@ -11,7 +11,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path
 from rover_planner.worlds.maps.ground_beneath import Standing, find_ground_beneath
-from rover_planner.worlds.maps.layers import CONTACT, FOOTPRINT, LOADED
+from rover_planner.worlds.maps.layers import CONTACT, FOOTPRINT
 from rover_planner.worlds.maps.living_map import LivingMap
 from support.grounds import make_terrain, rocky, waves
 
@@ -111,15 +111,6 @@ def test_a_map_that_begins_ahead_of_the_rover_grows_to_where_it_stands():
     assert fill(living, ROVERS["lsr1"], standing)
     terrain = living.snapshot().terrain
     assert terrain.contains(-0.5, 0.0) and terrain.elevation_at(0.0, 0.0) == pytest.approx(0.0)
-
-
-def test_nothing_is_filled_where_the_ground_is_known():
-    living = LivingMap()
-    living.load(SLOPE, 0.0)
-    standing, _ = standing_at(ROVERS["lsr1"], SLOPE, (0.0, 0.0, 0.3))
-    assert not fill(living, ROVERS["lsr1"], standing)
-    now = living.snapshot()
-    assert now.terrain is SLOPE and (now.sources.source == LOADED).all()
 
 
 def test_a_contact_replaces_what_was_assumed_and_a_map_replaces_both():

@@ -62,16 +62,6 @@ def test_a_loaded_map_survives_100_local_updates_to_the_bit():
     assert merged.elevation_std is None
 
 
-def test_what_a_newer_map_does_not_see_stays():
-    living = LivingMap()
-    living.merge(local_map((0.0, 0.0), 0.1), TOPIC, 1.0)
-    blind = np.full((20, 20), 0.2)
-    blind[:, :10] = np.nan
-    living.merge(Terrain(blind, 0.05, (0.0, 0.0)), TOPIC, 2.0)
-    assert cell(living, 0.1, 0.5) == (0.1, TOPIC, 1.0)
-    assert cell(living, 0.9, 0.5) == (0.2, TOPIC, 2.0)
-
-
 def test_the_newer_height_wins_whichever_arrives_last():
     living = LivingMap()
     living.merge(local_map((0.0, 0.0), 0.1), "front", 10.0)
@@ -224,15 +214,15 @@ def test_a_local_map_of_tiny_cells_is_refused_and_leaves_all_as_it_was():
 
 
 def test_a_coarse_map_is_laid_only_onto_the_cells_of_a_window():
-    orbital = Terrain(np.add.outer(np.arange(4000.0), np.arange(4000.0)), 1.0, (-2000.0, -2000.0))
+    orbital = Terrain(np.add.outer(np.arange(1000.0), np.arange(1000.0)), 1.0, (-500.0, -500.0))
     living = LivingMap(MergeRules(window=4.0))
-    living.load(orbital, 0.0)  # on cells of 1 cm it would have 1.6e11
+    living.load(orbital, 0.0)  # on cells of 1 cm it would have 1e10
     living.merge(local_map((0.0, 0.0), height=1.0, resolution=0.01), TOPIC, 1.0, (0.0, 0.0))
     assert living.snapshot().terrain.elevation.shape == (400, 400)
     height, source, _ = cell(living, 1.5, 1.25)
-    assert height == pytest.approx(4002.75, abs=1e-9) and source == "loaded"
+    assert height == pytest.approx(1002.75, abs=1e-9) and source == "loaded"
     living.merge(local_map((9.0, 9.0), resolution=0.01), TOPIC, 2.0, (9.0, 9.0))
-    assert cell(living, 10.5, 9.25)[0] == pytest.approx(4019.75, abs=1e-9)
+    assert cell(living, 10.5, 9.25)[0] == pytest.approx(1019.75, abs=1e-9)
     living.merge(local_map((5e3, 5e3), resolution=0.01), TOPIC, 3.0, (5e3, 5e3))
     assert cell(living, 5000.05, 5000.05)[:2] == (0.0, TOPIC)
 
