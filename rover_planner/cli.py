@@ -71,6 +71,6 @@ app.command()(figure4)
 app.command()(warm_up)
 
 
-def main(words: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str] | None = None) -> int:
     """Run the command and return its exit code; print one line on stderr for bad input."""
-    return run_program(NAME, lambda: run_app(app, NAME, words))
+    return run_program(NAME, lambda: run_app(app, NAME, argv))

@@ -6,18 +6,11 @@ from typing import Annotated
 
 import typer
 
-from rover_planner.command.options import MaxGap, RoverOption
+from rover_planner.command.options import MaxGap, OptionalMap, RoverOption
 
 
 def demo(
-    map_name: Annotated[
-        str | None,
-        typer.Option(
-            "--map",
-            metavar="TERRAIN",
-            help="Preset name (spirit) or elevation map, .npz; default: a generated one.",
-        ),
-    ] = None,
+    map_name: OptionalMap = None,
     out: Annotated[Path, typer.Option(help="Picture to write, .png.")] = Path(
         "demo_output/demo.png"
     ),

@@ -6,14 +6,14 @@ from typing import Annotated
 
 import typer
 
-from rover_planner.command.options import RoverOption
+from rover_planner.command.options import RoverOption, argument
 from rover_planner.shell.extras import need
 
 
 def figure4(
-    out: Annotated[
-        Path, typer.Argument(metavar="OUT", help="Picture to write, .png; is overwritten.")
-    ] = Path("figure4.png"),
+    out: Annotated[Path, argument("OUT", "Picture to write, .png; is overwritten.")] = Path(
+        "figure4.png"
+    ),
     rover: RoverOption = "lsr1",
 ) -> None:
     """Draw Figure 4 of the paper: how the torque of one wheel changes the loads of all."""

@@ -1,48 +1,98 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Arguments and options that several subcommands share."""
+"""The table of arguments and options that several subcommands share, and how others are made."""
 
-from typing import Annotated
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-Vector = tuple[float, float, float]
+from rover_planner.errors import PlanningError
 
-RoverName = Annotated[
-    str, typer.Argument(metavar="ROVER", help="Preset name (lsr1, m2020) or rover file.")
-]
-RoverOption = Annotated[str, typer.Option(help="Preset name (lsr1, m2020) or rover file.")]
-TerrainName = Annotated[
-    str,
-    typer.Argument(metavar="TERRAIN", help="Preset name (spirit) or elevation map, .npz."),
-]
-Friction = Annotated[float | None, typer.Option(metavar="MU", help="Coulomb friction everywhere.")]
-MaxTorque = Annotated[
-    float | None, typer.Option(metavar="TAU", help="Largest wheel torque in N m.")
-]
-Policy = Annotated[
-    str, typer.Option(metavar="equal|servo|optimal", help="How the wheels share the traction.")
-]
+if TYPE_CHECKING:
+    from rover_physics.rover.model import Rover
+
+
+def argument(metavar: str, help: str = "") -> Any:
+    """Return an argument of typer."""
+    return typer.Argument(metavar=metavar, help=help or None)
+
+
+def option(metavar: str, help: str, *names: str, **more: Any) -> Any:
+    """Return an option of typer that takes a value; without names it has that of its parameter."""
+    return typer.Option(*names, metavar=metavar, help=help, **more)
+
+
+def flag(name: str, help: str) -> Any:
+    """Return an option of typer that takes no value."""
+    return typer.Option(name, help=help)
+
+
+Vector = tuple[float, float, float]
+_ROVER = "Preset name (lsr1, m2020) or rover file."
+_TERRAIN = "Preset name (spirit) or elevation map, .npz"
+_OPTIONAL = f"{_TERRAIN}; default: a generated one."
+
+RoverName = Annotated[str, argument("ROVER", _ROVER)]
+RoverOption = Annotated[str, typer.Option(help=_ROVER)]
+TerrainName = Annotated[str, argument("TERRAIN", f"{_TERRAIN}.")]
+OptionalTerrain = Annotated[str | None, argument("TERRAIN", _OPTIONAL)]
+OptionalMap = Annotated[str | None, option("TERRAIN", _OPTIONAL, "--map")]
+Friction = Annotated[float | None, option("MU", "Coulomb friction everywhere.")]
+MaxTorque = Annotated[float | None, option("TAU", "Largest wheel torque in N m.")]
+Policy = Annotated[str, option("equal|servo|optimal", "How the wheels share the traction.")]
 SoilName = Annotated[
-    str | None,
-    typer.Option(metavar="NAME", help="Preset soil where the terrain names none (docs/soil.md)."),
+    str | None, option("NAME", "Preset soil where the terrain names none (docs/soil.md).")
+]
+Payload = Annotated[float | None, option("KG", "Mass at the arm's tip in kg.")]
+Sigmas = Annotated[
+    float,
+    option("K", "Standard deviations to allow for where the map has elevation_std; 0: none."),
 ]
 MaxGap = Annotated[
-    float,
-    typer.Option(
-        metavar="M", help="Widest unknown region of the map to interpolate in m; 0: none."
-    ),
+    float, option("M", "Widest unknown region of the map to interpolate in m; 0: none.")
 ]
 MaxCells = Annotated[
-    int,
-    typer.Option(metavar="N", min=4, help="Largest terrain file in cells; more are not unpacked."),
+    int, option("N", "Largest terrain file in cells; more are not unpacked.", min=4)
 ]
 MAX_CELLS = 25_000_000
 """Default of the option --max-cells; a test compares it with that of `load_terrain`."""
-Payload = Annotated[float | None, typer.Option(metavar="KG", help="Mass at the arm's tip in kg.")]
-Sigmas = Annotated[
-    float,
-    typer.Option(
-        metavar="K",
-        help="Standard deviations to allow for where the map has elevation_std; 0: none.",
-    ),
-]
+
+
+def read_arm_angles(rover: "Rover", words: Sequence[str]) -> dict[str, float] | None:
+    """Return the angles [rad] of all arm joints by name; None (stowed) if `words` is empty.
+
+    Args:
+        rover: The rover.
+        words: NAME=RAD for each joint of the arm, each joint once, in any order.
+
+    Raises:
+        PlanningError: The rover has no arm, a word has another form, an angle is not finite, or
+            a joint is unknown, named twice or missing.
+    """
+    if not words:
+        return None
+    arm = rover.manipulator
+    if arm is None:
+        raise PlanningError(f"--arm {words[0]}: rover {rover.name!r} has no manipulator")
+    known = ", ".join(arm.joints)
+    angles: dict[str, float] = {}
+    for word in words:
+        name, _, text = word.partition("=")
+        try:
+            angle = float(text)
+        except ValueError:
+            angle = math.nan
+        if not math.isfinite(angle):
+            raise PlanningError(
+                f"--arm is {word!r}; it must be NAME=RAD, such as {arm.joints[0]}=0.5"
+            )
+        if name not in arm.joints:
+            raise PlanningError(f"--arm {word}: no joint {name!r}; joints are {known}")
+        if name in angles:
+            raise PlanningError(f"--arm names {name} twice")
+        angles[name] = angle
+    missing = [name for name in arm.joints if name not in angles]
+    if missing:
+        raise PlanningError(f"--arm lacks {', '.join(missing)}; give all joints: {known}")
+    return angles

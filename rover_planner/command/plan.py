@@ -18,19 +18,17 @@ from rover_planner.command.options import (
     Sigmas,
     SoilName,
     TerrainName,
+    argument,
+    flag,
+    option,
 )
 from rover_planner.shell.poses import GOAL, START, Pose
 
 if TYPE_CHECKING:
     from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 
-Out = Annotated[
-    Path,
-    typer.Argument(metavar="OUT", help="The way with its predictions, .npz; written if found."),
-]
-Picture = Annotated[
-    Path | None, typer.Option(metavar="FILE", help="Draw the answer on the map (.png, .svg).")
-]
+Out = Annotated[Path, argument("OUT", "The way with its predictions, .npz; written if found.")]
+Picture = Annotated[Path | None, option("FILE", "Draw the answer on the map (.png, .svg).")]
 
 
 def plan(
@@ -44,22 +42,18 @@ def plan(
     max_torque: MaxTorque = None,
     soil: SoilName = None,
     payload: Payload = None,
-    budget: Annotated[float, typer.Option(metavar="S", help="Time for the search in s.")] = 2.0,
+    budget: Annotated[float, option("S", "Time for the search in s.")] = 2.0,
     cell: Annotated[
         float | None,
-        typer.Option(
-            metavar="M", help="Distance of the lattice's nodes in m; a quarter of the wheelbase."
-        ),
+        option("M", "Distance of the lattice's nodes in m; a quarter of the wheelbase."),
     ] = None,
     frontier: Annotated[
-        bool,
-        typer.Option("--frontier", help="Plan as near as possible to a goal on unknown ground."),
+        bool, flag("--frontier", "Plan as near as possible to a goal on unknown ground.")
     ] = False,
     sigmas: Sigmas = 3.0,
     picture: Picture = None,
     dump: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write the question for replay-plan, .npz."),
+        Path | None, option("FILE", "Write the question for replay-plan, .npz.")
     ] = None,
     max_cells: MaxCells = MAX_CELLS,
 ) -> None:
@@ -82,11 +76,7 @@ def plan(
         goal,
         PathQueryOptions(
             model=SweepOptions(
-                policy=policy,
-                friction=friction,
-                max_torque=max_torque,
-                soil=soil,
-                payload=payload,
+                policy=policy, friction=friction, max_torque=max_torque, soil=soil, payload=payload
             ),
             map_sigmas=sigmas,
         ),
@@ -97,9 +87,7 @@ def plan(
 
 
 def replay_plan(
-    question: Annotated[
-        Path, typer.Argument(metavar="QUESTION", help="Question that plan --dump has written.")
-    ],
+    question: Annotated[Path, argument("QUESTION", "Question that plan --dump has written.")],
     out: Out,
     picture: Picture = None,
     max_cells: MaxCells = MAX_CELLS,
@@ -131,11 +119,7 @@ def _ask(
         on_soil = options.soil is not None or bool(question.terrain.soil_names)
         assumed = assume(question.rover, options, question.options.map_sigmas)
         write_prediction(
-            out,
-            answer.path.prediction,
-            answer.path.verdict,
-            on_soil=on_soil,
-            assumptions=assumed,
+            out, answer.path.prediction, answer.path.verdict, on_soil=on_soil, assumptions=assumed
         )
     if picture is not None:
         from rover_planner.figures.path_picture import draw_path

@@ -18,6 +18,10 @@ from rover_planner.command.options import (
     SoilName,
     TerrainName,
     Vector,
+    argument,
+    flag,
+    option,
+    read_arm_angles,
 )
 
 MAX_IN_MEMORY = 20_000
@@ -34,47 +38,37 @@ def predict(
     terrain: TerrainName,
     poses: Annotated[
         Path,
-        typer.Argument(
-            metavar="POSES",
-            help="Poses x, y, yaw of the body, .npz; with curvature, where they form no path.",
+        argument(
+            "POSES", "Poses x, y, yaw of the body, .npz; with curvature, where they form no path."
         ),
     ],
-    out: Annotated[Path, typer.Argument(metavar="OUT", help="Predictions, .npz; is overwritten.")],
+    out: Annotated[Path, argument("OUT", "Predictions, .npz; is overwritten.")],
     friction: Friction = None,
     max_torque: MaxTorque = None,
     policy: Policy = "equal",
     control_margin: Annotated[
         float,
-        typer.Option(
-            metavar="SHARE",
-            help="Share of friction and torque that policy optimal leaves to the controller.",
+        option(
+            "SHARE", "Share of friction and torque that policy optimal leaves to the controller."
         ),
     ] = 0.0,
     soil: SoilName = None,
     arm: Annotated[
-        list[str] | None,
-        typer.Option(metavar="NAME=RAD", help="Angle of a joint of the arm in rad; give all."),
+        list[str] | None, option("NAME=RAD", "Angle of a joint of the arm in rad; give all.")
     ] = None,
     payload: Payload = None,
     tool_force: Annotated[
-        Vector | None,
-        typer.Option(metavar="FX FY FZ", help="Force on the arm's tip in N, body frame."),
+        Vector | None, option("FX FY FZ", "Force on the arm's tip in N, body frame.")
     ] = None,
     tool_moment: Annotated[
-        Vector | None,
-        typer.Option(metavar="MX MY MZ", help="Moment on the arm's tip in N m, body frame."),
+        Vector | None, option("MX MY MZ", "Moment on the arm's tip in N m, body frame.")
     ] = None,
     sigmas: Sigmas = 3.0,
     classes: Annotated[
-        bool,
-        typer.Option(
-            "--classes",
-            help="Add the class of each waypoint, by all torque policies.",
-        ),
+        bool, flag("--classes", "Add the class of each waypoint, by all torque policies.")
     ] = False,
     torque_ranges: Annotated[
-        bool,
-        typer.Option("--torque-ranges", help="Add the range of feasible torques of each wheel."),
+        bool, flag("--torque-ranges", "Add the range of feasible torques of each wheel.")
     ] = False,
     max_cells: MaxCells = MAX_CELLS,
 ) -> None:
@@ -89,7 +83,6 @@ def predict(
     from rover_physics.traversability.judge import judge_path, judge_poses
     from rover_physics.traversability.partwise import PartwiseJudge
     from rover_physics.traversability.torque_ranges import find_torque_ranges
-    from rover_planner.command.arm_options import read_arm_angles
     from rover_planner.command.prediction_files import (
         read_curvature,
         read_poses,
@@ -145,13 +138,7 @@ def predict(
             if classes:
                 progress("classify the waypoints")
                 found = classify_judged(
-                    model,
-                    ground,
-                    prediction,
-                    verdict,
-                    options,
-                    sigmas=sigmas,
-                    curvature=curvature,
+                    model, ground, prediction, verdict, options, sigmas=sigmas, curvature=curvature
                 )
             write_prediction(
                 out,

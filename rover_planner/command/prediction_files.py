@@ -20,11 +20,7 @@ from rover_physics.traversability.classification import ClassifiedWaypoint
 from rover_physics.traversability.torque_ranges import TorqueRanges
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.errors import PlanningError
-from rover_planner.planning.assumptions import (
-    Assumptions,
-    read_assumptions,
-    write_assumptions,
-)
+from rover_planner.planning.assumptions import Assumptions, read_assumptions, write_assumptions
 
 Shape = tuple[int, ...]
 
@@ -57,8 +53,10 @@ REPLAY_ARRAYS: dict[str, Shape] = {"poses": (3,), "status": ()} | {
 """Further arrays in the file that `rover_planner view` needs to replay it."""
 SOIL_ARRAYS = ("sinkage", "motion_resistance")
 """Further arrays in the file if a soil was given or the terrain has soils."""
-FLAGS = ("settled", "falling")
-"""Arrays of bools; `status` holds whole numbers, `reason` texts, and the others numbers."""
+NUMBERS: tuple[DTypeLike, str, str] = (np.float64, "fiu", "numbers")
+FLAGS: tuple[DTypeLike, str, str] = (np.bool_, "b", "bools")
+TYPES = {"settled": FLAGS, "falling": FLAGS, "status": (np.int8, "i", "whole numbers")}
+"""Arrays that do not hold NUMBERS: type when read, kinds of types in the file, and name."""
 SHOWN = ("position", "wheel_centres", "distance", "time")
 """Arrays that a replay cannot do without where the rover settled."""
 MAX_NUMBER = 1e9
@@ -138,7 +136,9 @@ def read_prediction(path: Path) -> tuple[PathPrediction, tuple[str, ...]]:
         for name, shape in shapes.items():
             _check_header(archive.read_header(name), name, (reason.size, *shape))
         arrays: dict[str, Any] = {
-            name: archive.read(name, _type_of(name), most=8 * reason.size * math.prod(shape))
+            name: archive.read(
+                name, TYPES.get(name, NUMBERS)[0], most=8 * reason.size * math.prod(shape)
+            )
             for name, shape in shapes.items()
         }
         reasons = tuple(archive.read("reason", most=MAX_REASONS).tolist())
@@ -182,19 +182,9 @@ def _check_count(name: str, count: int) -> None:
         raise RoverFileError(f"{name} has {count} rows; a file may have {MAX_POSES}")
 
 
-def _type_of(name: str) -> DTypeLike:
-    if name in FLAGS:
-        return np.bool_
-    return np.int8 if name == "status" else np.float64
-
-
 def _check_header(header: ArrayHeader, name: str, shape: Shape) -> None:
     """Check type and shape of an array of a prediction."""
-    kinds, what = "fiu", "numbers"
-    if name in FLAGS:
-        kinds, what = "b", "bools"
-    elif name == "status":
-        kinds, what = "i", "whole numbers"
+    _, kinds, what = TYPES.get(name, NUMBERS)
     if header.dtype.kind not in kinds:
         raise RoverFileError(f"{name} is of type {header.dtype}; it must hold {what}")
     if header.shape != shape:
@@ -244,16 +234,15 @@ def write_prediction(
     Raises:
         PlanningError: The file cannot be written.
     """
-    arrays = _rows_of(prediction, on_soil)
+    arrays = _rows_of(prediction, on_soil) | _summary_of(verdict, prediction, assumptions, ranges)
     arrays["reason"] = np.array(verdict.reasons, dtype=np.str_)
-    arrays |= _text_of(assumptions) | _summary_of(verdict, prediction, classes, ranges)
+    if classes is not None:
+        for name in ("traversability_class", "constraint", "wheel"):
+            texts = np.array([getattr(waypoint, name) for waypoint in classes], dtype=np.str_)
+            arrays[name if name == "traversability_class" else f"class_{name}"] = texts
+        arrays["class_margin"] = np.array([waypoint.margin for waypoint in classes])
     with _errors_of(path):
         write_npz(path, arrays, compressed=False)
-
-
-def _text_of(assumptions: Assumptions | None) -> dict[str, Any]:
-    """Return the array of the assumptions, if there are any."""
-    return {} if assumptions is None else {ASSUMPTIONS: np.array(write_assumptions(assumptions))}
 
 
 @contextmanager
@@ -288,9 +277,6 @@ class PartsFile:
     def take(self, prediction: PathPrediction) -> None:
         """Take the prediction of the next waypoints."""
         self._parts.add(_rows_of(prediction, self._on_soil))
-        bounds = prediction.bounds
-        if bounds is not None:
-            self._parts.add({f"{name}_bounds": getattr(bounds, name) for name in BOUNDED_VALUES})
         self._last = prediction
 
     def close(self, verdict: Verdict, ranges: TorqueRanges | None = None) -> None:
@@ -300,9 +286,8 @@ class PartsFile:
         for first in range(0, len(verdict.reasons), BLOCK):
             block = np.array(verdict.reasons[first : first + BLOCK], f"<U{longest}")
             self._parts.add({"reason": block})
-        summary = _summary_of(verdict, self._last, None, ranges)
-        rest = {name: summary[name] for name in summary if not name.endswith("_bounds")}
-        self._parts.write(self._path, _text_of(self._assumptions) | rest)
+        summary = _summary_of(verdict, self._last, self._assumptions, ranges)
+        self._parts.write(self._path, summary)
 
 
 def _rows_of(prediction: PathPrediction, on_soil: bool) -> dict[str, Any]:
@@ -312,29 +297,27 @@ def _rows_of(prediction: PathPrediction, on_soil: bool) -> dict[str, Any]:
     rows["steering_angle"] = np.where(
         prediction.settled[:, None], prediction.steering_angle, np.nan
     )
+    if prediction.bounds is not None:
+        for name in BOUNDED_VALUES:
+            rows[f"{name}_bounds"] = getattr(prediction.bounds, name)
     return rows
 
 
 def _summary_of(
     verdict: Verdict,
     prediction: PathPrediction,
-    classes: Sequence[ClassifiedWaypoint] | None,
+    assumptions: Assumptions | None,
     ranges: TorqueRanges | None,
 ) -> dict[str, Any]:
-    """Return the arrays of verdict, bounds, classes and torque ranges, without the reasons."""
+    """Return the arrays about the whole path, and torque ranges."""
     arrays: dict[str, Any] = {
         "traversable": np.array(verdict.traversable, dtype=np.bool_),
         "first_failure": np.array(verdict.first_failure, dtype=np.int64),
     }
+    if assumptions is not None:
+        arrays[ASSUMPTIONS] = np.array(write_assumptions(assumptions))
     if prediction.bounds is not None:
         arrays["map_sigmas"] = np.array(prediction.bounds.sigmas)
-        for name in BOUNDED_VALUES:
-            arrays[f"{name}_bounds"] = getattr(prediction.bounds, name)
-    if classes is not None:
-        for name in ("traversability_class", "constraint", "wheel"):
-            texts = np.array([getattr(waypoint, name) for waypoint in classes], dtype=np.str_)
-            arrays[name if name == "traversability_class" else f"class_{name}"] = texts
-        arrays["class_margin"] = np.array([waypoint.margin for waypoint in classes])
     if ranges is not None:
         arrays["torque_range"] = np.stack([ranges.lowest, ranges.highest], axis=-1)
     return arrays

@@ -17,25 +17,25 @@ from rover_planner.command.options import (
     SoilName,
     TerrainName,
     Vector,
+    argument,
+    option,
 )
 
 
 def reach(
     rover: RoverName,
     terrain: TerrainName,
-    x: Annotated[float, typer.Argument(metavar="X", help="Position of the body in m, map frame.")],
-    y: Annotated[float, typer.Argument(metavar="Y")],
-    yaw: Annotated[float, typer.Argument(metavar="YAW", help="Heading of the body in rad.")],
-    tx: Annotated[float, typer.Argument(metavar="TX", help="Target for the tip in m, map frame.")],
-    ty: Annotated[float, typer.Argument(metavar="TY")],
-    tz: Annotated[float, typer.Argument(metavar="TZ")],
+    x: Annotated[float, argument("X", "Position of the body in m, map frame.")],
+    y: Annotated[float, argument("Y")],
+    yaw: Annotated[float, argument("YAW", "Heading of the body in rad.")],
+    tx: Annotated[float, argument("TX", "Target for the tip in m, map frame.")],
+    ty: Annotated[float, argument("TY")],
+    tz: Annotated[float, argument("TZ")],
     force: Annotated[
-        Vector | None,
-        typer.Option(metavar="FX FY FZ", help="Force on the tip there in N, map frame."),
+        Vector | None, option("FX FY FZ", "Force on the tip there in N, map frame.")
     ] = None,
     moment: Annotated[
-        Vector | None,
-        typer.Option(metavar="MX MY MZ", help="Moment on the tip there in N m, map frame."),
+        Vector | None, option("MX MY MZ", "Moment on the tip there in N m, map frame.")
     ] = None,
     payload: Payload = None,
     friction: Friction = None,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rover_planner.command.options import argument, option
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
 from rover_planner.shell.poses import read_numbers
@@ -18,16 +19,11 @@ if TYPE_CHECKING:
 
 
 def reachable(
-    store: Annotated[Path, typer.Argument(metavar="OUT", help="Zarr store of a survey.")],
-    start: Annotated[
-        str, typer.Option("--from", metavar="X,Y", help="Start in m, in the map's coordinates.")
-    ],
-    picture: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw the area on the map, .png.")
-    ] = None,
+    store: Annotated[Path, argument("OUT", "Zarr store of a survey.")],
+    start: Annotated[str, option("X,Y", "Start in m, in the map's coordinates.", "--from")],
+    picture: Annotated[Path | None, option("FILE", "Draw the area on the map, .png.")] = None,
     geotiff: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write the length of the ways as GeoTIFF (COG)."),
+        Path | None, option("FILE", "Write the length of the ways as GeoTIFF (COG).")
     ] = None,
 ) -> None:
     """Find the cells that the rover can reach from a place and return from.

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from rover_planner.command.options import argument, option
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
 from rover_planner.shell.poses import Pose, pose_option
@@ -21,43 +22,22 @@ NODE_KEYS = ("/**", "traverse_server", "/traverse_server")
 
 
 def replay(
-    bag: Annotated[
-        Path, typer.Argument(metavar="BAG", help="Folder of a rosbag2, or its .mcap or .db3 file.")
-    ],
-    out: Annotated[
-        Path, typer.Argument(metavar="OUT", help="Folder for the answers; must not exist.")
-    ],
+    bag: Annotated[Path, argument("BAG", "Folder of a rosbag2, or its .mcap or .db3 file.")],
+    out: Annotated[Path, argument("OUT", "Folder for the answers; must not exist.")],
     parameters: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Parameter file of traverse_server, .yaml."),
+        Path | None, option("FILE", "Parameter file of traverse_server, .yaml.")
     ] = None,
-    rover: Annotated[
-        str, typer.Option(metavar="ROVER", help="Preset name or rover file; sets the parameter.")
-    ] = "",
-    map_frame: Annotated[
-        str, typer.Option(metavar="NAME", help="Frame of the map; sets the parameter.")
-    ] = "",
-    resolution: Annotated[
-        float, typer.Option(metavar="M", help="Cell size of the map; sets map_resolution.")
-    ] = 0.0,
-    goal: Annotated[
-        Pose | None,
-        pose_option("Ask for a way to it after each new map."),
-    ] = None,
-    start: Annotated[
-        Pose | None,
-        pose_option("Start of that way; default: the odometry."),
-    ] = None,
-    stretch: Annotated[
-        float, typer.Option(metavar="M", help="Length in which the drive is judged.", min=0.1)
-    ] = 5.0,
-    map_topic: Annotated[str, typer.Option(metavar="TOPIC", help="PointCloud2 or GridMap.")] = "",
-    joints_topic: Annotated[str, typer.Option(metavar="TOPIC", help="JointState.")] = "",
-    odometry_topic: Annotated[str, typer.Option(metavar="TOPIC", help="Odometry.")] = "",
-    imu_topic: Annotated[
-        str, typer.Option(metavar="TOPIC", help="Imu, for the parameter imu_attitude.")
-    ] = "",
-    path_topic: Annotated[str, typer.Option(metavar="TOPIC", help="Path to check.")] = "",
+    rover: Annotated[str, option("ROVER", "Preset name or rover file; sets the parameter.")] = "",
+    map_frame: Annotated[str, option("NAME", "Frame of the map; sets the parameter.")] = "",
+    resolution: Annotated[float, option("M", "Cell size of the map; sets map_resolution.")] = 0.0,
+    goal: Annotated[Pose | None, pose_option("Ask for a way to it after each new map.")] = None,
+    start: Annotated[Pose | None, pose_option("Start of that way; default: the odometry.")] = None,
+    stretch: Annotated[float, option("M", "Length in which the drive is judged.", min=0.1)] = 5.0,
+    map_topic: Annotated[str, option("TOPIC", "PointCloud2 or GridMap.")] = "",
+    joints_topic: Annotated[str, option("TOPIC", "JointState.")] = "",
+    odometry_topic: Annotated[str, option("TOPIC", "Odometry.")] = "",
+    imu_topic: Annotated[str, option("TOPIC", "Imu, for the parameter imu_attitude.")] = "",
+    path_topic: Annotated[str, option("TOPIC", "Path to check.")] = "",
 ) -> None:
     """Answer the questions of a bag again and write the predictions as MCAP and .npz.
 
@@ -88,7 +68,10 @@ def replay(
     with bag_reader.open_bag(bag, topics) as source:
         if bag_reader.MAP not in source.topics:
             raise PlanningError(f"{bag}: has no map: PointCloud2 or GridMap")
-        _make_folder(out)
+        try:
+            out.mkdir(parents=True)
+        except OSError as error:
+            raise PlanningError(f"{out} cannot be made: {error.strerror or error}") from None
         with (
             write_bag(out / "predictions") as predictions,
             show_bar("replay", source.count) as step,
@@ -207,17 +190,6 @@ class _Results:
             self._bag.write(f"/traverse_server/{topic}", messages.message(topic), answer.stamp)
 
 
-def _make_folder(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True)
-    except OSError as error:
-        raise PlanningError(f"{folder} cannot be made: {error.strerror or error}") from None
-
-
-def _has_parameters(part: Any) -> bool:
-    return isinstance(part, dict) and isinstance(part.get("ros__parameters"), dict)
-
-
 def _read_parameters(path: Path | None, given: dict[str, Any]) -> "TraverseServerParameters":
     """Return the parameters of a file, with those that are given over them.
 
@@ -231,17 +203,19 @@ def _read_parameters(path: Path | None, given: dict[str, Any]) -> "TraverseServe
     content: dict[str, Any] = {}
     if path is not None:
         read = read_yaml(path)
-        found = [read[key] for key in NODE_KEYS if key in read] if isinstance(read, dict) else []
-        found = [part["ros__parameters"] for part in found if _has_parameters(part)]
-        if not found:
+        parts = [read.get(key) for key in NODE_KEYS] if isinstance(read, dict) else []
+        found = [part.get("ros__parameters") for part in parts if isinstance(part, dict)]
+        if not any(isinstance(part, dict) for part in found):
             raise PlanningError(f"{path} is no parameter file; it needs /**: ros__parameters:")
-        content = {name: value for part in found for name, value in part.items()}
+        for part in found:
+            content |= part if isinstance(part, dict) else {}
     content |= {name: value for name, value in given.items() if value}
     known = {spec.name for spec in specs_of(TraverseServerParameters)}
     unknown = sorted(content.keys() - known - {"use_sim_time"})
     if unknown:
         raise PlanningError(f"{path}: traverse_server has no parameter {unknown[0]}")
-    values: dict[str, Any] = {name: content[name] for name in known & content.keys()}
-    for name, value in values.items():
-        values[name] = tuple(value) if isinstance(value, list) else value
+    values: dict[str, Any] = {
+        name: tuple(content[name]) if isinstance(content[name], list) else content[name]
+        for name in known & content.keys()
+    }
     return TraverseServerParameters(**values)

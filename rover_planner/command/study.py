@@ -7,14 +7,13 @@ from typing import Annotated
 import typer
 
 from rover_physics.files.validation import show_file
+from rover_planner.command.options import argument
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
 
 
 def study(
-    file: Annotated[
-        Path, typer.Argument(metavar="STUDY", help="Study file, .yaml, or the name of an example.")
-    ],
+    file: Annotated[Path, argument("STUDY", "Study file, .yaml, or the name of an example.")],
     output: Annotated[Path, typer.Option(help="Folder for table and picture.")] = Path("."),
 ) -> None:
     """Sweep or optimise numbers of a rover; write a CSV and a picture.
@@ -23,9 +22,8 @@ def study(
     """
     need("matplotlib", "the picture of a study")
     from rover_planner.shell.progress import show_bar
-    from rover_planner.studies.example_studies import find_examples
     from rover_planner.studies.runner import count_trials, run_study
-    from rover_planner.studies.study_file import load_study
+    from rover_planner.studies.study_file import find_examples, load_study
     from rover_planner.studies.study_plot import draw_study
     from rover_planner.studies.summary import describe_question, describe_result
 

@@ -4,7 +4,7 @@
 import json
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,13 +16,17 @@ from rover_planner.command.options import (
     Policy,
     RoverName,
     Sigmas,
+    argument,
+    flag,
+    option,
 )
 from rover_planner.shell.end_signals import end_as_by_ctrl_c
 from rover_planner.shell.exit_codes import EXIT_FAILED, EXIT_OK
 from rover_planner.shell.extras import need
-from rover_planner.shell.one_line import MAX_LINE, one_line
+from rover_planner.shell.run_program import end_with
 
 if TYPE_CHECKING:
+    from rover_planner.survey.dask_cluster import ClusterSettings
     from rover_planner.survey.runner import SurveyOutcome
     from rover_planner.survey.survey import PreparedSurvey
 
@@ -30,49 +34,30 @@ if TYPE_CHECKING:
 def survey(
     rover: RoverName,
     map_name: Annotated[
-        str,
-        typer.Argument(
-            metavar="MAP", help="Preset (spirit), elevation map, .npz, or GeoTIFF, .tif."
-        ),
+        str, argument("MAP", "Preset (spirit), elevation map, .npz, or GeoTIFF, .tif.")
     ],
-    out: Annotated[
-        Path,
-        typer.Argument(metavar="OUT", help="Zarr store; goes on with one of the same survey."),
-    ],
-    headings: Annotated[int, typer.Option(metavar="N", help="Number of headings.")] = 16,
-    step: Annotated[
-        int, typer.Option(metavar="CELLS", help="Distance of surveyed cells in map cells.")
-    ] = 1,
+    out: Annotated[Path, argument("OUT", "Zarr store; goes on with one of the same survey.")],
+    headings: Annotated[int, option("N", "Number of headings.")] = 16,
+    step: Annotated[int, option("CELLS", "Distance of surveyed cells in map cells.")] = 1,
     policy: Policy = "equal",
     friction: Friction = None,
     turns: Annotated[
-        bool, typer.Option("--turns", help="Judge turns on the spot, too; takes up to 3 x.")
+        bool, flag("--turns", "Judge turns on the spot, too; takes up to 3 x.")
     ] = False,
     sigmas: Sigmas = 3.0,
     max_gap: MaxGap = 0.0,
     scheduler: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS", help="Dask scheduler, tcp://...; default: this machine's cores."
-        ),
+        str | None, option("ADDRESS", "Dask scheduler, tcp://...; default: this machine's cores.")
     ] = None,
-    workers: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Worker processes on this machine.")
-    ] = None,
+    workers: Annotated[int | None, option("N", "Worker processes on this machine.", min=1)] = None,
     memory_limit: Annotated[
-        str | None, typer.Option(metavar="SIZE", help="Memory of a worker, such as 1GiB.")
+        str | None, option("SIZE", "Memory of a worker, such as 1GiB.")
     ] = None,
-    chunk: Annotated[
-        int | None,
-        typer.Option(metavar="CELLS", help="Side of a chunk in surveyed cells."),
-    ] = None,
+    chunk: Annotated[int | None, option("CELLS", "Side of a chunk in surveyed cells.")] = None,
     geotiff: Annotated[
-        Path | None,
-        typer.Option(metavar="FOLDER", help="Write each layer as GeoTIFF (COG), too."),
+        Path | None, option("FOLDER", "Write each layer as GeoTIFF (COG), too.")
     ] = None,
-    picture: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Draw the classes on the map, .png.")
-    ] = None,
+    picture: Annotated[Path | None, option("FILE", "Draw the classes on the map, .png.")] = None,
     max_cells: MaxCells = MAX_CELLS,
 ) -> int:
     """Judge a rover at all cells of a map and all headings; write the results to a Zarr store.
@@ -89,7 +74,8 @@ def survey(
     from rover_physics.rover.rover_file import load_rover
     from rover_planner.survey.dask_cluster import ClusterSettings, check_settings
     from rover_planner.survey.request import SurveyRequest
-    from rover_planner.survey.survey import prepare_survey
+    from rover_planner.survey.runner import SurveyOutcome
+    from rover_planner.survey.survey import prepare_survey, summarise
 
     settings = ClusterSettings(scheduler, workers, memory_limit)
     check_settings(settings)
@@ -101,11 +87,17 @@ def survey(
         turns=turns,
         sigmas=sigmas,
     )
-    _check_places(geotiff, picture)
+    if geotiff is not None:  # before hours of work
+        from rover_planner.survey.cog import make_folder
+
+        make_folder(geotiff)
+    if picture is not None:
+        from rover_planner.figures.pictures import check_picture
+
+        check_picture(picture)
     with end_as_by_ctrl_c():
         prepared = prepare_survey(request, map_name, out, chunk, max_cells, max_gap, settings)
-        began = time.monotonic()
-        outcome = None
+        began, outcome = time.monotonic(), SurveyOutcome()
         if prepared.chunks:  # what is finished may be read-only
             with prepared.store.locked():
                 outcome = _run(prepared, settings)
@@ -117,28 +109,30 @@ def survey(
         from rover_planner.figures.survey_picture import draw_survey
 
         draw_survey(picture, prepared.store)
-    typer.echo(json.dumps(_report(prepared, outcome, time.monotonic() - began)))
-    if outcome is None or not outcome.failed:
+    seconds = time.monotonic() - began
+    report = {
+        "out": str(prepared.store.path),
+        **summarise(prepared.store),
+        "chunks": prepared.finished + len(prepared.chunks),
+        "chunks_found": prepared.finished,
+        "chunks_done": outcome.done,
+        "chunks_failed": [list(chunk) for chunk in outcome.failed],
+        "poses": outcome.poses,
+        "seconds": round(seconds, 3),
+        "poses_per_second": round(outcome.poses / seconds, 1) if seconds > 0.0 else None,
+    }
+    typer.echo(json.dumps(report))
+    if not outcome.failed:
         return EXIT_OK
-    typer.echo(one_line(_name_failures(outcome), MAX_LINE), err=True)
-    return EXIT_FAILED
+    names = ", ".join(f"[{i}, {j}]" for i, j in list(outcome.failed)[:5])
+    more = f" and {len(outcome.failed) - 5} more" if len(outcome.failed) > 5 else ""
+    why = next(iter(outcome.failed.values()))
+    return end_with("rover_planner", EXIT_FAILED, f"chunks {names}{more} failed: {why}")
 
 
-def _check_places(geotiff: Path | None, picture: Path | None) -> None:
-    """Check that the results have places, before hours of work."""
-    if geotiff is not None:
-        from rover_planner.survey.cog import make_folder
-
-        make_folder(geotiff)
-    if picture is not None:
-        from rover_planner.figures.pictures import check_picture
-
-        check_picture(picture)
-
-
-def _run(prepared: "PreparedSurvey", settings: Any) -> "SurveyOutcome":
+def _run(prepared: "PreparedSurvey", settings: "ClusterSettings") -> "SurveyOutcome":
     """Survey what is not finished."""
-    from rover_planner.shell.progress import show_progress, show_rate
+    from rover_planner.shell.progress import show_bar, show_progress
     from rover_planner.survey.runner import run_survey
     from rover_planner.survey.tile_survey import warm_up_survey
 
@@ -146,39 +140,9 @@ def _run(prepared: "PreparedSurvey", settings: Any) -> "SurveyOutcome":
     with show_progress() as progress:
         progress("load the model (the first run compiles it)")
         warm_up_survey(job.request)
-    layout, headings = job.layout, job.request.headings
-    total = sum(_poses(layout.cells_of(chunk), headings) for chunk in prepared.chunks)
-    with show_rate("survey", total, "poses") as advance:
+    total = 0
+    for rows, columns in map(job.layout.cells_of, prepared.chunks):
+        cells = (rows.stop - rows.start) * (columns.stop - columns.start)
+        total += cells * job.request.headings
+    with show_bar("survey", total, "poses") as advance:
         return run_survey(job, prepared.chunks, settings, lambda report: advance(report.poses))
-
-
-def _poses(cells: tuple[slice, slice], headings: int) -> int:
-    rows, columns = cells
-    return (rows.stop - rows.start) * (columns.stop - columns.start) * headings
-
-
-def _report(
-    prepared: "PreparedSurvey", outcome: "SurveyOutcome | None", seconds: float
-) -> dict[str, Any]:
-    """Return what is printed at the end."""
-    from rover_planner.survey.survey import summarise
-
-    poses = 0 if outcome is None else outcome.poses
-    return {
-        "out": str(prepared.store.path),
-        **summarise(prepared.store),
-        "chunks": prepared.finished + len(prepared.chunks),
-        "chunks_found": prepared.finished,
-        "chunks_done": 0 if outcome is None else outcome.done,
-        "chunks_failed": [] if outcome is None else [list(chunk) for chunk in outcome.failed],
-        "poses": poses,
-        "seconds": round(seconds, 3),
-        "poses_per_second": round(poses / seconds, 1) if seconds > 0.0 else None,
-    }
-
-
-def _name_failures(outcome: "SurveyOutcome") -> str:
-    names = ", ".join(f"[{i}, {j}]" for i, j in list(outcome.failed)[:5])
-    more = f" and {len(outcome.failed) - 5} more" if len(outcome.failed) > 5 else ""
-    why = next(iter(outcome.failed.values()))
-    return f"rover_planner: chunks {names}{more} failed: {why}"

@@ -6,11 +6,11 @@ from typing import Annotated
 
 import typer
 
+from rover_planner.command.options import argument
+
 
 def terrain(
-    out: Annotated[
-        Path, typer.Argument(metavar="OUT", help="Elevation map to write, .npz; is overwritten.")
-    ],
+    out: Annotated[Path, argument("OUT", "Elevation map to write, .npz; is overwritten.")],
     seed: Annotated[int, typer.Option(help="Seed of all random numbers.")] = 1,
     size: Annotated[float, typer.Option(help="Width and height in m.")] = 24.0,
     resolution: Annotated[float, typer.Option(help="Cell size in m.")] = 0.05,
@@ -31,12 +31,7 @@ def terrain(
     with show_progress() as progress:
         progress("make the terrain")
         made = make_mars_terrain(
-            seed,
-            size,
-            resolution,
-            roughness=roughness,
-            rock_cover=rocks,
-            crater_density=craters,
+            seed, size, resolution, roughness=roughness, rock_cover=rocks, crater_density=craters
         )
     save_terrain(out, made)
     typer.echo(f"wrote {out}: {describe_terrain(made)}")

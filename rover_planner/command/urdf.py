@@ -6,15 +6,14 @@ from typing import Annotated
 
 import typer
 
-from rover_planner.command.options import RoverName
+from rover_planner.command.options import RoverName, argument, option
 
 
 def urdf(
     rover: RoverName,
-    out: Annotated[Path, typer.Argument(metavar="OUT", help="URDF to write; is overwritten.")],
+    out: Annotated[Path, argument("OUT", "URDF to write; is overwritten.")],
     joint_map: Annotated[
-        Path | None,
-        typer.Option("--map", metavar="FILE", help="Write the joint map that reads it back."),
+        Path | None, option("FILE", "Write the joint map that reads it back.", "--map")
     ] = None,
 ) -> None:
     """Write a rover as URDF, with inertias, joint limits and collision cylinders."""
@@ -31,17 +30,10 @@ def urdf(
 
 
 def rover(
-    out: Annotated[
-        Path, typer.Argument(metavar="OUT", help="Rover file to write, .yaml; is overwritten.")
-    ],
-    from_urdf: Annotated[
-        Path, typer.Option("--from-urdf", metavar="FILE", help="URDF of the rover.")
-    ],
+    out: Annotated[Path, argument("OUT", "Rover file to write, .yaml; is overwritten.")],
+    from_urdf: Annotated[Path, option("FILE", "URDF of the rover.", "--from-urdf")],
     joint_map: Annotated[
-        Path,
-        typer.Option(
-            "--map", metavar="FILE", help="Joint map, .yaml (docs/integration/robot.md)."
-        ),
+        Path, option("FILE", "Joint map, .yaml (docs/integration/robot.md).", "--map")
     ],
 ) -> None:
     """Write a rover file from a URDF and a joint map."""

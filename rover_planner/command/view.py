@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rover_planner.command.options import MAX_CELLS, MaxCells, MaxGap, RoverName
+from rover_planner.command.options import (
+    MAX_CELLS,
+    MaxCells,
+    MaxGap,
+    OptionalTerrain,
+    RoverName,
+    flag,
+    option,
+)
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
 from rover_planner.shell.poses import GOAL, START, Pose
@@ -36,30 +44,20 @@ End = tuple[float, float, float]
 
 def view(
     rover: RoverName = "lsr1",
-    terrain: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="TERRAIN",
-            help="Preset name (spirit) or elevation map, .npz; default: a generated one.",
-        ),
-    ] = None,
+    terrain: OptionalTerrain = None,
     start: Annotated[Pose | None, START] = None,
     goal: Annotated[Pose | None, GOAL] = None,
     max_gap: MaxGap = 0.2,
     max_cells: MaxCells = MAX_CELLS,
     prediction: Annotated[
-        Path | None,
-        typer.Option(metavar="OUT", help="Replay a file of `predict` instead of planning."),
+        Path | None, option("OUT", "Replay a file of `predict` instead of planning.")
     ] = None,
     survey: Annotated[
         Path | None,
-        typer.Option(
-            metavar="OUT",
-            help="Colour the ground with a store of `survey`; without TERRAIN show its map.",
-        ),
+        option("OUT", "Colour the ground with a store of `survey`; without TERRAIN show its map."),
     ] = None,
     follow: Annotated[
-        bool, typer.Option("--follow", help="Follow a live ROS graph instead of planning.")
+        bool, flag("--follow", "Follow a live ROS graph instead of planning.")
     ] = False,
     host: Annotated[str, typer.Option(help="Address to serve on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option(help="Port to serve on; 0: any free port.")] = 8080,
@@ -85,13 +83,19 @@ def view(
 
     model = load_rover(rover)
     check_address(host, port)
+    surveyed = None
     if survey is not None and terrain is None:
-        ground = _load_map_of(survey, max_cells)
+        from rover_planner.viewer.state.survey_layers import load_map
+
+        ground = load_map(survey, max_cells)
     else:
         ground = _load_or_make(terrain, follow, max_cells)
         if prediction is None:  # predictions were made on the original map
             ground = ground.fill_gaps(max_gap)
-    surveyed = None if survey is None else _open_survey(survey, model, ground, terrain is None)
+    if survey is not None:
+        from rover_planner.viewer.state.survey_layers import open_survey
+
+        surveyed = open_survey(survey, model, None if terrain is None else ground)
     if not follow:
         _check_on_map(ground, start=start, goal=goal)
     _compile()
@@ -146,20 +150,6 @@ def _compile() -> None:
     with show_progress() as progress, Compilation(steps) as compilation:
         progress("load the model")
         compilation.run(lambda name: progress(f"compile {name} (only the first time)"))
-
-
-def _load_map_of(survey: Path, max_cells: int) -> "Terrain":
-    """Return the map of a survey."""
-    from rover_planner.viewer.state.survey_layers import load_map
-
-    return load_map(survey, max_cells)
-
-
-def _open_survey(survey: Path, rover: "Rover", ground: "Terrain", own: bool) -> "ShownSurvey":
-    """Open a survey of this rover and, unless the ground is its own map, of this ground."""
-    from rover_planner.viewer.state.survey_layers import open_survey
-
-    return open_survey(survey, rover, None if own else ground)
 
 
 def _show(
@@ -219,8 +209,8 @@ def choose_ends(rover: "Rover", ground: "Terrain") -> tuple[End, End]:
     import numpy as np
 
     low, high = _ends_about_the_middle(rover, ground)
-    way = np.linspace(low[:2], high[:2], PLACES_TRIED)
-    if np.isfinite(ground.elevation_at(way[:, 0], way[:, 1])).all():
+    between = np.linspace(low[:2], high[:2], PLACES_TRIED)
+    if np.isfinite(ground.elevation_at(*between.T)).all():
         return low, high
     return _ends_on_known_ground(rover, ground) or (low, high)
 

@@ -90,7 +90,7 @@ def _draw_map(axes: Axes, terrain: Terrain, answers: Sequence[LabelledAnswer]) -
     lowest, highest = _elevation_range(terrain, view)
     axes.set_axisbelow(False)
     axes.grid(False)
-    placed = {"extent": extent, "origin": "lower"}
+    placed: dict[str, Any] = {"extent": extent, "origin": "lower"}
     image = axes.imshow(terrain.elevation, cmap=_GROUND, vmin=lowest, vmax=highest, **placed)
     axes.imshow(_shade_layer(terrain), interpolation="bilinear", zorder=1, **placed)
     bar = axes.inset_axes((1.015, 0.12, 0.015, 0.76))
@@ -141,7 +141,12 @@ def _map_legend(terrain: Terrain) -> list[Line2D]:
         _key("start", **_start_style(0.5 * np.pi, 10)),
     ]
     if not np.isfinite(terrain.elevation).all():
-        square = {"marker": "s", "ls": "", "markersize": 9, "markeredgecolor": "#888888"}
+        square: dict[str, Any] = {
+            "marker": "s",
+            "ls": "",
+            "markersize": 9,
+            "markeredgecolor": "#888888",
+        }
         handles.append(_key("unknown ground", color=UNKNOWN, **square))
     return handles
 
@@ -165,15 +170,15 @@ def _draw_candidates(axes: Axes, answer: PathAnswer) -> None:
     """Draw all candidates of an answer, the chosen one last and thick."""
     for candidate in answer.candidates:
         colour = PASSABLE if candidate.verdict.traversable else REFUSED
-        thin = {"lw": 1.2, "alpha": 0.95, "zorder": 3, "solid_capstyle": "round"}
+        thin: dict[str, Any] = {"lw": 1.2, "alpha": 0.95, "zorder": 3, "solid_capstyle": "round"}
         axes.plot(*candidate.poses[:, :2].T, color=colour, **thin)
     refused = [one for one in answer.candidates if not one.verdict.traversable]
     if refused:
         spots = np.array([one.poses[one.verdict.first_failure, :2] for one in refused])
-        cross = {"color": REFUSED, "mew": 2, "ms": 6, "zorder": 6}
+        cross: dict[str, Any] = {"color": REFUSED, "mew": 2, "ms": 6, "zorder": 6}
         axes.plot(*spots.T, "x", **cross, **_around("white", 3.5))
     if answer.traversable:
-        thick = {"color": CHOSEN, "lw": 2.4, "zorder": 5}
+        thick: dict[str, Any] = {"color": CHOSEN, "lw": 2.4, "zorder": 5}
         axes.plot(*answer.chosen.poses[:, :2].T, **thick, **_around(INK, 4.6))
 
 
@@ -182,7 +187,7 @@ def _draw_goal(axes: Axes, labelled: LabelledAnswer) -> None:
     x, y = labelled.answer.chosen.poses[-1, :2]
     colour = PASSABLE if labelled.answer.traversable else REFUSED
     axes.plot(x, y, "o", ms=17, color=colour, markeredgecolor="white", mew=1.5, zorder=8)
-    middle = {"ha": "center", "va": "center_baseline"}
+    middle: dict[str, Any] = {"ha": "center", "va": "center_baseline"}
     axes.text(x, y, labelled.name, color="white", fontweight="bold", zorder=10, clip_on=True,
               **middle)  # fmt: skip
 

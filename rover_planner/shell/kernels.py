@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Loads the kernels of a program before it needs them; compiles those that are not on disk."""
 
+import itertools
 from collections.abc import Callable, Sequence
 
 from rover_physics.compilation import BackgroundCompilation, Compilation, CompilationStep
@@ -25,12 +26,16 @@ def load_kernels(
     Returns:
         What loads the others; to be closed when the program ends.
     """
-    background = BackgroundCompilation(behind, lambda names: _tell(names, report))
-    count = count_up(len(first), report)
+
+    def describe(names: Sequence[str]) -> None:
+        if names:
+            report(f"compiled besides: {', '.join(names)}")
+
+    background, count = BackgroundCompilation(behind, describe), itertools.count(1)
 
     def begin(name: str) -> None:
         background.start()
-        count(name)
+        report(f"compiling kernels {next(count)} of {len(first)}: {name}")
 
     try:
         with Compilation(first) as compilation:
@@ -40,20 +45,3 @@ def load_kernels(
         raise
     background.start(LOADING_DELAY)
     return background
-
-
-def _tell(names: Sequence[str], report: Report) -> None:
-    if names:
-        report(f"compiled besides: {', '.join(names)}")
-
-
-def count_up(total: int, report: Report) -> Report:
-    """Return a function that takes names and reports them as 1 of `total`, 2 of `total`, ..."""
-    count = 0
-
-    def take(name: str) -> None:
-        nonlocal count
-        count += 1
-        report(f"compiling kernels {count} of {total}: {name}")
-
-    return take

@@ -2,20 +2,14 @@
 """Progress on the terminal while a command runs: spinner, bar and steps."""
 
 import itertools
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
-from rich.progress import (
-    MofNCompleteColumn,
-    Progress,
-    SpinnerColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 
 @contextmanager
@@ -25,55 +19,39 @@ def show_progress() -> Iterator[Callable[[str], None]]:
     Yields:
         A function to call with the text of the next step.
     """
-    console = Console(stderr=True)
-    if not console.is_terminal:  # even a disabled bar of rich 13.7 prints an empty line
+    if not _is_terminal():
         yield lambda step: None
         return
-    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
-    with Progress(*columns, console=console, transient=True) as progress:
+    with _open_bar(None) as progress:
         task = progress.add_task("start")
         yield lambda step: progress.update(task, description=step)
 
 
 @contextmanager
-def show_bar(name: str, total: int) -> Iterator[Callable[[], None]]:
+def show_bar(name: str, total: int, unit: str = "") -> Iterator[Callable[..., None]]:
     """Show a progress bar; show nothing if stderr is not a terminal.
 
-    Yields:
-        A function to call after each of the `total` pieces of work.
-    """
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        yield lambda: None
-        return
-    columns = (*Progress.get_default_columns(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console) as progress:
-        task = progress.add_task(name, total=total)
-        yield lambda: progress.advance(task)
-
-
-@contextmanager
-def show_rate(name: str, total: int, unit: str) -> Iterator[Callable[[int], None]]:
-    """Show a progress bar with the rate of the work; show nothing if stderr is not a terminal.
+    Args:
+        name: What is done.
+        total: Number of pieces of work.
+        unit: What the pieces are, to show how many are done in a second; empty shows none.
 
     Yields:
-        A function to call with the number of pieces of work that are done, of `total`.
+        A function to call with the number of pieces that are done (default: one).
     """
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        yield lambda count: None
+    if not _is_terminal():
+        yield lambda count=1: None
         return
-    rate = TextColumn("{task.fields[rate]}")
-    columns = (*Progress.get_default_columns()[:3], rate, TimeRemainingColumn())
-    with Progress(*columns, console=console) as progress:
+    with _open_bar("{task.fields[rate]}") as progress:
         task = progress.add_task(name, total=total, rate="")
         began, done = time.monotonic(), 0
 
-        def advance(count: int) -> None:
+        def advance(count: int = 1) -> None:
             nonlocal done
             done += count
-            rate = done / max(time.monotonic() - began, 1e-9)
-            progress.update(task, completed=done, rate=f"{rate:,.0f} {unit}/s")
+            speed = done / max(time.monotonic() - began, 1e-9)
+            rate = f"{speed:,.0f} {unit}/s" if unit else f"{done}/{total}"
+            progress.update(task, completed=done, rate=rate)
 
         yield advance
 
@@ -85,12 +63,10 @@ def show_names(total: int) -> Iterator[Callable[[str], None]]:
     Yields:
         A function to call with the name of each of at most `total` pieces when it begins.
     """
-    console = Console(stderr=True, highlight=False)
-    if not console.is_terminal:
-        yield lambda name: console.print(f"compiling {name}")
+    if not _is_terminal():
+        yield lambda name: print(f"compiling {name}", file=sys.stderr, flush=True)
         return
-    columns = (*Progress.get_default_columns()[:2], MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console) as progress:
+    with _open_bar("{task.completed}/{task.total}") as progress:
         task, begun = progress.add_task("load kernels", total=total), itertools.count()
 
         def begin(name: str) -> None:
@@ -100,10 +76,32 @@ def show_names(total: int) -> Iterator[Callable[[str], None]]:
         progress.update(task, description="kernels", completed=total)
 
 
+def _is_terminal() -> bool:
+    """Return whether stderr is a terminal; rich, which takes time to import, is for those."""
+    return sys.stderr is not None and sys.stderr.isatty()
+
+
+def _open_bar(behind: str | None) -> "Progress":
+    """Return a bar with a text behind it; without one, a spinner that vanishes at its end."""
+    from rich import progress
+    from rich.console import Console
+
+    console = Console(stderr=True, highlight=False)
+    text, time_taken = progress.TextColumn("{task.description}"), progress.TimeElapsedColumn()
+    if behind is None:
+        spinner = progress.SpinnerColumn()
+        return progress.Progress(spinner, text, time_taken, console=console, transient=True)
+    left = progress.TimeRemainingColumn()
+    columns = (text, progress.BarColumn(), progress.TextColumn(behind), time_taken, left)
+    return progress.Progress(*columns, console=console)
+
+
 class Steps:
     """Prints the steps of a command and their durations on the terminal."""
 
     def __init__(self) -> None:
+        from rich.console import Console
+
         self.console = Console(highlight=False)
         if not self.console.is_terminal:
             self.console = Console(highlight=False, width=160)

@@ -9,13 +9,13 @@ import typer
 from rover_planner.errors import PlanningError
 
 
-def run_app(app: typer.Typer, name: str, words: Sequence[str] | None) -> Any:
+def run_app(app: typer.Typer, name: str, argv: Sequence[str] | None) -> Any:
     """Run an app; return the result of its command, 0 after help was printed.
 
     Args:
         app: The app.
         name: Name of the program, for its help.
-        words: Its arguments; None takes those of the process.
+        argv: Its arguments; None takes those of the process.
 
     Raises:
         PlanningError: The arguments are invalid; the text says which and why.
@@ -24,7 +24,7 @@ def run_app(app: typer.Typer, name: str, words: Sequence[str] | None) -> Any:
     """
     try:
         return typer.main.get_command(app).main(
-            args=None if words is None else list(words), prog_name=name, standalone_mode=False
+            args=None if argv is None else list(argv), prog_name=name, standalone_mode=False
         )
     except SystemExit as error:
         if isinstance(error.__context__, BrokenPipeError):  # typer's answer to a closed pipe

@@ -63,7 +63,7 @@ def evaluate(study: Study, rover: Rover) -> Score:
 
 def load_shares(rover: Rover) -> Floats:
     """Return the shares (6,) of the weight on the wheels, at rest on level ground."""
-    loads = judge_poses(rover, _flat(rover), np.zeros((1, 3)))[0].wheel_loads[0]
+    loads = judge_poses(rover, step_ground(rover, 0.0), np.zeros((1, 3)))[0].wheel_loads[0]
     return np.asarray(loads / loads.sum())
 
 
@@ -150,10 +150,6 @@ def _load_once(file: str) -> Terrain:
 def _length(rover: Rover) -> float:
     wheels = rover.suspension.wheels
     return wheels["front"][0] - wheels["rear"][0] + 2.0 * rover.wheel.radius
-
-
-def _flat(rover: Rover) -> Terrain:
-    return step_ground(rover, 0.0)
 
 
 def step_ground(rover: Rover, height: float) -> Terrain:

@@ -1,18 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Values of a rover that can be changed interactively: labels, units and ranges."""
+"""Numbers of a rover file by dotted names, such as suspension.wheels.front.x, and their change."""
 
 import dataclasses
+import difflib
+import functools
 import math
-from collections.abc import Mapping, Sequence
+import operator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import yaml
 
-from rover_physics.files.validation import Key, errors_of
+from rover_physics.errors import RoverFileError
+from rover_physics.files.validation import Key, describe, errors_of, find_unit
 from rover_physics.files.yaml_file import parse_yaml
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
+
+AXES = ("x", "y", "z")
+"""Names of the three numbers of a point."""
 
 
 @dataclass(frozen=True)
@@ -92,12 +99,61 @@ def _make_value(
     return RoverValue(keys, label, round(min(low, now), 9), round(max(high, now), 9), step)
 
 
+def find_key(contents: Mapping[str, Any], name: str) -> tuple[Key, str]:
+    """Return the key and the unit of a number of a rover file.
+
+    Args:
+        contents: Contents of the rover file.
+        name: Dotted name; numbers of a point are named x, y, z, other list items from 0.
+
+    Raises:
+        RoverFileError: There is no such number; the text lists the nearest names.
+    """
+    known = dict(_list_keys(contents))
+    if name not in known:
+        near = difflib.get_close_matches(name, known, 3) or sorted(known)[:3]
+        raise RoverFileError(
+            f"the rover has no number {describe(name)}; it has {', '.join(near)}, ..."
+        )
+    return known[name], find_unit(Rover, known[name])
+
+
+def _list_keys(contents: Any, name: str = "", key: Key = ()) -> Iterator[tuple[str, Key]]:
+    if isinstance(contents, Mapping):
+        for word, inner in contents.items():
+            yield from _list_keys(inner, f"{name}.{word}" if name else word, (*key, word))
+    elif isinstance(contents, list):
+        for k, inner in enumerate(contents):
+            is_point = len(contents) == 3 and key[-1] not in (
+                "link_lengths",
+                "link_masses",
+                "stowed",
+            )
+            word = AXES[k] if is_point else str(k)
+            yield from _list_keys(inner, f"{name}.{word}", (*key, k))
+    elif isinstance(contents, int | float) and not isinstance(contents, bool):
+        yield name, key
+
+
 def get_value(data: Mapping[str, Any], key: Key) -> float:
     """Return a number from the contents of a rover file, by key."""
-    inner: Any = data
-    for part in key:
-        inner = inner[part]
-    return float(inner)
+    return float(_follow(data, key))
+
+
+def _follow(data: Any, key: Key) -> Any:
+    return functools.reduce(operator.getitem, key, data)
+
+
+def vary(rover: Rover, values: Mapping[Key, float]) -> Rover:
+    """Return a copy of a rover with changed numbers, by key.
+
+    Raises:
+        RoverFileError: The changed rover is invalid; the text names the key.
+    """
+    data = rover_to_dict(rover)
+    for key, value in values.items():
+        _follow(data, key[:-1])[key[-1]] = float(value)
+    return rover_from_dict(data, rover.name)
 
 
 def with_value(rover: Rover, keys: Sequence[Key], value: float) -> Rover:
@@ -106,13 +162,7 @@ def with_value(rover: Rover, keys: Sequence[Key], value: float) -> Rover:
     Raises:
         RoverFileError: The changed rover is invalid; the text names the key.
     """
-    data = rover_to_dict(rover)
-    for key in keys:
-        inner: Any = data
-        for part in key[:-1]:
-            inner = inner[part]
-        inner[key[-1]] = float(value)
-    return rover_from_dict(data, rover.name)
+    return vary(rover, dict.fromkeys(keys, value))
 
 
 def write_rover(rover: Rover) -> str:

@@ -4,8 +4,8 @@
 import contextlib
 import csv
 import itertools
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +16,8 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_planner.errors import PlanningError
 from rover_planner.studies.objectives import evaluate, load_shares
-from rover_planner.studies.rover_keys import vary
-from rover_planner.studies.study_file import OBJECTIVES, Study
+from rover_planner.studies.rover_values import vary
+from rover_planner.studies.study_file import OBJECTIVES, Study, label_of
 
 SEED = 1
 """Seed of the optimisation."""
@@ -88,8 +88,8 @@ class StudyResult:
     def write_csv(self, path: Path) -> None:
         """Write a CSV file with a row for each trial."""
         _, what, unit = OBJECTIVES[self.study.objective]
-        heads = [_head(p.name, p.unit) for p in self.study.parameters]
-        heads += [_head(what, unit), *(f"load share {wheel}" for wheel in WHEELS), "note"]
+        heads = [label_of(p.name, p.unit) for p in self.study.parameters]
+        heads += [label_of(what, unit), *(f"load share {wheel}" for wheel in WHEELS), "note"]
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow(heads)
@@ -97,10 +97,6 @@ class StudyResult:
                 shares = [f"{share:.6f}" for share in trial.load_shares]
                 numbers = [f"{number:.9g}" for number in (*trial.values, trial.objective)]
                 writer.writerow([*numbers, *shares, trial.note])
-
-
-def _head(name: str, unit: str) -> str:
-    return f"{name} [{unit}]" if unit else name
 
 
 def count_trials(study: Study) -> int:
@@ -128,7 +124,8 @@ def run_study(study: Study, on_trial: Callable[[Trial], None] | None = None) -> 
         return trial.objective
 
     if study.method == "sweep":
-        for values in _combinations(study):
+        axes = [np.linspace(p.low, p.high, p.count).tolist() for p in study.parameters]
+        for values in itertools.product(*axes):
             attempt(values)
     else:
         _optimise(study, attempt)
@@ -141,31 +138,23 @@ def find_rover(study: Study, trial: Trial) -> Rover:
     Raises:
         RoverFileError, ModelError: It is invalid.
     """
-    return _rover_of(study, trial.values)
-
-
-def _rover_of(study: Study, values: tuple[float, ...]) -> Rover:
     numbers = {
         key: value
-        for parameter, value in zip(study.parameters, values, strict=True)
+        for parameter, value in zip(study.parameters, trial.values, strict=True)
         for key in parameter.keys
     }
     return vary(study.rover, numbers)
 
 
 def _try(study: Study, values: tuple[float, ...]) -> Trial:
+    trial = Trial(values, float("nan"), "")
     try:
-        rover = _rover_of(study, values)
+        rover = find_rover(study, trial)
         shares = tuple(load_shares(rover).tolist())
         score = evaluate(study, rover)
     except (RoverFileError, ModelError) as error:
-        return Trial(values, float("nan"), str(error))
+        return replace(trial, note=str(error))
     return Trial(values, score.value, score.note, shares)
-
-
-def _combinations(study: Study) -> Iterator[tuple[float, ...]]:
-    axes = [np.linspace(p.low, p.high, p.count).tolist() for p in study.parameters]
-    return itertools.product(*axes)
 
 
 class _EnoughError(Exception):

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from rover_physics.errors import RoverFileError
+from rover_physics.files.config_files import find_config
 from rover_physics.files.rules import (
     ListOfMappings,
     Metres,
@@ -25,8 +26,7 @@ from rover_physics.files.yaml_file import read_yaml
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover, rover_to_dict
 from rover_physics.terrain.soil_file import soil_named
-from rover_planner.studies.rover_keys import find_key
-from rover_planner.studies.rover_values import get_value
+from rover_planner.studies.rover_values import find_key, get_value
 
 OBJECTIVES = {
     "worst_utilisation": ("smallest", "largest friction utilisation on the drives", ""),
@@ -42,6 +42,11 @@ MAX_TRIALS = 100_000
 """Largest number of rovers that a study tries."""
 ABOUT_DRIVES = ("worst_utilisation", "tip_over_margin", "drive_energy")
 """Objectives that need drives."""
+
+
+def label_of(name: str, unit: str) -> str:
+    """Return a name with its unit, as in heads of tables and at axes."""
+    return f"{name} [{unit}]" if unit else name
 
 
 def _whole(least: int, most: int) -> Rule:
@@ -154,6 +159,12 @@ class _StudyFile(StudyOptions):
     rover: Text
     parameters: Annotated[tuple[ParameterEntry, ...], ListOfMappings()]
     drives: Annotated[tuple[StudyDrive, ...], ListOfMappings()] | None = None
+
+
+def find_examples() -> dict[str, Path]:
+    """Return the files of the studies that come with the package, beside config/, by name."""
+    folder = find_config("rovers").parents[1] / "examples"
+    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
 
 
 def load_study(path: Path) -> Study:

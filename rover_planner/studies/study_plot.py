@@ -15,7 +15,7 @@ from rover_physics.numerics.arrays import Floats
 from rover_planner.figures.pictures import STYLE, drawing, new_figure
 from rover_planner.figures.wheel_colours import WHEEL_COLOURS
 from rover_planner.studies.runner import StudyResult
-from rover_planner.studies.study_file import OBJECTIVES
+from rover_planner.studies.study_file import OBJECTIVES, label_of
 from rover_planner.studies.summary import describe_ties
 
 POINT, BEST, NOW = "#0072B2", "#D55E00", "#009E73"
@@ -68,10 +68,6 @@ def _draw(figure: Figure, result: StudyResult) -> None:
     axes.set_title("\n".join(filter(None, lines)), fontsize=9)
 
 
-def _label(name: str, unit: str) -> str:
-    return f"{name} [{unit}]" if unit else name
-
-
 def _draw_shares(figure: Figure, result: StudyResult) -> Axes:
     """Draw the load shares of the rover as it is and of the best; return the axes beside them.
 
@@ -110,8 +106,8 @@ def _draw_curve(axes: Axes, result: StudyResult) -> None:
                   markersize=10, label="as good" if k == 0 else None)  # fmt: skip
     axes.legend(fontsize=8)
     _, what, unit = OBJECTIVES[study.objective]
-    axes.set_xlabel(_label(parameter.name, parameter.unit))
-    axes.set_ylabel(_label(what, unit))
+    axes.set_xlabel(label_of(parameter.name, parameter.unit))
+    axes.set_ylabel(label_of(what, unit))
 
 
 def _draw_band(axes: Axes, result: StudyResult, points: Floats) -> None:
@@ -146,9 +142,9 @@ def _draw_map(figure: Figure, axes: Axes, result: StudyResult) -> None:
     )
     axes.legend()
     _, what, unit = OBJECTIVES[result.study.objective]
-    figure.colorbar(points, ax=axes, label=_label(what, unit))
-    axes.set_xlabel(_label(first.name, first.unit))
-    axes.set_ylabel(_label(second.name, second.unit))
+    figure.colorbar(points, ax=axes, label=label_of(what, unit))
+    axes.set_xlabel(label_of(first.name, first.unit))
+    axes.set_ylabel(label_of(second.name, second.unit))
 
 
 def _draw_progress(axes: Axes, result: StudyResult) -> None:

@@ -10,7 +10,7 @@ from rover_physics.errors import RoverFileError
 from rover_physics.rover.rover_file import load_rover, rover_to_dict
 from rover_planner.cli import main
 from rover_planner.studies.objectives import climbs, tallest_step
-from rover_planner.studies.rover_keys import find_key, vary
+from rover_planner.studies.rover_values import find_key, vary
 from rover_planner.studies.runner import find_rover, run_study
 from rover_planner.studies.study_file import study_from_dict
 from rover_planner.studies.summary import describe_ties

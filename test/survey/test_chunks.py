@@ -23,13 +23,12 @@ from support.survey_maps import (
 )
 
 
-def test_three_chunkings_give_the_same_bits(tmp_path):
-    terrain, request = make_rough_map(130, 140), make_request(headings=2)
+def test_any_chunks_give_the_same_bits(tmp_path):
+    terrain, request = make_rough_map(70, 140), make_request(headings=2)
     whole = layers_of(survey_here(tmp_path / "a", terrain, request, chunk=2000))
     assert len(np.unique(whole["first_limit"])) > 3
-    for chunk in (64, 128):
-        other = survey_here(tmp_path / str(chunk), terrain, request, chunk=chunk)
-        assert_same_bits(whole, layers_of(other))
+    parts = survey_here(tmp_path / "b", terrain, request, chunk=64)
+    assert_same_bits(whole, layers_of(parts))
 
 
 @pytest.mark.parametrize("step", [3, 100])
@@ -57,7 +56,7 @@ def test_ground_beyond_the_halo_is_not_looked_at(policy):
 
 
 def test_ground_within_the_halo_matters(tmp_path):
-    job = prepare_here(tmp_path, make_rough_map(), make_request(), chunk=64).job
+    job = prepare_here(tmp_path, make_rough_map(), make_request(step=4), chunk=16).job
     nearer = replace(job, layout=replace(job.layout, halo=4))
     ours, theirs = (compute_chunk(one, (1, 1)) for one in (job, nearer))
     assert (ours["first_limit"] != theirs["first_limit"]).any()

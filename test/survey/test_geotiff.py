@@ -16,10 +16,8 @@ from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.survey.cog import write_cog, write_layers
 from rover_planner.survey.geotiff import GeoTiffMap
-from rover_planner.survey.layers import unpack_bits
 from rover_planner.survey.map_source import MapFrame
 from rover_planner.survey.survey import prepare_survey
-from rover_planner.survey.tile_survey import outline_of
 from rover_planner.viewer.state.survey_layers import load_map
 from support.survey_maps import (
     assert_same_bits,
@@ -72,7 +70,7 @@ def survey_tif(path, request, out, **changes):
 
 
 def test_corners_and_projection_come_back(tmp_path):
-    heights = make_rough_map(50, 70).elevation.astype(np.float32)
+    heights = make_rough_map(20, 30).elevation.astype(np.float32)
     path = write_tif(tmp_path / "map.tif", heights[::-1], nodata=np.nan)
     prepared = survey_tif(path, make_request(), tmp_path / "out")
     write_layers(prepared.store, tmp_path / "layers")
@@ -90,13 +88,14 @@ def test_corners_and_projection_come_back(tmp_path):
 def test_a_tif_gives_the_bits_of_the_same_map_in_an_npz_file(tmp_path):
     heights = make_rough_map(60, 90).elevation.astype(np.float32)
     path = write_tif(tmp_path / "map.tif", heights[::-1], nodata=np.nan)
-    one = survey_tif(path, make_request(), tmp_path / "out", chunk=64)
+    request = make_request(step=3)
+    one = survey_tif(path, request, tmp_path / "out", chunk=21)
     terrain = Terrain(heights.astype(float), CELL, (7.0, -3.0))
-    other = survey_here(tmp_path / "npz", terrain, make_request(), chunk=192)
+    other = survey_here(tmp_path / "npz", terrain, request, chunk=63)
     assert_same_bits(layers_of(one), layers_of(other))
 
 
-@pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.uint64, np.float32])
+@pytest.mark.parametrize("kind", [np.uint64, np.float32])
 def test_overviews_have_values_of_the_layer(tmp_path, kind):
     values = np.array([0, 3, 255], kind) if kind != np.float32 else np.array([0.5, np.inf], kind)
     layer = np.random.default_rng(3).choice(values, (700, 1100))
@@ -128,30 +127,6 @@ def test_whole_numbers_with_scale_and_nodata_are_heights(tmp_path):
     heights = GeoTiffMap(path).read((slice(0, 30), slice(0, 40)))["elevation"]
     assert np.isnan(heights[26, 5]) and np.isnan(heights).sum() == 1
     assert heights[22, 9] == pytest.approx(113.0) and heights[0, 0] == pytest.approx(112.34)
-
-
-def test_no_cell_passes_whose_footprint_touches_a_nodata_hole(tmp_path):
-    rng = np.random.default_rng(4)
-    heights = (0.02 * rng.random((80, 90))).astype(np.float32)
-    holes = rng.integers((0, 0), heights.shape, (12, 2))
-    heights[holes[:, 0], holes[:, 1]] = -32768.0
-    path = write_tif(tmp_path / "map.tif", heights, nodata=-32768.0)
-    request = make_request(headings=8)
-    prepared = survey_tif(path, request, tmp_path / "out", chunk=64)
-    passes = unpack_bits(prepared.store.layer("passable_headings")[:], 8)
-    rear, front, right, left = outline_of(request.rover)
-    rows, columns = np.mgrid[0:80, 0:90]
-    touched = np.zeros(passes.shape, bool)
-    for row, column in holes:
-        away = np.stack([columns - column, rows - (79 - row)], axis=-1) * -CELL
-        for k, yaw in enumerate(request.yaws):
-            along = away @ (np.cos(yaw), np.sin(yaw))
-            across = away @ (-np.sin(yaw), np.cos(yaw))
-            touched[..., k] |= (
-                (rear <= along) & (along <= front) & (right <= across) & (across <= left)
-            )
-    assert touched.mean() > 0.05 and passes.mean() > 0.1
-    assert not (touched & passes).any()
 
 
 @pytest.mark.filterwarnings("ignore:The given matrix is equal to Affine.identity")

@@ -173,7 +173,7 @@ def test_judged_turns_bound_the_area(tmp_path):
     terrain = make_rough_map(70, 70)
     areas = []
     for turns in (False, True):
-        request = make_request(headings=8, turns=turns)
+        request = make_request(headings=8, step=2, turns=turns)
         prepared = survey_here(tmp_path / str(turns), terrain, request)
         areas.append(find_reachable(prepared.store, 1202.5, -337.5))
     assumed, judged = (np.isfinite(area.distance[:]) for area in areas)

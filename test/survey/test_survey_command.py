@@ -31,6 +31,7 @@ from rover_planner.survey.store import create_store
 from rover_planner.survey.survey import prepare_survey
 from support.survey_maps import (
     assert_same_bits,
+    compute_here,
     fail_on_one,
     forget_package,
     layers_of,
@@ -42,7 +43,7 @@ from support.survey_maps import (
 )
 
 SIDE = 130
-"""Cells of a side of the map; it has 9 chunks of 64 cells."""
+"""Cells of a side of the map; at every fourth cell it has 9 chunks of 16 cells."""
 
 
 @pytest.fixture
@@ -78,22 +79,23 @@ def survey(map_file, *words) -> int:
 
 @pytest.mark.slow
 def test_two_workers_find_what_one_process_finds_and_a_second_run_does_nothing(tmp_path, capfd):
-    terrain, request = make_rough_map(SIDE, SIDE), make_request()
-    whole = survey_here(tmp_path / "whole", terrain, request, chunk=192)
+    terrain, request = make_rough_map(SIDE, SIDE), make_request(step=4)
+    whole = survey_here(tmp_path / "whole", terrain, request, chunk=48)
     map_file, picture = tmp_path / "map.npz", tmp_path / "p.png"
     save_terrain(map_file, terrain)
-    assert survey(map_file, "--chunk", 64, "--workers", 2, "--picture", picture) == 0
+    words = map_file, "--step", 4, "--picture", picture
+    assert survey(*words, "--chunk", 16, "--workers", 2) == 0
     out, err = capfd.readouterr()
     report = json.loads(out)
     assert err == "" and report["chunks"] == report["chunks_done"] == 9
-    assert report["chunks_failed"] == [] and report["poses"] == SIDE * SIDE * 4
+    assert report["chunks_failed"] == [] and report["poses"] == 33 * 33 * 4
     assert sum(report["best_class"].values()) == pytest.approx(1.0, abs=1e-5)
     assert picture.stat().st_size > 10_000
     done = prepare_survey(request, str(map_file), tmp_path / "out")
     assert_same_bits(layers_of(done), layers_of(whole))
     (tmp_path / "out" / ".lock").unlink()
     (tmp_path / "out" / ".lock").mkdir()  # as on a read-only disk, to which nothing is written
-    assert survey(map_file, "--picture", picture) == 0
+    assert survey(*words) == 0
     again = json.loads(capfd.readouterr().out)
     assert again["chunks_done"] == 0 and again["chunks_found"] == 9
 
@@ -103,16 +105,16 @@ def test_two_workers_find_what_one_process_finds_and_a_second_run_does_nothing(t
 
 @pytest.mark.slow
 def test_a_chunk_that_fails_is_named_and_the_rest_stands(tmp_path, scheduler):
-    prepared = prepare_here(tmp_path, make_rough_map(120, 120), make_request(), chunk=64)
+    prepared = prepare_here(tmp_path, make_rough_map(120, 120), make_request(step=4), chunk=16)
     settings = ClusterSettings(scheduler)
     outcome = run_survey(prepared.job, prepared.chunks, settings, task=fail_on_one)
     assert outcome.failed == {(0, 1): "RuntimeError: this chunk is cursed after 3 attempts"}
     assert outcome.done == 3
-    again = prepare_survey(make_request(), str(tmp_path / "map.npz"), tmp_path / "out")
+    again = prepare_survey(make_request(step=4), str(tmp_path / "map.npz"), tmp_path / "out")
     assert again.chunks == [(0, 1)]
     cells = again.job.layout.cells_of((0, 1))
     assert (again.store.layer("best_class")[cells] == 255).all()
-    assert (again.store.layer("best_class")[:] == 255).sum() == 64 * 56
+    assert (again.store.layer("best_class")[:] == 255).sum() == 16 * 14
     with pytest.raises(PlanningError, match="cannot be written: No room; finished chunks are ke"):
         run_survey(again.job, again.chunks, settings, task=refuse_one)
 
@@ -155,11 +157,11 @@ def small_files(most: int) -> Iterator[None]:
 
 def test_on_a_full_disk_a_chunk_is_refused_and_what_is_there_is_whole(tmp_path):
     rasterio = pytest.importorskip("rasterio", reason="install the extra survey")
-    prepared = prepare_here(tmp_path, make_rough_map(120, 120), make_request(), chunk=64)
+    prepared = prepare_here(tmp_path, make_rough_map(64, 64), make_request(headings=1))
     with small_files(1500):
         report = survey_chunk(prepared.job, (0, 0))
     assert report.refusal == "File too large" and not prepared.store.find_finished()
-    survey_here(tmp_path, make_rough_map(120, 120), make_request())
+    compute_here(prepared)
     refused = pytest.raises(PlanningError, match=r"\.tif: cannot be written: File too large")
     with small_files(10_000), refused:
         write_layers(prepared.store, tmp_path / "layers")

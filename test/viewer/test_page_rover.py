@@ -7,10 +7,9 @@ from dataclasses import replace
 import pytest
 
 from rover_physics.rover.rover_file import load_rover
-from rover_planner.studies.example_studies import find_examples
 from rover_planner.studies.rover_values import read_rover, write_rover
 from rover_planner.studies.runner import find_rover, run_study
-from rover_planner.studies.study_file import load_study
+from rover_planner.studies.study_file import find_examples, load_study
 from rover_planner.viewer.pages import page as page_module
 from rover_planner.viewer.panel.controls import CHANGED
 from support.viewer.browser import WAIT, Visitor, needs_browser, wait_until

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from rover_physics.files.validation import errors_of
 from rover_physics.files.yaml_file import parse_yaml
-from rover_planner.studies.example_studies import find_examples
-from rover_planner.studies.study_file import Study, load_study, study_from_dict
+from rover_planner.studies.study_file import Study, find_examples, load_study, study_from_dict
 from rover_planner.viewer.state.visitor_requests import Action
 
 
