@@ -104,13 +104,13 @@ def _close_notice(visitor: Visitor) -> None:
 def _show_failure(page: Page, visitor: Visitor) -> str:
     """Show the first candidate that a wheel refuses, at its failure; return what fails."""
     session = page.session
-    for index in range(len(session.candidates)):
-        if session.candidates[index].verdict.traversable:
+    for index in range(len(session.shown.candidates)):
+        if session.shown.candidates[index].verdict.traversable:
             continue
         page.requests.add(lambda index=index: session.show_candidate(index))
         wait_until(lambda index=index: session.shown.index == index, "the path")
         wait_until(lambda: not page.is_busy, "its verdicts")
-        failure = explain(session.finished).failure
+        failure = explain(session.shown).failure
         if failure is not None and failure.link in WHEELS:
             visitor.press("Go to the failure")
             at = min(failure.time, page.playback.duration)

@@ -54,8 +54,8 @@ def visitor(opened, page):
         if session.wanted is not page.home:
             session.take_scenario(page.home)
             page.judged.show_inputs()
-        elif session.shown.index != session.answer.nearest:
-            session.show_candidate(session.answer.nearest)
+        elif session.shown.index != session.shown.answer.nearest:
+            session.show_candidate(session.shown.answer.nearest)
         page.judged.show_verdict()
 
     ask(page, begin_anew)

@@ -55,7 +55,7 @@ def at_rest(page):
         asked.append(session.wanted)
 
     def is_shown() -> bool:
-        return asked and session.finished.answered is asked[0] and not page.is_busy
+        return asked and session.shown.answered is asked[0] and not page.is_busy
 
     page.requests.add(ask)
     wait_until(is_shown, "the rover as it was loaded", PATIENCE)
@@ -192,7 +192,7 @@ def test_the_ghost_of_a_failure_stays_for_the_next_one_and_hides_without(page):
     ghosts = []
     for friction in (0.4, 0.35):
         session.change_rover([("friction",)], friction)
-        failure = explain(session.finished).failure
+        failure = explain(session.shown).failure
         mark.show(session.rover, failure)
         ghosts.append(mark._ghost)
         np.testing.assert_allclose(

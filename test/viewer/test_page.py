@@ -54,7 +54,7 @@ def slowly(page, monkeypatch) -> None:
 
 def show_refused(page) -> None:
     """Show the first path that is refused, judged under all policies."""
-    verdicts = [candidate.verdict for candidate in page.session.candidates]
+    verdicts = [candidate.verdict for candidate in page.session.shown.candidates]
     index = next(k for k, verdict in enumerate(verdicts) if not verdict.traversable)
     ask(page, lambda: page.session.show_candidate(index))
     wait_for_rest(page)
@@ -364,17 +364,20 @@ def test_the_camera_looks_from_above_from_the_side_and_goes_along(visitor, page)
 
 
 def test_clicks_set_goal_and_start_and_one_into_the_sky_is_refused_in_every_tab(onlooker, page):
-    session, (start, goal) = page.session, (page.session.start, page.session.goal)
+    session, (start, goal) = (
+        page.session,
+        (page.session.scenario.start, page.session.scenario.goal),
+    )
     onlooker.click_scene(*MIDDLE)
-    wait_until(lambda: session.goal != goal, "another goal")
-    x, y, _ = session.goal
-    assert abs(x) < 4.0 and abs(y) < 4.0 and session.start == start
+    wait_until(lambda: session.scenario.goal != goal, "another goal")
+    x, y, _ = session.scenario.goal
+    assert abs(x) < 4.0 and abs(y) < 4.0 and session.scenario.start == start
     wait_until(lambda: "candidate paths" in onlooker.text("#details"), "all candidates")
     wait_for_rest(page)
-    goal = session.goal
+    goal = session.scenario.goal
     onlooker.click_scene(MIDDLE[0] - 60, MIDDLE[1], shift=True)
-    wait_until(lambda: session.start != start, "another start")
-    assert session.goal[:2] == goal[:2]
+    wait_until(lambda: session.scenario.start != start, "another start")
+    assert session.scenario.goal[:2] == goal[:2]
     onlooker.open_tab("Ground and path")
     onlooker.click_scene(600, 100)  # the sky
     onlooker.wait_for("refused: the click is beside the known ground")
@@ -389,7 +392,7 @@ def test_a_goal_behind_a_wall_is_refused_with_its_reason_and_shows_what_was_sear
     ask(page, lambda: page.plan(np.array([3.35, 0.0])))
     onlooker.wait_for("not traversable")
     wait_for_rest(page)
-    assert not page.session.answer.traversable
+    assert not page.session.shown.answer.traversable
     headline, reason = page.judged.path.why.failure.headline, page.session.shown.verdict.reason
     wait_until(lambda: headline in onlooker.text("#verdict"), "the broken limit")
     wait_until(lambda: reason in onlooker.text("#details"), "the reason")
@@ -450,7 +453,7 @@ def test_a_refusal_is_sent_as_one_file_with_scene_pose_numbers_and_versions(
     with visitor.tab.expect_download() as download:
         visitor.press("Save as HTML file")
     download.value.save_as(file)
-    reason, verdict = page.session.finished.reason, page.session.shown.verdict
+    reason, verdict = page.session.shown.reason, page.session.shown.verdict
     context = browser.new_context(viewport=LAPTOP, offline=True, device_scale_factor=0.4)
     tab = context.new_page()
     errors: list[str] = []

@@ -191,7 +191,7 @@ def test_a_study_is_cancelled_and_another_one_gives_the_best_rover(visitor, page
     assert best != page.session.rover
     visitor.press("Show the best rover")
     wait_until(lambda: page.session.rover == best, "the best rover")
-    assert page.session.finished.scenario.loaded == study.rover
+    assert page.session.shown.scenario.loaded == study.rover
     wait_until(lambda: "lsr1 (changed)" in visitor.text("#header"), "the header")
 
 
@@ -213,7 +213,7 @@ def test_while_a_change_is_judged_every_visitor_sees_so_and_the_old_verdict_is_g
             one.wait_for("old values: judging")
         assert session.wanted is not before and session.progress is not None
         assert session.shown is shown
-        grey = set(range(len(session.candidates)))
+        grey = set(range(len(session.shown.candidates)))
         wait_until(lambda: page.scene.paths._old == grey, "grey paths")
         ask(page, page.playback.play)
         wait_until(lambda: page.playback.time > 0.0, "the rover to drive on")

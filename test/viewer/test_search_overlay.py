@@ -58,9 +58,9 @@ def count_rows(page: Page) -> int:
 def test_a_click_beyond_a_wall_shows_the_way_or_the_closed_area_on_the_page(page):
     session = page.session
     page.requests.add(lambda: page.click(BEYOND, False))
-    wait_until(lambda: session.finished.way is not None and not page.is_busy, "a way", PATIENCE)
+    wait_until(lambda: session.shown.way is not None and not page.is_busy, "a way", PATIENCE)
     overlay = page.scene.search
-    closes = session.finished.way.closed is not None
+    closes = session.shown.way.closed is not None
     wait_until(lambda: set(overlay._layers) == ({CLOSED, ASKED} if closes else {ASKED}), "layers")
     asked = overlay._layers[ASKED][0]
     assert not asked.visible
@@ -70,7 +70,7 @@ def test_a_click_beyond_a_wall_shows_the_way_or_the_closed_area_on_the_page(page
     assert tuple(asked.color) == UNKNOWN
     overlay.mark_old(False)
     if closes:
-        is_refused = session.finished.way.closed.around_goal
+        is_refused = session.shown.way.closed.around_goal
         colour = tuple(overlay._layers[CLOSED][0].color)
         assert colour == (REFUSED if is_refused else PASSABLE)
     text = page.drive_tab._verdict.content + page.drive_tab._details.content
@@ -81,5 +81,5 @@ def test_a_click_beyond_a_wall_shows_the_way_or_the_closed_area_on_the_page(page
         assert "passable, best" in page.candidates._table.content
         assert page.playback.duration == session.shown.trajectory.duration
     page.requests.add(lambda: page.click(np.array([-1.1, 0.0]), False))
-    wait_until(lambda: session.finished.way is None and not overlay._layers, "no layers", PATIENCE)
+    wait_until(lambda: session.shown.way is None and not overlay._layers, "no layers", PATIENCE)
     assert not page.errors.messages

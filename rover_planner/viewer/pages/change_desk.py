@@ -27,23 +27,23 @@ class ChangeDesk:
             changed: Called after a change was taken back.
         """
         self._session, self._tab, self._changed = session, tab, changed
-        self._history = ChangeHistory(session.finished)
+        self._history = ChangeHistory(session.shown)
 
     def take_judged(self) -> None:
         """Note what the session has judged last."""
-        self._history.take(self._session.finished)
+        self._history.take(self._session.shown)
 
     @property
     def before(self) -> Trajectory | None:
         """The drive of the rover before along the shown path; None if there is none."""
-        judgement = self._history.reference_for(self._session.finished)
-        return None if judgement is None else judgement.shown.trajectory
+        judgement = self._history.reference_for(self._session.shown)
+        return None if judgement is None else judgement.trajectory
 
     def show(self) -> None:
         """Show what has changed of the rover and of its drive."""
-        now, before = self._session.finished, self.before
+        now, before = self._session.shown, self.before
         changed = list_changes(now.scenario.loaded, now.scenario.rover)
-        differences = () if before is None else compare_drives(before, now.shown.trajectory)
+        differences = () if before is None else compare_drives(before, now.trajectory)
         self._tab.show_changes(changed, differences)
 
     def undo(self) -> None:

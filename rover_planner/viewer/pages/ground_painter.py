@@ -13,7 +13,7 @@ from rover_planner.viewer.panel.tabs.ground_tab import GroundTab
 from rover_planner.viewer.scene.ground_mesh import GroundMesh, build_ground_mesh, export_ground
 from rover_planner.viewer.scene.scene import Scene
 from rover_planner.viewer.scene.survey_mesh import SurveyMesh, build_survey_mesh
-from rover_planner.viewer.state.background_work import BackgroundWork, Report
+from rover_planner.viewer.state.background_work import BackgroundWork, Progress
 from rover_planner.viewer.state.scenario import Scenario
 from rover_planner.viewer.state.survey_layers import ShownSurvey
 
@@ -101,8 +101,8 @@ def _options_of(asked: Scenario) -> SweepOptions:
     return asked.asked_options.model
 
 
-def _paint(request: PaintRequest, report: Report) -> Iterator[PaintedGround]:
-    report("colouring the ground", 1, 1)
+def _paint(request: PaintRequest) -> Iterator[Progress | PaintedGround]:
+    yield Progress("colouring the ground", 1, 1)
     drawn = _build(request)
     yield PaintedGround(drawn, export_ground(drawn.mesh, request.origin))
 

@@ -93,11 +93,11 @@ class JudgedDisplay:
 
     def show_judged(self) -> None:
         """Take what was judged, and show it."""
-        session, before = self._session, self._session.finished
+        session, before = self._session, self._session.shown
         try:
             session.take_finished()
         finally:
-            now = session.finished
+            now = session.shown
             self.show_verdict()
             if now.scenario is not before.scenario:
                 self._show_scenario(before.scenario, now.scenario)
@@ -106,7 +106,7 @@ class JudgedDisplay:
                 self._draw_predicted_ground()
             if now.way is not before.way:
                 self._ask("the searched ground is not drawn", self.path.draw_search)
-            if now.shown.candidate is not before.shown.candidate:
+            if now.candidate is not before.candidate:
                 self.show_path()
             elif now.answer is not before.answer:
                 self._ask(NO_PATHS, self._draw_paths)
@@ -146,8 +146,8 @@ class JudgedDisplay:
 
     def draw_ground(self) -> None:
         """Begin to colour the ground."""
-        now = self._session.finished
-        path = now.shown.candidate.poses
+        now = self._session.shown
+        path = now.candidate.poses
         self._run(NO_GROUND, lambda: self._painter.paint(now.scenario, path))
 
     def take_ground(self) -> None:
@@ -183,7 +183,7 @@ class JudgedDisplay:
         self._panels.drawings.ask(failure, draw_with_picture)
 
     def _draw_rover(self) -> None:
-        self._panels.scene.draw_rover(self._session.rover, self._session.arm_angles)
+        self._panels.scene.draw_rover(self._session.rover, self._session.scenario.arm_angles)
 
     def _fit_cameras(self) -> None:
         shown = self._session.shown.candidate.poses[:, :2]
@@ -205,8 +205,8 @@ class JudgedDisplay:
         """Show the table of the candidates, those with old verdicts grey."""
         session, shown = self._session, self._session.shown.index
         others = session.has_old_candidates
-        old = [others and k != shown for k in range(len(session.candidates))]
-        rows = list_candidates(session.candidates, session.answer.nearest, old)
+        old = [others and k != shown for k in range(len(session.shown.candidates))]
+        rows = list_candidates(session.shown.candidates, session.shown.answer.nearest, old)
         self._panels.candidates.show(rows, shown)
 
 

@@ -158,7 +158,9 @@ class PageBase(ABC):
 
     def _aim_camera(self, client: Any) -> None:
         session = self.session
-        self.scene.aim_camera(client, session.rover, session.terrain, session.start, session.goal)
+        self.scene.aim_camera(
+            client, session.rover, session.terrain, session.scenario.start, session.scenario.goal
+        )
 
     def _welcome(self, client: Any) -> None:
         """Aim the camera of a new visitor, then fit the panels; it waits for the browser."""
@@ -197,7 +199,7 @@ class PageBase(ABC):
 
     def path_to_look_at(self) -> np.ndarray:
         """Return x and y (n, 2) [m] of what a view of everything shows."""
-        return np.array([self.session.start[:2], self.session.goal[:2]])
+        return np.array([self.session.scenario.start[:2], self.session.scenario.goal[:2]])
 
     def _request_click(self, event: Any, shift: bool) -> None:
         origin = self.scene.frame.to_map(event.ray_origin)

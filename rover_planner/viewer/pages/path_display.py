@@ -62,7 +62,7 @@ class PathDisplay:
             old: Why it is a verdict on old values; empty if it is not.
         """
         session, shown = self._session, self._session.shown
-        self._old, reason, notes = old, session.finished.reason, shown.trajectory.notes
+        self._old, reason, notes = old, session.shown.reason, shown.trajectory.notes
         judged = shown.verdict.traversable, reason, ""
         failure = self.why.failure if self.why and self._explained is shown.candidate else None
         words = "" if failure is None else describe_failure(failure)
@@ -80,7 +80,7 @@ class PathDisplay:
     def explain(self) -> None:
         """Find out where the shown path uses its limits and breaks one."""
         self.why = None  # an error must not leave that of another path
-        self.why = explain(self._session.finished)
+        self.why = explain(self._session.shown)
         self._explained = self._session.shown.candidate
         self.show_verdict(self._old)
 
@@ -116,7 +116,7 @@ class PathDisplay:
         self._scene.paths.show(
             session.rover,
             session.terrain,
-            session.candidates,
+            session.shown.candidates,
             session.shown.index,
             self._old_paths(path_is_old),
         )
@@ -125,7 +125,7 @@ class PathDisplay:
     def draw_search(self) -> None:
         """Draw the area that is closed in, if no way was found, and what was searched."""
         self._scene.search.show(
-            self._session.rover, self._session.terrain, self._session.finished.way
+            self._session.rover, self._session.terrain, self._session.shown.way
         )
 
     def mark_old(self, path_is_old: bool) -> None:
@@ -140,7 +140,7 @@ class PathDisplay:
         """Return the indices of the paths whose verdicts are of old values."""
         session = self._session
         index, others = session.shown.index, session.has_old_candidates
-        old = {k for k in range(len(session.candidates)) if others and k != index}
+        old = {k for k in range(len(session.shown.candidates)) if others and k != index}
         return old | {index} if path_is_old else old
 
     def advance(self, seconds: float) -> None:

@@ -4,7 +4,7 @@
 import html
 from collections.abc import Sequence
 
-from rover_planner.viewer.state.colours import NOTICE, ColourScale, to_css
+from rover_planner.viewer.state.colours import NOTICE, to_css
 from rover_planner.viewer.state.survey_layers import ColouredGround, Key
 
 
@@ -19,7 +19,7 @@ def draw_survey_legend(
         meaning: What its colours mean.
         differences: In what the survey differs from what the page shows.
     """
-    body = _draw_keys(meaning.keys) if meaning.scale is None else _draw_scale(meaning.scale)
+    body = _draw_keys(meaning.keys)
     notice = ""
     if differences:
         notice = (
@@ -38,13 +38,4 @@ def _draw_keys(keys: Sequence[Key]) -> str:
         f'<div><span style="background:{to_css(colour)};padding:0 .6em">&nbsp;</span> '
         f"{html.escape(text)}</div>"
         for colour, text in keys
-    )
-
-
-def _draw_scale(scale: ColourScale) -> str:
-    return (
-        '<div style="height:10px;background:linear-gradient(90deg,#00224e,#434e6c,#7d7c78,'
-        '#bcae6c,#fee838)"></div><div style="display:flex;justify-content:space-between">'
-        f"<span>{scale.low:g} {scale.unit}</span><span>{scale.high:.4g} {scale.unit}</span></div>"
-        '<div style="opacity:.7">grey: unknown, or the rover cannot stand or go</div>'
     )

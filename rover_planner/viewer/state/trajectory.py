@@ -159,6 +159,7 @@ def read_series(prediction: PathPrediction) -> dict[str, Floats]:
 
 def make_state(values: dict[str, Any]) -> RoverState:
     """Return the state with the values of all fields, arrays and numbers of numpy."""
-    return RoverState(
-        **{name: float(value) if np.ndim(value) == 0 else value for name, value in values.items()}
-    )
+    plain: dict[str, Any] = {
+        name: float(value) if np.ndim(value) == 0 else value for name, value in values.items()
+    }
+    return RoverState(**plain)

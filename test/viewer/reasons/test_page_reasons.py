@@ -38,7 +38,7 @@ def show(page: Page, index: int) -> None:
 @pytest.fixture
 def refused(visitor, page) -> None:
     """The first path that is refused is shown."""
-    verdicts = [candidate.verdict for candidate in page.session.candidates]
+    verdicts = [candidate.verdict for candidate in page.session.shown.candidates]
     show(page, next(k for k, verdict in enumerate(verdicts) if not verdict.traversable))
 
 
@@ -65,9 +65,9 @@ def test_a_refused_path_says_which_limit_by_how_much_where_and_a_button_goes_the
 
 
 def test_beside_the_sliders_a_long_reason_hides_no_policy(visitor, page, refused, monkeypatch):
-    short = page.session.finished.reason
+    short = page.session.shown.reason
     text = f"no way within the map, closed in by much; the shown path: {short} {short} {short}"
-    monkeypatch.setattr(type(page.session.finished), "reason", text)
+    monkeypatch.setattr(type(page.session.shown), "reason", text)
     ask(page, page.judged.show_verdict)
     visitor.open_tab("Rover")
     wait_until(lambda: text in visitor.text("#verdict:visible"), "the reason")
@@ -108,7 +108,7 @@ def test_lanes_have_the_scale_of_the_plots_and_no_letter_is_lower_than_12_px(
 
 
 def test_labels_do_not_overlap_on_the_screen(onlooker, page, refused):
-    count = len(page.session.candidates) + 3  # start, goal and the failure
+    count = len(page.session.shown.candidates) + 3  # start, goal and the failure
     top, flat, at = (0.0, 0.01, 12.0), (-6.0, 0.02, 0.4), FAR_AND_FLAT[1]
     for place in (top, flat, (0.0, -9.0, 0.3), FAR_AND_FLAT[0]):
         look_from(page, onlooker, place, at)
@@ -137,9 +137,9 @@ def test_a_row_under_the_mouse_highlights_its_path_to_this_visitor_and_a_click_s
     for one in (visitor, other):
         one.open_tab("Ground and path")
     rows = visitor.tab.locator("#candidates tr[data-path]")
-    wait_until(lambda: rows.count() == len(page.session.candidates), "the table")
+    wait_until(lambda: rows.count() == len(page.session.shown.candidates), "the table")
     wait_for_highlight(page, visitor, None)
-    best = page.session.answer.nearest
+    best = page.session.shown.answer.nearest
     pointed = (best + 1) % rows.count()
     drawn = [ribbon._core for ribbon in page.scene.paths.ribbons.values()]
     rows.nth(pointed).hover()
@@ -225,4 +225,4 @@ def test_a_layer_colours_the_ground_with_its_limit_on_the_scale_and_a_soil_lets_
     onlooker.choose("Soil", "dry_sand")
     wait_until(lambda: page.session.shown.verdict.max_sinkage > 0.0, "wheels that sink")
     onlooker.choose("Soil", "none (Coulomb)")
-    wait_until(lambda: page.session.options.model.soil is None, "hard ground")
+    wait_until(lambda: page.session.scenario.options.model.soil is None, "hard ground")

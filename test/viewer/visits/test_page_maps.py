@@ -59,8 +59,8 @@ def test_a_far_map_looks_like_a_near_one_and_a_click_lands_where_it_is_aimed(bro
         look_down_at(page, visitor, np.array([*aim, height]), 3.0)
         box = visitor.tab.locator("canvas").first.bounding_box()
         visitor.click_scene(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
-        wait_until(lambda: page.session.goal[0] != FAR[0] + 1.0, "another goal")
-        np.testing.assert_allclose(page.session.goal[:2], aim, atol=0.05)
+        wait_until(lambda: page.session.scenario.goal[0] != FAR[0] + 1.0, "another goal")
+        np.testing.assert_allclose(page.session.scenario.goal[:2], aim, atol=0.05)
         wait_for_rest(page)
         poses = page.session.shown.candidate.poses
         np.testing.assert_allclose(poses[-1, :2], aim, atol=0.05)

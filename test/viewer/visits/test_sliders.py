@@ -18,7 +18,7 @@ from rover_planner.planning.ways.way_search import LatticeSettings
 from rover_planner.studies.rover_values import get_value, list_values
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.panel.controls import on_visitor_input
-from rover_planner.viewer.state.scenario import Judgement
+from rover_planner.viewer.state.scenario import Shown
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.viewer.browser import Visitor, needs_browser, wait_until
@@ -108,19 +108,19 @@ def check_page(page: Page, visitor: Visitor) -> None:
     chip = visitor.tab.locator('[data-chip="is"]')
     text = visitor.tab.locator("#verdict:visible")
 
-    def find_shown() -> Judgement | None:
+    def find_shown() -> Shown | None:
         """Return the judgement that the browser shows; None on the way to another one."""
-        now, verdict = session.finished, session.finished.shown.verdict
+        now, verdict = session.shown, session.shown.verdict
         word = "traversable" if verdict.traversable else "not traversable"
         is_seen = chip.inner_text() == word and verdict.reason in text.inner_text()
-        return now if is_seen and session.finished is now else None
+        return now if is_seen and session.shown is now else None
 
     now = wait_until(find_shown, "the verdict in header and tab")
     options = now.scenario.asked_options.model
-    poses = now.shown.candidate.poses
+    poses = now.candidate.poses
     _, verdict = judge_path(now.scenario.rover, now.scenario.terrain, poses, options)
-    assert now.shown.verdict.traversable == verdict.traversable
-    assert now.shown.verdict.reason == verdict.reason
+    assert now.verdict.traversable == verdict.traversable
+    assert now.verdict.reason == verdict.reason
     assert not page.errors.messages and visitor.page_errors == []
 
 
@@ -189,7 +189,7 @@ def test_sliders_at_both_ends_leave_the_page_alive_and_right(name, choose, brows
             drag_to_both_ends(page, visitor, slider)
         wait_for_rest(page)
         check_page(page, visitor)
-        assert page.session.rover == LSR1 and not page.session.arm_angles
+        assert page.session.rover == LSR1 and not page.session.scenario.arm_angles
         for slider in sliders:
             wait_until(
                 lambda slider=slider: (

@@ -13,7 +13,7 @@ from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.viewer.state.reasons.limits import Limit
 from rover_planner.viewer.state.reasons.path_limits import AskedPoses, PathLimits, find_path_limits
-from rover_planner.viewer.state.scenario import Judgement
+from rover_planner.viewer.state.scenario import Shown
 from rover_planner.viewer.state.trajectory import RoverState, make_state, read_series
 
 BODY = "body"
@@ -211,8 +211,8 @@ class Explanation:
         return "" if self.failure is None else self.failure.link
 
 
-def explain(judgement: Judgement) -> Explanation:
-    """Return the explanation of the shown path of a judgement."""
-    asked, shown = judgement.scenario, judgement.shown
+def explain(shown: Shown) -> Explanation:
+    """Return the explanation of the shown path."""
+    asked = shown.scenario
     limits = find_path_limits(asked.rover, shown.candidate.prediction, shown.verdict)
     return Explanation(limits, find_failure(asked.rover, asked.terrain, shown.verdict, limits))
