@@ -8,8 +8,7 @@ import numpy as np
 
 from rover_physics.terrain.grid import Terrain
 from rover_planner.viewer.live.listener import NO_ODOMETRY, LiveData, LiveListener
-from rover_planner.viewer.live.live_state import StateBuilder
-from rover_planner.viewer.live.topic_ages import TopicAge
+from rover_planner.viewer.live.live_state import StateBuilder, TopicAge
 from rover_planner.viewer.pages.page_base import PageBase
 from rover_planner.viewer.panel.board import BoardNotes
 from rover_planner.viewer.panel.dashboard import describe_verdict
