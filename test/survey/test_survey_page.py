@@ -17,8 +17,8 @@ from rover_planner.errors import PlanningError
 from rover_planner.survey.layers import CLASS_NUMBERS
 from rover_planner.survey.palette import CLASS_COLOURS
 from rover_planner.survey.reach.reachable import find_reachable
-from rover_planner.viewer.panel.survey_legend import draw_survey_legend
-from rover_planner.viewer.scene.survey_mesh import build_survey_mesh
+from rover_planner.viewer.panel.legend import draw_survey_legend
+from rover_planner.viewer.scene.ground_mesh import build_survey_mesh
 from rover_planner.viewer.state.colours import UNKNOWN, from_css
 from rover_planner.viewer.state.survey_layers import (
     BEST_CLASS,
@@ -91,8 +91,8 @@ def test_every_layer_has_colours_and_a_meaning(shown):
 
 def test_a_pixel_of_the_ground_is_that_of_its_cell(shown, surveyed):
     terrain = load_map(surveyed, 10_000)
-    drawn = build_survey_mesh(terrain, shown, CLASS)
-    picture = np.asarray(drawn.mesh.visual.material.baseColorTexture)[::-1]
+    drawn, _ = build_survey_mesh(terrain, shown, CLASS)
+    picture = np.asarray(drawn.visual.material.baseColorTexture)[::-1]
     factor = picture.shape[0] // 60
     assert factor == 8
     row, column = (int((at / 0.1 + 0.5) * factor) for at in PASSABLE[::-1])

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a sent page says in words and numbers beside its scene: verdict, failing pose, versions."""
+"""A page that is sent: one HTML file with the scene, verdict, failing pose, numbers, versions."""
 
 import html
 import platform
+import re
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
+from typing import Any
 
 import numpy as np
 
@@ -30,6 +32,39 @@ WHEEL_ROWS = {
 }
 """Rows of the table of wheels: field of the prediction and digits."""
 MILLI = 1e3
+STYLE = """
+#report { position: fixed; top: 0; left: 0; bottom: 0; width: 34em; overflow: auto; z-index: 10;
+  background: rgba(255, 255, 255, .92); padding: .5em 1em; font: 13px/1.4 sans-serif;
+  box-sizing: border-box; color: #222; }
+#report th { text-align: left; vertical-align: top; padding-right: .8em; font-weight: normal;
+  opacity: .7; }
+#report td { padding-right: .6em; overflow-wrap: anywhere; }
+#report h1 { font-size: 1.5em; }
+#report #wheels th { white-space: nowrap; }
+#report #wheels td { text-align: right; }
+@media (max-width: 1000px) { #report { top: auto; right: 0; width: auto; height: 45%; } }
+"""
+VISERS_TITLE = re.compile("<title>.*?</title>")
+"""The title that viser gives a file; a browser shows the first one."""
+
+
+def write_page(server: Any, camera: Any, report: str, title: str) -> bytes:
+    """Return the scene and a report as one HTML file that needs no network.
+
+    Args:
+        server: The server of viser.
+        camera: The camera of the visitor, from which the file looks at first.
+        report: The report, HTML.
+        title: Title of the file, text.
+    """
+    server.initial_camera.position = camera.position
+    server.initial_camera.look_at = camera.look_at
+    safe = html.escape(title)
+    page: str = server.get_scene_serializer().as_html()
+    page = VISERS_TITLE.sub(lambda _found: f"<title>{safe}</title>", page, count=1)
+    inserted = f'<style>{STYLE}</style><div id="report"><h1>{safe}</h1>{report}</div>'
+    at = page.rindex("</body>")
+    return (page[:at] + inserted + page[at:]).encode()
 
 
 def describe_judgement(judgement: Judgement, context: Context, query: str) -> str:

@@ -18,19 +18,9 @@ WEIGHT_LENGTH = 4.0
 class ForceArrows:
     """An arrow for each normal force, and one for each force along the ground."""
 
-    def __init__(
-        self,
-        scene: Any,
-        rover: Rover,
-        frame: LocalFrame | None = None,
-        name: str = "/forces",
-    ):
-        """Add arrows of no length to the scene, below a node `name`.
-
-        Without a frame it is drawn in the map frame.
-        """
-        self._frame = frame or LocalFrame()
-        self._rover = rover
+    def __init__(self, scene: Any, rover: Rover, frame: LocalFrame, name: str = "/forces"):
+        """Add arrows of no length to the scene, below a node `name`."""
+        self._frame, self._rover = frame, rover
         self._scale = WEIGHT_LENGTH * rover.wheel.radius / (rover.weight / 6.0)
         radius = rover.wheel.radius
         no_arrows = np.zeros((6, 2, 3))

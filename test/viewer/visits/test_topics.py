@@ -2,7 +2,7 @@
 """Ages of topics: what is streamed gets stale, what comes once does not."""
 
 from rover_planner.viewer.live.topic_ages import MAX_AGE, TopicAges
-from rover_planner.viewer.panel.topics import draw_topics
+from rover_planner.viewer.panel.dashboard import draw_topics
 
 
 def test_a_stream_gets_stale_and_fresh_again_and_a_result_never():
