@@ -18,7 +18,7 @@ from rover_planner.shell.poses import GOAL, START, Pose
 if TYPE_CHECKING:
     from rover_physics.rover.model import Rover
     from rover_physics.terrain.grid import Terrain
-    from rover_planner.viewer.pages.page_base import PageBase
+    from rover_planner.viewer.pages.base import PageBase
     from rover_planner.viewer.state.session import ViewSession
     from rover_planner.viewer.state.survey_layers import ShownSurvey
 
@@ -80,7 +80,7 @@ def view(
     if survey is not None:
         need("zarr", "a survey")
     from rover_physics.rover.rover_file import load_rover
-    from rover_planner.viewer.pages.address import check_address
+    from rover_planner.viewer.pages.base import check_address
     from rover_planner.viewer.state.session import ViewSession
 
     model = load_rover(rover)

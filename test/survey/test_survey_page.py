@@ -16,8 +16,8 @@ from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.survey.layers import CLASS_NUMBERS
 from rover_planner.survey.palette import CLASS_COLOURS
-from rover_planner.viewer.panel.survey_legend import draw_survey_legend
-from rover_planner.viewer.scene.survey_mesh import build_survey_mesh
+from rover_planner.viewer.panel.legend import draw_survey_legend
+from rover_planner.viewer.scene.ground_mesh import build_survey_mesh
 from rover_planner.viewer.state.colours import UNKNOWN, from_css
 from rover_planner.viewer.state.survey_layers import CLASS, LIMIT, load_map, open_survey
 from support.survey_maps import make_request, survey_here
@@ -71,8 +71,8 @@ def test_the_first_limit_has_a_colour_and_a_meaning_for_each_that_fails_somewher
 
 def test_a_pixel_of_the_ground_is_that_of_its_cell(shown, surveyed):
     terrain = load_map(surveyed, 10_000)
-    drawn = build_survey_mesh(terrain, shown, CLASS)
-    picture = np.asarray(drawn.mesh.visual.material.baseColorTexture)[::-1]
+    drawn, _ = build_survey_mesh(terrain, shown, CLASS)
+    picture = np.asarray(drawn.visual.material.baseColorTexture)[::-1]
     factor = picture.shape[0] // 60
     assert factor == 8
     row, column = (int((at / 0.1 + 0.5) * factor) for at in PASSABLE[::-1])

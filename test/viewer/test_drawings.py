@@ -24,7 +24,7 @@ pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
 from rover_planner.planning.ways.way_search import LatticeSettings
 from rover_planner.viewer.pages import page as page_module
-from rover_planner.viewer.pages.drawings import Drawings
+from rover_planner.viewer.pages.base import Drawings
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.scene.ribbons import Ribbon, Strand
 from rover_planner.viewer.scene.rover_visual import RoverVisual
@@ -175,8 +175,11 @@ def test_a_rover_of_another_shape_is_drawn_as_a_new_one(page):
     wide = replace(LSR1, wheel=replace(LSR1.wheel, radius=1.3 * LSR1.wheel.radius))
     pivots = {name: (x, 1.2 * y, z) for name, (x, y, z) in LSR1.suspension.wheels.items()}
     wide = replace(wide, suspension=replace(LSR1.suspension, wheels=pivots))
-    shaped, new = RoverVisual(scene, LSR1, "/test/a"), RoverVisual(scene, wide, "/test/b")
-    shaped.shape(wide, {})
+    shaped, new = (
+        RoverVisual(scene, rover, page.scene.frame, name)
+        for rover, name in ((LSR1, "/test/a"), (wide, "/test/b"))
+    )
+    shaped.shape(wide)
     assert shaped._meshes.keys() == new._meshes.keys()
     for name, mesh in new._meshes.items():
         np.testing.assert_array_equal(shaped._meshes[name].vertices, mesh.vertices)

@@ -14,7 +14,7 @@ from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_planner.figures.wheel_colours import LEFT_DASHES, WHEEL_COLOURS, colour_of
-from rover_planner.viewer.panel.reasons.lanes import Lanes
+from rover_planner.viewer.panel.lanes import Lanes
 from rover_planner.viewer.state.colours import REFUSED, Colour, blend, to_css
 
 MAX_POINTS = 160

@@ -7,7 +7,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rover_physics.errors import RoverError
 from rover_physics.files.validation import Key
@@ -121,18 +120,16 @@ class ViewSession:
             raise PlanningError("the listed paths are old; judge again first")
         return self._ask(self.wanted, index)
 
-    def plan_to(self, goal: NDArray[np.float64]) -> bool:
+    def plan_to(self, goal: Sequence[float]) -> bool:
         """Plan to a goal (2,) [m] with the yaw of the straight line there."""
         start = self.wanted.start
         return self._want(start=start, goal=_facing(start, goal), recorded=None)
 
-    def plan_from(self, start: NDArray[np.float64]) -> bool:
+    def plan_from(self, start: Sequence[float]) -> bool:
         """Plan from a start (2,) [m] with the yaw of the straight line to the goal."""
-        goal = self.wanted.goal
-        ahead = np.asarray(goal[:2]) - np.asarray(start)
-        yaw = float(np.arctan2(ahead[1], ahead[0]))
+        x, y, yaw = _facing(start, self.wanted.goal)
         pose = (float(start[0]), float(start[1]), yaw)
-        return self._want(start=pose, goal=(goal[0], goal[1], yaw), recorded=None)
+        return self._want(start=pose, goal=(x, y, yaw), recorded=None)
 
     def restore_rover(self, rover: Rover, arm_angles: Mapping[str, float]) -> bool:
         """Take other numbers of the same rover, such as those before a change.
@@ -150,14 +147,9 @@ class ViewSession:
             return False
         return self._want(options=options)
 
-    def take_rover(self, rover: Rover, loaded: Rover | None = None) -> bool:
-        """Take another rover, changed from a loaded one (default: not), and plan again.
-
-        Changed from the one that is loaded now, it is a change like those of sliders.
-        """
-        if loaded is not None and loaded == self.wanted.loaded:
-            loaded = self.wanted.loaded
-        return self._want(loaded=loaded or rover, rover=rover, arm_angles={})
+    def take_rover(self, rover: Rover) -> bool:
+        """Take another rover as it was loaded, and plan again."""
+        return self._want(loaded=rover, rover=rover, arm_angles={})
 
     def plan_again(self) -> bool:
         """Judge all candidates again, after a change of the rover."""
@@ -308,7 +300,7 @@ class ViewSession:
                 options=assumptions.change_options(wanted.options),
                 arm_angles=assumptions.joint_angles or {},
             )
-        start, goal = (_as_pose(poses[row]) for row in (0, -1))
+        start, goal = tuple(poses[0].tolist()), tuple(poses[-1].tolist())
         self.wanted = replace(wanted, start=start, goal=goal, recorded=poses)
         self.shown, self._index = show_recorded(self.wanted, prediction, reasons), 0
 
@@ -318,12 +310,7 @@ def _results(steps: Iterator[Progress | Shown]) -> Iterator[Shown]:
     return (step for step in steps if isinstance(step, Shown))
 
 
-def _as_pose(pose: NDArray[np.float64]) -> Pose:
-    x, y, yaw = pose.tolist()
-    return x, y, yaw
-
-
-def _facing(start: Pose, goal: NDArray[np.float64]) -> Pose:
-    """Return the pose at a goal (2,) with the yaw of the straight line from start to goal."""
-    ahead = np.asarray(goal, dtype=float) - np.asarray(start[:2])
-    return float(goal[0]), float(goal[1]), float(np.arctan2(ahead[1], ahead[0]))
+def _facing(start: Sequence[float], goal: Sequence[float]) -> Pose:
+    """Return the pose at a goal x, y [m] with the yaw of the straight line from start to goal."""
+    yaw = np.arctan2(goal[1] - start[1], goal[0] - start[0])
+    return float(goal[0]), float(goal[1]), float(yaw)

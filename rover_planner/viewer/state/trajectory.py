@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.names import SERVO
+from rover_physics.names import SERVO, WHEELS
 from rover_physics.numerics.arrays import Floats
+from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_rpy
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.traversability.verdict import Verdict
@@ -163,3 +164,17 @@ def make_state(values: dict[str, Any]) -> RoverState:
         name: float(value) if np.ndim(value) == 0 else value for name, value in values.items()
     }
     return RoverState(**plain)
+
+
+def find_axles(rover: Rover, state: RoverState) -> Floats:
+    """Return the directions (6, 3) of the wheels' axles, map frame, positive to the left."""
+    R = matrix_from_xyzw(xyzw_from_rpy(*state.attitude))
+    axles = np.empty((6, 3))
+    for k, wheel in enumerate(WHEELS):
+        side = k // 3
+        link = state.rocker_angle[side]
+        if not wheel.startswith(rover.suspension.rocker_wheel):
+            link = link + state.bogie_angle[side]
+        s, c = np.sin(state.steering_angle[k]), np.cos(state.steering_angle[k])
+        axles[k] = R @ (-s * np.cos(link), c, s * np.sin(link))
+    return axles

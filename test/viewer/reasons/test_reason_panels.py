@@ -10,16 +10,16 @@ import pytest
 
 from rover_physics.names import WHEELS
 from rover_planner.viewer.panel.board import FONT, BoardNotes, draw_board
+from rover_planner.viewer.panel.candidate_table import draw_candidates
+from rover_planner.viewer.panel.changes import draw_changes
+from rover_planner.viewer.panel.lanes import BROKEN, COLOURS, WIDTH, draw_lanes
+from rover_planner.viewer.panel.legend import draw_scale
 from rover_planner.viewer.panel.plots import (
     MAX_POINTS,
     add_cursor,
     add_mark,
     choose_rows,
 )
-from rover_planner.viewer.panel.reasons.candidate_table import draw_candidates
-from rover_planner.viewer.panel.reasons.changes import draw_changes
-from rover_planner.viewer.panel.reasons.colour_scale import draw_scale
-from rover_planner.viewer.panel.reasons.lanes import BROKEN, COLOURS, WIDTH, draw_lanes
 from rover_planner.viewer.state import colours
 from rover_planner.viewer.state.colours import (
     MIN_CONTRAST,
@@ -92,12 +92,12 @@ def test_the_table_has_a_row_for_each_candidate_with_its_numbers_and_marks_the_s
     session = session_on(wall_at(0.5), goal=(1.5, 0.0, 0.0))
     rows = list_candidates(session.shown.candidates, session.shown.answer.nearest, [False] * 5)
     text = draw_candidates(rows, 1)
-    assert [int(n) for n in re.findall(r'<tr data-path="(\d)"', text)] == [1, 2, 3, 4, 5]
+    assert [int(n) for n in re.findall(r'<tbody data-say="show (\d)"', text)] == [1, 2, 3, 4, 5]
     for row in rows:
         assert f"{row.driven:.2f} / {row.length:.2f}" in text and f"{row.energy:.1f}" in text
     assert text.count("background:rgba") == 1
     marked = text[text.index("background:rgba") - 40 : text.index("background:rgba")]
-    assert 'tbody data-path="2"' in marked and text.count('aria-selected="true"') == 1
+    assert 'tbody data-say="show 2"' in marked and text.count('aria-selected="true"') == 1
 
 
 def test_changes_are_listed_with_their_differences_and_what_stays_the_same_takes_no_place():
@@ -163,7 +163,7 @@ def ground_colours() -> set[tuple[int, int, int]]:
     Also those of the layers of a survey, whose numbers have the same scale.
     """
     scale = {tuple(c) for c in map_colours(np.linspace(0.0, 1.0, 65), 0.0, 1.0).tolist()}
-    names = ("GOOD", "BEYOND", "UNKNOWN", "PASSABLE", "REFUSED", "SEARCHED")
+    names = ("GOOD", "BEYOND", "UNKNOWN", "PASSABLE", "REFUSED")
     scale |= {getattr(colours, name) for name in names}
     scale |= {*list_class_colours(), *list_limit_colours()}
     shades = np.linspace(0.3 * LINE_SHADE * HATCH_SHADE, 1.25, 12)

@@ -7,8 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from rover_planner.viewer.browser.export import write_page
-from rover_planner.viewer.browser.report import describe_judgement
+from rover_planner.viewer.browser.report import describe_judgement, write_page
 from rover_planner.viewer.state.context import describe_scenario
 from support.grounds import gap
 from support.viewer.sessions import session_on
@@ -42,7 +41,7 @@ def test_the_name_of_a_rover_is_text_in_the_title_of_a_file_and_in_its_heading()
     server = viser.ViserServer("127.0.0.1", 0, verbose=False)
     camera = SimpleNamespace(position=(0.0, 0.0, 1.0), look_at=(0.0, 0.0, 0.0))
     try:
-        page = write_page(server, camera, "", r"<script>\1 & co", "").decode()
+        page = write_page(server, camera, "", r"<script>\1 & co").decode()
     finally:
         server.stop()
     safe = r"&lt;script&gt;\1 &amp; co"
