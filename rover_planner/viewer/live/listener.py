@@ -62,9 +62,9 @@ class LiveVerdict:
     """The last verdict of the server."""
 
     traversable: bool
-    """Whether there is a path that the rover can drive."""
+    """True if there is a path that the rover can drive."""
     reason: str
-    """Why not, empty where there is one."""
+    """Reason of a refusal, empty where there is one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,13 +73,13 @@ class LiveData:
 
     values: LiveValues
     """Of the rover."""
-    terrain: Terrain | None
+    terrain: Terrain | None = None
     """The map."""
-    plan: np.ndarray | None
+    plan: np.ndarray | None = None
     """(n, 3) poses of the plan, x, y [m], yaw [rad]."""
-    verdict: LiveVerdict | None
+    verdict: LiveVerdict | None = None
     """The verdict of the server."""
-    ages: tuple[TopicAge, ...]
+    ages: tuple[TopicAge, ...] = ()
     """The ages of all topics."""
 
     @property
@@ -99,14 +99,12 @@ class LiveListener(Node):
         """Subscribe to the topics of a rover, a traverse_server and a traction_controller."""
         super().__init__("rover_view", **node_arguments)
         self._frame = map_frame
-        self._values = LiveValues()
+        self._data = LiveData(LiveValues())
+        """Without the ages, and with the values that the rover itself tells."""
         self._forces: Mapping[str, Any] = {}
         """Forces by their field, as the server has predicted them at the rover's place."""
         self._predicted: Mapping[str, np.ndarray] = {}
         self._estimated: Mapping[str, np.ndarray] = {}
-        self._terrain: Terrain | None = None
-        self._plan: np.ndarray | None = None
-        self._verdict: LiveVerdict | None = None
         self._ages: dict[str, TopicAge] = {}
         self._first_time: float | None = None
         self._planner = self.create_client(
@@ -157,9 +155,9 @@ class LiveListener(Node):
 
     def latest(self) -> LiveData:
         """Return the latest data."""
-        values = self._values
-        if self._plan is not None and values.position is not None:
-            self._forces = _read_nearest(self._predicted, self._plan, values.position)
+        data = self._data
+        if data.plan is not None and data.values.position is not None:
+            self._forces = _read_nearest(self._predicted, data.plan, data.values.position)
         estimated = {
             field: self._estimated[field]
             for topic, field in ESTIMATED_FIELDS.items()
@@ -169,8 +167,8 @@ class LiveListener(Node):
         source = "forces predicted by the server" if self._forces else ""
         source = "forces estimated by the traction controller" if is_estimated else source
         forces: dict[str, Any] = {**self._forces, **estimated, "forces_from": source}
-        values, ages = replace(values, **forces), tuple(self._ages.values())
-        return LiveData(values, self._terrain, self._plan, self._verdict, ages)
+        values, ages = replace(data.values, **forces), tuple(self._ages.values())
+        return replace(data, values=values, ages=ages)
 
     def request_plan(self, goal: np.ndarray) -> str:
         """Ask the server for a plan from the rover's pose to a goal (2,) [m].
@@ -178,7 +176,7 @@ class LiveListener(Node):
         Returns:
             Why that is not possible, empty if it is; plan and verdict come on their topics.
         """
-        values = self._values
+        values = self._data.values
         if values.position is None:
             return "no odometry yet, so the start is not known"
         if not self._planner.service_is_ready():
@@ -192,18 +190,19 @@ class LiveListener(Node):
         return ""
 
     def _on_joint_states(self, state: JointState) -> None:
-        known = self._values
+        known = self._data.values
         joints, efforts = (
             {**was, **_name_finite(state.name, values)}
             for was, values in ((known.joints, state.position), (known.efforts, state.effort))
         )
-        self._values = replace(known, joints=joints, efforts=efforts)
+        self._note(joints=joints, efforts=efforts)
         if len(state.velocity) == len(state.name):
             self._add_work(dict(zip(state.name, state.velocity, strict=True)), state)
 
     def _add_work(self, rates: dict[str, float], state: JointState) -> None:
         """Add the work of the wheel motors since the last message, rates [rad/s] by joint name."""
-        now, known = state.header.stamp.sec + 1e-9 * state.header.stamp.nanosec, self._values
+        known = self._data.values
+        now = state.header.stamp.sec + 1e-9 * state.header.stamp.nanosec
         self._first_time = now if self._first_time is None else self._first_time
         passed = now - self._first_time - known.time
         if passed > 0.0:
@@ -211,8 +210,11 @@ class LiveListener(Node):
                 max(known.efforts.get(name, 0.0) * rates.get(name, 0.0), 0.0)
                 for name in WHEEL_JOINTS
             )
-            energy, seconds = known.energy + power * passed, known.time + passed
-            self._values = replace(known, energy=energy, time=seconds)
+            self._note(energy=known.energy + power * passed, time=known.time + passed)
+
+    def _note(self, **values: Any) -> None:
+        """Take values of the rover."""
+        self._data = replace(self._data, values=replace(self._data.values, **values))
 
     def _on_odometry(self, odometry: Odometry) -> None:
         point, q = odometry.pose.pose.position, odometry.pose.pose.orientation
@@ -221,14 +223,13 @@ class LiveListener(Node):
         except MessageError:
             return
         roll, pitch, _ = rpy_from_xyzw((q.x, q.y, q.z, q.w))
-        position, known = np.array([point.x, point.y, point.z]), self._values
+        position, known = np.array([point.x, point.y, point.z]), self._data.values
         if not np.isfinite(position).all():
             return
         moved = 0.0
         if known.position is not None:
             moved = float(np.hypot(*(position - known.position)[:2]))
-        self._values = replace(
-            known,
+        self._note(
             position=position,
             attitude=np.array([roll, pitch, yaw]),
             speed=float(odometry.twist.twist.linear.x),
@@ -237,17 +238,19 @@ class LiveListener(Node):
 
     def _on_cloud(self, cloud: PointCloud2) -> None:
         with self._skipping("elevation_cloud"):
-            self._terrain = terrain_from_point_cloud(cloud)
+            self._data = replace(self._data, terrain=terrain_from_point_cloud(cloud))
 
     def _on_plan(self, plan: Path) -> None:
         with self._skipping("plan"):
-            self._plan = path_to_poses(plan, self._frame) if plan.poses else None
+            poses = path_to_poses(plan, self._frame) if plan.poses else None
+            self._data = replace(self._data, plan=poses)
 
     def _on_verdict(self, verdict: DiagnosticArray) -> None:
         if verdict.status:
             status = verdict.status[0]
             passable = status.level != DiagnosticStatus.ERROR
-            self._verdict = LiveVerdict(passable, "" if passable else status.message)
+            verdict = LiveVerdict(passable, "" if passable else status.message)
+            self._data = replace(self._data, verdict=verdict)
 
     def _on_prediction(self, field: str, message: Float64MultiArray) -> None:
         with self._skipping(field):

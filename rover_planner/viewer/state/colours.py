@@ -37,7 +37,7 @@ MIN_CONTRAST = 3.0
 
 @dataclass(frozen=True)
 class ColourScale:
-    """What the colours of a layer mean."""
+    """The meaning of the colours of a layer."""
 
     low: float
     """Value of the first colour."""

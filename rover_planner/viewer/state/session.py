@@ -29,7 +29,7 @@ REFUSALS = (RoverError, PlanningError)
 
 
 class ViewSession:
-    """What is wanted and what is finished; both are frozen values that are replaced as a whole.
+    """The scenario that is wanted and what is shown: frozen values that are replaced as a whole.
 
     It judges at once, or in the background after `judge_in_background`. All changes belong to one
     thread, the owner's. A refused change alters nothing but `refusal`.
@@ -61,19 +61,19 @@ class ViewSession:
         self.wanted = Scenario(
             rover, rover, terrain, start, goal, options, {}, search=search or LatticeSettings()
         )
-        """What visitors want judged."""
+        """The scenario that visitors want judged."""
         self.ground_name = name_ground(terrain)
-        """What the page calls the ground; by default its size."""
+        """Name of the ground on the page; by default its size."""
         self.refusal = ""
-        """Why the last change was refused, empty if it was not."""
+        """Reason why the last change was refused, empty if it was not."""
         self.is_stopped = False
-        """Whether the judgement of `wanted` was cancelled or failed."""
+        """True if the judgement of `wanted` was cancelled or failed."""
         self._background: BackgroundWork[JudgeRequest, Shown] | None = None
         self._judge = partial(judge_request, memory=EdgeMemory())
         self._asked = JudgeRequest(self.wanted, searches=False)
         """The newest request."""
         *_, self.shown = _results(self._judge(self._asked))
-        """What was judged last."""
+        """The last finding."""
         self._index = self.shown.index
         """Index of the candidate that is wanted."""
 
@@ -96,12 +96,12 @@ class ViewSession:
 
     @property
     def is_outdated(self) -> bool:
-        """Whether the shown verdict is of other values than those that are wanted."""
+        """True if the shown verdict is of other values than those that are wanted."""
         return self.shown.scenario is not self.wanted
 
     @property
     def has_old_candidates(self) -> bool:
-        """Whether the other candidates were judged for other values."""
+        """True if the other candidates were judged for other values."""
         return self.shown.answered is not self.wanted
 
     # What is wanted. All return whether the change was accepted; if not, `refusal` says why. In
@@ -241,12 +241,12 @@ class ViewSession:
 
     @property
     def progress(self) -> Progress | None:
-        """How far the judgement in the background is; None if nothing is judged."""
+        """Progress of the judgement in the background; None if nothing is judged."""
         return self._background.progress if self._background is not None else None
 
     @property
     def has_news(self) -> bool:
-        """Whether there is something for `take_finished`."""
+        """True if there is something for `take_finished`."""
         return self._background is not None and self._background.has_news
 
     def take_finished(self) -> bool:

@@ -99,7 +99,7 @@ class Trajectory:
 
     @property
     def has_slip(self) -> bool:
-        """Whether slip is predicted: on yielding soil, or with speed servos."""
+        """True if slip is predicted: on yielding soil, or with speed servos."""
         prediction = self.prediction
         return prediction.policy == SERVO or bool(np.any(prediction.sinkage > 0.0))
 

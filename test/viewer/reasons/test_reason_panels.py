@@ -90,11 +90,14 @@ def test_the_mark_of_a_failure_leaves_the_curves_as_they_are():
 
 def test_the_table_has_a_row_for_each_candidate_with_its_numbers_and_marks_the_shown_one():
     session = session_on(wall_at(0.5), goal=(1.5, 0.0, 0.0))
-    rows = list_candidates(session.shown.candidates, session.shown.answer.nearest, [False] * 5)
+    rows = list_candidates(session.shown, False)
     text = draw_candidates(rows, 1)
     assert [int(n) for n in re.findall(r'<tbody data-say="show (\d)"', text)] == [1, 2, 3, 4, 5]
     for row in rows:
-        assert f"{row.driven:.2f} / {row.length:.2f}" in text and f"{row.energy:.1f}" in text
+        assert (
+            f"{row.driven:.2f} / {row.candidate.length:.2f}" in text
+            and f"{row.energy:.1f}" in text
+        )
     assert text.count("background:rgba") == 1
     marked = text[text.index("background:rgba") - 40 : text.index("background:rgba")]
     assert 'tbody data-say="show 2"' in marked and text.count('aria-selected="true"') == 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a change of the rover has changed: the drive before and after it, in curves and numbers."""
+"""The rovers and drives before and after changes: history, undo, and differences in numbers."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ class Difference:
     """A number of the drive before and after a change; NaN where there is none."""
 
     name: str
-    """What it is."""
+    """Its name."""
     unit: str
     """Its unit, empty for none."""
     before: float
@@ -33,7 +33,7 @@ class Difference:
 
     @property
     def change(self) -> float:
-        """What was added."""
+        """The difference."""
         return self.after - self.before
 
 
