@@ -39,8 +39,6 @@ class JudgeRequest:
     """The last finding, of which a candidate is judged again; None: all candidates are judged."""
     index: int = 0
     """Index of that candidate."""
-    searches: bool = True
-    """True if a way around obstacles is searched if all candidates are refused."""
 
 
 Step = Progress | Shown
@@ -67,7 +65,7 @@ def judge_request(request: JudgeRequest, memory: EdgeMemory | None = None) -> It
     if judged.scenario.recorded is not None:
         return
     judged = yield from _add_policies(judged)
-    if request.searches and judged.needs_way:
+    if judged.needs_way:
         yield from _search_ways(judged, memory or EdgeMemory())
 
 

@@ -4,12 +4,14 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from rover_physics.errors import RoverError
 from rover_physics.files.validation import Key
+from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
@@ -70,9 +72,9 @@ class ViewSession:
         """True if the judgement of `wanted` was cancelled or failed."""
         self._background: BackgroundWork[JudgeRequest, Shown] | None = None
         self._judge = partial(judge_request, memory=EdgeMemory())
-        self._asked = JudgeRequest(self.wanted, searches=False)
+        self._asked = JudgeRequest(self.wanted)
         """The newest request."""
-        *_, self.shown = _results(self._judge(self._asked))
+        *_, self.shown = islice(_results(self._judge(self._asked)), 2)  # and not what it searches
         """The last finding."""
         self._index = self.shown.index
         """Index of the candidate that is wanted."""
@@ -120,12 +122,12 @@ class ViewSession:
             raise PlanningError("the listed paths are old; judge again first")
         return self._ask(self.wanted, index)
 
-    def plan_to(self, goal: Sequence[float]) -> bool:
+    def plan_to(self, goal: Floats) -> bool:
         """Plan to a goal (2,) [m] with the yaw of the straight line there."""
         start = self.wanted.start
         return self._want(start=start, goal=_facing(start, goal), recorded=None)
 
-    def plan_from(self, start: Sequence[float]) -> bool:
+    def plan_from(self, start: Floats) -> bool:
         """Plan from a start (2,) [m] with the yaw of the straight line to the goal."""
         x, y, yaw = _facing(start, self.wanted.goal)
         pose = (float(start[0]), float(start[1]), yaw)
@@ -310,7 +312,7 @@ def _results(steps: Iterator[Progress | Shown]) -> Iterator[Shown]:
     return (step for step in steps if isinstance(step, Shown))
 
 
-def _facing(start: Sequence[float], goal: Sequence[float]) -> Pose:
+def _facing(start: Pose | Floats, goal: Pose | Floats) -> Pose:
     """Return the pose at a goal x, y [m] with the yaw of the straight line from start to goal."""
     yaw = np.arctan2(goal[1] - start[1], goal[0] - start[0])
     return float(goal[0]), float(goal[1]), float(yaw)
