@@ -103,7 +103,7 @@ def _close_notice(visitor: Visitor) -> None:
 def _show_failure(page: Page, visitor: Visitor) -> str:
     """Show the first candidate that a wheel refuses, at its failure; return what fails."""
     session = page.session
-    for index, candidate in enumerate(session.candidates):
+    for index, candidate in enumerate(session.shown.candidates):
         if candidate.verdict.traversable:
             continue
         page.requests.add(lambda index=index: page.show_path(index + 1))

@@ -14,6 +14,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.ways.way_search import LatticeSettings
+from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.scenario import Scenario
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, waves
@@ -87,7 +88,7 @@ def wait_for_rest(page: Any) -> None:
     session = page.session
 
     def at_rest() -> bool:
-        done = session.finished.answered is session.finished.scenario is session.wanted
+        done = session.shown.answered is session.shown.scenario is session.wanted
         return done and not page.is_busy and page._changed_at is None
 
     wait_until(lambda: at_rest() or session.refusal, "all judgements", PATIENCE)
@@ -142,13 +143,12 @@ def held(background: Any, at: str = "") -> Iterator[None]:
     """
     work, go_on = background._work, threading.Event()
 
-    def work_and_wait(request, report):
-        def tell(what: str, step: int, steps: int) -> None:
-            report(what, step, steps)
-            while at in ("", what) and not go_on.wait(0.01):
-                report(what, step, steps)  # which ends work that was stopped
-
-        return work(request, tell)
+    def work_and_wait(request):
+        for found in work(request):
+            yield found
+            is_held = isinstance(found, Progress) and at in ("", found.what)
+            while is_held and not go_on.wait(0.01):
+                yield found  # which ends work that was stopped
 
     background._work = work_and_wait
     try:

@@ -61,7 +61,7 @@ def test_the_page_opens_predictions_on_their_maps(tmp_path, capsys):
     np.testing.assert_allclose(ground.elevation, waves().elevation, atol=1e-6)
     session = ViewSession(LSR1, ground, (0.5, 0.0, 0.0), (1.5, 0.0, 0.0))
     session.replay(prediction, reasons)
-    assert session.answer.candidates[0].verdict.traversable
+    assert session.shown.answer.candidates[0].verdict.traversable
 
 
 def test_predictions_are_recorded_as_a_server_publishes_them(tmp_path, capsys):

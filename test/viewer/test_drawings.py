@@ -30,7 +30,7 @@ from rover_planner.viewer.scene.ribbons import Ribbon, Strand
 from rover_planner.viewer.scene.rover_visual import RoverVisual
 from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN
 from rover_planner.viewer.state.judging import POLICY
-from rover_planner.viewer.state.reasons.explanation import explain
+from rover_planner.viewer.state.reasons.failure import explain
 from rover_planner.viewer.state.session import ViewSession
 
 MAX_PAUSE = 1.0
@@ -55,7 +55,7 @@ def at_rest(page):
         asked.append(session.wanted)
 
     def is_shown() -> bool:
-        return asked and session.finished.answered is asked[0] and not page.is_busy
+        return asked and session.shown.answered is asked[0] and not page.is_busy
 
     page.requests.add(ask)
     wait_until(is_shown, "the rover as it was loaded", PATIENCE)
@@ -195,7 +195,7 @@ def test_the_ghost_of_a_failure_stays_for_the_next_one_and_hides_without(page):
     ghosts = []
     for friction in (0.4, 0.35):
         session.change_rover([("friction",)], friction)
-        failure = explain(session.finished).failure
+        failure = explain(session.shown).failure
         mark.show(session.rover, failure)
         ghosts.append(mark._ghost)
         np.testing.assert_allclose(

@@ -41,7 +41,7 @@ def visitor(page, browser):
 
 def show_refused(page: Page) -> None:
     """Show the first path that is refused, judged under all policies."""
-    verdicts = [candidate.verdict for candidate in page.session.candidates]
+    verdicts = [candidate.verdict for candidate in page.session.shown.candidates]
     index = next(k for k, verdict in enumerate(verdicts) if not verdict.traversable)
     ask(page, lambda: page.show_path(index + 1))
     wait_for_rest(page)
@@ -68,7 +68,7 @@ def test_the_page_opens_with_verdict_loads_and_header_on_the_screen_of_a_laptop(
 
 
 def test_buttons_keys_typed_times_and_clicks_on_lanes_and_plots_move_the_drive(visitor, page):
-    ask(page, lambda: page.show_path(page.session.answer.nearest + 1))
+    ask(page, lambda: page.show_path(page.session.shown.answer.nearest + 1))
     wait_for_rest(page)
     trajectory, keyboard = page.session.shown.trajectory, visitor.tab.keyboard
 
@@ -152,15 +152,15 @@ def test_a_typed_or_dragged_number_is_judged_and_an_impossible_one_is_refused(vi
 def test_a_click_sets_the_goal_one_into_the_sky_is_refused_and_one_on_a_number_shows_its_path(
     visitor, page
 ):
-    session, goal = page.session, page.session.goal
+    session, goal = page.session, page.session.scenario.goal
     visitor.open_tab("Ground and path")
     visitor.tab.mouse.click(*SKY)
     visitor.wait_for("refused: the click is beside the known ground")
     visitor.tab.mouse.click(*MIDDLE)
-    wait_until(lambda: session.goal != goal, "another goal")
-    assert max(map(abs, session.goal[:2])) < 4.0
+    wait_until(lambda: session.scenario.goal != goal, "another goal")
+    assert max(map(abs, session.scenario.goal[:2])) < 4.0
     wait_for_rest(page)
-    other = (session.shown.index + 1) % len(session.candidates)
+    other = (session.shown.index + 1) % len(session.shown.candidates)
     camera = max(page.server.get_clients().items())[1].camera
     camera.look_at = page.scene.paths._numbers[other]  # the number is in the middle
     camera.position = camera.look_at + np.array([-2.0, 0.0, 2.0])
@@ -172,9 +172,9 @@ def test_a_click_sets_the_goal_one_into_the_sky_is_refused_and_one_on_a_number_s
         visitor.tab.wait_for_timeout(500)  # the browser moves its camera picture by picture
         return session.shown.index == other
 
-    goal = session.goal
+    goal = session.scenario.goal
     wait_until(is_shown, "the path of the number")
-    assert session.goal == goal
+    assert session.scenario.goal == goal
 
 
 def test_a_layer_colours_the_ground_and_a_soil_lets_wheels_sink(visitor, page):
@@ -184,7 +184,7 @@ def test_a_layer_colours_the_ground_and_a_soil_lets_wheels_sink(visitor, page):
     visitor.choose("Soil", "dry_sand")
     wait_until(lambda: page.session.shown.verdict.max_sinkage > 0.0, "wheels that sink")
     visitor.choose("Soil", "none (Coulomb)")
-    wait_until(lambda: page.session.options.model.soil is None, "hard ground")
+    wait_until(lambda: page.session.scenario.options.model.soil is None, "hard ground")
     wait_for_rest(page)
 
 

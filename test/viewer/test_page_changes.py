@@ -99,7 +99,7 @@ def test_while_a_change_is_judged_the_old_verdict_is_grey_and_it_can_be_cancelle
         wait_until(lambda: notice._cancel.visible, "the notice", PATIENCE)
         assert "judging path" in notice._text.content and "old values</b>: judging" in verdict()
         assert "(old values)" in page.header._box.content and session.shown is shown
-        grey = set(range(len(session.candidates)))
+        grey = set(range(len(session.shown.candidates)))
         wait_until(lambda: page.scene.paths._old == grey, "grey paths", PATIENCE)
         ask(page, page._cancel)
         wait_until(lambda: session.is_stopped, "the end of the work", PATIENCE)
@@ -160,8 +160,8 @@ def test_on_a_far_map_the_rover_is_where_it_is_on_a_near_one_and_a_click_lands_w
             away = np.array([-1.0, 0.0, 2.0])
             ray = SimpleNamespace(ray_origin=place + away, ray_direction=-away / np.sqrt(5.0))
             page._request_click(ray, shift=False)
-            wait_until(lambda: page.session.goal[0] != x + 1.0, "a goal", PATIENCE)  # noqa: B023
-            np.testing.assert_allclose(page.session.goal[:2], aim, atol=0.05)
+            wait_until(lambda: page.session.scenario.goal[0] != x + 1.0, "a goal", PATIENCE)  # noqa: B023
+            np.testing.assert_allclose(page.session.scenario.goal[:2], aim, atol=0.05)
         finally:
             page.close()
     np.testing.assert_allclose(places[FAR[0]], places[0.0], atol=1e-6)

@@ -61,7 +61,7 @@ def test_a_shown_path_that_a_change_of_the_rover_makes_impassable_is_drawn(serve
     assert session.change_rover([("friction",)], 0.4)
     assert not session.shown.verdict.traversable
     overlay = PathOverlay(server.scene, Labels(server.scene), LocalFrame())
-    overlay.show(session.rover, session.terrain, session.candidates, session.shown.index)
+    overlay.show(session.rover, session.terrain, session.shown.candidates, session.shown.index)
     driven, beyond, *cross = overlay.ribbons[session.shown.index].strands
     assert driven.colour == REFUSED and driven.width > beyond.width
     np.testing.assert_array_equal(driven.line[-1], beyond.line[0])
@@ -73,12 +73,12 @@ def test_a_path_that_is_judged_again_replaces_its_own_candidate(index):
     session = session_on(ramp)
     session.show_candidate(index)
     session.change_rover([("friction",)], 0.4)
-    assert len(session.candidates) == len(session.answer.candidates)
-    assert session.candidates[index] is session.shown.candidate
+    assert len(session.shown.candidates) == len(session.shown.answer.candidates)
+    assert session.shown.candidates[index] is session.shown.candidate
     np.testing.assert_array_equal(
-        session.candidates[index].poses, session.answer.candidates[index].poses
+        session.shown.candidates[index].poses, session.shown.answer.candidates[index].poses
     )
-    traversable = [candidate.verdict.traversable for candidate in session.candidates]
+    traversable = [candidate.verdict.traversable for candidate in session.shown.candidates]
     assert traversable == [k != index for k in range(len(traversable))]
 
 

@@ -12,6 +12,7 @@ import pytest
 from rover_physics.names import TORQUE_POLICIES
 from rover_physics.traversability.judge import judge_path
 from rover_planner.planning.ways.way_search import FOUND, NO_WAY, OUT_OF_TIME
+from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.judging import (
     BETTER,
     PATH,
@@ -20,6 +21,7 @@ from rover_planner.viewer.state.judging import (
     JudgeRequest,
     judge_request,
 )
+from rover_planner.viewer.state.scenario import Shown
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import wall_with_gap, whole_wall
 from support.viewer.sessions import LSR1, held, walled_session
@@ -49,24 +51,24 @@ def closed() -> ViewSession:
 
 
 def steps_of(session: ViewSession) -> list:
-    """Return what is reported and how many candidates each result has."""
-    steps: list = []
-    request = JudgeRequest(session.wanted)
-    for judged in judge_request(request, lambda what, *_: steps.append(what)):
-        steps.append(len(judged.answer.candidates))
-    return steps
+    """Return what is begun and how many candidates each result has."""
+    return [
+        step.what if isinstance(step, Progress) else len(step.answer.candidates)
+        for step in judge_request(JudgeRequest(session.wanted))
+    ]
 
 
 def test_beyond_a_wall_with_a_gap_a_way_follows_the_refused_candidates_and_is_shown(found):
-    *direct, way = found.candidates
+    *direct, way = found.shown.candidates
     assert len(direct) == 5 and not any(one.verdict.traversable for one in direct)
-    assert found.finished.way.outcome == FOUND
-    assert found.shown.index == found.answer.best == found.answer.nearest == 5
+    assert found.shown.way.outcome == FOUND
+    assert found.shown.index == found.shown.answer.best == found.shown.answer.nearest == 5
     assert found.shown.candidate is way
     poses = way.poses
-    np.testing.assert_allclose(poses[[0, -1], :2], [found.start[:2], BEYOND], atol=1e-9)
+    np.testing.assert_allclose(poses[[0, -1], :2], [found.scenario.start[:2], BEYOND], atol=1e-9)
     assert np.all(poses[np.abs(poses[:, 0]) < 0.2, 1] > 1.0)
-    assert judge_path(LSR1, found.terrain, poses, found.sweep_options())[1].traversable
+    model = found.scenario.asked_options.model
+    assert judge_path(LSR1, found.terrain, poses, model)[1].traversable
     shown = found.shown
     assert [one.policy for one in shown.by_policy] == list(TORQUE_POLICIES)
     assert not any(one.is_old for one in shown.by_policy)
@@ -74,13 +76,16 @@ def test_beyond_a_wall_with_a_gap_a_way_follows_the_refused_candidates_and_is_sh
 
 
 def test_where_there_is_no_way_the_closed_area_and_the_reason_are_kept(closed):
-    way = closed.finished.way
-    assert way.outcome == NO_WAY and len(closed.candidates) == 5
+    way = closed.shown.way
+    assert way.outcome == NO_WAY and len(closed.shown.candidates) == 5
     assert not closed.shown.verdict.traversable
-    reason = closed.finished.reason
+    reason = closed.shown.reason
     assert reason.startswith("no way within the map: ") and "closed in by: " in reason
     assert reason.endswith(closed.shown.verdict.reason)
-    ends = [value_at(way, way.closed.places, pose) for pose in (closed.start, closed.goal)]
+    ends = [
+        value_at(way, way.closed.places, pose)
+        for pose in (closed.scenario.start, closed.scenario.goal)
+    ]
     assert ends == [not way.closed.around_goal, way.closed.around_goal]
     assert 0 < way.asked.sum() < way.asked.size
     assert value_at(way, way.asked, (0.0, 0.0))  # the wall between the ends
@@ -100,8 +105,8 @@ def test_the_search_is_reported_after_paths_and_policies(closed, found):
 
 
 def test_the_first_way_is_shown_at_once_and_replaced_only_by_a_better_one(found):
-    judged = list(judge_request(JudgeRequest(found.wanted), lambda *_: None))
-    ways = [one.way for one in judged if one.way is not None]
+    judged = list(judge_request(JudgeRequest(found.wanted)))
+    ways = [one.way for one in judged if isinstance(one, Shown) and one.way is not None]
     costs = [one.cost for one in ways]
     assert all(one.outcome == FOUND and one.path.verdict.traversable for one in ways)
     assert costs == sorted(costs, reverse=True)
@@ -113,25 +118,25 @@ def test_nothing_is_searched_where_a_candidate_passes_off_the_map_or_for_a_recor
     session = walled_session(wall_with_gap)
     for goal, passes in (((-1.1, 0.1), True), ((9.0, 0.0), False)):
         assert session.plan_to(np.array(goal))
-        assert session.finished.way is None and session.answer.traversable == passes
+        assert session.shown.way is None and session.shown.answer.traversable == passes
         assert WAY not in steps_of(session)
     assert session.plan_to(np.array([-1.1, 0.1]))
     session.replay(session.shown.candidate.prediction, session.shown.verdict.reasons)
     assert session.change_rover(FRICTION, 0.05) and session.plan_again()
-    assert not session.shown.verdict.traversable and session.finished.way is None
+    assert not session.shown.verdict.traversable and session.shown.way is None
 
 
 def test_a_goal_where_the_rover_cannot_stand_is_named_as_the_reason():
     session = walled_session(whole_wall)
     assert session.plan_to(np.array([0.25, 0.0]))
-    assert session.finished.reason.startswith("the rover cannot stand at the goal: ")
-    assert session.finished.way.closed is None and not session.finished.way.asked.any()
+    assert session.shown.reason.startswith("the rover cannot stand at the goal: ")
+    assert session.shown.way.closed is None and not session.shown.way.asked.any()
 
 
 def test_a_search_that_runs_out_of_time_says_that_there_may_be_a_way(closed):
     short = dataclasses.replace(closed.wanted.search, budget=0.01)
     hurried = dataclasses.replace(closed.wanted, search=short)
-    *_, judged = judge_request(JudgeRequest(hurried), lambda *_: None)
+    *_, judged = judge_request(JudgeRequest(hurried))
     assert judged.way.outcome == OUT_OF_TIME and judged.way.closed is None
     assert "there may be one" in judged.reason
 
@@ -139,12 +144,12 @@ def test_a_search_that_runs_out_of_time_says_that_there_may_be_a_way(closed):
 def test_a_slider_judges_the_shown_way_again_and_then_searches_another():
     session = walled_session(wall_with_gap)
     session.plan_to(BEYOND)
-    poses, way = session.shown.candidate.poses, session.finished.way
+    poses, way = session.shown.candidate.poses, session.shown.way
     assert session.change_rover(FRICTION, 0.7)
-    assert session.shown.index == 5 and session.finished.way is way
+    assert session.shown.index == 5 and session.shown.way is way
     np.testing.assert_array_equal(session.shown.candidate.poses, poses)
     assert session.plan_again()
-    assert session.shown.index == 5 and session.finished.way is not way
+    assert session.shown.index == 5 and session.shown.way is not way
     assert session.shown.verdict.traversable
 
 
@@ -178,13 +183,13 @@ def searching(session: ViewSession) -> Iterator[None]:
 
 def test_while_a_way_is_searched_the_verdict_on_the_candidates_is_there(session):
     with searching(session):
-        assert not session.is_outdated and len(session.candidates) == 5
+        assert not session.is_outdated and len(session.shown.candidates) == 5
         assert not session.shown.verdict.traversable
         other = 1 if session.shown.index != 1 else 2
         assert session.show_candidate(other)  # it stays, and the way is listed
     finish(session)
-    assert session.shown.index == other and len(session.candidates) == 6
-    assert session.answer.nearest == 5 and session.candidates[5].verdict.traversable
+    assert session.shown.index == other and len(session.shown.candidates) == 6
+    assert session.shown.answer.nearest == 5 and session.shown.candidates[5].verdict.traversable
     assert session.show_candidate(5)
     finish(session)
     assert session.shown.verdict.traversable
@@ -195,10 +200,10 @@ def test_a_cancelled_search_leaves_the_verdict_on_the_candidates_and_can_be_begu
         shown = session.shown
         session.cancel()
         session.take_finished()
-        assert session.is_stopped and session.shown is shown and session.finished.way is None
+        assert session.is_stopped and session.shown is shown and session.shown.way is None
     assert session.plan_again()
     finish(session)
-    assert session.finished.way.outcome == FOUND
+    assert session.shown.way.outcome == FOUND
 
 
 def test_the_way_of_a_rover_that_slips_is_no_candidate_once_it_can_climb_the_wall():
@@ -217,17 +222,17 @@ def test_the_way_of_a_rover_that_slips_is_no_candidate_once_it_can_climb_the_wal
         session.change_rover(FRICTION, 1.3)
         finish(session)
         assert not session.is_outdated and session.rover.friction == 1.3
-        assert session.candidates[session.shown.index].verdict.traversable
+        assert session.shown.candidates[session.shown.index].verdict.traversable
         session.plan_again()
         finish(session)
-        assert len(session.candidates) == 5 and session.answer.traversable
+        assert len(session.shown.candidates) == 5 and session.shown.answer.traversable
     finally:
         assert session.close()
 
 
 def test_a_session_that_begins_before_a_wall_searches_as_soon_as_it_has_a_thread():
     session = walled_session(wall_with_gap, GOAL)
-    assert session.finished.needs_way and len(session.candidates) == 5
+    assert session.shown.needs_way and len(session.shown.candidates) == 5
     session.judge_in_background(lambda: None)
     try:
         finish(session)

@@ -18,7 +18,7 @@ from rover_physics.results.uses import find_uses, limits_of
 from rover_physics.rover.model import Rover
 from rover_planner.studies.rover_values import write_rover
 from rover_planner.viewer.state.context import Context
-from rover_planner.viewer.state.scenario import Judgement
+from rover_planner.viewer.state.scenario import Shown
 
 PACKAGES = ("numpy", "scipy", "numba", "viser")
 WHEEL_ROWS = {
@@ -67,7 +67,7 @@ def write_page(server: Any, camera: Any, report: str, title: str) -> bytes:
     return (page[:at] + inserted + page[at:]).encode()
 
 
-def describe_judgement(judgement: Judgement, context: Context, query: str) -> str:
+def describe_judgement(judgement: Shown, context: Context, query: str) -> str:
     """Return the verdict on the shown path with its numbers as HTML.
 
     Args:
@@ -75,7 +75,7 @@ def describe_judgement(judgement: Judgement, context: Context, query: str) -> st
         context: What it is about.
         query: The link to it, as `write_link` returns it; empty if it would be too long.
     """
-    scenario, shown = judgement.scenario, judgement.shown
+    scenario, shown = judgement.scenario, judgement
     verdict, prediction = shown.verdict, shown.candidate.prediction
     facts = {
         "rover": context.rover,

@@ -227,7 +227,9 @@ class PageBase(ABC):
 
     def _aim_camera(self, client: Any) -> None:
         session = self.session
-        self.scene.aim_camera(client, session.rover, session.terrain, session.start, session.goal)
+        self.scene.aim_camera(
+            client, session.rover, session.terrain, session.scenario.start, session.scenario.goal
+        )
 
     def _request_view(self, event: Any) -> None:
         client, name = event.client, event.target.value

@@ -15,7 +15,7 @@ from rover_planner.viewer.scene.ground_mesh import (
     export_ground,
 )
 from rover_planner.viewer.scene.scene import Scene
-from rover_planner.viewer.state.background_work import BackgroundWork, Report
+from rover_planner.viewer.state.background_work import BackgroundWork, Progress
 from rover_planner.viewer.state.colours import ColourScale
 from rover_planner.viewer.state.scenario import Scenario
 from rover_planner.viewer.state.survey_layers import ColouredGround, ShownSurvey
@@ -100,8 +100,8 @@ class GroundPainter:
             self._tab.show_legend(draw_survey_legend(name, told, scale, differences))
 
 
-def _paint(request: PaintRequest, report: Report) -> Iterator[PaintedGround]:
-    report("colouring the ground", 1, 1)
+def _paint(request: PaintRequest) -> Iterator[Progress | PaintedGround]:
+    yield Progress("colouring the ground", 1, 1)
     asked, name = request.scenario, request.layer
     if request.survey is not None:
         mesh, meaning = build_survey_mesh(asked.terrain, request.survey, name)

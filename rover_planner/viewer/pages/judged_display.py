@@ -33,10 +33,8 @@ from rover_planner.viewer.state.reasons.before_after import (
     list_changes,
 )
 from rover_planner.viewer.state.reasons.candidate_rows import list_candidates
-from rover_planner.viewer.state.reasons.explanation import Explanation, explain
-from rover_planner.viewer.state.reasons.failure import Failure
-from rover_planner.viewer.state.reasons.path_limits import along_rows
-from rover_planner.viewer.state.reasons.worst import find_worst
+from rover_planner.viewer.state.reasons.failure import Explanation, Failure, explain
+from rover_planner.viewer.state.reasons.path_limits import find_worst
 from rover_planner.viewer.state.scenario import Scenario
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.trajectory import MAX_VALUE, RoverState, Trajectory
@@ -93,7 +91,7 @@ class JudgedDisplay:
         self._panels, self._run = panels, panels.errors.run
         self._age = ("", "")
         """Why the shown verdict is old, and the notice, as they are shown."""
-        self.history = ChangeHistory(session.finished)
+        self.history = ChangeHistory(session.shown)
         """The rovers before, and their drives."""
         self.why: Explanation | None = None
         """Why the shown path can be driven or not."""
@@ -122,11 +120,11 @@ class JudgedDisplay:
 
     def show_judged(self) -> None:
         """Take what was judged, and show it."""
-        session, before = self._session, self._session.finished
+        session, before = self._session, self._session.shown
         try:
             session.take_finished()
         finally:
-            now = session.finished
+            now = session.shown
             self.show_verdict()
             if now.scenario is not before.scenario:
                 self._show_scenario(before.scenario, now.scenario)
@@ -135,7 +133,7 @@ class JudgedDisplay:
                 self._draw_predicted_ground()
             if now.way is not before.way:
                 self._ask("the closed area is not drawn", self._draw_closed_area)
-            if now.shown.candidate is not before.shown.candidate:
+            if now.candidate is not before.candidate:
                 self.show_path()
             elif now.answer is not before.answer:
                 self._ask(NO_PATHS, self._draw_paths)
@@ -174,7 +172,7 @@ class JudgedDisplay:
         below it, so that the board is seen without scrolling. In the tab of the rover they stand
         above the policies, and the reason, which may be long, below them.
         """
-        shown, reason, panels = self._session.shown, self._session.finished.reason, self._panels
+        shown, reason, panels = self._session.shown, self._session.shown.reason, self._panels
         passes, notes, old = shown.verdict.traversable, shown.trajectory.notes, self.why_old
         is_known = self.failure is not None and self._explained is shown.candidate
         failure = describe_failure(self.failure) if self.failure is not None and is_known else ""
@@ -192,8 +190,8 @@ class JudgedDisplay:
 
     def draw_ground(self) -> None:
         """Begin to colour the ground."""
-        now = self._session.finished
-        path = now.shown.candidate.poses
+        now = self._session.shown
+        path = now.candidate.poses
         self._run(NO_GROUND, lambda: self._painter.paint(now.scenario, path))
 
     def take_ground(self) -> None:
@@ -232,7 +230,7 @@ class JudgedDisplay:
         self._panels.drawings.ask(failure, draw_with_picture)
 
     def _draw_rover(self) -> None:
-        self._panels.scene.draw_rover(self._session.rover, self._session.arm_angles)
+        self._panels.scene.draw_rover(self._session.rover, self._session.scenario.arm_angles)
 
     def _fit_cameras(self) -> None:
         shown = self._session.shown.candidate.poses[:, :2]
@@ -248,17 +246,17 @@ class JudgedDisplay:
         """Draw all candidate paths over the ground, those with old verdicts grey."""
         session, scene = self._session, self._panels.scene
         shown, old = session.shown.index, self._old_paths()
-        scene.paths.show(session.rover, session.terrain, session.candidates, shown, old)
+        scene.paths.show(session.rover, session.terrain, session.shown.candidates, shown, old)
         scene.closed.mark_old(session.has_old_candidates)
 
     def _draw_closed_area(self) -> None:
         session = self._session
-        self._panels.scene.closed.show(session.rover, session.terrain, session.finished.way)
+        self._panels.scene.closed.show(session.rover, session.terrain, session.shown.way)
 
     def _old_paths(self) -> set[int]:
         """Return the indices of the paths whose verdicts are of old values."""
         session, shown = self._session, self._session.shown.index
-        others = set(range(len(session.candidates))) - {shown}
+        others = set(range(len(session.shown.candidates))) - {shown}
         old = others if session.has_old_candidates else set()
         return old | {shown} if self.why_old else old
 
@@ -266,14 +264,14 @@ class JudgedDisplay:
         """Show the table of the candidates, those with old verdicts grey."""
         session, shown = self._session, self._session.shown.index
         others = session.has_old_candidates
-        old = [others and k != shown for k in range(len(session.candidates))]
-        rows = list_candidates(session.candidates, session.answer.nearest, old)
+        old = [others and k != shown for k in range(len(session.shown.candidates))]
+        rows = list_candidates(session.shown.candidates, session.shown.answer.nearest, old)
         self._panels.show_candidates(draw_candidates(rows, shown))
 
     def _explain(self) -> None:
         """Find out where the shown path uses its limits and breaks one."""
         self.why = None  # an error must not leave that of another path
-        self.why = explain(self._session.finished)
+        self.why = explain(self._session.shown)
         self._explained = self._session.shown.candidate
         self.show_verdict()
 
@@ -285,8 +283,8 @@ class JudgedDisplay:
     @property
     def _before(self) -> Trajectory | None:
         """The drive of the rover before along the shown path; None if there is none."""
-        judgement = self.history.reference_for(self._session.finished)
-        return None if judgement is None else judgement.shown.trajectory
+        shown = self.history.reference_for(self._session.shown)
+        return None if shown is None else shown.trajectory
 
     def _draw_plots(self) -> None:
         """Plot the values along the shown path, those of the drive before pale."""
@@ -298,15 +296,15 @@ class JudgedDisplay:
             return
         limit = why.limits.lane("friction").limit.bound
         limit = math.inf if limit is None else limit  # speed servos have none
-        now = _curves_between(trajectory, why)
+        now = _curves_between(why)
         plots.set_curves(rover, now, old, why.failure_at, limit)
         plots.lanes.set_limits(why.limits)
 
     def _show_changes(self) -> None:
         """Show what has changed of the rover and of its drive."""
-        now, before = self._session.finished, self._before
+        now, before = self._session.shown, self._before
         changed = list_changes(now.scenario.loaded, now.scenario.rover)
-        differences = () if before is None else compare_drives(before, now.shown.trajectory)
+        differences = () if before is None else compare_drives(before, now.trajectory)
         self._panels.rover_tab.show_changes(changed, differences)
 
     # The drive.
@@ -373,13 +371,13 @@ def _differ_in_size(one: Rover, other: Rover) -> bool:
     return large > MUCH_LARGER * small
 
 
-def _curves_between(trajectory: Trajectory, why: Explanation) -> Curves:
+def _curves_between(why: Explanation) -> Curves:
     """Return the curves of the plots with the poses between waypoints, while the rover stands."""
-    rows, prediction = why.limits.rows, trajectory.prediction
-    lost = np.flatnonzero(along_rows(rows, prediction, "settled") == 0)
+    rows = why.limits.rows
+    lost = np.flatnonzero(~rows.prediction.settled)
     stands = slice(int(lost[0]) if lost.size else len(rows.distance))
     values = {
-        name: np.nan_to_num(along_rows(rows, prediction, name)[stands], posinf=MAX_VALUE)
+        name: np.nan_to_num(getattr(rows.prediction, name)[stands], posinf=MAX_VALUE)
         for name in PLOTS
     }
     return Curves(rows.distance[stands], values)

@@ -10,8 +10,7 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.viewer.browser.link import Link
 from rover_planner.viewer.live.listener import NO_ODOMETRY, LiveData, LiveListener
-from rover_planner.viewer.live.live_state import StateBuilder
-from rover_planner.viewer.live.topic_ages import TopicAge
+from rover_planner.viewer.live.live_state import StateBuilder, TopicAge
 from rover_planner.viewer.pages.base import PageBase
 from rover_planner.viewer.panel.board import BoardNotes
 from rover_planner.viewer.panel.dashboard import describe_verdict, draw_topics
@@ -119,7 +118,7 @@ class LivePage(PageBase):
 
     def path_to_look_at(self) -> Floats:
         """Return x and y (2, 2) [m] of the places between which the rover was first seen."""
-        return np.array([self.session.start[:2], self.session.goal[:2]])
+        return np.array([self.session.scenario.start[:2], self.session.scenario.goal[:2]])
 
     def add_due_requests(self) -> None:
         """Do nothing: all comes by topics."""

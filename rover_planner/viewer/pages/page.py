@@ -140,7 +140,7 @@ class Page(PageBase):
     def describe_context(self) -> tuple[Context, tuple[Chip, ...]]:
         """Return what is judged, the verdict, and what is played."""
         session, playback = self.session, self.playback
-        return describe_scenario(session.finished.scenario, session.ground_name), (
+        return describe_scenario(session.shown.scenario, session.ground_name), (
             verdict_chip(session.shown.verdict.traversable, self.judged.why_old),
             play_chip(playback.rate != 0.0, playback.describe()),
         )

@@ -65,7 +65,7 @@ class Sharing:
     def _save(self, client: Any) -> None:
         """Send a visitor the scene and its report as one HTML file."""
         session, link = self._session, self.make_link()
-        judgement = session.finished
+        judgement = session.shown
         context = describe_scenario(judgement.scenario, session.ground_name)
         word = "traversable" if session.shown.verdict.traversable else "not traversable"
         title = f"{judgement.scenario.rover.name} on {context.ground}: {word}"
@@ -94,7 +94,7 @@ class Sharing:
 
     def make_link(self) -> Link:
         """Return the link to what is shown."""
-        session, now = self._session, self._session.finished.scenario
+        session, now = self._session, self._session.shown.scenario
         return Link(
             rover=now.loaded.name,
             ground=self._identify(now.terrain),
@@ -165,7 +165,7 @@ class Sharing:
         if session.shown.index == link.path - 1:
             self._opening = None
             self._playback.go_to(link.time)
-        elif link.path <= len(session.answer.candidates):
+        elif link.path <= len(session.shown.answer.candidates):
             session.show_candidate(link.path - 1)
         elif session.progress is None:  # no way around was found this time
             self._opening = None

@@ -9,8 +9,9 @@ from rover_physics.rover.model import Rover
 from rover_planner.viewer.live.topic_ages import TopicAge
 from rover_planner.viewer.panel.board import BoardNotes, draw_board, draw_legend
 from rover_planner.viewer.state.colours import NOTICE, PASSABLE, REFUSED, UNKNOWN, to_css
-from rover_planner.viewer.state.comparison import POLICY_TITLES, PolicyVerdict
+from rover_planner.viewer.state.context import POLICY_TITLES
 from rover_planner.viewer.state.reasons.failure import Failure
+from rover_planner.viewer.state.scenario import PolicyVerdict
 from rover_planner.viewer.state.trajectory import RoverState
 
 

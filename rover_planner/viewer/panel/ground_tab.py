@@ -123,7 +123,7 @@ class GroundTab:
     @property
     def is_predicted(self) -> bool:
         """Whether the layer is predicted for the rover."""
-        return not self.is_surveyed and LAYERS[self.layer].score is not None
+        return not self.is_surveyed and LAYERS[self.layer].is_predicted
 
     @property
     def is_surveyed(self) -> bool:

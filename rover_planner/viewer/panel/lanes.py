@@ -11,7 +11,7 @@ import numpy as np
 from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_planner.viewer.state.colours import LOAD, MIDDLE, REFUSED, blend, to_css
-from rover_planner.viewer.state.reasons.path_limits import Lane, PathLimits, Use
+from rover_planner.viewer.state.reasons.path_limits import Lane, PathLimits
 
 ROW_HEIGHT = 14
 """Height of a lane [px]."""
@@ -104,8 +104,7 @@ def classify(lane: Lane) -> Floats:
     """Return the class (m,) of each pose on a lane, a key of COLOURS."""
     with np.errstate(invalid="ignore"):
         shares = np.select([lane.used <= HALF, lane.used <= MUCH], [LITTLE_USED, HALF_USED], NEAR)
-    unknown = (lane.use >= Use.EXEMPT) | np.isnan(lane.used)
-    return np.select([lane.use == Use.BROKEN, unknown], [BROKEN, NOT_ASKED], shares)
+    return np.select([lane.used > 1.0, np.isnan(lane.used)], [BROKEN, NOT_ASKED], shares)
 
 
 def _edges(distance: Floats) -> Floats:

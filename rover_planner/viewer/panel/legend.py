@@ -52,9 +52,6 @@ def draw_survey_legend(
         differences: In what the survey differs from what the page shows.
     """
     parts = [_key(to_css(colour), text) for colour, text in meaning.keys]
-    if meaning.scale is not None:
-        parts += [_gradient(meaning.scale)]
-        parts += [_key(to_css(UNKNOWN), "unknown, or the rover cannot stand or go")]
     parts.append(f'<div style="opacity:.75">{html.escape(told)}</div>')
     if differences:
         parts.append(

@@ -75,7 +75,7 @@ def build_ground_mesh(
     """
     layer = LAYERS[layer_name]
     x, y, heights = subsample(terrain)
-    if layer.score is not None:
+    if layer.is_predicted:
         coarse_x, coarse_y, _ = subsample(terrain, MAX_PREDICTED)
         at = (coarse_x, coarse_y)
         values, broken = predict_layer(layer, rover, terrain, heading, at, options)

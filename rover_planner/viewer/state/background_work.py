@@ -19,10 +19,6 @@ END_TIME = 20.0
 
 Request = TypeVar("Request")
 Result = TypeVar("Result")
-Report = Callable[[str, int, int], None]
-"""Takes what is worked on, such as "judging path", its number from 1, and how many there are."""
-Work = Callable[[Request, Report], Iterator[Result]]
-"""Yields the results of a request, each as soon as it is known."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +38,10 @@ class Progress:
         """Return the progress in words, such as "judging path 2 of 5"."""
         many = f" {self.step} of {self.steps}" if self.steps > 1 else ""
         return f"{self.what or 'waiting'}{many}"
+
+
+Work = Callable[[Request], Iterator[Progress | Result]]
+"""Yields what is begun, and the results of a request, each as soon as it is known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,19 +83,17 @@ class BackgroundWork(Generic[Request, Result]):
         work: Work[Request, Result],
         wake: Callable[[], object],
         name: str = "background",
-        is_hasty: Callable[[Request], bool] = lambda _request: False,
     ):
         """Start the thread.
 
         Args:
-            work: Does a request. Between the slices of the model's sweeps and at each report it
-                may be stopped by an error, which it must let pass.
+            work: Does a request. Between the slices of the model's sweeps it may be stopped by
+                an error, which it must let pass; it is left at what it yields.
             wake: Called in the thread when there is something to take. It may wait until that
                 was taken.
             name: Name of the thread.
-            is_hasty: Returns whether a newer request stops a request at once (default: none).
         """
-        self._work, self._wake, self._is_hasty = work, wake, is_hasty
+        self._work, self._wake = work, wake
         self._changed = threading.Condition()
         # The lock of _changed guards all that follows.
         self._waiting: Request | None = None
@@ -171,22 +169,19 @@ class BackgroundWork(Generic[Request, Result]):
 
     def _do(self, job: _Job[Request]) -> None:
         def check() -> None:
-            if job.is_stopped or (self._waiting is not None and not has_time()):
+            has_time = not job.has_result and time.monotonic() - job.began < PATIENCE
+            if job.is_stopped or (self._waiting is not None and not has_time):
                 raise _StoppedError("a newer request or a visitor stopped the work")
-
-        def has_time() -> bool:
-            late = time.monotonic() - job.began > PATIENCE
-            return not (late or job.has_result or self._is_hasty(job.request))
-
-        def report(what: str, step: int, steps: int) -> None:
-            check()
-            with self._changed:
-                self._progress = Progress(what, step, steps)
 
         try:
             with interruptible(check):
-                for result in self._work(job.request, report):
-                    self._deliver(job, Delivery(job.request, result))
+                for found in self._work(job.request):
+                    check()
+                    if isinstance(found, Progress):
+                        with self._changed:
+                            self._progress = found
+                    else:
+                        self._deliver(job, Delivery(job.request, found))
         except _StoppedError:
             return
         except BaseException as error:  # the thread must go on; whoever takes it tells of it

@@ -3,9 +3,12 @@
 
 from dataclasses import dataclass
 
+from rover_physics.names import EQUAL, OPTIMAL, SERVO
 from rover_physics.terrain.grid import Terrain
-from rover_planner.viewer.state.comparison import POLICY_TITLES
 from rover_planner.viewer.state.scenario import Scenario
+
+POLICY_TITLES = {EQUAL: "equal torques", SERVO: "speed servos", OPTIMAL: "traction control"}
+"""What the page calls the torque policies."""
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from rover_physics.limits.table import LIMITS
 from rover_physics.names import SERVO, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_prediction import PathPrediction
+from rover_planner.viewer.state.reasons.path_limits import AskedPoses, merge_poses
 
 MAX_PLACES = 3
 """Most places that are named in a sentence."""
@@ -14,50 +15,42 @@ NEAR = 0.1
 """Distance up to which exempt rows are one place [m]."""
 
 
-def tell_exemptions(prediction: PathPrediction, waypoints: int) -> tuple[str, ...]:
+def describe_exemptions(prediction: PathPrediction, waypoints: int) -> tuple[str, ...]:
     """Return what a reader of plots and reasons should know of the first waypoints of a path.
 
     One sentence on the friction utilisation between waypoints where it is larger than at all of
     them, and one on the places where a wheel rolls off an edge.
     """
-    own = prediction.select(slice(waypoints))
-    parts = [own]
-    if prediction.between is not None and len(prediction.between.poses):
-        parts.append(prediction.between.select(prediction.between.waypoint < waypoints))
-    told = _tell_largest(own, parts[1:]) if prediction.policy != SERVO else ""
-    return tuple(filter(None, (told, _tell_falls(own, parts))))
+    if not waypoints:
+        return ()
+    rows = merge_poses(prediction.cut(waypoints))
+    next_waypoint = prediction.distance[rows.prediction.waypoint]
+    largest = "" if prediction.policy == SERVO else _describe_largest(rows, next_waypoint)
+    return tuple(filter(None, (largest, _describe_falls(rows, next_waypoint))))
 
 
-def _tell_largest(own: PathPrediction, between: list[PathPrediction]) -> str:
+def _describe_largest(rows: AskedPoses, on_the_way_to: Floats) -> str:
     """Return the largest utilisation between waypoints; empty if it is not the largest."""
-    for part in between:
-        worst = _largest_of_rows(part)
-        if not worst.size or not worst.max() > _largest_of_rows(own).max(initial=0.0):
-            continue
-        row = int(np.argmax(worst))
-        wheel = WHEELS[int(np.nanargmax(part.friction_utilisation[row]))].replace("_", " ")
-        place = own.distance[part.waypoint[row]]
-        exempt = ", not asked: a wheel rolls off an edge" if part.falling[row].any() else ""
-        return (
-            f"between waypoints the utilisation reaches {worst[row]:.2f} ({wheel}, on the way to "
-            f"{place:.2f} m{exempt})"
-        )
-    return ""
-
-
-def _largest_of_rows(part: PathPrediction) -> Floats:
-    """Return the largest utilisation (n,) of each row; 0 where the rover does not settle."""
+    part = rows.prediction
     largest = np.fmax.reduce(part.friction_utilisation, axis=1)
-    return np.where(part.settled, np.nan_to_num(largest, posinf=np.inf), 0.0)
+    largest = np.where(part.settled, np.nan_to_num(largest, posinf=np.inf), 0.0)
+    between = np.where(rows.is_between, largest, -np.inf)
+    if not between.max(initial=-np.inf) > largest[~rows.is_between].max(initial=0.0):
+        return ""
+    row = int(np.argmax(between))
+    wheel = WHEELS[int(np.nanargmax(part.friction_utilisation[row]))].replace("_", " ")
+    exempt = ", not asked: a wheel rolls off an edge" if part.falling[row].any() else ""
+    return (
+        f"between waypoints the utilisation reaches {largest[row]:.2f} ({wheel}, on the way to "
+        f"{on_the_way_to[row]:.2f} m{exempt})"
+    )
 
 
-def _tell_falls(own: PathPrediction, parts: list[PathPrediction]) -> str:
+def _describe_falls(rows: AskedPoses, on_the_way_to: Floats) -> str:
     """Return where wheels roll off edges, and which limits are not asked there."""
     found: dict[str, list[float]] = {}
-    for part in parts:
-        for row, wheel in np.argwhere(part.falling).tolist():
-            name = WHEELS[wheel].replace("_", " ")
-            found.setdefault(name, []).append(float(own.distance[part.waypoint[row]]))
+    for row, wheel in np.argwhere(rows.prediction.falling).tolist():
+        found.setdefault(WHEELS[wheel].replace("_", " "), []).append(float(on_the_way_to[row]))
     places: dict[str, list[str]] = {}
     for name, distances in found.items():
         for start, end in _stretches(sorted(distances)):

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.limits.table import LIMITS
+from rover_physics.limits.table import LIMITS, Limit
 from rover_physics.numerics.arrays import Floats
-from rover_physics.prediction.map_sweep import PoseScores, score_poses
+from rover_physics.prediction.map_sweep import score_poses
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
@@ -23,87 +23,64 @@ STEEP = 35.0
 class Layer:
     """One layer: its unit, its values and the range of its colours."""
 
-    unit: str
+    unit: str = ""
     """Unit for the scale, empty for none."""
-    score: Callable[[PoseScores], NDArray[Any]] | None = None
-    """Values from scores of the rover at the cells; None for layers of the ground alone."""
-    span: Callable[[Rover], tuple[float, float]] | None = None
-    """Values of the first and last colour; None: the smallest and largest value."""
-    code: str = ""
-    """Code of the limit of the values; empty for none."""
-    factor: float = 1.0
-    """The limit in SI units times this is in `unit`."""
-    has_classes: bool = False
-    """Whether values are classes: 1 keeps the limits, 0 breaks one."""
+    scores: str = ""
+    """Field of `PoseScores` that has the values; empty for layers of the ground alone."""
+    limit: Limit | None = None
+    """Limit of the values; None for none."""
+    top: Callable[[Rover], float] | None = None
+    """Value of the last colour [unit], that of the first is the limit or 0; None: from 0 to the
+    limit, or from the smallest value to the largest."""
+
+    @property
+    def is_predicted(self) -> bool:
+        """Whether the model predicts it for the rover."""
+        return bool(self.scores)
+
+    @property
+    def has_classes(self) -> bool:
+        """Whether values are classes: 1 keeps the limits, 0 breaks one."""
+        return self.scores == "passable"
+
+    @property
+    def factor(self) -> float:
+        """Values in SI units times this are in `unit`."""
+        return 1.0 if self.limit is None else (self.limit.shown or self.limit.unit).factor
 
     def find_limit(self, rover: Rover) -> float | None:
-        """Return the limit of the values, None if there is none."""
-        row = next((row for row in LIMITS if row.code == self.code), None)
-        bound = None if row is None else row.find_bound(rover)
+        """Return the limit of the values [unit], None if there is none."""
+        bound = None if self.limit is None else self.limit.find_bound(rover)
         return self.factor * bound if isinstance(bound, float | int) else None
+
+
+def _limited(code: str, scores: str, top: Callable[[Rover], float] | None = None) -> Layer:
+    """Return the layer of scores that the limit of a code holds."""
+    limit = next(row for row in LIMITS if row.code == code)
+    return Layer((limit.shown or limit.unit).name, scores, limit, top)
+
+
+def _standing_clearance(rover: Rover) -> float:
+    """Return the clearance of the belly on flat ground [cm]."""
+    ground = rover.suspension.wheels["rear"][2] - rover.wheel.radius
+    return max(100.0 * (rover.belly.z - ground), 100.0 * rover.limits.belly_clearance + 1.0)
 
 
 HEIGHT, SLOPE = "height", "slope"
 LAYERS: Mapping[str, Layer] = {
     HEIGHT: Layer("m"),
-    SLOPE: Layer("deg", span=lambda _rover: (0.0, STEEP)),
-    "passable or not": Layer(
-        "",
-        lambda scores: np.where(scores.status == 0, scores.passable, np.nan),
-        lambda _rover: (0.0, 1.0),
-        has_classes=True,
+    SLOPE: Layer("deg", top=lambda _rover: STEEP),
+    "passable or not": Layer(scores="passable", top=lambda _rover: 1.0),
+    "friction utilisation": _limited("friction", "friction_utilisation"),
+    "torque saturation": _limited("torque", "torque_saturation"),
+    "stability margin": _limited(
+        "tip_over", "tip_over_ratio", lambda rover: max(1.0, rover.limits.tip_over_ratio + 0.1)
     ),
-    "friction utilisation": Layer(
-        "",
-        lambda scores: scores.friction_utilisation,
-        lambda rover: (0.0, rover.limits.friction_utilisation),
-        "friction",
-    ),
-    "torque saturation": Layer(
-        "",
-        lambda scores: scores.torque_saturation,
-        lambda rover: (0.0, rover.limits.torque_saturation),
-        "torque",
-    ),
-    "stability margin": Layer(
-        "",
-        lambda scores: scores.tip_over_ratio,
-        lambda rover: (rover.limits.tip_over_ratio, max(1.0, rover.limits.tip_over_ratio + 0.1)),
-        "tip_over",
-    ),
-    "smallest wheel load": Layer(
-        "N",
-        lambda scores: scores.least_load,
-        lambda rover: (0.0, rover.weight / 6.0),
-        "wheel_lift",
-    ),
-    "tilt": Layer(
-        "deg",
-        lambda scores: np.degrees(scores.tilt),
-        lambda rover: (0.0, float(np.degrees(rover.limits.tilt))),
-        "tilt",
-        180.0 / np.pi,
-    ),
-    "belly clearance": Layer(
-        "cm",
-        lambda scores: 100.0 * scores.belly_clearance.astype(float),
-        lambda rover: _belly_span(rover),
-        "belly",
-        100.0,
-    ),
+    "smallest wheel load": _limited("wheel_lift", "least_load", lambda rover: rover.weight / 6.0),
+    "tilt": _limited("tilt", "tilt"),
+    "belly clearance": _limited("belly", "belly_clearance", _standing_clearance),
 }
 """The layers by name."""
-
-
-def _belly_span(rover: Rover) -> tuple[float, float]:
-    """Return the smallest good clearance, and that on flat ground [cm]."""
-    least = 100.0 * rover.limits.belly_clearance
-    return least, max(100.0 * (rover.belly.z - _flat_ground(rover)), least + 1.0)
-
-
-def _flat_ground(rover: Rover) -> float:
-    """Return the height of flat ground under the wheels, body frame [m]."""
-    return rover.suspension.wheels["rear"][2] - rover.wheel.radius
 
 
 def compute_slope(x: Floats, y: Floats, heights: Floats) -> Floats:
@@ -123,7 +100,7 @@ def predict_layer(
     """Return a predicted layer with the rover at each point.
 
     Args:
-        layer: A layer with a score.
+        layer: A layer that is predicted.
         rover: The rover.
         terrain: The ground.
         heading: Yaw of the body [rad]; or a path (n, 3) whose yaw at the nearest waypoint it has.
@@ -136,13 +113,15 @@ def predict_layer(
     Raises:
         RoverError: The model refuses an option.
     """
-    assert layer.score is not None
     x, y = np.meshgrid(*at)
     poses = np.stack([x, y, _headings(x, y, heading)], axis=-1)
     scores = score_poses(rover, terrain, poses, options)
-    of_layer = [layer.has_classes or row.code == layer.code for row in scores.limits.rows]
+    code = "" if layer.limit is None else layer.limit.code
+    of_layer = [code in ("", row.code) for row in scores.limits.rows]
     broken = (scores.uses[..., of_layer] > 1.0).any(axis=-1)
-    return np.asarray(layer.score(scores), float), broken & (scores.status == PoseStatus.SETTLED)
+    settled = scores.status == PoseStatus.SETTLED
+    values = layer.factor * np.asarray(getattr(scores, layer.scores), float)
+    return np.where(settled, values, np.nan), broken & settled
 
 
 def _headings(x: Floats, y: Floats, heading: float | Floats) -> Floats:
@@ -157,7 +136,10 @@ def _headings(x: Floats, y: Floats, heading: float | Floats) -> Floats:
 
 def colour_span(layer: Layer, rover: Rover, values: Floats) -> tuple[float, float]:
     """Return the values of the first and the last colour of a layer with these values."""
+    limit = layer.find_limit(rover)
+    if layer.top is not None:
+        return limit or 0.0, layer.top(rover)
+    if limit is not None:
+        return 0.0, limit
     known = values[np.isfinite(values)]
-    if layer.span is not None:
-        return layer.span(rover)
     return (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)

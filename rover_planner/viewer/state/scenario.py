@@ -10,7 +10,6 @@ from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.planning.path_query import Candidate, PathAnswer, PathQueryOptions
 from rover_planner.planning.ways.way_search import LatticeSettings, WayAnswer
-from rover_planner.viewer.state.comparison import PolicyVerdict
 from rover_planner.viewer.state.trajectory import Trajectory
 
 Pose = tuple[float, float, float]
@@ -55,30 +54,23 @@ class Scenario:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class ShownPath:
-    """The path that is shown, and its verdict."""
+@dataclass(frozen=True)
+class PolicyVerdict:
+    """The verdict of a path under one torque policy."""
 
-    index: int
-    """Its index among the candidates of the last answer."""
-    candidate: Candidate
-    """The path as it was judged last."""
-    trajectory: Trajectory
-    """The drive along it."""
-    summary: str
-    """What was judged and how long that took; empty for a recorded path."""
-    by_policy: tuple[PolicyVerdict, ...] = ()
-    """Its verdicts under all torque policies; empty for a replay, whose soil is not known."""
-
-    @property
-    def verdict(self) -> Verdict:
-        """Whether the rover can drive it, and why not."""
-        return self.candidate.verdict
+    policy: str
+    """One of `TORQUE_POLICIES`."""
+    traversable: bool | None
+    """Whether the rover can drive the path; None if this policy cannot judge it or did not yet."""
+    reason: str
+    """Why not; empty if it can."""
+    is_old: bool = False
+    """Whether it is of other values than the verdict beside it, or not known yet."""
 
 
 @dataclass(frozen=True, eq=False)
-class Judgement:
-    """The verdict on the shown path, and those on all candidates, which may be older."""
+class Shown:
+    """What is shown: a path with its verdict, and those of all candidates, which may be older."""
 
     scenario: Scenario
     """What the shown path was judged for."""
@@ -86,15 +78,28 @@ class Judgement:
     """All candidates."""
     answered: Scenario
     """What they were judged for."""
-    shown: ShownPath
-    """The shown path."""
+    index: int
+    """Index of the shown path among the candidates."""
+    candidate: Candidate
+    """The shown path as it was judged last."""
+    trajectory: Trajectory
+    """The drive along it."""
+    summary: str
+    """What was judged and how long that took; empty for a recorded path."""
+    by_policy: tuple[PolicyVerdict, ...] = ()
+    """Its verdicts under all torque policies; empty for a replay, whose soil is not known."""
     way: WayAnswer | None = None
     """What a search around obstacles has found for `answered`; None if none was made."""
 
     @property
+    def verdict(self) -> Verdict:
+        """Whether the rover can drive the shown path, and why not."""
+        return self.candidate.verdict
+
+    @property
     def reason(self) -> str:
         """Why the shown path is refused, and before it why there is no way; empty if it passes."""
-        reason = self.shown.verdict.reason
+        reason = self.verdict.reason
         is_old = self.answered is not self.scenario
         if not reason or is_old or self.way is None or self.way.path is not None:
             return reason
@@ -116,5 +121,5 @@ class Judgement:
     def candidates(self) -> tuple[Candidate, ...]:
         """The candidates, with the shown one as it was judged last."""
         candidates = list(self.answer.candidates)
-        candidates[self.shown.index] = self.shown.candidate
+        candidates[self.index] = self.candidate
         return tuple(candidates)

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_planner.studies.runner import StudyResult, Trial, count_trials, run_study
+from rover_planner.studies.runner import StudyResult, count_trials, run_study
 from rover_planner.studies.study_file import Study
 from rover_planner.studies.study_plot import draw_pixels
 from rover_planner.studies.summary import describe_result
-from rover_planner.viewer.state.background_work import Report
+from rover_planner.viewer.state.background_work import Progress
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,19 +26,12 @@ class FinishedStudy:
     """The picture of the study (height, width, 4), RGBA."""
 
 
-def run_in_background(study: Study, report: Report) -> Iterator[FinishedStudy]:
+def run_in_background(study: Study) -> Iterator[Progress | FinishedStudy]:
     """Run a study and yield its result; see `background_work.Work`.
 
     Raises:
         PlanningError: No rover of the study could be judged.
     """
-    count, tried = count_trials(study), 0
-
-    def tell(_trial: Trial) -> None:
-        nonlocal tried
-        tried += 1
-        report("trying rover", min(tried + 1, count), count)
-
-    report("trying rover", 1, count)
-    result = run_study(study, tell)
+    yield Progress("trying rover", 1, count_trials(study))
+    result = run_study(study)
     yield FinishedStudy(result, tuple(describe_result(result)), draw_pixels(result))

@@ -11,7 +11,7 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.traversability.verdict import Verdict
-from rover_planner.viewer.state.exemptions import tell_exemptions
+from rover_planner.viewer.state.exemptions import describe_exemptions
 
 MAX_SLIP = 0.95
 """Slip ratio at which the shown rate of a wheel is limited."""
@@ -84,32 +84,17 @@ class Trajectory:
             end = min(end, verdict.first_failure + 1)
         self.length = end
         """Number of waypoints; 0 where the rover does not settle at the start."""
-        self.notes = tell_exemptions(prediction, end)
+        self.notes = describe_exemptions(prediction, end)
         """Sentences on what lies between the waypoints, and on what the verdict did not ask."""
-        self._series = self._collect(rover, prediction, end) if end else {}
+        self._series = self._collect(rover, prediction.select(slice(end))) if end else {}
 
-    def _collect(self, rover: Rover, prediction: PathPrediction, n: int) -> dict[str, Floats]:
+    def _collect(self, rover: Rover, driven: PathPrediction) -> dict[str, Floats]:
         """Return the values (n, ...) of each field of `RoverState`."""
-        yaw = np.unwrap(prediction.poses[:n, 2])
-        series = {
-            field.name: getattr(prediction, field.name)[:n]
-            for field in fields(RoverState)
-            if hasattr(prediction, field.name)
-        }
-        series["attitude"] = np.column_stack([prediction.roll[:n], prediction.pitch[:n], yaw])
-        moves = np.linalg.norm(np.diff(prediction.wheel_centres[:n], axis=0), axis=2)
-        rolled = (
-            moves / rover.wheel.radius / (1.0 - np.clip(series["slip_ratio"], 0, MAX_SLIP))[1:]
-        )
-        rolled *= np.where(prediction.wheel_speed[1:n] < 0.0, -1.0, 1.0)
-        series["spin"] = np.vstack([np.zeros(6), np.cumsum(np.nan_to_num(rolled), axis=0)])
-        series["speed"] = np.hypot(series["motion"][:, 0], series["motion"][:, 1])
-        return {
-            name: values
-            if name in PLACES
-            else np.clip(np.nan_to_num(values), -MAX_VALUE, MAX_VALUE)
-            for name, values in series.items()
-        }
+        moves = np.linalg.norm(np.diff(driven.wheel_centres, axis=0), axis=2)
+        rolled = moves / rover.wheel.radius / (1.0 - np.clip(driven.slip_ratio, 0, MAX_SLIP))[1:]
+        rolled *= np.where(driven.wheel_speed[1:] < 0.0, -1.0, 1.0)
+        spin = np.vstack([np.zeros(6), np.cumsum(np.nan_to_num(rolled), axis=0)])
+        return {**read_series(driven), "spin": spin}
 
     @property
     def has_slip(self) -> bool:
@@ -151,8 +136,30 @@ class Trajectory:
         after = min(after, len(times) - 1)
         span = times[after] - times[before]
         share = float(np.clip((time - times[before]) / span, 0.0, 1.0)) if span > 0.0 else 0.0
-        values: dict[str, Any] = {}
-        for name, rows in self._series.items():
-            value = (1.0 - share) * rows[before] + share * rows[after]
-            values[name] = float(value) if np.ndim(value) == 0 else value
-        return RoverState(**values)
+        return make_state(
+            {
+                n: (1.0 - share) * rows[before] + share * rows[after]
+                for n, rows in self._series.items()
+            }
+        )
+
+
+def read_series(prediction: PathPrediction) -> dict[str, Floats]:
+    """Return the values (n, ...) of the fields of `RoverState` but for the spin of the wheels."""
+    names = [field.name for field in fields(RoverState) if hasattr(prediction, field.name)]
+    series = {name: getattr(prediction, name) for name in names}
+    yaw = np.unwrap(prediction.poses[:, 2])
+    series["attitude"] = np.column_stack([prediction.roll, prediction.pitch, yaw])
+    series["speed"] = np.hypot(prediction.motion[:, 0], prediction.motion[:, 1])
+    return {
+        name: values if name in PLACES else np.clip(np.nan_to_num(values), -MAX_VALUE, MAX_VALUE)
+        for name, values in series.items()
+    }
+
+
+def make_state(values: dict[str, Any]) -> RoverState:
+    """Return the state with the values of all fields, arrays and numbers of numpy."""
+    plain: dict[str, Any] = {
+        name: float(value) if np.ndim(value) == 0 else value for name, value in values.items()
+    }
+    return RoverState(**plain)

@@ -24,7 +24,7 @@ from rover_physics.traversability.pose_classes import (
 from rover_planner.survey.layers import NO_LIMIT, number_limits
 from rover_planner.survey.request import SurveyRequest
 from rover_planner.survey.tile_survey import survey_tile
-from rover_planner.viewer.state.reasons.path_limits import Use, find_path_limits
+from rover_planner.viewer.state.reasons.path_limits import find_path_limits
 from support.grounds import make_terrain, waves
 
 HEAVIEST = Limit(
@@ -114,5 +114,5 @@ def test_the_page_has_a_lane_for_it(strict):
     lane = find_path_limits(strict, prediction, verdict).lane("wheel_load")
     assert lane.limit.title == "heaviest"
     assert lane.limit.bound == strict.limits.further["wheel_load"]
-    assert lane.use.tolist() == [Use.KEPT] * verdict.first_failure + [Use.BROKEN]
+    assert (lane.used > 1.0).tolist() == [False] * verdict.first_failure + [True]
     assert lane.wheel[-1] == prediction.wheel_loads[verdict.first_failure].argmax()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rover_planner.viewer.panel.dashboard import describe_verdict
-from rover_planner.viewer.state.comparison import PolicyVerdict
+from rover_planner.viewer.state.scenario import PolicyVerdict
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain
 from support.viewer.sessions import LSR1, ramp, session_on

@@ -17,9 +17,8 @@ from rover_planner.viewer.state.reasons.before_after import (
     list_changes,
 )
 from rover_planner.viewer.state.reasons.candidate_rows import list_candidates, place_numbers
-from rover_planner.viewer.state.reasons.explanation import explain
-from rover_planner.viewer.state.reasons.path_limits import Use
-from rover_planner.viewer.state.reasons.worst import find_worst
+from rover_planner.viewer.state.reasons.failure import explain
+from rover_planner.viewer.state.reasons.path_limits import find_worst
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import gap, make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, ramp, session_on
@@ -36,7 +35,7 @@ def why_on(height, **options):
     ends = (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)
     session = ViewSession(LSR1, make_terrain(height), *ends, options)
     shown = session.shown
-    return shown.candidate.prediction, shown.verdict, explain(session.finished)
+    return shown.candidate.prediction, shown.verdict, explain(session.shown)
 
 
 # Limits along a path.
@@ -65,8 +64,8 @@ def test_rows_are_in_the_order_of_the_path_with_the_poses_between_in_their_place
 def test_a_limit_is_broken_on_a_lane_exactly_where_the_verdict_refuses_the_path(height, policy):
     _, verdict, why = why_on(height, policy=policy, friction=0.5)
     limits, failure = why.limits, why.failure
-    broken = np.any([lane.use == Use.BROKEN for lane in limits.lanes], axis=0)
-    refused = set(np.unique(limits.rows.waypoint[broken]).tolist())
+    broken = np.any([lane.used > 1.0 for lane in limits.lanes], axis=0)
+    refused = set(np.unique(limits.rows.prediction.waypoint[broken]).tolist())
     first = verdict.first_failure
     assert refused == ({first} if first >= 0 else set())
     assert (failure is None) == verdict.traversable
@@ -76,11 +75,8 @@ def test_a_limit_is_broken_on_a_lane_exactly_where_the_verdict_refuses_the_path(
         assert failure.is_settled == (failure.code != "unknown_ground")
 
 
-def test_a_limit_is_used_by_its_share_and_fully_where_it_is_broken():
+def test_a_limit_is_used_by_its_share():
     _, _, why = why_on(wall_at(0.5))
-    for lane in why.limits.lanes:
-        used = lane.used[(lane.use == Use.KEPT) & ~np.isnan(lane.used)]
-        assert (used <= 1.0 + 1e-6).all(), lane.limit.title
     friction = why.limits.lane("friction")
     known = ~np.isnan(friction.values)
     np.testing.assert_allclose(friction.used[known], friction.values[known] / friction.limit.bound)
@@ -109,7 +105,7 @@ def test_the_failure_names_value_limit_and_wheel_as_the_verdict_does():
     assert failure.headline == f"friction {failure.value:.2f} of 1.00, {failure.where}"
     row = verdict.first_failure
     assert failure.distance == pytest.approx(prediction.distance[row], abs=0.021)
-    assert why.failure_at == failure.distance <= why.limits.path_length
+    assert why.failure_at == failure.distance
     assert why.limits.end >= failure.distance
 
 
@@ -140,13 +136,13 @@ def test_where_the_rover_does_not_settle_a_level_one_stands_and_the_wheel_beyond
 @pytest.mark.parametrize("start", [-1.0, 0.4])
 def test_a_refusal_on_unknown_ground_is_at_the_time_to_which_the_drive_is_played(start):
     session = session_on(gap, start=(start, 0.0, 0.0), goal=(1.9, 0.0, 0.0))
-    shown, why = session.shown, explain(session.finished)
+    shown, why = session.shown, explain(session.shown)
     assert why.failure is not None and why.failure.code == "unknown_ground"
     assert why.failure.time == shown.trajectory.duration
     assert (shown.trajectory.length == 0) == (start > 0.0) == (why.failure.time == 0.0)
     assert np.isfinite(why.limits.rows.time).all()
-    count = len(session.candidates)
-    for row in list_candidates(session.candidates, 0, [False] * count):
+    count = len(session.shown.candidates)
+    for row in list_candidates(session.shown.candidates, 0, [False] * count):
         assert np.isfinite(row.energy)
 
 
@@ -155,21 +151,21 @@ def test_a_refusal_on_unknown_ground_is_at_the_time_to_which_the_drive_is_played
 
 def test_a_row_of_a_candidate_has_the_numbers_of_its_verdict():
     session = session_on(wall_at(0.5), goal=(1.5, 0.0, 0.0))
-    rows = list_candidates(session.candidates, session.answer.nearest, [False] * 5)
-    for row, candidate in zip(rows, session.candidates, strict=True):
+    rows = list_candidates(session.shown.candidates, session.shown.answer.nearest, [False] * 5)
+    for row, candidate in zip(rows, session.shown.candidates, strict=True):
         verdict = candidate.verdict
         assert row.traversable == verdict.traversable and row.reason == verdict.reason
         assert row.length == candidate.length
         assert row.driven < row.length or row.traversable
         assert row.utilisation == verdict.max_friction_utilisation
         assert row.margin == verdict.min_tip_over_ratio
-    assert [row.number for row in rows if row.is_best] == [session.answer.nearest + 1]
+    assert [row.number for row in rows if row.is_best] == [session.shown.answer.nearest + 1]
 
 
 @pytest.mark.parametrize("replayed", [False, True])
 def test_the_numbers_of_the_only_path_are_those_up_to_its_failure(replayed):
     session = session_on(gap, start=(-1.5, 0.0, 0.0), goal=(2.5, 0.0, 0.0))
-    poses = session.candidates[0].poses
+    poses = session.shown.candidates[0].poses
 
     def slope_beyond(x, y):
         return gap(x, y) + 0.5 * np.maximum(x - 1.0, 0.0)
@@ -177,11 +173,15 @@ def test_the_numbers_of_the_only_path_are_those_up_to_its_failure(replayed):
     prediction, verdict = judge_path(LSR1, make_terrain(slope_beyond), poses)
     assert verdict.max_tilt > 0.4
     session = ViewSession(
-        LSR1, make_terrain(slope_beyond), session.start, session.goal, PathQueryOptions(count=1)
+        LSR1,
+        make_terrain(slope_beyond),
+        session.scenario.start,
+        session.scenario.goal,
+        PathQueryOptions(count=1),
     )
     if replayed:
         session.replay(prediction, verdict.reasons)
-    [candidate] = session.candidates
+    [candidate] = session.shown.candidates
     assert candidate.verdict.code == "unknown_ground"
     before = prediction.cut(verdict.first_failure + 1)
     assert candidate.verdict.max_tilt == hold_against_limits(LSR1, before).max_tilt < 0.2
@@ -189,8 +189,8 @@ def test_the_numbers_of_the_only_path_are_those_up_to_its_failure(replayed):
 
 def test_the_numbers_of_paths_stand_on_them_and_apart_from_each_other():
     session = session_on(waves)
-    paths = [candidate.poses[:, :2] for candidate in session.candidates]
-    taken = np.array([session.start[:2], session.goal[:2]])
+    paths = [candidate.poses[:, :2] for candidate in session.shown.candidates]
+    taken = np.array([session.scenario.start[:2], session.scenario.goal[:2]])
     places = place_numbers(paths, taken)
     for path, place in zip(paths, places, strict=True):
         assert np.linalg.norm(path - place, axis=1).min() < 0.03
@@ -208,75 +208,75 @@ def changed(session, friction: float) -> None:
 
 def test_the_rover_before_is_the_last_one_for_which_all_paths_were_judged():
     session = session_on(waves)
-    history = ChangeHistory(session.finished)
-    first = session.finished
+    history = ChangeHistory(session.shown)
+    first = session.shown
     for friction in (0.7, 0.65, 0.6):  # a slider that is dragged
         changed(session, friction)
-        history.take(session.finished)
-        assert history.reference_for(session.finished) is first
+        history.take(session.shown)
+        assert history.reference_for(session.shown) is first
     session.plan_again()
-    history.take(session.finished)
-    assert history.reference_for(session.finished).scenario.rover.friction == 0.8
+    history.take(session.shown)
+    assert history.reference_for(session.shown).scenario.rover.friction == 0.8
     changed(session, 0.5)
-    history.take(session.finished)
-    assert history.reference_for(session.finished).scenario.rover.friction == 0.6
+    history.take(session.shown)
+    assert history.reference_for(session.shown).scenario.rover.friction == 0.6
 
 
 def test_undo_goes_back_rover_by_rover():
     session = session_on(waves)
-    history = ChangeHistory(session.finished)
+    history = ChangeHistory(session.shown)
     for friction in (0.7, 0.6):
         changed(session, friction)
         session.plan_again()
-        history.take(session.finished)
+        history.take(session.shown)
     for friction in (0.7, 0.8):
         back = history.undo(session.wanted).scenario
         assert back.rover.friction == friction
         session.restore_rover(back.rover, back.arm_angles)
-        history.take(session.finished)
+        history.take(session.shown)
     assert history.undo(session.wanted) is None
 
 
 def test_undo_takes_back_a_change_before_all_its_paths_are_judged():
     session = session_on(waves)
-    history = ChangeHistory(session.finished)
+    history = ChangeHistory(session.shown)
     changed(session, 0.7)  # only the shown path is judged
     assert history.undo(session.wanted).scenario.rover.friction == 0.8
     session.plan_again()
-    history.take(session.finished)
+    history.take(session.shown)
     changed(session, 0.6)
     assert history.undo(session.wanted).scenario.rover.friction == 0.7
 
 
 def test_undo_never_brings_numbers_of_one_rover_to_another_that_was_loaded_since():
     session = session_on(waves)
-    history = ChangeHistory(session.finished)
+    history = ChangeHistory(session.shown)
     changed(session, 0.7)
     session.plan_again()
-    history.take(session.finished)
+    history.take(session.shown)
     session.take_rover(load_rover("m2020"))  # and not taken by the history yet
     assert history.undo(session.wanted) is None
 
 
 def test_the_best_rover_of_a_study_of_the_loaded_one_is_a_change_that_can_be_undone():
     session = session_on(waves)
-    history = ChangeHistory(session.finished)
+    history = ChangeHistory(session.shown)
     best = replace(LSR1, friction=0.6)
     session.take_rover(best, load_rover("lsr1"))  # the study has read its rover by itself
-    history.take(session.finished)
-    assert history.reference_for(session.finished) is not None
+    history.take(session.shown)
+    assert history.reference_for(session.shown) is not None
     assert history.undo(session.wanted).scenario.rover == LSR1
 
 
 def test_another_goal_begins_the_history_anew():
     session = session_on(waves)
-    history = ChangeHistory(session.finished)
+    history = ChangeHistory(session.shown)
     changed(session, 0.7)
     session.plan_again()
-    history.take(session.finished)
+    history.take(session.shown)
     session.plan_to(np.array([0.5, 0.5]))
-    history.take(session.finished)
-    assert history.before is None and history.reference_for(session.finished) is None
+    history.take(session.shown)
+    assert history.before is None and history.reference_for(session.shown) is None
 
 
 def test_changed_numbers_and_differences_of_the_drive_are_those_of_the_rovers():

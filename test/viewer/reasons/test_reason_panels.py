@@ -31,8 +31,8 @@ from rover_planner.viewer.state.colours import (
 from rover_planner.viewer.state.layers import LAYERS, predict_layer
 from rover_planner.viewer.state.reasons.before_after import Difference
 from rover_planner.viewer.state.reasons.candidate_rows import list_candidates
-from rover_planner.viewer.state.reasons.explanation import explain
-from rover_planner.viewer.state.reasons.worst import find_worst
+from rover_planner.viewer.state.reasons.failure import explain
+from rover_planner.viewer.state.reasons.path_limits import find_worst
 from rover_planner.viewer.state.survey_layers import list_class_colours, list_limit_colours
 from support.grounds import make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, ramp, session_on
@@ -60,7 +60,7 @@ def refused():
 
 
 def test_lanes_have_a_strip_for_each_limit_that_is_broken_where_the_path_fails(refused):
-    why = explain(refused.finished)
+    why = explain(refused.shown)
     drawing = draw_lanes(why.limits)
     for k, lane in enumerate(why.limits.lanes):
         assert f'y="{14 * k + 1}"' in drawing, lane.limit.title
@@ -90,7 +90,7 @@ def test_the_mark_of_a_failure_leaves_the_curves_as_they_are():
 
 def test_the_table_has_a_row_for_each_candidate_with_its_numbers_and_marks_the_shown_one():
     session = session_on(wall_at(0.5), goal=(1.5, 0.0, 0.0))
-    rows = list_candidates(session.candidates, session.answer.nearest, [False] * 5)
+    rows = list_candidates(session.shown.candidates, session.shown.answer.nearest, [False] * 5)
     text = draw_candidates(rows, 1)
     assert [int(n) for n in re.findall(r'<tbody data-say="show (\d)"', text)] == [1, 2, 3, 4, 5]
     for row in rows:
@@ -128,7 +128,7 @@ def test_the_board_shows_the_papers_traction_ratio_on_firm_ground_and_slip_on_so
 
 
 def test_the_board_outlines_the_link_that_fails_and_lists_the_worst_so_far(refused):
-    why, trajectory = explain(refused.finished), refused.shown.trajectory
+    why, trajectory = explain(refused.shown), refused.shown.trajectory
     worst = find_worst(why.limits, trajectory.duration)
     board = draw_board(LSR1, trajectory.state_at(trajectory.duration), BoardNotes(False, worst))
     assert f"{why.failure.value:.2f}max 1.00" in re.sub(r"<[^>]*>", "", board)
@@ -228,7 +228,7 @@ def test_a_layer_along_a_path_has_the_heading_of_its_nearest_waypoint():
     path = np.array([[-1.0, 0.0, 0.4], [1.0, 0.0, -1.1]])
     at = np.array([-0.6, 0.7]), np.array([0.2])
     tilt = LAYERS["torque saturation"]
-    options = session_on(waves).sweep_options()
+    options = session_on(waves).scenario.asked_options.model
     along, _ = predict_layer(tilt, LSR1, ground, path, at, options)
     for column, yaw in enumerate((0.4, -1.1)):
         fixed, _ = predict_layer(tilt, LSR1, ground, yaw, at, options)

@@ -16,7 +16,7 @@ viser = pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
 
 def report_of(session) -> str:
-    judgement = session.finished
+    judgement = session.shown
     return describe_judgement(judgement, describe_scenario(judgement.scenario, "gap.npz"), "")
 
 
@@ -29,10 +29,10 @@ def test_numbers_of_a_rover_that_never_settles_are_not_known():
 @pytest.mark.parametrize("value", [float("inf"), float("nan")])
 def test_what_has_no_bound_is_said_in_words(value):
     session = session_on(gap)
-    judged = session.finished
-    verdict = replace(judged.shown.verdict, max_friction_utilisation=value)
-    candidate = replace(judged.shown.candidate, verdict=verdict)
-    session.finished = replace(judged, shown=replace(judged.shown, candidate=candidate))
+    judged = session.shown
+    verdict = replace(judged.verdict, max_friction_utilisation=value)
+    candidate = replace(judged.candidate, verdict=verdict)
+    session.shown = replace(judged, candidate=candidate)
     word = "infinite" if value > 0.0 else "?"
     assert f"<th>largest friction utilisation</th><td>{word}</td>" in report_of(session)
 

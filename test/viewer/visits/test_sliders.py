@@ -61,16 +61,16 @@ def check_page(page: Page, visitor: Visitor) -> None:
     session, chip = page.session, visitor.tab.locator('[data-chip="is"]')
 
     def is_seen() -> bool:
-        verdict = session.finished.shown.verdict
+        verdict = session.shown.verdict
         word = "traversable" if verdict.traversable else "not traversable"
         return chip.inner_text() == word and verdict.reason in visitor.text("#verdict:visible")
 
     wait_until(is_seen, "the verdict in header and tab")
-    now = session.finished
-    options, poses = now.scenario.asked_options.model, now.shown.candidate.poses
+    now = session.shown
+    options, poses = now.scenario.asked_options.model, now.candidate.poses
     _, verdict = judge_path(now.scenario.rover, now.scenario.terrain, poses, options)
-    assert now.shown.verdict.traversable == verdict.traversable
-    assert now.shown.verdict.reason == verdict.reason
+    assert now.verdict.traversable == verdict.traversable
+    assert now.verdict.reason == verdict.reason
     assert not page.errors.messages and visitor.page_errors == []
 
 
@@ -94,7 +94,7 @@ def test_sliders_at_both_ends_leave_the_page_alive_and_right(name, browser):
             wait_until(lambda: page.session.wanted.rover == LSR1, "the loaded rover")
             wait_for_rest(page)
         check_page(page, visitor)
-        assert page.session.rover == LSR1 and not page.session.arm_angles
+        assert page.session.rover == LSR1 and not page.session.scenario.arm_angles
         visitor.open_tab("Drive")
         visitor.press("Play")
         wait_until(lambda: page.playback.time > 0.0, "the rover to drive")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The first failure of a path: which limit, by how much, which wheel or link, where and when."""
+"""The first failure of a judged path: limit, value, wheel or link, place and time."""
 
 from dataclasses import dataclass, fields
 from typing import Any
@@ -8,18 +8,28 @@ import numpy as np
 
 from rover_physics.names import SIDES, WHEEL_POSITIONS, WHEELS
 from rover_physics.numerics.arrays import Floats
-from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.verdict import Verdict
-from rover_planner.viewer.state.reasons.limits import WAYS, Limit
-from rover_planner.viewer.state.reasons.path_limits import PathLimits, Use
-from rover_planner.viewer.state.trajectory import MAX_VALUE, PLACES, RoverState
+from rover_planner.viewer.state.reasons.limits import Limit
+from rover_planner.viewer.state.reasons.path_limits import AskedPoses, PathLimits, find_path_limits
+from rover_planner.viewer.state.scenario import Shown
+from rover_planner.viewer.state.trajectory import RoverState, make_state, read_series
 
 BODY = "body"
 """Name of the body among the links."""
 BODY_CODES = ("tilt", "tip_over", "belly")
 """Codes of limits of the body."""
+TITLES = {
+    "steering": "steering",
+    "off_map": "off the map",
+    "unknown_ground": "unknown ground",
+    "not_settled": "does not settle",
+    "no_equilibrium": "no equilibrium",
+    "not_computable": "not computable",
+    "trapped": "trapped",
+}
+"""Short names of the codes of a verdict that have no number."""
 ON_THE_WAY = "on the way here: "
 """How the reason of a failure between waypoints begins."""
 MAX_BETWEEN = 8
@@ -65,106 +75,62 @@ class Failure:
         """The value beside the limit, such as "friction 1.32 of 1.00, middle left wheel"."""
         if not np.isnan(self.value):
             words = self.limit.compare(self.value)
-        elif self.code in WAYS:
-            words = WAYS[self.code]
+        elif self.code in TITLES:
+            words = TITLES[self.code]
         else:
             return self.reason.removeprefix(ON_THE_WAY)
         return f"{words}, {self.where}" if self.where else words
 
 
 def find_failure(
-    rover: Rover,
-    terrain: Terrain,
-    prediction: PathPrediction,
-    verdict: Verdict,
-    limits: PathLimits,
+    rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathLimits
 ) -> Failure | None:
     """Return the first failure of a judged path; None if there is none.
 
     Args:
         rover: The rover.
         terrain: The ground.
-        prediction: The prediction of the path.
-        verdict: The verdict on it.
+        verdict: The verdict on the path.
         limits: Its limits, as `find_path_limits` returns them.
     """
     if verdict.first_failure < 0:
         return None
     lane, rows = limits.lane(verdict.code), limits.rows
-    here = rows.waypoint == verdict.first_failure
-    broken = np.flatnonzero(here & (lane.use == Use.BROKEN))
+    here = rows.prediction.waypoint == verdict.first_failure
+    broken = np.flatnonzero(here & (lane.used > 1.0))
     if not broken.size:  # a recorded refusal that this rover does not explain
         broken = np.flatnonzero(here & ~rows.is_between)
     at = int(broken[np.argmin(rows.is_between[broken])])
-    is_between, row = bool(rows.is_between[at]), int(rows.row[at])
-    part = prediction.between if is_between and prediction.between is not None else prediction
-    settled = bool(part.settled[row])
-    distance, time = float(rows.distance[at]), float(rows.time[at])
-    pose = part.poses[row]
-    state = (
-        state_of(part, row, distance, time)
-        if settled
-        else level_state(rover, terrain, pose, distance, time)
-    )
-    value = float(lane.values[at])
-    wheel = int(lane.wheel[at]) if lane.limit.is_broken_by(value) else -1
-    link = _find_link(rover, terrain, (verdict.code, part, row), wheel)
+    settled, value = bool(rows.prediction.settled[at]), float(lane.values[at])
+    explains = lane.limit.is_broken_by(value)
+    near = rows.is_between & (rows.prediction.waypoint >= verdict.first_failure - 1)
+    before = np.flatnonzero(near[:at] & rows.prediction.settled[:at])
     return Failure(
         code=verdict.code,
         reason=verdict.reason,
         limit=lane.limit,
-        value=value if lane.limit.is_broken_by(value) else np.nan,
-        link=link,
-        distance=distance,
-        time=time,
-        is_between=is_between,
+        value=value if explains else np.nan,
+        link=_find_link(rover, terrain, verdict.code, rows, at)
+        or (WHEELS[lane.wheel[at]] if explains and lane.wheel[at] >= 0 else ""),
+        distance=float(rows.distance[at]),
+        time=float(rows.time[at]),
+        is_between=bool(rows.is_between[at]),
         is_settled=settled,
-        state=state,
-        between=_states_between(prediction, limits, at),
+        state=_state_at(rows, at) if settled else level_state(rover, terrain, rows, at),
+        between=tuple(_state_at(rows, int(k)) for k in before[-MAX_BETWEEN:]),
     )
 
 
-def _states_between(prediction: PathPrediction, limits: PathLimits, at: int) -> tuple[Any, ...]:
-    """Return the states at poses between the waypoints before a row, of its last two waypoints."""
-    rows, between = limits.rows, prediction.between
-    if between is None:
-        return ()
-    near = rows.is_between & (rows.waypoint >= rows.waypoint[at] - 1)
-    near[at] = False
-    found = [k for k in np.flatnonzero(near[: at + 1]) if between.settled[rows.row[k]]]
-    return tuple(
-        state_of(between, int(rows.row[k]), float(rows.distance[k]), float(rows.time[k]))
-        for k in found[-MAX_BETWEEN:]
-    )
+def _state_at(rows: AskedPoses, at: int) -> RoverState:
+    """Return the state at a row at which the rover settles, with unturned wheels."""
+    series = read_series(rows.prediction.select([at]))
+    series |= {"distance": rows.distance[[at]], "time": rows.time[[at]], "spin": np.zeros((1, 6))}
+    return make_state({name: values[0] for name, values in series.items()})
 
 
-def state_of(part: PathPrediction, row: int, distance: float, time: float) -> RoverState:
-    """Return the state at a row of a prediction, at a distance [m] and a time [s]."""
-    values: dict[str, Any] = {
-        field.name: getattr(part, field.name)[row]
-        for field in fields(RoverState)
-        if hasattr(part, field.name)
-    }
-    x, y = part.motion[row, :2]
-    values |= {
-        "distance": distance,
-        "time": time,
-        "attitude": np.array([part.roll[row], part.pitch[row], part.poses[row, 2]]),
-        "spin": np.zeros(6),
-        "speed": np.hypot(x, y),
-    }
-    finite: dict[str, Any] = {}
-    for name, value in values.items():
-        known = value if name in PLACES else np.clip(np.nan_to_num(value), -MAX_VALUE, MAX_VALUE)
-        finite[name] = float(known) if np.ndim(known) == 0 else known
-    return RoverState(**finite)
-
-
-def level_state(
-    rover: Rover, terrain: Terrain, pose: Floats, distance: float, time: float
-) -> RoverState:
-    """Return a level rover without forces over a pose x, y [m], yaw [rad]."""
-    x, y, yaw = pose.tolist()
+def level_state(rover: Rover, terrain: Terrain, rows: AskedPoses, at: int) -> RoverState:
+    """Return a level rover without forces at a row, above the ground below its origin."""
+    x, y, yaw = rows.prediction.poses[at].tolist()
     height = float(terrain.elevation_at(x, y))
     height = height if np.isfinite(height) else 0.0
     standing = rover.wheel.radius - rover.suspension.wheels["middle"][2]
@@ -177,8 +143,8 @@ def level_state(
         for field in fields(RoverState)
     }
     values |= {
-        "distance": distance,
-        "time": time,
+        "distance": float(rows.distance[at]),
+        "time": float(rows.time[at]),
         "position": position,
         "attitude": np.array([0.0, 0.0, yaw]),
         "wheel_centres": position + centres,
@@ -189,46 +155,64 @@ def level_state(
 
 def place_wheels(rover: Rover) -> Floats:
     """Return the wheel centres (6, 3) on flat ground, body frame [m]."""
+    sides = {"left": (1.0, 1.0, 1.0), "right": (1.0, -1.0, 1.0)}
+    names = (name.rsplit("_", 1) for name in WHEELS)
     wheels = rover.suspension.wheels
-    sides = {"left": 1.0, "right": -1.0}
-    return np.array(
-        [
-            np.multiply(wheels[name], (1.0, sides[side], 1.0))
-            for side in SIDES
-            for name in WHEEL_POSITIONS
-        ]
-    )
+    return np.array([np.multiply(wheels[position], sides[side]) for position, side in names])
 
 
-def _find_link(
-    rover: Rover, terrain: Terrain, at: tuple[str, PathPrediction, int], wheel: int
-) -> str:
-    """Return the link that fails at a code, a part of the prediction and a row of it."""
-    code, part, row = at
+def _find_link(rover: Rover, terrain: Terrain, code: str, rows: AskedPoses, at: int) -> str:
+    """Return the link that fails at a row; empty if the wheel that decides the limit does."""
+    part = rows.prediction
     if code in BODY_CODES:
         return BODY
     if code == "suspension":
-        joints = np.hstack([part.rocker_angle[row], part.bogie_angle[row]])
+        joints = np.hstack([part.rocker_angle[at], part.bogie_angle[at]])
         limits = rover.suspension.rocker_limits, rover.suspension.bogie_limits
         low, high = np.repeat(limits, 2, axis=0).T
         joint = int(np.argmin(np.minimum(joints - low, high - joints)))
         return f"{('rocker', 'bogie')[joint // 2]}_{SIDES[joint % 2]}"
     if code in ("off_map", "unknown_ground"):
-        state = level_state(rover, terrain, part.poses[row], 0.0, 0.0)
-        wheel = _find_lost_wheel(rover, terrain, state.wheel_centres)
+        return _find_lost_wheel(rover, terrain, level_state(rover, terrain, rows, at))
     if code == "steering" and rover.steering is not None:
         turns = np.tile([name in rover.steering.wheels for name in WHEEL_POSITIONS], 2)
         allowed = np.where(turns, rover.steering.limit, 0.0)
-        wheel = int(np.argmax(np.abs(part.steering_angle[row]) - allowed))
-    return WHEELS[wheel] if wheel >= 0 else ""
+        return WHEELS[int(np.argmax(np.abs(part.steering_angle[at]) - allowed))]
+    return ""
 
 
-def _find_lost_wheel(rover: Rover, terrain: Terrain, centres: Floats) -> int:
-    """Return the wheel with the most of its footprint beyond known ground; -1 for none."""
-    radius = rover.wheel.radius
-    offsets = radius * np.linspace(-1.0, 1.0, 5)
-    x = centres[:, 0, None, None] + offsets[:, None]
-    y = centres[:, 1, None, None] + offsets
+def _find_lost_wheel(rover: Rover, terrain: Terrain, state: RoverState) -> str:
+    """Return the wheel with the most of its footprint beyond known ground; empty for none."""
+    offsets = rover.wheel.radius * np.linspace(-1.0, 1.0, 5)
+    x = state.wheel_centres[:, 0, None, None] + offsets[:, None]
+    y = state.wheel_centres[:, 1, None, None] + offsets
     lost = ~np.isfinite(terrain.elevation_at(x + 0.0 * y, y + 0.0 * x)).reshape(6, -1)
     counts = lost.sum(axis=1)
-    return int(np.argmax(counts)) if counts.any() else -1
+    return WHEELS[int(np.argmax(counts))] if counts.any() else ""
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """Why a judged path can be driven or not: the limits along it and its first failure."""
+
+    limits: PathLimits
+    """How it uses the limits, up to the first failure."""
+    failure: Failure | None
+    """The first failure; None if the path can be driven."""
+
+    @property
+    def failure_at(self) -> float | None:
+        """Distance of the failure [m]; None without one."""
+        return None if self.failure is None else self.failure.distance
+
+    @property
+    def failing_link(self) -> str:
+        """The link that fails; empty for none."""
+        return "" if self.failure is None else self.failure.link
+
+
+def explain(shown: Shown) -> Explanation:
+    """Return the explanation of the shown path."""
+    asked = shown.scenario
+    limits = find_path_limits(asked.rover, shown.candidate.prediction, shown.verdict)
+    return Explanation(limits, find_failure(asked.rover, asked.terrain, shown.verdict, limits))
