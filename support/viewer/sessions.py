@@ -124,10 +124,13 @@ def slow_scenario(friction: float = 2.0) -> Scenario:
     return Scenario(rover, rover, lowered_reef(), START, GOAL, slow_options(), {})
 
 
-def walled_session(height, goal=(-1.1, 0.0, 0.0), rover=LSR1) -> ViewSession:
-    """Return a session on 5 m x 5 m with a wall at x = 0; searches may take long."""
-    patient, ground = LatticeSettings(budget=60.0), make_terrain(height, half=2.5)
-    return ViewSession(rover, ground, (-1.6, 0.0, 0.0), goal, search=patient)
+def walled_session(
+    height, goal=(-1.1, 0.0, 0.0), rover=LSR1, *, ends_at_first: bool = True
+) -> ViewSession:
+    """Return a session on 5 m x 5 m with a wall at x = 0; a search for the best may take long."""
+    search = LatticeSettings(budget=60.0, ends_at_first=ends_at_first)
+    ground = make_terrain(height, half=2.5)
+    return ViewSession(rover, ground, (-1.6, 0.0, 0.0), goal, search=search)
 
 
 @contextmanager

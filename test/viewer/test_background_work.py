@@ -162,6 +162,7 @@ def test_no_error_ends_the_thread(error):
     assert work.close()
 
 
+@pytest.mark.long
 def test_a_process_ends_although_work_runs_in_it():
     code = (
         "import time\n"

@@ -226,10 +226,8 @@ class PageBase(ABC):
             self.open_link(link)
 
     def _aim_camera(self, client: Any) -> None:
-        session = self.session
-        self.scene.aim_camera(
-            client, session.rover, session.terrain, session.scenario.start, session.scenario.goal
-        )
+        now = self.session.scenario
+        self.scene.aim_camera(client, now.rover, now.terrain, now.start, now.goal)
 
     def _request_view(self, event: Any) -> None:
         client, name = event.client, event.target.value

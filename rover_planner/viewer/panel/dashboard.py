@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from rover_physics.rover.model import Rover
-from rover_planner.viewer.live.topic_ages import TopicAge
+from rover_planner.viewer.live.live_state import TopicAge
 from rover_planner.viewer.panel.board import BoardNotes, draw_board, draw_legend
 from rover_planner.viewer.state.colours import NOTICE, PASSABLE, REFUSED, UNKNOWN, to_css
 from rover_planner.viewer.state.context import POLICY_TITLES

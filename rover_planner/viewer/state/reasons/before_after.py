@@ -45,11 +45,6 @@ class ChangeHistory:
         self._done = [judgement]
         """Showns of different rovers on the same paths, the newest last."""
 
-    @property
-    def before(self) -> Shown | None:
-        """The judgement of the last rover before the newest one; None if there is none."""
-        return self._done[-2] if len(self._done) > 1 else None
-
     def take(self, judgement: Shown) -> None:
         """Note a judgement of all paths; one of other paths begins anew.
 
