@@ -82,16 +82,20 @@ def view(
     from rover_physics.rover.rover_file import load_rover
     from rover_planner.viewer.pages.base import check_address
     from rover_planner.viewer.state.session import ViewSession
+    from rover_planner.viewer.state.survey_layers import load_map, open_survey
 
     model = load_rover(rover)
     check_address(host, port)
+    surveyed = None
     if survey is not None and terrain is None:
-        ground = _load_map_of(survey, max_cells)
+        ground = load_map(survey, max_cells)
+        surveyed = open_survey(survey, model, None)  # on its own map
     else:
         ground = _load_or_make(terrain, follow, max_cells)
         if prediction is None:  # predictions were made on the original map
             ground = ground.fill_gaps(max_gap)
-    surveyed = None if survey is None else _open_survey(survey, model, ground, terrain is None)
+        if survey is not None:
+            surveyed = open_survey(survey, model, ground)
     if not follow:
         _check_on_map(ground, start=start, goal=goal)
     _compile()
@@ -146,20 +150,6 @@ def _compile() -> None:
     with show_progress() as progress, Compilation(steps) as compilation:
         progress("load the model")
         compilation.run(lambda name: progress(f"compile {name} (only the first time)"))
-
-
-def _load_map_of(survey: Path, max_cells: int) -> "Terrain":
-    """Return the map of a survey."""
-    from rover_planner.viewer.state.survey_layers import load_map
-
-    return load_map(survey, max_cells)
-
-
-def _open_survey(survey: Path, rover: "Rover", ground: "Terrain", own: bool) -> "ShownSurvey":
-    """Open a survey of this rover and, unless the ground is its own map, of this ground."""
-    from rover_planner.viewer.state.survey_layers import open_survey
-
-    return open_survey(survey, rover, None if own else ground)
 
 
 def _show(
@@ -218,23 +208,20 @@ def choose_ends(rover: "Rover", ground: "Terrain") -> tuple[End, End]:
     """
     import numpy as np
 
-    low, high = _ends_about_the_middle(rover, ground)
-    way = np.linspace(low[:2], high[:2], PLACES_TRIED)
-    if np.isfinite(ground.elevation_at(way[:, 0], way[:, 1])).all():
-        return low, high
-    return _ends_on_known_ground(rover, ground) or (low, high)
-
-
-def _ends_on_known_ground(rover: "Rover", ground: "Terrain") -> tuple[End, End] | None:
-    """Return a start and the farthest goal on plain ground, None if the map has none."""
     from rover_planner.planning.goals import choose_mission
 
+    low, high = _ends_about_the_middle(rover, ground)
+    between = np.linspace(low[:2], high[:2], PLACES_TRIED)
+    if np.isfinite(ground.elevation_at(between[:, 0], between[:, 1])).all():
+        return low, high
     try:
         mission = choose_mission(ground, rover)
     except PlanningError:
-        return None
+        return low, high
     plain = [goal.pose for goal in mission.goals if goal.intent == "plain"]
-    return (mission.start, max(plain, key=partial(math.dist, mission.start))) if plain else None
+    if not plain:
+        return low, high
+    return mission.start, max(plain, key=partial(math.dist, mission.start))
 
 
 def _ends_about_the_middle(rover: "Rover", ground: "Terrain") -> tuple[End, End]:

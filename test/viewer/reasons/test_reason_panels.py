@@ -16,8 +16,6 @@ from rover_planner.viewer.panel.lanes import BROKEN, COLOURS, WIDTH, draw_lanes
 from rover_planner.viewer.panel.legend import draw_scale
 from rover_planner.viewer.panel.plots import (
     MAX_POINTS,
-    add_cursor,
-    add_mark,
     choose_rows,
 )
 from rover_planner.viewer.state import colours
@@ -71,18 +69,6 @@ def test_lanes_have_a_strip_for_each_limit_that_is_broken_where_the_path_fails(r
     left, width = map(float, strips[-1])
     assert left <= WIDTH * why.failure.distance / why.limits.end <= left + width + 0.5
     assert why.failure.headline.split(",")[0] in drawing
-
-
-def test_the_mark_of_a_failure_leaves_the_curves_as_they_are():
-    x, values = np.linspace(0.0, 4.0, 9), np.column_stack([np.arange(9.0)])
-    columns = add_mark(add_cursor(x, values, 1.25, None, 0.0), 3.1, 0.0)
-    at, curve, mark, cursor = columns
-    assert all(np.isfinite(column).all() for column in columns)
-    assert (np.diff(at) >= 0.0).all()
-    np.testing.assert_allclose(curve, 2.0 * at)
-    assert at[np.argmax(mark)] == 3.1 and at[np.argmax(cursor)] == 1.25
-    *_, none, _ = add_mark(add_cursor(x, values, 1.25, None, 0.0), None, 0.0)
-    assert none.max() == 0.0
 
 
 # Tables.
