@@ -108,7 +108,7 @@ def test_other_policies_are_judged_after_the_drawings(page, monkeypatch):
 
 @pytest.mark.timed
 def test_the_rover_drives_on_while_a_change_is_judged_and_drawn():
-    options, search = slow_options(2, 2e-4), LatticeSettings(budget=0.1)
+    options, search = slow_options(1, 3e-4), LatticeSettings(budget=0.1)
     session = ViewSession(tolerant_rover(), lowered_reef(), START, GOAL, options, search)
     page = Page(session, port=0)
     try:

@@ -87,15 +87,9 @@ class Trajectory:
         """Number of waypoints; 0 where the rover does not settle at the start."""
         self.notes = describe_exemptions(prediction, end)
         """Sentences on what lies between the waypoints, and on what the verdict did not ask."""
-        self._series = self._collect(rover, prediction.select(slice(end))) if end else {}
-
-    def _collect(self, rover: Rover, driven: PathPrediction) -> dict[str, Floats]:
-        """Return the values (n, ...) of each field of `RoverState`."""
-        moves = np.linalg.norm(np.diff(driven.wheel_centres, axis=0), axis=2)
-        rolled = moves / rover.wheel.radius / (1.0 - np.clip(driven.slip_ratio, 0, MAX_SLIP))[1:]
-        rolled *= np.where(driven.wheel_speed[1:] < 0.0, -1.0, 1.0)
-        spin = np.vstack([np.zeros(6), np.cumsum(np.nan_to_num(rolled), axis=0)])
-        return {**read_series(driven), "spin": spin}
+        self._series = dict.fromkeys(("time", "distance", "energy"), np.zeros(1))
+        if end:
+            self._series = _read_drive(rover, prediction.select(slice(end)))
 
     @property
     def has_slip(self) -> bool:
@@ -103,20 +97,15 @@ class Trajectory:
         prediction = self.prediction
         return prediction.policy == SERVO or bool(np.any(prediction.sinkage > 0.0))
 
-    @staticmethod
-    def empty_times() -> Floats:
-        """Return the times of a trajectory without waypoints: the start alone."""
-        return np.zeros(1)
-
     @property
     def times(self) -> Floats:
-        """(length,) times of the waypoints [s]."""
-        return self._series["time"] if self.length else self.empty_times()
+        """(length,) times of the waypoints [s]; the start alone without waypoints."""
+        return self._series["time"]
 
     @property
     def distance(self) -> Floats:
-        """(length,) distances driven at the waypoints [m]."""
-        return self._series["distance"] if self.length else self.empty_times()
+        """(length,) distances driven at the waypoints [m]; as many as times."""
+        return self._series["distance"]
 
     @property
     def duration(self) -> float:
@@ -143,6 +132,15 @@ class Trajectory:
                 for n, rows in self._series.items()
             }
         )
+
+
+def _read_drive(rover: Rover, driven: PathPrediction) -> dict[str, Floats]:
+    """Return the values (n, ...) of each field of `RoverState`."""
+    moves = np.linalg.norm(np.diff(driven.wheel_centres, axis=0), axis=2)
+    rolled = moves / rover.wheel.radius / (1.0 - np.clip(driven.slip_ratio, 0, MAX_SLIP))[1:]
+    rolled *= np.where(driven.wheel_speed[1:] < 0.0, -1.0, 1.0)
+    spin = np.vstack([np.zeros(6), np.cumsum(np.nan_to_num(rolled), axis=0)])
+    return {**read_series(driven), "spin": spin}
 
 
 def read_series(prediction: PathPrediction) -> dict[str, Floats]:

@@ -84,8 +84,8 @@ def test_the_table_has_a_row_for_each_candidate_with_its_numbers_and_marks_the_s
             f"{row.driven:.2f} / {row.candidate.length:.2f}" in text
             and f"{row.energy:.1f}" in text
         )
-    assert text.count("background:rgba") == 1
-    marked = text[text.index("background:rgba") - 40 : text.index("background:rgba")]
+    assert text.count("background:rgba(0,114,178") == 1
+    marked = text[text.index("background:rgba(0") - 40 : text.index("background:rgba(0")]
     assert 'tbody data-say="show 2"' in marked and text.count('aria-selected="true"') == 1
 
 

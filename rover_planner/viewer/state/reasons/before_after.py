@@ -126,4 +126,4 @@ def compare_drives(before: Trajectory, after: Trajectory) -> tuple[Difference, .
 
 
 def _last(trajectory: Trajectory, name: str) -> float:
-    return float(trajectory.series(name)[-1]) if trajectory.length else 0.0
+    return float(trajectory.series(name)[-1])
