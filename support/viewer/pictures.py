@@ -106,7 +106,7 @@ def _show_failure(page: Page, visitor: Visitor) -> str:
     for index, candidate in enumerate(session.shown.candidates):
         if candidate.verdict.traversable:
             continue
-        page.requests.add(lambda index=index: page.show_path(index + 1))
+        page.requests.add(lambda index=index: page.session.show_candidate(index))
         wait_until(lambda index=index: session.shown.index == index, "the path")
         wait_until(lambda: not page.is_busy, "its verdicts")
         failure = page.judged.failure

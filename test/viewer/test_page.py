@@ -17,8 +17,8 @@ from rover_planner.viewer.pages.page import Page
 
 pytestmark = [needs_browser, pytest.mark.slow]
 
-MIDDLE, SKY = (720, 480), (600, 130)
-"""Points of the screen, on the ground and beside it [px]."""
+MIDDLE, SKY = (720, 480), (750, 110)
+"""Points of the screen beside the notices of viser, on the ground and beside it [px]."""
 FRICTION = "friction [-]"
 
 
@@ -43,7 +43,7 @@ def show_refused(page: Page) -> None:
     """Show the first path that is refused, judged under all policies."""
     verdicts = [candidate.verdict for candidate in page.session.shown.candidates]
     index = next(k for k, verdict in enumerate(verdicts) if not verdict.traversable)
-    ask(page, lambda: page.show_path(index + 1))
+    ask(page, lambda: page.session.show_candidate(index))
     wait_for_rest(page)
     assert page.session.shown.index == index
 
@@ -68,7 +68,7 @@ def test_the_page_opens_with_verdict_loads_and_header_on_the_screen_of_a_laptop(
 
 
 def test_buttons_keys_typed_times_and_clicks_on_lanes_and_plots_move_the_drive(visitor, page):
-    ask(page, lambda: page.show_path(page.session.shown.answer.nearest + 1))
+    ask(page, lambda: page.session.show_candidate(page.session.shown.answer.nearest))
     wait_for_rest(page)
     trajectory, keyboard = page.session.shown.trajectory, visitor.tab.keyboard
 

@@ -6,7 +6,7 @@ change. Nobody sees the box.
 """
 
 import html
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from importlib.resources import files
 from typing import Any
 
@@ -19,21 +19,19 @@ HIDDEN = (
 """Hides the box behind it; an image that cannot be shown runs the script."""
 
 
-def add_script(gui: Any, actions: Mapping[str, Callable[[str], None]]) -> None:
+def add_script(gui: Any, hear: Callable[[str, str], None]) -> None:
     """Add the script and its box to the container that is open.
 
     Args:
         gui: The GUI of viser.
-        actions: Quick actions by their words, which get what follows the word; other words are
-            ignored.
+        hear: Called quickly with each word that a visitor's script sends, and what follows it.
     """
     script = files(__package__).joinpath("page.js").read_text(encoding="utf-8")
     gui.add_html(HIDDEN.format(script=html.escape(script)))
 
-    async def hear(event: Any) -> None:
-        """Act on the words of a visitor; on viser's loop, so that none are lost."""
-        _, _, word, rest = (*event.target.value.split(" ", 3), "", "", "", "")[:4]
-        if event.client is not None and word in actions:
-            actions[word](rest)
+    async def read(event: Any) -> None:  # on viser's loop, so that no words are lost
+        words = event.target.value.split(" ", 3)
+        if event.client is not None and len(words) == 4:
+            hear(words[2], words[3])
 
-    gui.add_text("words", PREFIX).on_update(hear)
+    gui.add_text("words", PREFIX).on_update(read)

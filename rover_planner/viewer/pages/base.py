@@ -16,7 +16,6 @@ import numpy as np
 from rover_physics.files.validation import describe
 from rover_physics.numerics.arrays import Floats
 from rover_planner.errors import PlanningError
-from rover_planner.viewer.browser.link import Link, read_link
 from rover_planner.viewer.browser.words import add_script
 from rover_planner.viewer.panel.header import Chip, Header
 from rover_planner.viewer.panel.notices import ErrorNotice
@@ -160,28 +159,25 @@ class PageBase(ABC):
         """Act on a click at a point of the ground (2,) [m]; None beside known ground."""
 
     @abstractmethod
-    def show_path(self, number: int) -> None:
-        """Show a path by its number, from 1, of a row or in the scene."""
+    def hear(self, word: str, rest: str) -> None:
+        """Act on words of the page's script.
 
-    @abstractmethod
-    def seek_share(self, share: float) -> None:
-        """Go to a share, 0 to 1, of the distance of lanes and plots."""
-
-    @abstractmethod
-    def open_link(self, link: Link) -> None:
-        """Show what a link holds.
+        Args:
+            word: "open" a link, "show" a path, or "seek" on lanes and plots.
+            rest: The query of the address, the number of the path from 1, or the share, 0 to 1, of
+                the distance.
 
         Raises:
-            RoverError, PlanningError: This page cannot show it.
+            RoverError, PlanningError: This page cannot.
         """
 
     @abstractmethod
     def advance(self, seconds: float) -> None:
         """Draw the next picture, after a time of the visitor [s]."""
 
-    @abstractmethod
     def add_due_requests(self) -> None:
         """Add requests whose time has come; called in each period, with or without pictures."""
+        return
 
     @abstractmethod
     def describe_context(self) -> tuple[Context, tuple[Chip, ...]]:
@@ -203,14 +199,7 @@ class PageBase(ABC):
         self.errors = ErrorNotice(gui)
         self.drawings = Drawings(self.errors, self.server.atomic)
         add = self.requests.add
-        add_script(
-            gui,
-            {
-                "open": lambda query: add(lambda: self._open_query(query), "link"),
-                "show": lambda number: add(lambda: self.show_path(int(number)), "path"),
-                "seek": lambda share: add(lambda: self.seek_share(float(share)), "seek"),
-            },
-        )
+        add_script(gui, lambda word, rest: add(lambda: self.hear(word, rest), word))
         self._camera = gui.add_button_group("Camera", (*VIEWS, FOLLOW))
         self._camera.on_click(self._request_view)
         left = gui.add_panel()
@@ -219,11 +208,6 @@ class PageBase(ABC):
         left.dock_left()
         left.set_width(PLOTS_WIDTH)
         self.fill_panel()
-
-    def _open_query(self, query: str) -> None:
-        link = read_link(query)
-        if link is not None:
-            self.open_link(link)
 
     def _aim_camera(self, client: Any) -> None:
         now = self.session.scenario
@@ -246,9 +230,9 @@ class PageBase(ABC):
         origin, direction = np.array(event.ray_origin), np.array(event.ray_direction)
 
         def click() -> None:
-            number = self.scene.paths.find_number(origin, direction)
-            if number is not None:
-                self.show_path(number + 1)
+            index = self.scene.paths.find_number(origin, direction)
+            if index is not None:
+                self.hear("show", f"{index + 1}")
                 return
             start = self.scene.frame.to_map(origin)
             self.click(intersect_ground(self.session.terrain, start, direction), shift)

@@ -8,7 +8,7 @@ import numpy as np
 from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
-from rover_planner.viewer.browser.link import Link
+from rover_planner.viewer.browser.link import read_link
 from rover_planner.viewer.live.listener import NO_ODOMETRY, LiveData, LiveListener
 from rover_planner.viewer.live.live_state import StateBuilder, TopicAge
 from rover_planner.viewer.pages.base import PageBase
@@ -106,22 +106,14 @@ class LivePage(PageBase):
         else:
             self.show_refusal(self._listener.request_plan(point))
 
-    def show_path(self, number: int) -> None:
-        """Do nothing: the plan is the only path."""
-
-    def seek_share(self, share: float) -> None:
-        """Do nothing: a live rover is where it is."""
-
-    def open_link(self, link: Link) -> None:
-        """Refuse a link."""
-        raise PlanningError("this page follows a live rover, so it opens no links")
+    def hear(self, word: str, rest: str) -> None:
+        """Refuse a link; the plan is the only path, and the rover is where it is."""
+        if word == "open" and read_link(rest) is not None:
+            raise PlanningError("this page follows a live rover, so it opens no links")
 
     def path_to_look_at(self) -> Floats:
         """Return x and y (2, 2) [m] of the places between which the rover was first seen."""
         return np.array([self.session.scenario.start[:2], self.session.scenario.goal[:2]])
-
-    def add_due_requests(self) -> None:
-        """Do nothing: all comes by topics."""
 
     def show_refusal(self, reason: str) -> None:
         """Show, as text, why a request was refused; nothing if the reason is empty."""

@@ -8,7 +8,7 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import RoverValue
-from rover_planner.viewer.browser.link import Link
+from rover_planner.viewer.browser.link import Link, read_link
 from rover_planner.viewer.pages.base import PageBase
 from rover_planner.viewer.pages.ground_painter import GroundPainter
 from rover_planner.viewer.pages.judged_display import JudgedDisplay, Panels
@@ -151,6 +151,17 @@ class Page(PageBase):
 
     # Requests of visitors.
 
+    def hear(self, word: str, rest: str) -> None:
+        """Open a link, show a path, or go to a place of lanes and plots."""
+        if word == "open":
+            link = read_link(rest)
+            if link is not None:
+                self.open_link(link)
+        elif word == "show":
+            self.session.show_candidate(int(rest) - 1)
+        elif word == "seek":
+            self.judged.seek_share(float(rest))
+
     def open_link(self, link: Link) -> None:
         """Judge what a link holds, and show it."""
         self.sharing.open(link)
@@ -171,14 +182,6 @@ class Page(PageBase):
         else:
             self.session.plan_from(point)
         self.judged.show_verdict()
-
-    def show_path(self, number: int) -> None:
-        """Show a candidate by its number, from 1."""
-        self.session.show_candidate(number - 1)
-
-    def seek_share(self, share: float) -> None:
-        """Go to a share, 0 to 1, of the distance of lanes and plots."""
-        self.judged.seek_share(share)
 
     def show_refusal(self, reason: str) -> None:
         """Show, as text, why a request was refused."""

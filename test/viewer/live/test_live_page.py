@@ -97,7 +97,7 @@ def test_a_page_on_a_given_map_says_so_and_refuses_links(ros):
     try:
         assert page.describe_context()[0].ground == session.ground_name == "7.95 x 7.95 m"
         query = "?rover=lsr1&map=1&start=0,0,0&goal=1,0,0&torques=equal&layer=height"
-        ask(page, lambda: page._open_query(query))
+        ask(page, lambda: page.hear("open", query))
         assert "opens no links" in page._refusal
     finally:
         page.close()
