@@ -88,6 +88,10 @@ class LiveData:
         return next((one for one in self.ages if one.topic == ODOMETRY), NO_ODOMETRY)
 
 
+Take = Callable[[Any], None]
+"""Takes a message."""
+
+
 class LiveListener(Node):
     """Keeps the latest values, map, plan and verdict; it skips bad messages with a warning.
 
@@ -110,25 +114,25 @@ class LiveListener(Node):
         self._planner = self.create_client(
             GetPlan, f"{SERVER}/can_traverse", qos_profile=service_qos()
         )
-        self._subscribe_to_rover()
-        self._subscribe_to_server()
-        self._subscribe_to_controller()
+        self._subscribe()
 
-    def _subscribe_to_rover(self) -> None:
-        sensors = sensor_qos()
+    def _subscribe(self) -> None:
+        sensors, results, numbers = sensor_qos(), result_qos(), Float64MultiArray
         self._listen(JointState, "joint_states", self._on_joint_states, sensors, is_stream=True)
         self._listen(Odometry, ODOMETRY, self._on_odometry, sensors, is_stream=True)
         for qos in map_subscriptions_qos("either"):
             self._listen(PointCloud2, "elevation_cloud", self._on_cloud, qos)
+        self._listen(Path, f"{SERVER}/plan", self._on_plan, results)
+        self._listen(DiagnosticArray, f"{SERVER}/verdict", self._on_verdict, results)
+        for topic, field in PREDICTED_FIELDS.items():
+            take = partial(self._on_prediction, field)
+            self._listen(numbers, f"{SERVER}/{topic}", take, results)
+        for topic, field in ESTIMATED_FIELDS.items():
+            take = partial(self._on_estimate, field)
+            self._listen(numbers, f"{CONTROLLER}/{topic}", take, topic_qos(), is_stream=True)
 
     def _listen(
-        self,
-        kind: Any,
-        topic: str,
-        take: Callable[[Any], None],
-        qos: QoSProfile,
-        *,
-        is_stream: bool = False,
+        self, kind: Any, topic: str, take: Take, qos: QoSProfile, *, is_stream: bool = False
     ) -> None:
         """Subscribe to a topic and note the age of its messages."""
         self._ages[topic] = TopicAge(topic, None, is_stream)
@@ -138,20 +142,6 @@ class LiveListener(Node):
             take(message)
 
         self.create_subscription(kind, topic, hear, qos)
-
-    def _subscribe_to_server(self) -> None:
-        qos = result_qos()
-        self._listen(Path, f"{SERVER}/plan", self._on_plan, qos)
-        self._listen(DiagnosticArray, f"{SERVER}/verdict", self._on_verdict, qos)
-        for topic, field in PREDICTED_FIELDS.items():
-            take = partial(self._on_prediction, field)
-            self._listen(Float64MultiArray, f"{SERVER}/{topic}", take, qos)
-
-    def _subscribe_to_controller(self) -> None:
-        qos = topic_qos()
-        for topic, field in ESTIMATED_FIELDS.items():
-            take = partial(self._on_estimate, field)
-            self._listen(Float64MultiArray, f"{CONTROLLER}/{topic}", take, qos, is_stream=True)
 
     def latest(self) -> LiveData:
         """Return the latest data."""
@@ -257,8 +247,8 @@ class LiveListener(Node):
             self._predicted = {**self._predicted, field: array_values(message).copy()}
 
     def _on_estimate(self, field: str, message: Float64MultiArray) -> None:
-        if len(message.data) == 6:
-            self._estimated = {**self._estimated, field: np.array(message.data)}
+        if len(message.data) >= 6:  # deviations may follow
+            self._estimated = {**self._estimated, field: np.array(message.data[:6])}
 
     @contextlib.contextmanager
     def _skipping(self, what: str) -> Iterator[None]:

@@ -76,13 +76,6 @@ def test_a_limit_is_broken_on_a_lane_exactly_where_the_verdict_refuses_the_path(
         assert failure.is_settled == (failure.code != "unknown_ground")
 
 
-def test_a_limit_is_used_by_its_share():
-    _, _, why = why_on(wall_at(0.5))
-    friction = why.limits.lane("friction")
-    known = ~np.isnan(friction.values)
-    np.testing.assert_allclose(friction.used[known], friction.values[known] / friction.limit.bound)
-
-
 def test_the_worst_so_far_grows_and_ends_with_the_extremes_of_the_verdict():
     prediction, verdict, why = why_on(waves)
     times = np.linspace(0.0, prediction.time[-1], 7)
