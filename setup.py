@@ -14,8 +14,7 @@ HERE = Path(__file__).resolve().parent  # colcon --symlink-install runs a link t
 # it, its pydantic is version 1, and its typer is 0.9, which knows no `float | None`. 0.18 is the
 # first typer that works with every click it allows. constraints-lowest.txt holds the lowest
 # versions; a test installs them.
-# Upper bounds: the next version that may break; of viser also parts that are not public are used
-# (viewer/browser/channel.py). constraints.txt holds the versions tested.
+# Upper bounds: the next version that may break. constraints.txt holds the versions tested.
 REQUIRES = [
     "numpy>=1.26,<3",
     "scipy>=1.11,<2",
@@ -90,6 +89,7 @@ setup(
     name=NAME,
     version=read_version(),
     packages=find_packages(HERE, include=[f"{name}*" for name in IMPORT_PACKAGES]),
+    package_data={"rover_planner.viewer.browser": ["page.js"]},
     data_files=list_data_files(),
     python_requires=">=3.11",
     install_requires=REQUIRES,

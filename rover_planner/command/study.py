@@ -14,15 +14,16 @@ from rover_planner.shell.extras import need
 
 def study(
     file: Annotated[Path, argument("STUDY", "Study file, .yaml, or the name of an example.")],
-    output: Annotated[Path, typer.Option(help="Folder for table and picture.")] = Path("."),
+    output: Annotated[Path, typer.Option(help="Folder for table, picture and rover.")] = Path("."),
 ) -> None:
-    """Sweep or optimise numbers of a rover; write a CSV and a picture.
+    """Sweep or optimise numbers of a rover; write a CSV, a picture and the best rover's file.
 
     Exit code 0: it ran. 2: bad input.
     """
     need("matplotlib", "the picture of a study")
     from rover_planner.shell.progress import show_bar
-    from rover_planner.studies.runner import count_trials, run_study
+    from rover_planner.studies.rover_values import write_rover
+    from rover_planner.studies.runner import count_trials, find_rover, run_study
     from rover_planner.studies.study_file import find_examples, load_study
     from rover_planner.studies.study_plot import draw_study
     from rover_planner.studies.summary import describe_question, describe_result
@@ -34,8 +35,10 @@ def study(
     try:
         output.mkdir(parents=True, exist_ok=True)
         result.write_csv(output / f"{file.stem}.csv")
+        best = write_rover(find_rover(task, result.best))
+        (output / f"{file.stem}_best.yaml").write_text(best, encoding="utf-8")
     except OSError as error:
         raise PlanningError(f"cannot write into {show_file(output)}: {error.strerror}") from None
     draw_study(result, output / f"{file.stem}.png")
     typer.echo("\n".join(describe_result(result)))
-    typer.echo(f"wrote {output / file.stem}.csv and .png")
+    typer.echo(f"wrote {output / file.stem}.csv and .png, and {file.stem}_best.yaml")

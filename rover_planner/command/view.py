@@ -26,7 +26,7 @@ from rover_planner.shell.poses import GOAL, START, Pose
 if TYPE_CHECKING:
     from rover_physics.rover.model import Rover
     from rover_physics.terrain.grid import Terrain
-    from rover_planner.viewer.pages.page_base import PageBase
+    from rover_planner.viewer.pages.base import PageBase
     from rover_planner.viewer.state.session import ViewSession
     from rover_planner.viewer.state.survey_layers import ShownSurvey
 
@@ -78,24 +78,22 @@ def view(
     if survey is not None:
         need("zarr", "a survey")
     from rover_physics.rover.rover_file import load_rover
-    from rover_planner.viewer.pages.address import check_address
+    from rover_planner.viewer.pages.base import check_address
     from rover_planner.viewer.state.session import ViewSession
+    from rover_planner.viewer.state.survey_layers import load_map, open_survey
 
     model = load_rover(rover)
     check_address(host, port)
     surveyed = None
     if survey is not None and terrain is None:
-        from rover_planner.viewer.state.survey_layers import load_map
-
         ground = load_map(survey, max_cells)
+        surveyed = open_survey(survey, model, None)  # on its own map
     else:
         ground = _load_or_make(terrain, follow, max_cells)
         if prediction is None:  # predictions were made on the original map
             ground = ground.fill_gaps(max_gap)
-    if survey is not None:
-        from rover_planner.viewer.state.survey_layers import open_survey
-
-        surveyed = open_survey(survey, model, None if terrain is None else ground)
+        if survey is not None:
+            surveyed = open_survey(survey, model, ground)
     if not follow:
         _check_on_map(ground, start=start, goal=goal)
     _compile()
@@ -208,23 +206,20 @@ def choose_ends(rover: "Rover", ground: "Terrain") -> tuple[End, End]:
     """
     import numpy as np
 
-    low, high = _ends_about_the_middle(rover, ground)
-    between = np.linspace(low[:2], high[:2], PLACES_TRIED)
-    if np.isfinite(ground.elevation_at(*between.T)).all():
-        return low, high
-    return _ends_on_known_ground(rover, ground) or (low, high)
-
-
-def _ends_on_known_ground(rover: "Rover", ground: "Terrain") -> tuple[End, End] | None:
-    """Return a start and the farthest goal on plain ground, None if the map has none."""
     from rover_planner.planning.goals import choose_mission
 
+    low, high = _ends_about_the_middle(rover, ground)
+    between = np.linspace(low[:2], high[:2], PLACES_TRIED)
+    if np.isfinite(ground.elevation_at(between[:, 0], between[:, 1])).all():
+        return low, high
     try:
         mission = choose_mission(ground, rover)
     except PlanningError:
-        return None
+        return low, high
     plain = [goal.pose for goal in mission.goals if goal.intent == "plain"]
-    return (mission.start, max(plain, key=partial(math.dist, mission.start))) if plain else None
+    if not plain:
+        return low, high
+    return mission.start, max(plain, key=partial(math.dist, mission.start))
 
 
 def _ends_about_the_middle(rover: "Rover", ground: "Terrain") -> tuple[End, End]:

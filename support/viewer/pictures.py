@@ -14,7 +14,6 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.command.view import SEED, TERRAIN_SIZE, choose_ends
 from rover_planner.viewer.pages.page import Page
-from rover_planner.viewer.state.reasons.failure import explain
 from rover_planner.viewer.state.scenario import Pose
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.worlds.mars_terrain import make_mars_terrain
@@ -84,7 +83,7 @@ def _write(browser: Any, case: Case, file: Path) -> str:
         visitor.press("Got it")
         shows = _show_failure(page, visitor) if case.refused else _show_drive(page)
         time.sleep(SETTLE)  # what changes while a page opens may be drawn once more
-        page.requests.add(lambda: setattr(page.drive_tab, "outdated", True))
+        page.requests.add(lambda: setattr(page._panels.controls, "outdated", True))
         time.sleep(SETTLE)
         file.write_bytes(visitor.tab.screenshot())
         visitor.tab.close()
@@ -104,13 +103,13 @@ def _close_notice(visitor: Visitor) -> None:
 def _show_failure(page: Page, visitor: Visitor) -> str:
     """Show the first candidate that a wheel refuses, at its failure; return what fails."""
     session = page.session
-    for index in range(len(session.candidates)):
-        if session.candidates[index].verdict.traversable:
+    for index, candidate in enumerate(session.shown.candidates):
+        if candidate.verdict.traversable:
             continue
-        page.requests.add(lambda index=index: session.show_candidate(index))
+        page.requests.add(lambda index=index: page.session.show_candidate(index))
         wait_until(lambda index=index: session.shown.index == index, "the path")
         wait_until(lambda: not page.is_busy, "its verdicts")
-        failure = explain(session.finished).failure
+        failure = page.judged.failure
         if failure is not None and failure.link in WHEELS:
             visitor.press("Go to the failure")
             at = min(failure.time, page.playback.duration)
@@ -122,7 +121,7 @@ def _show_failure(page: Page, visitor: Visitor) -> str:
 def _show_drive(page: Page) -> str:
     """Show the rover after a third of its drive."""
     page.requests.add(lambda: page.playback.seek(page.playback.duration / 3.0))
-    page.requests.add(lambda: setattr(page.drive_tab, "outdated", True))
+    page.requests.add(lambda: setattr(page._panels.controls, "outdated", True))
     return page.session.shown.summary
 
 

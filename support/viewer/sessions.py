@@ -14,6 +14,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.query import LatticeSettings
+from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.scenario import Scenario
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, waves
@@ -87,7 +88,7 @@ def wait_for_rest(page: Any) -> None:
     session = page.session
 
     def at_rest() -> bool:
-        done = session.finished.answered is session.finished.scenario is session.wanted
+        done = session.shown.answered is session.shown.scenario is session.wanted
         return done and not page.is_busy and page._changed_at is None
 
     wait_until(lambda: at_rest() or session.refusal, "all judgements", PATIENCE)
@@ -123,10 +124,13 @@ def slow_scenario(friction: float = 2.0) -> Scenario:
     return Scenario(rover, rover, lowered_reef(), START, GOAL, slow_options(), {})
 
 
-def walled_session(height, goal=(-1.1, 0.0, 0.0), rover=LSR1) -> ViewSession:
-    """Return a session on 5 m x 5 m with a wall at x = 0; searches may take long."""
-    patient, ground = LatticeSettings(budget=60.0), make_terrain(height, half=2.5)
-    return ViewSession(rover, ground, (-1.6, 0.0, 0.0), goal, search=patient)
+def walled_session(
+    height, goal=(-1.1, 0.0, 0.0), rover=LSR1, *, ends_at_first: bool = True
+) -> ViewSession:
+    """Return a session on 5 m x 5 m with a wall at x = 0; a search for the best may take long."""
+    search = LatticeSettings(budget=60.0, ends_at_first=ends_at_first)
+    ground = make_terrain(height, half=2.5)
+    return ViewSession(rover, ground, (-1.6, 0.0, 0.0), goal, search=search)
 
 
 @contextmanager
@@ -142,13 +146,12 @@ def held(background: Any, at: str = "") -> Iterator[None]:
     """
     work, go_on = background._work, threading.Event()
 
-    def work_and_wait(request, report):
-        def tell(what: str, step: int, steps: int) -> None:
-            report(what, step, steps)
-            while at in ("", what) and not go_on.wait(0.01):
-                report(what, step, steps)  # which ends work that was stopped
-
-        return work(request, tell)
+    def work_and_wait(request):
+        for found in work(request):
+            yield found
+            is_held = isinstance(found, Progress) and at in ("", found.what)
+            while is_held and not go_on.wait(0.01):
+                yield found  # which ends work that was stopped
 
     background._work = work_and_wait
     try:

@@ -24,7 +24,7 @@ pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
 from rover_planner.planning.search.query import LatticeSettings
 from rover_planner.viewer.pages import page as page_module
-from rover_planner.viewer.pages.drawings import Drawings
+from rover_planner.viewer.pages.base import Drawings
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.scene.ribbons import Ribbon, Strand
 from rover_planner.viewer.scene.rover_visual import RoverVisual
@@ -55,7 +55,7 @@ def at_rest(page):
         asked.append(session.wanted)
 
     def is_shown() -> bool:
-        return asked and session.finished.answered is asked[0] and not page.is_busy
+        return asked and session.shown.answered is asked[0] and not page.is_busy
 
     page.requests.add(ask)
     wait_until(is_shown, "the rover as it was loaded", PATIENCE)
@@ -108,7 +108,7 @@ def test_other_policies_are_judged_after_the_drawings(page, monkeypatch):
 
 @pytest.mark.timed
 def test_the_rover_drives_on_while_a_change_is_judged_and_drawn():
-    options, search = slow_options(2, 2e-4), LatticeSettings(budget=0.1)
+    options, search = slow_options(1, 3e-4), LatticeSettings(budget=0.1)
     session = ViewSession(tolerant_rover(), lowered_reef(), START, GOAL, options, search)
     page = Page(session, port=0)
     try:
@@ -175,8 +175,11 @@ def test_a_rover_of_another_shape_is_drawn_as_a_new_one(page):
     wide = replace(LSR1, wheel=replace(LSR1.wheel, radius=1.3 * LSR1.wheel.radius))
     pivots = {name: (x, 1.2 * y, z) for name, (x, y, z) in LSR1.suspension.wheels.items()}
     wide = replace(wide, suspension=replace(LSR1.suspension, wheels=pivots))
-    shaped, new = RoverVisual(scene, LSR1, "/test/a"), RoverVisual(scene, wide, "/test/b")
-    shaped.shape(wide, {})
+    shaped, new = (
+        RoverVisual(scene, rover, page.scene.frame, name)
+        for rover, name in ((LSR1, "/test/a"), (wide, "/test/b"))
+    )
+    shaped.shape(wide)
     assert shaped._meshes.keys() == new._meshes.keys()
     for name, mesh in new._meshes.items():
         np.testing.assert_array_equal(shaped._meshes[name].vertices, mesh.vertices)
@@ -192,7 +195,7 @@ def test_the_ghost_of_a_failure_stays_for_the_next_one_and_hides_without(page):
     ghosts = []
     for friction in (0.4, 0.35):
         session.change_rover([("friction",)], friction)
-        failure = explain(session.finished).failure
+        failure = explain(session.shown).failure
         mark.show(session.rover, failure)
         ghosts.append(mark._ghost)
         np.testing.assert_allclose(
@@ -202,18 +205,3 @@ def test_the_ghost_of_a_failure_stays_for_the_next_one_and_hides_without(page):
     assert [node.name for node in mark._nodes] == ["/failure/outline", "/failure/leader"]
     mark.show(session.rover, None)
     assert not mark._root.visible and not mark._nodes
-
-
-def test_the_ground_is_made_ready_in_the_background(page, monkeypatch):
-    from rover_planner.viewer.pages import ground_painter
-
-    threads, export = [], ground_painter.export_ground
-
-    def note(*arguments) -> bytes:
-        threads.append(threading.current_thread().name)
-        return export(*arguments)
-
-    monkeypatch.setattr(ground_painter, "export_ground", note)
-    page.requests.add(page.judged.draw_ground)
-    wait_until(lambda: threads and not page.is_busy, "the ground", PATIENCE)
-    assert threads == ["ground"]

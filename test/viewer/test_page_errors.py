@@ -18,6 +18,7 @@ from rover_planner.viewer.live.listener import LiveListener
 from rover_planner.viewer.pages.live_page import LivePage
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.scene.labels import Labels
+from rover_planner.viewer.scene.local_frame import LocalFrame
 from rover_planner.viewer.scene.overlays import PathOverlay
 from rover_planner.viewer.state.colours import REFUSED
 
@@ -59,8 +60,8 @@ def test_a_shown_path_that_a_change_of_the_rover_makes_impassable_is_drawn(serve
     assert session.shown.verdict.traversable
     assert session.change_rover([("friction",)], 0.4)
     assert not session.shown.verdict.traversable
-    overlay = PathOverlay(server.scene, Labels(server.gui))
-    overlay.show(session.rover, session.terrain, session.candidates, session.shown.index)
+    overlay = PathOverlay(server.scene, Labels(server.scene), LocalFrame())
+    overlay.show(session.rover, session.terrain, session.shown.candidates, session.shown.index)
     driven, beyond, *cross = overlay.ribbons[session.shown.index].strands
     assert driven.colour == REFUSED and driven.width > beyond.width
     np.testing.assert_array_equal(driven.line[-1], beyond.line[0])
@@ -72,12 +73,12 @@ def test_a_path_that_is_judged_again_replaces_its_own_candidate(index):
     session = session_on(ramp)
     session.show_candidate(index)
     session.change_rover([("friction",)], 0.4)
-    assert len(session.candidates) == len(session.answer.candidates)
-    assert session.candidates[index] is session.shown.candidate
+    assert len(session.shown.candidates) == len(session.shown.answer.candidates)
+    assert session.shown.candidates[index] is session.shown.candidate
     np.testing.assert_array_equal(
-        session.candidates[index].poses, session.answer.candidates[index].poses
+        session.shown.candidates[index].poses, session.shown.answer.candidates[index].poses
     )
-    traversable = [candidate.verdict.traversable for candidate in session.candidates]
+    traversable = [candidate.verdict.traversable for candidate in session.shown.candidates]
     assert traversable == [k != index for k in range(len(traversable))]
 
 
@@ -105,7 +106,7 @@ def test_the_verdict_is_right_and_the_rover_drives_if_the_paths_cannot_be_drawn(
 
 
 def test_a_failed_picture_is_not_drawn_again_before_the_next_request(page, monkeypatch):
-    wait_until(lambda: not page.drive_tab.outdated, "the first picture")
+    wait_until(lambda: not page._panels.controls.outdated, "the first picture")
     tried = []
 
     def fail_and_count(_frame):
@@ -129,11 +130,11 @@ def test_an_error_of_a_judgement_is_shown_and_the_old_verdict_is_marked(page):
     wait_until(lambda: "not judged" in shown_errors(page), "the notice")
     assert "could not convert string to float" in shown_errors(page)
     wait_until(lambda: "old values" in page.drive_tab._verdict.content, "the mark")
-    wait_until(lambda: page._notice._again.visible, "the button")
-    assert not page._notice._cancel.visible
+    wait_until(lambda: page._panels.notice._again.visible, "the button")
+    assert not page._panels.notice._cancel.visible
     ask(page, lambda: page._change_options(map_sigmas=3.0))
     wait_until(lambda: not shown_errors(page), "the notice to go")
-    wait_until(lambda: not page._notice._again.visible, "the button to go")
+    wait_until(lambda: not page._panels.notice._again.visible, "the button to go")
     wait_until(lambda: "old values" not in page.drive_tab._verdict.content, "the mark to go")
 
 
@@ -143,7 +144,7 @@ def test_a_closed_page_leaves_no_thread_behind():
     page.requests.add(lambda: page.session.plan_again())
     page.close()
     left = {thread.name for thread in set(threading.enumerate()) - before}
-    assert not left & {"page", "judge", "ground", "study"}
+    assert not left & {"page", "judge", "ground"}
 
 
 @pytest.mark.slow

@@ -11,7 +11,8 @@ import pytest
 
 from rover_physics.names import TORQUE_POLICIES
 from rover_physics.traversability.judge import judge_path
-from rover_planner.planning.search.path_search import FOUND, NO_WAY, OUT_OF_TIME
+from rover_planner.planning.search.path_search import FOUND, NO_WAY
+from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.judging import (
     BETTER,
     PATH,
@@ -32,119 +33,73 @@ BEYOND = np.array(GOAL[:2])
 FRICTION = [("friction",)]
 
 
-@pytest.fixture(scope="module")
-def found() -> ViewSession:
-    """A session with a way through the gap; tests do not change it."""
+BEGIN = [*[PATH] * 5, 5, *[POLICY] * 3, 5, WAY]
+"""What is begun before and with a search, and how many candidates each result has."""
+
+
+def judge(session: ViewSession) -> list:
+    """Return what is begun when all is judged, and how many candidates each result has."""
+    steps = judge_request(JudgeRequest(session.wanted))
+    return [
+        step.what if isinstance(step, Progress) else len(step.answer.candidates) for step in steps
+    ]
+
+
+def test_beyond_a_wall_with_a_gap_a_way_follows_the_refused_candidates_and_is_shown():
     session = walled_session(wall_with_gap)
     assert session.plan_to(BEYOND)
-    return session
-
-
-@pytest.fixture(scope="module")
-def closed() -> ViewSession:
-    """A session that has found no way; tests do not change it."""
-    session = walled_session(whole_wall)
-    assert session.plan_to(BEYOND)
-    return session
-
-
-def steps_of(session: ViewSession) -> list:
-    """Return what is reported and how many candidates each result has."""
-    steps: list = []
-    request = JudgeRequest(session.wanted)
-    for judged in judge_request(request, lambda what, *_: steps.append(what)):
-        steps.append(len(judged.answer.candidates))
-    return steps
-
-
-def test_beyond_a_wall_with_a_gap_a_way_follows_the_refused_candidates_and_is_shown(found):
-    *direct, way = found.candidates
+    shown = session.shown
+    *direct, way = shown.candidates
     assert len(direct) == 5 and not any(one.verdict.traversable for one in direct)
-    assert found.finished.way.outcome == FOUND
-    assert found.shown.index == found.answer.best == found.answer.nearest == 5
-    assert found.shown.candidate is way
+    assert shown.way.outcome == FOUND and shown.candidate is way
+    assert shown.index == shown.answer.best == shown.answer.nearest == 5
     poses = way.poses
-    np.testing.assert_allclose(poses[[0, -1], :2], [found.start[:2], BEYOND], atol=1e-9)
+    np.testing.assert_allclose(poses[[0, -1], :2], [session.scenario.start[:2], BEYOND], atol=1e-9)
     assert np.all(poses[np.abs(poses[:, 0]) < 0.2, 1] > 1.0)
-    assert judge_path(LSR1, found.terrain, poses, found.sweep_options())[1].traversable
-    shown = found.shown
+    assert judge_path(LSR1, session.terrain, poses)[1].traversable
     assert [one.policy for one in shown.by_policy] == list(TORQUE_POLICIES)
     assert not any(one.is_old for one in shown.by_policy)
     assert f"way of {shown.candidate.length:.1f} m around" in shown.summary
 
 
-def test_where_there_is_no_way_the_closed_area_and_the_reason_are_kept(closed):
-    way = closed.finished.way
-    assert way.outcome == NO_WAY and len(closed.candidates) == 5
-    assert not closed.shown.verdict.traversable
-    reason = closed.finished.reason
-    assert reason.startswith("no way within the map: ") and "closed in by: " in reason
-    assert reason.endswith(closed.shown.verdict.reason)
-    ends = [value_at(way, way.closed.places, pose) for pose in (closed.start, closed.goal)]
-    assert ends == [not way.closed.around_goal, way.closed.around_goal]
-    assert 0 < way.asked.sum() < way.asked.size
-    assert value_at(way, way.asked, (0.0, 0.0))  # the wall between the ends
+def test_the_first_way_is_shown_before_a_better_one_is_searched():
+    way = [6, *[POLICY] * 3, 6]
+    steps = judge(walled_session(wall_with_gap, GOAL, ends_at_first=False))
+    assert steps in ([*BEGIN, *way, BETTER], [*BEGIN, *way, BETTER, *way])
 
 
-def value_at(way, places, pose) -> bool:
-    """Return the value of places (rows, columns) at a pose."""
-    column, row = np.rint(np.array(pose[:2]) / way.nodes.cell).astype(int) - way.nodes.first
-    return bool(places[row, column])
-
-
-def test_the_search_is_reported_after_paths_and_policies(closed, found):
-    before, way = [*[PATH] * 5, 5, *[POLICY] * 3, 5, WAY], [6, *[POLICY] * 3, 6]
-    assert steps_of(closed) == [*before, 5]
-    steps = steps_of(found)
-    assert steps in ([*before, *way, BETTER], [*before, *way, BETTER, *way])
-
-
-def test_the_first_way_is_shown_at_once_and_replaced_only_by_a_better_one(found):
-    judged = list(judge_request(JudgeRequest(found.wanted), lambda *_: None))
-    ways = [one.way for one in judged if one.way is not None]
-    costs = [one.cost for one in ways]
-    assert all(one.outcome == FOUND and one.path.verdict.traversable for one in ways)
-    assert costs == sorted(costs, reverse=True)
-    assert ways[0].edges_judged < ways[-1].edges_judged
-    assert len(judged[-1].answer.candidates) == 6
+def test_where_there_is_no_way_the_reason_is_told():
+    session = walled_session(whole_wall, GOAL)
+    assert judge(session) == [*BEGIN, 5]
+    assert session.plan_again()
+    shown = session.shown
+    assert shown.way.outcome == NO_WAY and len(shown.candidates) == 5
+    assert not shown.verdict.traversable
+    assert shown.reason.startswith("no way within the map: ") and "closed in by: " in shown.reason
+    assert shown.reason.endswith(shown.verdict.reason)
 
 
 def test_nothing_is_searched_where_a_candidate_passes_off_the_map_or_for_a_recorded_path():
     session = walled_session(wall_with_gap)
     for goal, passes in (((-1.1, 0.1), True), ((9.0, 0.0), False)):
         assert session.plan_to(np.array(goal))
-        assert session.finished.way is None and session.answer.traversable == passes
-        assert WAY not in steps_of(session)
+        assert session.shown.way is None and session.shown.answer.traversable == passes
+        assert WAY not in judge(session)
     assert session.plan_to(np.array([-1.1, 0.1]))
     session.replay(session.shown.candidate.prediction, session.shown.verdict.reasons)
     assert session.change_rover(FRICTION, 0.05) and session.plan_again()
-    assert not session.shown.verdict.traversable and session.finished.way is None
-
-
-def test_a_goal_where_the_rover_cannot_stand_is_named_as_the_reason():
-    session = walled_session(whole_wall)
-    assert session.plan_to(np.array([0.25, 0.0]))
-    assert session.finished.reason.startswith("the rover cannot stand at the goal: ")
-    assert session.finished.way.closed is None and not session.finished.way.asked.any()
-
-
-def test_a_search_that_runs_out_of_time_says_that_there_may_be_a_way(closed):
-    short = dataclasses.replace(closed.wanted.search, budget=0.01)
-    hurried = dataclasses.replace(closed.wanted, search=short)
-    *_, judged = judge_request(JudgeRequest(hurried), lambda *_: None)
-    assert judged.way.outcome == OUT_OF_TIME and judged.way.closed is None
-    assert "there may be one" in judged.reason
+    assert not session.shown.verdict.traversable and session.shown.way is None
 
 
 def test_a_slider_judges_the_shown_way_again_and_then_searches_another():
     session = walled_session(wall_with_gap)
     session.plan_to(BEYOND)
-    poses, way = session.shown.candidate.poses, session.finished.way
+    poses, way = session.shown.candidate.poses, session.shown.way
     assert session.change_rover(FRICTION, 0.7)
-    assert session.shown.index == 5 and session.finished.way is way
+    assert session.shown.index == 5 and session.shown.way is way
     np.testing.assert_array_equal(session.shown.candidate.poses, poses)
     assert session.plan_again()
-    assert session.shown.index == 5 and session.finished.way is not way
+    assert session.shown.index == 5 and session.shown.way is not way
     assert session.shown.verdict.traversable
 
 
@@ -178,13 +133,13 @@ def searching(session: ViewSession) -> Iterator[None]:
 
 def test_while_a_way_is_searched_the_verdict_on_the_candidates_is_there(session):
     with searching(session):
-        assert not session.is_outdated and len(session.candidates) == 5
+        assert not session.is_outdated and len(session.shown.candidates) == 5
         assert not session.shown.verdict.traversable
         other = 1 if session.shown.index != 1 else 2
         assert session.show_candidate(other)  # it stays, and the way is listed
     finish(session)
-    assert session.shown.index == other and len(session.candidates) == 6
-    assert session.answer.nearest == 5 and session.candidates[5].verdict.traversable
+    assert session.shown.index == other and len(session.shown.candidates) == 6
+    assert session.shown.answer.nearest == 5 and session.shown.candidates[5].verdict.traversable
     assert session.show_candidate(5)
     finish(session)
     assert session.shown.verdict.traversable
@@ -195,10 +150,10 @@ def test_a_cancelled_search_leaves_the_verdict_on_the_candidates_and_can_be_begu
         shown = session.shown
         session.cancel()
         session.take_finished()
-        assert session.is_stopped and session.shown is shown and session.finished.way is None
+        assert session.is_stopped and session.shown is shown and session.shown.way is None
     assert session.plan_again()
     finish(session)
-    assert session.finished.way.outcome == FOUND
+    assert session.shown.way.outcome == FOUND
 
 
 def test_the_way_of_a_rover_that_slips_is_no_candidate_once_it_can_climb_the_wall():
@@ -217,17 +172,17 @@ def test_the_way_of_a_rover_that_slips_is_no_candidate_once_it_can_climb_the_wal
         session.change_rover(FRICTION, 1.3)
         finish(session)
         assert not session.is_outdated and session.rover.friction == 1.3
-        assert session.candidates[session.shown.index].verdict.traversable
+        assert session.shown.candidates[session.shown.index].verdict.traversable
         session.plan_again()
         finish(session)
-        assert len(session.candidates) == 5 and session.answer.traversable
+        assert len(session.shown.candidates) == 5 and session.shown.answer.traversable
     finally:
         assert session.close()
 
 
 def test_a_session_that_begins_before_a_wall_searches_as_soon_as_it_has_a_thread():
     session = walled_session(wall_with_gap, GOAL)
-    assert session.finished.needs_way and len(session.candidates) == 5
+    assert session.shown.needs_way and len(session.shown.candidates) == 5
     session.judge_in_background(lambda: None)
     try:
         finish(session)

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A link that holds what the page shows: rover, changed numbers, ends, path, time and colours."""
 
+import base64
 import math
 import zlib
 from collections.abc import Mapping
@@ -11,17 +12,18 @@ import numpy as np
 
 from rover_physics.files.validation import describe
 from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_file import rover_to_dict
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
-from rover_planner.studies.rover_values import get_value, list_values, with_value
-from rover_planner.viewer.browser.packed_text import pack_text, unpack_text
+from rover_planner.studies.rover_values import list_values, with_value
+from rover_planner.viewer.state.reasons.before_after import list_changes
 from rover_planner.viewer.state.scenario import Pose
 
 VALUE, JOINT = "rover.", "arm."
 """What comes before the keys of changed numbers and of the arm's joints."""
 MAX_LENGTH = 8000
 """Most characters of a link; servers accept hardly more."""
+MAX_TEXT = 200_000
+"""Most bytes of a rover file that are unpacked; a few letters can hold far more."""
 HALF_TURN = 180.0
 """Largest heading of a layer, both ways [deg]."""
 
@@ -69,13 +71,7 @@ def fingerprint(terrain: Terrain) -> str:
 
 def list_changed_values(loaded: Rover, rover: Rover) -> dict[str, float]:
     """Return the numbers, by label, in which a rover differs from the one that was loaded."""
-    before, now = rover_to_dict(loaded), rover_to_dict(rover)
-    return {
-        value.label: get_value(now, value.keys[0])
-        for values in list_values(loaded).values()
-        for value in values
-        if get_value(now, value.keys[0]) != get_value(before, value.keys[0])
-    }
+    return {label: now for label, (_, now) in list_changes(loaded, rover).items()}
 
 
 def change_values(loaded: Rover, values: Mapping[str, float]) -> Rover:
@@ -151,7 +147,7 @@ def read_link(query: str) -> Link | None:
         values=_read_all(VALUE, words),
         joints=_read_all(JOINT, words),
         along=words.get("along") == "1",
-        rover_file=unpack_text(words.get("rover_file", "")) if "rover_file" in words else "",
+        rover_file=unpack_text(words["rover_file"]) if "rover_file" in words else "",
     )
 
 
@@ -204,3 +200,27 @@ def _join(pose: Pose) -> str:
 def _number(value: float) -> str:
     """Return a number in the fewest digits that give it back; a plus sign would be lost."""
     return repr(float(value)).replace("e+", "e")
+
+
+def pack_text(text: str) -> str:
+    """Return a text in letters that an address may hold, compressed."""
+    return base64.urlsafe_b64encode(zlib.compress(text.encode(), 9)).decode().rstrip("=")
+
+
+def unpack_text(packed: str) -> str:
+    """Return the text that `pack_text` has packed.
+
+    Raises:
+        PlanningError: It is damaged, or larger than MAX_TEXT.
+    """
+    unpacker = zlib.decompressobj()
+    try:
+        data = base64.urlsafe_b64decode(packed + "=" * (-len(packed) % 4))
+        text = unpacker.decompress(data, MAX_TEXT).decode()
+    except (ValueError, zlib.error) as error:
+        raise PlanningError(f"the rover file in the link is damaged ({error})") from error
+    if not unpacker.eof:
+        raise PlanningError(
+            f"the rover file in the link is cut off, or larger than {MAX_TEXT} bytes"
+        )
+    return text

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a sent page says in words and numbers beside its scene: verdict, failing pose, versions."""
+"""A page that is sent: one HTML file with the scene, verdict, failing pose, numbers, versions."""
 
 import html
 import platform
+import re
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +18,7 @@ from rover_physics.results.uses import find_uses, limits_of
 from rover_physics.rover.model import Rover
 from rover_planner.studies.rover_values import write_rover
 from rover_planner.viewer.state.context import Context
-from rover_planner.viewer.state.scenario import Judgement
+from rover_planner.viewer.state.scenario import Shown
 
 PACKAGES = ("numpy", "scipy", "numba", "viser")
 WHEEL_ROWS = {
@@ -30,17 +32,50 @@ WHEEL_ROWS = {
 }
 """Rows of the table of wheels: field of the prediction and digits."""
 MILLI = 1e3
+STYLE = """
+#report { position: fixed; top: 0; left: 0; bottom: 0; width: 34em; overflow: auto; z-index: 10;
+  background: rgba(255, 255, 255, .92); padding: .5em 1em; font: 13px/1.4 sans-serif;
+  box-sizing: border-box; color: #222; }
+#report th { text-align: left; vertical-align: top; padding-right: .8em; font-weight: normal;
+  opacity: .7; }
+#report td { padding-right: .6em; overflow-wrap: anywhere; }
+#report h1 { font-size: 1.5em; }
+#report #wheels th { white-space: nowrap; }
+#report #wheels td { text-align: right; }
+@media (max-width: 1000px) { #report { top: auto; right: 0; width: auto; height: 45%; } }
+"""
+VISERS_TITLE = re.compile("<title>.*?</title>")
+"""The title that viser gives a file; a browser shows the first one."""
 
 
-def describe_judgement(judgement: Judgement, context: Context, query: str) -> str:
+def write_page(server: Any, camera: Any, report: str, title: str) -> bytes:
+    """Return the scene and a report as one HTML file that needs no network.
+
+    Args:
+        server: The server of viser.
+        camera: The camera of the visitor, from which the file looks at first.
+        report: The report, HTML.
+        title: Title of the file, text.
+    """
+    server.initial_camera.position = camera.position
+    server.initial_camera.look_at = camera.look_at
+    safe = html.escape(title)
+    page: str = server.get_scene_serializer().as_html()
+    page = VISERS_TITLE.sub(lambda _found: f"<title>{safe}</title>", page, count=1)
+    inserted = f'<style>{STYLE}</style><div id="report"><h1>{safe}</h1>{report}</div>'
+    at = page.rindex("</body>")
+    return (page[:at] + inserted + page[at:]).encode()
+
+
+def describe_judgement(shown: Shown, context: Context, query: str) -> str:
     """Return the verdict on the shown path with its numbers as HTML.
 
     Args:
-        judgement: What was judged.
+        shown: What is shown.
         context: What it is about.
         query: The link to it, as `write_link` returns it; empty if it would be too long.
     """
-    scenario, shown = judgement.scenario, judgement.shown
+    scenario = shown.scenario
     verdict, prediction = shown.verdict, shown.candidate.prediction
     facts = {
         "rover": context.rover,
@@ -50,7 +85,7 @@ def describe_judgement(judgement: Judgement, context: Context, query: str) -> st
         "torques": context.policy,
         "start": _pose(scenario.start),
         "goal": _pose(scenario.goal),
-        "path": f"{shown.index + 1} of {len(judgement.answer.candidates)}, "
+        "path": f"{shown.index + 1} of {len(shown.answer.candidates)}, "
         f"{shown.candidate.length:.2f} m",
         "largest friction utilisation": _number(verdict.max_friction_utilisation, 2),
         "largest torque saturation": _number(verdict.max_torque_saturation, 2),
@@ -62,8 +97,8 @@ def describe_judgement(judgement: Judgement, context: Context, query: str) -> st
         "link": f"?{query}" if query else "too long; the rover file is below",
     }
     parts = []
-    if judgement.reason:
-        parts.append(f'<p id="reason"><b>{html.escape(judgement.reason)}</b></p>')
+    if shown.reason:
+        parts.append(f'<p id="reason"><b>{html.escape(shown.reason)}</b></p>')
     if not verdict.traversable:
         parts.append(_failing_pose(scenario.rover, prediction, verdict.first_failure))
     parts += [f"<p>{html.escape(note)}</p>" for note in shown.trajectory.notes]

@@ -4,8 +4,10 @@
 import contextlib
 import math
 import threading
-from collections.abc import Callable
-from dataclasses import dataclass
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -35,8 +37,7 @@ from rover_planner.ros.qos import (
     service_qos,
     topic_qos,
 )
-from rover_planner.viewer.live.live_state import LiveValues
-from rover_planner.viewer.live.topic_ages import TopicAge, TopicAges
+from rover_planner.viewer.live.live_state import LiveValues, TopicAge
 
 SERVER, CONTROLLER = "/traverse_server", "/traction_controller"
 ODOMETRY = "odometry"
@@ -48,7 +49,11 @@ PREDICTED_FIELDS = {
     "tip_over_margin": "tip_over_ratio",
 }
 """Topics of the server with a row for each waypoint, and the field of LiveValues each fills."""
-ESTIMATED_FIELDS = {"wheel_loads": "wheel_loads", "friction_utilisation": "friction_utilisation"}
+ESTIMATED_FIELDS = {
+    "wheel_loads": "wheel_loads",
+    "friction_utilisation": "friction_utilisation",
+    "contact_angles": "contact_angles",
+}
 """Topics of the controller and the fields they fill, in place of predictions."""
 
 
@@ -57,9 +62,9 @@ class LiveVerdict:
     """The last verdict of the server."""
 
     traversable: bool
-    """Whether there is a path that the rover can drive."""
+    """True if there is a path that the rover can drive."""
     reason: str
-    """Why not, empty where there is one."""
+    """Reason of a refusal, empty where there is one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,11 +73,11 @@ class LiveData:
 
     values: LiveValues
     """Of the rover."""
-    terrain: Terrain | None
+    terrain: Terrain | None = None
     """The map."""
-    plan: np.ndarray | None
+    plan: np.ndarray | None = None
     """(n, 3) poses of the plan, x, y [m], yaw [rad]."""
-    verdict: LiveVerdict | None
+    verdict: LiveVerdict | None = None
     """The verdict of the server."""
     ages: tuple[TopicAge, ...] = ()
     """The ages of all topics."""
@@ -83,85 +88,77 @@ class LiveData:
         return next((one for one in self.ages if one.topic == ODOMETRY), NO_ODOMETRY)
 
 
+Take = Callable[[Any], None]
+"""Takes a message."""
+
+
 class LiveListener(Node):
-    """Keeps the latest values, map, plan and verdict; it skips bad messages with a warning."""
+    """Keeps the latest values, map, plan and verdict; it skips bad messages with a warning.
+
+    Messages come in one thread and are asked for in another: what they share is frozen, and
+    replaced as a whole.
+    """
 
     def __init__(self, map_frame: str = "map", **node_arguments: Any):
         """Subscribe to the topics of a rover, a traverse_server and a traction_controller."""
         super().__init__("rover_view", **node_arguments)
         self._frame = map_frame
-        self._lock = threading.Lock()
-        self._values = LiveValues()
-        self._predicted: dict[str, np.ndarray] = {}
-        self._terrain: Terrain | None = None
-        self._plan: np.ndarray | None = None
-        self._verdict: LiveVerdict | None = None
-        self._estimated: set[str] = set()
-        self._ages = TopicAges()
+        self._data = LiveData(LiveValues())
+        """Without the ages, and with the values that the rover itself tells."""
+        self._forces: Mapping[str, Any] = {}
+        """Forces by their field, as the server has predicted them at the rover's place."""
+        self._predicted: Mapping[str, np.ndarray] = {}
+        self._estimated: Mapping[str, np.ndarray] = {}
+        self._ages: dict[str, TopicAge] = {}
         self._first_time: float | None = None
         self._planner = self.create_client(
             GetPlan, f"{SERVER}/can_traverse", qos_profile=service_qos()
         )
-        self._subscribe_to_rover()
-        self._subscribe_to_server()
-        self._subscribe_to_controller()
+        self._subscribe()
 
-    def _subscribe_to_rover(self) -> None:
-        sensors = sensor_qos()
+    def _subscribe(self) -> None:
+        sensors, results, numbers = sensor_qos(), result_qos(), Float64MultiArray
         self._listen(JointState, "joint_states", self._on_joint_states, sensors, is_stream=True)
         self._listen(Odometry, ODOMETRY, self._on_odometry, sensors, is_stream=True)
         for qos in map_subscriptions_qos("either"):
             self._listen(PointCloud2, "elevation_cloud", self._on_cloud, qos)
+        self._listen(Path, f"{SERVER}/plan", self._on_plan, results)
+        self._listen(DiagnosticArray, f"{SERVER}/verdict", self._on_verdict, results)
+        for topic, field in PREDICTED_FIELDS.items():
+            take = partial(self._on_prediction, field)
+            self._listen(numbers, f"{SERVER}/{topic}", take, results)
+        for topic, field in ESTIMATED_FIELDS.items():
+            take = partial(self._on_estimate, field)
+            self._listen(numbers, f"{CONTROLLER}/{topic}", take, topic_qos(), is_stream=True)
 
     def _listen(
-        self,
-        kind: Any,
-        topic: str,
-        take: Callable[[Any], None],
-        qos: QoSProfile,
-        *,
-        is_stream: bool = False,
+        self, kind: Any, topic: str, take: Take, qos: QoSProfile, *, is_stream: bool = False
     ) -> None:
         """Subscribe to a topic and note the age of its messages."""
-        self._ages.expect(topic, is_stream=is_stream)
+        self._ages[topic] = TopicAge(topic, None, is_stream)
 
         def hear(message: Any) -> None:
-            self._ages.hear(topic)
+            self._ages[topic] = TopicAge(topic, time.monotonic(), is_stream)
             take(message)
 
         self.create_subscription(kind, topic, hear, qos)
 
-    def _subscribe_to_server(self) -> None:
-        qos = result_qos()
-        self._listen(Path, f"{SERVER}/plan", self._on_plan, qos)
-        self._listen(DiagnosticArray, f"{SERVER}/verdict", self._on_verdict, qos)
-        for topic, field in PREDICTED_FIELDS.items():
-            take = self._on_prediction_of(field)
-            self._listen(Float64MultiArray, f"{SERVER}/{topic}", take, qos)
-
-    def _subscribe_to_controller(self) -> None:
-        qos = topic_qos()
-        takes = {name: self._on_estimate_of(field) for name, field in ESTIMATED_FIELDS.items()}
-        takes["contact_angles"] = self._on_contact_angles
-        for name, take in takes.items():
-            self._listen(Float64MultiArray, f"{CONTROLLER}/{name}", take, qos, is_stream=True)
-
     def latest(self) -> LiveData:
         """Return the latest data."""
-        ages = tuple(self._ages.list_all())
-        with self._lock:
-            self._forget_stale_estimates()
-            self._fill_from_prediction()
-            values = self._values.copy()
-            return LiveData(values, self._terrain, self._plan, self._verdict, ages)
-
-    def _forget_stale_estimates(self) -> None:
-        """Drop forces that the controller no longer publishes, so that none looks like now."""
-        for topic, field in ESTIMATED_FIELDS.items():
-            if field in self._estimated and self._ages.is_stale(f"{CONTROLLER}/{topic}"):
-                self._estimated.discard(field)
-                setattr(self._values, field, np.full(6, np.nan))
-                self._values.forces_from = ""
+        data = self._data
+        if data.plan is not None and data.values.position is not None:
+            self._forces = _read_nearest(self._predicted, data.plan, data.values.position)
+        estimated = {
+            field: self._estimated[field]
+            for topic, field in ESTIMATED_FIELDS.items()
+            if field in self._estimated and not self._ages[f"{CONTROLLER}/{topic}"].is_stale
+        }
+        is_estimated = not estimated.keys().isdisjoint(PREDICTED_FIELDS.values())
+        source = "forces predicted by the server" if self._forces else ""
+        source = "forces estimated by the traction controller" if is_estimated else source
+        forces: dict[str, Any] = {**self._forces, **estimated, "forces_from": source}
+        values, ages = replace(data.values, **forces), tuple(self._ages.values())
+        return replace(data, values=values, ages=ages)
 
     def request_plan(self, goal: np.ndarray) -> str:
         """Ask the server for a plan from the rover's pose to a goal (2,) [m].
@@ -169,8 +166,7 @@ class LiveListener(Node):
         Returns:
             Why that is not possible, empty if it is; plan and verdict come on their topics.
         """
-        with self._lock:
-            values = self._values.copy()
+        values = self._data.values
         if values.position is None:
             return "no odometry yet, so the start is not known"
         if not self._planner.service_is_ready():
@@ -183,44 +179,32 @@ class LiveListener(Node):
         self._planner.call_async(request)
         return ""
 
-    def _fill_from_prediction(self) -> None:
-        """Take fields without estimates from the prediction at the rover's nearest waypoint."""
-        values = self._values
-        if self._plan is None or values.position is None:
-            return
-        away = np.hypot(*(self._plan[:, :2] - values.position[:2]).T)
-        share = int(np.argmin(away)) / max(len(away) - 1, 1)
-        for field, rows in self._predicted.items():
-            if field in self._estimated or not len(rows):
-                continue
-            row = rows[round(share * (len(rows) - 1))]
-            setattr(values, field, float(row[0]) if field == "tip_over_ratio" else row)
-            values.forces_from = values.forces_from or "forces predicted by the server"
-
     def _on_joint_states(self, state: JointState) -> None:
-        with self._lock:
-            for values, into in (
-                (state.position, self._values.joints),
-                (state.effort, self._values.efforts),
-            ):
-                if len(values) == len(state.name):
-                    pairs = zip(state.name, values, strict=True)
-                    into.update({name: value for name, value in pairs if math.isfinite(value)})
-            if len(state.velocity) == len(state.name):
-                self._add_work(dict(zip(state.name, state.velocity, strict=True)), state)
+        known = self._data.values
+        joints, efforts = (
+            {**was, **_name_finite(state.name, values)}
+            for was, values in ((known.joints, state.position), (known.efforts, state.effort))
+        )
+        self._note(joints=joints, efforts=efforts)
+        if len(state.velocity) == len(state.name):
+            self._add_work(dict(zip(state.name, state.velocity, strict=True)), state)
 
     def _add_work(self, rates: dict[str, float], state: JointState) -> None:
         """Add the work of the wheel motors since the last message, rates [rad/s] by joint name."""
+        known = self._data.values
         now = state.header.stamp.sec + 1e-9 * state.header.stamp.nanosec
         self._first_time = now if self._first_time is None else self._first_time
-        passed = now - self._first_time - self._values.time
+        passed = now - self._first_time - known.time
         if passed > 0.0:
             power = sum(
-                max(self._values.efforts.get(name, 0.0) * rates.get(name, 0.0), 0.0)
+                max(known.efforts.get(name, 0.0) * rates.get(name, 0.0), 0.0)
                 for name in WHEEL_JOINTS
             )
-            self._values.energy += power * passed
-            self._values.time += passed
+            self._note(energy=known.energy + power * passed, time=known.time + passed)
+
+    def _note(self, **values: Any) -> None:
+        """Take values of the rover."""
+        self._data = replace(self._data, values=replace(self._data.values, **values))
 
     def _on_odometry(self, odometry: Odometry) -> None:
         point, q = odometry.pose.pose.position, odometry.pose.pose.orientation
@@ -229,68 +213,74 @@ class LiveListener(Node):
         except MessageError:
             return
         roll, pitch, _ = rpy_from_xyzw((q.x, q.y, q.z, q.w))
-        position = np.array([point.x, point.y, point.z])
+        position, known = np.array([point.x, point.y, point.z]), self._data.values
         if not np.isfinite(position).all():
             return
-        with self._lock:
-            if self._values.position is not None:
-                moved = np.hypot(*(position - self._values.position)[:2])
-                self._values.distance += float(moved)
-            self._values.position = position
-            self._values.attitude = np.array([roll, pitch, yaw])
-            self._values.speed = float(odometry.twist.twist.linear.x)
+        moved = 0.0
+        if known.position is not None:
+            moved = float(np.hypot(*(position - known.position)[:2]))
+        self._note(
+            position=position,
+            attitude=np.array([roll, pitch, yaw]),
+            speed=float(odometry.twist.twist.linear.x),
+            distance=known.distance + moved,
+        )
 
     def _on_cloud(self, cloud: PointCloud2) -> None:
-        try:
-            terrain = terrain_from_point_cloud(cloud)
-        except (MessageError, RoverError) as error:
-            self.get_logger().warning(f"elevation_cloud not shown: {error}")
-            return
-        with self._lock:
-            self._terrain = terrain
+        with self._skipping("elevation_cloud"):
+            self._data = replace(self._data, terrain=terrain_from_point_cloud(cloud))
 
     def _on_plan(self, plan: Path) -> None:
-        try:
+        with self._skipping("plan"):
             poses = path_to_poses(plan, self._frame) if plan.poses else None
-        except MessageError as error:
-            self.get_logger().warning(f"plan not shown: {error}")
-            return
-        with self._lock:
-            self._plan = poses
+            self._data = replace(self._data, plan=poses)
 
     def _on_verdict(self, verdict: DiagnosticArray) -> None:
         if verdict.status:
             status = verdict.status[0]
             passable = status.level != DiagnosticStatus.ERROR
-            with self._lock:
-                self._verdict = LiveVerdict(passable, "" if passable else status.message)
+            verdict = LiveVerdict(passable, "" if passable else status.message)
+            self._data = replace(self._data, verdict=verdict)
 
-    def _on_contact_angles(self, message: Float64MultiArray) -> None:
-        if len(message.data) >= 6:
-            with self._lock:
-                self._values.contact_angles = np.array(message.data[:6])
+    def _on_prediction(self, field: str, message: Float64MultiArray) -> None:
+        with self._skipping(field):
+            self._predicted = {**self._predicted, field: array_values(message).copy()}
 
-    def _on_prediction_of(self, field: str) -> Callable[[Float64MultiArray], None]:
-        def take(message: Float64MultiArray) -> None:
-            try:
-                rows = array_values(message).copy()
-            except MessageError as error:
-                self.get_logger().warning(f"{field} not shown: {error}")
-                return
-            with self._lock:
-                self._predicted[field] = rows
+    def _on_estimate(self, field: str, message: Float64MultiArray) -> None:
+        if len(message.data) >= 6:  # deviations may follow
+            self._estimated = {**self._estimated, field: np.array(message.data[:6])}
 
-        return take
+    @contextlib.contextmanager
+    def _skipping(self, what: str) -> Iterator[None]:
+        """Warn of a bad message instead of taking it."""
+        try:
+            yield
+        except (MessageError, RoverError) as error:
+            self.get_logger().warning(f"{what} not shown: {error}")
 
-    def _on_estimate_of(self, field: str) -> Callable[[Float64MultiArray], None]:
-        def take(message: Float64MultiArray) -> None:
-            if len(message.data) == 6:
-                with self._lock:
-                    self._estimated.add(field)
-                    setattr(self._values, field, np.array(message.data))
-                    self._values.forces_from = "forces estimated by the traction controller"
 
-        return take
+def _name_finite(names: Sequence[str], values: Sequence[float]) -> dict[str, float]:
+    """Return the finite values by name; none where they are not one for each name."""
+    if len(values) != len(names):
+        return {}
+    pairs = zip(names, values, strict=True)
+    return {name: value for name, value in pairs if math.isfinite(value)}
+
+
+def _read_nearest(
+    predicted: Mapping[str, np.ndarray], plan: np.ndarray, position: np.ndarray
+) -> dict[str, Any]:
+    """Return the predicted values, by field, at the waypoint of a plan nearest to a position."""
+    away = np.hypot(*(plan[:, :2] - position[:2]).T)
+    share = int(np.argmin(away)) / max(len(away) - 1, 1)
+    nearest = {
+        field: rows[round(share * (len(rows) - 1))]
+        for field, rows in predicted.items()
+        if len(rows)
+    }
+    if "tip_over_ratio" in nearest:
+        nearest["tip_over_ratio"] = float(nearest["tip_over_ratio"][0])
+    return nearest
 
 
 class LiveLink:

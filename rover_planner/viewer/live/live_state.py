@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A live rover: the latest values of its topics, and the state of the page made of them."""
+"""A live rover: the latest values of its topics, their ages, and the state made of them."""
 
 import math
-from dataclasses import dataclass, field, replace
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -14,12 +16,43 @@ from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
 from rover_planner.viewer.state.trajectory import RoverState
 
+MAX_AGE = 2.0
+"""Age from which a topic that is published all the time is stale [s]."""
+
 
 def _unknown() -> Floats:
     return np.full(6, np.nan)
 
 
-@dataclass
+@dataclass(frozen=True)
+class TopicAge:
+    """The age of a topic's last message."""
+
+    topic: str
+    """Its name."""
+    heard: float | None
+    """Time on the monotonic clock [s]; None if no message has come."""
+    is_stream: bool
+    """True if it is published all the time; others come when there is something new."""
+
+    @property
+    def age(self) -> float | None:
+        """[s]; None if no message has come."""
+        return None if self.heard is None else time.monotonic() - self.heard
+
+    @property
+    def is_stale(self) -> bool:
+        """True if its values are no longer those of the rover."""
+        return self.is_stream and self.age is not None and self.age > MAX_AGE
+
+    def describe(self) -> str:
+        """Return the age in words."""
+        if self.age is None:
+            return "nothing yet"
+        return f"{self.age:.1f} s" if self.age < 10.0 else f"{self.age:.0f} s"
+
+
+@dataclass(frozen=True, eq=False)
 class LiveValues:
     """The latest values of the topics; NaN for values that did not come."""
 
@@ -29,9 +62,9 @@ class LiveValues:
     """(3,) roll, pitch, yaw [rad]."""
     speed: float = 0.0
     """[m/s]"""
-    joints: dict[str, float] = field(default_factory=dict)
+    joints: Mapping[str, float] = field(default_factory=dict)
     """Angles [rad] by joint name."""
-    efforts: dict[str, float] = field(default_factory=dict)
+    efforts: Mapping[str, float] = field(default_factory=dict)
     """Torques [N m] by joint name."""
     wheel_loads: Floats = field(default_factory=_unknown)
     """(6,) [N]"""
@@ -51,10 +84,6 @@ class LiveValues:
     """Distance driven since then [m]."""
     energy: float = 0.0
     """Work of the wheel motors since then [J]."""
-
-    def copy(self) -> "LiveValues":
-        """Return a copy that later messages do not change."""
-        return replace(self, joints=dict(self.joints), efforts=dict(self.efforts))
 
 
 class StateBuilder:

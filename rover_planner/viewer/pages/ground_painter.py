@@ -7,15 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from rover_physics.numerics.arrays import Floats
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_planner.viewer.panel.survey_legend import draw_survey_legend
-from rover_planner.viewer.panel.tabs.ground_tab import GroundTab
-from rover_planner.viewer.scene.ground_mesh import GroundMesh, build_ground_mesh, export_ground
+from rover_planner.viewer.panel.ground_tab import GroundTab
+from rover_planner.viewer.panel.legend import draw_survey_legend
+from rover_planner.viewer.scene.ground_mesh import (
+    build_ground_mesh,
+    build_survey_mesh,
+    export_ground,
+)
 from rover_planner.viewer.scene.scene import Scene
-from rover_planner.viewer.scene.survey_mesh import SurveyMesh, build_survey_mesh
-from rover_planner.viewer.state.background_work import BackgroundWork, Report
+from rover_planner.viewer.state.background_work import BackgroundWork, Progress
+from rover_planner.viewer.state.colours import ColourScale
 from rover_planner.viewer.state.scenario import Scenario
-from rover_planner.viewer.state.survey_layers import ShownSurvey
+from rover_planner.viewer.state.survey_layers import ColouredGround, ShownSurvey
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,10 +42,10 @@ class PaintRequest:
 class PaintedGround:
     """The ground, ready to be sent."""
 
-    drawn: GroundMesh | SurveyMesh
-    """What is drawn, and what its colours mean."""
     glb: bytes
-    """The same as a file for the scene."""
+    """The ground as a file for the scene."""
+    scale: ColourScale | ColouredGround
+    """What its colours mean; the latter for a layer of a survey."""
 
 
 class GroundPainter:
@@ -84,32 +87,26 @@ class GroundPainter:
                 raise one.error
             if one.result is not None:
                 self._scene.draw_ground(one.result.glb)
-                self._explain(one.request, one.result.drawn)
+                self._explain(one.request, one.result.scale)
 
-    def _explain(self, request: PaintRequest, drawn: GroundMesh | SurveyMesh) -> None:
+    def _explain(self, request: PaintRequest, scale: ColourScale | ColouredGround) -> None:
         """Show what the colours mean."""
-        if isinstance(drawn, GroundMesh):
-            self._tab.show_scale(drawn.scale)
+        if isinstance(scale, ColourScale):
+            self._tab.show_scale(scale)
         elif request.survey is not None:
-            asked, name = request.scenario, request.layer
-            differences = request.survey.find_differences(asked.rover, _options_of(asked))
-            told = request.survey.describe(name)
-            self._tab.show_legend(draw_survey_legend(name, told, drawn.meaning, differences))
+            survey, asked, name = request.survey, request.scenario, request.layer
+            differences = survey.find_differences(asked.rover, asked.asked_options.model)
+            told = survey.describe(name)
+            self._tab.show_legend(draw_survey_legend(name, told, scale, differences))
 
 
-def _options_of(asked: Scenario) -> SweepOptions:
-    return asked.asked_options.model
-
-
-def _paint(request: PaintRequest, report: Report) -> Iterator[PaintedGround]:
-    report("colouring the ground", 1, 1)
-    drawn = _build(request)
-    yield PaintedGround(drawn, export_ground(drawn.mesh, request.origin))
-
-
-def _build(request: PaintRequest) -> GroundMesh | SurveyMesh:
-    asked = request.scenario
+def _paint(request: PaintRequest) -> Iterator[Progress | PaintedGround]:
+    yield Progress("colouring the ground", 1, 1)
+    asked, name = request.scenario, request.layer
     if request.survey is not None:
-        return build_survey_mesh(asked.terrain, request.survey, request.layer)
-    options = _options_of(asked)
-    return build_ground_mesh(asked.rover, asked.terrain, request.layer, request.heading, options)
+        mesh, meaning = build_survey_mesh(asked.terrain, request.survey, name)
+        yield PaintedGround(export_ground(mesh, request.origin), meaning)
+    else:
+        options = asked.asked_options.model
+        drawn = build_ground_mesh(asked.rover, asked.terrain, name, request.heading, options)
+        yield PaintedGround(export_ground(drawn.mesh, request.origin), drawn.scale)

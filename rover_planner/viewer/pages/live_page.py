@@ -2,23 +2,23 @@
 """The page that follows a live rover: the data of its topics, and plans asked of its server."""
 
 import time
-from typing import Any
 
 import numpy as np
 
+from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
+from rover_planner.errors import PlanningError
+from rover_planner.viewer.browser.link import read_link
 from rover_planner.viewer.live.listener import NO_ODOMETRY, LiveData, LiveListener
-from rover_planner.viewer.live.live_state import StateBuilder
-from rover_planner.viewer.live.topic_ages import TopicAge
-from rover_planner.viewer.pages.page_base import PageBase
+from rover_planner.viewer.live.live_state import StateBuilder, TopicAge
+from rover_planner.viewer.pages.base import PageBase
 from rover_planner.viewer.panel.board import BoardNotes
-from rover_planner.viewer.panel.dashboard import describe_verdict
+from rover_planner.viewer.panel.dashboard import describe_verdict, draw_topics
+from rover_planner.viewer.panel.drive_tab import DriveTab
+from rover_planner.viewer.panel.ground_tab import GroundActions, GroundTab
 from rover_planner.viewer.panel.header import Chip, verdict_chip
 from rover_planner.viewer.panel.history import History
 from rover_planner.viewer.panel.plots import Curves
-from rover_planner.viewer.panel.tabs.drive_tab import DriveTab
-from rover_planner.viewer.panel.tabs.ground_tab import GroundActions, GroundTab
-from rover_planner.viewer.panel.topics import draw_topics
 from rover_planner.viewer.scene.ground_mesh import build_ground_mesh, export_ground
 from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN
 from rover_planner.viewer.state.context import Context
@@ -78,10 +78,11 @@ class LivePage(PageBase):
         self._draw_ground()
         self.start()
 
-    def fill_panel(self, tabs: Any) -> None:
+    def fill_panel(self) -> None:
         """Add the tabs Drive and Ground."""
         gui, add = self.server.gui, self.requests.add
-        self.drive_tab = DriveTab(gui, tabs.add_tab("Drive"), None, self.requests)
+        tabs = gui.add_tab_group()
+        self.drive_tab = DriveTab(gui, tabs.add_tab("Drive"), self.requests, None)
         actions = GroundActions(
             recolour=lambda: add(self._draw_ground, "colours"),
             show_forces=lambda visible: add(lambda: self.scene.show_forces(visible)),
@@ -98,12 +99,21 @@ class LivePage(PageBase):
         passable = None if verdict is None else verdict.traversable
         return context, (verdict_chip(passable, ""), self._freshness)
 
-    def click(self, point: np.ndarray | None, shift: bool) -> None:
+    def click(self, point: Floats | None, shift: bool) -> None:
         """Ask the server for a plan to a point."""
         if point is None or not self._has_ground:
             self.show_refusal("the click is beside the known ground")
         else:
             self.show_refusal(self._listener.request_plan(point))
+
+    def hear(self, word: str, rest: str) -> None:
+        """Refuse a link; the plan is the only path, and the rover is where it is."""
+        if word == "open" and read_link(rest) is not None:
+            raise PlanningError("this page follows a live rover, so it opens no links")
+
+    def path_to_look_at(self) -> Floats:
+        """Return x and y (2, 2) [m] of the places between which the rover was first seen."""
+        return np.array([self.session.scenario.start[:2], self.session.scenario.goal[:2]])
 
     def show_refusal(self, reason: str) -> None:
         """Show, as text, why a request was refused; nothing if the reason is empty."""
@@ -134,7 +144,7 @@ class LivePage(PageBase):
         if state is None:
             if update:
                 self.drive_tab.show(self.session.rover, None, "waiting for odometry")
-                self.drive_tab.show_topics(draw_topics(data.ages))
+                self.drive_tab.show_below(draw_topics(data.ages))
             return
         self._turn_arm(data)
         if not self._camera_aimed:
@@ -148,7 +158,7 @@ class LivePage(PageBase):
             notes = BoardNotes(has_slip=bool(np.nan_to_num(state.slip_ratio).any()))
             status = f"{word}; {source}"
             self.drive_tab.show(self.session.rover, state, status, notes, stale=stale)
-            self.drive_tab.show_topics(draw_topics(data.ages))
+            self.drive_tab.show_below(draw_topics(data.ages))
         if moved and update:
             curves = Curves(self._history.distance, self._history.values)
             self.plots.set_curves(self.session.rover, curves)
@@ -196,7 +206,7 @@ class LivePage(PageBase):
             steps = {name: ARM_STEP * round(angle / ARM_STEP) for name, angle in known.items()}
             self.scene.turn_arm(steps)
 
-    def _aim_cameras(self, position: np.ndarray) -> None:
+    def _aim_cameras(self, position: Floats) -> None:
         """Aim the cameras of all visitors, present and future, at the rover."""
         ahead = (float(position[0]) + 4.0, float(position[1]), 0.0)
         self.session.move(start=(float(position[0]), float(position[1]), 0.0), goal=ahead)

@@ -2,31 +2,22 @@
 """The page that plans: its tabs, and what visitors can request of the session behind it."""
 
 import time
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Mapping
 
-import numpy as np
-
+from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
+from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import RoverValue
-from rover_planner.viewer.browser.link import Link
-from rover_planner.viewer.browser.words import Words
+from rover_planner.viewer.browser.link import Link, read_link
+from rover_planner.viewer.pages.base import PageBase
 from rover_planner.viewer.pages.ground_painter import GroundPainter
 from rover_planner.viewer.pages.judged_display import JudgedDisplay, Panels
-from rover_planner.viewer.pages.page_base import PageBase
 from rover_planner.viewer.pages.sharing import Sharing
-from rover_planner.viewer.pages.study_desk import StudyDesk
-from rover_planner.viewer.panel.header import (
-    Chip,
-    play_chip,
-    verdict_chip,
-)
-from rover_planner.viewer.panel.judging_notice import JudgingNotice
-from rover_planner.viewer.panel.reasons.candidate_table import CandidateTable
-from rover_planner.viewer.panel.tabs.drive_tab import DriveTab
-from rover_planner.viewer.panel.tabs.ground_tab import GroundActions, GroundTab
-from rover_planner.viewer.panel.tabs.rover_tab import RoverActions, RoverTab
-from rover_planner.viewer.panel.tabs.share_tab import ShareActions, ShareTab
+from rover_planner.viewer.panel.drive_tab import DriveTab
+from rover_planner.viewer.panel.ground_tab import GroundActions, GroundTab
+from rover_planner.viewer.panel.header import Chip, play_chip, verdict_chip
+from rover_planner.viewer.panel.notices import JudgingNotice
+from rover_planner.viewer.panel.rover_tab import RoverActions, RoverTab
 from rover_planner.viewer.state.context import Context, describe_scenario
 from rover_planner.viewer.state.playback import Playback
 from rover_planner.viewer.state.session import ViewSession
@@ -64,92 +55,50 @@ class Page(PageBase):
         self._changed_at: float | None = None
         """When the rover was changed last [s]; None if all candidates are judged for it."""
         super().__init__(session, host, port)
-        add = self.requests.add
         self._painter = GroundPainter(
-            self.scene, self.ground_tab, lambda: add(self.judged.take_ground, "painted"), survey
+            self.scene,
+            self.ground_tab,
+            lambda: self.requests.add(self.judged.take_ground, "painted"),
+            survey,
         )
-        self.judged = JudgedDisplay(
-            session, self.playback, self._panels(), self._painter, self._note_change
-        )
-        self.drive_tab.go_to_failure = self.judged.path.go_to_failure
+        self.judged = JudgedDisplay(session, self.playback, self._panels, self._painter)
+        self.drive_tab.go_to_failure = self.judged.go_to_failure
         session.judge_in_background(self._show_and_wait)
         self.judged.show_all()
         self.start()
 
-    def _panels(self) -> Panels:
-        return Panels(
-            self.scene,
-            self.errors,
-            self.drawings,
-            self._notice,
-            self.plots,
-            self.drive_tab,
-            self.rover_tab,
-            self.ground_tab,
-            self.candidates,
-        )
-
-    @property
-    def is_busy(self) -> bool:
-        """Whether something is judged, or judged and not shown yet."""
-        works = self.session, self._painter.work
-        is_judged = any(work.progress is not None or work.has_news for work in works)
-        return is_judged or self.is_drawing  # in this order: what was taken is drawn
-
-    def end_work(self) -> None:
-        """End all threads in the background."""
-        self.session.close()
-        self._painter.work.close()
-        self.studies.work.close()
-
-    def add_notices(self) -> None:
-        """Add the notice of what is judged."""
-        add = self.requests.add
-        self._notice = JudgingNotice(
-            self.server.gui,
+    def fill_panel(self) -> None:
+        """Add the notice of what is judged, and the tabs."""
+        gui, add = self.server.gui, self.requests.add
+        notice = JudgingNotice(
+            gui,
             cancel=lambda: add(self._cancel, "cancel"),
             judge_again=lambda: add(self._judge_again, "judge again"),
         )
-        Words(
-            self.server.gui,
-            {
-                "show": lambda _client, path: add(lambda: self._choose_path(path - 1), "path"),
-                "point": lambda client, path: add(
-                    lambda: self.scene.paths.point_at(client, path - 1),
-                    f"point {client.client_id}",
-                ),
-            },
-        )
-
-    def fill_panel(self, tabs: Any) -> None:
-        """Add the tabs Drive, Rover, Ground and path, and Studies."""
-        gui = self.server.gui
-        self.drive_tab = DriveTab(gui, tabs.add_tab("Drive"), self.playback, self.requests)
+        tabs = gui.add_tab_group()
+        self.drive_tab = DriveTab(gui, tabs.add_tab("Drive"), self.requests, self.playback)
         self.rover_tab = RoverTab(gui, tabs.add_tab("Rover"), self._rover_actions())
         with tabs.add_tab("Ground and path"):
-            self.candidates = CandidateTable(gui)
+            self.candidates = gui.add_html("")
             names = () if self._survey is None else self._survey.names
             self.ground_tab = GroundTab(gui, self._ground_actions(), surveyed=names)
-        with tabs.add_tab("Studies"):
-            self.studies = StudyDesk(gui, self.requests, self._show_rover)
         with tabs.add_tab("Share"):
-            share_tab = ShareTab(gui, self._share_actions())
-        self.sharing = Sharing(self.session, self.playback, self.ground_tab, share_tab)
-
-    def _show_rover(self, rover: Rover, loaded: Rover | None = None) -> None:
-        self.session.take_rover(rover, loaded)
-        self.judged.show_inputs()
-        self.judged.show_verdict()
-
-    def _share_actions(self) -> ShareActions:
-        add = self.requests.add
-        return ShareActions(
-            save=lambda client: add(lambda: self._save(client)),
-            link=lambda client: add(lambda: self.sharing.show_link(client)),
+            self.sharing = Sharing(
+                self.server, self.requests, self.session, self.playback, self.ground_tab
+            )
+        assert self.drive_tab.controls is not None
+        self._panels = Panels(
+            self.scene,
+            self.errors,
+            self.drawings,
+            notice,
+            self.plots,
+            self.drive_tab,
+            self.drive_tab.controls,
+            self.rover_tab,
+            self.ground_tab,
+            lambda table: setattr(self.candidates, "content", table),
         )
-
-    def _save(self, client: Any) -> None:
-        self.sharing.save(self.server, client, self.scene.labels.html)
 
     def _rover_actions(self) -> RoverActions:
         add = self.requests.add
@@ -162,8 +111,8 @@ class Page(PageBase):
                 lambda: self._turn_arm(joint, angle), f"joint {joint}"
             ),
             current=lambda: self.session.wanted.rover,
-            undo=lambda: add(lambda: self.judged.changes.undo(), "undo"),
-            reset=lambda: add(lambda: self.judged.changes.reset(), "reset"),
+            undo=lambda: add(self._undo, "undo"),
+            reset=lambda: add(lambda: self._restore(self.session.wanted.loaded, {}), "reset"),
         )
 
     def _ground_actions(self) -> GroundActions:
@@ -173,22 +122,45 @@ class Page(PageBase):
             recolour=lambda: add(self.judged.draw_ground, "colours"),
             show_forces=lambda visible: add(lambda: self.scene.show_forces(visible)),
             show_between=lambda visible: add(lambda: self.scene.failure.show_between(visible)),
-            show_asked=lambda visible: add(lambda: self.scene.search.show_asked(visible)),
         )
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether something is judged, or judged and not shown yet."""
+        works = self.session, self._painter.work
+        is_judged = any(work.progress is not None or work.has_news for work in works)
+        return is_judged or self.is_drawing  # in this order: what was taken is drawn
+
+    def close(self) -> None:
+        """End the page and its threads in the background."""
+        super().close()
+        self.session.close()
+        self._painter.work.close()
 
     def describe_context(self) -> tuple[Context, tuple[Chip, ...]]:
         """Return what is judged, the verdict, and what is played."""
         session, playback = self.session, self.playback
-        return describe_scenario(session.finished.scenario, session.ground_name), (
+        return describe_scenario(session.shown.scenario, session.ground_name), (
             verdict_chip(session.shown.verdict.traversable, self.judged.why_old),
             play_chip(playback.rate != 0.0, playback.describe()),
         )
 
-    def path_to_look_at(self) -> np.ndarray:
+    def path_to_look_at(self) -> Floats:
         """Return x and y (n, 2) [m] of the shown path."""
         return self.session.shown.candidate.poses[:, :2]
 
     # Requests of visitors.
+
+    def hear(self, word: str, rest: str) -> None:
+        """Open a link, show a path, or go to a place of lanes and plots."""
+        if word == "open":
+            link = read_link(rest)
+            if link is not None:
+                self.open_link(link)
+        elif word == "show":
+            self.session.show_candidate(int(rest) - 1)
+        elif word == "seek":
+            self.judged.seek_share(float(rest))
 
     def open_link(self, link: Link) -> None:
         """Judge what a link holds, and show it."""
@@ -197,14 +169,13 @@ class Page(PageBase):
         self.judged.draw_ground()
         self.judged.show_verdict()
 
-    def click(self, point: np.ndarray | None, shift: bool) -> None:
+    def click(self, point: Floats | None, shift: bool) -> None:
         """Set goal or start, and plan."""
         if point is None:
-            self.show_refusal("the click is beside the known ground")
-        else:
-            self.plan(point, "start" if shift else self.ground_tab.click_sets)
+            raise PlanningError("the click is beside the known ground")
+        self.plan(point, "start" if shift else self.ground_tab.click_sets)
 
-    def plan(self, point: np.ndarray, sets: str = "goal") -> None:
+    def plan(self, point: Floats, sets: str = "goal") -> None:
         """Plan with a point (2,) [m] as the "goal" or the "start"."""
         if sets == "goal":
             self.session.plan_to(point)
@@ -219,23 +190,41 @@ class Page(PageBase):
 
     def _change_value(self, value: RoverValue, number: float) -> None:
         self.session.change_rover(value.keys, number)
-        self._changed_at = time.monotonic()
-        self.judged.show_verdict()
+        self._note_change()
 
     def _turn_arm(self, joint: str, angle: float) -> None:
         self.session.change_arm(joint, angle)
+        self._note_change()
+
+    def _note_change(self) -> None:
+        """Show the verdict after a change of the rover; soon all candidates are judged."""
         self._changed_at = time.monotonic()
         self.judged.show_verdict()
 
-    def _choose_path(self, index: int) -> None:
-        self.session.show_candidate(index)
+    def _undo(self) -> None:
+        """Take the last rover again.
+
+        Raises:
+            PlanningError: There is none.
+        """
+        before = self.judged.history.undo(self.session.wanted)
+        if before is None:
+            raise PlanningError("there is no change of this rover on these paths to undo")
+        self._restore(before.scenario.rover, before.scenario.arm_angles)
+
+    def _restore(self, rover: Rover, arm_angles: Mapping[str, float]) -> None:
+        self.session.restore_rover(rover, arm_angles)
+        self.judged.show_inputs()
+        self._note_change()
 
     def _change_options(self, **changes: object) -> None:
         self.session.change_options(**changes)
         self.judged.show_verdict()
 
     def _load(self, read: Callable[[], Rover]) -> None:
-        self._show_rover(read())
+        self.session.take_rover(read())
+        self.judged.show_inputs()
+        self.judged.show_verdict()
 
     def _plan_again(self) -> None:
         """After a change of the rover: judge all candidates, or put a refused value back."""
@@ -252,11 +241,7 @@ class Page(PageBase):
         self.session.plan_again()
         self.judged.show_verdict()
 
-    def _note_change(self) -> None:
-        """Show inputs and verdict after a change of the rover; soon all candidates are judged."""
-        self._changed_at = time.monotonic()
-        self.judged.show_inputs()
-        self.judged.show_verdict()
+    # What was judged.
 
     def _show_and_wait(self) -> None:
         """Request that what was judged is shown; in the judging thread.
@@ -284,7 +269,7 @@ class Page(PageBase):
             if self.session.refusal:
                 self._changed_at = time.monotonic()
             self.sharing.go_on()
-            self.drive_tab.outdated = True
+            self._panels.controls.outdated = True
 
     def add_due_requests(self) -> None:
         """Request that all candidates are judged, REPLAN_DELAY after a change of the rover.
@@ -292,7 +277,6 @@ class Page(PageBase):
         It also tells what is worked on, with or without pictures.
         """
         self.errors.run("the progress is not shown", self.judged.show_work)
-        self.errors.run("the study's progress is not shown", self.studies.show_progress)
         changed = self._changed_at
         is_due = changed is not None and time.monotonic() - changed > REPLAN_DELAY
         if is_due and self.session.progress is None:
@@ -301,4 +285,4 @@ class Page(PageBase):
 
     def advance(self, seconds: float) -> None:
         """Play on by a time of the visitor [s]."""
-        self.judged.path.advance(seconds)
+        self.judged.advance(seconds)

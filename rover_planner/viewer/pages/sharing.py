@@ -2,6 +2,7 @@
 """Sends what the page shows as a file or a link, and shows again what a link holds."""
 
 import dataclasses
+import html
 from typing import Any
 
 from rover_physics.rover.model import Rover
@@ -9,10 +10,7 @@ from rover_physics.rover.rover_file import load_rover, preset_names
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.soil_file import soil_named
 from rover_planner.errors import PlanningError
-from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.studies.rover_values import read_rover, write_rover
-from rover_planner.viewer.browser.channel import run_for
-from rover_planner.viewer.browser.export import write_page
 from rover_planner.viewer.browser.link import (
     Link,
     change_values,
@@ -20,62 +18,83 @@ from rover_planner.viewer.browser.link import (
     list_changed_values,
     write_link,
 )
-from rover_planner.viewer.browser.report import describe_judgement
-from rover_planner.viewer.panel.tabs.ground_tab import GroundTab
-from rover_planner.viewer.panel.tabs.share_tab import ShareTab
+from rover_planner.viewer.browser.report import describe_judgement, write_page
+from rover_planner.viewer.panel.ground_tab import GroundTab
 from rover_planner.viewer.state.context import describe_scenario
 from rover_planner.viewer.state.playback import Playback
 from rover_planner.viewer.state.scenario import Scenario
 from rover_planner.viewer.state.session import ViewSession
+from rover_planner.viewer.state.visitor_requests import VisitorRequests
+
+FILE_WORDS = (
+    "One HTML file with the scene, the failing pose, all numbers and versions. It opens in any "
+    "browser, without this program."
+)
+LINK_WORDS = (
+    "A link to this page that holds rover (also one of a file), changed values, ends, path, time "
+    "and colours."
+)
 
 
 class Sharing:
-    """Writes and opens links, and writes files."""
+    """The tab to share what is shown: it writes and opens links, and writes files."""
 
     def __init__(
         self,
+        server: Any,
+        requests: VisitorRequests,
         session: ViewSession,
         playback: Playback,
         ground_tab: GroundTab,
-        share_tab: ShareTab,
     ):
-        """Open no link yet."""
-        self._session, self._playback = session, playback
-        self._ground_tab, self._share_tab = ground_tab, share_tab
+        """Add buttons to the container that is open; no link is opened yet."""
+        self._server, self._session, self._playback = server, session, playback
+        self._ground_tab = ground_tab
         self._fingerprint: tuple[Terrain | None, str] = (None, "")
         self._opening: tuple[Link, Scenario] | None = None
         """The link whose path and time are not shown yet, and what it asks for."""
+        gui = server.gui
+        gui.add_html(_text(FILE_WORDS))
+        save = gui.add_button("Save as HTML file")
+        save.on_click(lambda event: requests.add(lambda: self._save(event.client)))
+        gui.add_html(_text(LINK_WORDS))
+        link = gui.add_button("Link to what is shown")
+        link.on_click(lambda _event: requests.add(self._show_link))
+        self._link = gui.add_html("")
 
-    def save(self, server: Any, client: Any, labels: str) -> None:
-        """Send a visitor the scene with its labels, HTML, and its report as one HTML file."""
+    def _save(self, client: Any) -> None:
+        """Send a visitor the scene and its report as one HTML file."""
         session, link = self._session, self.make_link()
-        judgement = session.finished
+        judgement = session.shown
         context = describe_scenario(judgement.scenario, session.ground_name)
         word = "traversable" if session.shown.verdict.traversable else "not traversable"
         title = f"{judgement.scenario.rover.name} on {context.ground}: {word}"
-        report = describe_judgement(judgement, context, _write_short(link))
-        content = write_page(server, client.camera, report, title, labels)
+        try:
+            query = write_link(link)
+        except PlanningError:  # it would be too long; the report has the rover file itself
+            query = ""
+        report = describe_judgement(judgement, context, query)
+        content = write_page(self._server, client.camera, report, title)
         name = f"{judgement.scenario.rover.name}_{word.replace(' ', '_')}.html"
         client.send_file_download(name, content, save_immediately=True)
 
-    def show_link(self, client: Any) -> None:
-        """Show the link, and put it into a visitor's address bar and clipboard.
+    def _show_link(self) -> None:
+        """Show the link, to open or to copy.
 
         Raises:
             PlanningError: It would be too long.
         """
-        self._share_tab.show_link("")
-        query = write_link(self.make_link())
-        self._share_tab.show_link(query)
-        run_for(
-            client,
-            f"history.replaceState(null, '', {f'?{query}'!r});"
-            "navigator.clipboard?.writeText(location.href).catch(() => {});",
+        self._link.content = ""
+        safe = html.escape(f"?{write_link(self.make_link())}", quote=True)
+        copy = "navigator.clipboard.writeText(document.getElementById('link').href)"
+        self._link.content = _text(
+            f'<button onclick="{copy}">Copy</button> '
+            f'<a id="link" href="{safe}" style="overflow-wrap:anywhere">{safe}</a>'
         )
 
     def make_link(self) -> Link:
         """Return the link to what is shown."""
-        session, now = self._session, self._session.finished.scenario
+        session, now = self._session, self._session.shown.scenario
         return Link(
             rover=now.loaded.name,
             ground=self._identify(now.terrain),
@@ -116,7 +135,8 @@ class Sharing:
         _check_joints(link, loaded)
         same = (link.start, link.goal) == (wanted.start, wanted.goal)
         options = wanted.options.change(policy=link.policy, soil=link.soil or None)
-        _check_options(options)
+        if options.model.soil is not None:
+            soil_named(options.model.soil)  # before the page shows it as chosen
         return dataclasses.replace(
             wanted,
             loaded=loaded,
@@ -145,7 +165,7 @@ class Sharing:
         if session.shown.index == link.path - 1:
             self._opening = None
             self._playback.go_to(link.time)
-        elif link.path <= len(session.answer.candidates):
+        elif link.path <= len(session.shown.answer.candidates):
             session.show_candidate(link.path - 1)
         elif session.progress is None:  # no way around was found this time
             self._opening = None
@@ -157,18 +177,8 @@ class Sharing:
         return self._fingerprint[1]
 
 
-def _write_short(link: Link) -> str:
-    """Return a link for a report, which has the rover file itself; empty if it is too long."""
-    try:
-        return write_link(link)
-    except PlanningError:
-        return ""
-
-
-def _check_options(options: PathQueryOptions) -> None:
-    """Check the soil by its name, before the page shows it as chosen."""
-    if options.model.soil is not None:
-        soil_named(options.model.soil)
+def _text(text: str) -> str:
+    return f'<div style="font-size:12px;padding:4px 8px">{text}</div>'
 
 
 def _check_joints(link: Link, rover: Rover) -> None:

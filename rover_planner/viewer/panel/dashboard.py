@@ -1,14 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The dashboard: the board with its numbers, and the verdict as text."""
+"""The dashboard: the board with its numbers, the verdict as text, and the ages of topics."""
 
 import html
 import math
 from collections.abc import Sequence
 
 from rover_physics.rover.model import Rover
+from rover_planner.viewer.live.live_state import TopicAge
 from rover_planner.viewer.panel.board import BoardNotes, draw_board, draw_legend
 from rover_planner.viewer.state.colours import NOTICE, PASSABLE, REFUSED, UNKNOWN, to_css
-from rover_planner.viewer.state.comparison import POLICY_TITLES, PolicyVerdict
+from rover_planner.viewer.state.context import POLICY_TITLES
+from rover_planner.viewer.state.reasons.failure import Failure
+from rover_planner.viewer.state.scenario import PolicyVerdict
 from rover_planner.viewer.state.trajectory import RoverState
 
 
@@ -119,6 +122,32 @@ def describe_details(reason: str, summary: str, notes: Sequence[str]) -> str:
     lines += _describe_notes(notes, summary)
     style = "font-size:12px;line-height:1.35;padding:4px 8px 0"
     return f'<div id="details" style="{style}">{"".join(lines)}</div>'
+
+
+def describe_failure(failure: Failure) -> str:
+    """Return a failure as HTML: limit, value, link and place."""
+    between = ", between waypoints" if failure.is_between else ""
+    return (
+        f'<span id="failure"><b>{html.escape(failure.headline)}</b>, '
+        f"after {failure.distance:.2f} m, {failure.time:.0f} s{between}</span>"
+    )
+
+
+def draw_topics(ages: Sequence[TopicAge]) -> str:
+    """Return the topics of a live rover with their ages as HTML; stale ones are grey."""
+    rows = "".join(
+        f'<div data-topic="{html.escape(one.topic)}" data-stale="{str(one.is_stale).lower()}" '
+        f'style="display:flex;justify-content:space-between;gap:1em;'
+        f'{"opacity:.45;filter:grayscale(1)" if one.is_stale else ""}">'
+        f"<span>{html.escape(one.topic)}</span>"
+        f"<span>{'stale, ' if one.is_stale else ''}{one.describe()}</span></div>"
+        for one in ages
+    )
+    return (
+        '<div id="topics" style="font-size:12px;line-height:1.4;padding:4px 8px">'
+        f'<div style="border-top:1px solid {to_css(NOTICE)};opacity:.7">'
+        f"age of the last message</div>{rows}</div>"
+    )
 
 
 def _describe_notes(notes: Sequence[str], summary: str) -> list[str]:

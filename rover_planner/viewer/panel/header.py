@@ -10,14 +10,8 @@ from rover_planner.viewer.state.context import Context
 
 LEFT, RIGHT = 310, 410
 """Distances of the header from the sides of a wide window [px]: beside the panels."""
-NOTICES = 100
-"""Distance of the notices of viser from the lower edge [px]: between the header and the hint."""
-NARROW = 1000
-"""Width of a window below which the plots float over the scene [px]."""
 SHEET = 576
 """Largest width of a window in which viser lists all panels in a sheet at the bottom [px]."""
-FLOATING = 232
-"""Height of the floating plots [px]: all lanes with their legend are seen without scrolling."""
 HINT = (
     "Drag: turn the view. Wheel: nearer. Click on the ground: goal, with Shift: start. "
     "Space: play or pause. Arrows left and right: a waypoint."
@@ -87,10 +81,7 @@ def draw_header(context: Context, chips: tuple[Chip, ...]) -> str:
 
 
 def _style() -> str:
-    """Return the rules that place things over the scene, beside the panels.
-
-    viser would show its notices, as that of a browser without a graphics card, over the header.
-    """
+    """Return the rules that place things over the scene, beside the panels."""
     return (
         f"<style>.over-scene{{position:fixed;left:{LEFT}px;right:{RIGHT}px;z-index:5;"
         "display:flex;flex-wrap:wrap;gap:.3em 1em;align-items:center;justify-content:center;"
@@ -98,11 +89,8 @@ def _style() -> str:
         "background:rgba(255,255,255,.88);color:#222;pointer-events:none;"
         "width:fit-content;margin:0 auto}"
         "[data-hint=off] #hint{display:none!important}"
-        f".mantine-Notifications-root{{top:auto!important;bottom:{NOTICES}px!important}}"
-        f"@media (max-width:{NARROW - 1}px){{.over-scene{{left:8px}}"
-        f"#hint{{bottom:{FLOATING + 12}px!important}}"
-        f".mantine-Notifications-root{{bottom:{FLOATING + NOTICES}px!important}}}}"
-        f"@media (max-width:{SHEET}px){{.over-scene{{right:8px}}#hint{{display:none!important}}}}"
+        f"@media (max-width:{SHEET}px){{.over-scene{{left:8px;right:8px}}"
+        "#hint{display:none!important}}"
         "</style>"
     )
 

@@ -14,7 +14,7 @@ from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_planner.figures.wheel_colours import LEFT_DASHES, WHEEL_COLOURS, colour_of
-from rover_planner.viewer.panel.reasons.lanes import Lanes
+from rover_planner.viewer.panel.lanes import Lanes
 from rover_planner.viewer.state.colours import REFUSED, Colour, blend, to_css
 
 MAX_POINTS = 160
@@ -114,9 +114,13 @@ class Plots:
     def move_cursor(self, distance: float) -> None:
         """Show the curves and the lanes with the cursor at a distance [m]."""
         for name, (x, values) in self.curves.items():
-            low = 0.0 if PLOTS[name].from_zero else None
-            columns = add_cursor(x, values, distance, self.limits.get(name), low)
-            self.plots[name].data = add_mark(columns, self._failure_at, low)
+            columns = (x, *values.T)
+            if name in self.limits:
+                columns = (*columns, np.full(len(x), self.limits[name]))
+            low = min(float(column.min()) for column in columns[1:])
+            low = min(low, 0.0) if PLOTS[name].from_zero else low
+            columns = add_line(columns, self._failure_at, low)
+            self.plots[name].data = add_line(columns, distance, low)
         self.lanes.move_cursor(distance)
 
 
@@ -208,60 +212,22 @@ def _legend() -> str:
     )
 
 
-def add_cursor(
-    x: Floats, values: Floats, distance: float, limit: float | None, low: float | None = None
-) -> tuple[Floats, ...]:
-    """Return the columns of a plot: x, curves, limit, and a vertical line at a distance.
+def add_line(columns: tuple[Floats, ...], at: float | None, low: float) -> tuple[Floats, ...]:
+    """Return the columns of a plot with one more, a vertical line at a distance.
 
     The line is a curve of its own: along the lower edge, and at the distance up and down again.
     It has no gaps, for the page cannot plot NaN.
 
     Args:
-        x: (n,) distances [m], ascending.
-        values: (n, k) curves.
-        distance: Where the line is [m].
-        limit: Value of a horizontal line; None for none.
-        low: Lower end of the vertical line; None: the smallest value.
+        columns: Distances [m], ascending, and curves, each (n,).
+        at: Where the line is [m]; None: it lies along the lower edge.
+        low: Lower end of the line.
     """
-    at = int(np.searchsorted(x, distance))
-    columns = [np.insert(x, at, [distance] * 3)]
-    least, high = float(values.min()), float(values.max())
-    for k in range(values.shape[1]):
-        here = float(np.interp(distance, x, values[:, k]))
-        columns.append(np.insert(values[:, k], at, [here] * 3))
-    if limit is not None:
-        columns.append(np.full(len(x) + 3, limit))
-        least, high = min(least, limit), max(high, limit)
-    line = np.full(len(x) + 3, least if low is None else min(low, least))
-    line[at + 1] = high
-    return (*columns, line)
-
-
-def add_mark(
-    columns: tuple[Floats, ...], distance: float | None, low: float | None = None
-) -> tuple[Floats, ...]:
-    """Return the columns of a plot with one more below the cursor, a vertical line at a distance.
-
-    Args:
-        columns: x and curves, the last of them the cursor.
-        distance: Where the line is [m]; None: it lies along the lower edge.
-        low: Lower end of the line; None: that of the cursor.
-    """
-    cursor = columns[-1]
-    least = float(cursor.min()) if low is None else min(low, float(cursor.min()))
-    if distance is None:
-        return (*columns[:-1], np.full(len(cursor), least), cursor)
-    x = columns[0]
-    at = int(np.searchsorted(x, distance))
-    line = np.full(len(x) + 3, least)
-    line[at + 1] = float(cursor.max())
-    curves = [
-        np.insert(column, at, [float(np.interp(distance, x, column))] * 3)
-        for column in columns[1:-1]
-    ]
-    return (
-        np.insert(x, at, [distance] * 3),
-        *curves,
-        line,
-        np.insert(cursor, at, [least] * 3),
-    )
+    x, *curves = columns
+    if at is None:
+        return (*columns, np.full(len(x), low))
+    row = int(np.searchsorted(x, at))
+    line = np.full(len(x) + 3, low)
+    line[row + 1] = max(float(curve.max()) for curve in curves)
+    widened = [np.insert(curve, row, [np.interp(at, x, curve)] * 3) for curve in curves]
+    return (np.insert(x, row, [at] * 3), *widened, line)

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The cameras of all visitors: where they look from, and whether they go along with the rover."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from rover_physics.names import WHEEL_POSITIONS
 from rover_physics.numerics.arrays import Floats
+from rover_physics.rover.model import Rover
 from rover_planner.viewer.scene.local_frame import LocalFrame
+from rover_planner.viewer.state.reasons.failure import Failure
 
 FIT, TOP, SIDE = "Fit", "Top", "Side"
 VIEWS = (FIT, TOP, SIDE)
@@ -20,35 +22,8 @@ MIN_AWAY = 12.0
 """Smallest distance of a camera from what it looks at [wheel radii]."""
 
 
-@dataclass(frozen=True, eq=False)
-class Target:
-    """What a camera looks at, map frame."""
-
-    points: Floats
-    """(n, 3) points that a view shall show [m]: the path, or the ground."""
-    rover: Floats
-    """(3,) position of the rover [m]."""
-    ahead: Floats
-    """(2,) direction of the path, of length 1."""
-    wheel_radius: float
-    """[m]"""
-    rover_radius: float = 0.0
-    """Radius of a circle around the rover, which may stand at any of the points [m]."""
-
-    @property
-    def middle(self) -> Floats:
-        """(3,) middle of the points [m]."""
-        return 0.5 * (self.points.min(axis=0) + self.points.max(axis=0))
-
-    @property
-    def radius(self) -> float:
-        """Radius of a ball around the middle that contains the rover at all points [m]."""
-        away = float(np.linalg.norm(self.points - self.middle, axis=1).max()) + self.rover_radius
-        return max(away, MIN_AWAY * self.wheel_radius)
-
-
 class Cameras:
-    """Places the cameras of visitors."""
+    """Places the cameras of visitors; places are (3,) [m], map frame."""
 
     def __init__(self, server: Any, frame: LocalFrame):
         """Move no camera yet."""
@@ -56,34 +31,39 @@ class Cameras:
         self.follows = False
         """Whether the cameras go along with the rover."""
 
-    def look(self, client: Any, view: str, target: Target) -> None:
-        """Let a visitor's camera look at a target.
+    def look(self, client: Any, view: str, rover: Rover, path: Floats, at: Floats) -> None:
+        """Let a visitor's camera look at a path or at the rover on it.
 
         Args:
             client: The visitor's client of viser.
-            view: FIT all points from behind and beside; TOP all points from above, north at the
-                top; SIDE the rover from the right side of its path.
-            target: What to look at.
+            view: FIT all of the path from behind and beside; TOP the same from above, north at
+                the top; SIDE the rover from the right side of its path.
+            rover: The rover, for its size.
+            path: (n, 3) points of the path.
+            at: Where the rover is.
         """
+        ahead = path[-1, :2] - path[0, :2]
+        length = float(np.linalg.norm(ahead))
+        ahead = ahead / length if length > 0.0 else np.array([1.0, 0.0])
+        beside, away = np.array([ahead[1], -ahead[0]]), MIN_AWAY * rover.wheel.radius
+        if view == SIDE:
+            self._place(client, at + 1.5 * away * np.array([*beside, 0.25]), at)
+            return
         fov, aspect = _field_of_view(client)
-        beside = np.array([target.ahead[1], -target.ahead[0]])
-        if view in (FIT, TOP):
-            centre = target.middle
-            away = MARGIN * target.radius / np.sin(0.5 * fov) / min(aspect, 1.0)
-            flat = 0.45 * beside - 0.65 * target.ahead
-            offset = np.array([*flat, SLANT]) if view == FIT else np.array([0.0, -1e-3, 1.0])
-            offset *= away / np.linalg.norm(offset)
-        else:
-            centre, away = target.rover, 1.5 * MIN_AWAY * target.wheel_radius
-            offset = away * np.array([*beside, 0.25])
-        self._place(client, centre + offset, centre)
+        middle = 0.5 * (path.min(axis=0) + path.max(axis=0))
+        radius = float(np.linalg.norm(path - middle, axis=1).max()) + find_radius(rover)
+        flat = 0.45 * beside - 0.65 * ahead
+        towards = np.array([*flat, SLANT] if view == FIT else [0.0, -1e-3, 1.0])
+        towards /= np.linalg.norm(towards)
+        away = MARGIN * max(radius, away) / np.sin(0.5 * fov) / min(aspect, 1.0)
+        self._place(client, middle + away * towards, middle)
 
     def aim(self, client: Any, first: Floats, ahead: Floats, wheel_radius: float) -> None:
         """Aim a visitor's camera along a line, from behind and beside its start.
 
         Args:
             client: The visitor's client of viser.
-            first: (3,) start of the line [m], map frame.
+            first: Start of the line.
             ahead: (2,) from the start of the line to its end [m].
             wheel_radius: [m]
         """
@@ -95,21 +75,39 @@ class Cameras:
         self._place(client, position, first + np.array([*(0.12 * ahead), 0.0]))
 
     def centre(self, place: Floats) -> None:
-        """Let all cameras look at a place (3,) [m] from the same side and distance as before."""
-        for client in self._server.get_clients().values():
-            here = self._frame.to_map(client.camera.position)
-            offset = here - self._frame.to_map(client.camera.look_at)
+        """Let all cameras look at a place from the same side and distance as before."""
+        for client in self._clients():
+            offset = client.camera.position - client.camera.look_at
             self._place(client, place + offset, place)
+
+    def look_at_failure(self, rover: Rover, failure: Failure) -> None:
+        """Let all cameras look at a failure, from the side of what fails."""
+        yaw, at = float(failure.state.attitude[2]), failure.state.position
+        size = rover.suspension.wheels["front"][0] - rover.belly.x[0]
+        side = -1.0 if "right" in failure.link else 1.0
+        ahead, left = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
+        offset = size * np.array([*(-0.9 * ahead + side * 2.2 * left), 1.3])
+        for client in self._clients():
+            self._place(client, at + offset, at)
 
     def go_along(self, by: Floats) -> None:
         """Move all cameras by (3,) [m] if they go along with the rover."""
         if self.follows:
-            for client in self._server.get_clients().values():
+            for client in self._clients():
                 client.camera.position = client.camera.position + by
+
+    def _clients(self) -> list[Any]:
+        return list(self._server.get_clients().values())
 
     def _place(self, client: Any, position: Floats, look_at: Floats) -> None:
         client.camera.position = self._frame.to_scene(position)
         client.camera.look_at = self._frame.to_scene(look_at)
+
+
+def find_radius(rover: Rover) -> float:
+    """Return the radius of the circle around a rover, seen from above, that holds its wheels."""
+    hubs = np.array([rover.suspension.wheels[name] for name in WHEEL_POSITIONS])
+    return float(np.linalg.norm(hubs[:, :2], axis=1).max()) + rover.wheel.radius
 
 
 def _field_of_view(client: Any) -> tuple[float, float]:

@@ -39,9 +39,9 @@ OUTLINE_WIDTH = 5.0
 class FailureMark:
     """A ghost of the whole rover where the shown path is refused, until another one is shown."""
 
-    def __init__(self, scene: Any, labels: Labels, frame: LocalFrame | None = None):
-        """Draw nothing yet; without a frame the scene is drawn in the map frame."""
-        self._scene, self._labels, self._frame = scene, labels, frame or LocalFrame()
+    def __init__(self, scene: Any, labels: Labels, frame: LocalFrame):
+        """Draw nothing yet."""
+        self._scene, self._labels, self._frame = scene, labels, frame
         self._rover: Rover | None = None
         """The rover of the ghost; None if there is none."""
         self._failure: Failure | None = None
@@ -104,11 +104,11 @@ class FailureMark:
             self._failure = failure
             self._root = self._scene.add_frame(NAME, show_axes=False)
             name = f"{NAME}/rover"
-            self._ghost = RoverVisual(self._scene, rover, name, frame=self._frame, opacity=OPACITY)
+            self._ghost = RoverVisual(self._scene, rover, self._frame, name, OPACITY)
             self._add_arrows(rover)
         assert self._rover is not None and self._ghost is not None and self._arrows is not None
         if not look_alike(self._rover, rover):
-            self._ghost.shape(rover, {})
+            self._ghost.shape(rover)
             self._add_arrows(rover)
         self._root.visible = self._ghost.visible = True
         self._ghost.show(failure.state)
@@ -163,7 +163,7 @@ class FailureMark:
             f"{NAME}/leader", np.array([[top, foot]]), CASING,
             thickness=2.0, thickness_units="screen",
         )  # fmt: skip
-        label = Label(f"{words}\n{where}", top, rank=0, colour=REFUSED)
+        label = Label(f"{words}\n{where}", top)
         self._labels.show(LABELS, {"reason": label})
         self._nodes.append(leader)
 

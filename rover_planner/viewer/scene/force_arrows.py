@@ -8,8 +8,7 @@ import numpy as np
 from rover_physics.rover.model import Rover
 from rover_planner.viewer.scene.local_frame import LocalFrame
 from rover_planner.viewer.state.colours import LOAD, TRACTION
-from rover_planner.viewer.state.trajectory import RoverState
-from rover_planner.viewer.state.turning import find_axles
+from rover_planner.viewer.state.trajectory import RoverState, find_axles
 
 WEIGHT_LENGTH = 4.0
 """Length of the arrow of a sixth of the rover's weight [wheel radii]."""
@@ -18,19 +17,9 @@ WEIGHT_LENGTH = 4.0
 class ForceArrows:
     """An arrow for each normal force, and one for each force along the ground."""
 
-    def __init__(
-        self,
-        scene: Any,
-        rover: Rover,
-        frame: LocalFrame | None = None,
-        name: str = "/forces",
-    ):
-        """Add arrows of no length to the scene, below a node `name`.
-
-        Without a frame it is drawn in the map frame.
-        """
-        self._frame = frame or LocalFrame()
-        self._rover = rover
+    def __init__(self, scene: Any, rover: Rover, frame: LocalFrame, name: str = "/forces"):
+        """Add arrows of no length to the scene, below a node `name`."""
+        self._frame, self._rover = frame, rover
         self._scale = WEIGHT_LENGTH * rover.wheel.radius / (rover.weight / 6.0)
         radius = rover.wheel.radius
         no_arrows = np.zeros((6, 2, 3))

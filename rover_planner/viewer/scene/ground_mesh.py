@@ -23,6 +23,7 @@ from rover_planner.viewer.state.layers import (
     compute_slope,
     predict_layer,
 )
+from rover_planner.viewer.state.survey_layers import ColouredGround, ShownSurvey
 
 MAX_CELLS = 250
 """Most cells along a side of the mesh; of more, every second, third, ... is drawn."""
@@ -42,7 +43,7 @@ LINE_SHADE = 0.82
 """Brightness of the grid lines, one every metre, relative to the ground."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GroundMesh:
     """The ground as it is drawn."""
 
@@ -92,12 +93,31 @@ def build_ground_mesh(
         beyond = np.zeros(heights.shape, bool)
         low, high = colour_span(layer, rover, values)
         colours = map_colours(values, low, high)
-    texture = _texture(shade_hills(colours, x, y, heights), x, y, beyond)
+    texture = _texture(_shade_hills(colours, x, y, heights), x, y, beyond)
     classes = (("keeps all limits", GOOD),) if layer.has_classes else ()
     return GroundMesh(
-        build_textured_mesh(x, y, heights, texture),
+        _build_textured_mesh(x, y, heights, texture),
         ColourScale(low, high, layer.unit, layer.find_limit(rover), classes),
     )
+
+
+def build_survey_mesh(
+    terrain: Terrain, survey: ShownSurvey, name: str
+) -> tuple[trimesh.Trimesh, ColouredGround]:
+    """Return the ground in the colours of a survey's layer, and what they mean.
+
+    The texture is finer than the mesh, so that each pixel has the colour of a surveyed cell.
+    """
+    x, y, heights = subsample(terrain)
+    factor = _count_pixels(heights)
+    fine_x, fine_y = (
+        at[0] + (at[1] - at[0]) * ((np.arange(factor * len(at)) + 0.5) / factor - 0.5)
+        for at in (x, y)
+    )
+    meaning = survey.colour(name, fine_x, fine_y)
+    fine = terrain.elevation_at(fine_x, fine_y[:, None])
+    texture = _draw_grid_lines(_shade_hills(meaning.colours, fine_x, fine_y, fine), x, y)
+    return _build_textured_mesh(x, y, heights, texture), meaning
 
 
 def subsample(terrain: Terrain, max_cells: int = MAX_CELLS) -> tuple[Floats, Floats, Floats]:
@@ -121,7 +141,7 @@ def _resample_nearest(
     return values[rows][:, columns]
 
 
-def shade_hills(
+def _shade_hills(
     colours: NDArray[np.uint8], x: Floats, y: Floats, heights: Floats
 ) -> NDArray[np.uint8]:
     """Return colours (ny, nx, 3) as if lit from LIGHT.
@@ -143,18 +163,18 @@ def _texture(
     colours: NDArray[np.uint8], x: Floats, y: Floats, beyond: NDArray[np.bool_]
 ) -> NDArray[np.uint8]:
     """Return a finer picture of the colours, hatched where asked, with thin lines every metre."""
-    factor = count_pixels(colours)
+    factor = _count_pixels(colours)
     fine = ndimage.zoom(colours, (factor, factor, 1), order=1, mode="nearest", grid_mode=True)
     _hatch(fine, np.kron(beyond, np.ones((factor, factor), bool)), (x[1] - x[0]) / factor)
-    return draw_grid_lines(fine, x, y)
+    return _draw_grid_lines(fine, x, y)
 
 
-def count_pixels(grid: NDArray) -> int:
+def _count_pixels(grid: NDArray) -> int:
     """Return the number of pixels along a side of a cell of a grid (ny, nx, ...)."""
     return max(1, min(8, MAX_PIXELS // max(grid.shape[:2])))
 
 
-def draw_grid_lines(fine: NDArray[np.uint8], x: Floats, y: Floats) -> NDArray[np.uint8]:
+def _draw_grid_lines(fine: NDArray[np.uint8], x: Floats, y: Floats) -> NDArray[np.uint8]:
     """Draw thin lines every metre into a picture that has some pixels for each x and y [m]."""
     for axis, places in enumerate((y, x)):
         step, factor = places[1] - places[0], fine.shape[axis] // len(places)
@@ -173,7 +193,7 @@ def _hatch(picture: NDArray[np.uint8], where: NDArray[np.bool_], pixel: float) -
     picture[stripes] = (HATCH_SHADE * picture[stripes]).astype(np.uint8)
 
 
-def build_textured_mesh(
+def _build_textured_mesh(
     x: Floats, y: Floats, heights: Floats, texture: NDArray[np.uint8]
 ) -> trimesh.Trimesh:
     """Return the surface of heights (ny, nx) [m] at x and y [m] with a picture on it."""

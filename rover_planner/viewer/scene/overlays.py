@@ -32,23 +32,26 @@ NUMBERS, FLAGS = "/numbers", "/flags"
 """Groups of labels."""
 NUMBER_HEIGHT = 1.5
 """Height of a path's number above the ground [wheel radii]."""
+NUMBER_ANGLE = 0.018
+"""Half the angle under which a number is seen [rad]: a click within it is one on the number."""
+SHOWN_SIZE = 1.6
+"""Size of the number of the shown path, relative to the others."""
 
 
 class PathOverlay:
     """Candidate paths in the colours of their verdicts, with their numbers."""
 
-    def __init__(self, scene: Any, labels: Labels, frame: LocalFrame | None = None):
-        """Draw nothing yet; without a frame the scene is drawn in the map frame."""
-        self._scene, self._labels = scene, labels
-        self._frame = frame or LocalFrame()
+    def __init__(self, scene: Any, labels: Labels, frame: LocalFrame):
+        """Draw nothing yet."""
+        self._scene, self._labels, self._frame = scene, labels, frame
         self._poles: dict[str, Any] = {}
         self.ribbons: dict[int, Ribbon] = {}
         """The drawn paths by their index."""
         self._plan = Ribbon(scene, "/paths/plan")
         self._old: set[int] = set()
         """Indices of the paths that are greyed."""
-        self._pointed: dict[int, tuple[Any, int]] = {}
-        """The clients of visitors who point at a path, and its index, by the client's number."""
+        self._numbers: dict[int, Floats] = {}
+        """Places of the numbers in the scene by the index of their path [m]."""
 
     def show(
         self,
@@ -77,8 +80,6 @@ class PathOverlay:
         poses = candidates[shown].poses
         self._draw_numbers(terrain, candidates, radius, shown)
         self._draw_flags(terrain, {"start": poses[0], "goal": poses[-1]}, radius)
-        for client, index in self._pointed.values():
-            self._highlight(client, index, True)
 
     def show_plan(self, rover: Rover, terrain: Terrain, plan: Floats | None) -> None:
         """Draw a path (n, 3) without a verdict of ours, or none, instead of what was drawn."""
@@ -92,21 +93,19 @@ class PathOverlay:
             self._labels.show(FLAGS, {})
         self._labels.show(NUMBERS, {})
 
-    def point_at(self, client: Any, index: int) -> None:
-        """Highlight a path to one visitor instead of the one before; -1: none."""
-        _, before = self._pointed.get(client.client_id, (client, -1))
-        if index != before:
-            self._highlight(client, before, False)
-            self._highlight(client, index, True)
-            self._pointed[client.client_id] = client, index
+    def find_number(self, origin: Floats, direction: Floats) -> int | None:
+        """Return the index of the path whose number a ray (3,) of the scene hits; None for none.
 
-    def forget(self, client: Any) -> None:
-        """Forget a visitor who has left."""
-        self._pointed.pop(client.client_id, None)
-
-    def _highlight(self, client: Any, index: int, is_on: bool) -> None:
-        if index in self.ribbons:
-            self.ribbons[index].highlight(client, is_on)
+        Args:
+            origin: (3,) start of the ray, a camera [m].
+            direction: (3,) its direction, of length 1.
+        """
+        for index, place in self._numbers.items():
+            away = place - origin
+            aside = np.linalg.norm(np.cross(direction, away))
+            if direction @ away > 0.0 and aside < NUMBER_ANGLE * np.linalg.norm(away):
+                return index
+        return None
 
     def clear(self) -> None:
         """Remove all that was drawn but the labels, which are moved to other places."""
@@ -114,6 +113,7 @@ class PathOverlay:
             node.remove()
         self.ribbons.clear()
         self._poles.clear()
+        self._numbers.clear()
         self._old.clear()
 
     def mark_old(self, indices: Iterable[int]) -> None:
@@ -176,23 +176,18 @@ class PathOverlay:
         self, terrain: Terrain, candidates: Sequence[Candidate], radius: float, shown: int
     ) -> None:
         """Write the number of each path beside it, away from the ends of the shown path."""
-        if len(candidates) < 2:
-            self._labels.show(NUMBERS, {})
-            return
+        self._numbers.clear()
         ends = candidates[shown].poses[[0, -1], :2]
-        places = place_numbers([candidate.poses[:, :2] for candidate in candidates], ends)
-        labels = {}
-        for index, (x, y) in enumerate(places):
+        paths = [candidate.poses[:, :2] for candidate in candidates]
+        for index, (x, y) in enumerate(place_numbers(paths, ends) if len(paths) > 1 else ()):
             height = _ground_height(terrain, x, y) + NUMBER_HEIGHT * radius
-            labels[f"{index}"] = Label(
-                f"{index + 1}",
-                self._frame.to_scene(np.array([x, y, height])),
-                rank=1 if index == shown else 3,
-                path=index + 1,
-                colour=PASSABLE if candidates[index].verdict.traversable else REFUSED,
-                is_shown=index == shown,
-                stands=False,
+            self._numbers[index] = self._frame.to_scene(np.array([x, y, height]))
+        labels = {
+            str(index): Label(
+                str(index + 1), place, SHOWN_SIZE if index == shown else 1.0, stands=False
             )
+            for index, place in self._numbers.items()
+        }
         self._labels.show(NUMBERS, labels)
 
     def _draw_flags(self, terrain: Terrain, flags: Mapping[str, Floats], radius: float) -> None:

@@ -10,7 +10,6 @@ import trimesh
 from numpy.typing import NDArray
 
 from rover_physics.numerics.arrays import Floats
-from rover_planner.viewer.browser.channel import show_to
 from rover_planner.viewer.scene.ground_mesh import as_unlit_glb
 from rover_planner.viewer.state.colours import Colour, choose_halo
 
@@ -18,9 +17,8 @@ HALO = 0.2
 """Width of each halo on each side [widths of the ribbon]."""
 PIXELS = 64
 """Pixels across a ribbon."""
-LINE_WIDTH, BROAD_LINE_WIDTH = 2.0, 9.0
-"""Widths of the line along its middle, and of that of a highlighted one [px]; they are seen from
-any distance."""
+LINE_WIDTH = 2.0
+"""Width of the line along its middle [px], which is seen from any distance."""
 LIFT = 0.05
 """Height of that line above the ribbon [widths of the ribbon]."""
 
@@ -76,16 +74,6 @@ class Ribbon:
             self._draw([one if paint is None else replace(one, colour=paint) for one in strands])
         else:
             self.remove()
-
-    def highlight(self, client: Any, is_on: bool) -> None:
-        """Show it broad to one visitor, or as it was; it sends one number.
-
-        Args:
-            client: The visitor's client of viser.
-            is_on: Whether it is broad.
-        """
-        if self._core is not None:
-            show_to(client, self._core, thickness=BROAD_LINE_WIDTH if is_on else LINE_WIDTH)
 
     def paint(self, colour: Colour | None) -> None:
         """Show all strands in a colour, or each in its own again."""

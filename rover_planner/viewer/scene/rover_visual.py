@@ -30,30 +30,26 @@ class RoverVisual:
         self,
         scene: Any,
         rover: Rover,
+        frame: LocalFrame,
         name: str = "/rover",
-        arm_angles: Any = None,
-        frame: LocalFrame | None = None,
         opacity: float | None = None,
     ):
-        """Add the nodes below a node `name`.
-
-        Without a frame it is drawn in the map frame, without an opacity it is opaque.
-        """
-        self._scene, self._name, self._opacity = scene, name, opacity
-        self._frame = frame or LocalFrame()
+        """Add the nodes below a node `name`; without an opacity it is opaque."""
+        self._scene, self._frame = scene, frame
+        self._name, self._opacity = name, opacity
         self._root = scene.add_frame(name, show_axes=False)
         self._joints: dict[str, Any] = {}
         self._meshes: dict[str, Any] = {}
         self._tyres: dict[str, Any] = {}
-        self.shape(rover, arm_angles or {})
+        self.shape(rover)
 
-    def shape(self, rover: Rover, arm_angles: Mapping[str, float]) -> None:
-        """Give the nodes the shapes of a rover with the same parts, and turn its arm."""
+    def shape(self, rover: Rover) -> None:
+        """Give the nodes the shapes of a rover with the same parts, its arm stowed."""
         self._put("body", make_body(rover), BODY)
         wheel = make_wheel(rover)
         for side in SIDES:
             self._put_side(rover, side, wheel)
-        self.turn_arm(rover, arm_angles)
+        self.turn_arm(rover, {})
 
     def _put(self, name: str, mesh: trimesh.Trimesh, colour: tuple[int, int, int]) -> Any:
         """Add a mesh, or give the one of this name another shape."""

@@ -3,7 +3,6 @@
 
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
@@ -19,22 +18,18 @@ END_TIME = 20.0
 
 Request = TypeVar("Request")
 Result = TypeVar("Result")
-Report = Callable[[str, int, int], None]
-"""Takes what is worked on, such as "judging path", its number from 1, and how many there are."""
-Work = Callable[[Request, Report], Iterator[Result]]
-"""Yields the results of a request, each as soon as it is known."""
 
 
 @dataclass(frozen=True)
 class Progress:
-    """How far the work is."""
+    """Progress of the work."""
 
     what: str = ""
-    """What is worked on; empty before the first report."""
+    """Name of what is worked on; empty before the first."""
     step: int = 0
     """Its number, from 1."""
     steps: int = 0
-    """How many there are."""
+    """Number of all."""
     seconds: float = 0.0
     """Time since the work began, or since its last result [s]."""
 
@@ -42,6 +37,10 @@ class Progress:
         """Return the progress in words, such as "judging path 2 of 5"."""
         many = f" {self.step} of {self.steps}" if self.steps > 1 else ""
         return f"{self.what or 'waiting'}{many}"
+
+
+Work = Callable[[Request], Iterator[Progress | Result]]
+"""Yields what is begun, and the results of a request, each as soon as it is known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,24 +82,22 @@ class BackgroundWork(Generic[Request, Result]):
         work: Work[Request, Result],
         wake: Callable[[], object],
         name: str = "background",
-        is_hasty: Callable[[Request], bool] = lambda _request: False,
     ):
         """Start the thread.
 
         Args:
-            work: Does a request. Between the slices of the model's sweeps and at each report it
-                may be stopped by an error, which it must let pass.
+            work: Does a request. Between the slices of the model's sweeps it may be stopped by
+                an error, which it must let pass; it is left at what it yields.
             wake: Called in the thread when there is something to take. It may wait until that
                 was taken.
             name: Name of the thread.
-            is_hasty: Returns whether a newer request stops a request at once (default: none).
         """
-        self._work, self._wake, self._is_hasty = work, wake, is_hasty
+        self._work, self._wake = work, wake
         self._changed = threading.Condition()
         # The lock of _changed guards all that follows.
         self._waiting: Request | None = None
         self._job: _Job[Request] | None = None
-        self._done: deque[Delivery[Request, Result]] = deque()
+        self._done: list[Delivery[Request, Result]] = []
         self._progress = Progress()
         self._since = 0.0
         self._ending = False
@@ -127,19 +124,18 @@ class BackgroundWork(Generic[Request, Result]):
     def take(self) -> list[Delivery[Request, Result]]:
         """Return what was finished since the last call, the oldest first."""
         with self._changed:
-            done = list(self._done)
-            self._done.clear()
+            done, self._done = self._done, []
         return done
 
     @property
     def has_news(self) -> bool:
-        """Whether there is something to take."""
+        """True if there is something to take."""
         with self._changed:
             return bool(self._done)
 
     @property
     def progress(self) -> Progress | None:
-        """How far the work is; None if there is none."""
+        """Progress of the work; None if there is none."""
         with self._changed:
             if not self._is_busy():
                 return None
@@ -171,22 +167,19 @@ class BackgroundWork(Generic[Request, Result]):
 
     def _do(self, job: _Job[Request]) -> None:
         def check() -> None:
-            if job.is_stopped or (self._waiting is not None and not has_time()):
+            has_time = not job.has_result and time.monotonic() - job.began < PATIENCE
+            if job.is_stopped or (self._waiting is not None and not has_time):
                 raise _StoppedError("a newer request or a visitor stopped the work")
-
-        def has_time() -> bool:
-            late = time.monotonic() - job.began > PATIENCE
-            return not (late or job.has_result or self._is_hasty(job.request))
-
-        def report(what: str, step: int, steps: int) -> None:
-            check()
-            with self._changed:
-                self._progress = Progress(what, step, steps)
 
         try:
             with interruptible(check):
-                for result in self._work(job.request, report):
-                    self._deliver(job, Delivery(job.request, result))
+                for found in self._work(job.request):
+                    if isinstance(found, Progress):
+                        check()
+                        with self._changed:
+                            self._progress = found
+                    else:
+                        self._deliver(job, Delivery(job.request, found))
         except _StoppedError:
             return
         except BaseException as error:  # the thread must go on; whoever takes it tells of it

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the verdict took from between waypoints, and what it did not ask, in sentences."""
+"""Sentences on what the verdict took from between waypoints, and on what it did not ask."""
 
 import numpy as np
 
@@ -29,7 +29,7 @@ def describe_exemptions(prediction: PathPrediction, waypoints: int) -> tuple[str
     return tuple(filter(None, (largest, _describe_falls(rows, next_waypoint))))
 
 
-def _describe_largest(rows: AskedPoses, place: Floats) -> str:
+def _describe_largest(rows: AskedPoses, on_the_way_to: Floats) -> str:
     """Return the largest utilisation between waypoints; empty if it is not the largest."""
     part = rows.prediction
     largest = np.fmax.reduce(part.friction_utilisation, axis=1)
@@ -42,15 +42,15 @@ def _describe_largest(rows: AskedPoses, place: Floats) -> str:
     exempt = ", not asked: a wheel rolls off an edge" if part.falling[row].any() else ""
     return (
         f"between waypoints the utilisation reaches {largest[row]:.2f} ({wheel}, on the way to "
-        f"{place[row]:.2f} m{exempt})"
+        f"{on_the_way_to[row]:.2f} m{exempt})"
     )
 
 
-def _describe_falls(rows: AskedPoses, place: Floats) -> str:
+def _describe_falls(rows: AskedPoses, on_the_way_to: Floats) -> str:
     """Return where wheels roll off edges, and which limits are not asked there."""
     found: dict[str, list[float]] = {}
     for row, wheel in np.argwhere(rows.prediction.falling).tolist():
-        found.setdefault(WHEELS[wheel].replace("_", " "), []).append(float(place[row]))
+        found.setdefault(WHEELS[wheel].replace("_", " "), []).append(float(on_the_way_to[row]))
     places: dict[str, list[str]] = {}
     for name, distances in found.items():
         for start, end in _stretches(sorted(distances)):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is judged, and what came out: frozen values that threads may share."""
+"""The question that is judged and the answer that is shown: frozen values for all threads."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,7 +11,6 @@ from rover_physics.traversability.verdict import Verdict
 from rover_planner.planning.path_query import Candidate, PathAnswer, PathQueryOptions
 from rover_planner.planning.search.path_search import SearchResult
 from rover_planner.planning.search.query import LatticeSettings
-from rover_planner.viewer.state.comparison import PolicyVerdict
 from rover_planner.viewer.state.trajectory import Trajectory
 
 Pose = tuple[float, float, float]
@@ -32,17 +31,17 @@ class Scenario:
     goal: Pose
     """The same."""
     options: PathQueryOptions
-    """How candidates are made and judged."""
+    """Options of the candidates and of the model."""
     arm_angles: Mapping[str, float]
     """Angles [rad] of the arm's joints by name; joints that are not named are stowed."""
     recorded: Floats | None = None
     """Poses (n, 3) of a recorded path that takes the place of candidates."""
     search: LatticeSettings = field(default_factory=LatticeSettings)
-    """How a way around obstacles is searched."""
+    """Options of the search of a path around obstacles."""
 
     @property
     def asked_options(self) -> PathQueryOptions:
-        """How candidates are judged with the arm as it is."""
+        """The options with the arm as it is."""
         return self.options.change(joint_angles=self.arm_angles)
 
     def has_paths_of(self, other: "Scenario") -> bool:
@@ -56,46 +55,52 @@ class Scenario:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class ShownPath:
-    """The path that is shown, and its verdict."""
+@dataclass(frozen=True)
+class PolicyVerdict:
+    """The verdict of a path under one torque policy."""
 
-    index: int
-    """Its index among the candidates of the last answer."""
-    candidate: Candidate
-    """The path as it was judged last."""
-    trajectory: Trajectory
-    """The drive along it."""
-    summary: str
-    """What was judged and how long that took; empty for a recorded path."""
-    by_policy: tuple[PolicyVerdict, ...] = ()
-    """Its verdicts under all torque policies; empty for a replay, whose soil is not known."""
-
-    @property
-    def verdict(self) -> Verdict:
-        """Whether the rover can drive it, and why not."""
-        return self.candidate.verdict
+    policy: str
+    """One of `TORQUE_POLICIES`."""
+    traversable: bool | None
+    """True if the rover can drive the path; None if this policy cannot judge it or did not yet."""
+    reason: str
+    """Reason of a refusal; empty if it can."""
+    is_old: bool = False
+    """True if it is of other values than the verdict beside it, or not known yet."""
 
 
 @dataclass(frozen=True, eq=False)
-class Judgement:
-    """The verdict on the shown path, and those on all candidates, which may be older."""
+class Shown:
+    """The shown path with its verdict, and those of all candidates, which may be older."""
 
     scenario: Scenario
-    """What the shown path was judged for."""
+    """Values for which the shown path was judged."""
     answer: PathAnswer
     """All candidates."""
     answered: Scenario
-    """What they were judged for."""
-    shown: ShownPath
-    """The shown path."""
+    """Values for which they were judged."""
+    index: int
+    """Index of the shown path among the candidates."""
+    candidate: Candidate
+    """The shown path as it was judged last."""
+    trajectory: Trajectory
+    """The drive along it."""
+    summary: str
+    """Sentence on what was judged and for how long; empty for a recorded path."""
+    by_policy: tuple[PolicyVerdict, ...] = ()
+    """Its verdicts under all torque policies; empty for a replay, whose soil is not known."""
     way: SearchResult | None = None
-    """What a search around obstacles has found for `answered`; None if none was made."""
+    """The finding of a search around obstacles for `answered`; None if none was made."""
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict on the shown path."""
+        return self.candidate.verdict
 
     @property
     def reason(self) -> str:
-        """Why the shown path is refused, and before it why there is no way; empty if it passes."""
-        reason = self.shown.verdict.reason
+        """The reason of a refusal, and before it why there is no way; empty if the path passes."""
+        reason = self.verdict.reason
         is_old = self.answered is not self.scenario
         if not reason or is_old or self.way is None or self.way.path is not None:
             return reason
@@ -103,7 +108,7 @@ class Judgement:
 
     @property
     def needs_way(self) -> bool:
-        """Whether all candidates are refused, and no way around obstacles was searched yet."""
+        """True if all candidates are refused, and no way around obstacles was searched yet."""
         asked = self.scenario
         return (
             asked.recorded is None
@@ -117,5 +122,5 @@ class Judgement:
     def candidates(self) -> tuple[Candidate, ...]:
         """The candidates, with the shown one as it was judged last."""
         candidates = list(self.answer.candidates)
-        candidates[self.shown.index] = self.shown.candidate
+        candidates[self.index] = self.candidate
         return tuple(candidates)

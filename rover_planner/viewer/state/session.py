@@ -1,39 +1,37 @@
 # SPDX-License-Identifier: Apache-2.0
 """The state behind the page: what visitors want judged, and what was judged last."""
 
-import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
+from itertools import islice
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rover_physics.errors import RoverError
 from rover_physics.files.validation import Key
-from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.verdict import hold_against_limits
 from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import Assumptions
-from rover_planner.planning.path_query import Candidate, PathAnswer, PathQueryOptions
+from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.query import LatticeSettings
 from rover_planner.studies.rover_values import with_value
 from rover_planner.viewer.state.background_work import BackgroundWork, Progress
 from rover_planner.viewer.state.context import name_ground
-from rover_planner.viewer.state.judging import JudgeRequest, judge_request
-from rover_planner.viewer.state.scenario import Judgement, Pose, Scenario, ShownPath
-from rover_planner.viewer.state.trajectory import Trajectory
+from rover_planner.viewer.state.judging import JudgeRequest, judge_request, show_recorded
+from rover_planner.viewer.state.scenario import Pose, Scenario, Shown
 
 REFUSALS = (RoverError, PlanningError)
 """Errors that say what is wrong with a request."""
 
 
 class ViewSession:
-    """What is wanted and what is finished; both are frozen values that are replaced as a whole.
+    """The scenario that is wanted and what is shown: frozen values that are replaced as a whole.
 
     It judges at once, or in the background after `judge_in_background`. All changes belong to one
     thread, the owner's. A refused change alters nothing but `refusal`.
@@ -65,87 +63,48 @@ class ViewSession:
         self.wanted = Scenario(
             rover, rover, terrain, start, goal, options, {}, search=search or LatticeSettings()
         )
-        """What visitors want judged."""
+        """The scenario that visitors want judged."""
         self.ground_name = name_ground(terrain)
-        """What the page calls the ground; by default its size."""
+        """Name of the ground on the page; by default its size."""
         self.refusal = ""
-        """Why the last change was refused, empty if it was not."""
+        """Reason why the last change was refused, empty if it was not."""
         self.is_stopped = False
-        """Whether the judgement of `wanted` was cancelled or failed."""
-        self._background: BackgroundWork[JudgeRequest, Judgement] | None = None
+        """True if the judgement of `wanted` was cancelled or failed."""
+        self._background: BackgroundWork[JudgeRequest, Shown] | None = None
         self._judge = partial(judge_request, memory=EdgeMemory())
-        self._asked = JudgeRequest(self.wanted, searches=False)
+        self._asked = JudgeRequest(self.wanted)
         """The newest request."""
-        *_, self.finished = self._judge(self._asked, _ignore)
-        """The last judgement."""
-        self._index = self.finished.shown.index
+        *_, self.shown = islice(_results(self._judge(self._asked)), 2)  # and not what it searches
+        """The last finding."""
+        self._index = self.shown.index
         """Index of the candidate that is wanted."""
 
     # What is shown.
 
     @property
+    def scenario(self) -> Scenario:
+        """Rover, ground, ends and options of what is shown; `wanted` has the newest values."""
+        return self.shown.scenario
+
+    @property
     def rover(self) -> Rover:
-        """The rover of the last judgement; `wanted` has the newest values."""
-        return self.finished.scenario.rover
+        """The rover of what is shown."""
+        return self.shown.scenario.rover
 
     @property
     def terrain(self) -> Terrain:
-        """The ground."""
-        return self.finished.scenario.terrain
-
-    @property
-    def start(self) -> Pose:
-        """Start of the shown path: x, y [m] and yaw [rad], map frame."""
-        return self.finished.scenario.start
-
-    @property
-    def goal(self) -> Pose:
-        """Its goal."""
-        return self.finished.scenario.goal
-
-    @property
-    def options(self) -> PathQueryOptions:
-        """How the candidates were made and judged."""
-        return self.finished.scenario.options
-
-    @property
-    def arm_angles(self) -> Mapping[str, float]:
-        """Angles [rad] of the arm's joints by name; joints that are not named are stowed."""
-        return self.finished.scenario.arm_angles
-
-    @property
-    def recorded(self) -> bool:
-        """Whether the path is a recorded one, so that no other is planned."""
-        return self.finished.scenario.recorded is not None
-
-    @property
-    def answer(self) -> PathAnswer:
-        """The candidates as they were judged together last."""
-        return self.finished.answer
-
-    @property
-    def shown(self) -> ShownPath:
-        """The shown path and its verdict."""
-        return self.finished.shown
-
-    @property
-    def candidates(self) -> tuple[Candidate, ...]:
-        """The candidates of the last answer, with the shown one as it was judged last."""
-        return self.finished.candidates
+        """Its ground."""
+        return self.shown.scenario.terrain
 
     @property
     def is_outdated(self) -> bool:
-        """Whether the shown verdict is of other values than those that are wanted."""
-        return self.finished.scenario is not self.wanted
+        """True if the shown verdict is of other values than those that are wanted."""
+        return self.shown.scenario is not self.wanted
 
     @property
     def has_old_candidates(self) -> bool:
-        """Whether the other candidates were judged for other values."""
-        return self.finished.answered is not self.wanted
-
-    def sweep_options(self) -> SweepOptions:
-        """Return the options of the model of the last judgement."""
-        return self.finished.scenario.asked_options.model
+        """True if the other candidates were judged for other values."""
+        return self.shown.answered is not self.wanted
 
     # What is wanted. All return whether the change was accepted; if not, `refusal` says why. In
     # the background a change may be accepted and still be refused when it is judged.
@@ -156,25 +115,23 @@ class ViewSession:
         Raises:
             PlanningError: There is no candidate of this index, or other paths are wanted.
         """
-        count = len(self.answer.candidates)
+        count = len(self.shown.answer.candidates)
         if not 0 <= index < count:
             raise PlanningError(f"no path {index + 1}; there are paths 1 to {count}")
-        if not self.wanted.has_paths_of(self.finished.answered):
+        if not self.wanted.has_paths_of(self.shown.answered):
             raise PlanningError("the listed paths are old; judge again first")
         return self._ask(self.wanted, index)
 
-    def plan_to(self, goal: NDArray[np.float64]) -> bool:
+    def plan_to(self, goal: Floats) -> bool:
         """Plan to a goal (2,) [m] with the yaw of the straight line there."""
         start = self.wanted.start
         return self._want(start=start, goal=_facing(start, goal), recorded=None)
 
-    def plan_from(self, start: NDArray[np.float64]) -> bool:
+    def plan_from(self, start: Floats) -> bool:
         """Plan from a start (2,) [m] with the yaw of the straight line to the goal."""
-        goal = self.wanted.goal
-        ahead = np.asarray(goal[:2]) - np.asarray(start)
-        yaw = float(np.arctan2(ahead[1], ahead[0]))
+        x, y, yaw = _facing(start, self.wanted.goal)
         pose = (float(start[0]), float(start[1]), yaw)
-        return self._want(start=pose, goal=(goal[0], goal[1], yaw), recorded=None)
+        return self._want(start=pose, goal=(x, y, yaw), recorded=None)
 
     def restore_rover(self, rover: Rover, arm_angles: Mapping[str, float]) -> bool:
         """Take other numbers of the same rover, such as those before a change.
@@ -192,14 +149,9 @@ class ViewSession:
             return False
         return self._want(options=options)
 
-    def take_rover(self, rover: Rover, loaded: Rover | None = None) -> bool:
-        """Take another rover, changed from a loaded one (default: not), and plan again.
-
-        Changed from the one that is loaded now, it is a change like those of sliders.
-        """
-        if loaded is not None and loaded == self.wanted.loaded:
-            loaded = self.wanted.loaded
-        return self._want(loaded=loaded or rover, rover=rover, arm_angles={})
+    def take_rover(self, rover: Rover) -> bool:
+        """Take another rover as it was loaded, and plan again."""
+        return self._want(loaded=rover, rover=rover, arm_angles={})
 
     def plan_again(self) -> bool:
         """Judge all candidates again, after a change of the rover."""
@@ -231,18 +183,18 @@ class ViewSession:
 
     def _want(self, **changes: Any) -> bool:
         """Plan with other values."""
-        return self._ask(dataclasses.replace(self.wanted, **changes))
+        return self._ask(replace(self.wanted, **changes))
 
     def _judge_shown(self, **changes: Any) -> bool:
         """Judge the shown path again with other values; all, if others are wanted meanwhile."""
-        wanted = dataclasses.replace(self.wanted, **changes)
-        same = wanted.has_paths_of(self.finished.answered)
-        is_listed = self._index < len(self.answer.candidates)
+        wanted = replace(self.wanted, **changes)
+        same = wanted.has_paths_of(self.shown.answered)
+        is_listed = self._index < len(self.shown.answer.candidates)
         return self._ask(wanted, self._index if same and is_listed else None)
 
     def _ask(self, wanted: Scenario, index: int | None = None) -> bool:
         """Judge a candidate by its index, or all; without background do it at once."""
-        before = None if index is None else self.finished
+        before = None if index is None else self.shown
         request = JudgeRequest(wanted, before, index or 0)
         self.wanted, self._asked = wanted, request
         self._index = self._index if index is None else index
@@ -251,34 +203,31 @@ class ViewSession:
             self._background.ask(request)
             return True
         try:
-            for judgement in self._judge(request, _ignore):
-                self._finish(request, judgement)
+            for shown in _results(self._judge(request)):
+                self._finish(request, shown)
         except REFUSALS as error:
             self._refuse(error)
             return False
         return True
 
-    def _finish(self, request: JudgeRequest, judgement: Judgement) -> None:
-        """Take a judgement; one of a single path leaves the others as they were judged last."""
-        now, before = self.finished, request.before
-        is_listed = judgement.shown.index < len(now.answer.candidates)
+    def _finish(self, request: JudgeRequest, shown: Shown) -> None:
+        """Take what was judged; one path leaves the others as they were judged last."""
+        now, before = self.shown, request.before
         if (
             before is not None
-            and judgement.way is before.way
+            and shown.way is before.way
             and request.scenario.has_paths_of(now.answered)
-            and is_listed
+            and shown.index < len(now.answer.candidates)
         ):
-            judgement = dataclasses.replace(
-                judgement, answer=now.answer, answered=now.answered, way=now.way
-            )
-        self.finished = judgement
+            shown = replace(shown, answer=now.answer, answered=now.answered, way=now.way)
+        self.shown = shown
         if request is self._asked:
-            self._index = judgement.shown.index
+            self._index = shown.index
 
     def _refuse(self, error: Exception) -> None:
         """Want again what was judged last."""
         self.refusal = str(error)
-        self.wanted, self._index = self.finished.scenario, self.finished.shown.index
+        self.wanted, self._index = self.shown.scenario, self.shown.index
 
     # In the background.
 
@@ -288,18 +237,18 @@ class ViewSession:
         Args:
             wake: Called in that thread when there is something to take with `take_finished`.
         """
-        self._background = BackgroundWork(self._judge, wake, "judge", _judges_all)
-        if self.finished.needs_way:
+        self._background = BackgroundWork(self._judge, wake, "judge")
+        if self.shown.needs_way:
             self._ask(self.wanted, self._index)
 
     @property
     def progress(self) -> Progress | None:
-        """How far the judgement in the background is; None if nothing is judged."""
+        """Progress of the judgement in the background; None if nothing is judged."""
         return self._background.progress if self._background is not None else None
 
     @property
     def has_news(self) -> bool:
-        """Whether there is something for `take_finished`."""
+        """True if there is something for `take_finished`."""
         return self._background is not None and self._background.has_news
 
     def take_finished(self) -> bool:
@@ -332,9 +281,8 @@ class ViewSession:
 
     def move(self, **places: Any) -> None:
         """Replace terrain, start or goal without a judgement, for a page that follows a rover."""
-        scenario = dataclasses.replace(self.finished.scenario, **places)
-        self.finished = dataclasses.replace(self.finished, scenario=scenario)
-        self.wanted = scenario
+        self.wanted = replace(self.shown.scenario, **places)
+        self.shown = replace(self.shown, scenario=self.wanted)
 
     def replay(
         self,
@@ -346,51 +294,25 @@ class ViewSession:
 
         Changed values are judged under the assumptions of the record, where it tells them.
         """
+        poses, wanted = prediction.poses, self.wanted
         if assumptions is not None:
-            rover, options = self.wanted.rover, self.wanted.options
-            self.wanted = dataclasses.replace(
-                self.wanted,
-                rover=assumptions.change(rover),
-                options=assumptions.change_options(options),
+            wanted = replace(
+                wanted,
+                rover=assumptions.change(wanted.rover),
+                options=assumptions.change_options(wanted.options),
                 arm_angles=assumptions.joint_angles or {},
             )
-        first = next((k for k, reason in enumerate(reasons) if reason), -1)
-        driven = prediction if first < 0 else prediction.cut(first + 1)
-        verdict = dataclasses.replace(
-            hold_against_limits(self.wanted.rover, driven),
-            traversable=first < 0,
-            reasons=tuple(reasons),
-            first_failure=first,
-            reason=reasons[first] if first >= 0 else "",
-        )
-        poses = prediction.poses
-        candidate = Candidate(poses, prediction, verdict, (0.0, 0.0))
-        answer = PathAnswer((candidate,), 0 if first < 0 else -1, 0)
-        start, goal = (_as_pose(poses[row]) for row in (0, -1))
-        self.wanted = scenario = dataclasses.replace(
-            self.wanted, start=start, goal=goal, recorded=poses
-        )
-        shown = ShownPath(
-            0, candidate, Trajectory(scenario.rover, prediction, verdict), "recorded"
-        )
-        self.finished, self._index = Judgement(scenario, answer, scenario, shown), 0
+        start, goal = tuple(poses[0].tolist()), tuple(poses[-1].tolist())
+        self.wanted = replace(wanted, start=start, goal=goal, recorded=poses)
+        self.shown, self._index = show_recorded(self.wanted, prediction, reasons), 0
 
 
-def _judges_all(request: JudgeRequest) -> bool:
-    """Return whether a request is for all paths, which a slider that moves on makes worthless."""
-    return request.before is None
+def _results(steps: Iterator[Progress | Shown]) -> Iterator[Shown]:
+    """Yield what was judged, without what is begun."""
+    return (step for step in steps if isinstance(step, Shown))
 
 
-def _ignore(_what: str, _step: int, _steps: int) -> None:
-    """Report progress to nobody."""
-
-
-def _as_pose(pose: NDArray[np.float64]) -> Pose:
-    x, y, yaw = pose.tolist()
-    return x, y, yaw
-
-
-def _facing(start: Pose, goal: NDArray[np.float64]) -> Pose:
-    """Return the pose at a goal (2,) with the yaw of the straight line from start to goal."""
-    ahead = np.asarray(goal, dtype=float) - np.asarray(start[:2])
-    return float(goal[0]), float(goal[1]), float(np.arctan2(ahead[1], ahead[0]))
+def _facing(start: Pose | Floats, goal: Pose | Floats) -> Pose:
+    """Return the pose at a goal x, y [m] with the yaw of the straight line from start to goal."""
+    yaw = np.arctan2(goal[1] - start[1], goal[0] - start[0])
+    return float(goal[0]), float(goal[1]), float(yaw)

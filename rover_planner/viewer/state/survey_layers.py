@@ -27,46 +27,22 @@ from rover_planner.survey.layers import (
     CLASS_LABELS,
     CLASS_NUMBERS,
     NOT_SURVEYED,
-    QUANTITIES,
     SOME_HEADINGS,
     UNKNOWN_LABEL,
     number_limits,
-    unpack_bits,
 )
-from rover_planner.survey.reachable_area import open_area
 from rover_planner.survey.store import SurveyStore
-from rover_planner.viewer.state.colours import (
-    UNKNOWN,
-    Colour,
-    ColourScale,
-    from_css,
-    map_colours,
-)
+from rover_planner.viewer.state.colours import UNKNOWN, Colour, from_css
 
 MAX_READ = 1200
 """Most cells along a side that are read of a layer; of more, every second, third, ..."""
-CLASS, WORST_CLASS, BEST_CLASS = "survey: class", "survey: worst class", "survey: best class"
-LIMIT, HEADINGS = "survey: first limit", "survey: passable headings"
-REACHABLE = "survey: reachable"
+CLASS, LIMIT = "survey: class", "survey: first limit"
+"""Layers to choose from."""
 OPTION_NAMES = {"policy": "torque policy", "max_torque": "largest torque"}
 """Names of options that are not those of the fields."""
 
 Key = tuple[Colour, str]
 """Entry of a legend: a colour and what it means."""
-
-
-@dataclass(frozen=True)
-class Numbers:
-    """A layer whose colours are a scale."""
-
-    layer: str
-    """Name in the store."""
-    unit: str
-    """Unit that is shown."""
-    factor: float
-    """Factor from the unit of the store."""
-    high: float | None
-    """Value of the last colour; None: the largest value. That of the first is 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,40 +51,40 @@ class ColouredGround:
 
     colours: NDArray[np.uint8]
     """(ny, nx, 3), grey where nothing is known."""
-    keys: tuple[Key, ...] = ()
-    """The legend of classes; empty where the colours are a scale."""
-    scale: ColourScale | None = None
-    """The scale."""
+    keys: tuple[Key, ...]
+    """The legend of the classes or limits that there are."""
 
 
 class ShownSurvey:
     """The layers of a survey on the page."""
 
+    names = (CLASS, LIMIT)
+    """Names of the layers to choose from."""
+
     def __init__(self, store: SurveyStore):
         """Show a survey; `open_survey` also compares it with rover and map."""
-        self._store, self._area = store, open_area(store)
-        rover = store.notes.description["rover"]
-        self._numbers = _number_layers(rover)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the layers to choose from."""
-        reach = (REACHABLE,) if self._area is not None else ()
-        return (CLASS, *reach, WORST_CLASS, BEST_CLASS, LIMIT, HEADINGS, *self._numbers)
+        self._store = store
 
     def colour(self, name: str, x: Floats, y: Floats) -> ColouredGround:
         """Return the colours of a layer at x (nx,) and y (ny,) [m], map frame.
 
         Each is that of the nearest surveyed cell that is read.
         """
-        if name in (CLASS, WORST_CLASS, BEST_CLASS):
-            numbers, labels = self._read_classes(name), CLASS_LABELS
-            found = _colour_classes(numbers, labels, list_class_colours())
-        elif name == LIMIT:
-            found = self._colour_limits()
+        limits = number_limits()
+        if name == CLASS:
+            numbers, colours = self._read_classes(limits), list_class_colours()
+            labels: tuple[str, ...] = CLASS_LABELS
         else:
-            found = self._colour_numbers(name)
-        return ColouredGround(self._place(found.colours, x, y), found.keys, found.scale)
+            names = {number: code.replace("_", " ") for code, number in limits.items()}
+            labels = tuple(names[k] or "none: all headings pass" for k in sorted(names))
+            numbers, colours = self._read("first_limit"), list_limit_colours()
+        table = np.full((256, 3), UNKNOWN, np.uint8)
+        table[: len(colours)] = colours
+        found = np.unique(numbers)
+        keys = [(colours[k], labels[k]) for k in found if k < len(labels)]
+        if (found >= len(labels)).any():
+            keys.append((UNKNOWN, UNKNOWN_LABEL))
+        return ColouredGround(self._place(table[numbers], x, y), tuple(keys))
 
     def find_differences(self, rover: Rover, options: SweepOptions) -> tuple[str, ...]:
         """Return in what the survey differs from a rover and options that are shown."""
@@ -130,65 +106,27 @@ class ShownSurvey:
     def describe(self, name: str) -> str:
         """Return in words what a layer is about."""
         notes = self._store.notes
-        rover, headings = notes.description["rover"]["name"], notes.headings
-        if name == REACHABLE and self._area is not None:
-            x, y = self._area.from_place
-            return (
-                f"{rover}, length of the way from ({x:g}, {y:g}), where it can go and return: "
-                f"{self._area.area:.1f} m2"
-            )
-        margin = notes.description["options"]["control_margin"]
-        told = f"{rover}, {headings} headings, a cell every {notes.cell:g} m"
-        is_class = name in (CLASS, WORST_CLASS, BEST_CLASS)
-        return told + (f", control margin {margin:g}" if is_class else "")
-
-    def _read(self, layer: Any) -> NDArray:
-        """Read every so many cells of a layer."""
-        every = self._every
-        return np.asarray(layer[::every, ::every])
+        rover, options = notes.description["rover"]["name"], notes.description["options"]
+        margin = f", control margin {options['control_margin']:g}" if name == CLASS else ""
+        return f"{rover}, {notes.headings} headings, a cell every {notes.cell:g} m{margin}"
 
     @property
     def _every(self) -> int:
+        """Of how many cells along a side one is read."""
         return max(1, -(-max(self._store.notes.layout.shape) // MAX_READ))
 
-    def _read_classes(self, name: str) -> NDArray:
+    def _read(self, layer: str) -> NDArray:
+        return np.asarray(self._store.layer(layer)[:: self._every, :: self._every])
+
+    def _read_classes(self, limits: Mapping[str, int]) -> NDArray:
         """Return the numbers of classes; NOT_SURVEYED where the ground is unknown, too."""
-        worst, best, limits = (
-            self._read(self._store.layer(layer))
-            for layer in ("worst_class", "best_class", "first_limit")
-        )
+        worst, best, first = map(self._read, ("worst_class", "best_class", "first_limit"))
         impassable = CLASS_NUMBERS[IMPASSABLE]
-        shown = (best if name == BEST_CLASS else worst).copy()
-        if name == CLASS:
-            shown[(worst == impassable) & (best < impassable)] = SOME_HEADINGS
-        off_ground = [number_limits()[code] for code in ("off_map", "unknown_ground")]
-        shown[(best == impassable) & np.isin(limits, off_ground)] = NOT_SURVEYED
+        shown = worst.copy()
+        shown[(worst == impassable) & (best < impassable)] = SOME_HEADINGS
+        off_ground = [limits[code] for code in ("off_map", "unknown_ground")]
+        shown[(best == impassable) & np.isin(first, off_ground)] = NOT_SURVEYED
         return shown
-
-    def _colour_limits(self) -> ColouredGround:
-        """Return the colours of the first limits that fail."""
-        limits = self._read(self._store.layer("first_limit"))
-        names = {number: code.replace("_", " ") for code, number in number_limits().items()}
-        labels = tuple(names[k] or "none: all headings pass" for k in sorted(names))
-        return _colour_classes(limits, labels, list_limit_colours())
-
-    def _colour_numbers(self, name: str) -> ColouredGround:
-        """Return the colours of a layer on a scale."""
-        if name == REACHABLE and self._area is not None:
-            values = self._read(self._area.distance).astype(float)
-            longest = max(self._area.longest or 0.0, self._area.cell)
-            return _colour_scale(values, ColourScale(0.0, longest, "m"))
-        if name == HEADINGS:
-            bits = self._read(self._store.layer("passable_headings"))
-            values = unpack_bits(bits, self._store.notes.headings).sum(axis=-1).astype(float)
-            values[self._read(self._store.layer("best_class")) == NOT_SURVEYED] = np.nan
-            return _colour_scale(values, ColourScale(0.0, self._store.notes.headings, ""))
-        wanted = self._numbers[name]
-        values = wanted.factor * self._read(self._store.layer(wanted.layer)).astype(float)
-        known = values[np.isfinite(values)]
-        high = wanted.high if wanted.high is not None else known.max(initial=1e-9)
-        values[values == np.inf] = high
-        return _colour_scale(values, ColourScale(0.0, float(high), wanted.unit))
 
     def _place(self, colours: NDArray[np.uint8], x: Floats, y: Floats) -> NDArray[np.uint8]:
         """Return the colours of cells at x and y, grey off the survey."""
@@ -260,22 +198,6 @@ def load_map(path: Path, max_cells: int) -> Terrain:
     )
 
 
-def _number_layers(rover: Mapping[str, Any]) -> dict[str, Numbers]:
-    """Return the layers of quantities by name; their scales end at the rover's limits."""
-    limits = rover["limits"]
-    ends = {
-        "tilt": ("deg", 180.0 / np.pi, float(np.degrees(limits["tilt"]))),
-        "belly_clearance": ("cm", 100.0, None),
-    }
-    layers = {}
-    for quantity in QUANTITIES:
-        unit, factor, high = ends.get(quantity.name, ("", 1.0, 1.0))
-        for which in ("worst", "best"):
-            name = f"survey: {quantity.name.replace('_', ' ')}, {which}"
-            layers[name] = Numbers(f"{which}_{quantity.name}", unit, factor, high)
-    return layers
-
-
 def list_class_colours() -> tuple[Colour, ...]:
     """Return the colours of the classes by number."""
     return tuple(map(from_css, CLASS_COLOURS))
@@ -291,23 +213,6 @@ def list_limit_colours() -> tuple[Colour, ...]:
         red, green, blue = palette[k % len(palette)]
         colours.append((red, green, blue))
     return tuple(colours)
-
-
-def _colour_scale(values: Floats, scale: ColourScale) -> ColouredGround:
-    return ColouredGround(map_colours(values, scale.low, scale.high), (), scale)
-
-
-def _colour_classes(
-    numbers: NDArray, labels: tuple[str, ...], colours: tuple[Colour, ...]
-) -> ColouredGround:
-    """Return the colours of numbers of classes, and the keys of those that there are."""
-    table = np.full((256, 3), UNKNOWN, np.uint8)
-    table[: len(colours)] = colours
-    found = np.unique(numbers)
-    keys = [(colours[k], labels[k]) for k in found if k < len(labels)]
-    if (found >= len(labels)).any():
-        keys.append((UNKNOWN, UNKNOWN_LABEL))
-    return ColouredGround(table[numbers], tuple(keys))
 
 
 def _as_json(value: Any) -> Any:

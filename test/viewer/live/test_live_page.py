@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page of a live rover in a real browser, with simulator and server as nodes."""
+"""The page of a live rover, with simulator and server as nodes and without a browser."""
 
-import time
+import re
 
 import numpy as np
 import pytest
 from rclpy.parameter import Parameter
+
+pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, save_terrain
@@ -15,91 +17,88 @@ from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.viewer.live.listener import LiveLink
 from rover_planner.viewer.pages.live_page import LivePage
 from rover_planner.viewer.state.session import ViewSession
+from support import waiting
 from support.grounds import make_terrain, waves
-from support.viewer.browser import Visitor, needs_browser, wait_until
+from support.viewer.sessions import PATIENCE, ask
 
-pytestmark = [needs_browser, pytest.mark.slow]
+pytestmark = pytest.mark.slow
 
 LSR1 = load_rover("lsr1")
-AHEAD = (640, 400)
-"""A point of the screen on the ground ahead of the rover [px]."""
-ASK_AGAIN = 5.0
-"""Time after which an unanswered request is repeated [s]."""
+LEVEL = Terrain(np.zeros((160, 160)), 0.05, (-4.0, -4.0))
+
+
+def wait_until(condition, what: str) -> None:
+    waiting.wait_until(condition, what, PATIENCE)
 
 
 @pytest.fixture
 def page(ros):
     """A page that follows the graph of the test."""
     warm_up()
-    level = Terrain(np.zeros((160, 160)), 0.05, (-4.0, -4.0))
-    session = ViewSession(LSR1, level, (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
     link = LiveLink(context=ros.context)
-    served = LivePage(session, link.listener, port=0)
+    served = LivePage(
+        ViewSession(LSR1, LEVEL, (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)), link.listener, port=0
+    )
     yield served
     served.close()
     link.close()
 
 
-@pytest.fixture
-def visitor(page, browser):
-    opened = Visitor(browser, page.url)
-    yield opened
-    opened.tab.close()
+def row_of(page, topic: str) -> str:
+    """Return the row of a topic in the list of ages, HTML."""
+    found = re.search(f'<div data-topic="{topic}".*?</div>', page.drive_tab._below.content)
+    return found.group() if found else ""
 
 
-def test_a_visitor_watches_a_rover_and_asks_its_server_for_a_plan(ros, page, visitor, tmp_path):
-    visitor.wait_for("waiting for odometry")
-    wait_until(lambda: "no verdict" in visitor.text("#verdict"), "the missing verdict")
-    wait_until(lambda: "map not known yet" in visitor.text("#header"), "the missing map")
-    given = LivePage(page.session, page._listener, port=0, has_ground=True)
-    try:
-        assert given.describe_context()[0].ground == page.session.ground_name == "7.95 x 7.95 m"
-    finally:
-        given.close()
-    empty = visitor.picture()
+def test_a_live_page_shows_a_rover_and_the_plan_and_forces_of_its_server_until_it_falls_silent(
+    ros, page, tmp_path
+):
+    def board() -> str:
+        return page.drive_tab._dashboard.content
+
+    wait_until(lambda: "waiting for odometry" in board(), "the missing odometry")
+    assert "no verdict" in page.drive_tab._verdict.content
+    assert "map not known yet" in page.header._box.content
     save_terrain(tmp_path / "waves.npz", make_terrain(waves))
     values = {"terrain_file": str(tmp_path / "waves.npz"), "start_x": -1.0}
     parameters = [Parameter(name, value=value) for name, value in values.items()]
     simulator = RoverSimulator(context=ros.context, parameter_overrides=parameters)
     ros.spin(simulator)
     ros.spin(TraverseServer(context=ros.context))
-    visitor.wait_for("live; forces not known")
-    wait_until(lambda: visitor.picture() != empty, "rover and ground in the scene")
+    wait_until(lambda: "live; forces not known" in board(), "the rover")
+    wait_until(lambda: "elevation_cloud" in page.header._box.content, "the map")
 
-    def ask() -> bool:
-        """Click again every few seconds: before the server is found a click is refused.
+    def is_answered() -> bool:
+        """Ask again until the server is found."""
+        if page._refusal:
+            ask(page, lambda: page.click(np.array([1.0, 0.0]), False))
+        return "traversable" in page.header._box.content and "predicted by the server" in board()
 
-        One that comes before the camera looks at the rover may ask for another place.
-        """
-        if time.monotonic() - asked[-1] > ASK_AGAIN:
-            asked.append(time.monotonic())
-            visitor.click_scene(*AHEAD)
-        is_answered = visitor.text("#verdict").startswith("traversable")
-        return is_answered and "forces predicted by the server" in visitor.text("#dashboard")
-
-    asked = [-ASK_AGAIN]
-    wait_until(ask, "the server's verdict and forces")
-    visitor.wait_for("live; forces predicted by the server")
-
-    def read_loads() -> list[float] | None:
-        text = visitor.text("#dashboard")
-        lines = [line for line in text.splitlines() if line.endswith(" N")]
-        return None if "? N" in text else [float(line.removesuffix(" N")) for line in lines]
-
-    loads = wait_until(read_loads, "the loads on the dashboard")
+    ask(page, lambda: page.click(np.array([1.0, 0.0]), False))
+    wait_until(is_answered, "the server's verdict and forces")
+    wait_until(lambda: "? N<" not in board(), "the loads on the dashboard")
+    loads = [float(load) for load in re.findall(r">([\d.]+) N<", board())]
     assert sum(loads) == pytest.approx(LSR1.weight, rel=0.05)
-    wait_until(lambda: age_of(visitor, "odometry")[1] == "false", "the fresh topic")
+    wait_until(lambda: 'data-stale="false"' in row_of(page, "odometry"), "the fresh topic")
 
     for timer in simulator.timers:  # the simulator falls silent, as if it was killed
         timer.cancel()
-    visitor.wait_for("not live: odometry is ")
-    wait_until(lambda: age_of(visitor, "odometry")[1] == "true", "the stale topic")
-    assert "stale, " in age_of(visitor, "odometry")[0]
-    assert age_of(visitor, "/traverse_server/plan")[1] == "false"
-    assert visitor.page_errors == []
+    wait_until(lambda: "not live: odometry is " in page.header._box.content, "the silence")
+    wait_until(lambda: 'data-stale="true"' in row_of(page, "odometry"), "the stale topic")
+    assert "stale, " in row_of(page, "odometry") and "grayscale" in board()
+    assert 'data-stale="false"' in row_of(page, "/traverse_server/plan")
+    assert page.errors.messages == {}
 
 
-def age_of(visitor: Visitor, topic: str) -> tuple[str, str]:
-    """Return what the page says of a topic's age, and whether it is stale."""
-    row = visitor.tab.locator(f'[data-topic="{topic}"]')
-    return row.inner_text(), row.get_attribute("data-stale")
+def test_a_page_on_a_given_map_says_so_and_refuses_links(ros):
+    link = LiveLink(context=ros.context)
+    session = ViewSession(LSR1, LEVEL, (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    page = LivePage(session, link.listener, port=0, has_ground=True)
+    try:
+        assert page.describe_context()[0].ground == session.ground_name == "7.95 x 7.95 m"
+        query = "?rover=lsr1&map=1&start=0,0,0&goal=1,0,0&torques=equal&layer=height"
+        ask(page, lambda: page.hear("open", query))
+        assert "opens no links" in page._refusal
+    finally:
+        page.close()
+        link.close()

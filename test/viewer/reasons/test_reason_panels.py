@@ -10,16 +10,14 @@ import pytest
 
 from rover_physics.names import WHEELS
 from rover_planner.viewer.panel.board import FONT, BoardNotes, draw_board
+from rover_planner.viewer.panel.candidate_table import draw_candidates
+from rover_planner.viewer.panel.changes import draw_changes
+from rover_planner.viewer.panel.lanes import BROKEN, COLOURS, WIDTH, draw_lanes
+from rover_planner.viewer.panel.legend import draw_scale
 from rover_planner.viewer.panel.plots import (
     MAX_POINTS,
-    add_cursor,
-    add_mark,
     choose_rows,
 )
-from rover_planner.viewer.panel.reasons.candidate_table import draw_candidates
-from rover_planner.viewer.panel.reasons.changes import draw_changes
-from rover_planner.viewer.panel.reasons.colour_scale import draw_scale
-from rover_planner.viewer.panel.reasons.lanes import BROKEN, COLOURS, WIDTH, draw_lanes
 from rover_planner.viewer.state import colours
 from rover_planner.viewer.state.colours import (
     MIN_CONTRAST,
@@ -60,7 +58,7 @@ def refused():
 
 
 def test_lanes_have_a_strip_for_each_limit_that_is_broken_where_the_path_fails(refused):
-    why = explain(refused.finished)
+    why = explain(refused.shown)
     drawing = draw_lanes(why.limits)
     for k, lane in enumerate(why.limits.lanes):
         assert f'y="{14 * k + 1}"' in drawing, lane.limit.title
@@ -73,31 +71,22 @@ def test_lanes_have_a_strip_for_each_limit_that_is_broken_where_the_path_fails(r
     assert why.failure.headline.split(",")[0] in drawing
 
 
-def test_the_mark_of_a_failure_leaves_the_curves_as_they_are():
-    x, values = np.linspace(0.0, 4.0, 9), np.column_stack([np.arange(9.0)])
-    columns = add_mark(add_cursor(x, values, 1.25, None, 0.0), 3.1, 0.0)
-    at, curve, mark, cursor = columns
-    assert all(np.isfinite(column).all() for column in columns)
-    assert (np.diff(at) >= 0.0).all()
-    np.testing.assert_allclose(curve, 2.0 * at)
-    assert at[np.argmax(mark)] == 3.1 and at[np.argmax(cursor)] == 1.25
-    *_, none, _ = add_mark(add_cursor(x, values, 1.25, None, 0.0), None, 0.0)
-    assert none.max() == 0.0
-
-
 # Tables.
 
 
 def test_the_table_has_a_row_for_each_candidate_with_its_numbers_and_marks_the_shown_one():
     session = session_on(wall_at(0.5), goal=(1.5, 0.0, 0.0))
-    rows = list_candidates(session.candidates, session.answer.nearest, [False] * 5)
+    rows = list_candidates(session.shown, False)
     text = draw_candidates(rows, 1)
-    assert [int(n) for n in re.findall(r'<tr data-path="(\d)"', text)] == [1, 2, 3, 4, 5]
+    assert [int(n) for n in re.findall(r'<tbody data-say="show (\d)"', text)] == [1, 2, 3, 4, 5]
     for row in rows:
-        assert f"{row.driven:.2f} / {row.length:.2f}" in text and f"{row.energy:.1f}" in text
-    assert text.count("background:rgba") == 1
-    marked = text[text.index("background:rgba") - 40 : text.index("background:rgba")]
-    assert 'tbody data-path="2"' in marked and text.count('aria-selected="true"') == 1
+        assert (
+            f"{row.driven:.2f} / {row.candidate.length:.2f}" in text
+            and f"{row.energy:.1f}" in text
+        )
+    assert text.count("background:rgba(0,114,178") == 1
+    marked = text[text.index("background:rgba(0") - 40 : text.index("background:rgba(0")]
+    assert 'tbody data-say="show 2"' in marked and text.count('aria-selected="true"') == 1
 
 
 def test_changes_are_listed_with_their_differences_and_what_stays_the_same_takes_no_place():
@@ -128,7 +117,7 @@ def test_the_board_shows_the_papers_traction_ratio_on_firm_ground_and_slip_on_so
 
 
 def test_the_board_outlines_the_link_that_fails_and_lists_the_worst_so_far(refused):
-    why, trajectory = explain(refused.finished), refused.shown.trajectory
+    why, trajectory = explain(refused.shown), refused.shown.trajectory
     worst = find_worst(why.limits, trajectory.duration)
     board = draw_board(LSR1, trajectory.state_at(trajectory.duration), BoardNotes(False, worst))
     assert f"{why.failure.value:.2f}max 1.00" in re.sub(r"<[^>]*>", "", board)
@@ -163,7 +152,7 @@ def ground_colours() -> set[tuple[int, int, int]]:
     Also those of the layers of a survey, whose numbers have the same scale.
     """
     scale = {tuple(c) for c in map_colours(np.linspace(0.0, 1.0, 65), 0.0, 1.0).tolist()}
-    names = ("GOOD", "BEYOND", "UNKNOWN", "PASSABLE", "REFUSED", "SEARCHED")
+    names = ("GOOD", "BEYOND", "UNKNOWN", "PASSABLE", "REFUSED")
     scale |= {getattr(colours, name) for name in names}
     scale |= {*list_class_colours(), *list_limit_colours()}
     shades = np.linspace(0.3 * LINE_SHADE * HATCH_SHADE, 1.25, 12)
@@ -228,7 +217,7 @@ def test_a_layer_along_a_path_has_the_heading_of_its_nearest_waypoint():
     path = np.array([[-1.0, 0.0, 0.4], [1.0, 0.0, -1.1]])
     at = np.array([-0.6, 0.7]), np.array([0.2])
     tilt = LAYERS["torque saturation"]
-    options = session_on(waves).sweep_options()
+    options = session_on(waves).scenario.asked_options.model
     along, _ = predict_layer(tilt, LSR1, ground, path, at, options)
     for column, yaw in enumerate((0.4, -1.1)):
         fixed, _ = predict_layer(tilt, LSR1, ground, yaw, at, options)

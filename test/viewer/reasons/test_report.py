@@ -7,8 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from rover_planner.viewer.browser.export import write_page
-from rover_planner.viewer.browser.report import describe_judgement
+from rover_planner.viewer.browser.report import describe_judgement, write_page
 from rover_planner.viewer.state.context import describe_scenario
 from support.grounds import gap
 from support.viewer.sessions import session_on
@@ -17,7 +16,7 @@ viser = pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
 
 def report_of(session) -> str:
-    judgement = session.finished
+    judgement = session.shown
     return describe_judgement(judgement, describe_scenario(judgement.scenario, "gap.npz"), "")
 
 
@@ -30,10 +29,10 @@ def test_numbers_of_a_rover_that_never_settles_are_not_known():
 @pytest.mark.parametrize("value", [float("inf"), float("nan")])
 def test_what_has_no_bound_is_said_in_words(value):
     session = session_on(gap)
-    judged = session.finished
-    verdict = replace(judged.shown.verdict, max_friction_utilisation=value)
-    candidate = replace(judged.shown.candidate, verdict=verdict)
-    session.finished = replace(judged, shown=replace(judged.shown, candidate=candidate))
+    judged = session.shown
+    verdict = replace(judged.verdict, max_friction_utilisation=value)
+    candidate = replace(judged.candidate, verdict=verdict)
+    session.shown = replace(judged, candidate=candidate)
     word = "infinite" if value > 0.0 else "?"
     assert f"<th>largest friction utilisation</th><td>{word}</td>" in report_of(session)
 
@@ -42,7 +41,7 @@ def test_the_name_of_a_rover_is_text_in_the_title_of_a_file_and_in_its_heading()
     server = viser.ViserServer("127.0.0.1", 0, verbose=False)
     camera = SimpleNamespace(position=(0.0, 0.0, 1.0), look_at=(0.0, 0.0, 0.0))
     try:
-        page = write_page(server, camera, "", r"<script>\1 & co", "").decode()
+        page = write_page(server, camera, "", r"<script>\1 & co").decode()
     finally:
         server.stop()
     safe = r"&lt;script&gt;\1 &amp; co"

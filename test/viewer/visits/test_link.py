@@ -13,10 +13,10 @@ from rover_planner.viewer.browser.link import (
     Link,
     change_values,
     list_changed_values,
+    pack_text,
     read_link,
     write_link,
 )
-from rover_planner.viewer.browser.packed_text import pack_text
 from support.viewer.sessions import FAR
 
 LINK = Link(

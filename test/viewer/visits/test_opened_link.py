@@ -48,10 +48,10 @@ def test_path_and_time_of_a_link_to_fewer_paths_do_not_come_with_a_later_goal(pa
     link = replace(page.sharing.make_link(), goal=(-2.0, 0.0, 0.0), path=5, time=20.0)
     ask(page, lambda: page.open_link(link))
     wait_for_rest(page)
-    assert len(page.session.candidates) < 5  # it stays where it is: nothing to choose from
+    assert len(page.session.shown.candidates) < 5  # it stays where it is: nothing to choose from
     ask(page, lambda: page.plan(np.array([1.0, 0.5])))
     wait_for_rest(page)
-    assert page.session.shown.index == page.session.answer.nearest != 4
+    assert page.session.shown.index == page.session.shown.answer.nearest != 4
     assert page.playback.time == 0.0
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a change of the rover has changed: the drive before and after it, in curves and numbers."""
+"""The rovers and drives before and after changes: history, undo, and differences in numbers."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ import numpy as np
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import rover_to_dict
 from rover_planner.studies.rover_values import get_value, list_values
-from rover_planner.viewer.state.scenario import Judgement, Scenario
+from rover_planner.viewer.state.scenario import Scenario, Shown
 from rover_planner.viewer.state.trajectory import Trajectory
 
 MAX_STEPS = 50
@@ -21,7 +21,7 @@ class Difference:
     """A number of the drive before and after a change; NaN where there is none."""
 
     name: str
-    """What it is."""
+    """Its name."""
     unit: str
     """Its unit, empty for none."""
     before: float
@@ -33,24 +33,19 @@ class Difference:
 
     @property
     def change(self) -> float:
-        """What was added."""
+        """The difference."""
         return self.after - self.before
 
 
 class ChangeHistory:
     """The rovers of the last finished judgements, for comparison and undo."""
 
-    def __init__(self, judgement: Judgement):
+    def __init__(self, judgement: Shown):
         """Begin with a judgement."""
         self._done = [judgement]
-        """Judgements of different rovers on the same paths, the newest last."""
+        """Showns of different rovers on the same paths, the newest last."""
 
-    @property
-    def before(self) -> Judgement | None:
-        """The judgement of the last rover before the newest one; None if there is none."""
-        return self._done[-2] if len(self._done) > 1 else None
-
-    def take(self, judgement: Judgement) -> None:
+    def take(self, judgement: Shown) -> None:
         """Note a judgement of all paths; one of other paths begins anew.
 
         While a slider is dragged, only the shown path is judged: those are no steps.
@@ -63,17 +58,17 @@ class ChangeHistory:
         elif judgement.answered is asked:
             self._done = [*self._done[-MAX_STEPS:], judgement]
 
-    def reference_for(self, judgement: Judgement) -> Judgement | None:
+    def reference_for(self, judgement: Shown) -> Shown | None:
         """Return the last judgement of another rover than that of a judgement, on its path."""
         now = judgement.scenario
         for one in reversed(self._done):
             then = one.scenario
             if _differ(then, now):
-                same = then.has_paths_of(now) and one.shown.index == judgement.shown.index
+                same = then.has_paths_of(now) and one.index == judgement.index
                 return one if same else None
         return None
 
-    def undo(self, wanted: Scenario) -> Judgement | None:
+    def undo(self, wanted: Scenario) -> Shown | None:
         """Return the judgement of the rover before the newest one, and forget the newest.
 
         The newest one is that which is wanted, also while not all of its paths are judged.
@@ -131,4 +126,4 @@ def compare_drives(before: Trajectory, after: Trajectory) -> tuple[Difference, .
 
 
 def _last(trajectory: Trajectory, name: str) -> float:
-    return float(trajectory.series(name)[-1]) if trajectory.length else 0.0
+    return float(trajectory.series(name)[-1])

@@ -13,7 +13,7 @@ from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.viewer.state.reasons.limits import Limit
 from rover_planner.viewer.state.reasons.path_limits import AskedPoses, PathLimits, find_path_limits
-from rover_planner.viewer.state.scenario import Judgement
+from rover_planner.viewer.state.scenario import Shown
 from rover_planner.viewer.state.trajectory import RoverState, make_state, read_series
 
 BODY = "body"
@@ -31,7 +31,7 @@ TITLES = {
 }
 """Short names of the codes of a verdict that have no number."""
 ON_THE_WAY = "on the way here: "
-"""How the reason of a failure between waypoints begins."""
+"""Beginning of the reason of a failure between waypoints."""
 MAX_BETWEEN = 8
 """Most poses before a failure that are shown beside it."""
 
@@ -56,9 +56,9 @@ class Failure:
     time: float
     """Time since the start [s]."""
     is_between: bool
-    """Whether it is between two waypoints."""
+    """True if it is between two waypoints."""
     is_settled: bool
-    """Whether the rover stands there; if not, `state` is a level rover above the ground."""
+    """True if the rover stands there; if not, `state` is a level rover above the ground."""
     state: RoverState
     """The rover there."""
     between: tuple[RoverState, ...] = ()
@@ -193,10 +193,10 @@ def _find_lost_wheel(rover: Rover, terrain: Terrain, state: RoverState) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """Why a judged path can be driven or not: the limits along it and its first failure."""
+    """The reasons of a verdict: the limits along the path and its first failure."""
 
     limits: PathLimits
-    """How it uses the limits, up to the first failure."""
+    """Its uses of the limits, up to the first failure."""
     failure: Failure | None
     """The first failure; None if the path can be driven."""
 
@@ -211,8 +211,8 @@ class Explanation:
         return "" if self.failure is None else self.failure.link
 
 
-def explain(judgement: Judgement) -> Explanation:
-    """Return the explanation of the shown path of a judgement."""
-    asked, shown = judgement.scenario, judgement.shown
+def explain(shown: Shown) -> Explanation:
+    """Return the explanation of the shown path."""
+    asked = shown.scenario
     limits = find_path_limits(asked.rover, shown.candidate.prediction, shown.verdict)
     return Explanation(limits, find_failure(asked.rover, asked.terrain, shown.verdict, limits))

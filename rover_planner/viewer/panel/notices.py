@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The notice of errors: what could not be drawn or done, and why."""
+"""Notices: what could not be drawn or done, why a request was refused, and what is worked on."""
 
 import html
 import traceback
 from collections.abc import Callable
 from typing import Any
 
-from rover_planner.viewer.state.colours import FAILED, to_css
+from rover_planner.viewer.state.colours import FAILED, NOTICE, to_css
 from rover_planner.viewer.state.session import REFUSALS
+from rover_planner.viewer.state.visitor_requests import Action
 
 
 class ErrorNotice:
@@ -61,3 +62,41 @@ class ErrorNotice:
             f'padding:.6em 1em">{lines}</div>'
         )
         self._box.visible = bool(self.messages)
+
+
+class JudgingNotice:
+    """What is judged, with buttons; hidden while there is nothing to say, else in every tab."""
+
+    def __init__(self, gui: Any, cancel: Action, judge_again: Action):
+        """Add the notice to the container that is open.
+
+        Args:
+            gui: The GUI of viser.
+            cancel: Stops the work.
+            judge_again: Begins it again.
+        """
+        self._refusal, self._text = (gui.add_html("", visible=False) for _ in range(2))
+        self._cancel, self._again = (
+            gui.add_button(name, visible=False) for name in ("Cancel", "Judge again")
+        )
+        self._cancel.on_click(lambda _event: cancel())
+        self._again.on_click(lambda _event: judge_again())
+
+    def show_refusal(self, reason: str) -> None:
+        """Show why the last request was refused; an empty text hides it."""
+        self._refusal.content = _frame("refusal", f"refused: {reason}")
+        self._refusal.visible = bool(reason)
+
+    def show(self, text: str, in_work: bool) -> None:
+        """Show what is worked on or was stopped; an empty text hides the notice."""
+        self._text.content = _frame("judging", text)
+        self._text.visible = bool(text)
+        self._cancel.visible = bool(text) and in_work
+        self._again.visible = bool(text) and not in_work
+
+
+def _frame(name: str, text: str) -> str:
+    return (
+        f'<div id="{name}" style="border-left:5px solid {to_css(NOTICE)};padding-left:.5em;'
+        f'margin:4px 8px;font-size:13px;line-height:1.4">{html.escape(text)}</div>'
+    )

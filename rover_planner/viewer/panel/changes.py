@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What has changed of the rover and of its drive: a table, and buttons to undo and to reset."""
+"""The table of what has changed of the rover and of its drive."""
 
 import html
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from rover_planner.viewer.state.colours import NOTICE, to_css
 from rover_planner.viewer.state.reasons.before_after import Difference
-from rover_planner.viewer.state.visitor_requests import Action
 
 SAME = "0"
 """Change of a number that stays the same."""
@@ -16,29 +14,6 @@ HEIGHT = 92
 """Height of the table [px], whatever is in it, so that no slider moves under the mouse. A longer
 table scrolls."""
 NOTHING = '<div style="padding:0 4px;opacity:0.7">nothing is changed</div>'
-
-
-class Changes:
-    """The buttons stand above the table, and both keep their places."""
-
-    def __init__(self, gui: Any, undo: Action, reset: Action):
-        """Add buttons and an empty table to the container that is open.
-
-        Args:
-            gui: The GUI of viser.
-            undo: Takes the last rover again.
-            reset: Takes the rover as it was loaded.
-        """
-        actions = {"Undo": undo, "Reset": reset}
-        buttons = gui.add_button_group("Rover", tuple(actions))
-        buttons.on_click(lambda event: actions[event.target.value]())
-        self._table = gui.add_html(draw_changes({}, ()))
-
-    def show(
-        self, changed: Mapping[str, tuple[float, float]], differences: Sequence[Difference]
-    ) -> None:
-        """Show changed numbers of the rover by label, and differences of the drive."""
-        self._table.content = draw_changes(changed, differences)
 
 
 def draw_changes(

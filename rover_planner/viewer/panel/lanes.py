@@ -23,8 +23,6 @@ WIDTH = 1000
 """Width of the drawing in its own units; the page stretches it."""
 MIN_BROKEN = 40
 """Least width of a place where a limit is broken, in the same units."""
-TIMES = 101
-"""Places along the lanes whose times a click can find."""
 HALF, MUCH = 0.5, 0.8
 """Shares of a limit at which the colour changes."""
 LITTLE_USED, HALF_USED, NEAR, BROKEN, NOT_ASKED = range(5)
@@ -56,48 +54,31 @@ class Lanes:
         """Add empty lanes to the container that is open."""
         self._box = gui.add_html("")
         self._end = 0.0
-        self._labels = self._drawing = self._times = ""
+        self._labels = self._drawing = ""
 
     def set_limits(self, limits: PathLimits | None) -> None:
         """Show the limits along another path; None shows nothing."""
-        self._drawing = ""
-        if limits is None or limits.end <= 0.0:
-            self._box.content = ""
-            return
-        self._end = limits.end
-        self._labels, self._drawing = _label_lanes(limits), draw_lanes(limits)
-        self._times = list_times(limits)
-        self.move_cursor(0.0)
+        self._drawing = self._box.content = ""
+        if limits is not None and limits.end > 0.0:
+            self._end = limits.end
+            self._labels, self._drawing = _label_lanes(limits), draw_lanes(limits)
+            self.move_cursor(0.0)
 
     def move_cursor(self, distance: float) -> None:
         """Show the cursor at a distance [m]."""
         if not self._drawing:
             return
-        rows = self._labels.count("</div>")
-        cursor = self._line(distance, "#333", 2)
+        height = ROW_HEIGHT * self._labels.count("</div>")
+        x = WIDTH * min(max(distance / self._end, 0.0), 1.0)
         self._box.content = (
-            f'<div id="lanes" data-times="{self._times}" '
-            'style="padding:0 8px 4px;font-size:12px;line-height:1">'
+            '<div id="lanes" style="padding:0 8px 4px;font-size:12px;line-height:1">'
             f'<div style="display:flex;padding-right:{RIGHT_GUTTER}px">'
             f'<div style="width:{GUTTER}px;text-align:right;flex:none">{self._labels}</div>'
-            f'<svg viewBox="0 0 {WIDTH} {rows * ROW_HEIGHT}" preserveAspectRatio="none" '
-            f'style="flex:1;min-width:0;height:{rows * ROW_HEIGHT}px">{self._drawing}'
-            f"{cursor}</svg></div>{_legend()}</div>"
+            f'<svg data-along viewBox="0 0 {WIDTH} {height}" preserveAspectRatio="none" '
+            f'style="flex:1;min-width:0;height:{height}px">{self._drawing}'
+            f'<line x1="{x:.1f}" x2="{x:.1f}" y1="0" y2="100%" stroke="#333" stroke-width="2" '
+            f'vector-effect="non-scaling-stroke"/></svg></div>{_legend()}</div>'
         )
-
-    def _line(self, distance: float, colour: str, width: int) -> str:
-        x = WIDTH * min(max(distance / self._end, 0.0), 1.0)
-        return (
-            f'<line x1="{x:.1f}" x2="{x:.1f}" y1="0" y2="100%" stroke="{colour}" '
-            f'stroke-width="{width}" vector-effect="non-scaling-stroke"/>'
-        )
-
-
-def list_times(limits: PathLimits) -> str:
-    """Return the times [s] at TIMES places along the lanes, for the script that a click runs."""
-    places = np.linspace(0.0, limits.end, TIMES)
-    times = np.interp(places, limits.rows.distance, limits.rows.time)
-    return " ".join(f"{time:.1f}" for time in times)
 
 
 def draw_lanes(limits: PathLimits) -> str:
@@ -178,8 +159,7 @@ def _label_lanes(limits: PathLimits) -> str:
     titles = [lane.limit.title for lane in limits.lanes] + ["between"]
     return "".join(
         f'<div style="height:{ROW_HEIGHT}px;line-height:{ROW_HEIGHT}px;padding-right:3px;'
-        f'white-space:nowrap">'
-        f"{title}</div>"
+        f'white-space:nowrap">{title}</div>'
         for title in titles
     )
 

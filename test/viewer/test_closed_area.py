@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The layers of a search on the ground of a real page, without a browser."""
+"""The closed area on the ground of a real page, without a browser."""
 
 from collections.abc import Iterator
 
@@ -15,8 +15,8 @@ pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
 from rover_planner.planning.search.nodes import nodes_within
 from rover_planner.viewer.pages.page import Page
-from rover_planner.viewer.scene.search_overlay import ASKED, CLOSED, cover_places
-from rover_planner.viewer.state.colours import PASSABLE, REFUSED, SEARCHED, UNKNOWN
+from rover_planner.viewer.scene.closed_area import cover_places
+from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN
 
 BEYOND = np.array([1.6, 0.0])
 """A place on the other side of the wall [m]."""
@@ -52,34 +52,28 @@ def page(request) -> Iterator[Page]:
 
 def count_rows(page: Page) -> int:
     """Return how many paths the table of candidates has."""
-    return page.candidates._table.content.count("<tbody data-path=")
+    return page.candidates.content.count("<tbody data-say=")
 
 
 def test_a_click_beyond_a_wall_shows_the_way_or_the_closed_area_on_the_page(page):
     session = page.session
     page.requests.add(lambda: page.click(BEYOND, False))
-    wait_until(lambda: session.finished.way is not None and not page.is_busy, "a way", PATIENCE)
-    overlay = page.scene.search
-    closes = session.finished.way.closed is not None
-    wait_until(lambda: set(overlay._layers) == ({CLOSED, ASKED} if closes else {ASKED}), "layers")
-    asked = overlay._layers[ASKED][0]
-    assert not asked.visible
-    overlay.show_asked(True)
-    assert asked.visible and tuple(asked.color) == SEARCHED
-    overlay.mark_old(True)
-    assert tuple(asked.color) == UNKNOWN
-    overlay.mark_old(False)
+    wait_until(lambda: session.shown.way is not None and not page.is_busy, "a way", PATIENCE)
+    area = page.scene.closed
+    closes = session.shown.way.closed is not None
+    wait_until(lambda: (area.layer is not None) == closes, "the layer")
     if closes:
-        is_refused = session.finished.way.closed.around_goal
-        colour = tuple(overlay._layers[CLOSED][0].color)
-        assert colour == (REFUSED if is_refused else PASSABLE)
-    text = page.drive_tab._verdict.content + page.drive_tab._details.content
+        colour = REFUSED if session.shown.way.closed.around_goal else PASSABLE
+        for is_old, wanted in ((True, UNKNOWN), (False, colour)):
+            area.mark_old(is_old)
+            assert tuple(area.layer.color) == wanted
+    text = page.drive_tab._verdict.content + page.drive_tab._below.content
     if closes:
         assert "no way within the map" in text and count_rows(page) == 5
     else:
         wait_until(lambda: count_rows(page) == 6, "the list of paths")
-        assert "passable, best" in page.candidates._table.content
+        assert "passable, best" in page.candidates.content
         assert page.playback.duration == session.shown.trajectory.duration
     page.requests.add(lambda: page.click(np.array([-1.1, 0.0]), False))
-    wait_until(lambda: session.finished.way is None and not overlay._layers, "no layers", PATIENCE)
+    wait_until(lambda: session.shown.way is None and area.layer is None, "no layer", PATIENCE)
     assert not page.errors.messages

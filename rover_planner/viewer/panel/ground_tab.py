@@ -8,7 +8,7 @@ from typing import Any
 from rover_physics.terrain.soil_file import load_soils
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.viewer.panel.controls import on_visitor_input
-from rover_planner.viewer.panel.reasons.colour_scale import draw_scale
+from rover_planner.viewer.panel.legend import draw_scale
 from rover_planner.viewer.state.colours import ColourScale
 from rover_planner.viewer.state.layers import HEIGHT, LAYERS
 from rover_planner.viewer.state.visitor_requests import Action
@@ -33,8 +33,6 @@ class GroundActions:
     """Changes fields of PathQueryOptions."""
     show_between: Callable[[bool], None] = lambda _visible: None
     """Shows or hides the poses between the waypoints before a failure."""
-    show_asked: Callable[[bool], None] = lambda _visible: None
-    """Shows or hides where a search for a way has asked the model."""
 
 
 class GroundTab:
@@ -84,8 +82,6 @@ class GroundTab:
         )
         between = gui.add_checkbox("Poses between waypoints", True)
         between.on_update(lambda event: actions.show_between(event.target.value))
-        asked = gui.add_checkbox("What was searched", False)
-        asked.on_update(lambda event: actions.show_asked(event.target.value))
 
     def _show_heading(self) -> None:
         """Show the controls of the heading while the layer depends on it."""

@@ -1,25 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The table of the candidate paths, whose rows can be pointed at and selected."""
+"""The table of the candidate paths; a click, or Enter, on a row shows its path."""
 
 import html
 import math
 from collections.abc import Sequence
-from typing import Any
 
 from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN, to_css
 from rover_planner.viewer.state.reasons.candidate_rows import CandidateRow
-
-
-class CandidateTable:
-    """A table whose rows the page's script tells the server about (browser/path_script.py)."""
-
-    def __init__(self, gui: Any):
-        """Add an empty table to the container that is open."""
-        self._table = gui.add_html("")
-
-    def show(self, rows: Sequence[CandidateRow], shown: int) -> None:
-        """Show candidates, the shown one by its index marked."""
-        self._table.content = draw_candidates(rows, shown)
 
 
 def draw_candidates(rows: Sequence[CandidateRow], shown: int) -> str:
@@ -33,33 +20,35 @@ def draw_candidates(rows: Sequence[CandidateRow], shown: int) -> str:
     )
     body = "".join(_row(row, row.number - 1 == shown) for row in rows)
     return (
-        '<div style="padding:0 8px"><table id="candidates" style="border-collapse:collapse;'
+        '<div style="padding:0 8px"><style>#candidates tbody:is(:hover,:focus-within)'
+        "{background:rgba(240,228,66,.35)!important}</style>"
+        '<table id="candidates" style="border-collapse:collapse;'
         f'width:100%;font-size:12px;line-height:1.35" role="grid"><tr>{head}</tr>{body}</table>'
-        '<div style="font-size:12px;opacity:.75;padding-top:4px">Point at a row to see its path '
-        "in the scene, click to show it. Values of a refused path are those up to its failure."
-        "</div></div>"
+        '<div style="font-size:12px;opacity:.75;padding-top:4px">Click a row to show its path. '
+        "Values of a refused path are those up to its failure.</div></div>"
     )
 
 
 def _row(row: CandidateRow, is_shown: bool) -> str:
     """Return the two rows of a candidate: its numbers, and its reason below them.
 
-    The first row takes the focus; both are pointed at and clicked as one.
+    The first row takes the focus; both are clicked as one.
     """
-    colour = to_css(UNKNOWN if row.is_old else PASSABLE if row.traversable else REFUSED)
+    colour = to_css(UNKNOWN if row.is_old else PASSABLE if row.verdict.traversable else REFUSED)
     back = "background:rgba(0,114,178,.12);" if is_shown else ""
     faded = "opacity:.5;" if row.is_old else ""
-    word = "passable" if row.traversable else "refused"
+    word = "passable" if row.verdict.traversable else "refused"
     word += " (old)" if row.is_old else ""
-    word += ", best" if row.is_best and row.traversable else ""
-    length = f"{row.length:.2f}" if row.traversable else f"{row.driven:.2f} / {row.length:.2f}"
+    word += ", best" if row.is_best and row.verdict.traversable else ""
+    length = f"{row.candidate.length:.2f}"
+    length = length if row.verdict.traversable else f"{row.driven:.2f} / {length}"
     cells = (
         f"<b>{row.number}</b>",
         f'<span style="color:{colour}">&#9632;</span> {word}',
         length,
         f"{row.energy:.1f}",
-        _number(row.utilisation),
-        _number(row.margin),
+        _number(row.verdict.max_friction_utilisation),
+        _number(row.verdict.min_tip_over_ratio),
     )
     mark = f"border-left:4px solid {colour if is_shown else 'transparent'};"
     line = "".join(
@@ -67,10 +56,10 @@ def _row(row: CandidateRow, is_shown: bool) -> str:
         f'white-space:nowrap">{cell}</td>'
         for k, cell in enumerate(cells)
     )
-    reason = html.escape(row.reason) or "&nbsp;"
+    reason = html.escape(row.verdict.reason) or "&nbsp;"
     return (
-        f'<tbody data-path="{row.number}" style="{back}cursor:pointer;user-select:none">'
-        f'<tr data-path="{row.number}" tabindex="0" aria-selected="{str(is_shown).lower()}" '
+        f'<tbody data-say="show {row.number}" style="{back}cursor:pointer;user-select:none">'
+        f'<tr tabindex="0" aria-selected="{str(is_shown).lower()}" '
         f'style="{faded}border-top:1px solid #ddd">{line}</tr>'
         f'<tr style="{faded}"><td style="{mark}"></td>'
         f'<td colspan="5" style="padding:0 4px 3px;opacity:.8">{reason}</td></tr></tbody>'
