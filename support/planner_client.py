@@ -156,6 +156,7 @@ class PlannerClient(Node):
         wait_until(lambda: any(text in line for line in self.logs), f"a log line with {text!r}")
 
     def send(self, publisher, message) -> None:
+        """Publish a message as soon as someone hears it."""
         wait_until(lambda: publisher.get_subscription_count() > 0, publisher.topic_name)
         publisher.publish(message)
 
