@@ -68,7 +68,7 @@ class PlannerClient(Node):
 
     def send_cloud(self, cloud: PointCloud2) -> None:
         """Publish a cloud unchanged."""
-        self._send(self._cloud, cloud)
+        self.send(self._cloud, cloud)
 
     def send_terrain(self, terrain) -> None:
         """Publish a terrain and wait until the server has it."""
@@ -78,18 +78,18 @@ class PlannerClient(Node):
 
     def send_path(self, path: Path) -> None:
         """Publish a path."""
-        self._send(self._path, path)
+        self.send(self._path, path)
 
     def send_joints(self, names, positions) -> None:
         """Publish joint positions."""
-        self._send(self._joints, JointState(name=list(names), position=list(positions)))
+        self.send(self._joints, JointState(name=list(names), position=list(positions)))
 
     def send_odometry(self, pose, frame="map") -> None:
         """Publish odometry of a level pose (3,)."""
         odometry = Odometry()
         odometry.header.frame_id, odometry.child_frame_id = frame, "base_link"
         odometry.pose.pose = stamped_pose(pose, frame).pose
-        self._send(self._odometry, odometry)
+        self.send(self._odometry, odometry)
 
     def can_traverse(self, start, goal, tolerance=0.0, frame="map") -> Path:
         """Ask for a plan between two poses (3,)."""
@@ -155,7 +155,8 @@ class PlannerClient(Node):
         """Wait for a log line of the server with a text in it."""
         wait_until(lambda: any(text in line for line in self.logs), f"a log line with {text!r}")
 
-    def _send(self, publisher, message) -> None:
+    def send(self, publisher, message) -> None:
+        """Publish a message as soon as someone hears it."""
         wait_until(lambda: publisher.get_subscription_count() > 0, publisher.topic_name)
         publisher.publish(message)
 

@@ -17,7 +17,6 @@ from std_srvs.srv import SetBool
 from msg_adapters.commands import joint_order
 from msg_adapters.results.diagnostics import traction_diagnostics
 from rover_physics.names import WHEEL_COUNT, WHEEL_JOINTS
-from rover_planner.nodes.navigation.frames import NodeFrames
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.traction.inputs import TractionInputs
 from rover_planner.nodes.traction.maps import TractionMaps
@@ -29,6 +28,7 @@ from rover_planner.parameters.declare import (
     warn_of_unknown_parameters,
 )
 from rover_planner.parameters.traction_controller import TractionControllerParameters
+from rover_planner.ros.frames import NodeFrames
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.process import take_priority

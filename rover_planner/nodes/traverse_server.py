@@ -35,7 +35,6 @@ from rover_planner.nodes.arm_topics import ArmTopics
 from rover_planner.nodes.maps.map_cloud import MapCloud
 from rover_planner.nodes.maps.map_topics import MapTopics
 from rover_planner.nodes.nav2_services import PathComputation, PathValidity
-from rover_planner.nodes.navigation.frames import NodeFrames
 from rover_planner.nodes.navigation.hazard_topics import HazardTopics
 from rover_planner.nodes.navigation.path_watch import MAX_POSE_AGE, PathWatch
 from rover_planner.nodes.question_desk import QuestionDesk
@@ -67,7 +66,7 @@ from rover_planner.planning.path_query import Pose
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.deferred_work import DeferredWork
-from rover_planner.ros.frames import is_empty
+from rover_planner.ros.frames import NodeFrames, is_empty
 from rover_planner.ros.guard import INPUT_ERRORS, Guard
 from rover_planner.ros.qos import sensor_qos, topic_qos
 from rover_planner.ros.subscriptions import subscribe_to_requests

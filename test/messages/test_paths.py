@@ -8,10 +8,9 @@ import struct
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import PoseStamped, Quaternion
+from geometry_msgs.msg import Quaternion
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from nav_msgs.msg import Path
 
 from msg_adapters.errors import MAX_TEXT, MessageError
 from msg_adapters.frames import check_frame
@@ -110,12 +109,6 @@ def long_path():
 def test_a_path_is_refused_by_its_bad_part(make, text):
     with pytest.raises(MessageError, match=text):
         path_to_poses(make(), "map")
-
-
-def test_poses_of_a_path_may_leave_their_frame_empty():
-    path = Path(poses=[PoseStamped()])
-    path.header.frame_id = "map"
-    np.testing.assert_array_equal(path_to_poses(path, "map"), np.zeros((1, 3)))
 
 
 @settings(max_examples=50)

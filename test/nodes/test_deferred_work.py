@@ -154,12 +154,3 @@ def test_whoever_comes_after_a_listener_has_left_never_gets_what_is_out_of_date(
 
     wait_until(catch_up, "the latest")
     assert heard == [2]
-
-
-def test_a_message_that_cannot_be_made_is_not_tried_again(ros, topic):
-    topic.publish(lambda: 1 / 0)
-    listen(ros)
-    wait_until(lambda: topic.is_awaited, "the listener")
-    with pytest.raises(ZeroDivisionError):
-        topic.catch_up()
-    assert not topic.is_awaited

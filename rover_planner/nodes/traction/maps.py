@@ -10,9 +10,9 @@ from sensor_msgs.msg import PointCloud2
 from msg_adapters.elevation import terrain_from_point_cloud
 from rover_physics.rover.model import Rover
 from rover_physics.traction.map_contacts import MapContactFinder
-from rover_planner.nodes.navigation.frames import NodeFrames
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.planning.navigation.transforms import Rigid
+from rover_planner.ros.frames import NodeFrames
 from rover_planner.ros.logs import RepeatLog
 from rover_planner.ros.map_intake import CLOUD, MapIntake
 

@@ -52,7 +52,7 @@ def send_odometry(client, stamp) -> None:
     place, turn = message.pose.pose.position, message.pose.pose.orientation
     place.x, place.y, place.z = ROBOT.translation.tolist()
     turn.x, turn.y, turn.z, turn.w = ROBOT.rotation.as_quat().tolist()
-    client._send(client._odometry, message)
+    client.send(client._odometry, message)
 
 
 def test_a_cloud_of_a_camera_gives_the_map_of_the_same_cloud_in_the_map_frame(
