@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Thrust of a wheel at a slip ratio, which the product only needs the other way round."""
+"""Thrust of a wheel at a slip ratio; the product finds the slip ratio of a thrust."""
 
 import numpy as np
 

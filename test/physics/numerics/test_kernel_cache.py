@@ -97,6 +97,7 @@ def test_kernels_compile_on_a_full_disk_and_the_note_says_so(package):
     assert package.run() == (7.0, 0, "")  # what the full disk has left does no harm
 
 
+@pytest.mark.long
 def test_a_damaged_file_is_compiled_again(package):
     package.run()
     for ending, left in (("nbi", 20), ("nbc", 0)):
