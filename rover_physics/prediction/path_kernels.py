@@ -46,7 +46,7 @@ class Wheels(NamedTuple):
 
     radius: float
     """Wheel radius [m]."""
-    reach: float
+    swing_radius: float
     """Distance of the outermost wheel from the body origin, seen from above [m]."""
     friction_limit: float
     """Safety limit of the friction utilisation, see `force_limit`."""
@@ -140,7 +140,11 @@ def find_jumps(results, poses, joined, wheels, ends):
             joined[row] and (_jumps(here, there, wheels) or _finest(here, there, wheels) < np.inf)
         ):
             continue
-        if 0.0 < way_between(poses[row], poses[row + 1], wheels.reach) <= wheels.radius:
+        if (
+            0.0
+            < distance_between(poses[row], poses[row + 1], wheels.swing_radius)
+            <= wheels.radius
+        ):
             ends[count, 0], ends[count, 1] = row, row + 1
             count += 1
     return count
@@ -182,7 +186,7 @@ def find_turns(results, poses, joined, wheels, turns):
     for row in range(results.size - 1):
         if joined[row] and results[row + 1].motion[2] != 0.0:
             here, there = poses[row], poses[row + 1]
-            swing = wheels.reach * abs(turn_between(here, there))
+            swing = wheels.swing_radius * abs(turn_between(here, there))
             length = np.hypot(there[0] - here[0], there[1] - here[1])
             if swing > max(wheels.radius, length):
                 turns[count, 0] = row
@@ -248,7 +252,7 @@ def sort_pieces(ends, pieces, known, wheels, sorted_ends):
                 skipped = True
                 continue
             if _jumps(results[before], results[after], wheels):
-                way = way_between(poses[before], poses[after], wheels.reach)
+                way = distance_between(poses[before], poses[after], wheels.swing_radius)
                 if skipped or way < MIN_SPACING:
                     sorted_ends[1, n_closed, 0], sorted_ends[1, n_closed, 1] = before, after
                     n_closed += 1
@@ -257,7 +261,7 @@ def sort_pieces(ends, pieces, known, wheels, sorted_ends):
                     n_open += 1
             elif not skipped:
                 finest = _finest(results[before], results[after], wheels)
-                if finest < way_between(poses[before], poses[after], wheels.reach):
+                if finest < distance_between(poses[before], poses[after], wheels.swing_radius):
                     sorted_ends[0, n_open, 0], sorted_ends[0, n_open, 1] = before, after
                     n_open += 1
             before, skipped = after, False
@@ -266,7 +270,7 @@ def sort_pieces(ends, pieces, known, wheels, sorted_ends):
 
 
 @exact_kernel
-def way_between(here, there, reach):
+def distance_between(here, there, reach):
     """Return the way [m] from a pose to another: of the body or, if it turns, of a wheel.
 
     `reach` is the distance [m] of the outermost wheel from the body origin.
@@ -437,7 +441,7 @@ def find_remaining_jumps(path, between, wheels, ends):
         if _jumps(a, b, wheels):
             apart = 0.0
             if last < n and here < n:
-                apart = way_between(path.poses[last], path.poses[here], wheels.reach)
+                apart = distance_between(path.poses[last], path.poses[here], wheels.swing_radius)
             searched = last >= n or here >= n or apart > 0.0
             if searched and apart <= wheels.radius:
                 ends[count, 0], ends[count, 1] = last, here

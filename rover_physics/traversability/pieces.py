@@ -25,9 +25,9 @@ from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_kernels import (
     FACE,
     add_up,
+    distance_between,
     find_jumps,
     find_turns,
-    way_between,
 )
 from rover_physics.prediction.path_motion import path_motions
 from rover_physics.prediction.sweep import check_poses, find_suspects, joined_paths
@@ -218,7 +218,7 @@ def sum_up_pieces(path, turns, look, steering_rate, sums, found):
         if not (
             _is_easy(results[piece], numbers[piece], limits, wheels)
             and _is_easy(turned[its_turns], turned_numbers[its_turns], limits, wheels)
-            and _keeps_to_path(poses[piece], results[piece], wheels.reach, wheelbase)
+            and _keeps_to_path(poses[piece], results[piece], wheels.swing_radius, wheelbase)
         ):
             continue
         start = (0.0, 0.0, 0.0)
@@ -262,7 +262,7 @@ def _keeps_to_path(poses, results, reach, wheelbase):
     """Return whether the deviations from the path stay small, whatever their directions."""
     turn, slide = 0.0, 0.0
     for row in range(1, results.size):
-        way = way_between(poses[row - 1], poses[row], reach)
+        way = distance_between(poses[row - 1], poses[row], reach)
         for i in range(row - 1, row + 1):
             x, y, rate = results[i].deviation[0], results[i].deviation[1], results[i].deviation[2]
             if x != 0.0 or y != 0.0 or rate != 0.0:
