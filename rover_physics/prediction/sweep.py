@@ -223,7 +223,7 @@ class _StartedPath:
             if not len(crossings.place):
                 return
             falls = find_falls(self._model.wheels, here, results, crossings)
-            if not falls.drops.max() > self._model.settings.allowed_drop:
+            if not falls.drops.max() > self._model.wheels.drop_limit:
                 return
         swept, falls = make_prediction(self._model, here, results, crossings)
         failure = find_first_failure(self._model.limits, swept.prediction)

@@ -19,7 +19,7 @@ from rover_physics.limits.table import MAX_SLIDE, MAX_TURN_OFF
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import view_read_only
-from rover_physics.prediction.crossing import turn_wheels
+from rover_physics.prediction.crossing import find_turns, turn_wheels
 from rover_physics.prediction.drops import MIN_ANGLE
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_kernels import (
@@ -27,7 +27,6 @@ from rover_physics.prediction.path_kernels import (
     add_up,
     distance_between,
     find_jumps,
-    find_turns,
 )
 from rover_physics.prediction.path_motion import path_motions
 from rover_physics.prediction.sweep import check_poses, find_suspects, joined_paths
@@ -169,9 +168,8 @@ class _Sweep:
         joined = joined_paths(ends)
         turned = turn_wheels(self._model, poses, results, joined)
         jumps, wheels = np.empty((len(poses), 2), np.int64), self._model.wheels
-        far = np.empty_like(jumps)
         jumps = jumps[: find_jumps(results, poses, joined, wheels, jumps)]
-        far = far[: find_turns(results, poses, joined, wheels, far)]
+        far = find_turns(self._model, poses, results, joined)
         found, sums = np.full((len(indices), 3), np.nan), np.empty((3, len(poses)))
         path = view_read_only(poses), readable(results), ends
         turns = readable(turned.results), np.searchsorted(turned.waypoint, ends)
