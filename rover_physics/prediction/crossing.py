@@ -12,15 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import (
     HEIGHT_JUMP,
     NO_CROSSINGS,
     Crossings,
-    divide_stretches,
     find_jumps,
-    find_turned_wheels,
-    find_turns,
     join_crossings,
     sort_pieces,
 )
@@ -30,6 +28,11 @@ from rover_physics.terrain.grid import Terrain
 
 PIECES = 4
 """Number of pieces into which a stretch with a jump is divided in each round."""
+TURNED = 0.1
+"""Change of a steering angle [rad] from a waypoint to the next above which the rover is also
+evaluated with the wheels turned where it still stands. Smaller changes count as gradual."""
+TURN_SPACING = 0.25
+"""Largest distance of the outermost wheel [wheel radii] between poses of a turn."""
 CLIMB_STAGES = np.linspace(0.0, 1.0, 6)
 """Fractions of a face's height at which a climbing wheel is evaluated. The foot (0) counts only if
 the wheel already touches the edge of the face there: no later contact is as steep."""
@@ -87,15 +90,13 @@ def _divide_turns(
 
     Also return a mask of those between waypoints, and the neighbours between which to search.
     """
-    turns = np.empty((len(poses), 2), np.int64)
-    turns = turns[: find_turns(results, poses, joined, model.wheels, turns)]
+    turns = find_turns(model, poses, results, joined)
     if not len(turns):
         return NO_CROSSINGS, np.empty(0, bool), np.empty((0, 2), np.int64)
     first, pieces = np.repeat(turns, turns[:, 1] + 1, axis=0).T
     within = np.concatenate([np.arange(count + 1) for count in turns[:, 1]])
     inside, share = (within > 0) & (within < pieces), within / pieces
-    steps = poses[first + 1] - poses[first]
-    steps[:, 2] = (steps[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
+    steps = _steps(poses[first], poses[first + 1])
     at = poses[first] + share[:, None] * steps
     found = select_results(results, np.where(within > 0, first + 1, first))
     turned = model.evaluate(at[inside], motions=found["motion"][inside])
@@ -108,8 +109,8 @@ def turn_wheels(
     model: PackedModel, poses: np.ndarray, results: Any, joined: np.ndarray
 ) -> Crossings:
     """Return the waypoints where the wheels turn, with the motion that leads on from there."""
-    rows = np.empty(len(poses), np.int64)
-    rows = rows[: find_turned_wheels(results, joined, rows)]
+    changes = np.abs(np.diff(results["steering_angle"], axis=0)).max(axis=1)
+    rows = np.flatnonzero(joined & (changes > TURNED))
     if not len(rows):
         return NO_CROSSINGS
     at, motions = np.ascontiguousarray(poses[rows]), results["motion"][rows + 1]
@@ -117,14 +118,59 @@ def turn_wheels(
     return Crossings(rows.astype(float), rows + 1, np.zeros(len(rows), bool), at, turned)
 
 
+def find_turns(
+    model: PackedModel, poses: np.ndarray, results: Any, joined: np.ndarray
+) -> np.ndarray:
+    """Find the steps that turn so far that the wheels sweep ground away from both waypoints.
+
+    On such a step the outermost wheel goes farther by turning than a wheel radius, and than the
+    body goes.
+
+    Returns:
+        (k, 2) first waypoints of these steps and numbers of pieces TURN_SPACING apart.
+    """
+    wheels, steps = model.wheels, _steps(poses[:-1], poses[1:])
+    swing = wheels.swing_radius * np.abs(steps[:, 2])
+    far = swing > np.maximum(wheels.radius, np.hypot(steps[:, 0], steps[:, 1]))
+    rows = np.flatnonzero(joined & far & (results["motion"][1:, 2] != 0.0))
+    pieces = np.ceil(swing[rows] / (TURN_SPACING * wheels.radius)).astype(np.int64)
+    return np.column_stack([rows, pieces])
+
+
+def _steps(here: np.ndarray, there: np.ndarray) -> Floats:
+    """Return the steps (n, 3) from poses to others: x, y [m] and turn [rad], the shorter way."""
+    steps = np.asarray(there - here)
+    steps[:, 2] = (steps[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
+    return steps
+
+
+def divide_stretches(
+    known: Crossings, ends: np.ndarray
+) -> tuple[Floats, np.ndarray, Floats, Floats]:
+    """Return PIECES - 1 poses in each stretch between the rows `ends` (k, 2), evenly.
+
+    They are places, next waypoints, poses and motions, stretch by stretch. The motions are those
+    of the end of the stretch, which lead there.
+    """
+    (before, after), share = ends.T, np.arange(1, PIECES) / PIECES
+    first, steps = known.place[before], _steps(known.poses[before], known.poses[after])
+    place = first[:, None] + share * (known.place[after] - first)[:, None]
+    poses = known.poses[before][:, None] + share[:, None] * steps[:, None]
+    waypoint, motions = known.waypoint[before], known.results["motion"][after]
+    within = PIECES - 1
+    return (
+        place.ravel(),
+        np.repeat(waypoint, within),
+        poses.reshape(-1, 3),
+        np.repeat(motions, within, axis=0),
+    )
+
+
 def _divide(model: PackedModel, known: Crossings, ends: np.ndarray) -> Crossings:
-    """Return PIECES - 1 evaluated poses in each stretch between the rows `ends` (k, 2)."""
-    n = len(ends) * (PIECES - 1)
-    place, waypoint, poses = np.empty(n), np.empty(n, np.int64), np.empty((n, 3))
-    motions = np.empty((n, 3))
-    divide_stretches(ends, PIECES, known.views, (place, waypoint, poses, motions))
+    """Return the poses of `divide_stretches`, evaluated."""
+    place, waypoint, poses, motions = divide_stretches(known, ends)
     results = model.evaluate(poses, motions=motions)
-    return Crossings(place, waypoint, np.zeros(n, bool), poses, results)
+    return Crossings(place, waypoint, np.zeros(len(place), bool), poses, results)
 
 
 def _sort_pieces(

@@ -24,8 +24,8 @@ from rover_physics.prediction.path_kernels import (
     ROUNDING,
     Crossings,
     Wheels,
+    distance_between,
     force_limit,
-    way_between,
 )
 
 MIN_ANGLE = np.radians(15.0)
@@ -80,7 +80,7 @@ def _find_falls(wheels, poses, results, between):
         i = order[k]
         here = poses[i] if i < n else between.poses[i - n]
         result = results[i] if i < n else between.results[i - n]
-        steps[k] = way_between(last, here, wheels.reach)
+        steps[k] = distance_between(last, here, wheels.swing_radius)
         if _read_contacts(result, angle[k], height[k]) < -WALL:
             for wheel in range(6):
                 at_wall[k, wheel] = angle[k, wheel] < -WALL

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rover_physics.numerics.arrays import Floats, SingleFloats
+from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import freeze_fields
 from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.packed_model import PackedModel, pack_model
@@ -117,6 +118,7 @@ def sweep_map(
         yield first, score(model, poses, grid.shape[:-1])
 
 
+@quiet
 def score(model: PackedModel, poses: np.ndarray, shape: tuple[int, ...]) -> PoseScores:
     """Score poses (n, 3) and return scores of `shape`, which has n elements."""
     n, limits = len(poses), model.limits
@@ -137,9 +139,7 @@ def find_scores(results: Any) -> Floats:
     settled = results["status"] == PoseStatus.SETTLED
     use = results["friction_utilisation"].max(axis=1)
     use[~(results["speed_share"] > 0.0)] = np.inf
-    saturation, least = (
-        results["torque_saturation"].max(axis=1),
-        results["wheel_loads"].min(axis=1),
-    )
+    saturation = results["torque_saturation"].max(axis=1)
+    least = results["wheel_loads"].min(axis=1)
     single = (results[name] for name in ("tip_over_ratio", "tilt", "belly_clearance"))
     return np.where(settled, np.stack([use, saturation, least, *single]), np.nan)

@@ -87,7 +87,7 @@ class PackedModel:
         linkage, settings = self.record.linkage, self.settings
         return Wheels(
             float(linkage.radius),
-            float(linkage.reach),
+            float(linkage.swing_radius),
             float(settings.allowed_friction),
             float(settings.allowed_saturation),
             float(settings.allowed_drop),

@@ -21,11 +21,6 @@ peaks and ends of falls. With 0.06 for smaller peaks, twice as many waypoints ch
 1,000, not 2, and rough ground costs less than 1 % less."""
 ANGLE_JUMP = np.radians(12.0)
 """Change of a contact angle [rad] above which it is a jump, if one of the two angles is steep."""
-TURNED = 0.1
-"""Change of a steering angle [rad] from a waypoint to the next above which the rover is also
-evaluated with the wheels turned where it still stands. Smaller changes count as gradual."""
-TURN_SPACING = 0.25
-"""Largest distance of the outermost wheel [wheel radii] between poses of a turn."""
 STEEP_CONTACT = np.radians(25.0)
 """Size of a contact angle [rad] above which the contact is steep."""
 FACE = np.radians(45.0)
@@ -46,7 +41,7 @@ class Wheels(NamedTuple):
 
     radius: float
     """Wheel radius [m]."""
-    reach: float
+    swing_radius: float
     """Distance of the outermost wheel from the body origin, seen from above [m]."""
     friction_limit: float
     """Safety limit of the friction utilisation, see `force_limit`."""
@@ -140,85 +135,14 @@ def find_jumps(results, poses, joined, wheels, ends):
             joined[row] and (_jumps(here, there, wheels) or _finest(here, there, wheels) < np.inf)
         ):
             continue
-        if 0.0 < way_between(poses[row], poses[row + 1], wheels.reach) <= wheels.radius:
+        if (
+            0.0
+            < distance_between(poses[row], poses[row + 1], wheels.swing_radius)
+            <= wheels.radius
+        ):
             ends[count, 0], ends[count, 1] = row, row + 1
             count += 1
     return count
-
-
-@exact_kernel
-def find_turned_wheels(results, joined, rows):
-    """Find the waypoints where a wheel turns by more than TURNED for the next; return how many.
-
-    Args:
-        results: (n,) RESULT of each waypoint.
-        joined: (n - 1,) True where a waypoint and the next one belong to the same path.
-        rows: (>= n,) indices of these waypoints, written.
-    """
-    count = 0
-    for row in range(results.size - 1):
-        if joined[row] and _largest_change(results[row], results[row + 1]) > TURNED:
-            rows[count] = row
-            count += 1
-    return count
-
-
-@exact_kernel
-def find_turns(results, poses, joined, wheels, turns):
-    """Find the steps that turn so far that the wheels sweep ground away from both waypoints.
-
-    Returns their number. On such a step the outermost wheel goes farther by turning than
-    a wheel radius, and than the body goes.
-
-    Args:
-        results: (n,) RESULT of each waypoint.
-        poses: (n, 3) x, y [m] and yaw [rad] of the waypoints.
-        joined: (n - 1,) True where a waypoint and the next one belong to the same path.
-        wheels: Wheels.
-        turns: (>= n, 2) first waypoints of these steps and numbers of pieces TURN_SPACING apart,
-            written.
-    """
-    count = 0
-    for row in range(results.size - 1):
-        if joined[row] and results[row + 1].motion[2] != 0.0:
-            here, there = poses[row], poses[row + 1]
-            swing = wheels.reach * abs(turn_between(here, there))
-            length = np.hypot(there[0] - here[0], there[1] - here[1])
-            if swing > max(wheels.radius, length):
-                turns[count, 0] = row
-                turns[count, 1] = np.ceil(swing / (TURN_SPACING * wheels.radius))
-                count += 1
-    return count
-
-
-@exact_kernel
-def divide_stretches(ends, pieces, known, new):
-    """Divide stretches evenly and write the poses within them, stretch by stretch.
-
-    Args:
-        ends: (k, 2) rows of `known` at the start and end of each stretch.
-        pieces: Number of pieces of a stretch.
-        known: Crossings.
-        new: (place, waypoint, poses, motions), each with k * (pieces - 1) rows, written. Motions
-            are those of the end of the stretch, which lead there.
-    """
-    place, waypoint, poses = known.place, known.waypoint, known.poses
-    new_place, new_waypoint, new_poses, motions = new
-    row = 0
-    for stretch in range(ends.shape[0]):
-        before, after = ends[stretch, 0], ends[stretch, 1]
-        first, last = poses[before], poses[after]
-        turn = turn_between(first, last)
-        for i in range(1, pieces):
-            share = i / pieces
-            new_place[row] = place[before] + share * (place[after] - place[before])
-            new_waypoint[row] = waypoint[before]
-            new_poses[row, 0] = first[0] + share * (last[0] - first[0])
-            new_poses[row, 1] = first[1] + share * (last[1] - first[1])
-            new_poses[row, 2] = first[2] + share * turn
-            for k in range(3):
-                motions[row, k] = known.results[after].motion[k]
-            row += 1
 
 
 @exact_kernel
@@ -248,7 +172,7 @@ def sort_pieces(ends, pieces, known, wheels, sorted_ends):
                 skipped = True
                 continue
             if _jumps(results[before], results[after], wheels):
-                way = way_between(poses[before], poses[after], wheels.reach)
+                way = distance_between(poses[before], poses[after], wheels.swing_radius)
                 if skipped or way < MIN_SPACING:
                     sorted_ends[1, n_closed, 0], sorted_ends[1, n_closed, 1] = before, after
                     n_closed += 1
@@ -257,7 +181,7 @@ def sort_pieces(ends, pieces, known, wheels, sorted_ends):
                     n_open += 1
             elif not skipped:
                 finest = _finest(results[before], results[after], wheels)
-                if finest < way_between(poses[before], poses[after], wheels.reach):
+                if finest < distance_between(poses[before], poses[after], wheels.swing_radius):
                     sorted_ends[0, n_open, 0], sorted_ends[0, n_open, 1] = before, after
                     n_open += 1
             before, skipped = after, False
@@ -266,7 +190,7 @@ def sort_pieces(ends, pieces, known, wheels, sorted_ends):
 
 
 @exact_kernel
-def way_between(here, there, reach):
+def distance_between(here, there, reach):
     """Return the way [m] from a pose to another: of the body or, if it turns, of a wheel.
 
     `reach` is the distance [m] of the outermost wheel from the body origin.
@@ -437,7 +361,7 @@ def find_remaining_jumps(path, between, wheels, ends):
         if _jumps(a, b, wheels):
             apart = 0.0
             if last < n and here < n:
-                apart = way_between(path.poses[last], path.poses[here], wheels.reach)
+                apart = distance_between(path.poses[last], path.poses[here], wheels.swing_radius)
             searched = last >= n or here >= n or apart > 0.0
             if searched and apart <= wheels.radius:
                 ends[count, 0], ends[count, 1] = last, here

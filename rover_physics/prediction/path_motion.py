@@ -42,7 +42,7 @@ STRAIGHT = 1e-6
 """Curvature [rad per wheelbase] up to which a step is straight."""
 
 
-class Step(IntEnum):
+class StepKind(IntEnum):
     """What is known of the way from a waypoint to the next."""
 
     RESTS = 0
@@ -117,7 +117,7 @@ def write_curvature_motions(models, curvature, motions):
     for i in range(curvature.size):
         bend, motion = curvature[i], motions[i]
         motion[0], motion[1], motion[2] = settings.direction, 0.0, 0.0
-        if abs(bend) * ON_THE_SPOT * linkage.reach >= 1.0:
+        if abs(bend) * ON_THE_SPOT * linkage.swing_radius >= 1.0:
             motion[0], motion[2] = 0.0, settings.direction * (1.0 if bend > 0.0 else -1.0)
         elif abs(bend) * linkage.length > STRAIGHT:
             motion[2] = settings.direction * bend
@@ -134,9 +134,9 @@ def write_path_motions(models, poses, motions):
             end = _end_of_line(poses, i)
             is_ahead = _is_line_ahead(poses[i - 1], poses[end])
         step = _find_motion(linkage, poses[i - 1], poses[i], is_ahead, motions[i])
-        if step == Step.DRIVEN:
+        if step == StepKind.DRIVEN:
             driven += 1
-        elif step == Step.OPEN:
+        elif step == StepKind.OPEN:
             open_steps += 1
     first = 0  # first waypoint that a motion leads to
     for i in range(1, n):
@@ -195,22 +195,22 @@ def _is_line_ahead(here, there):
 
 @kernel
 def _find_motion(linkage, here, there, is_ahead, motion):
-    """Write the motion of a step, of any speed: NaN at rest, zeros if open; return a Step.
+    """Write the motion of a step, of any speed: NaN at rest, zeros if open; return a StepKind.
 
     `is_ahead` tells whether the line that the step is on leads ahead or back as a whole.
     """
     dx, dy = there[0] - here[0], there[1] - here[1]
     turn = (there[2] - here[2] + np.pi) % (2.0 * np.pi) - np.pi
-    length, swing = np.hypot(dx, dy), linkage.reach * abs(turn)
+    length, swing = np.hypot(dx, dy), linkage.swing_radius * abs(turn)
     motion[0] = motion[1] = motion[2] = 0.0
     if max(length, swing) <= AT_REST * linkage.length:
         motion[0] = np.nan
-        return Step.RESTS
+        return StepKind.RESTS
     if length <= ON_THE_SPOT * swing:
         motion[2] = 1.0 if turn > 0.0 else -1.0
-        return Step.DRIVEN
+        return StepKind.DRIVEN
     if length > LONGEST * linkage.length:
-        return Step.OPEN
+        return StepKind.OPEN
     if linkage.length * abs(turn) <= STRAIGHT * length:
         turn = 0.0
     yaw = here[2] + 0.5 * turn
@@ -219,11 +219,11 @@ def _find_motion(linkage, here, there, is_ahead, motion):
     rate = turn / (length * bulge(turn))
     if abs(turn) <= MAX_TURN and (is_ahead or _swings_out(linkage, (ahead, aside, rate), turn)):
         motion[0], motion[2] = (1.0 if ahead >= 0.0 else -1.0), rate
-        return Step.DRIVEN
+        return StepKind.DRIVEN
     if abs(turn) <= CRAB_TURN and length <= LONGEST_CRAB * linkage.length:
         motion[0], motion[1], motion[2] = ahead, aside, rate
-        return Step.DRIVEN
-    return Step.OPEN
+        return StepKind.DRIVEN
+    return StepKind.OPEN
 
 
 @kernel

@@ -230,5 +230,5 @@ def _in_order(n: int, place: np.ndarray) -> np.ndarray:
 def _ways(wheels: Wheels, poses: np.ndarray) -> Floats:
     """Return the ways (n - 1,) between poses [m]: of the body or, if it turns, of a wheel."""
     steps = np.diff(poses, axis=0)
-    swing = wheels.reach * np.abs((steps[:, 2] + np.pi) % (2.0 * np.pi) - np.pi)
+    swing = wheels.swing_radius * np.abs((steps[:, 2] + np.pi) % (2.0 * np.pi) - np.pi)
     return np.maximum(np.hypot(steps[:, 0], steps[:, 1]), swing)

@@ -71,7 +71,7 @@ class SweptPath:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class PathPart:
     """The prediction of consecutive waypoints of a path, as that of the whole path has them."""
 
     first: int
@@ -112,7 +112,7 @@ def predict_paths(
     return [path.swept for path in started if path.swept is not None]
 
 
-def predict_in_parts(model: PackedModel, path: np.ndarray) -> Iterator[Part]:
+def predict_in_parts(model: PackedModel, path: np.ndarray) -> Iterator[PathPart]:
     """Sweep a path (n, 3), as `check_poses` returns it, part by part.
 
     A part ends before wheels whose fall depends on poses that are not yet swept. The next one
@@ -130,7 +130,7 @@ def predict_in_parts(model: PackedModel, path: np.ndarray) -> Iterator[Part]:
         swept, falls = make_prediction(model, here, results, crossings, sums)
         decided = end - start if end == len(path) else falls.decided
         if start + decided > done:
-            yield Part(done, done - start, swept.prediction.cut(decided))
+            yield PathPart(done, done - start, swept.prediction.cut(decided))
             done = start + decided
         if falls.restart:
             first = slice(falls.restart + 1)
@@ -223,7 +223,7 @@ class _StartedPath:
             if not len(crossings.place):
                 return
             falls = find_falls(self._model.wheels, here, results, crossings)
-            if not falls.drops.max() > self._model.settings.allowed_drop:
+            if not falls.drops.max() > self._model.wheels.drop_limit:
                 return
         swept, falls = make_prediction(self._model, here, results, crossings)
         failure = find_first_failure(self._model.limits, swept.prediction)

@@ -10,7 +10,7 @@ from rover_physics.errors import ModelError
 from rover_physics.files.validation import refuse
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS, WHEEL_POSITIONS
 from rover_physics.numerics import plausible as known
-from rover_physics.rover.model import Rover, Suspension
+from rover_physics.rover.model import Rover
 
 _LEVEL_TOLERANCE = 1e-3  # m, largest height difference of level wheels
 
@@ -30,6 +30,10 @@ RANGES = {
 """Smallest and largest values by dotted key, in SI units."""
 
 
+Demand = tuple[bool, str, object, str]
+"""Whether it is met, the key, its value, and what it must be."""
+
+
 def check_rover(rover: Rover) -> None:
     """Check the rules between several keys of a rover file.
 
@@ -39,153 +43,100 @@ def check_rover(rover: Rover) -> None:
     Raises:
         RoverFileError: Two or more keys contradict each other; the text names the key to correct.
     """
-    _check_wheels(rover)
-    _check_pivots(rover.suspension)
-    _check_joint_limits(rover.suspension)
-    _check_belly(rover)
-    _check_speed(rover)
-    _check_balance(rover)
-    _check_manipulator(rover)
+    for demands in (_of_wheels, _of_pivots, _of_other_parts, _of_balance, _of_manipulator):
+        for is_met, key, value, must in demands(rover):
+            if not is_met:
+                raise refuse(key, value, must)
 
 
-def _check_wheels(rover: Rover) -> None:
-    """Check that wheels are ordered rear to front, on the left side, level and apart."""
+def _of_wheels(rover: Rover) -> Iterator[Demand]:
+    """Yield that wheels are ordered rear to front, on the left side, level and apart."""
     wheels = rover.suspension.wheels
-    width, diameter = rover.wheel.width, 2.0 * rover.wheel.radius
+    half, diameter, level = rover.wheel.width / 2.0, 2.0 * rover.wheel.radius, wheels["rear"][2]
     for position in WHEEL_POSITIONS:
-        wheel = wheels[position]
-        key = f"suspension.wheels.{position}"
-        if wheel[1] < width / 2.0:
-            raise refuse(
-                key, wheel, f"on the left side, y at least half the wheel width, {width / 2.0:g} m"
-            )
-        if abs(wheel[2] - wheels["rear"][2]) > _LEVEL_TOLERANCE:
-            level = wheels["rear"][2]
-            raise refuse(key, wheel, f"as high as the rear wheel, z = {level:g}, on flat ground")
+        wheel, key = wheels[position], f"suspension.wheels.{position}"
+        left = f"on the left side, y at least half the wheel width, {half:g} m"
+        yield wheel[1] >= half, key, wheel, left
+        high = f"as high as the rear wheel, z = {level:g}, on flat ground"
+        yield abs(wheel[2] - level) <= _LEVEL_TOLERANCE, key, wheel, high
     for behind, ahead in (("rear", "middle"), ("middle", "front")):
-        spacing = wheels[ahead][0] - wheels[behind][0]
-        key = f"suspension.wheels.{ahead}"
-        if spacing <= 0.0:
-            at = wheels[behind][0]
-            raise refuse(key, wheels[ahead], f"ahead of the {behind} wheel, x above {at:g}")
-        beside = abs(wheels[ahead][1] - wheels[behind][1]) >= width
-        if spacing < diameter and not beside:
-            raise refuse(
-                key,
-                wheels[ahead],
-                f"a wheel diameter, {diameter:g} m, ahead of the {behind} wheel",
-            )
-
-
-def _check_pivots(suspension: Suspension) -> None:
-    """Check that the rocker pivot is on the body's y axis and each pivot between its parts."""
-    pivot, bogie, wheels = suspension.rocker_pivot, suspension.bogie_pivot, suspension.wheels
-    if abs(pivot[0]) > 1e-9 or abs(pivot[2]) > 1e-9:
-        raise refuse(
-            "suspension.rocker_pivot",
-            pivot,
-            f"[0, {pivot[1]:g}, 0]: the origin of the body frame is midway between the pivots",
+        (x, y, _), wheel, key = wheels[behind], wheels[ahead], f"suspension.wheels.{ahead}"
+        yield wheel[0] > x, key, wheel, f"ahead of the {behind} wheel, x above {x:g}"
+        is_apart = wheel[0] - x >= diameter or abs(wheel[1] - y) >= rover.wheel.width
+        yield (
+            is_apart,
+            key,
+            wheel,
+            f"a wheel diameter, {diameter:g} m, ahead of the {behind} wheel",
         )
-    if pivot[1] <= 0.0:
-        raise refuse("suspension.rocker_pivot", pivot, "on the left side, y above 0")
-    if bogie[1] <= 0.0:
-        raise refuse("suspension.bogie_pivot", bogie, "on the left side, y above 0")
+
+
+def _of_pivots(rover: Rover) -> Iterator[Demand]:
+    """Yield that the rocker pivot is on the body's y axis and each pivot between its parts."""
+    suspension = rover.suspension
+    pivot, bogie, wheels = suspension.rocker_pivot, suspension.bogie_pivot, suspension.wheels
+    key, bogie_key = "suspension.rocker_pivot", "suspension.bogie_pivot"
+    middle = f"[0, {pivot[1]:g}, 0]: the origin of the body frame is midway between the pivots"
+    yield abs(pivot[0]) <= 1e-9 and abs(pivot[2]) <= 1e-9, key, pivot, middle
+    yield pivot[1] > 0.0, key, pivot, "on the left side, y above 0"
+    yield bogie[1] > 0.0, bogie_key, bogie, "on the left side, y above 0"
     behind, ahead = suspension.bogie_wheels
     low, high = wheels[behind][0], wheels[ahead][0]
-    if not low < bogie[0] < high:
-        raise refuse(
-            "suspension.bogie_pivot",
-            bogie,
-            f"between its two wheels, {behind} and {ahead}, x from {low:g} to {high:g}",
-        )
-    ends = sorted((wheels[suspension.rocker_wheel][0], bogie[0]))
-    if not ends[0] < pivot[0] < ends[1]:
-        raise refuse(
-            "suspension.rocker_pivot",
-            pivot,
-            f"between the {suspension.rocker_wheel} wheel and the bogie pivot, "
-            f"whose x are {ends[0]:g} and {ends[1]:g}",
-        )
-
-
-def _check_joint_limits(suspension: Suspension) -> None:
-    """Check that angle 0, flat ground, is within the limits and no joint makes a full turn."""
+    between = f"between its two wheels, {behind} and {ahead}, x from {low:g} to {high:g}"
+    yield low < bogie[0] < high, bogie_key, bogie, between
+    alone = suspension.rocker_wheel
+    low, high = sorted((wheels[alone][0], bogie[0]))
+    between = f"between the {alone} wheel and the bogie pivot, whose x are {low:g} and {high:g}"
+    yield low < pivot[0] < high, key, pivot, between
     for name in ("rocker_limits", "bogie_limits"):
         low, high = getattr(suspension, name)
-        if not -math.pi < low <= 0.0 <= high < math.pi:
-            raise refuse(
-                f"suspension.{name}",
-                (low, high),
-                "within -3.14 to 3.14 rad and contain 0, the angle on flat ground",
-            )
+        within = "within -3.14 to 3.14 rad and contain 0, the angle on flat ground"
+        yield -math.pi < low <= 0.0 <= high < math.pi, f"suspension.{name}", (low, high), within
 
 
-def _check_belly(rover: Rover) -> None:
-    """Check that the belly is above flat ground."""
+def _of_other_parts(rover: Rover) -> Iterator[Demand]:
+    """Yield that the belly is above flat ground, and that wheels reach the nominal speed."""
     ground = rover.suspension.wheels["rear"][2] - rover.wheel.radius
-    if rover.belly.z <= ground:
-        raise refuse("belly.z", rover.belly.z, f"above the ground under the wheels, {ground:g} m")
+    above = f"above the ground under the wheels, {ground:g} m"
+    yield rover.belly.z > ground, "belly.z", rover.belly.z, above
+    fastest, speed = rover.wheel.max_speed * rover.wheel.radius, rover.nominal_speed
+    most = f"at most wheel.max_speed x wheel.radius = {fastest:g} m/s"
+    yield speed <= fastest, "nominal_speed", speed, most
 
 
-def _check_speed(rover: Rover) -> None:
-    """Check that the wheels can reach the nominal speed."""
-    fastest = rover.wheel.max_speed * rover.wheel.radius
-    if rover.nominal_speed > fastest:
-        raise refuse(
-            "nominal_speed",
-            rover.nominal_speed,
-            f"at most wheel.max_speed x wheel.radius = {fastest:g} m/s",
-        )
-
-
-def _check_balance(rover: Rover) -> None:
-    """Check that the rover stands on flat ground, with its centre of mass between the wheels."""
+def _of_balance(rover: Rover) -> Iterator[Demand]:
+    """Yield that the rover stands on flat ground, with its centre of mass between the wheels."""
     wheels, masses = rover.suspension.wheels, rover.masses
-    if masses.body.mass <= 0.0:
-        raise refuse("masses.body.mass", masses.body.mass, "a number above 0 in kg")
-    moment = masses.body.mass * masses.body.com[0]
+    mass, com = masses.body.mass, masses.body.com
+    yield mass > 0.0, "masses.body.mass", mass, "a number above 0 in kg"
+    moment = mass * com[0]
     for part in (masses.rocker, masses.bogie):
         moment += 2.0 * part.mass * part.com[0]
     moment += 2.0 * rover.wheel.mass * sum(wheel[0] for wheel in wheels.values())
-    x = moment / rover.total_mass
-    y = masses.body.mass * masses.body.com[1] / rover.total_mass
-    half_track = min(wheel[1] for wheel in wheels.values())
-    if not wheels["rear"][0] < x < wheels["front"][0] or abs(y) >= half_track:
-        raise refuse(
-            "masses.body.com",
-            masses.body.com,
-            f"such that the rover's centre of mass, now x = {x:.3g}, y = {y:.3g} m, "
-            "is between the wheels",
-        )
+    x, y = moment / rover.total_mass, mass * com[1] / rover.total_mass
+    is_ahead = wheels["rear"][0] < x < wheels["front"][0]
+    is_inside = is_ahead and abs(y) < min(wheel[1] for wheel in wheels.values())
+    now = f"now x = {x:.3g}, y = {y:.3g} m"
+    inside = f"such that the rover's centre of mass, {now}, is between the wheels"
+    yield is_inside, "masses.body.com", com, inside
 
 
-def _check_manipulator(rover: Rover) -> None:
-    """Check the arm: lighter than the body, stowed within its limits, with joint names unused."""
+def _of_manipulator(rover: Rover) -> Iterator[Demand]:
+    """Yield that the arm is lighter than the body, stowed within its limits, its names unused."""
     arm = rover.manipulator
     if arm is None:
         return
-    if sum(arm.link_masses) >= rover.masses.body.mass:
-        raise refuse(
-            "manipulator.link_masses",
-            arm.link_masses,
-            f"together below masses.body.mass, {rover.masses.body.mass:g} kg, which includes them",
-        )
+    mass = rover.masses.body.mass
+    lighter = f"together below masses.body.mass, {mass:g} kg, which includes them"
+    yield sum(arm.link_masses) < mass, "manipulator.link_masses", arm.link_masses, lighter
     for name, angle, (low, high) in zip(
         arm.joints, arm.stowed, arm.joint_limits or (), strict=arm.joint_limits is not None
     ):
-        if not low <= angle <= high:
-            raise refuse(
-                "manipulator.stowed",
-                arm.stowed,
-                f"within manipulator.joint_limits, for {name} from {low:g} to {high:g} rad",
-            )
+        within = f"within manipulator.joint_limits, for {name} from {low:g} to {high:g} rad"
+        yield low <= angle <= high, "manipulator.stowed", arm.stowed, within
     taken = set(arm.joints) & {*SUSPENSION_JOINTS, *WHEEL_JOINTS}
-    if taken:
-        raise refuse(
-            "manipulator.joints",
-            arm.joints,
-            f"names of the arm's own: {', '.join(sorted(taken))} belongs to the suspension",
-        )
+    own = f"names of the arm's own: {', '.join(sorted(taken))} belongs to the suspension"
+    yield not taken, "manipulator.joints", arm.joints, own
 
 
 def check_plausible(rover: Rover) -> None:

@@ -17,7 +17,10 @@ LINKAGE = record_type(
     ("steers", np.uint8, (6,)),  # 1 for the wheels that steer
     ("steering_limit", float),  # largest steering angle [rad], 0 if all wheels are fixed
     ("steering_rate", float),  # largest speed of the steering [rad/s]
-    ("reach", float),  # distance of the outermost wheel from the body origin, seen from above [m]
+    (
+        "swing_radius",
+        float,
+    ),  # distance of the outermost wheel from the body origin, seen from above [m]
     ("rocker_pivots", float, (2, 3)),  # rocker pivots [m]
     ("bogie_pivots", float, (2, 3)),  # bogie pivots [m]
     ("gravity", float),  # gravity [m/s^2]
@@ -66,7 +69,7 @@ def pack_linkage(
         steers=np.array(steers * 2),
         steering_limit=0.0 if steering is None else float(steering.limit),
         steering_rate=np.inf if steering is None else float(steering.rate),
-        reach=max(float(np.hypot(x, y)) for x, y, _ in left),
+        swing_radius=max(float(np.hypot(x, y)) for x, y, _ in left),
         rocker_pivots=_both_sides(suspension.rocker_pivot),
         bogie_pivots=_both_sides(suspension.bogie_pivot),
         gravity=float(rover.gravity),

@@ -7,9 +7,9 @@ limit, no contact jumps between them and no wheel may fall. `judge_paths` decide
 The verdicts are the same as its own.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,46 +19,47 @@ from rover_physics.limits.table import MAX_SLIDE, MAX_TURN_OFF
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import view_read_only
-from rover_physics.prediction.crossing import turn_wheels
+from rover_physics.prediction.crossing import find_turns, turn_wheels
 from rover_physics.prediction.drops import MIN_ANGLE
-from rover_physics.prediction.packed_model import pack_model
+from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_kernels import (
     FACE,
     add_up,
+    distance_between,
     find_jumps,
-    find_turns,
-    way_between,
 )
 from rover_physics.prediction.path_motion import path_motions
 from rover_physics.prediction.sweep import check_poses, find_suspects, joined_paths
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.record import (
     place_results,
     select_results,
     unwritten_results,
 )
-from rover_physics.results.uses import find_codes, readable
+from rover_physics.results.uses import find_codes, find_risk, find_uses, limits_of, readable
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.exposure import add_exposure, find_exposure
 from rover_physics.traversability.judge import judge_paths
 
+SAFE = 0.5
+"""Use of a limit up to which there is no exposure."""
 STRIDE = 8
 """Every so many waypoints of a piece are evaluated first, then the others."""
 
 
 @dataclass(frozen=True)
 class PieceVerdict:
-    """What is found of a piece of path."""
+    """What is found of a piece of path; time, energy and exposure are NaN if it fails."""
 
     code: str
     """Code of a limit that fails, empty if the rover may drive the piece."""
-    time: float
-    """Time that it takes [s], NaN if it fails."""
-    energy: float
-    """Energy that it takes [J], NaN if it fails."""
-    exposure: float
-    """Exposure to the safety limits [s], see `find_exposure`; NaN if it fails."""
+    time: float = math.nan
+    """Time that it takes [s]."""
+    energy: float = math.nan
+    """Energy that it takes [J]."""
+    exposure: float = math.nan
+    """Exposure to the safety limits [s], see `find_exposure`."""
 
 
 @quiet
@@ -86,14 +87,11 @@ def judge_pieces(
     """
     if not len(pieces):
         return []
-    sweep = _Sweep(rover, terrain, pieces, options)
-    verdicts: list[PieceVerdict | None] = [None] * len(pieces)
-    for k, code in sweep.find_failures().items():
-        verdicts[k] = PieceVerdict(code, np.nan, np.nan, np.nan)
+    sweep = _Sweep(pack_model(rover, terrain, options), list(map(check_poses, pieces)))
+    found = {k: PieceVerdict(code) for k, code in sweep.find_failures().items()}
     if terrain.elevation_std is None or not sigmas:
-        for k, passed in sweep.find_passes().items():
-            verdicts[k] = passed
-    rest = [k for k, verdict in enumerate(verdicts) if verdict is None]
+        found |= sweep.find_passes()
+    rest = [k for k in range(len(pieces)) if k not in found]
     judged = judge_paths(
         rover,
         terrain,
@@ -104,48 +102,35 @@ def judge_pieces(
         check_entrapment=False,
     )
     for k, (prediction, verdict) in zip(rest, judged, strict=True):
+        found[k] = PieceVerdict(verdict.code)
         if verdict.traversable:
             time, energy = float(prediction.time[-1]), float(prediction.energy[-1])
-            verdicts[k] = PieceVerdict("", time, energy, find_exposure(rover, prediction))
-        else:
-            verdicts[k] = PieceVerdict(verdict.code, np.nan, np.nan, np.nan)
-    return [verdict for verdict in verdicts if verdict is not None]
+            found[k] = PieceVerdict("", time, energy, find_exposure(rover, prediction))
+    return [found[k] for k in range(len(pieces))]
 
 
-class CloseLook(NamedTuple):
-    """What a piece must keep to pass without a closer look."""
+def find_exposure(rover: Rover, prediction: PathPrediction) -> float:
+    """Return the exposure [s]: the integral over time of the squared excess over SAFE.
 
-    limits: np.ndarray
-    """(k,) LIMIT of the waypoints."""
-    steepest: float
-    """Least contact angle behind a wheel [rad]; no wheel falls from there."""
-    most_turn: float
-    """Largest turn off the path [rad]."""
-    most_slide: float
-    """Largest way off the path [m]."""
-    reach: float
-    """Distance of the outermost wheel from the body origin [m]."""
-    steering_rate: float
-    """Largest speed of the steering [rad/s]."""
+    The excess is (use - SAFE) / (1 - SAFE), 0 below SAFE and 1 at the limit and beyond.
+    """
+    uses = find_uses(limits_of(rover, prediction.policy), prediction.results)
+    counts = uses.limits.records["is_risk"] > 0
+    risk = np.fmax.reduce(uses.use[:, counts], axis=1, initial=0.0)
+    excess = np.clip((risk - SAFE) / (1.0 - SAFE), 0.0, 1.0) ** 2
+    return float(np.sum(0.5 * (excess[1:] + excess[:-1]) * np.diff(prediction.time)))
 
 
 class _Sweep:
     """The waypoints of some pieces, evaluated as far as needed."""
 
-    def __init__(
-        self,
-        rover: Rover,
-        terrain: Terrain,
-        pieces: Sequence[ArrayLike],
-        options: SweepOptions,
-    ):
-        self._rover, self._model = rover, pack_model(rover, terrain, options)
-        poses = [check_poses(piece) for piece in pieces]
-        self._counts = np.array([len(one) for one in poses])
-        self._poses = np.concatenate(poses)
-        self._motions = np.concatenate([path_motions(self._model, one) for one in poses])
+    def __init__(self, model: PackedModel, pieces: Sequence[np.ndarray]):
+        self._model = model
+        self._counts = np.array([len(one) for one in pieces])
+        self._poses = np.concatenate(pieces)
+        self._motions = np.concatenate([path_motions(model, one) for one in pieces])
         self._results = unwritten_results(len(self._poses))
-        self._is_open = np.ones(len(poses), bool)
+        self._is_open = np.ones(len(pieces), bool)
 
     def find_failures(self) -> dict[int, str]:
         """Return the codes of pieces with a waypoint that fails in any case, by index."""
@@ -183,13 +168,14 @@ class _Sweep:
         joined = joined_paths(ends)
         turned = turn_wheels(self._model, poses, results, joined)
         jumps, wheels = np.empty((len(poses), 2), np.int64), self._model.wheels
-        far = np.empty_like(jumps)
         jumps = jumps[: find_jumps(results, poses, joined, wheels, jumps)]
-        far = far[: find_turns(results, poses, joined, wheels, far)]
+        far = find_turns(self._model, poses, results, joined)
         found, sums = np.full((len(indices), 3), np.nan), np.empty((3, len(poses)))
         path = view_read_only(poses), readable(results), ends
         turns = readable(turned.results), np.searchsorted(turned.waypoint, ends)
-        sum_up_pieces(path, turns, self._close_look(), sums, found)
+        linkage = self._model.record.linkage
+        look = self._model.limits.records, wheels, float(linkage.length)
+        sum_up_pieces(path, turns, look, float(linkage.steering_rate), sums, found)
         closer = np.append(jumps[:, 0], far[:, 0])
         found[np.searchsorted(ends, closer, side="right"), 0] = np.nan
         return {
@@ -197,18 +183,6 @@ class _Sweep:
             for k, row in zip(indices.tolist(), found.tolist(), strict=True)
             if row[0] == row[0]
         }
-
-    def _close_look(self) -> CloseLook:
-        """Return what a piece must keep to pass without a closer look."""
-        on_servos, linkage = self._model.wheels.on_servos, self._model.record.linkage
-        return CloseLook(
-            self._model.limits.records,
-            -MIN_ANGLE if on_servos else -FACE,
-            MAX_TURN_OFF if on_servos else np.inf,
-            MAX_SLIDE * self._rover.wheelbase if on_servos else np.inf,
-            float(linkage.reach),
-            float(linkage.steering_rate),
-        )
 
 
 @exact_kernel
@@ -220,7 +194,7 @@ def mark_failures(results, numbers, limits, fails):
 
 
 @exact_kernel
-def sum_up_pieces(path, turns, look, sums, found):
+def sum_up_pieces(path, turns, look, steering_rate, sums, found):
     """Write time, energy and exposure of the pieces that pass without a closer look.
 
     Args:
@@ -228,53 +202,69 @@ def sum_up_pieces(path, turns, look, sums, found):
             pieces end.
         turns: Results where wheels turn at a waypoint, and (k,) the rows where those of the pieces
             end.
-        look: CloseLook.
+        look: (k,) LIMIT, Wheels and wheelbase [m].
+        steering_rate: Largest speed of the steering [rad/s].
         sums: (3, n) work space.
         found: (k, 3) time [s], energy [J] and exposure [s], written for pieces that pass.
     """
     (poses, (results, numbers), ends), ((turned, turned_numbers), turned_ends) = path, turns
+    limits, wheels, wheelbase = look
     first, first_turn = 0, 0
     for k in range(ends.size):
         piece, its_turns = slice(first, ends[k]), slice(first_turn, turned_ends[k])
         first, first_turn = ends[k], turned_ends[k]
         if not (
-            _is_easy(results[piece], numbers[piece], look)
-            and _is_easy(turned[its_turns], turned_numbers[its_turns], look)
-            and _keeps_to_path(poses[piece], results[piece], look)
+            _is_easy(results[piece], numbers[piece], limits, wheels)
+            and _is_easy(turned[its_turns], turned_numbers[its_turns], limits, wheels)
+            and _keeps_to_path(poses[piece], results[piece], wheels.swing_radius, wheelbase)
         ):
             continue
         start = (0.0, 0.0, 0.0)
-        last = add_up(poses[piece], results[piece], look.steering_rate, start, sums[:, piece])
+        last = add_up(poses[piece], results[piece], steering_rate, start, sums[:, piece])
         found[k, 0], found[k, 1] = last[1], last[2]
-        found[k, 2] = add_exposure(numbers[piece], sums[1, piece], look.limits)
+        found[k, 2] = add_exposure(numbers[piece], sums[1, piece], limits)
 
 
 @exact_kernel
-def _is_easy(results, numbers, look):
+def add_exposure(numbers, time, limits):
+    """Return the exposure [s] as `find_exposure`, of results (n, NUMBERS) at times (n,) [s]."""
+    exposure, before = 0.0, 0.0
+    for row in range(numbers.shape[0]):
+        excess = (find_risk(numbers, row, limits) - SAFE) / (1.0 - SAFE)
+        here = min(max(excess, 0.0), 1.0) ** 2
+        if row > 0:
+            exposure += 0.5 * (before + here) * (time[row] - time[row - 1])
+        before = here
+    return exposure
+
+
+@exact_kernel
+def _is_easy(results, numbers, limits, wheels):
     """Return whether no RESULT may break a limit and no wheel may fall or lift."""
-    if find_suspects(results, numbers, look.limits)[0] >= 0:
+    if find_suspects(results, numbers, limits)[0] >= 0:
         return False
+    steepest = -MIN_ANGLE if wheels.on_servos else -FACE  # no wheel falls from there
     for row in range(results.size):
         result = results[row]
         for wheel in range(6):
             angle = result.contact_angle[wheel]
             if result.wheel_speed[wheel] < 0.0:
                 angle = -angle
-            if angle < look.steepest or result.lift_rate[wheel] > 0.0:
+            if angle < steepest or result.lift_rate[wheel] > 0.0:
                 return False
     return True
 
 
 @exact_kernel
-def _keeps_to_path(poses, results, look):
+def _keeps_to_path(poses, results, reach, wheelbase):
     """Return whether the deviations from the path stay small, whatever their directions."""
     turn, slide = 0.0, 0.0
     for row in range(1, results.size):
-        way = way_between(poses[row - 1], poses[row], look.reach)
+        way = distance_between(poses[row - 1], poses[row], reach)
         for i in range(row - 1, row + 1):
             x, y, rate = results[i].deviation[0], results[i].deviation[1], results[i].deviation[2]
             if x != 0.0 or y != 0.0 or rate != 0.0:
                 share = 0.5 * way / results[i].speed_share
                 turn += share * abs(rate)
                 slide += share * np.hypot(x, y)
-    return turn <= look.most_turn and slide <= look.most_slide
+    return turn <= MAX_TURN_OFF and slide <= MAX_SLIDE * wheelbase

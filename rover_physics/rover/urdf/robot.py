@@ -54,7 +54,7 @@ class Link:
 
 
 @dataclass(frozen=True)
-class Limit:
+class JointLimit:
     """What a joint reaches; inf where the file sets no limit."""
 
     lower: float = -math.inf
@@ -81,7 +81,7 @@ class Joint:
     """(4, 4) pose of the child in the parent's frame at angle 0 [m]."""
     axis: Floats
     """(3,) unit vector in the child's frame."""
-    limit: Limit
+    limit: JointLimit
     """Range, torque and speed."""
 
 
@@ -190,11 +190,11 @@ def _read_joint(element: ElementTree.Element, links: dict[str, Link]) -> Joint:
     )
 
 
-def _read_limit(element: ElementTree.Element, name: str, kind: str) -> Limit:
+def _read_limit(element: ElementTree.Element, name: str, kind: str) -> JointLimit:
     """Return the limits of a joint; 0 as torque or speed counts as not told."""
     limit = element.find("limit")
     if limit is None:
-        return Limit()
+        return JointLimit()
 
     def read(key: str, missing: float) -> float:
         value = missing if limit.get(key) is None else _number(limit, key, name, math.inf)
@@ -203,7 +203,9 @@ def _read_limit(element: ElementTree.Element, name: str, kind: str) -> Limit:
     lower, upper = read("lower", 0.0), read("upper", 0.0)
     if kind == "continuous":
         lower, upper = -math.inf, math.inf
-    return Limit(lower, upper, read("effort", 0.0) or math.inf, read("velocity", 0.0) or math.inf)
+    return JointLimit(
+        lower, upper, read("effort", 0.0) or math.inf, read("velocity", 0.0) or math.inf
+    )
 
 
 def _read_place(element: ElementTree.Element, name: str) -> Floats:

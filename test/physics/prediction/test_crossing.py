@@ -113,15 +113,6 @@ def test_the_margins_of_a_verdict_count_what_is_between_waypoints():
 # The higher the harder
 
 
-@pytest.mark.parametrize("policy", ["equal", "optimal"])
-def test_the_higher_a_step_the_more_friction_and_torque_it_needs(policy):
-    verdicts = [
-        over_step(height, policy, friction=5.0)[1] for height in (0.02, 0.06, 0.1, 0.15, 0.2)
-    ]
-    assert (np.diff([verdict.max_friction_utilisation for verdict in verdicts]) > 0.0).all()
-    assert (np.diff([verdict.max_torque_saturation for verdict in verdicts]) > 0.0).all()
-
-
 @pytest.mark.parametrize("height", [0.06, 0.12, 0.2])
 def test_friction_decides_between_passing_and_slipping(height):
     outcomes = [over_step(height, "optimal", mu)[1] for mu in (0.2, 0.4, 0.6, 0.8, 1.2)]
@@ -155,14 +146,6 @@ def test_an_obstacle_under_one_side_does_to_that_side_what_its_mirror_image_does
     assert one.roll == pytest.approx(-other.roll, abs=1e-4)
     assert one.roll.max() > 0.25 * height / 0.62, "the left side goes up"
     assert not np.degrees(one.between.contact_angle[:, :3]).any(), "the right side stays level"
-
-
-def test_a_wheel_rolls_over_a_ditch_much_narrower_than_itself():
-    narrow, _ = drive(drive_ground("ditch", 0.05))
-    dip = RADIUS - np.sqrt(RADIUS**2 - 0.04**2)
-    lowest = np.nanmin(narrow.wheel_centres[:, :, 2]) - RADIUS
-    assert -dip - 1e-3 <= lowest < 0.0
-    assert len(narrow.between.poses) == 0
 
 
 # Spacing

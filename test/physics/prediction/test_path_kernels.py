@@ -4,11 +4,11 @@
 import numpy as np
 import pytest
 
+from rover_physics.prediction.crossing import divide_stretches
 from rover_physics.prediction.path_kernels import (
     Crossings,
     Wheels,
     add_up,
-    divide_stretches,
     find_jumps,
     sort_pieces,
 )
@@ -103,12 +103,10 @@ def test_there_is_no_jump_to_a_waypoint_without_a_pose(status):
 
 def test_stretches_are_divided_evenly_and_turned_the_shorter_way():
     ends, place = np.array([[0, 1]]), np.array([3.0, 4.0])
-    poses = np.array([[0.0, 0.0, 3.0], [0.4, -0.8, -3.0]])
-    new_place, new_waypoint, new_poses = np.empty(3), np.empty(3, np.int64), np.empty((3, 3))
-    motions, results = np.empty((3, 3)), new_results(2)
+    poses, results = np.array([[0.0, 0.0, 3.0], [0.4, -0.8, -3.0]]), new_results(2)
     results["motion"] = [[0.03, 0.0, 0.0], [0.02, 0.0, 0.1]]
     known = crossings_of(place, np.array([4, 4]), poses, results)
-    divide_stretches(ends, 4, known, (new_place, new_waypoint, new_poses, motions))
+    new_place, new_waypoint, new_poses, motions = divide_stretches(known, ends)
     assert motions.tolist() == [[0.02, 0.0, 0.1]] * 3
     assert new_place.tolist() == [3.25, 3.5, 3.75] and new_waypoint.tolist() == [4, 4, 4]
     assert new_poses[:, :2] == pytest.approx(np.array([[0.1, -0.2], [0.2, -0.4], [0.3, -0.6]]))

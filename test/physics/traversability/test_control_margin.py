@@ -48,15 +48,6 @@ def test_what_speed_servos_pass_is_classed_so_whatever_the_margin(margin, passes
     assert found.traversability_class == WITH_SPEED_SERVOS
 
 
-def test_the_margin_is_kept_in_torque_too():
-    options = replace(OPTIMAL, max_torque=0.7)
-    assert judge_path(LSR1, STEEP, POSE, options)[1].traversable
-    used = judge_path(LSR1, STEEP, POSE, options)[0].torque_saturation.max()
-    short = replace(options, control_margin=1.0 - 0.7 * used)
-    verdict = judge_path(LSR1, STEEP, POSE, short)[1]
-    assert verdict.code in ("torque", "friction") and "control margin" in verdict.reason
-
-
 def test_torques_keep_the_margin_where_they_can():
     step = drive_ground("step", 0.08)
     options = replace(OPTIMAL, friction=1.0, max_torque=0.85)

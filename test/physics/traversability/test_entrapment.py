@@ -126,25 +126,6 @@ def test_a_crater_of_soft_soil_is_a_trap_that_has_no_edges(policy):
         assert -5.0 + 0.04 * verdict.first_failure < -1.0
 
 
-@pytest.mark.parametrize("policy", ["equal", "optimal"])
-def test_the_same_crater_of_firm_ground_is_none(policy):
-    assert verdict_in(CRATER, -5.0, 0.0, policy=policy).traversable
-    assert verdict_in(CRATER, -5.0, 5.0, policy=policy).traversable
-
-
-def test_down_a_sandy_slope_to_open_ground_is_no_trap():
-    """The way back up is too steep, but the plain ahead is open."""
-    x = np.tile(np.arange(-6.0, 6.001, 0.05), (241, 1))
-    ramp = Terrain(np.clip(-x * np.tan(0.3), 0.0, 0.7), 0.05, (-6.0, -6.0))
-    assert verdict_in(ramp, -4.5, 1.5, soil="dry_sand").traversable
-    assert not judge_path(
-        LSR1,
-        ramp,
-        np.column_stack([np.arange(1.5, -4.5, -0.04), *np.zeros((2, 150))]),
-        SweepOptions(soil="dry_sand", backward=True),
-    )[1].traversable
-
-
 def test_down_a_sandy_slope_to_a_wall_there_is_a_way_round_it():
     x = np.tile(np.arange(-6.0, 6.001, 0.05), (241, 1))
     ramp = np.clip(-x * np.tan(0.3), 0.0, 0.7)

@@ -113,9 +113,8 @@ def test_no_rover_of_extreme_numbers_passes_without_numbers(places, number, sign
         (("friction",), 5e-324, "friction is 5e-324; it must be from 1e-06"),
     ],
 )
-@pytest.mark.parametrize("policy", [EQUAL, OPTIMAL])
-def test_an_impossible_rover_is_refused_by_name_even_without_a_file(place, number, right, policy):
-    rover, options = with_number(LSR1, place, number), SweepOptions(policy=policy)
+def test_an_impossible_rover_is_refused_by_name_even_without_a_file(place, number, right):
+    rover, options = with_number(LSR1, place, number), SweepOptions()
     for ask in (judge_path, score_poses, classify_path, find_torque_ranges):
         with pytest.raises(ModelError, match=right):
             ask(rover, LEVEL, POSES, options)
@@ -145,12 +144,6 @@ def test_a_pose_without_numbers_is_within_no_limits_and_a_reason_of_its_own():
     motions = motions_of(model, POSES, np.zeros(5))
     verdict = hold_against_limits(LSR1, predict_poses(model, POSES, motions))
     assert verdict.code == "not_computable" and "not a finite number" in verdict.reason
-
-
-@pytest.mark.parametrize("payload", [1e308, 1e200, 1.1e9, math.inf, math.nan])
-def test_an_impossible_payload_is_refused_with_what_would_be_right(payload):
-    with pytest.raises(RoverError, match=r"payload is .*0 kg or more, to 1e\+09"):
-        judge_path(LSR1, LEVEL, POSES, SweepOptions(payload=payload))
 
 
 @pytest.mark.parametrize("name", DECISIVE)
@@ -194,35 +187,7 @@ def test_a_path_of_unknown_energy_costs_more_than_any_other():
     assert path_cost(unknown, verdict) == (math.inf, math.inf)
 
 
-@pytest.mark.parametrize(
-    ("key", "value", "right"),
-    [
-        ("gravity", 1e-300, "at least 1e-06 and at most 1000 in m/s^2"),
-        ("gravity", 1e5, "at most 1000 in m/s^2"),
-        ("masses.body.mass", 1.7e308, "at most 1e+09 in kg"),
-        ("wheel.radius", 1e-9, "at least 0.001 and at most 1000 in m"),
-        ("wheel.width", 1e9, "at most 1000 in m"),
-        ("wheel.max_torque", 1e-300, "at least 1e-09"),
-        ("wheel.max_speed", 1e300, "at most 1e+06"),
-        ("nominal_speed", 1e-300, "at least 1e-09"),
-        ("friction", 1e-300, "at least 1e-06"),
-        ("suspension.bogie_pivot", [1e200, 0.3, 0.0], "each from -1000 to 1000"),
-        ("manipulator.payload", 1e308, "at most 1e+09 in kg"),
-    ],
-)
-def test_an_implausible_number_of_a_rover_file_is_named(key, value, right):
-    data = rover_to_dict(LSR1)
-    *inner, last = key.split(".")
-    part = data
-    for name in inner:
-        part = part[name]
-    part[last] = value
-    with pytest.raises(RoverError) as raised:
-        rover_from_dict(data, "test")
-    assert str(raised.value).startswith(f"test: {key} is ") and right in str(raised.value)
-
-
-@pytest.mark.parametrize("gravity", [5.8e-5, 3.5e-4, 1.62, 3.71, 9.81, 24.8])
+@pytest.mark.parametrize("gravity", [5.8e-5, 24.8])
 def test_bodies_from_bennu_to_jupiter_keep_their_gravity(gravity):
     data = rover_to_dict(LSR1)
     data["gravity"] = gravity
@@ -230,7 +195,7 @@ def test_bodies_from_bennu_to_jupiter_keep_their_gravity(gravity):
     assert verdict.code == ("" if gravity < 20.0 else verdict.code)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(
     values=st.lists(st.floats(allow_nan=True, allow_infinity=True), min_size=6, max_size=6),
 )
@@ -244,7 +209,7 @@ def test_no_target_or_load_of_the_arm_passes_without_numbers(values):
         assert np.isfinite(answer.prediction.wheel_loads).all()
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(
     x=st.floats(),
     y=st.floats(),

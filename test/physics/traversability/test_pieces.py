@@ -6,9 +6,8 @@ import pytest
 
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.exposure import SAFE, find_exposure
 from rover_physics.traversability.judge import judge_paths
-from rover_physics.traversability.pieces import judge_pieces
+from rover_physics.traversability.pieces import SAFE, find_exposure, judge_pieces
 from support.rough_grounds import fractal, rocky
 
 LSR1 = load_rover("lsr1")
