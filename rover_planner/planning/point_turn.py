@@ -22,7 +22,7 @@ def turn_and_drive(
             outermost wheel.
 
     Returns:
-        Waypoints (n, 3), and the straight way plus that of the outermost wheel in the turns [m].
+        Waypoints (n, 3), and the straight distance plus that of the outer wheel in turns [m].
     """
     away = goal[:2] - start[:2]
     length = float(np.hypot(*away))

@@ -34,7 +34,7 @@ class ServiceSettings:
     planner: str
     """FAN, LATTICE or AUTO."""
     lattice: LatticeSettings
-    """How ways around obstacles are searched."""
+    """How paths around obstacles are searched."""
     max_map_age: float
     """Age from which a map is too old to be used [s]; 0 allows any age."""
     blind_ground: str = ALLOW

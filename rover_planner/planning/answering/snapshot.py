@@ -67,7 +67,7 @@ class Snapshot:
     edge_memory: EdgeMemory = field(default_factory=EdgeMemory)
     """What earlier searches have found of the ground; grows with each search."""
     watch: SearchWatch | None = None
-    """Watches searches for a way."""
+    """Watches searches around obstacles."""
 
     @property
     def terrain(self) -> Terrain | None:
@@ -86,7 +86,7 @@ class Snapshot:
         Raises:
             PlanningError: The request is invalid.
             RoverError: The model refuses the request.
-            NewerMapError: The map has changed while a way was searched, see `SearchWatch`.
+            NewerMapError: The map has changed while a path was searched, see `SearchWatch`.
         """
         if not (math.isfinite(tolerance) and tolerance >= 0.0):
             raise PlanningError(f"tolerance is {tolerance}; it must be a distance of at least 0 m")

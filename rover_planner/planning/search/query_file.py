@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files that hold a question for a way with its map, so that it can be asked again elsewhere."""
+"""Files that hold a query for a path with its map, so that it can be asked again elsewhere."""
 
 import json
 from dataclasses import asdict, dataclass, fields
