@@ -188,7 +188,7 @@ def test_efforts_drive_the_robot_straight_ahead(ros, start, tmp_path):
     moved = plant.simulation.plant.pose() - place
     assert abs(moved[1]) < 0.02 and abs(moved[2]) < 0.05
     wait_until(lambda: controller.state == "driving", "driving")
-    angles = controller.service._suspension_angles
+    angles = controller.service.joints.suspension_angles
     assert np.abs(angles).max() < 0.01  # the offset of the rocker's encoder is taken off
 
 
