@@ -43,7 +43,7 @@ from rover_physics.traction.layout import (
     TRACTION_EQUATION,
     TRACTIONS,
 )
-from rover_physics.traction.rolling import ROLLING, write_rolling
+from rover_physics.traction.rolling import ROLLING, Rolling, write_rolling
 
 FORCE_ROW, MOMENT_ROW = 0, 3
 """First row of the forces and of the moments in the equations of `equilibrium`."""
@@ -178,11 +178,11 @@ class BalanceWriter:
         self.on_bogie = np.array(linkage.on_bogie, dtype=bool)
         """(6,) whether each wheel hangs on a bogie."""
 
-    def find_rolling(self, state: MeasuredState) -> Any:
-        """Return a record ROLLING at a measured state; contact angles are not used."""
+    def find_rolling(self, state: MeasuredState) -> Rolling:
+        """Return how the wheels roll at a measured state; contact angles are not used."""
         self._take(state)
         _place_wheels(self._linkages, self._works)
-        return self._works["rolling"].copy()[0]
+        return Rolling(self._works["rolling"].copy())
 
     def _take(self, state: MeasuredState, push: float = 0.0, resistance: float = 0.0) -> None:
         q = 0.0, state.roll, state.pitch, state.rocker_angle, *state.bogie_angles
