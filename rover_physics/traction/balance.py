@@ -43,7 +43,7 @@ from rover_physics.traction.layout import (
     TRACTION_EQUATION,
     TRACTIONS,
 )
-from rover_physics.traction.rolling import ROLLING, write_rolling
+from rover_physics.traction.rolling import ROLLING, Rolling, write_rolling
 
 FORCE_ROW, MOMENT_ROW = 0, 3
 """First row of the forces and of the moments in the equations of `equilibrium`."""
@@ -133,7 +133,7 @@ class BalanceRows:
 
 MEASUREMENT = record_type(
     ("pose", float, (3,)),  # x, y [m] and yaw [rad], for `place`
-    ("q", float, (6,)),  # z [m], roll, pitch, right rocker, right and left bogie [rad], also
+    ("q", float, (6,)),  # z [m], roll, pitch, right rocker, right and left bogie [rad]
     ("contact_angles", float, (WHEEL_COUNT,)),  # [rad]
     ("contact_offsets", float, (WHEEL_COUNT,)),  # [m]
     ("steering", float, (WHEEL_COUNT,)),  # [rad]
@@ -170,22 +170,26 @@ class BalanceWriter:
         linkage = pack_linkage(rover, mass, com)
         self._linkages = array_of(linkage)
         self._works = array_of(new_record(BALANCE_WORK, com=_centre_of_mass(linkage)))
+        # Views are kept because looking up a field of a record is as slow as writing it.
+        measured, fields = self._works["measured"], MEASUREMENT.names or ()
+        self._measured = [measured[name].reshape(-1) for name in fields[1:]]  # x, y, yaw stay 0
         self.weight = float(linkage.mass * linkage.gravity)
         """Weight of the rover with its payload in [N]."""
         self.on_bogie = np.array(linkage.on_bogie, dtype=bool)
         """(6,) whether each wheel hangs on a bogie."""
 
-    def find_rolling(self, state: MeasuredState) -> Any:
-        """Return a record ROLLING at a measured state; contact angles are not used."""
+    def find_rolling(self, state: MeasuredState) -> Rolling:
+        """Return how the wheels roll at a measured state; contact angles are not used."""
         self._take(state)
         _place_wheels(self._linkages, self._works)
-        return self._works["rolling"].copy()[0]
+        return Rolling(self._works["rolling"].copy())
 
     def _take(self, state: MeasuredState, push: float = 0.0, resistance: float = 0.0) -> None:
         q = 0.0, state.roll, state.pitch, state.rocker_angle, *state.bogie_angles
         angles, offsets = state.contact_angles, state.contact_offsets
-        here = (0.0, 0.0, 0.0), q, angles, offsets, state.steering, push, resistance
-        self._works["measured"][0] = here
+        values = q, angles, offsets, state.steering, push, resistance
+        for view, value in zip(self._measured, values, strict=True):
+            view[:] = value
 
     def write(
         self, state: MeasuredState, net_traction: float, resistance: float = 0.0

@@ -132,8 +132,9 @@ class MotionContactEstimator:
     @property
     def estimate(self) -> ContactEstimate:
         """The current estimate."""
-        state = self._filters[0]
-        return ContactEstimate(state.angles.copy(), state.covariance.copy(), "motion")
+        state = self._filters
+        angles, covariance = state["angles"][0].copy(), state["covariance"][0].copy()
+        return ContactEstimate(angles, covariance, "motion")
 
     def update(self, motion: Motion, duration: float) -> ContactEstimate:
         """Correct the angles by a measurement, `duration` [s] after the last, and return them."""

@@ -83,19 +83,20 @@ class MapContactFinder:
             ModelError: A wheel is beyond the map, over unknown ground, or not near the ground.
         """
         arrays = self._ground.records, self._linkages, self._searches
-        search = self._searches[0]
-        search.pose[:] = pose[0], pose[1], pose[3]
-        search.q[:4] = pose[2], state.roll, state.pitch, state.rocker_angle
-        search.q[4:] = state.bogie_angles
-        search.directions[:] = directions
-        search.placement.steering[:] = state.steering
+        search = self._searches  # its fields are views; attributes of a record are slow
+        q, gaps, angles = search["q"][0], search["gaps"][0], search["angles"][0]
+        search["pose"][0] = pose[0], pose[1], pose[3]
+        q[:4] = pose[2], state.roll, state.pitch, state.rocker_angle
+        q[4:] = state.bogie_angles
+        search["directions"][0] = directions
+        search["placement"]["steering"][0] = state.steering
         _measure_gaps(*arrays)
-        known = np.isfinite(search.gaps)
+        known = np.isfinite(gaps)
         if known.all():
-            lower, upper = np.sort(search.gaps)[WHEEL_COUNT // 2 - 1 : WHEEL_COUNT // 2 + 1]
-            search.q[0] -= 0.5 * (lower + upper)
+            lower, upper = np.sort(gaps)[WHEEL_COUNT // 2 - 1 : WHEEL_COUNT // 2 + 1]
+            q[0] -= 0.5 * (lower + upper)
             _find_nearest(*arrays)
-            known = np.isfinite(search.angles)
+            known = np.isfinite(angles)
         if not known.all():
             raise ModelError(
                 f"{WHEELS[int(np.argmin(known))]} of a rover at {np.round(pose[:2], 2)} m is over "
@@ -104,7 +105,7 @@ class MapContactFinder:
         error = np.hypot(deviation, CELL_DEVIATION * self.terrain.resolution)
         error /= self.rover.wheel.radius
         covariance = (ANGLE_DEVIATION**2 + error**2) * np.eye(WHEEL_COUNT)
-        return ContactEstimate(search.angles.copy(), covariance, MAP_SOURCE)
+        return ContactEstimate(angles.copy(), covariance, MAP_SOURCE)
 
 
 @kernel

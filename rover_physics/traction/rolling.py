@@ -6,6 +6,8 @@ mean speed of the wheels along their headings is 1. It goes forward, or to the l
 a turn. Wheels straight ahead have the motion (1, 0, 0).
 """
 
+import numpy as np
+
 from rover_physics.forces.shares import has_turned_wheels, write_shares
 from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.kernels import kernel
@@ -20,6 +22,16 @@ ROLLING = record_type(
     ("arms", float, (WHEEL_COUNT,)),  # moment about body z per traction [m], positive to the left
 )
 """The motion in which the wheels roll with their steering angles."""
+
+
+class Rolling:
+    """A copy of ROLLING, whose fields are attributes."""
+
+    def __init__(self, packed: np.ndarray):
+        """Give the fields of `packed`, an array (1,) of ROLLING, their names."""
+        self.motion, self.directions = packed["motion"][0], packed["directions"][0]
+        self.speeds, self.arms = packed["speeds"][0], packed["arms"][0]
+        self.inertia = float(packed["inertia"][0])
 
 
 @kernel

@@ -2,6 +2,7 @@
 """Solving for the torques: a sequence of quadratic programs by OSQP, each about the last one."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import osqp
@@ -10,7 +11,7 @@ from scipy import sparse
 from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.records import array_of, new_record
 from rover_physics.traction.balance import MEASURED_BALANCE, BalanceRows
-from rover_physics.traction.layout import FORCES, LOADS, ROWS, TRACTION, TRACTIONS, VARIABLES
+from rover_physics.traction.layout import FORCES, ROWS, TRACTION, TRACTIONS, VARIABLES
 from rover_physics.traction.line_search import find_best_between, measure_peak
 from rover_physics.traction.program import (
     ProgramInputs,
@@ -18,6 +19,7 @@ from rover_physics.traction.program import (
     TractionQP,
     build_traction_qp,
 )
+from rover_physics.traction.wheel_forces import WHEEL_FORCES, write_wheel_forces
 
 OSQP_SETTINGS = {
     # Of scaled rows. The default of 1e-3 leaves rows 1e-2 of the weight open.
@@ -154,27 +156,20 @@ def solve_traction(
             break
     x = forces.x if programs else rows.pull_equally()
     fallback = programs == 0 < max_programs
-    return _describe_answer(rows, inputs, x, (iterations, programs, fallback, status))
+    run = {"iterations": iterations, "programs": programs, "fallback": fallback, "status": status}
+    return _describe_answer(rows, inputs, x, run)
 
 
 def _describe_answer(
-    rows: BalanceRows, inputs: ProgramInputs, x: np.ndarray, run: tuple[int, int, bool, str]
+    rows: BalanceRows, inputs: ProgramInputs, x: np.ndarray, run: dict[str, Any]
 ) -> TractionAnswer:
     """Return forces x (14,) in SI units, with what the run of the programs came to."""
-    unit, limit = rows.force_unit, inputs.max_torque
-    tractions, loads = unit * x[TRACTIONS], unit * x[LOADS]
-    lateral = unit * rows.lateral_forces(x)
-    across = np.sqrt(tractions * tractions + lateral * lateral)
-    utilisation = np.full(WHEEL_COUNT, np.inf)
-    np.divide(across, inputs.friction * loads, out=utilisation, where=loads > 0.0)
+    table = np.empty((len(WHEEL_FORCES), WHEEL_COUNT))
+    peak, min_load, max_traction = write_wheel_forces(rows.packed, inputs.packed, x, table)
     return TractionAnswer(
-        np.minimum(np.maximum(inputs.radius * tractions, -limit), limit),
-        loads,
-        tractions,
-        lateral,
-        utilisation,
-        max(float(utilisation.max()) - 1.0, 0.0),
-        max(-float(loads.min()), 0.0),
-        max(inputs.radius * float(np.abs(tractions).max()) - limit, 0.0),
-        *run,
+        *table,
+        friction_slack=max(peak - 1.0, 0.0),
+        load_slack=max(-min_load, 0.0),
+        torque_slack=max(inputs.radius * max_traction - inputs.max_torque, 0.0),
+        **run,
     )

@@ -14,7 +14,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
@@ -52,14 +52,20 @@ class ChildProcess:
     @property
     def running(self) -> bool:
         """Whether the process is still running."""
-        return self._process.returncode is None and self._exit_status() is None
+        return self.exit_code is None
 
     @property
     def exit_code(self) -> int | None:
-        """Exit code, negative for a signal; None while the process is running."""
+        """Exit code, negative for a signal; None while the process is running.
+
+        Asking does not reap the process, so that its number stays that of its group.
+        """
         if self._process.returncode is not None:
             return self._process.returncode
-        return self._exit_status()
+        result = os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT)
+        if result is None:
+            return None
+        return result.si_status if result.si_code == os.CLD_EXITED else -result.si_status
 
     def lines(self, watch: Callable[[], None]) -> Iterator[str]:
         """Yield the lines of standard output until it closes; call `watch` regularly meanwhile."""
@@ -96,18 +102,8 @@ class ChildProcess:
             self._process.stdout.close()
 
     def _signal(self, number: int) -> None:
-        try:
-            os.killpg(self._process.pid, number)
-        except (ProcessLookupError, PermissionError):
-            return
-
-    def _exit_status(self) -> int | None:
-        """Return the leader's exit status without reaping it, None while it is running."""
-        flags = os.WEXITED | os.WNOHANG | os.WNOWAIT
-        result = os.waitid(os.P_PID, self._process.pid, flags)
-        if result is None:
-            return None
-        return result.si_status if result.si_code == os.CLD_EXITED else -result.si_status
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(self.pid, number)
 
 
 @contextmanager

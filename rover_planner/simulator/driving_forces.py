@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.errors import ModelError
-from rover_physics.names import WHEEL_COUNT, WHEELS
+from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_rpy
 from rover_physics.results.path_prediction import PathPrediction
@@ -26,8 +26,6 @@ class DrivingForces:
 
     push: float
     """Net force along the rolling motion of the wheels that accelerates the rover [N]."""
-    tractions: Floats
-    """(6,) tractions along the ground in the wheels' headings, limited by friction [N]."""
     loads: Floats
     """(6,) normal forces, at least 0 [N]."""
     utilisation: Floats
@@ -61,7 +59,7 @@ def find_driving_forces(
     state = measure_state(here, writer.on_bogie)
     rolls = direction * writer.find_rolling(state).directions
     wanted = torques / radius - rolls * resistance
-    tractions, push, sliding = wanted, 0.0, np.zeros(WHEEL_COUNT, dtype=bool)
+    push = 0.0
     for _ in range(ROUNDS):
         loads = np.maximum(loads, 0.0)
         limit = np.sqrt(np.clip((friction * loads) ** 2 - lateral**2, 0.0, None))
@@ -70,7 +68,7 @@ def find_driving_forces(
         try:
             rows = writer.write(state, push)
         except ModelError:
-            return DrivingForces(0.0, tractions, loads, here.friction_utilisation[0], sliding)
+            return DrivingForces(0.0, loads, here.friction_utilisation[0], sliding)
         x = rows.complete(tractions / rows.force_unit) * rows.force_unit
         push += float((rows.directions * (tractions - x[TRACTIONS])).sum())
         loads, lateral = x[LOADS], rows.lateral_forces(x)
@@ -79,7 +77,7 @@ def find_driving_forces(
     if not direction:  # at rest, a push below the soil's resistance has no effect
         push = float(np.sign(push) * max(abs(push) - resistance.sum(), 0.0))
     utilisation = np.where(sliding, 1.0, np.minimum(used, 1.0))
-    return DrivingForces(push, tractions, loads, utilisation, sliding)
+    return DrivingForces(push, loads, utilisation, sliding)
 
 
 def measure_state(here: PathPrediction, on_bogie: NDArray[np.bool_]) -> MeasuredState:

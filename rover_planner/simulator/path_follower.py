@@ -126,19 +126,16 @@ class _Leg:
         if self.is_turn:
             return
         ahead = np.linspace(self.done, min(self.done + look_ahead, self.length), 40)
-        places = np.array([self.at(along) for along in ahead])
-        away = np.hypot(*(places - pose[:2]).T)
+        away = np.hypot(*(self.at(ahead) - pose[:2]).T)
         self.done = float(ahead[int(np.argmin(away))])
 
-    def at(self, along: float) -> Floats:
-        """Return the point (2,) at a distance along the leg [m], extended straight on."""
-        over = max(along - self.length, 0.0)
+    def at(self, along: float | Floats) -> Floats:
+        """Return the points (..., 2) at distances along the leg [m], extended straight on."""
         x, y = (np.interp(along, self._along, self._places[:, k]) for k in (0, 1))
-        if over > 0.0 and len(self._places) > 1:
-            last = self._places[-1] - self._places[-2]
-            direction = last / max(float(np.hypot(*last)), 1e-9)
-            return np.array([x, y]) + over * direction
-        return np.array([x, y])
+        last = self._places[-1] - self._places[max(len(self._places) - 2, 0)]
+        direction = last / max(float(np.hypot(*last)), 1e-9)
+        over = np.maximum(along - self.length, 0.0)[..., None]
+        return np.stack([x, y], axis=-1) + over * direction
 
 
 def _find_legs(poses: Floats) -> list[_Leg]:

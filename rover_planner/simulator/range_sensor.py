@@ -1,35 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """A terrain sensor on the rover's mast, with range, field of view, occlusion and noise."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
-from rover_planner.parameters.rover_simulator import ALL_AROUND
+from rover_planner.parameters.rover_simulator import ALL_AROUND, RoverSimulatorParameters
 
 RAYS = 1440
 """Directions of the occlusion test: every quarter degree."""
 
 
-@dataclass(frozen=True)
 class RangeSensor:
-    """Position and properties of the sensor."""
+    """A sensor with the properties that the parameters `sensor_...` name."""
 
-    max_range: float
-    """Range [m]."""
-    noise: float
-    """Standard deviation of heights [m]."""
-    height: float
-    """Height of the sensor above the body origin [m]."""
-    occlusion: bool
-    """Whether high ground hides the ground behind it."""
-    field_of_view: float = ALL_AROUND
-    """Angle over which it sees, half of it to each side of the heading [rad]."""
-    least_range: float = 0.0
-    """Distance of the nearest ground that it sees [m]."""
+    def __init__(self, parameters: RoverSimulatorParameters):
+        """Take the parameters of a simulator."""
+        self._parameters = parameters
 
     def look(
         self, terrain: Terrain, position: Floats, rng: np.random.Generator, yaw: float = 0.0
@@ -45,6 +33,7 @@ class RangeSensor:
         Raises:
             TerrainError: No cell is in sight.
         """
+        asked, noise = self._parameters, self._parameters.sensor_noise
         rows, columns = self._window(terrain, position)
         x0 = terrain.origin[0] + terrain.resolution * columns.start
         y0 = terrain.origin[1] + terrain.resolution * rows.start
@@ -54,22 +43,23 @@ class RangeSensor:
         dy = y0 + terrain.resolution * y - position[1]
         away = np.hypot(dx, dy)
         bearing = np.arctan2(dy, dx)
-        seen = (away <= self.max_range) & (away >= self.least_range)
-        if self.field_of_view < ALL_AROUND:
+        seen = (away <= asked.sensor_range) & (away >= asked.sensor_least_range)
+        if asked.sensor_field_of_view < ALL_AROUND:
             aside = np.abs((bearing - yaw + np.pi) % (2.0 * np.pi) - np.pi)
-            seen &= aside <= 0.5 * self.field_of_view
-        if self.occlusion:
+            seen &= aside <= 0.5 * asked.sensor_field_of_view
+        if asked.sensor_occlusion:
             seen &= self._in_sight(terrain, position, heights, away, bearing)
         heights[~seen] = np.nan
-        if self.noise > 0.0:
-            heights += rng.normal(0.0, self.noise, heights.shape)
-        std = np.where(seen, self.noise, np.nan) if self.noise > 0.0 else None
+        std = None
+        if noise > 0.0:
+            heights += rng.normal(0.0, noise, heights.shape)
+            std = np.where(seen, noise, np.nan)
         friction = None if terrain.friction is None else terrain.friction[rows, columns]
         return Terrain(heights, terrain.resolution, (x0, y0), friction, elevation_std=std)
 
     def _window(self, terrain: Terrain, position: Floats) -> tuple[slice, slice]:
         ny, nx = terrain.elevation.shape
-        cells = int(np.ceil(self.max_range / terrain.resolution))
+        cells = int(np.ceil(self._parameters.sensor_range / terrain.resolution))
         column, row = (
             round((position[k] - terrain.origin[k]) / terrain.resolution) for k in (0, 1)
         )
@@ -82,9 +72,11 @@ class RangeSensor:
         self, terrain: Terrain, position: Floats, heights: Floats, away: Floats, bearing: Floats
     ) -> NDArray[np.bool_]:
         """Return a mask of the cells that no nearer cell on the same ray hides."""
-        eye = position[2] + self.height
+        eye = position[2] + self._parameters.sensor_height
         ranges = np.arange(
-            terrain.resolution, self.max_range + terrain.resolution, terrain.resolution
+            terrain.resolution,
+            self._parameters.sensor_range + terrain.resolution,
+            terrain.resolution,
         )
         angles = (np.arange(RAYS) + 0.5) * (2.0 * np.pi / RAYS) - np.pi
         px = position[0] + ranges * np.cos(angles)[:, None]

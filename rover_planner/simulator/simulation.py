@@ -98,10 +98,7 @@ class Simulation:
         """
         self.settings, asked = settings, settings.parameters
         self.plant = make_plant(settings)
-        self._sensor = RangeSensor(
-            asked.sensor_range, asked.sensor_noise, asked.sensor_height, asked.sensor_occlusion,
-            asked.sensor_field_of_view, asked.sensor_least_range,
-        )  # fmt: skip
+        self._sensor = RangeSensor(asked)
         self._rng = np.random.default_rng(asked.seed)
         self._follower: SecondTry | None = None
         self._wanted, self._wanted_at = (0.0, 0.0), -np.inf

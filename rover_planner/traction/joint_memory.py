@@ -49,6 +49,12 @@ class JointMemory:
         """Start without values; `steering` are the names of the rover's steering joints."""
         self._positions = Readings((*SUSPENSION_JOINTS, *steering))
         self._velocities = Readings((*SUSPENSION_JOINTS, *WHEEL_JOINTS))
+        self.suspension_angles = self._positions.values[SUSPENSION]
+        """Last angles (4,) of SUSPENSION_JOINTS [rad]; each message writes them anew."""
+        self.steering_angles = self._positions.values[OTHERS]
+        """The same of the steering joints, in their order."""
+        self.wheel_rates = self._velocities.values[OTHERS]
+        """Last rates (6,) of WHEEL_JOINTS [rad/s]; each message writes them anew."""
 
     def take(
         self,
@@ -87,21 +93,6 @@ class JointMemory:
     def is_empty(self) -> bool:
         """Whether no joint has a value."""
         return max(self._positions.times.max(), self._velocities.times.max()) == NEVER
-
-    @property
-    def suspension_angles(self) -> Floats:
-        """Angles (4,) of SUSPENSION_JOINTS [rad]."""
-        return self._positions.values[SUSPENSION].copy()
-
-    @property
-    def steering_angles(self) -> Floats:
-        """Angles of the steering joints, in their order [rad]."""
-        return self._positions.values[OTHERS].copy()
-
-    @property
-    def wheel_rates(self) -> Floats:
-        """Rates (6,) of WHEEL_JOINTS [rad/s]."""
-        return self._velocities.values[OTHERS].copy()
 
     def find_suspension_rates(self, earliest: float) -> Floats | None:
         """Return the rates (4,) of SUSPENSION_JOINTS [rad/s]; None if one is older [s]."""

@@ -4,6 +4,7 @@
 A measurement outside these limits comes from a broken sensor or driver, not from a rover.
 """
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -28,7 +29,9 @@ class MeasurementLimits:
     def __init__(self, rover: Rover):
         """Take the limits from a rover."""
         suspension, wheel = rover.suspension, rover.wheel
-        self._max_wheel_rate = MAX_WHEEL_RATE_RATIO * wheel.max_speed
+        fastest = MAX_WHEEL_RATE_RATIO * wheel.max_speed
+        self._rates = dict.fromkeys(SUSPENSION_JOINTS, (-MAX_TURNING_RATE, MAX_TURNING_RATE))
+        self._rates |= dict.fromkeys(WHEEL_JOINTS, (-fastest, fastest))
         self._angles = {
             name: suspension.rocker_limits if "rocker" in name else suspension.bogie_limits
             for name in SUSPENSION_JOINTS
@@ -46,20 +49,17 @@ class MeasurementLimits:
         self, positions: Mapping[str, float], velocities: Mapping[str, float]
     ) -> str:
         """Describe an impossible angle [rad] or rate [rad/s] of a joint of the rover."""
-        for name, angle in positions.items():
-            low, high = self._angles.get(name, (angle, angle))
-            if not low - ANGLE_MARGIN <= angle <= high + ANGLE_MARGIN:
-                return (
-                    f"joint_states has position {angle:g} of {name}; it must be in "
-                    f"{low - ANGLE_MARGIN:g} to {high + ANGLE_MARGIN:g} rad"
-                )
-        for name, rate in velocities.items():
-            most = self._max_wheel_rate if name in WHEEL_JOINTS else MAX_TURNING_RATE
-            if not abs(rate) <= most:
-                return (
-                    f"joint_states has velocity {rate:g} of {name}; it must be within "
-                    f"{most:g} rad/s"
-                )
+        for kind, unit, values, bounds, margin in (
+            ("position", "rad", positions, self._angles, ANGLE_MARGIN),
+            ("velocity", "rad/s", velocities, self._rates, 0.0),
+        ):
+            for name, value in values.items():
+                low, high = bounds.get(name, (-math.inf, math.inf))
+                if not low - margin <= value <= high + margin:
+                    return (
+                        f"joint_states has {kind} {value:g} of {name}; it must be in "
+                        f"{low - margin:g} to {high + margin:g} {unit}"
+                    )
         return ""
 
     def find_wrong_rates(self, rates: Floats | None) -> str:

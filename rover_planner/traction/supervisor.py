@@ -135,7 +135,7 @@ class TractionSupervisor:
         if update.fault:
             self._latch(update.fault, now)
             return self._rest(FAULT, update.fault, now, duration)
-        return TractionCommand(update.torques, False, DRIVING, update, self.service.expiry)
+        return TractionCommand(update.torques, False, DRIVING, update, self.service.monitor.expiry)
 
     def fail(self, fault: str) -> TractionCommand:
         """Return zero torques and the brake, after an internal error."""
@@ -170,7 +170,7 @@ class TractionSupervisor:
         if self.service.climbs:
             self._stall.reset_time()
         stall_time = self.service.settings.parameters.stall_time
-        rates, wanted = self.service.wheel_rates, self.service.wanted_rates
+        rates, wanted = self.service.joints.wheel_rates, self.service.wanted_rates
         return self._stall.update(rates, wanted, duration, stall_time)
 
     def _is_standing(self, duration: float) -> bool:
@@ -184,10 +184,10 @@ class TractionSupervisor:
         update = self.service.rest(fault)
         torques, expiry = np.zeros(WHEEL_COUNT), float("inf")
         timeout, policy = parameters.joint_states_timeout, parameters.rest_policy
-        blind = now - self.service.wheel_time > timeout
+        blind = now - self.service.joints.wheel_time > timeout
         brake = policy == BRAKE or (policy == HOLD and blind)
         if policy == HOLD and not blind:
-            torques, expiry = self._hold_wheels(duration), self.service.wheel_time + timeout
+            torques, expiry = self._hold_wheels(duration), self.service.joints.wheel_time + timeout
         else:
             self._held = False
         self._rest_torques = torques
@@ -201,5 +201,5 @@ class TractionSupervisor:
             needed = -(service.weight * radius / WHEEL_COUNT) * math.sin(service.pitch)
             self._hold.start(np.full(WHEEL_COUNT, needed))
         self._held = True
-        torques = self._hold.update(-service.wheel_rates, min(duration, MAX_STEP))
+        torques = self._hold.update(-service.joints.wheel_rates, min(duration, MAX_STEP))
         return np.clip(torques, -most, most)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rover_physics.errors import ModelError
-from rover_physics.names import OPTIMAL, SUSPENSION_JOINTS, WHEEL_COUNT
+from rover_physics.names import OPTIMAL, WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.steering_joints import steered_wheels, steering_joints
 from rover_physics.terrain.grid import Terrain
@@ -29,7 +29,7 @@ from rover_physics.traction.solver import (
     solve_traction,
 )
 from rover_physics.traction.wheel_course import WheelCourse
-from rover_planner.traction.input_monitor import NEVER, InputMonitor
+from rover_planner.traction.input_monitor import InputMonitor
 from rover_planner.traction.joint_memory import JointMemory
 from rover_planner.traction.limits import MeasurementLimits
 from rover_planner.traction.loops import (
@@ -73,12 +73,10 @@ class TractionService:
     def __init__(self, settings: TractionSettings):
         """Start without measurements."""
         self._workspace = TractionWorkspace()
-        self._monitor = InputMonitor({}, optional=(ODOMETRY,))
+        self.monitor = InputMonitor({}, optional=(ODOMETRY,))
+        """Times and errors of the inputs; odometry is never a fault."""
         self._follow_steering(settings)
-        self._suspension_angles = np.zeros(len(SUSPENSION_JOINTS))
         self._suspension_rates: Floats | None = None
-        self.wheel_rates = np.zeros(WHEEL_COUNT)
-        """Last measured rates (6,) of the wheels [rad/s]."""
         self.roll, self.pitch = 0.0, 0.0
         """Last measured attitude [rad], pitch positive with the nose down."""
         self._body_rates: Floats | None = None
@@ -116,8 +114,9 @@ class TractionService:
     def _follow_steering(self, settings: TractionSettings) -> None:
         """Ask for the joints of a rover; all inputs must arrive anew."""
         rover = settings.rover
-        self._joints = JointMemory(steering_joints(rover))
-        self._monitor.forget()
+        self.joints = JointMemory(steering_joints(rover))
+        """Last measurements of the joints."""
+        self.monitor.forget()
         self._steered, self.course = steered_wheels(rover), WheelCourse(rover)
         """Which wheels steer, and what is asked of them."""
         self.steering = np.zeros(WHEEL_COUNT)
@@ -128,7 +127,7 @@ class TractionService:
         self._settings = settings
         rover, parameters = settings.rover, settings.parameters
         self._radius = rover.wheel.radius
-        self._monitor.timeouts = {
+        self.monitor.timeouts = {
             name: getattr(parameters, f"{name}_timeout")
             for name in (JOINT_STATES, IMU, CMD_VEL, ODOMETRY)
         }
@@ -155,24 +154,19 @@ class TractionService:
         return float(self._writer.weight)
 
     @property
+    def terrain(self) -> Terrain | None:
+        """The map; None before the first one."""
+        return None if self._finder is None else self._finder.terrain
+
+    @property
     def climbs(self) -> bool:
         """Whether the suspension shows that the rover climbs, at the last update."""
         return self._slip.detector.climbs
 
     @property
-    def wheel_time(self) -> float:
-        """Time of the oldest of these rates [s]."""
-        return self._joints.wheel_time
-
-    @property
     def wanted_rates(self) -> Floats:
         """Rates (6,) of the wheels that these ask for at the last steering angles [rad/s]."""
         return self.course.want(self.wanted, self.steering)[1] / self._radius
-
-    @property
-    def expiry(self) -> float:
-        """Time at which the first of the needed inputs becomes stale [s]."""
-        return self._monitor.expiry
 
     def take_joints(
         self,
@@ -188,24 +182,22 @@ class TractionService:
         """
         wrong = self._limits.find_wrong_joint(positions, velocities)
         if wrong:
-            self._monitor.refuse(JOINT_STATES, wrong, now)
+            self.monitor.refuse(JOINT_STATES, wrong, now)
             return
-        if not self._joints.take(positions, velocities, now, stamp):
+        if not self.joints.take(positions, velocities, now, stamp):
             if positions or velocities:
-                self._monitor.ignore(JOINT_STATES, "stamps do not advance")
+                self.monitor.ignore(JOINT_STATES, "stamps do not advance")
             return
-        self._suspension_angles = self._joints.suspension_angles
-        self.wheel_rates = self._joints.wheel_rates
-        self.steering[self._steered] = self._joints.steering_angles
-        earliest = now - self._monitor.timeouts[JOINT_STATES]
-        self._suspension_rates = self._joints.find_suspension_rates(earliest)
-        if math.isfinite(self._joints.time):
-            self._monitor.take(JOINT_STATES, self._joints.time)
+        self.steering[self._steered] = self.joints.steering_angles
+        earliest = now - self.monitor.timeouts[JOINT_STATES]
+        self._suspension_rates = self.joints.find_suspension_rates(earliest)
+        if math.isfinite(self.joints.time):
+            self.monitor.take(JOINT_STATES, self.joints.time)
 
     def forget_times(self) -> None:
         """Forget when inputs came, after a step of the clock: each must arrive anew."""
-        self._joints.forget()
-        self._monitor.forget()
+        self.joints.forget()
+        self.monitor.forget()
 
     def take_attitude(self, roll: float, pitch: float, rates: Floats | None, now: float) -> None:
         """Take roll and pitch [rad], measured at time `now` [s].
@@ -214,10 +206,10 @@ class TractionService:
         """
         wrong = self._limits.find_wrong_rates(rates)
         if wrong:
-            self._monitor.refuse(IMU, wrong, now)
+            self.monitor.refuse(IMU, wrong, now)
             return
         self.roll, self.pitch, self._body_rates = roll, pitch, rates
-        self._monitor.take(IMU, now)
+        self.monitor.take(IMU, now)
 
     def take_command(self, speed: float, yaw_rate: float, now: float) -> None:
         """Take the wanted speed [m/s] and yaw rate [rad/s], received at time `now` [s].
@@ -225,12 +217,12 @@ class TractionService:
         Speeds beyond those of the rover's wheels are reduced.
         """
         self.wanted = self._limits.clip_command(speed, yaw_rate)
-        self._monitor.take(CMD_VEL, now)
+        self.monitor.take(CMD_VEL, now)
 
     def take_odometry(self, pose: Floats, deviation: float, now: float) -> None:
         """Take x, y, z [m], yaw [rad] (4,), map frame, and the standard deviation of x, y [m]."""
         self._pose, self._deviation = pose, deviation
-        self._monitor.take(ODOMETRY, now)
+        self.monitor.take(ODOMETRY, now)
 
     def take_terrain(self, terrain: Terrain) -> None:
         """Take a map; it is used while odometry is recent."""
@@ -245,20 +237,12 @@ class TractionService:
         is_own = finder.rover is rover
         self._finder = finder if is_own else MapContactFinder(rover, finder.terrain)
 
-    def refuse(self, name: str, error: str, now: float = NEVER) -> None:
-        """Record an invalid input and its error; later inputs end it."""
-        self._monitor.refuse(name, error, now)
-
-    def ignore(self, name: str, reason: str) -> None:
-        """Record why a message was not used; it is a fault only if no other one comes."""
-        self._monitor.ignore(name, reason)
-
     def find_fault(self, now: float) -> str:
         """Return the fault of the inputs at time `now` [s]; empty if there is none."""
-        if not self._monitor.is_fresh(JOINT_STATES, now) and not self._joints.is_empty:
-            missing = self._joints.describe_older(now - self._monitor.timeouts[JOINT_STATES])
-            self._monitor.describe(JOINT_STATES, missing)
-        return self._monitor.find_fault(now)
+        if not self.monitor.is_fresh(JOINT_STATES, now) and not self.joints.is_empty:
+            missing = self.joints.describe_older(now - self.monitor.timeouts[JOINT_STATES])
+            self.monitor.describe(JOINT_STATES, missing)
+        return self.monitor.find_fault(now)
 
     def start_from(self, torques: Floats) -> None:
         """Start to drive from torques (6,) [N m] that act now: the next ones are near them."""
@@ -311,7 +295,7 @@ class TractionService:
     def _estimate_contacts(self, now: float, duration: float) -> tuple[ContactEstimate, str]:
         """Return the contact angles of the best source, and a warning, empty if none."""
         from_motion, warning = self._estimate_from_motion(duration)
-        if self._finder is None or not self._monitor.is_fresh(ODOMETRY, now):
+        if self._finder is None or not self.monitor.is_fresh(ODOMETRY, now):
             return from_motion, warning
         try:
             backward = self._mean_wanted() < 0.0
@@ -328,14 +312,16 @@ class TractionService:
             if self._suspension_rates is not None:
                 lacking = "imu has no angular velocity"
             return level_estimate(), f"contact angles are taken as zero: {lacking}"
-        joints, rates = map(_mean_rocker, (self._suspension_angles, self._suspension_rates))
+        joints, rates = map(_mean_rocker, (self.joints.suspension_angles, self._suspension_rates))
         attitude = np.array([self.roll, self.pitch])
-        motion = Motion(attitude, joints, rates, self.wheel_rates, self._body_rates, self.steering)
+        motion = Motion(
+            attitude, joints, rates, self.joints.wheel_rates, self._body_rates, self.steering
+        )
         return self._estimator.update(motion, duration), ""
 
     def _level_state(self) -> MeasuredState:
         """Return the measured state with zero contact angles."""
-        joints = _mean_rocker(self._suspension_angles)
+        joints = _mean_rocker(self.joints.suspension_angles)
         return MeasuredState(
             self.roll, self.pitch, joints[0], joints[1:], np.zeros(WHEEL_COUNT),
             steering=self.steering,
@@ -353,7 +339,7 @@ class TractionService:
 
     def _find_push(self, duration: float) -> float:
         """Return the wanted push [N], from the mean travel of the wheels."""
-        error = self._mean_wanted() - self.course.mean_of(self.wheel_rates) * self._radius
+        error = self._mean_wanted() - self.course.mean_of(self.joints.wheel_rates) * self._radius
         growth = STALLED_GROWTH * duration if self._slip.detector.stalled else duration
         if not self._optimal:
             return self._speed.update(error, growth, self._limited)
@@ -383,7 +369,7 @@ class TractionService:
         """Return the torques (6,) [N m] with the other loops, limited in magnitude and rate."""
         settings, torques, course = self._settings, answer.torques.copy(), self.course
         if self._body_rates is not None:
-            mean_speed = course.mean_of(self.wheel_rates) * self._radius
+            mean_speed = course.mean_of(self.joints.wheel_rates) * self._radius
             wanted = course.yaw_rate(self.wanted[1], mean_speed)
             error = wanted - float(self._body_rates[2])
             moment = self._heading.update(error, duration, self._limited)
@@ -391,8 +377,8 @@ class TractionService:
         if self._optimal:
             ahead = course.directions
             motion = WheelMotion(
-                ahead * self.wheel_rates, course.sign * ahead * rows.wheel_speeds,
-                self._suspension_angles, self._mean_wanted() / self._radius, self._from_map,
+                ahead * self.joints.wheel_rates, course.sign * ahead * rows.wheel_speeds,
+                self.joints.suspension_angles, self._mean_wanted() / self._radius, self._from_map,
                 course.ratios,
             )  # fmt: skip
             torques = ahead * self._slip.correct(ahead * torques, motion, duration)

@@ -22,11 +22,6 @@ HEIGHT_TO_DIAMETER = 0.5
 """Height of a rock over its diameter (Golombek and Rapp 1997 find about one half)."""
 
 
-def decay_rate(k: float) -> float:
-    """Return the decay rate q(k) [1/m] of the law for a total rock cover k [-]."""
-    return 1.79 + 0.152 / k
-
-
 def cumulative_number(k: float, diameters: np.ndarray, largest: float) -> np.ndarray:
     """Return the number of rocks per square metre at or above each diameter.
 
@@ -39,7 +34,7 @@ def cumulative_number(k: float, diameters: np.ndarray, largest: float) -> np.nda
         Numbers (n,) [1/m^2] of rocks between each diameter and `largest`; the law's n(D)
         integrated by Simpson's rule in log D.
     """
-    q = decay_rate(k)
+    q = 1.79 + 0.152 / k
     steps = 256
     diameters = np.minimum(np.asarray(diameters, dtype=float), largest)
     logs = np.linspace(np.log(diameters), np.log(largest), steps + 1)

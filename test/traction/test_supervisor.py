@@ -131,7 +131,7 @@ def test_an_input_that_is_bad_every_other_time_is_one_fault():
     rig.commands.clear()
     for k in range(100):
         if k % 2:
-            rig.supervisor.service.refuse("imu", "imu is nan", rig.now + PERIOD)
+            rig.supervisor.service.monitor.refuse("imu", "imu is nan", rig.now + PERIOD)
             rig.run(PERIOD, "joint_states", "cmd_vel")
         else:
             rig.run(PERIOD)

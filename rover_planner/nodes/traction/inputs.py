@@ -118,7 +118,7 @@ class TractionInputs:
             try:
                 take(message, now)
             except StampError as error:
-                self._service.ignore(name, str(error))
+                self._service.monitor.ignore(name, str(error))
             except INPUT_ERRORS as error:
                 self._refuse(name, str(error), now)
             except Exception as error:
@@ -127,7 +127,7 @@ class TractionInputs:
         return receive
 
     def _refuse(self, name: str, error: str, now: float) -> None:
-        self._service.refuse(name, error, now)
+        self._service.monitor.refuse(name, error, now)
         if name == ODOMETRY:  # the others are faults, which the node logs
             self._log.update(name, f"odometry not used: {error}", "odometry is used again", now)
 

@@ -146,12 +146,12 @@ def test_a_change_of_the_cell_height_acts_on_the_map_that_is_there(
     rover, controller, cloud_sender
 ):
     cloud_sender.publish(FLAT)
-    first = wait_until(lambda: controller.service._terrain, "the map")
+    first = wait_until(lambda: controller.service.terrain, "the map")
     changes = [Parameter("map_resolution", value=0.2), Parameter("cell_height", value="mean")]
     changed = run_in_executor(controller, lambda: controller.set_parameters_atomically(changes))
     assert changed.successful
-    wait_until(lambda: controller.service._terrain is not first, "the map in other cells")
-    assert controller.service._terrain.resolution == 0.2
+    wait_until(lambda: controller.service.terrain is not first, "the map in other cells")
+    assert controller.service.terrain.resolution == 0.2
 
 
 def test_a_mounted_imu_is_turned_into_the_body_frame(rover, start_controller):

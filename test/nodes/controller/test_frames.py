@@ -78,11 +78,11 @@ def test_a_cloud_in_odom_is_placed_on_the_map_and_refused_without_a_transform(
     sender.publish(terrain_to_point_cloud(ground, "odom", rover.get_clock().now().to_msg()))
     refusal = "the last map stays: no transforms connect the frames 'odom' and 'map'"
     wait_until(lambda: rover.count_lines(refusal), "the refusal")
-    assert controller.service._terrain is None
+    assert controller.service.terrain is None
     take = controller.frames.take
     send_transforms(controller, take, ("map", "odom", MAP_ODOM))
-    wait_until(lambda: controller.service._terrain is not None, "the map, without a new message")
-    found = controller.service._terrain
+    wait_until(lambda: controller.service.terrain is not None, "the map, without a new message")
+    found = controller.service.terrain
     there = MAP_ODOM.rotation.apply((0.5, 0.25, 0.0)) + MAP_ODOM.translation
     height = ground.elevation_at(0.5, 0.25) + 0.4
     assert found.elevation_at(*there[:2]) == pytest.approx(height, abs=1e-5)

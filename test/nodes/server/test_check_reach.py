@@ -25,7 +25,7 @@ def test_what_is_missing_is_asked_for_in_turn_then_the_answer_is_that_of_the_mod
 ):
     targets = client.create_publisher(PoseStamped, f"{SERVER}/tool_target", topic_qos())
     wrenches = client.create_publisher(WrenchStamped, f"{SERVER}/tool_wrench", topic_qos())
-    check, query = client.create_client(Trigger, f"{SERVER}/check_reach"), server.arm.query
+    check, arm = client.create_client(Trigger, f"{SERVER}/check_reach"), server.arm
 
     def ask() -> dict:
         response = call(check, Trigger.Request())
@@ -35,7 +35,7 @@ def test_what_is_missing_is_asked_for_in_turn_then_the_answer_is_that_of_the_mod
 
     def aim(place) -> None:
         client.send(targets, make_target(*place))
-        wait_until(lambda: np.array_equal(query.target, place), "the target")
+        wait_until(lambda: np.array_equal(arm.query.target, place), "the target")
 
     assert ask()["code"] == "no_path"
     client.check_poses(server, PATH)
@@ -47,7 +47,7 @@ def test_what_is_missing_is_asked_for_in_turn_then_the_answer_is_that_of_the_mod
     assert answer["code"] == "too_far" and answer["out_of_reach"] > 1.0
     aim(TARGET)
     client.send(wrenches, make_wrench(FORCE, MOMENT))
-    wait_until(lambda: np.array_equal(query.force, FORCE), "the wrench")
+    wait_until(lambda: np.array_equal(arm.query.force, FORCE), "the wrench")
     rover, terrain = server.service.settings.rover, server.service.terrain
     expected = judge_reach(rover, terrain, PATH[-1], TARGET, force=FORCE, moment=MOMENT)
     assert expected.possible and ask() == json.loads(json.dumps(expected.to_dict()))
@@ -62,5 +62,5 @@ def test_what_is_missing_is_asked_for_in_turn_then_the_answer_is_that_of_the_mod
     answer = ask()
     assert answer["code"] == "no_wrench" and "force" in answer["reason"]
     client.send(wrenches, make_wrench((0.0, 0.0, 0.0)))
-    wait_until(lambda: query.force is not None, "the wrench")
+    wait_until(lambda: arm.query.force is not None, "the wrench")
     assert ask()["possible"] and ros.is_alive(server)
