@@ -25,6 +25,7 @@ from msg_adapters.paths import path_to_poses
 from msg_adapters.results.diagnostics import SIMULATOR, diagnostics, make_status
 from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_message
 from rover_physics.names import WHEEL_JOINTS
+from rover_planner.maps.summary import describe_terrain
 from rover_planner.nodes.running import run_node
 from rover_planner.parameters.declare import declare_parameters, warn_of_unknown_parameters
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
@@ -32,7 +33,6 @@ from rover_planner.ros.optional_types import find_type
 from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
 from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.simulation import Simulation, load_simulation_settings
-from rover_planner.worlds.summary import describe_terrain
 
 NODE_NAME = "rover_simulator"
 COMMANDS = "traction_controller/commands"

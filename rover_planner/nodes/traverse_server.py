@@ -31,6 +31,8 @@ from msg_adapters.results.diagnostics import (
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.numerics.kernel_cache import kernel_cache_note
 from rover_physics.warm_up import EXACT, UNCERTAIN
+from rover_planner.maps.known_map import stamp_text
+from rover_planner.maps.summary import describe_terrain
 from rover_planner.nodes.arm_topics import ArmTopics
 from rover_planner.nodes.maps.map_cloud import MapCloud
 from rover_planner.nodes.maps.map_topics import MapTopics
@@ -49,7 +51,6 @@ from rover_planner.parameters.declare import (
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
 from rover_planner.planning.answering.budget import CANCELLED
 from rover_planner.planning.answering.judgement import PathJudgement
-from rover_planner.planning.answering.known_map import stamp_text
 from rover_planner.planning.answering.questions import (
     Answer,
     BadQuestion,
@@ -71,7 +72,6 @@ from rover_planner.ros.guard import INPUT_ERRORS, Guard
 from rover_planner.ros.qos import sensor_qos, topic_qos
 from rover_planner.ros.subscriptions import subscribe_to_requests
 from rover_planner.shell.kernels import load_kernels
-from rover_planner.worlds.summary import describe_terrain
 
 NODE_NAME = "traverse_server"
 SWITCH_INTERVAL = 1e-3

@@ -9,8 +9,8 @@ from typing import Any
 from rover_physics.numerics.plain_values import to_plain
 from rover_physics.traversability.classification import ClassifiedWaypoint, deciding_waypoint
 from rover_physics.traversability.verdict import BOUNDS, EXTREMES
+from rover_planner.maps.unobserved_ground import UnobservedShare
 from rover_planner.planning.path_query import Candidate, PathSearch
-from rover_planner.worlds.maps.blind_ground import BlindShare
 
 REPORTED = (*EXTREMES, "risk", "map_sigmas", *BOUNDS)
 """Fields of a verdict that a report has."""
@@ -102,7 +102,7 @@ def report_path(
     why: tuple[str, str],
     classes: Sequence[ClassifiedWaypoint],
     suspension: SuspensionReport | None = None,
-    ground: BlindShare | None = None,
+    ground: UnobservedShare | None = None,
     search: PathSearch | None = None,
 ) -> VerdictReport:
     """Return the full report of a judged path.

@@ -9,10 +9,10 @@ from sensor_msgs.msg import PointCloud2
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
 from rover_physics.terrain.grid import Terrain
+from rover_planner.maps.map_keeper import MapKeeper
+from rover_planner.maps.moved_map import MapMove
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.navigation.transforms import Rigid
-from rover_planner.worlds.maps.map_keeper import MapKeeper
-from rover_planner.worlds.maps.moved_map import MapMove
 
 LOOK_PERIOD = 0.5
 """Shortest time between two looks for unknown ground under the rover [s]."""

@@ -17,6 +17,10 @@ from msg_adapters.sensing import BASE_FRAME
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.files.validation import show_file
 from rover_physics.terrain.grid import load_terrain
+from rover_planner.maps.living_map import MapSnapshot
+from rover_planner.maps.map_file import MapFileError, open_map
+from rover_planner.maps.map_keeper import MapKeeper
+from rover_planner.maps.summary import describe_terrain
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.service_settings import keeper_settings, map_limits
 from rover_planner.planning.answering.traverse_service import TraverseService
@@ -31,10 +35,6 @@ from rover_planner.ros.map_messages import LOOK_PERIOD, MapSettings, read_map
 from rover_planner.ros.optional_types import find_type
 from rover_planner.ros.qos import sensor_qos
 from rover_planner.ros.subscriptions import subscribe_to_map
-from rover_planner.worlds.map_file import MapFileError, open_map
-from rover_planner.worlds.maps.living_map import MapSnapshot
-from rover_planner.worlds.maps.map_keeper import MapKeeper
-from rover_planner.worlds.summary import describe_terrain
 
 LOG_PERIOD = 10.0
 """Shortest time between two log lines about maps that merge, or come again and again [s]."""

@@ -197,9 +197,7 @@ class PathWatch:
         self._reported = judgement
         with interruptible(self._check_end):
             complete = judgement.complete()
-        self._handover.call(
-            lambda: self._report_stop(complete, finding.path_hash, sight.snapshot)
-        )
+        self._handover.call(lambda: self._report_stop(complete, finding.path_hash, sight.snapshot))
 
     def _take(self, finding: Finding) -> None:
         """Publish ~/stop where it has changed; called in the executor's thread."""

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rover_physics.names import EQUAL
 from rover_physics.traversability.classification import ClassifiedWaypoint
+from rover_planner.maps.unobserved_ground import UnobservedShare
 from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.path_query import Candidate, PathSearch
 from rover_planner.planning.search.judge import PathJudge
@@ -19,7 +20,6 @@ from rover_planner.planning.verdict_report import (
     report_path,
     report_refusal,
 )
-from rover_planner.worlds.maps.blind_ground import BlindShare
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +94,7 @@ class PathJudgement:
         return report_path(whole.candidate, why, *details)
 
     @cached_property
-    def ground(self) -> BlindShare | None:
+    def ground(self) -> UnobservedShare | None:
         """Never seen ground under the belly; None without a judged path. Computed on first use."""
         if self.candidate is None or self.judge is None or self.judge.blind is None:
             return None

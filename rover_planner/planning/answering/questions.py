@@ -6,8 +6,8 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+from rover_planner.maps.known_map import stamp_text
 from rover_planner.planning.answering.judgement import refusal
-from rover_planner.planning.answering.known_map import stamp_text
 from rover_planner.planning.answering.reach_query import ReachQuery, refuse_reach
 from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
 from rover_planner.planning.path_query import Pose

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rover_planner.errors import PlanningError
-from rover_planner.planning.answering.known_map import KnownMap
+from rover_planner.maps.known_map import KnownMap
 from rover_planner.planning.search.lattice_search import Progress
 
 PERIOD = 0.2

@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
+from rover_planner.maps.known_map import KnownMap
+from rover_planner.maps.unobserved_ground import CODE as BLIND
 from rover_planner.parameters.traverse_server import FAN, LATTICE
 from rover_planner.planning.answering.judgement import PathJudgement, refusal
-from rover_planner.planning.answering.known_map import KnownMap
 from rover_planner.planning.answering.search_watch import SearchWatch
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.path_geometry import densify
@@ -25,7 +26,6 @@ from rover_planner.planning.search.lattice_search import Progress
 from rover_planner.planning.search.path_search import GOAL_REFUSED, START_REFUSED, find_path
 from rover_planner.planning.search.query import SearchQuery
 from rover_planner.planning.verdict_report import SuspensionReport
-from rover_planner.worlds.maps.blind_ground import CODE as BLIND
 
 NO_PATH = "no path was received yet; publish one on ~/path"
 

@@ -19,7 +19,7 @@ from rover_physics.traversability.pose_classes import (
     RoverOnMap,
     classify_poses,
 )
-from rover_planner.worlds.maps.changes import (
+from rover_planner.maps.changes import (
     Shift,
     Window,
     find_changes,

@@ -9,8 +9,14 @@ from numpy.typing import NDArray
 
 from rover_physics.rover.model import Rover
 from rover_physics.traversability.verdict import with_refusals
+from rover_planner.maps.unobserved_ground import (
+    ALLOW,
+    CODE,
+    REFUSE,
+    ObservedGround,
+    UnobservedShare,
+)
 from rover_planner.planning.path_query import Candidate, PathAnswer, choose
-from rover_planner.worlds.maps.blind_ground import ALLOW, CODE, REFUSE, BlindShare, SeenGround
 
 _REFUSED_COST = (float("inf"), float("inf"))
 
@@ -21,12 +27,12 @@ class BlindCheck:
 
     rover: Rover
     """The rover."""
-    seen: SeenGround
+    seen: ObservedGround
     """What was seen of the map."""
     rule: str
-    """One of BLIND_GROUND."""
+    """One of UNOBSERVED_GROUND."""
 
-    def share(self, candidate: Candidate) -> BlindShare:
+    def share(self, candidate: Candidate) -> UnobservedShare:
         """Return how much of the ground under the belly was never seen along a path."""
         return self.seen.share(self.rover, candidate.poses)
 

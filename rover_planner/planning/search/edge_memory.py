@@ -6,12 +6,12 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from rover_physics.rover.steering_joints import swing_radius
+from rover_planner.maps.changes import find_changes, have_same_layers
+from rover_planner.maps.unobserved_ground import ALLOW
 from rover_planner.planning.search.edges import Edges
 from rover_planner.planning.search.nodes import HEADINGS, Nodes
 from rover_planner.planning.search.primitives import make_primitives
 from rover_planner.planning.search.query import SearchQuery
-from rover_planner.worlds.maps.blind_ground import ALLOW
-from rover_planner.worlds.maps.changes import find_changes, have_same_layers
 
 
 class EdgeMemory:
@@ -57,7 +57,7 @@ def _is_alike(asked: SearchQuery, edges: Edges, query: SearchQuery, nodes: Nodes
 
 
 def _rule_of(query: SearchQuery) -> str:
-    """Return the rule of BLIND_GROUND of a query."""
+    """Return the rule of UNOBSERVED_GROUND of a query."""
     return ALLOW if query.blind is None else query.blind.rule
 
 

@@ -28,6 +28,7 @@ from rover_physics.traversability.classification import ClassifiedWaypoint, clas
 from rover_physics.traversability.judge import judge_poses
 from rover_physics.traversability.pieces import PieceVerdict, judge_pieces
 from rover_physics.traversability.verdict import Verdict
+from rover_planner.maps.unobserved_ground import CODE
 from rover_planner.planning.path_geometry import rings_within
 from rover_planner.planning.path_query import (
     Candidate,
@@ -40,7 +41,6 @@ from rover_planner.planning.path_query import (
 )
 from rover_planner.planning.search.blind_check import BlindCheck, physical
 from rover_planner.planning.search.primitives import PRICES, Gear, Piece
-from rover_planner.worlds.maps.blind_ground import CODE
 
 CLIMB = 2.0
 """Metres of level ground that cost as much as the energy that lifts the rover by one metre."""

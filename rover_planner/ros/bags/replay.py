@@ -18,9 +18,11 @@ from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.errors import PlanningError
+from rover_planner.maps.known_map import stamp_text
+from rover_planner.maps.living_map import MapSnapshot
+from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.judgement import PathJudgement, refusal
-from rover_planner.planning.answering.known_map import stamp_text
 from rover_planner.planning.answering.measurements import Measurements
 from rover_planner.planning.answering.questions import Register
 from rover_planner.planning.answering.service_settings import (
@@ -44,8 +46,6 @@ from rover_planner.ros.bags.bag_reader import (
 from rover_planner.ros.bags.recorded_drive import Measured, RecordedDrive
 from rover_planner.ros.frames import Frames
 from rover_planner.ros.map_messages import LOOK_PERIOD, MapSettings, read_map
-from rover_planner.worlds.maps.living_map import MapSnapshot
-from rover_planner.worlds.maps.map_keeper import MapKeeper
 
 DRIVEN, CHECKED, PLANNED = "driven", "check_path", "can_traverse"
 """Kinds of questions: the drive that was recorded, a path that was recorded, a goal."""

@@ -145,7 +145,7 @@ def test_rates_and_steering_angles_are_those_of_the_commanded_motion(ros, start)
     wait_until(is_there, "the rates")
     efforts = robot.commands["wheel_efforts"]
     assert sum(efforts.values()) > 0.0  # with the signs of the motors
-    found = controller.service._suspension_angles
+    found = controller.service.joints.suspension_angles
     assert np.abs(found).max() < 1e-9  # the offset of the rocker's encoder is taken off
     for wheel, angle in zip(WHEEL_JOINTS, aims.angles, strict=True):
         joint = wheel.replace("_wheel", "_steering")

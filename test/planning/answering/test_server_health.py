@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from rover_physics.terrain.grid import Terrain
-from rover_planner.planning.answering.known_map import KnownMap
+from rover_planner.maps.known_map import KnownMap
 from rover_planner.planning.answering.server_health import LATENCIES, OK, WARN, ServerHealth
 
 

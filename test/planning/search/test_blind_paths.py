@@ -5,6 +5,14 @@ import numpy as np
 
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
+from rover_planner.maps.unobserved_ground import (
+    ALLOW_FOOTPRINT,
+    ASSUMED,
+    CODE,
+    REFUSE,
+    ObservedGround,
+    observed_ground,
+)
 from rover_planner.parameters.traverse_server import LATTICE, TraverseServerParameters
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
@@ -15,14 +23,6 @@ from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import START_REFUSED, find_path
 from rover_planner.planning.search.primitives import Gear, Piece
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
-from rover_planner.worlds.maps.blind_ground import (
-    ALLOW_FOOTPRINT,
-    ASSUMED,
-    CODE,
-    REFUSE,
-    SeenGround,
-    seen_ground,
-)
 
 LSR1 = load_rover("lsr1")
 OPTIONS = PathQueryOptions(waypoint_spacing=0.04).change(control_margin=0.0)
@@ -37,9 +37,9 @@ def flat_with_hole() -> Terrain:
     return Terrain(np.where(hole, np.nan, 0.0), 0.05, (-1.0, -2.0))
 
 
-def ask(rule: str, seen: SeenGround | None = None, start=START) -> SearchQuery:
+def ask(rule: str, seen: ObservedGround | None = None, start=START) -> SearchQuery:
     ground = flat_with_hole()
-    check = BlindCheck(LSR1, seen or seen_ground(ground, None), rule)
+    check = BlindCheck(LSR1, seen or observed_ground(ground, None), rule)
     return SearchQuery(LSR1, ground, start, GOAL, OPTIONS, check)
 
 
@@ -57,7 +57,7 @@ def test_a_search_leads_around_what_the_rule_refuses():
     assert judged.traversable, judged.reason
     poses = judged.candidate.poses
     assert np.abs(poses[:, 1]).max() > 0.2
-    share = seen_ground(flat_with_hole(), None).share(LSR1, poses)
+    share = observed_ground(flat_with_hole(), None).share(LSR1, poses)
     assert share.blind_share == 0.0 and share.first_refused(rule) == -1
 
 
@@ -77,10 +77,10 @@ def test_pieces_and_single_poses_are_refused_by_the_rule_as_paths_are():
 
 
 def test_what_is_seen_later_is_judged_anew():
-    memory, seen = EdgeMemory(), seen_ground(flat_with_hole(), None)
+    memory, seen = EdgeMemory(), observed_ground(flat_with_hole(), None)
     around = find_path(ask(ALLOW_FOOTPRINT), LONG, memory)
     kinds = np.where(seen.kinds == 0, 0, ASSUMED).astype(np.uint8)
-    filled = SeenGround(seen.terrain, kinds)
+    filled = ObservedGround(seen.terrain, kinds)
     warm = find_path(ask(ALLOW_FOOTPRINT, filled), LONG, memory)
     assert np.abs(around.path.poses[:, 1]).max() > 0.2
     assert np.abs(warm.path.poses[:, 1]).max() < 0.05

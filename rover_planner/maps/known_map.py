@@ -9,8 +9,8 @@ import numpy as np
 
 from msg_adapters.stamps import NANOSECONDS
 from rover_physics.terrain.grid import Terrain
-from rover_planner.worlds.maps.blind_ground import SeenGround, seen_ground
-from rover_planner.worlds.maps.layers import CellSources
+from rover_planner.maps.layers import CellSources
+from rover_planner.maps.unobserved_ground import ObservedGround, observed_ground
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,9 +36,9 @@ class KnownMap:
     """Frame of the map; empty if it has none."""
 
     @cached_property
-    def seen(self) -> SeenGround:
+    def seen(self) -> ObservedGround:
         """What was seen of the map; interpolated gaps were not. Computed on first use."""
-        return seen_ground(self.received, self.cells)
+        return observed_ground(self.received, self.cells)
 
     @cached_property
     def coverage(self) -> float:
