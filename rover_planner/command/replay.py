@@ -127,7 +127,7 @@ class _Results:
 
     def take(self, answer: "Answer") -> None:
         """Write an answer and print it in one line."""
-        from rover_planner.planning.answering.known_map import stamp_text
+        from rover_planner.maps.known_map import stamp_text
 
         self.count += 1
         name = f"{self.count:03d}_{answer.kind}"

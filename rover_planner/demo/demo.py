@@ -29,11 +29,11 @@ from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
 from rover_planner.demo.child_process import ChildProcess, stopping_children
 from rover_planner.demo.mission_report import answer_table
 from rover_planner.errors import DemoError, PlanningError
+from rover_planner.maps.summary import describe_terrain
 from rover_planner.planning.goals import Mission, choose_mission
 from rover_planner.shell.exit_codes import EXIT_NOT_TRAVERSABLE, EXIT_OK
 from rover_planner.shell.progress import Steps
 from rover_planner.worlds.mars_terrain import make_mars_terrain
-from rover_planner.worlds.summary import describe_terrain
 
 COMPILER = "rover_physics.warm_up"
 """Module that compiles the kernels when it is run."""

@@ -19,9 +19,9 @@ from rclpy.node import Node
 from msg_adapters.identity import path_hash
 from msg_adapters.paths import path_to_poses
 from msg_adapters.stamps import stamp_to_ns
+from rover_planner.maps.known_map import stamp_text
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.planning.answering.judgement import Judgement
-from rover_planner.planning.answering.known_map import stamp_text
 from rover_planner.planning.answering.questions import Answer, BadQuestion, PathCheck, Question
 from rover_planner.planning.answering.situation import GivenPath
 from rover_planner.planning.path_geometry import next_given_poses

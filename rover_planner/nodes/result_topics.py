@@ -32,8 +32,8 @@ from msg_adapters.results.verdicts import verdict_to_diagnostics
 from msg_adapters.stamps import ns_to_stamp, stamp_to_ns
 from rover_physics.names import WHEELS
 from rover_physics.rover.model import Rover
+from rover_planner.maps.known_map import stamp_text
 from rover_planner.planning.answering.judgement import Judgement
-from rover_planner.planning.answering.known_map import stamp_text
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
 from rover_planner.ros.deferred_work import DeferredWork
 from rover_planner.ros.publishing.lazy_publisher import LazyPublisher

@@ -29,6 +29,7 @@ from msg_adapters.joints import convert_steering
 from msg_adapters.paths import path_to_poses
 from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_message
 from rover_physics.names import WHEEL_JOINTS
+from rover_planner.maps.summary import describe_terrain
 from rover_planner.nodes.programs import read_words
 from rover_planner.nodes.stop_signals import LOOK_FOR_STOP, StopSignals
 from rover_planner.parameters.declare import declare_parameters
@@ -40,7 +41,6 @@ from rover_planner.ros.refusals import INPUT_ERRORS
 from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
 from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.simulation import Simulation, load_simulation_settings
-from rover_planner.worlds.summary import describe_terrain
 
 NODE_NAME = "rover_simulator"
 COMMANDS = "traction_controller/commands"

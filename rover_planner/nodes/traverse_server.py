@@ -31,6 +31,8 @@ from msg_adapters.results.verdicts import report_to_json
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.numerics.kernel_cache import kernel_cache_note
 from rover_physics.warm_up import EXACT, UNCERTAIN
+from rover_planner.maps.known_map import stamp_text
+from rover_planner.maps.summary import describe_terrain
 from rover_planner.nodes.maps.map_cloud import MapCloud
 from rover_planner.nodes.maps.map_file_service import MapFileService
 from rover_planner.nodes.maps.map_topics import MapTopics
@@ -50,7 +52,6 @@ from rover_planner.parameters.traverse_server import FAN, TraverseServerParamete
 from rover_planner.parameters.unknown import warn_of_unknown_parameters
 from rover_planner.planning.answering.budget import CANCELLED
 from rover_planner.planning.answering.judgement import Judgement
-from rover_planner.planning.answering.known_map import stamp_text
 from rover_planner.planning.answering.map_status import MapStatus
 from rover_planner.planning.answering.questions import (
     Answer,
@@ -74,7 +75,6 @@ from rover_planner.ros.refusals import INPUT_ERRORS
 from rover_planner.ros.requests import subscribe_to_requests
 from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
 from rover_planner.shell.kernels import load_kernels
-from rover_planner.worlds.summary import describe_terrain
 
 NODE_NAME = "traverse_server"
 SWITCH_INTERVAL = 1e-3

@@ -5,6 +5,10 @@ from dataclasses import dataclass
 
 from rover_physics.bounds.path import SIGMAS
 from rover_physics.names import EQUAL, TORQUE_POLICIES
+from rover_planner.maps.living_map import MERGE_RULES, NEWEST
+from rover_planner.maps.map_keeper import AUTO as AUTO_UPDATES
+from rover_planner.maps.map_keeper import MAP_UPDATES
+from rover_planner.maps.unobserved_ground import ALLOW, UNOBSERVED_GROUND
 from rover_planner.parameters.shared import (
     CONTROL_MARGIN,
     base_offset_parameter,
@@ -22,10 +26,6 @@ from rover_planner.parameters.shared import (
     steering_sign_parameter,
 )
 from rover_planner.parameters.table import ParameterError, ParameterTable, parameter
-from rover_planner.worlds.maps.blind_ground import ALLOW, BLIND_GROUND
-from rover_planner.worlds.maps.living_map import MERGE_RULES, NEWEST
-from rover_planner.worlds.maps.map_keeper import AUTO as AUTO_UPDATES
-from rover_planner.worlds.maps.map_keeper import MAP_UPDATES
 
 MIN_PLAN_SPACING = 0.001
 """Smallest plan_spacing other than 0 [m]."""
@@ -201,7 +201,7 @@ class TraverseServerParameters(ParameterTable):
         ALLOW,
         "Whether the belly may pass over ground that was never seen: allow, over filled ground "
         "only (allow_footprint), or refuse.",
-        choices=BLIND_GROUND,
+        choices=UNOBSERVED_GROUND,
     )
     unknown_cells: str = parameter(
         REFUSE,

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Terrains: generated from a seed with relief, craters and rocks, or from a client's file."""
+"""Terrains that are generated from a seed, with relief, craters and rocks."""

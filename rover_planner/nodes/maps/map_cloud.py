@@ -11,7 +11,7 @@ from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.stamps import NANOSECONDS
-from rover_planner.planning.answering.known_map import KnownMap
+from rover_planner.maps.known_map import KnownMap
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.ros.publishing.latched_publisher import LatchedPublisher
 

@@ -9,12 +9,12 @@ from rclpy.node import Node
 
 from msg_adapters.elevation import terrain_to_occupancy_grid
 from rover_physics.files.validation import show_file
+from rover_planner.maps.map_file import MapFileError, MapLimits, open_map
 from rover_planner.nodes.maps.map_topics import MapTopics
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.handover import Handover
 from rover_planner.ros.refusals import INPUT_ERRORS
-from rover_planner.worlds.map_file import MapFileError, MapLimits, open_map
 
 
 class MapFileService:

@@ -18,6 +18,10 @@ from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.sensing import BASE_FRAME
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_planner.maps.living_map import MapSnapshot
+from rover_planner.maps.map_keeper import MapKeeper
+from rover_planner.maps.moved_map import MapMove
+from rover_planner.maps.summary import describe_terrain
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.service_settings import keeper_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
@@ -26,10 +30,6 @@ from rover_planner.ros.logs.repeat_log import RepeatLog
 from rover_planner.ros.map_intake import MapIntake
 from rover_planner.ros.qos import map_subscriptions, sensor_qos
 from rover_planner.ros.qos_warnings import warn_of_mismatch
-from rover_planner.worlds.maps.living_map import MapSnapshot
-from rover_planner.worlds.maps.map_keeper import MapKeeper
-from rover_planner.worlds.maps.moved_map import MapMove
-from rover_planner.worlds.summary import describe_terrain
 
 CLOUD, GRID_MAP = "elevation_cloud", "elevation_map"
 """Topics of maps: PointCloud2, and GridMap where its package is installed."""

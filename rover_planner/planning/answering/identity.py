@@ -4,7 +4,7 @@
 import secrets
 from dataclasses import dataclass, field
 
-from rover_planner.planning.answering.known_map import stamp_text
+from rover_planner.maps.known_map import stamp_text
 from rover_planner.planning.answering.situation import Situation
 from rover_planner.planning.verdict_report import IdentityReport
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from rover_planner.planning.answering.known_map import KnownMap
+from rover_planner.maps.known_map import KnownMap
 from rover_planner.planning.answering.situation import Situation
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.names import SUSPENSION_JOINTS
-from rover_planner.worlds.maps.ground_beneath import Standing
+from rover_planner.maps.ground_beneath import Standing
 
 MAX_AGE = 1.0
 """Age up to which a measurement counts as one of now [s]."""

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from rover_planner.errors import PlanningError
-from rover_planner.planning.answering.known_map import KnownMap
+from rover_planner.maps.known_map import KnownMap
 from rover_planner.planning.lattice.search import Progress
 
 PERIOD = 0.2

@@ -9,14 +9,14 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steering_joints import check_joint_limit
 from rover_physics.terrain.soil_file import soil_named
+from rover_planner.maps.living_map import MergeRules
+from rover_planner.maps.map_file import MapLimits
+from rover_planner.maps.map_keeper import KeeperSettings
+from rover_planner.maps.unobserved_ground import ALLOW
 from rover_planner.parameters.shared import payload_or_none
 from rover_planner.parameters.traverse_server import INTERPOLATE, TraverseServerParameters
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.ways.way_search import LatticeSettings
-from rover_planner.worlds.map_file import MapLimits
-from rover_planner.worlds.maps.blind_ground import ALLOW
-from rover_planner.worlds.maps.living_map import MergeRules
-from rover_planner.worlds.maps.map_keeper import KeeperSettings
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class ServiceSettings:
     max_map_age: float
     """Age from which a map is too old to be used [s]; 0 allows any age."""
     blind_ground: str = ALLOW
-    """What paths over never seen ground under the belly are, one of BLIND_GROUND."""
+    """What paths over never seen ground under the belly are, one of UNOBSERVED_GROUND."""
 
     @property
     def manipulator_joints(self) -> tuple[str, ...]:

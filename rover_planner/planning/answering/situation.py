@@ -12,9 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
+from rover_planner.maps.known_map import KnownMap
+from rover_planner.maps.unobserved_ground import ALLOW
+from rover_planner.maps.unobserved_ground import CODE as BLIND
 from rover_planner.parameters.traverse_server import FAN, LATTICE
 from rover_planner.planning.answering.judgement import Judgement, refusal
-from rover_planner.planning.answering.known_map import KnownMap
 from rover_planner.planning.answering.search_watch import SearchWatch
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.suspension_check import compare_suspension
@@ -27,8 +29,6 @@ from rover_planner.planning.verdict_report import SuspensionReport
 from rover_planner.planning.ways.memory import EdgeMemory
 from rover_planner.planning.ways.question import WayQuestion
 from rover_planner.planning.ways.way_search import GOAL_REFUSED, START_REFUSED, find_way
-from rover_planner.worlds.maps.blind_ground import ALLOW
-from rover_planner.worlds.maps.blind_ground import CODE as BLIND
 
 NO_PATH = "no path was received yet; publish one on ~/path"
 

@@ -14,15 +14,15 @@ from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import pack_ground
+from rover_planner.maps.ground_beneath import Standing
+from rover_planner.maps.known_map import KnownMap
+from rover_planner.maps.layers import CellSources
 from rover_planner.planning.answering.judgement import Judgement
-from rover_planner.planning.answering.known_map import KnownMap
 from rover_planner.planning.answering.measurements import MAX_AGE, Measurements
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.situation import GivenPath, Situation
 from rover_planner.planning.candidates import generate_candidates
 from rover_planner.planning.ways.memory import EdgeMemory
-from rover_planner.worlds.maps.ground_beneath import Standing
-from rover_planner.worlds.maps.layers import CellSources
 
 
 class TraverseService:

@@ -9,10 +9,16 @@ from numpy.typing import NDArray
 
 from rover_physics.rover.model import Rover
 from rover_physics.traversability.verdict import with_refusals
+from rover_planner.maps.unobserved_ground import (
+    ALLOW,
+    CODE,
+    REFUSE,
+    ObservedGround,
+    UnobservedShare,
+)
 from rover_planner.planning.path_planner import PathSearch
 from rover_planner.planning.path_query import Candidate, choose
 from rover_planner.planning.verdict_report import GroundReport
-from rover_planner.worlds.maps.blind_ground import ALLOW, CODE, REFUSE, BlindShare, SeenGround
 
 _REFUSED_COST = (float("inf"), float("inf"))
 
@@ -23,10 +29,10 @@ class BlindCheck:
 
     rover: Rover
     """The rover."""
-    seen: SeenGround
+    seen: ObservedGround
     """What was seen of the map."""
     rule: str
-    """One of BLIND_GROUND."""
+    """One of UNOBSERVED_GROUND."""
 
     def report(self, candidate: Candidate) -> GroundReport:
         """Return how much of the ground under the belly was never seen along a path."""
@@ -84,7 +90,7 @@ class BlindCheck:
     def _name_rule(self) -> str:
         return f"(blind_ground is {self.rule})"
 
-    def _share(self, candidate: Candidate) -> BlindShare:
+    def _share(self, candidate: Candidate) -> UnobservedShare:
         return self.seen.share(self.rover, candidate.poses)
 
 

@@ -13,11 +13,11 @@ from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_poses
 from rover_physics.traversability.pieces import judge_pieces
 from rover_physics.traversability.verdict import Verdict
+from rover_planner.maps.unobserved_ground import CODE
 from rover_planner.planning.lattice.blind_check import BlindCheck
 from rover_planner.planning.lattice.costs import true_cost
 from rover_planner.planning.lattice.primitives import Gear
 from rover_planner.planning.path_query import Candidate, PathQueryOptions, check_path
-from rover_planner.worlds.maps.blind_ground import CODE
 
 
 @dataclass(frozen=True)

@@ -17,14 +17,14 @@ from rover_physics.traversability.pose_classes import (
     RoverOnMap,
     classify_poses,
 )
-from rover_planner.planning.navigation.footprint import find_footprint
-from rover_planner.worlds.maps.changes import (
+from rover_planner.maps.changes import (
     Shift,
     Window,
     find_changes,
     find_overlap,
     have_same_layers,
 )
+from rover_planner.planning.navigation.footprint import find_footprint
 
 TILE = 32
 """Cells along the side of a tile; tiles are judged one after another."""

@@ -6,13 +6,13 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from rover_physics.rover.turning import swing_radius
+from rover_planner.maps.changes import find_changes, have_same_layers
+from rover_planner.maps.unobserved_ground import ALLOW
 from rover_planner.planning.lattice.edges import Edges, JudgedEdges
 from rover_planner.planning.lattice.headings import HEADINGS
 from rover_planner.planning.lattice.nodes import Nodes
 from rover_planner.planning.lattice.primitives import make_primitives
 from rover_planner.planning.ways.question import WayQuestion
-from rover_planner.worlds.maps.blind_ground import ALLOW
-from rover_planner.worlds.maps.changes import find_changes, have_same_layers
 
 
 class EdgeMemory:
@@ -57,7 +57,7 @@ def _is_alike(asked: WayQuestion, question: WayQuestion, known: JudgedEdges, nod
 
 
 def _rule_of(question: WayQuestion) -> str:
-    """Return the rule of BLIND_GROUND of a question."""
+    """Return the rule of UNOBSERVED_GROUND of a question."""
     return ALLOW if question.blind is None else question.blind.rule
 
 

@@ -19,10 +19,13 @@ from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.errors import PlanningError
+from rover_planner.maps.known_map import stamp_text
+from rover_planner.maps.living_map import MapSnapshot
+from rover_planner.maps.map_keeper import MapKeeper
+from rover_planner.maps.moved_map import MapMove
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.identity import Register
 from rover_planner.planning.answering.judgement import Judgement, refusal
-from rover_planner.planning.answering.known_map import stamp_text
 from rover_planner.planning.answering.measurements import Measurements
 from rover_planner.planning.answering.service_settings import (
     keeper_settings,
@@ -43,9 +46,6 @@ from rover_planner.ros.bags.bag_reader import (
 )
 from rover_planner.ros.bags.recorded_drive import Measured, RecordedDrive
 from rover_planner.ros.bags.recorded_frames import RecordedFrames
-from rover_planner.worlds.maps.living_map import MapSnapshot
-from rover_planner.worlds.maps.map_keeper import MapKeeper
-from rover_planner.worlds.maps.moved_map import MapMove
 
 DRIVEN, CHECKED, PLANNED = "driven", "check_path", "can_traverse"
 """Kinds of questions: the drive that was recorded, a path that was recorded, a goal."""

@@ -15,8 +15,8 @@ from msg_adapters.paths import stamped_pose
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.terrain.grid import Terrain, save_terrain
+from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.ros.qos import map_qos
-from rover_planner.worlds.maps.map_keeper import MapKeeper
 from support.grounds import make_terrain, wall_at, waves
 from support.planner_client import GOAL, SERVER, START, ask, verdict_of
 from support.waiting import wait_until

@@ -9,8 +9,8 @@ import pytest
 
 from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.grid import Terrain
+from rover_planner.maps.known_map import KnownMap, stamp_text
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.known_map import KnownMap, stamp_text
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
 from support.grounds import make_terrain, waves

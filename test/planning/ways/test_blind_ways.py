@@ -6,6 +6,14 @@ import pytest
 
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
+from rover_planner.maps.unobserved_ground import (
+    ALLOW_FOOTPRINT,
+    ASSUMED,
+    CODE,
+    REFUSE,
+    ObservedGround,
+    observed_ground,
+)
 from rover_planner.parameters.traverse_server import LATTICE, TraverseServerParameters
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
@@ -16,14 +24,6 @@ from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.ways.memory import EdgeMemory
 from rover_planner.planning.ways.question import WayQuestion
 from rover_planner.planning.ways.way_search import FOUND, START_REFUSED, LatticeSettings, find_way
-from rover_planner.worlds.maps.blind_ground import (
-    ALLOW_FOOTPRINT,
-    ASSUMED,
-    CODE,
-    REFUSE,
-    SeenGround,
-    seen_ground,
-)
 
 LSR1 = load_rover("lsr1")
 OPTIONS = PathQueryOptions(waypoint_spacing=0.04).change(control_margin=0.0)
@@ -38,9 +38,9 @@ def flat_with_hole() -> Terrain:
     return Terrain(np.where(hole, np.nan, 0.0), 0.05, (-1.0, -2.0))
 
 
-def ask(rule: str, seen: SeenGround | None = None, start=START) -> WayQuestion:
+def ask(rule: str, seen: ObservedGround | None = None, start=START) -> WayQuestion:
     ground = flat_with_hole()
-    check = BlindCheck(LSR1, seen or seen_ground(ground, None), rule)
+    check = BlindCheck(LSR1, seen or observed_ground(ground, None), rule)
     return WayQuestion(LSR1, ground, start, GOAL, OPTIONS, check)
 
 
@@ -58,7 +58,7 @@ def test_a_search_leads_around_what_the_rule_refuses(rule):
     assert judged.traversable, judged.reason
     poses = judged.candidate.poses
     assert np.abs(poses[:, 1]).max() > 0.2
-    share = seen_ground(flat_with_hole(), None).share(LSR1, poses)
+    share = observed_ground(flat_with_hole(), None).share(LSR1, poses)
     assert share.blind_share == 0.0 and share.first_refused(rule) == -1
 
 
@@ -85,10 +85,10 @@ def test_a_start_on_refused_ground_is_refused_with_the_rule():
 def test_what_is_seen_later_is_judged_anew():
     plain = find_way(WayQuestion(LSR1, flat_with_hole(), START, GOAL, OPTIONS), LONG)
     assert plain.outcome == FOUND and np.abs(plain.path.poses[:, 1]).max() < 0.05
-    memory, seen = EdgeMemory(), seen_ground(flat_with_hole(), None)
+    memory, seen = EdgeMemory(), observed_ground(flat_with_hole(), None)
     around = find_way(ask(ALLOW_FOOTPRINT), LONG, memory)
     kinds = np.where(seen.kinds == 0, 0, ASSUMED).astype(np.uint8)
-    filled = SeenGround(seen.terrain, kinds)
+    filled = ObservedGround(seen.terrain, kinds)
     warm = find_way(ask(ALLOW_FOOTPRINT, filled), LONG, memory)
     assert np.abs(around.path.poses[:, 1]).max() > 0.2
     assert np.abs(warm.path.poses[:, 1]).max() < 0.05

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.worlds.maps.ground_beneath import GroundBeneath, Standing, find_ground_beneath
-from rover_planner.worlds.maps.living_map import LivingMap, MapSnapshot, MergeRules
-from rover_planner.worlds.maps.moved_map import MapMove, move_map
+from rover_planner.maps.ground_beneath import GroundBeneath, Standing, find_ground_beneath
+from rover_planner.maps.living_map import LivingMap, MapSnapshot, MergeRules
+from rover_planner.maps.moved_map import MapMove, move_map
 
 AUTO, MERGE, REPLACE = "auto", "merge", "replace"
 MAP_UPDATES = (AUTO, MERGE, REPLACE)

@@ -14,8 +14,8 @@ from rover_physics.numerics.read_only import seal_array
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.errors import PlanningError
-from rover_planner.worlds.maps.cells import CellBox, CellGrid, grid_of
-from rover_planner.worlds.maps.layers import (
+from rover_planner.maps.cells import CellBox, CellGrid, grid_of
+from rover_planner.maps.layers import (
     CONTACT,
     FIRST_NAMES,
     FOOTPRINT,

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.terrain.grid import Terrain
-from rover_planner.worlds.maps.cells import CellBox, CellGrid, grid_of
-from rover_planner.worlds.maps.changes import LAYERS
+from rover_planner.maps.cells import CellBox, CellGrid, grid_of
+from rover_planner.maps.changes import LAYERS
 
 MAX_OFF_CENTRE = 0.02
 """Largest distance between the centres of a map's cells and those of the grid at which the map

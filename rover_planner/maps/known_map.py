@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from rover_physics.terrain.grid import Terrain
-from rover_planner.worlds.maps.blind_ground import SeenGround, seen_ground
-from rover_planner.worlds.maps.layers import CellSources
+from rover_planner.maps.layers import CellSources
+from rover_planner.maps.unobserved_ground import ObservedGround, observed_ground
 
 NANOSECONDS = 1_000_000_000
 """Nanoseconds in a second."""
@@ -35,9 +35,9 @@ class KnownMap:
     """Frame of the map; empty if it has none."""
 
     @cached_property
-    def seen(self) -> SeenGround:
+    def seen(self) -> ObservedGround:
         """What was seen of the map; interpolated gaps were not. Computed on first use."""
-        return seen_ground(self.received, self.cells)
+        return observed_ground(self.received, self.cells)
 
     def age(self, ros_time: int, steady_time: float) -> float:
         """Return the age [s]: the longer of the times since its stamp and since its arrival.

@@ -8,16 +8,16 @@ import pytest
 
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.worlds.maps.blind_ground import (
+from rover_planner.maps.layers import FOOTPRINT, CellSources
+from rover_planner.maps.unobserved_ground import (
     ALLOW,
     ALLOW_FOOTPRINT,
     REFUSE,
     SEEN,
     UNSEEN,
-    SeenGround,
-    seen_ground,
+    ObservedGround,
+    observed_ground,
 )
-from rover_planner.worlds.maps.layers import FOOTPRINT, CellSources
 
 LSR1 = load_rover("lsr1")  # its belly is 0.6 m x 0.4 m
 PATH = np.column_stack([np.arange(0.0, 2.0, 0.02), np.zeros(100), np.zeros(100)])
@@ -35,7 +35,7 @@ def with_holes(x_low, x_high, value=np.nan):
 
 
 def test_the_share_is_that_of_the_cells_under_the_belly():
-    share = seen_ground(with_holes(1.0, 1.5), None).share(LSR1, PATH)
+    share = observed_ground(with_holes(1.0, 1.5), None).share(LSR1, PATH)
     # The belly sweeps x from -0.3 to 2.28 m: 53 columns of cells, of which 10 are unknown.
     assert share.blind_share == pytest.approx(10 / 53, abs=0.01)
     assert share.footprint_share == 0.0
@@ -48,7 +48,7 @@ def test_the_start_footprint_is_told_apart():
     x = -2.0 + 0.05 * np.arange(161)
     source[:, x < 0.5] = FOOTPRINT
     sources = CellSources(source, np.zeros(source.shape))
-    share = seen_ground(terrain, sources).share(LSR1, PATH)
+    share = observed_ground(terrain, sources).share(LSR1, PATH)
     assert share.blind_share == share.footprint_share == pytest.approx(16 / 53, abs=0.02)
     assert share.first == 0 and share.first_beyond_footprint == -1
     assert [share.first_refused(rule) for rule in (ALLOW, ALLOW_FOOTPRINT, REFUSE)] == [-1, -1, 0]
@@ -57,11 +57,11 @@ def test_the_start_footprint_is_told_apart():
 def test_ground_off_the_map_was_not_seen():
     kinds = np.full((81, 161), SEEN, np.uint8)
     far = PATH + np.array([5.0, 0.0, 0.0])
-    share = SeenGround(ground(), kinds).share(LSR1, far)
+    share = ObservedGround(ground(), kinds).share(LSR1, far)
     assert share.first == share.first_beyond_footprint
     assert 5.6 < far[share.first, 0] + 0.3 + 0.06 < 6.2
     assert share.blind_share == 0.0  # the shares are those of cells on the map
-    away = SeenGround(ground(), kinds).share(LSR1, PATH + np.array([1e7, 0.0, 0.0]))
+    away = ObservedGround(ground(), kinds).share(LSR1, PATH + np.array([1e7, 0.0, 0.0]))
     assert (away.blind_share, away.first) == (1.0, 0)
 
 
@@ -69,7 +69,7 @@ def test_a_long_path_off_the_map_takes_no_time():
     x = np.arange(0.0, 20_000.0, 0.02)
     path = np.column_stack([x, 0.0 * x, 0.0 * x])
     began = time.process_time()
-    share = seen_ground(ground(), None).share(LSR1, path)
+    share = observed_ground(ground(), None).share(LSR1, path)
     assert time.process_time() - began < 2.0
     assert 5.6 < path[share.first, 0] + 0.3 < 6.2 + 0.6
 
@@ -77,10 +77,10 @@ def test_a_long_path_off_the_map_takes_no_time():
 def test_a_long_path_counts_each_cell_once():
     kinds = np.full((81, 161), SEEN, np.uint8)
     kinds[:, 60] = UNSEEN
-    seen = SeenGround(ground(), kinds)
+    seen = ObservedGround(ground(), kinds)
     beside = np.full((81, 161), SEEN, np.uint8)
     beside[46:] = UNSEEN  # y of 0.3 m and more; the belly ends at 0.2 m
-    assert SeenGround(ground(), beside).share(LSR1, PATH).blind_share == 0.0
+    assert ObservedGround(ground(), beside).share(LSR1, PATH).blind_share == 0.0
     often = np.vstack([PATH] * 30)
     whole, once = seen.share(LSR1, often), seen.share(LSR1, PATH)
     assert whole.blind_share == once.blind_share > 0.0 and whole.first == once.first

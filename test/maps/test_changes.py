@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rover_physics.terrain.grid import Terrain
-from rover_planner.worlds.maps.changes import find_changes, find_overlap, have_same_layers
+from rover_planner.maps.changes import find_changes, find_overlap, have_same_layers
 
 
 def ground(seed=0, shape=(12, 15)) -> Terrain:

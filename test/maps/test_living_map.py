@@ -8,8 +8,8 @@ import pytest
 
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
-from rover_planner.worlds.maps.layers import LOADED, UNKNOWN, lay_onto
-from rover_planner.worlds.maps.living_map import SUREST, LivingMap, MergeRules
+from rover_planner.maps.layers import LOADED, UNKNOWN, lay_onto
+from rover_planner.maps.living_map import SUREST, LivingMap, MergeRules
 from support.grounds import make_terrain, waves
 
 TOPIC = "elevation_cloud"

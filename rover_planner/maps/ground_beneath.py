@@ -16,8 +16,8 @@ from rover_physics.prediction.evaluation import new_work
 from rover_physics.rover.linkage import pack_linkage, place
 from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
-from rover_planner.worlds.maps.cells import CellBox, CellGrid
-from rover_planner.worlds.maps.layers import Patch
+from rover_planner.maps.cells import CellBox, CellGrid
+from rover_planner.maps.layers import Patch
 
 CONTACT_LENGTH = 0.25
 """Distance along a wheel's plane from its contact up to which the ground is measured [radii]."""

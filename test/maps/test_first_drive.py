@@ -9,6 +9,8 @@ import numpy as np
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.numerics.quaternions import rpy_from_xyzw
 from rover_physics.terrain.grid import Terrain
+from rover_planner.maps.ground_beneath import Standing
+from rover_planner.maps.map_keeper import MERGE, MapKeeper
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
 from rover_planner.planning.answering.service_settings import (
@@ -17,8 +19,6 @@ from rover_planner.planning.answering.service_settings import (
 )
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.simulator.simulation import Simulation, load_simulation_settings
-from rover_planner.worlds.maps.ground_beneath import Standing
-from rover_planner.worlds.maps.map_keeper import MERGE, MapKeeper
 from support.grounds import make_terrain, waves
 
 CAMERA = {"sensor_field_of_view": math.radians(60.0), "sensor_least_range": 0.5}

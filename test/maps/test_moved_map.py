@@ -9,11 +9,11 @@ import pytest
 from rover_physics import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
+from rover_planner.maps.cells import CellGrid
+from rover_planner.maps.layers import lay_onto
+from rover_planner.maps.map_keeper import MERGE, KeeperSettings, MapKeeper
+from rover_planner.maps.moved_map import MAX_LEAN, MapMove, move_map
 from rover_planner.planning.navigation.transforms import Rigid
-from rover_planner.worlds.maps.cells import CellGrid
-from rover_planner.worlds.maps.layers import lay_onto
-from rover_planner.worlds.maps.map_keeper import MERGE, KeeperSettings, MapKeeper
-from rover_planner.worlds.maps.moved_map import MAX_LEAN, MapMove, move_map
 from support.grounds import make_terrain, waves
 
 CELL = 0.05

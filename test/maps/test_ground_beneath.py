@@ -10,9 +10,9 @@ from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path
-from rover_planner.worlds.maps.ground_beneath import Standing, find_ground_beneath
-from rover_planner.worlds.maps.layers import CONTACT, FOOTPRINT
-from rover_planner.worlds.maps.living_map import LivingMap
+from rover_planner.maps.ground_beneath import Standing, find_ground_beneath
+from rover_planner.maps.layers import CONTACT, FOOTPRINT
+from rover_planner.maps.living_map import LivingMap
 from support.grounds import make_terrain, rocky, waves
 
 ROVERS = {name: load_rover(name) for name in ("lsr1", "m2020")}

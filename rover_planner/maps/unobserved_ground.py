@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.worlds.maps.layers import FOOTPRINT, CellSources
+from rover_planner.maps.layers import FOOTPRINT, CellSources
 
 ALLOW, ALLOW_FOOTPRINT, REFUSE = "allow", "allow_footprint", "refuse"
-BLIND_GROUND = (ALLOW, ALLOW_FOOTPRINT, REFUSE)
+UNOBSERVED_GROUND = (ALLOW, ALLOW_FOOTPRINT, REFUSE)
 """Values of the parameter blind_ground: paths whose belly passes over ground that was never seen
 are allowed, allowed over the start footprint only, or refused."""
 CODE = "blind_ground"
@@ -27,7 +27,7 @@ CHUNK = 500_000
 
 
 @dataclass(frozen=True)
-class BlindShare:
+class UnobservedShare:
     """Ground under the belly along a path."""
 
     blind_share: float
@@ -35,19 +35,19 @@ class BlindShare:
     footprint_share: float
     """Share of the cells under the belly that were filled in as start footprint."""
     first: int
-    """First waypoint whose belly is over blind ground, -1 if none."""
+    """First waypoint whose belly is over unobserved ground, -1 if none."""
     first_beyond_footprint: int
     """The same without the start footprint."""
 
     def first_refused(self, rule: str) -> int:
-        """Return the first waypoint that a rule of BLIND_GROUND refuses, -1 if none."""
+        """Return the first waypoint that a rule of UNOBSERVED_GROUND refuses, -1 if none."""
         if rule == ALLOW:
             return -1
         return self.first if rule == REFUSE else self.first_beyond_footprint
 
 
 @dataclass(frozen=True, eq=False)
-class SeenGround:
+class ObservedGround:
     """The seen part of a map."""
 
     terrain: Terrain
@@ -55,14 +55,14 @@ class SeenGround:
     kinds: NDArray[np.uint8]
     """(ny, nx) SEEN, ASSUMED or UNSEEN."""
 
-    def share(self, rover: Rover, poses: NDArray[np.float64]) -> BlindShare:
-        """Return the blind share under the belly of a rover along poses (n, 3).
+    def share(self, rover: Rover, poses: NDArray[np.float64]) -> UnobservedShare:
+        """Return the share of unobserved ground under the belly of a rover along poses (n, 3).
 
         The belly is the rectangle of the rover file, seen from above. The shares are those of
         cells on the map; ground off the map counts for the first waypoints.
         """
         if self._is_seen_around(rover, poses):
-            return BlindShare(0.0, 0.0, -1, -1)
+            return UnobservedShare(0.0, 0.0, -1, -1)
         swept = np.zeros(self.kinds.shape, bool)
         poses, waypoints = self._spread_out(rover, poses)
         near = self._is_near(rover, poses)
@@ -74,16 +74,16 @@ class SeenGround:
                 found += waypoints[here][(kinds > best).any(axis=1)][:1].tolist()
         counts = np.bincount(self.kinds[swept], minlength=3)
         if not counts.any():
-            return BlindShare(1.0, 0.0, 0, 0)
+            return UnobservedShare(1.0, 0.0, 0, 0)
         total, assumed = int(counts.sum()), int(counts[ASSUMED])
-        blind = (assumed + int(counts[UNSEEN])) / total
+        unobserved = (assumed + int(counts[UNSEEN])) / total
         first, beyond = (min(found, default=-1) for found in firsts.values())
-        return BlindShare(blind, assumed / total, first, beyond)
+        return UnobservedShare(unobserved, assumed / total, first, beyond)
 
     def refused_below(
         self, rover: Rover, poses: NDArray[np.float64], rule: str
     ) -> NDArray[np.bool_]:
-        """Return (n,) whether a rule of BLIND_GROUND refuses the ground under the belly at poses.
+        """Return (n,) whether a rule of UNOBSERVED_GROUND refuses the ground under the belly.
 
         Ground off the map counts as never seen, as in `share`.
         """
@@ -163,7 +163,7 @@ def _corner_distance(rover: Rover) -> float:
     return max(math.hypot(x, y) for x in rover.belly.x for y in rover.belly.y)
 
 
-def seen_ground(received: Terrain, sources: CellSources | None) -> SeenGround:
+def observed_ground(received: Terrain, sources: CellSources | None) -> ObservedGround:
     """Return what was seen of a map.
 
     Args:
@@ -173,4 +173,4 @@ def seen_ground(received: Terrain, sources: CellSources | None) -> SeenGround:
     kinds = np.where(np.isnan(received.elevation), UNSEEN, SEEN).astype(np.uint8)
     if sources is not None:
         kinds[(sources.source == FOOTPRINT) & (kinds == SEEN)] = ASSUMED
-    return SeenGround(received, kinds)
+    return ObservedGround(received, kinds)
