@@ -79,10 +79,7 @@ def predict(
     from rover_physics.prediction.sweep_options import SweepOptions
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.terrain.grid import load_terrain
-    from rover_physics.traversability.classification import classify_judged
     from rover_physics.traversability.judge import judge_path, judge_poses
-    from rover_physics.traversability.partwise import PartwiseJudge
-    from rover_physics.traversability.torque_ranges import find_torque_ranges
     from rover_planner.command.prediction_files import (
         read_curvature,
         read_poses,
@@ -115,10 +112,14 @@ def predict(
         def find_ranges() -> "TorqueRanges | None":
             if not torque_ranges:
                 return None
+            from rover_physics.traversability.torque_ranges import find_torque_ranges
+
             progress("find the ranges of the torques")
             return find_torque_ranges(model, ground, path, options, curvature)
 
         if len(path) > MAX_IN_MEMORY and not classes:
+            from rover_physics.traversability.partwise import PartwiseJudge
+
             with writing_parts(out, len(path), on_soil, assumed) as file:
                 judge = PartwiseJudge(
                     model, ground, path, options, curvature=curvature, sigmas=sigmas
@@ -136,6 +137,8 @@ def predict(
                 )
             found = None
             if classes:
+                from rover_physics.traversability.classification import classify_judged
+
                 progress("classify the waypoints")
                 found = classify_judged(
                     model, ground, prediction, verdict, options, sigmas=sigmas, curvature=curvature

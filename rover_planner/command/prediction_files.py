@@ -5,7 +5,7 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -13,15 +13,17 @@ from numpy.typing import DTypeLike, NDArray
 from rover_physics.bounds.path import BOUNDED_VALUES
 from rover_physics.errors import RoverFileError
 from rover_physics.files.npz_file import ArrayHeader, open_npz, write_npz
-from rover_physics.files.npz_parts import NpzParts
 from rover_physics.files.validation import errors_of, show_file
 from rover_physics.results.path_prediction import PathPrediction, prediction_of
 from rover_physics.results.record import QUANTITIES
-from rover_physics.traversability.classification import ClassifiedWaypoint
-from rover_physics.traversability.torque_ranges import TorqueRanges
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import Assumptions, read_assumptions, write_assumptions
+
+if TYPE_CHECKING:
+    from rover_physics.files.npz_parts import NpzParts
+    from rover_physics.traversability.classification import ClassifiedWaypoint
+    from rover_physics.traversability.torque_ranges import TorqueRanges
 
 Shape = tuple[int, ...]
 
@@ -212,8 +214,8 @@ def write_prediction(
     verdict: Verdict,
     *,
     on_soil: bool = False,
-    classes: Sequence[ClassifiedWaypoint] | None = None,
-    ranges: TorqueRanges | None = None,
+    classes: "Sequence[ClassifiedWaypoint] | None" = None,
+    ranges: "TorqueRanges | None" = None,
     assumptions: Assumptions | None = None,
 ) -> None:
     """Write a prediction and its verdict to an .npz file; the file name is not extended.
@@ -261,6 +263,8 @@ def writing_parts(
     Raises:
         PlanningError: A file cannot be written.
     """
+    from rover_physics.files.npz_parts import NpzParts
+
     with _errors_of(path), NpzParts(path.absolute().parent, count) as parts:
         yield PartsFile(path, parts, on_soil, assumptions)
 
@@ -269,7 +273,7 @@ class PartsFile:
     """A file of a prediction whose waypoints come part by part."""
 
     def __init__(
-        self, path: Path, parts: NpzParts, on_soil: bool, assumptions: Assumptions | None
+        self, path: Path, parts: "NpzParts", on_soil: bool, assumptions: Assumptions | None
     ):
         self._path, self._parts, self._on_soil = path, parts, on_soil
         self._assumptions = assumptions
@@ -280,7 +284,7 @@ class PartsFile:
         self._parts.add(_rows_of(prediction, self._on_soil))
         self._last = prediction
 
-    def close(self, verdict: Verdict, ranges: TorqueRanges | None = None) -> None:
+    def close(self, verdict: Verdict, ranges: "TorqueRanges | None" = None) -> None:
         """Write the file with the verdict on all waypoints; arguments as `write_prediction`."""
         assert self._last is not None
         longest = max(1, max(map(len, verdict.reasons)))
@@ -308,7 +312,7 @@ def _summary_of(
     verdict: Verdict,
     prediction: PathPrediction,
     assumptions: Assumptions | None,
-    ranges: TorqueRanges | None,
+    ranges: "TorqueRanges | None",
 ) -> dict[str, Any]:
     """Return the arrays about the whole path, and torque ranges."""
     arrays: dict[str, Any] = {

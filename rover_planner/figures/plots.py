@@ -147,7 +147,7 @@ def _map_legend(terrain: Terrain) -> list[Line2D]:
             "markersize": 9,
             "markeredgecolor": "#888888",
         }
-        handles.append(_key("unknown ground", color=UNKNOWN, **square))
+        handles.append(_key("unknown ground", color=UNKNOWN, markeredgecolor="#888888", **square))
     return handles
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Numbers of a rover file: found by dotted names, such as suspension.wheels.front.x, and changed."""
+"""Numbers of a rover file: found by dotted names, such as belly.z, changed, and offered."""
 
 import dataclasses
 import difflib
