@@ -104,7 +104,6 @@ def predict(
         tool_force=tool_force,
         tool_moment=tool_moment,
     )
-    on_soil = soil is not None or bool(ground.soil_names)
     assumed = assume(model, options, sigmas)
     with show_progress() as progress:
         progress(f"sweep {len(path)} poses of {model.name} (the first run compiles the model)")
@@ -120,7 +119,7 @@ def predict(
         if len(path) > MAX_IN_MEMORY and not classes:
             from rover_physics.traversability.partwise import PartwiseJudge
 
-            with writing_parts(out, len(path), on_soil, assumed) as file:
+            with writing_parts(out, len(path), assumed) as file:
                 judge = PartwiseJudge(
                     model, ground, path, options, curvature=curvature, sigmas=sigmas
                 )
@@ -144,13 +143,7 @@ def predict(
                     model, ground, prediction, verdict, options, sigmas=sigmas, curvature=curvature
                 )
             write_prediction(
-                out,
-                prediction,
-                verdict,
-                on_soil=on_soil,
-                classes=found,
-                ranges=find_ranges(),
-                assumptions=assumed,
+                out, prediction, verdict, classes=found, ranges=find_ranges(), assumptions=assumed
             )
     typer.echo(f"wrote {out}: {_summarise(len(path), verdict)}")
 

@@ -28,34 +28,15 @@ if TYPE_CHECKING:
 Shape = tuple[int, ...]
 
 ARRAYS: dict[str, Shape] = {
+    "poses": (3,),
+    "status": (),
     "settled": (),
     "position": (3,),
     "roll": (),
     "pitch": (),
-    "rocker_angle": (2,),
     "bogie_angle": (2,),
-    "wheel_centres": (6, 3),
-    "wheel_loads": (6,),
-    "tangential": (6,),
-    "lateral": (6,),
-    "friction_utilisation": (6,),
-    "slip_ratio": (6,),
-    "torque_saturation": (6,),
-    "tip_over_ratio": (),
-    "tip_over_force_angle": (),
-    "belly_clearance": (),
-    "steering_angle": (6,),
-    "wheel_speed": (6,),
-    "energy": (),
-    "time": (),
-}
+} | {one.name: one.shape for one in QUANTITIES if one.is_kept}
 """Arrays of a prediction in the output file, under the same names: shape of a waypoint's part."""
-REPLAY_ARRAYS: dict[str, Shape] = {"poses": (3,), "status": ()} | {
-    one.name: one.shape for one in QUANTITIES if one.is_kept and one.name not in ARRAYS
-}
-"""Further arrays in the file that `rover_planner view` needs to replay it."""
-SOIL_ARRAYS = ("sinkage", "motion_resistance")
-"""Further arrays in the file if a soil was given or the terrain has soils."""
 NUMBERS: tuple[DTypeLike, str, str] = (np.float64, "fiu", "numbers")
 FLAGS: tuple[DTypeLike, str, str] = (np.bool_, "b", "bools")
 TYPES = {"settled": FLAGS, "falling": FLAGS, "status": (np.int8, "i", "whole numbers")}
@@ -135,14 +116,13 @@ def read_prediction(path: Path) -> tuple[PathPrediction, tuple[str, ...]]:
         if reason.dtype.kind != "U" or len(reason.shape) != 1 or reason.size == 0:
             raise RoverFileError("reason must be an array (n,) of texts, one for each waypoint")
         _check_count("reason", reason.size)
-        shapes = ARRAYS | REPLAY_ARRAYS
-        for name, shape in shapes.items():
+        for name, shape in ARRAYS.items():
             _check_header(archive.read_header(name), name, (reason.size, *shape))
         arrays: dict[str, Any] = {
             name: archive.read(
                 name, TYPES.get(name, NUMBERS)[0], most=8 * reason.size * math.prod(shape)
             )
-            for name, shape in shapes.items()
+            for name, shape in ARRAYS.items()
         }
         reasons = tuple(archive.read("reason", most=MAX_REASONS).tolist())
     _check_numbers(path, arrays)
@@ -213,7 +193,6 @@ def write_prediction(
     prediction: PathPrediction,
     verdict: Verdict,
     *,
-    on_soil: bool = False,
     classes: "Sequence[ClassifiedWaypoint] | None" = None,
     ranges: "TorqueRanges | None" = None,
     assumptions: Assumptions | None = None,
@@ -228,7 +207,6 @@ def write_prediction(
         path: The file; an existing one is overwritten.
         prediction: Prediction of n waypoints.
         verdict: Verdict on them.
-        on_soil: Whether to write SOIL_ARRAYS (n, 6), in m and N.
         classes: Class of each waypoint, written as `traversability_class`, `class_constraint` and
             `class_wheel` (n,) text and `class_margin` (n,).
         ranges: Torque ranges, written as `torque_range` (n, 6, 2), minimum and maximum [N m].
@@ -237,7 +215,7 @@ def write_prediction(
     Raises:
         PlanningError: The file cannot be written.
     """
-    arrays = _rows_of(prediction, on_soil) | _summary_of(verdict, prediction, assumptions, ranges)
+    arrays = _rows_of(prediction) | _summary_of(verdict, prediction, assumptions, ranges)
     arrays["reason"] = np.array(verdict.reasons, dtype=np.str_)
     if classes is not None:
         for name in ("traversability_class", "constraint", "wheel"):
@@ -250,14 +228,13 @@ def write_prediction(
 
 @contextmanager
 def writing_parts(
-    path: Path, count: int, on_soil: bool, assumptions: Assumptions | None = None
+    path: Path, count: int, assumptions: Assumptions | None = None
 ) -> Iterator["PartsFile"]:
     """Write a file as `write_prediction`, for a path that is too long to be kept in memory.
 
     Args:
         path: The file; an existing one is overwritten. Temporary files are made beside it.
         count: Number of waypoints.
-        on_soil: As for `write_prediction`.
         assumptions: As for `write_prediction`.
 
     Raises:
@@ -266,22 +243,19 @@ def writing_parts(
     from rover_physics.files.npz_parts import NpzParts
 
     with _errors_of(path), NpzParts(path.absolute().parent, count) as parts:
-        yield PartsFile(path, parts, on_soil, assumptions)
+        yield PartsFile(path, parts, assumptions)
 
 
 class PartsFile:
     """A file of a prediction whose waypoints come part by part."""
 
-    def __init__(
-        self, path: Path, parts: "NpzParts", on_soil: bool, assumptions: Assumptions | None
-    ):
-        self._path, self._parts, self._on_soil = path, parts, on_soil
-        self._assumptions = assumptions
+    def __init__(self, path: Path, parts: "NpzParts", assumptions: Assumptions | None):
+        self._path, self._parts, self._assumptions = path, parts, assumptions
         self._last: PathPrediction | None = None
 
     def take(self, prediction: PathPrediction) -> None:
         """Take the prediction of the next waypoints."""
-        self._parts.add(_rows_of(prediction, self._on_soil))
+        self._parts.add(_rows_of(prediction))
         self._last = prediction
 
     def close(self, verdict: Verdict, ranges: "TorqueRanges | None" = None) -> None:
@@ -295,10 +269,9 @@ class PartsFile:
         self._parts.write(self._path, summary)
 
 
-def _rows_of(prediction: PathPrediction, on_soil: bool) -> dict[str, Any]:
+def _rows_of(prediction: PathPrediction) -> dict[str, Any]:
     """Return the arrays that have a row for each waypoint."""
-    names = (*ARRAYS, *REPLAY_ARRAYS, *(SOIL_ARRAYS if on_soil else ()))
-    rows = {name: getattr(prediction, name) for name in names}
+    rows = {name: getattr(prediction, name) for name in ARRAYS}
     rows["steering_angle"] = np.where(
         prediction.settled[:, None], prediction.steering_angle, np.nan
     )
