@@ -39,7 +39,7 @@ def reachable(
 
         check_picture(picture)
     from rover_planner.shell.progress import show_progress
-    from rover_planner.survey.reachable import find_reachable, say_why_none
+    from rover_planner.survey.reachable import explain_no_area, find_reachable
     from rover_planner.survey.store import SurveyStore
 
     opened = SurveyStore(store)
@@ -60,7 +60,7 @@ def reachable(
         end = [left + area.farthest[1] * notes.cell, low + area.farthest[0] * notes.cell]
     report = {
         "cells": area.cells,
-        "reason": "" if area.cells else say_why_none(opened, area.start),
+        "reason": "" if area.cells else explain_no_area(opened, area.start),
         "area": round(area.area, 6),
         "cells_without_return": area.reached - area.cells,
         "longest": None if area.longest is None else round(area.longest, 3),
