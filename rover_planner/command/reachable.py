@@ -45,7 +45,7 @@ def reachable(
     opened = SurveyStore(store)
     with show_progress() as progress:
         progress("load the survey")
-        area = find_reachable(opened, *place, report=progress)
+        area = find_reachable(opened, place[0], place[1], report=progress)
     notes, end = opened.notes, None
     if geotiff is not None:
         from rover_planner.survey.cog import write_cog
