@@ -1,9 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Command-line helpers for tests: input files of `rover_planner`, and a check of refusals."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -30,18 +27,6 @@ def predict_words(
 ) -> list[str]:
     """Return the arguments of `rover_planner predict` for files of a folder."""
     return ["predict", str(rover), *(str(folder / name) for name in (terrain, poses, out))]
-
-
-def run_program(*words: str) -> subprocess.CompletedProcess:
-    """Run `rover_planner` in a separate process."""
-    return subprocess.run(
-        [sys.executable, "-m", "rover_planner", *words],
-        cwd=REPOSITORY,
-        env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
-        capture_output=True,
-        text=True,
-        timeout=600,
-    )
 
 
 def assert_refused(capfd, code: int, word: str) -> None:

@@ -116,11 +116,8 @@ def _ask(
         answer = find_path(question, settings)
     if answer.path is not None:
         options = question.options.model
-        on_soil = options.soil is not None or bool(question.terrain.soil_names)
         assumed = assume(question.rover, options, question.options.map_sigmas)
-        write_prediction(
-            out, answer.path.prediction, answer.path.verdict, on_soil=on_soil, assumptions=assumed
-        )
+        write_prediction(out, answer.path.prediction, answer.path.verdict, assumptions=assumed)
     if picture is not None:
         from rover_planner.figures.path_picture import draw_path
 

@@ -79,10 +79,7 @@ def predict(
     from rover_physics.prediction.sweep_options import SweepOptions
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.terrain.grid import load_terrain
-    from rover_physics.traversability.classification import classify_judged
     from rover_physics.traversability.judge import judge_path, judge_poses
-    from rover_physics.traversability.partwise import PartwiseJudge
-    from rover_physics.traversability.torque_ranges import find_torque_ranges
     from rover_planner.command.prediction_files import (
         read_curvature,
         read_poses,
@@ -107,7 +104,6 @@ def predict(
         tool_force=tool_force,
         tool_moment=tool_moment,
     )
-    on_soil = soil is not None or bool(ground.soil_names)
     assumed = assume(model, options, sigmas)
     with show_progress() as progress:
         progress(f"sweep {len(path)} poses of {model.name} (the first run compiles the model)")
@@ -115,11 +111,15 @@ def predict(
         def find_ranges() -> "TorqueRanges | None":
             if not torque_ranges:
                 return None
+            from rover_physics.traversability.torque_ranges import find_torque_ranges
+
             progress("find the ranges of the torques")
             return find_torque_ranges(model, ground, path, options, curvature)
 
         if len(path) > MAX_IN_MEMORY and not classes:
-            with writing_parts(out, len(path), on_soil, assumed) as file:
+            from rover_physics.traversability.partwise import PartwiseJudge
+
+            with writing_parts(out, len(path), assumed) as file:
                 judge = PartwiseJudge(
                     model, ground, path, options, curvature=curvature, sigmas=sigmas
                 )
@@ -136,18 +136,14 @@ def predict(
                 )
             found = None
             if classes:
+                from rover_physics.traversability.classification import classify_judged
+
                 progress("classify the waypoints")
                 found = classify_judged(
                     model, ground, prediction, verdict, options, sigmas=sigmas, curvature=curvature
                 )
             write_prediction(
-                out,
-                prediction,
-                verdict,
-                on_soil=on_soil,
-                classes=found,
-                ranges=find_ranges(),
-                assumptions=assumed,
+                out, prediction, verdict, classes=found, ranges=find_ranges(), assumptions=assumed
             )
     typer.echo(f"wrote {out}: {_summarise(len(path), verdict)}")
 

@@ -5,54 +5,38 @@ import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from rover_physics.bounds.path import BOUNDED_VALUES
 from rover_physics.errors import RoverFileError
-from rover_physics.files.npz_file import ArrayHeader, NpzParts, open_npz, write_npz
+from rover_physics.files.npz_file import ArrayHeader, open_npz, write_npz
 from rover_physics.files.validation import errors_of, show_file
 from rover_physics.results.path_prediction import PathPrediction, prediction_of
 from rover_physics.results.record import QUANTITIES
-from rover_physics.traversability.classification import ClassifiedWaypoint
-from rover_physics.traversability.torque_ranges import TorqueRanges
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import Assumptions, read_assumptions, write_assumptions
 
+if TYPE_CHECKING:
+    from rover_physics.files.npz_file import NpzParts
+    from rover_physics.traversability.classification import ClassifiedWaypoint
+    from rover_physics.traversability.torque_ranges import TorqueRanges
+
 Shape = tuple[int, ...]
 
 ARRAYS: dict[str, Shape] = {
+    "poses": (3,),
+    "status": (),
     "settled": (),
     "position": (3,),
     "roll": (),
     "pitch": (),
-    "rocker_angle": (2,),
     "bogie_angle": (2,),
-    "wheel_centres": (6, 3),
-    "wheel_loads": (6,),
-    "tangential": (6,),
-    "lateral": (6,),
-    "friction_utilisation": (6,),
-    "slip_ratio": (6,),
-    "torque_saturation": (6,),
-    "tip_over_ratio": (),
-    "tip_over_force_angle": (),
-    "belly_clearance": (),
-    "steering_angle": (6,),
-    "wheel_speed": (6,),
-    "energy": (),
-    "time": (),
-}
+} | {one.name: one.shape for one in QUANTITIES if one.is_kept}
 """Arrays of a prediction in the output file, under the same names: shape of a waypoint's part."""
-REPLAY_ARRAYS: dict[str, Shape] = {"poses": (3,), "status": ()} | {
-    one.name: one.shape for one in QUANTITIES if one.is_kept and one.name not in ARRAYS
-}
-"""Further arrays in the file that `rover_planner view` needs to replay it."""
-SOIL_ARRAYS = ("sinkage", "motion_resistance")
-"""Further arrays in the file if a soil was given or the terrain has soils."""
 NUMBERS: tuple[DTypeLike, str, str] = (np.float64, "fiu", "numbers")
 FLAGS: tuple[DTypeLike, str, str] = (np.bool_, "b", "bools")
 TYPES = {"settled": FLAGS, "falling": FLAGS, "status": (np.int8, "i", "whole numbers")}
@@ -132,14 +116,13 @@ def read_prediction(path: Path) -> tuple[PathPrediction, tuple[str, ...]]:
         if reason.dtype.kind != "U" or len(reason.shape) != 1 or reason.size == 0:
             raise RoverFileError("reason must be an array (n,) of texts, one for each waypoint")
         _check_count("reason", reason.size)
-        shapes = ARRAYS | REPLAY_ARRAYS
-        for name, shape in shapes.items():
+        for name, shape in ARRAYS.items():
             _check_header(archive.read_header(name), name, (reason.size, *shape))
         arrays: dict[str, Any] = {
             name: archive.read(
                 name, TYPES.get(name, NUMBERS)[0], most=8 * reason.size * math.prod(shape)
             )
-            for name, shape in shapes.items()
+            for name, shape in ARRAYS.items()
         }
         reasons = tuple(archive.read("reason", most=MAX_REASONS).tolist())
     _check_numbers(path, arrays)
@@ -210,9 +193,8 @@ def write_prediction(
     prediction: PathPrediction,
     verdict: Verdict,
     *,
-    on_soil: bool = False,
-    classes: Sequence[ClassifiedWaypoint] | None = None,
-    ranges: TorqueRanges | None = None,
+    classes: "Sequence[ClassifiedWaypoint] | None" = None,
+    ranges: "TorqueRanges | None" = None,
     assumptions: Assumptions | None = None,
 ) -> None:
     """Write a prediction and its verdict to an .npz file; the file name is not extended.
@@ -225,7 +207,6 @@ def write_prediction(
         path: The file; an existing one is overwritten.
         prediction: Prediction of n waypoints.
         verdict: Verdict on them.
-        on_soil: Whether to write SOIL_ARRAYS (n, 6), in m and N.
         classes: Class of each waypoint, written as `traversability_class`, `class_constraint` and
             `class_wheel` (n,) text and `class_margin` (n,).
         ranges: Torque ranges, written as `torque_range` (n, 6, 2), minimum and maximum [N m].
@@ -234,7 +215,7 @@ def write_prediction(
     Raises:
         PlanningError: The file cannot be written.
     """
-    arrays = _rows_of(prediction, on_soil) | _summary_of(verdict, prediction, assumptions, ranges)
+    arrays = _rows_of(prediction) | _summary_of(verdict, prediction, assumptions, ranges)
     arrays["reason"] = np.array(verdict.reasons, dtype=np.str_)
     if classes is not None:
         for name in ("traversability_class", "constraint", "wheel"):
@@ -247,39 +228,37 @@ def write_prediction(
 
 @contextmanager
 def writing_parts(
-    path: Path, count: int, on_soil: bool, assumptions: Assumptions | None = None
+    path: Path, count: int, assumptions: Assumptions | None = None
 ) -> Iterator["PartsFile"]:
     """Write a file as `write_prediction`, for a path that is too long to be kept in memory.
 
     Args:
         path: The file; an existing one is overwritten. Temporary files are made beside it.
         count: Number of waypoints.
-        on_soil: As for `write_prediction`.
         assumptions: As for `write_prediction`.
 
     Raises:
         PlanningError: A file cannot be written.
     """
+    from rover_physics.files.npz_file import NpzParts
+
     with _errors_of(path), NpzParts(path.absolute().parent, count) as parts:
-        yield PartsFile(path, parts, on_soil, assumptions)
+        yield PartsFile(path, parts, assumptions)
 
 
 class PartsFile:
     """A file of a prediction whose waypoints come part by part."""
 
-    def __init__(
-        self, path: Path, parts: NpzParts, on_soil: bool, assumptions: Assumptions | None
-    ):
-        self._path, self._parts, self._on_soil = path, parts, on_soil
-        self._assumptions = assumptions
+    def __init__(self, path: Path, parts: "NpzParts", assumptions: Assumptions | None):
+        self._path, self._parts, self._assumptions = path, parts, assumptions
         self._last: PathPrediction | None = None
 
     def take(self, prediction: PathPrediction) -> None:
         """Take the prediction of the next waypoints."""
-        self._parts.add(_rows_of(prediction, self._on_soil))
+        self._parts.add(_rows_of(prediction))
         self._last = prediction
 
-    def close(self, verdict: Verdict, ranges: TorqueRanges | None = None) -> None:
+    def close(self, verdict: Verdict, ranges: "TorqueRanges | None" = None) -> None:
         """Write the file with the verdict on all waypoints; arguments as `write_prediction`."""
         assert self._last is not None
         longest = max(1, max(map(len, verdict.reasons)))
@@ -290,10 +269,9 @@ class PartsFile:
         self._parts.write(self._path, summary)
 
 
-def _rows_of(prediction: PathPrediction, on_soil: bool) -> dict[str, Any]:
+def _rows_of(prediction: PathPrediction) -> dict[str, Any]:
     """Return the arrays that have a row for each waypoint."""
-    names = (*ARRAYS, *REPLAY_ARRAYS, *(SOIL_ARRAYS if on_soil else ()))
-    rows = {name: getattr(prediction, name) for name in names}
+    rows = {name: getattr(prediction, name) for name in ARRAYS}
     rows["steering_angle"] = np.where(
         prediction.settled[:, None], prediction.steering_angle, np.nan
     )
@@ -307,7 +285,7 @@ def _summary_of(
     verdict: Verdict,
     prediction: PathPrediction,
     assumptions: Assumptions | None,
-    ranges: TorqueRanges | None,
+    ranges: "TorqueRanges | None",
 ) -> dict[str, Any]:
     """Return the arrays about the whole path, and torque ranges."""
     arrays: dict[str, Any] = {

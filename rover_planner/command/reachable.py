@@ -4,7 +4,7 @@
 import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -12,10 +12,6 @@ from rover_planner.command.options import argument, option
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
 from rover_planner.shell.poses import read_numbers
-
-if TYPE_CHECKING:
-    from rover_planner.survey.reachable_area import ReachableArea
-    from rover_planner.survey.store import SurveyStore
 
 
 def reachable(
@@ -35,60 +31,41 @@ def reachable(
         need("rasterio", "a GeoTIFF")
     if picture is not None:
         need("matplotlib", "the picture of a survey")
-    x, y = _read_place(start)
+    place = read_numbers(start, 2)
+    if place is None:
+        raise PlanningError(f"--from is {start!r}; it must be two numbers: X,Y or X Y")
     if picture is not None:
         from rover_planner.figures.pictures import check_picture
 
         check_picture(picture)
     from rover_planner.shell.progress import show_progress
-    from rover_planner.survey.reachable import find_reachable
+    from rover_planner.survey.reachable import explain_no_area, find_reachable
     from rover_planner.survey.store import SurveyStore
 
     opened = SurveyStore(store)
     with show_progress() as progress:
         progress("load the survey")
-        area = find_reachable(opened, x, y, report=progress)
+        area = find_reachable(opened, place[0], place[1], report=progress)
+    notes, end = opened.notes, None
     if geotiff is not None:
         from rover_planner.survey.cog import write_cog
 
-        write_cog(geotiff, area.distance, opened.notes.frame, opened.notes.layout.step)
+        write_cog(geotiff, area.distance, notes.frame, notes.layout.step)
     if picture is not None:
         from rover_planner.figures.survey_picture import draw_reachable
 
         draw_reachable(picture, opened, area)
-    typer.echo(json.dumps(_report(opened, area)))
-
-
-def _report(store: "SurveyStore", area: "ReachableArea") -> dict[str, Any]:
-    """Return what is printed."""
-    from rover_planner.survey.reachable import say_why_none
-
-    notes = store.notes
-    farthest = area.farthest
-    place = None
-    if farthest is not None:
+    if area.farthest is not None:
         left, low = notes.frame.origin
-        place = [left + farthest[1] * notes.cell, low + farthest[0] * notes.cell]
-    return {
+        end = [left + area.farthest[1] * notes.cell, low + area.farthest[0] * notes.cell]
+    report = {
         "cells": area.cells,
-        "reason": "" if area.cells else say_why_none(store, area.start),
+        "reason": "" if area.cells else explain_no_area(opened, area.start),
         "area": round(area.area, 6),
         "cells_without_return": area.reached - area.cells,
         "longest": None if area.longest is None else round(area.longest, 3),
-        "farthest": place,
+        "farthest": end,
         "turns": "judged" if notes.turns else "assumed",
-        "chunks_missing": math.prod(notes.layout.chunks) - len(store.find_finished()),
+        "chunks_missing": math.prod(notes.layout.chunks) - len(opened.find_finished()),
     }
-
-
-def _read_place(text: str) -> tuple[float, float]:
-    """Return the place of the option --from.
-
-    Raises:
-        PlanningError: It is not two numbers.
-    """
-    place = read_numbers(text, 2)
-    if place is None:
-        raise PlanningError(f"--from is {text!r}; it must be two numbers: X,Y or X Y")
-    x, y = place
-    return x, y
+    typer.echo(json.dumps(report))

@@ -148,14 +148,12 @@ class _Results:
         candidate = answer.judgement.candidate
         if candidate is None or answer.terrain is None:
             return {}
-        on_soil = bool(self._parameters.soil) or bool(answer.terrain.soil_names)
         file = f"{name}.npz"
         query = load_service_settings(self._parameters).query
         write_prediction(
             self._folder / file,
             candidate.prediction,
             candidate.verdict,
-            on_soil=on_soil,
             assumptions=assume(self._rover, query.model, query.map_sigmas),
         )
         told: dict[str, Any] = {"prediction": file, "waypoints": len(candidate.prediction.poses)}

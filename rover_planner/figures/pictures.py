@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What all pictures share: style, writing to a file, and the shaded ground below a map."""
+"""The common parts of all pictures: style, writing to a file, and the shaded ground of a map."""
 
 import io
 from collections.abc import Iterator, Mapping

@@ -141,13 +141,8 @@ def _map_legend(terrain: Terrain) -> list[Line2D]:
         _key("start", **_start_style(0.5 * np.pi, 10)),
     ]
     if not np.isfinite(terrain.elevation).all():
-        square: dict[str, Any] = {
-            "marker": "s",
-            "ls": "",
-            "markersize": 9,
-            "markeredgecolor": "#888888",
-        }
-        handles.append(_key("unknown ground", color=UNKNOWN, **square))
+        square: dict[str, Any] = {"marker": "s", "ls": "", "markersize": 9}
+        handles.append(_key("unknown ground", color=UNKNOWN, markeredgecolor="#888888", **square))
     return handles
 
 

@@ -10,9 +10,9 @@ import typer
 from typer.core import TyperCommand
 
 SIZES = {"--start": 3, "--goal": 3, "--from": 2}
-"""How many numbers follow each option that takes a pose or a place."""
+"""Count of numbers behind each option that takes a pose or a place."""
 BETWEEN = re.compile(r"\s*,\s*|\s+")
-"""What stands between two numbers."""
+"""Separator of two numbers."""
 
 
 class Pose(NamedTuple):

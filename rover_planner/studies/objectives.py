@@ -94,7 +94,7 @@ def _score_drive(study: Study, rover: Rover, k: int) -> Score:
 
 
 def _count_steps(length: float) -> int:
-    """Return the number of steps of about SPACING on a way of a length [m], at least 1.
+    """Return the number of steps of about SPACING along a length [m], at least 1.
 
     Raises:
         ModelError: There are more than MAX_WAYPOINTS.
@@ -133,9 +133,9 @@ def _lift_limit(study: Study, rover: Rover) -> Rover:
 def _ground(rover: Rover, drive: StudyDrive) -> Terrain:
     if drive.file is not None:
         return _load_once(drive.file)
-    reach = drive.length + 2.0 * _length(rover) + abs(drive.start[0]) + abs(drive.start[1])
+    half = drive.length + 2.0 * _length(rover) + abs(drive.start[0]) + abs(drive.start[1])
     cell = 0.2 * rover.wheel.radius
-    axis = _make_axis(reach, cell)
+    axis = _make_axis(half, cell)
     x = np.broadcast_to(axis, (len(axis), len(axis)))
     if drive.slope is not None:
         return Terrain(np.tan(drive.slope) * x, cell, (axis[0], axis[0]))
@@ -195,8 +195,8 @@ def why_not_climbed(rover: Rover, height: float, policy: str, friction: float | 
         rover.limits, tilt=1.5, tip_over_ratio=0.0, belly_clearance=0.0, wheel_drop=100.0
     )
     able = replace(rover, limits=limits)
-    reach = 0.75 * _length(rover)
-    x = np.linspace(-reach, reach, _count_steps(2.0 * reach) + 1)
+    half = 0.75 * _length(rover)
+    x = np.linspace(-half, half, _count_steps(2.0 * half) + 1)
     poses = np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
     judged = judge_paths(
         able,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Numbers of a rover file by dotted names, such as suspension.wheels.front.x, and their change."""
+"""Numbers of a rover file: found by dotted names, such as belly.z, changed, and offered."""
 
 import dataclasses
 import difflib
@@ -44,19 +44,19 @@ def list_values(rover: Rover) -> dict[str, list[RoverValue]]:
     span = abs(rover.suspension.wheels["front"][0])
     radius = rover.wheel.radius
 
-    def length(label: str, *key: str | int, reach: float) -> RoverValue:
+    def length(label: str, *key: str | int, within: float) -> RoverValue:
         now = get_value(data, key)
-        return _make_value((key,), f"{label} [m]", now, now - reach, now + reach)
+        return _make_value((key,), f"{label} [m]", now, now - within, now + within)
 
     def amount(label: str, unit: str, *key: str | int, top: float = 0.0) -> RoverValue:
         now = get_value(data, key)
         return _make_value((key,), f"{label} [{unit}]", now, 0.2 * now, max(2.5 * now, top))
 
     names = ("rear", "middle", "front")
-    height = length("wheels z", "suspension", "wheels", "rear", 2, reach=1.5 * radius)
+    height = length("wheels z", "suspension", "wheels", "rear", 2, within=1.5 * radius)
     all_wheels = tuple(("suspension", "wheels", name, 2) for name in names)
     wheels = [
-        length(f"{name} wheel x", "suspension", "wheels", name, 0, reach=span) for name in names
+        length(f"{name} wheel x", "suspension", "wheels", name, 0, within=span) for name in names
     ]
     values = {
         "Ground and drive": [
@@ -66,8 +66,8 @@ def list_values(rover: Rover) -> dict[str, list[RoverValue]]:
             amount("gravity", "m/s^2", "gravity"),
         ],
         "Links": [
-            length("bogie pivot x", "suspension", "bogie_pivot", 0, reach=span),
-            length("bogie pivot z", "suspension", "bogie_pivot", 2, reach=1.5 * radius),
+            length("bogie pivot x", "suspension", "bogie_pivot", 0, within=span),
+            length("bogie pivot z", "suspension", "bogie_pivot", 2, within=1.5 * radius),
             *wheels,
             dataclasses.replace(height, keys=all_wheels),
         ],
@@ -77,8 +77,8 @@ def list_values(rover: Rover) -> dict[str, list[RoverValue]]:
         ],
         "Masses": [
             amount("body", "kg", "masses", "body", "mass"),
-            length("body centre x", "masses", "body", "com", 0, reach=span),
-            length("body centre z", "masses", "body", "com", 2, reach=2.0 * radius),
+            length("body centre x", "masses", "body", "com", 0, within=span),
+            length("body centre z", "masses", "body", "com", 2, within=2.0 * radius),
             amount("rocker", "kg", "masses", "rocker", "mass", top=1.0),
             amount("bogie", "kg", "masses", "bogie", "mass", top=1.0),
             amount("wheel", "kg", "wheel", "mass", top=1.0),

@@ -148,7 +148,7 @@ class Study(StudyOptions):
 
     @property
     def resolution(self) -> float:
-        """How far the objective is found to, in its unit; 0 where it is computed exactly."""
+        """Tolerance of the objective, in its unit; 0 where it is computed exactly."""
         return STEP_TOLERANCE if self.objective == "tallest_step" else 0.0
 
 

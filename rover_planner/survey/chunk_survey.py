@@ -34,7 +34,7 @@ class SurveyJob:
     """All that a worker needs to know; small, as it goes with each task."""
 
     request: SurveyRequest
-    """What is asked."""
+    """The question."""
     layout: SurveyLayout
     """Cells and chunks."""
     resolution: float
@@ -51,7 +51,7 @@ class SurveyJob:
 
 @dataclass(frozen=True)
 class ChunkReport:
-    """What a task says of its chunk."""
+    """The report of a task on its chunk."""
 
     chunk: Index
     """Row and column of the chunk."""
@@ -60,7 +60,7 @@ class ChunkReport:
     seconds: float = 0.0
     """Time that it took [s]."""
     refusal: str = ""
-    """Why the system refuses to write, empty if it does not."""
+    """Reason of the system for not writing, empty if it has written."""
 
 
 def open_map(store: Path, map_file: str) -> GeoTiffMap | StoredMap:

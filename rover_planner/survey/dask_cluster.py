@@ -32,7 +32,7 @@ NOISY = ("distributed", "tornado", "asyncio")
 
 @dataclass(frozen=True)
 class ClusterSettings:
-    """Where the chunks are computed."""
+    """The processes that compute the chunks."""
 
     scheduler: str | None = None
     """Address of a Dask scheduler, such as tcp://10.0.0.1:8786; None: a cluster of this machine's

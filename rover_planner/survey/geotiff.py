@@ -54,7 +54,7 @@ class GeoTiffMap:
 
     @property
     def frame(self) -> MapFrame:
-        """Where its cells are."""
+        """Place and size of its cells."""
         with self._open() as file:
             self._check(file)
             resolution = float(file.transform.a)

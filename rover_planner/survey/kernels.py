@@ -24,18 +24,18 @@ def mark_unknown_below(grounds, poses, outline, unknown):
     near = 0.5 * np.sqrt(2.0) * cell
     rear, front, right, left = outline
     rear, front, right, left = rear - near, front + near, right - near, left + near
-    reach = np.hypot(max(-rear, front), max(-right, left))
+    farthest = np.hypot(max(-rear, front), max(-right, left))
     for row in range(poses.shape[0]):
         x, y, yaw = poses[row, 0], poses[row, 1], poses[row, 2]
         unknown[row] = False
         gx, gy = (x - ground.x0) / cell, (y - ground.y0) / cell
-        if find_block_max(ground, gx, gy, reach / cell, reach / cell) < np.inf:
+        if find_block_max(ground, gx, gy, farthest / cell, farthest / cell) < np.inf:
             continue
         c, s = np.cos(yaw), np.sin(yaw)
-        low_i = max(int(np.floor((y - reach - ground.y0) / cell)), 0)
-        high_i = min(int(np.ceil((y + reach - ground.y0) / cell)), ground.rows - 1)
-        low_j = max(int(np.floor((x - reach - ground.x0) / cell)), 0)
-        high_j = min(int(np.ceil((x + reach - ground.x0) / cell)), ground.columns - 1)
+        low_i = max(int(np.floor((y - farthest - ground.y0) / cell)), 0)
+        high_i = min(int(np.ceil((y + farthest - ground.y0) / cell)), ground.rows - 1)
+        low_j = max(int(np.floor((x - farthest - ground.x0) / cell)), 0)
+        high_j = min(int(np.ceil((x + farthest - ground.x0) / cell)), ground.columns - 1)
         for i in range(low_i, high_i + 1):
             for j in range(low_j, high_j + 1):
                 height = elevation_of(ground, i, j)

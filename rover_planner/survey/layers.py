@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a survey keeps of each cell: names, types, meanings and colours of its layers."""
+"""The layers of a survey: names, types, meanings and colours."""
 
 from collections.abc import Mapping
 from typing import NamedTuple

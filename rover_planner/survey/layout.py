@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a map is cut for a survey: cells, tiles and chunks.
+"""The cells, tiles and chunks into which a survey cuts a map.
 
 The rover is judged at every `step`-th cell of the map. Cells are judged tile by tile, each tile in
 a frame of its own, so that what is found does not depend on the chunks. A chunk is a square of

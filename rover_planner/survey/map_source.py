@@ -22,7 +22,7 @@ Grids = dict[str, np.ndarray]
 
 
 class MapFrame(NamedTuple):
-    """Where the cells of a map are."""
+    """Place and size of the cells of a map."""
 
     shape: Index
     """Rows and columns."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a rover can go on a surveyed map and come back from, over cells and headings."""
+"""The search for the cells of a surveyed map that a rover can reach and return from."""
 
 import os
 from collections.abc import Callable
@@ -28,7 +28,7 @@ CLOSED = -1.0
 
 
 class HeadingGrid(NamedTuple):
-    """Where and how a rover may drive; a node is a cell at a heading that is passable there."""
+    """Passable headings, turns and moves on a map; a node is a cell at a passable heading."""
 
     passable: Any
     """(ny, nx) bits of the passable headings, an array or one of Zarr."""
@@ -78,7 +78,7 @@ def find_reachable(
     return kept
 
 
-def say_why_none(store: SurveyStore, start: Index) -> str:
+def explain_no_area(store: SurveyStore, start: Index) -> str:
     """Return why the rover cannot leave a start from which it reaches nothing.
 
     Args:

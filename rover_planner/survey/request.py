@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is asked of a survey: rover, options, headings and distance of cells."""
+"""The question of a survey: rover, options, headings and distance of cells."""
 
 import hashlib
 import json

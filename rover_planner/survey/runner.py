@@ -35,7 +35,7 @@ Task = Callable[[SurveyJob, Index], ChunkReport]
 
 @dataclass
 class SurveyOutcome:
-    """What became of the chunks of a run."""
+    """The outcome of a run: counts, and the chunks that failed."""
 
     poses: int = 0
     """Number of poses judged."""
@@ -44,7 +44,7 @@ class SurveyOutcome:
     done: int = 0
     """Number of chunks finished."""
     failed: dict[Index, str] = field(default_factory=dict)
-    """Why chunks failed, by chunk."""
+    """Reasons of chunks that failed, by chunk."""
 
 
 def run_survey(

@@ -40,19 +40,19 @@ WRITERS = 8
 FAILED = -1.0
 """Seconds of a chunk that failed."""
 UNREADABLE = (OSError, RuntimeError, ValueError, TypeError, KeyError)
-"""What Zarr and its codecs raise where a file is damaged or gone."""
+"""Errors of Zarr and its codecs where a file is damaged or gone."""
 
 
 @dataclass(frozen=True)
 class StoreNotes:
-    """What a store says of its survey."""
+    """The notes of a store on its survey."""
 
     description: dict[str, Any]
-    """What the result depends on, from `SurveyRequest.describe`."""
+    """All that the result depends on, from `SurveyRequest.describe`."""
     layout: SurveyLayout
     """Cells and chunks."""
     frame: MapFrame
-    """Where the cells of the map are."""
+    """Place and size of the cells of the map."""
     map_file: str
     """GeoTIFF file of the map; empty if the map is kept in the store."""
 

@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import zipfile
 
 import numpy as np
 import pytest
@@ -44,61 +43,35 @@ REFUSED = [
     (["dance"], "dance"),
     (["predict"], "ROVER"),
     (predict("--colour", "red"), "--colour"),
-    (predict("extra"), "extra"),
     (predict("--friction", "high"), "friction"),
-    (predict("--friction"), "friction"),
-    (predict(rover="curiosity"), "curiosity"),
-    (predict(rover=LONG), "no rover 'nnn"),
     (predict(terrain="none.npz"), "none.npz"),
-    (predict(terrain=LONG), "no terrain 'nnn"),
     (predict(terrain="poses.npz"), "elevation"),
     (predict(terrain="/dev/zero"), "it is a device"),
-    (predict(poses="none.npz"), "none.npz"),
     (predict(poses=LONG), "cannot be read: File name too long"),
-    (predict(poses="terrain.npz"), "poses"),
-    (predict(out="no/such/folder/out.npz"), "out.npz"),
-    (predict(out="."), "cannot be written"),
     (predict(out=LONG), "cannot be written: File name"),
     (predict(out="/dev/full"), "No space left on device"),
     (predict("--max-cells", "99"), "limit is"),
     (predict("--policy", "lucky"), "policy"),
     (predict("--friction", "0"), "0"),
-    (predict("--friction", "nan"), "nan"),
-    (predict("--max-torque", "0"), "0"),
     (predict("--max-torque", "inf"), "inf"),
     (predict("--sigmas", "-1"), "sigmas is -1.0"),
     (predict("--soil", "snow"), "dry_sand"),
     (predict("--payload", "-1"), "payload"),
-    (predict("--payload", "nan"), "payload"),
     (predict("--tool-force", "0", "nan", "0"), "tool_force"),
     (predict("--tool-force", "0", "1"), "tool-force"),
-    (predict("--tool-moment", "inf", "0", "0"), "tool_moment"),
-    (predict("--arm", "arm_yaw"), "NAME=RAD"),
     (predict("--arm", "arm_yaw=nan"), "NAME=RAD"),
     (predict("--arm", "arm_wrist=0.1"), "arm_elbow"),
     (predict("--arm", "arm_yaw=0.1"), "lacks arm_shoulder, arm_elbow"),
     (predict("--arm", "arm_yaw=0.1", "--arm", "arm_yaw=0.2"), "twice"),
     (predict("--arm", "arm_yaw=0", rover="m2020"), "no manipulator"),
-    (["reach", "lsr1", "terrain.npz", "1", "2", "0", "1", "2", "0", "--max-cells", "99"],
-     "elevation has 80 x 120 cells; the limit is 99"),
-    (["terrain", "t.npz", "--seed", "x"], "seed"),
-    (["terrain", LONG, "--size", "2"], "cannot be written: File name too long"),
     (["terrain", "no/t.npz"], "t.npz"),
     (["terrain", "t.npz", "--craters", "1e12"], "crater density is 1000000000000.0 1/m^2"),
-    (["terrain", "t.npz", "--size", "-1"], "size"),
-    (["terrain", "t.npz", "--size", "0.25"], "size is 0.25 x 0.25 m; it must be more"),
     (["terrain", "t.npz", "--size", "1e308", "--resolution", "1e307"], "at most 1e+06 m"),
-    (["terrain", "t.npz", "--roughness", "1e308"], "at most 100.0 m"),
     (["terrain", "t.npz", "--seed", DIGITS * 20], "--seed"),
-    (["terrain", "t.npz", "--seed", "-" + DIGITS], "seed is -999"),
-    (["study", LONG], "no study file nnn"),
     (["study", "."], "it is a directory; it must be a regular file"),
     (["study", "\x1b[2J\n\udcff"], "no study file \\x1b[2J\\n\\udcff"),
     (["figure4", "."], "must be a .png, .svg, .pdf file"),
-    (["figure4", LONG + ".png"], "File name too long"),
-    (["figure4", "folder.png"], "Is a directory"),
     (["figure4", "no/such/folder/a.png"], "no/such/folder"),
-    (["figure4", "a.png", "--rover", "tractor"], "tractor"),
 ]  # fmt: skip
 
 
@@ -106,7 +79,6 @@ REFUSED = [
     ("words", "names"), REFUSED, ids=["-".join(words)[:40] for words, _ in REFUSED]
 )
 def test_bad_input_is_refused_in_one_short_line(files, capfd, words, names):
-    (files / "folder.png").mkdir()
     assert_one_short_line(capfd, words, names)
 
 
@@ -114,11 +86,7 @@ def test_bad_input_is_refused_in_one_short_line(files, capfd, words, names):
     ("words", "names"),
     [
         (["--port", "99999"], "port is 99999; it must be 0 to 65535"),
-        (["--port", "-1"], "port is -1"),
-        (["--port", DIGITS], "port is 999"),
         (["--host", "999.1.1.1"], "host is '999.1.1.1'; it must be an address of this machine"),
-        (["--host", "192.0.2.1"], "host is '192.0.2.1'"),
-        (["--host", "a" * 300], "host is 'aaa"),
         (["--max-gap", "nan"], "max_gap is nan"),
         (["--start", "nan", "0", "0"], "'nan,0,0' is no pose"),
         (["--start", "-300", "0", "0"], "start is (-300, 0) m; it must be on the map"),
@@ -147,11 +115,7 @@ NONE_JUDGED = "no rover of the study could be judged"
     [
         (DRIVE % (3, "slope: 0.1, length: 1.0e+300"), "a drive is 1e+300 m long; it must be at"),
         (DRIVE % (3, "slope: 0.1, length: 1000.0"), "a ground of 2e+03 m in cells of 0.02 m has"),
-        (DRIVE % (3, "step: 0.1, start: [1.0e+300, 0.0, 0.0], file: x"), "one of slope (rad), st"),
-        (DRIVE % (3, "slope: 0.1, start: [1.0e+308, 1.0e+308, 0.0]"), "a ground of inf m"),
-        (DRIVE % (1000000, "slope: 0.1"), "parameters[0].count is 1000000"),
         (OBJECTIVE % ("load_imbalance", MANY), "parameters have 1e+12 combinations"),
-        (OBJECTIVE % ("tallest_step", WHEELS % ("1.0e-9", "1.0e-8")), NONE_JUDGED),
         (OBJECTIVE % ("tallest_step", WHEELS % ("1.0e+8", "1.0e+9")), NONE_JUDGED),
     ],
 )
@@ -160,54 +124,25 @@ def test_an_impossible_study_is_refused_in_one_short_line(files, capfd, study, n
     assert_one_short_line(capfd, ["study", "s.yaml"], names)
 
 
-@pytest.mark.parametrize(
-    ("text", "names"),
-    [("name: half\ngravity: 9.81\n", "wheel"), ("name: [unclosed\n", "rover.yaml")],
-)
-def test_a_bad_rover_file_is_one_line_that_names_the_key(files, capfd, text, names):
-    (files / "rover.yaml").write_text(text)
-    assert_one_short_line(capfd, predict(rover="rover.yaml"), names)
+def test_a_bad_rover_file_is_one_line_that_names_the_key(files, capfd):
+    (files / "rover.yaml").write_text("name: half\ngravity: 9.81\n")
+    assert_one_short_line(capfd, predict(rover="rover.yaml"), "wheel")
 
 
 @pytest.mark.parametrize(
     ("arrays", "names"),
     [
         ({"poses": np.zeros((4, 2))}, "pose"),
-        ({"poses": np.zeros(3)}, "pose"),
         ({"poses": np.zeros((0, 3))}, "pose"),
-        ({"poses": np.full((4, 3), np.nan)}, "pose"),
-        ({"poses": np.array([["a", "b", "c"]])}, "pose"),
         ({"poses": np.zeros((2, 3), dtype=complex)}, "pose"),
         ({"poses": np.array([[{}, {}, {}]], dtype=object)}, "pose"),
         ({"poses": np.zeros((2, 3)), "curvature": np.array([0.0, np.nan])},
          "curvature of pose 1 is nan"),
         ({"poses": np.zeros((2, 3)), "curvature": np.zeros(3)}, "shape (3,); it must be numbers"),
-        ({"poses": np.zeros((2, 3)), "curvature": np.array(["a", "b"])}, "must be numbers (2,)"),
     ],
 )  # fmt: skip
 def test_impossible_poses_are_one_line(capfd, files, arrays, names):
     np.savez(files / "poses.npz", **arrays)
-    assert_one_short_line(capfd, predict(), names)
-
-
-@pytest.mark.parametrize("content", [b"", b"PK\x03\x04 not a zip", b"hello", b"\x93NUMPY"])
-@pytest.mark.parametrize("name", ["poses.npz", "terrain.npz"])
-def test_files_of_another_kind_are_one_line(capfd, files, name, content):
-    (files / name).write_bytes(content)
-    assert_one_short_line(capfd, predict(), name)
-
-
-@pytest.mark.parametrize(
-    ("entry", "names"),
-    [
-        (b"no array", "entry poses"),
-        (b"", "entry poses"),
-        (b"\x93NUMPY\x01\x00\x05\x00(((((", "entry poses is damaged"),
-    ],
-)
-def test_poses_that_are_no_array_are_refused(files, capfd, entry, names):
-    with zipfile.ZipFile(files / "poses.npz", "w") as archive:
-        archive.writestr("poses.npy", entry)
     assert_one_short_line(capfd, predict(), names)
 
 
@@ -225,15 +160,9 @@ def predicted(tmp_path_factory):
     [
         ({"every": np.float64(1.0)}, "assumptions must be one text"),
         ({"roll": np.float64(1.0)}, "roll has shape (); it must be (30,)"),
-        ({"poses": np.zeros(30)}, "poses has shape (30,); it must be (30, 3)"),
-        ({"wheel_loads": np.zeros((29, 6))}, "wheel_loads has shape (29, 6)"),
-        ({"roll": np.zeros(30, complex)}, "entry roll has elements of type <c16"),
         ({"settled": np.zeros(30)}, "settled is of type float64; it must hold bools"),
-        ({"status": np.zeros(30)}, "status is of type float64; it must hold whole numbers"),
         ({"reason": np.zeros(30)}, "reason must be an array (n,) of texts"),
-        ({"reason": np.array([{}] * 30)}, "entry reason holds Python objects"),
         ({"position": np.full((30, 3), np.nan)}, "position has a value that is NaN or beyond"),
-        ({"poses": np.full((30, 3), 1e308)}, "poses has a value that is NaN or beyond"),
     ],
 )
 def test_a_replay_file_of_other_shapes_or_types_is_refused(

@@ -52,12 +52,8 @@ def params_of(name, *words):
     [
         (["plan", "lsr1", "a", "b", "--start", "-3,0,0", "--goal", "-.5,-1e-1,0"],
          "start", (-3.0, 0.0, 0.0)),
-        (["plan", "lsr1", "a", "b", "--start", "0,0,0", "--goal", "-.5,-1e-1,0"],
-         "goal", (-0.5, -0.1, 0.0)),
         (["reachable", "s.zarr", "--from", "-3,-0.5"], "start", "-3,-0.5"),
         (["reachable", "s.zarr", "--from", "-3", "-0.5"], "start", "-3,-0.5"),
-        (["replay", "bag", "out", "--goal", "-3,0,0"], "goal", (-3.0, 0.0, 0.0)),
-        (["replay", "bag", "out", "--start", "-3,0,-1"], "start", (-3.0, 0.0, -1.0)),
     ],
 )  # fmt: skip
 def test_lists_may_begin_with_a_negative_number(words, name, value):

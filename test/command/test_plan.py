@@ -67,8 +67,6 @@ def test_without_a_way_no_file_is_written_and_the_reason_is_told(ground, tmp_pat
         (["--start=-2.5,0,0", "--goal=a,b,c"], "'--goal': 'a,b,c' is no pose"),
         (["--start=-25,0,0", "--goal=2.5,0,0"], "start is at (-25, 0), off the map"),
         ([*ENDS, "--budget", "0"], "budget is 0.0; it must be a finite number above 0"),
-        ([*ENDS, "--cell", "-1"], "cell is -1.0"),
-        ([*ENDS, "--policy", "magic"], "no torque policy 'magic'"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(ground, tmp_path, words, said, capfd):

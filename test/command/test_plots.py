@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.errors import PlanningError
 from rover_planner.figures.plots import LabelledAnswer, draw_answers, hill_shade
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
 
@@ -95,13 +94,3 @@ def test_slopes_towards_the_sun_are_brighter():
     # the sun is in the north-west: a slope that rises to the east faces it
     assert (rising_east > level).all()
     assert (hill_shade(0.05 * x.T, 0.1) < level).all()
-
-
-def test_nothing_to_draw_and_nowhere_to_write_are_refused(tmp_path, rover, holed):
-    with pytest.raises(PlanningError, match="no answers"):
-        draw_answers(tmp_path / "picture.png", rover, holed, [])
-    answers = [ask(rover, holed, "A", (0, 0, 0))]
-    with pytest.raises(PlanningError, match="cannot be written"):
-        draw_answers(tmp_path / "no" / "picture.png", rover, holed, answers)
-    with pytest.raises(PlanningError, match="must be a .png, .svg, .pdf file"):
-        draw_answers(tmp_path / "picture.tiger", rover, holed, answers)

@@ -41,15 +41,9 @@ def test_reach_answers_in_json_whatever_the_answer(capfd, files):
 @pytest.mark.parametrize(
     ("change", "names"),
     [
-        ({"place": "nan"}, "pose"),
         ({"target": "inf"}, "target"),
         ({"place": "here"}, "'X'"),
-        ({"more": ["--force", "0", "0"]}, "force"),
         ({"more": ["--moment", "0", "nan", "0"]}, "moment"),
-        ({"more": ["--soil", "snow"]}, "dry_sand"),
-        ({"more": ["--payload", "-2"]}, "payload"),
-        ({"more": ["--policy", "lucky"]}, "lucky"),
-        ({"more": ["--colour"]}, "--colour"),
         ({"rover": "m2020"}, "no manipulator"),
     ],
 )

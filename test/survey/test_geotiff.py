@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """GeoTIFF maps keep their georeference and holes; those of another kind are refused."""
 
-import math
 import tracemalloc
-import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -106,18 +104,6 @@ def test_overviews_have_values_of_the_layer(tmp_path, kind):
             assert set(np.unique(overview.read(1))) <= set(values)
 
 
-@pytest.mark.parametrize("step", [2, 5])
-def test_surveyed_cells_are_the_middles_of_the_written_ones(tmp_path, step):
-    path = write_tif(tmp_path / "map.tif", np.zeros((40, 50)))
-    prepared = prepare_survey(make_request(step=step), str(path), tmp_path / "out")
-    write_cog(
-        tmp_path / "a.tif", prepared.store.layer("best_class"), prepared.store.notes.frame, step
-    )
-    with rasterio.open(tmp_path / "a.tif") as file, rasterio.open(path) as there:
-        assert file.xy(file.height - 1, 0) == pytest.approx(there.xy(39, 0))
-        assert file.res == pytest.approx((step * CELL, step * CELL))
-
-
 def test_whole_numbers_with_scale_and_nodata_are_heights(tmp_path):
     values = np.full((30, 40), 1234, np.int16)
     values[3, 5], values[7, 9] = -9999, 1300
@@ -134,15 +120,12 @@ def test_whole_numbers_with_scale_and_nodata_are_heights(tmp_path):
     ("changes", "said"),
     [
         ({"heights": np.zeros((3, 40, 50), np.uint8)}, "has 3 bands; it must have one"),
-        ({"heights": np.zeros((40, 50), np.complex64)}, "has values of type complex64"),
         ({"transform": rasterio.Affine.identity()}, "says nowhere where its cells are"),
         ({"crs": "EPSG:4326"}, "is in degrees; it must be in a map projection in metres"),
         ({"crs": "EPSG:2263"}, "has coordinates in US survey foot"),
         ({"crs": None}, "has no coordinate reference system"),
         ({"crs": 'LOCAL_CS["site",UNIT["metre",1]]'}, "is in coordinates of another kind"),
         ({"scale": 0.0}, "has heights with scale 0 and offset 0"),
-        ({"scale": math.nan}, "has heights with scale nan"),
-        ({"transform": rasterio.Affine(1e-9, 0, 0, 0, -1e-9, 0)}, "has cells of 1e-09 m"),
         ({"unit": "ft"}, "has heights in 'ft'; they must be in metres"),
         ({"transform": rasterio.Affine.rotation(10) @ rasterio.Affine.scale(0.1, -0.1)},
          "is rotated or mirrored"),
@@ -159,7 +142,7 @@ def test_a_tif_of_another_kind_is_refused_with_a_hint(tmp_path, changes, said):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("value", [-9999.0, -32768.0, float(np.finfo(np.float32).min)])
+@pytest.mark.parametrize("value", [-9999.0, float(np.finfo(np.float32).min)])
 def test_heights_that_stand_for_nothing_are_refused_where_no_nodata_is_declared(tmp_path, value):
     heights = np.zeros((40, 50), np.float32)
     heights[3, 4] = value
@@ -175,12 +158,6 @@ def test_heights_that_stand_for_nothing_are_refused_where_no_nodata_is_declared(
     assert advised == value  # as GDAL compares it with the heights
 
 
-def test_a_turn_by_less_than_a_millionth_of_a_cell_is_none(tmp_path):
-    turned = rasterio.Affine(CELL, 1e-12, LEFT, 1e-12, -CELL, TOP)
-    path = write_tif(tmp_path / "map.tif", np.zeros((40, 50), np.float32), transform=turned)
-    assert GeoTiffMap(path).frame.shape == (40, 50)
-
-
 def test_a_projection_in_kilometres_is_refused_in_one_line(tmp_path, capfd):
     """PROJ itself wrote a second line on stderr."""
     kilometres = "+proj=stere +lat_0=-90 +R=1737400 +units=km"
@@ -191,7 +168,7 @@ def test_a_projection_in_kilometres_is_refused_in_one_line(tmp_path, capfd):
     assert "has coordinates in kilometre" in err and err.count("\n") == 1, err
 
 
-@pytest.mark.parametrize("share", [0.0, 0.001, 0.5, 0.99, None])
+@pytest.mark.parametrize("share", [0.0, 0.5, None])
 def test_a_truncated_or_missing_tif_is_refused_before_anything_is_done(tmp_path, share, capfd):
     path = tmp_path / "map.tif"
     if share is not None:
@@ -229,16 +206,6 @@ def test_a_mask_or_a_nodata_value_beside_the_file_makes_another_map(tmp_path):
         hashes.append(GeoTiffMap(path).hash_content())
     assert GeoTiffMap(path).read((slice(0, 1), slice(0, 1)))["elevation"][0, 0] > 6.0
     assert len(set(hashes)) == 4 and hashes[3] == hashes[2]  # an offset of 0 changes no height
-
-
-def test_signalling_nans_are_unknown_without_noise(tmp_path):
-    heights = np.zeros((40, 50), np.float32)
-    heights.view(np.uint32)[3, 4] = 0x7FA00000
-    path = write_tif(tmp_path / "map.tif", heights, nodata=-1.0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        found = GeoTiffMap(path).read((slice(0, 40), slice(0, 50)))["elevation"]
-    assert np.isnan(found).sum() == 1 and np.isnan(found[36, 4])
 
 
 def test_a_thinned_map_is_read_by_parts(tmp_path):

@@ -146,7 +146,7 @@ def test_ground_that_is_all_unknown_is_impassable():
     assert {name: layer.dtype for name, layer in layers.items()} == types_of_layers(4, True)
 
 
-@pytest.mark.parametrize("headings", [1, 8, 9, 16, 33, 64])
+@pytest.mark.parametrize("headings", [1, 9, 64])
 def test_bits_come_back(headings):
     flags = np.random.default_rng(headings).random((50, headings)) < 0.5
     bits = pack_bits(flags)

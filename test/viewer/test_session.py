@@ -158,7 +158,7 @@ def test_a_replay_keeps_the_soil_the_policy_and_the_arm_it_was_predicted_with(tm
     assert verdict.max_sinkage > 0.0
     file = tmp_path / "out.npz"
     assumed = assume(LSR1, options, 2.0)
-    write_prediction(file, prediction, verdict, on_soil=True, assumptions=assumed)
+    write_prediction(file, prediction, verdict, assumptions=assumed)
     assert read_recorded_assumptions(file) == assumed
 
     session = ViewSession(LSR1, ground, (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
