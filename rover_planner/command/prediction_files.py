@@ -12,7 +12,7 @@ from numpy.typing import DTypeLike, NDArray
 
 from rover_physics.bounds.path import BOUNDED_VALUES
 from rover_physics.errors import RoverFileError
-from rover_physics.files.npz_file import ArrayHeader, open_npz, write_npz
+from rover_physics.files.npz_file import ArrayHeader, NpzParts, open_npz, write_npz
 from rover_physics.files.validation import errors_of, show_file
 from rover_physics.results.path_prediction import PathPrediction, prediction_of
 from rover_physics.results.record import QUANTITIES
@@ -21,7 +21,6 @@ from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import Assumptions, read_assumptions, write_assumptions
 
 if TYPE_CHECKING:
-    from rover_physics.files.npz_file import NpzParts
     from rover_physics.traversability.classification import ClassifiedWaypoint
     from rover_physics.traversability.torque_ranges import TorqueRanges
 
@@ -240,8 +239,6 @@ def writing_parts(
     Raises:
         PlanningError: A file cannot be written.
     """
-    from rover_physics.files.npz_file import NpzParts
-
     with _errors_of(path), NpzParts(path.absolute().parent, count) as parts:
         yield PartsFile(path, parts, assumptions)
 
@@ -249,7 +246,7 @@ def writing_parts(
 class PartsFile:
     """A file of a prediction whose waypoints come part by part."""
 
-    def __init__(self, path: Path, parts: "NpzParts", assumptions: Assumptions | None):
+    def __init__(self, path: Path, parts: NpzParts, assumptions: Assumptions | None):
         self._path, self._parts, self._assumptions = path, parts, assumptions
         self._last: PathPrediction | None = None
 
