@@ -2,6 +2,7 @@
 """The page in a real browser: one visit to one page, from its opening until its program ends."""
 
 import re
+from dataclasses import replace
 from io import BytesIO
 
 import numpy as np
@@ -192,7 +193,8 @@ def test_what_is_shown_is_sent_as_a_link_and_as_a_file_that_needs_no_network(
     visitor, page, browser, tmp_path
 ):
     session = page.session
-    ask(page, lambda: session.change_rover([("friction",)], 0.6))
+    ask(page, lambda: page._restore(replace(LSR1, friction=0.6), {}))
+    wait_for_rest(page)
     show_refused(page)
     ask(page, lambda: page.playback.go_to(2.0))
     shown, at = session.shown, page.playback.time
