@@ -10,7 +10,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics.errors import RoverError
 from rover_physics.names import TORQUE_POLICIES
 from rover_physics.terrain.grid import load_terrain
 from rover_physics.traversability.judge import judge_path
@@ -132,17 +131,6 @@ def test_cancelled_work_stops_soon_and_is_never_delivered(busy_judge, spirit):
     passed = start_watch()
     assert busy_judge.close()
     assert passed() < STOP_TIME
-
-
-def test_a_request_that_the_model_refuses_is_delivered_as_an_error(judge, spirit):
-    options = spirit.options.change(max_torque=1.0, friction=0.3, payload=1e300)
-    judge.ask(JudgeRequest(replace(spirit, options=options)))
-    wait_for_idle(judge)
-    (done,) = judge.take()
-    assert done.result is None and isinstance(done.error, RoverError)
-    judge.ask(JudgeRequest(spirit))
-    wait_for_idle(judge)
-    assert [one.error for one in judge.take()] == [None, None]
 
 
 @pytest.mark.parametrize("error", [MemoryError(), SystemExit(3)])

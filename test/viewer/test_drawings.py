@@ -108,7 +108,7 @@ def test_other_policies_are_judged_after_the_drawings(page, monkeypatch):
 
 @pytest.mark.timed
 def test_the_rover_drives_on_while_a_change_is_judged_and_drawn():
-    options, search = slow_options(2, 2e-4), LatticeSettings(budget=0.1)
+    options, search = slow_options(1, 3e-4), LatticeSettings(budget=0.1)
     session = ViewSession(tolerant_rover(), lowered_reef(), START, GOAL, options, search)
     page = Page(session, port=0)
     try:
@@ -205,18 +205,3 @@ def test_the_ghost_of_a_failure_stays_for_the_next_one_and_hides_without(page):
     assert [node.name for node in mark._nodes] == ["/failure/outline", "/failure/leader"]
     mark.show(session.rover, None)
     assert not mark._root.visible and not mark._nodes
-
-
-def test_the_ground_is_made_ready_in_the_background(page, monkeypatch):
-    from rover_planner.viewer.pages import ground_painter
-
-    threads, export = [], ground_painter.export_ground
-
-    def note(*arguments) -> bytes:
-        threads.append(threading.current_thread().name)
-        return export(*arguments)
-
-    monkeypatch.setattr(ground_painter, "export_ground", note)
-    page.requests.add(page.judged.draw_ground)
-    wait_until(lambda: threads and not page.is_busy, "the ground", PATIENCE)
-    assert threads == ["ground"]

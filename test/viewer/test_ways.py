@@ -11,7 +11,7 @@ import pytest
 
 from rover_physics.names import TORQUE_POLICIES
 from rover_physics.traversability.judge import judge_path
-from rover_planner.planning.ways.way_search import FOUND, NO_WAY, OUT_OF_TIME
+from rover_planner.planning.ways.way_search import FOUND, NO_WAY
 from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.judging import (
     BETTER,
@@ -21,7 +21,6 @@ from rover_planner.viewer.state.judging import (
     JudgeRequest,
     judge_request,
 )
-from rover_planner.viewer.state.scenario import Shown
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import wall_with_gap, whole_wall
 from support.viewer.sessions import LSR1, held, walled_session
@@ -34,105 +33,50 @@ BEYOND = np.array(GOAL[:2])
 FRICTION = [("friction",)]
 
 
-def plan_beyond(height) -> tuple[ViewSession, list]:
-    """Return a session that has planned beyond a wall, and the steps of its judgement."""
-    session = walled_session(height, ends_at_first=False)
-    steps: list = []
-    judge = session._judge
-
-    def note(request):
-        for step in judge(request):
-            steps.append(step)
-            yield step
-
-    session._judge = note
-    assert session.plan_to(BEYOND)
-    return session, steps
+BEGIN = [*[PATH] * 5, 5, *[POLICY] * 3, 5, WAY]
+"""What is begun before and with a search, and how many candidates each result has."""
 
 
-@pytest.fixture(scope="module")
-def through() -> tuple[ViewSession, list]:
-    """A session with a way through the gap, and its steps; tests do not change them."""
-    return plan_beyond(wall_with_gap)
-
-
-@pytest.fixture(scope="module")
-def found(through) -> ViewSession:
-    return through[0]
-
-
-@pytest.fixture(scope="module")
-def before_wall() -> tuple[ViewSession, list]:
-    """A session that has found no way, and its steps; tests do not change them."""
-    return plan_beyond(whole_wall)
-
-
-@pytest.fixture(scope="module")
-def closed(before_wall) -> ViewSession:
-    return before_wall[0]
-
-
-def describe(steps: list) -> list:
-    """Return what is begun and how many candidates each result has."""
+def judge(session: ViewSession) -> list:
+    """Return what is begun when all is judged, and how many candidates each result has."""
+    steps = judge_request(JudgeRequest(session.wanted))
     return [
         step.what if isinstance(step, Progress) else len(step.answer.candidates) for step in steps
     ]
 
 
-def test_beyond_a_wall_with_a_gap_a_way_follows_the_refused_candidates_and_is_shown(found):
-    *direct, way = found.shown.candidates
+def test_beyond_a_wall_with_a_gap_a_way_follows_the_refused_candidates_and_is_shown():
+    session = walled_session(wall_with_gap)
+    assert session.plan_to(BEYOND)
+    shown = session.shown
+    *direct, way = shown.candidates
     assert len(direct) == 5 and not any(one.verdict.traversable for one in direct)
-    assert found.shown.way.outcome == FOUND
-    assert found.shown.index == found.shown.answer.best == found.shown.answer.nearest == 5
-    assert found.shown.candidate is way
+    assert shown.way.outcome == FOUND and shown.candidate is way
+    assert shown.index == shown.answer.best == shown.answer.nearest == 5
     poses = way.poses
-    np.testing.assert_allclose(poses[[0, -1], :2], [found.scenario.start[:2], BEYOND], atol=1e-9)
+    np.testing.assert_allclose(poses[[0, -1], :2], [session.scenario.start[:2], BEYOND], atol=1e-9)
     assert np.all(poses[np.abs(poses[:, 0]) < 0.2, 1] > 1.0)
-    model = found.scenario.asked_options.model
-    assert judge_path(LSR1, found.terrain, poses, model)[1].traversable
-    shown = found.shown
+    assert judge_path(LSR1, session.terrain, poses)[1].traversable
     assert [one.policy for one in shown.by_policy] == list(TORQUE_POLICIES)
     assert not any(one.is_old for one in shown.by_policy)
     assert f"way of {shown.candidate.length:.1f} m around" in shown.summary
 
 
-def test_where_there_is_no_way_the_closed_area_and_the_reason_are_kept(closed):
-    way = closed.shown.way
-    assert way.outcome == NO_WAY and len(closed.shown.candidates) == 5
-    assert not closed.shown.verdict.traversable
-    reason = closed.shown.reason
-    assert reason.startswith("no way within the map: ") and "closed in by: " in reason
-    assert reason.endswith(closed.shown.verdict.reason)
-    ends = [
-        value_at(way, way.closed.places, pose)
-        for pose in (closed.scenario.start, closed.scenario.goal)
-    ]
-    assert ends == [not way.closed.around_goal, way.closed.around_goal]
-    assert 0 < way.asked.sum() < way.asked.size
-    assert value_at(way, way.asked, (0.0, 0.0))  # the wall between the ends
+def test_the_first_way_is_shown_before_a_better_one_is_searched():
+    way = [6, *[POLICY] * 3, 6]
+    steps = judge(walled_session(wall_with_gap, GOAL, ends_at_first=False))
+    assert steps in ([*BEGIN, *way, BETTER], [*BEGIN, *way, BETTER, *way])
 
 
-def value_at(way, places, pose) -> bool:
-    """Return the value of places (rows, columns) at a pose."""
-    column, row = np.rint(np.array(pose[:2]) / way.nodes.cell).astype(int) - way.nodes.first
-    return bool(places[row, column])
-
-
-def test_the_search_follows_paths_and_policies(through, before_wall):
-    begin, way = [*[PATH] * 5, 5, *[POLICY] * 3, 5, WAY], [6, *[POLICY] * 3, 6]
-    assert describe(before_wall[1]) == [*begin, 5]
-    steps = describe(through[1])
-    assert steps in ([*begin, *way, BETTER], [*begin, *way, BETTER, *way])
-
-
-def test_the_first_way_is_shown_at_once_and_replaced_only_by_a_better_one(through):
-    judged = [step for step in through[1] if isinstance(step, Shown)]
-    ways = [one.way for one in judged if one.way is not None]
-    costs = [one.cost for one in ways]
-    assert all(one.outcome == FOUND and one.path.verdict.traversable for one in ways)
-    assert costs == sorted(costs, reverse=True)
-    assert ways[0].edges_judged <= ways[-1].edges_judged
-    assert len(judged[-1].answer.candidates) == 6
+def test_where_there_is_no_way_the_reason_is_told():
+    session = walled_session(whole_wall, GOAL)
+    assert judge(session) == [*BEGIN, 5]
+    assert session.plan_again()
+    shown = session.shown
+    assert shown.way.outcome == NO_WAY and len(shown.candidates) == 5
+    assert not shown.verdict.traversable
+    assert shown.reason.startswith("no way within the map: ") and "closed in by: " in shown.reason
+    assert shown.reason.endswith(shown.verdict.reason)
 
 
 def test_nothing_is_searched_where_a_candidate_passes_off_the_map_or_for_a_recorded_path():
@@ -140,19 +84,11 @@ def test_nothing_is_searched_where_a_candidate_passes_off_the_map_or_for_a_recor
     for goal, passes in (((-1.1, 0.1), True), ((9.0, 0.0), False)):
         assert session.plan_to(np.array(goal))
         assert session.shown.way is None and session.shown.answer.traversable == passes
-        assert WAY not in describe(list(judge_request(JudgeRequest(session.wanted))))
+        assert WAY not in judge(session)
     assert session.plan_to(np.array([-1.1, 0.1]))
     session.replay(session.shown.candidate.prediction, session.shown.verdict.reasons)
     assert session.change_rover(FRICTION, 0.05) and session.plan_again()
     assert not session.shown.verdict.traversable and session.shown.way is None
-
-
-def test_a_search_that_runs_out_of_time_says_that_there_may_be_a_way(closed):
-    short = dataclasses.replace(closed.wanted.search, budget=0.01)
-    hurried = dataclasses.replace(closed.wanted, search=short)
-    *_, judged = judge_request(JudgeRequest(hurried))
-    assert judged.way.outcome == OUT_OF_TIME and judged.way.closed is None
-    assert "there may be one" in judged.reason
 
 
 def test_a_slider_judges_the_shown_way_again_and_then_searches_another():

@@ -12,10 +12,10 @@ import numpy as np
 
 from rover_physics.files.validation import describe
 from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_contents import rover_to_dict
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
-from rover_planner.studies.rover_values import get_value, list_values, with_value
+from rover_planner.studies.rover_values import list_values, with_value
+from rover_planner.viewer.state.reasons.before_after import list_changes
 from rover_planner.viewer.state.scenario import Pose
 
 VALUE, JOINT = "rover.", "arm."
@@ -71,13 +71,7 @@ def fingerprint(terrain: Terrain) -> str:
 
 def list_changed_values(loaded: Rover, rover: Rover) -> dict[str, float]:
     """Return the numbers, by label, in which a rover differs from the one that was loaded."""
-    before, now = rover_to_dict(loaded), rover_to_dict(rover)
-    return {
-        value.label: get_value(now, value.keys[0])
-        for values in list_values(loaded).values()
-        for value in values
-        if get_value(now, value.keys[0]) != get_value(before, value.keys[0])
-    }
+    return {label: now for label, (_, now) in list_changes(loaded, rover).items()}
 
 
 def change_values(loaded: Rover, values: Mapping[str, float]) -> Rover:

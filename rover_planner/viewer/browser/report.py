@@ -67,15 +67,15 @@ def write_page(server: Any, camera: Any, report: str, title: str) -> bytes:
     return (page[:at] + inserted + page[at:]).encode()
 
 
-def describe_judgement(judgement: Shown, context: Context, query: str) -> str:
+def describe_judgement(shown: Shown, context: Context, query: str) -> str:
     """Return the verdict on the shown path with its numbers as HTML.
 
     Args:
-        judgement: What was judged.
+        shown: What is shown.
         context: What it is about.
         query: The link to it, as `write_link` returns it; empty if it would be too long.
     """
-    scenario, shown = judgement.scenario, judgement
+    scenario = shown.scenario
     verdict, prediction = shown.verdict, shown.candidate.prediction
     facts = {
         "rover": context.rover,
@@ -85,7 +85,7 @@ def describe_judgement(judgement: Shown, context: Context, query: str) -> str:
         "torques": context.policy,
         "start": _pose(scenario.start),
         "goal": _pose(scenario.goal),
-        "path": f"{shown.index + 1} of {len(judgement.answer.candidates)}, "
+        "path": f"{shown.index + 1} of {len(shown.answer.candidates)}, "
         f"{shown.candidate.length:.2f} m",
         "largest friction utilisation": _number(verdict.max_friction_utilisation, 2),
         "largest torque saturation": _number(verdict.max_torque_saturation, 2),
@@ -97,8 +97,8 @@ def describe_judgement(judgement: Shown, context: Context, query: str) -> str:
         "link": f"?{query}" if query else "too long; the rover file is below",
     }
     parts = []
-    if judgement.reason:
-        parts.append(f'<p id="reason"><b>{html.escape(judgement.reason)}</b></p>')
+    if shown.reason:
+        parts.append(f'<p id="reason"><b>{html.escape(shown.reason)}</b></p>')
     if not verdict.traversable:
         parts.append(_failing_pose(scenario.rover, prediction, verdict.first_failure))
     parts += [f"<p>{html.escape(note)}</p>" for note in shown.trajectory.notes]

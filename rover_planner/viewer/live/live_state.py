@@ -26,14 +26,14 @@ def _unknown() -> Floats:
 
 @dataclass(frozen=True)
 class TopicAge:
-    """When the last message of a topic came, and so how old it is."""
+    """The age of a topic's last message."""
 
     topic: str
     """Its name."""
     heard: float | None
     """Time on the monotonic clock [s]; None if no message has come."""
     is_stream: bool
-    """Whether it is published all the time; others come when there is something new."""
+    """True if it is published all the time; others come when there is something new."""
 
     @property
     def age(self) -> float | None:
@@ -42,7 +42,7 @@ class TopicAge:
 
     @property
     def is_stale(self) -> bool:
-        """Whether its values are no longer those of the rover."""
+        """True if its values are no longer those of the rover."""
         return self.is_stream and self.age is not None and self.age > MAX_AGE
 
     def describe(self) -> str:

@@ -262,11 +262,9 @@ class JudgedDisplay:
 
     def _list_candidates(self) -> None:
         """Show the table of the candidates, those with old verdicts grey."""
-        session, shown = self._session, self._session.shown.index
-        others = session.has_old_candidates
-        old = [others and k != shown for k in range(len(session.shown.candidates))]
-        rows = list_candidates(session.shown.candidates, session.shown.answer.nearest, old)
-        self._panels.show_candidates(draw_candidates(rows, shown))
+        shown = self._session.shown
+        rows = list_candidates(shown, self._session.has_old_candidates)
+        self._panels.show_candidates(draw_candidates(rows, shown.index))
 
     def _explain(self) -> None:
         """Find out where the shown path uses its limits and breaks one."""

@@ -34,20 +34,21 @@ def _row(row: CandidateRow, is_shown: bool) -> str:
 
     The first row takes the focus; both are clicked as one.
     """
-    colour = to_css(UNKNOWN if row.is_old else PASSABLE if row.traversable else REFUSED)
+    colour = to_css(UNKNOWN if row.is_old else PASSABLE if row.verdict.traversable else REFUSED)
     back = "background:rgba(0,114,178,.12);" if is_shown else ""
     faded = "opacity:.5;" if row.is_old else ""
-    word = "passable" if row.traversable else "refused"
+    word = "passable" if row.verdict.traversable else "refused"
     word += " (old)" if row.is_old else ""
-    word += ", best" if row.is_best and row.traversable else ""
-    length = f"{row.length:.2f}" if row.traversable else f"{row.driven:.2f} / {row.length:.2f}"
+    word += ", best" if row.is_best and row.verdict.traversable else ""
+    length = f"{row.candidate.length:.2f}"
+    length = length if row.verdict.traversable else f"{row.driven:.2f} / {length}"
     cells = (
         f"<b>{row.number}</b>",
         f'<span style="color:{colour}">&#9632;</span> {word}',
         length,
         f"{row.energy:.1f}",
-        _number(row.utilisation),
-        _number(row.margin),
+        _number(row.verdict.max_friction_utilisation),
+        _number(row.verdict.min_tip_over_ratio),
     )
     mark = f"border-left:4px solid {colour if is_shown else 'transparent'};"
     line = "".join(
@@ -55,7 +56,7 @@ def _row(row: CandidateRow, is_shown: bool) -> str:
         f'white-space:nowrap">{cell}</td>'
         for k, cell in enumerate(cells)
     )
-    reason = html.escape(row.reason) or "&nbsp;"
+    reason = html.escape(row.verdict.reason) or "&nbsp;"
     return (
         f'<tbody data-say="show {row.number}" style="{back}cursor:pointer;user-select:none">'
         f'<tr tabindex="0" aria-selected="{str(is_shown).lower()}" '

@@ -4,6 +4,8 @@
 import time
 from typing import Any
 
+import numpy as np
+
 from rover_physics.rover.model import Rover
 from rover_planner.viewer.panel.board import BoardNotes
 from rover_planner.viewer.panel.controls import on_slider_input
@@ -29,7 +31,7 @@ class PlaybackControls:
         self._gui, self._tab, self._playback, self._requests = gui, tab, playback, requests
         self.outdated = True
         """Whether the playback has moved to a time that is not drawn yet."""
-        self._times = Trajectory.empty_times()
+        self._times = np.zeros(1)
         self._failure_at: float | None = None
         self._held_until: float | None = None
         """When the page may move the scrubber again [s]; None if it may."""

@@ -8,8 +8,7 @@ import numpy as np
 from rover_physics.rover.model import Rover
 from rover_planner.viewer.scene.local_frame import LocalFrame
 from rover_planner.viewer.state.colours import LOAD, TRACTION
-from rover_planner.viewer.state.trajectory import RoverState
-from rover_planner.viewer.state.turning import find_axles
+from rover_planner.viewer.state.trajectory import RoverState, find_axles
 
 WEIGHT_LENGTH = 4.0
 """Length of the arrow of a sixth of the rover's weight [wheel radii]."""

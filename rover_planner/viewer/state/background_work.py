@@ -3,7 +3,6 @@
 
 import threading
 import time
-from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
@@ -23,14 +22,14 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class Progress:
-    """How far the work is."""
+    """Progress of the work."""
 
     what: str = ""
-    """What is worked on; empty before the first report."""
+    """Name of what is worked on; empty before the first."""
     step: int = 0
     """Its number, from 1."""
     steps: int = 0
-    """How many there are."""
+    """Number of all."""
     seconds: float = 0.0
     """Time since the work began, or since its last result [s]."""
 
@@ -98,7 +97,7 @@ class BackgroundWork(Generic[Request, Result]):
         # The lock of _changed guards all that follows.
         self._waiting: Request | None = None
         self._job: _Job[Request] | None = None
-        self._done: deque[Delivery[Request, Result]] = deque()
+        self._done: list[Delivery[Request, Result]] = []
         self._progress = Progress()
         self._since = 0.0
         self._ending = False
@@ -125,19 +124,18 @@ class BackgroundWork(Generic[Request, Result]):
     def take(self) -> list[Delivery[Request, Result]]:
         """Return what was finished since the last call, the oldest first."""
         with self._changed:
-            done = list(self._done)
-            self._done.clear()
+            done, self._done = self._done, []
         return done
 
     @property
     def has_news(self) -> bool:
-        """Whether there is something to take."""
+        """True if there is something to take."""
         with self._changed:
             return bool(self._done)
 
     @property
     def progress(self) -> Progress | None:
-        """How far the work is; None if there is none."""
+        """Progress of the work; None if there is none."""
         with self._changed:
             if not self._is_busy():
                 return None
@@ -176,8 +174,8 @@ class BackgroundWork(Generic[Request, Result]):
         try:
             with interruptible(check):
                 for found in self._work(job.request):
-                    check()
                     if isinstance(found, Progress):
+                        check()
                         with self._changed:
                             self._progress = found
                     else:

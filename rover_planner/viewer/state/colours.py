@@ -21,8 +21,6 @@ NOTICE = (204, 121, 167)
 """Reddish purple: a change that was refused."""
 FAILED = (176, 0, 32)
 """Red, with white letters: a part of the page has failed."""
-SEARCHED = (0, 158, 115)
-"""Bluish green: places that a search has asked the model about."""
 MIDDLE = (240, 228, 66)
 """Yellow: half-way from blue to vermillion."""
 METAL, DARK, BODY = (150, 155, 160), (50, 52, 56), (225, 220, 205)
@@ -39,7 +37,7 @@ MIN_CONTRAST = 3.0
 
 @dataclass(frozen=True)
 class ColourScale:
-    """What the colours of a layer mean."""
+    """The meaning of the colours of a layer."""
 
     low: float
     """Value of the first colour."""

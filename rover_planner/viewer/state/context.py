@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the page is about, in words: rover, map, soil, torque policy and mode."""
+"""The subject of the page in words: rover, map, soil, torque policy and mode."""
 
 from dataclasses import dataclass
 
@@ -8,12 +8,12 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.viewer.state.scenario import Scenario
 
 POLICY_TITLES = {EQUAL: "equal torques", SERVO: "speed servos", OPTIMAL: "traction control"}
-"""What the page calls the torque policies."""
+"""Names of the torque policies on the page."""
 
 
 @dataclass(frozen=True)
 class Context:
-    """What the page is about; empty texts are not shown."""
+    """The subject of the page; empty texts are not shown."""
 
     rover: str
     """Name of the rover, and whether it was changed."""
@@ -24,7 +24,7 @@ class Context:
     policy: str
     """Title of the torque policy."""
     mode: str
-    """What the page does, such as "planning"."""
+    """Mode of the page, such as "planning"."""
 
 
 def name_ground(terrain: Terrain) -> str:

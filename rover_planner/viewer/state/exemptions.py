@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the verdict took from between waypoints, and what it did not ask, in sentences."""
+"""Sentences on what the verdict took from between waypoints, and on what it did not ask."""
 
 import numpy as np
 

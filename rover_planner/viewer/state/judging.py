@@ -26,25 +26,23 @@ from rover_planner.viewer.state.trajectory import Trajectory
 
 PATH, POLICY, WAY = "judging path", "judging policy", "searching a way"
 BETTER = "way found, searching a better one"
-"""What is worked on."""
+"""Names of steps."""
 
 
 @dataclass(frozen=True, eq=False)
 class JudgeRequest:
-    """What to judge."""
+    """A scenario to judge, or one path of it."""
 
     scenario: Scenario
     """Rover, ground, ends and options."""
     before: Shown | None = None
-    """What was shown, of which a candidate is judged again; None: all candidates are judged."""
+    """The last finding, of which a candidate is judged again; None: all candidates are judged."""
     index: int = 0
     """Index of that candidate."""
-    searches: bool = True
-    """Whether a way around obstacles is searched if all candidates are refused."""
 
 
 Step = Progress | Shown
-"""What is begun, or what is known."""
+"""The beginning of a step, or what is known."""
 
 
 def judge_request(request: JudgeRequest, memory: EdgeMemory | None = None) -> Iterator[Step]:
@@ -67,7 +65,7 @@ def judge_request(request: JudgeRequest, memory: EdgeMemory | None = None) -> It
     if judged.scenario.recorded is not None:
         return
     judged = yield from _add_policies(judged)
-    if request.searches and judged.needs_way:
+    if judged.needs_way:
         yield from _search_ways(judged, memory or EdgeMemory())
 
 

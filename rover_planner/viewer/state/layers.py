@@ -35,12 +35,12 @@ class Layer:
 
     @property
     def is_predicted(self) -> bool:
-        """Whether the model predicts it for the rover."""
+        """True if the model predicts it for the rover."""
         return bool(self.scores)
 
     @property
     def has_classes(self) -> bool:
-        """Whether values are classes: 1 keeps the limits, 0 breaks one."""
+        """True if values are classes: 1 keeps the limits, 0 breaks one."""
         return self.scores == "passable"
 
     @property

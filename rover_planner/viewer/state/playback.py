@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The clock of the page: play, pause, step, rewind and fast forward at a chosen speed."""
+"""The clock of the page: play, pause, step and rewind at a chosen speed."""
 
 from dataclasses import dataclass, field
 
@@ -10,7 +10,7 @@ from rover_physics.numerics.arrays import Floats
 SPEEDS = (1, 2, 5, 10, 20, 50, 100)
 """Speeds to choose from, in seconds of the drive per second of the visitor."""
 FAST = 4.0
-"""Rate of fast forward and, backwards, of rewind."""
+"""Rate of rewind, backwards."""
 
 
 @dataclass
@@ -24,7 +24,7 @@ class Playback:
     speed: float = 10.0
     """Chosen speed, one of SPEEDS."""
     rate: float = 0.0
-    """Factor on the speed: 0 paused, 1 playing, FAST and -FAST fast forward and rewind."""
+    """Factor on the speed: 0 paused, 1 playing, -FAST rewinding."""
 
     _times: Floats = field(default_factory=lambda: np.zeros(1))
     _distance: Floats = field(default_factory=lambda: np.zeros(1))
@@ -48,10 +48,6 @@ class Playback:
     def pause(self) -> None:
         """Stop at the shown time."""
         self.rate = 0.0
-
-    def fast_forward(self) -> None:
-        """Play faster."""
-        self.rate = FAST
 
     def rewind(self) -> None:
         """Play backwards, faster."""
@@ -89,7 +85,7 @@ class Playback:
         """Return how it moves, in words."""
         if self.rate == 0.0:
             return "paused"
-        word = {1.0: "playing", FAST: "fast forward", -FAST: "rewinding"}[self.rate]
+        word = "playing" if self.rate > 0.0 else "rewinding"
         return f"{word}, {abs(self.rate) * self.speed:g} times as fast as the rover"
 
     def set_drive(self, times: Floats, distance: Floats) -> None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is judged, and what came out: frozen values that threads may share."""
+"""The question that is judged and the answer that is shown: frozen values for all threads."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -30,17 +30,17 @@ class Scenario:
     goal: Pose
     """The same."""
     options: PathQueryOptions
-    """How candidates are made and judged."""
+    """Options of the candidates and of the model."""
     arm_angles: Mapping[str, float]
     """Angles [rad] of the arm's joints by name; joints that are not named are stowed."""
     recorded: Floats | None = None
     """Poses (n, 3) of a recorded path that takes the place of candidates."""
     search: LatticeSettings = field(default_factory=LatticeSettings)
-    """How a way around obstacles is searched."""
+    """Options of the search of a path around obstacles."""
 
     @property
     def asked_options(self) -> PathQueryOptions:
-        """How candidates are judged with the arm as it is."""
+        """The options with the arm as it is."""
         return self.options.change(joint_angles=self.arm_angles)
 
     def has_paths_of(self, other: "Scenario") -> bool:
@@ -61,23 +61,23 @@ class PolicyVerdict:
     policy: str
     """One of `TORQUE_POLICIES`."""
     traversable: bool | None
-    """Whether the rover can drive the path; None if this policy cannot judge it or did not yet."""
+    """True if the rover can drive the path; None if this policy cannot judge it or did not yet."""
     reason: str
-    """Why not; empty if it can."""
+    """Reason of a refusal; empty if it can."""
     is_old: bool = False
-    """Whether it is of other values than the verdict beside it, or not known yet."""
+    """True if it is of other values than the verdict beside it, or not known yet."""
 
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What is shown: a path with its verdict, and those of all candidates, which may be older."""
+    """The shown path with its verdict, and those of all candidates, which may be older."""
 
     scenario: Scenario
-    """What the shown path was judged for."""
+    """Values for which the shown path was judged."""
     answer: PathAnswer
     """All candidates."""
     answered: Scenario
-    """What they were judged for."""
+    """Values for which they were judged."""
     index: int
     """Index of the shown path among the candidates."""
     candidate: Candidate
@@ -85,20 +85,20 @@ class Shown:
     trajectory: Trajectory
     """The drive along it."""
     summary: str
-    """What was judged and how long that took; empty for a recorded path."""
+    """Sentence on what was judged and for how long; empty for a recorded path."""
     by_policy: tuple[PolicyVerdict, ...] = ()
     """Its verdicts under all torque policies; empty for a replay, whose soil is not known."""
     way: WayAnswer | None = None
-    """What a search around obstacles has found for `answered`; None if none was made."""
+    """The finding of a search around obstacles for `answered`; None if none was made."""
 
     @property
     def verdict(self) -> Verdict:
-        """Whether the rover can drive the shown path, and why not."""
+        """The verdict on the shown path."""
         return self.candidate.verdict
 
     @property
     def reason(self) -> str:
-        """Why the shown path is refused, and before it why there is no way; empty if it passes."""
+        """The reason of a refusal, and before it why there is no way; empty if the path passes."""
         reason = self.verdict.reason
         is_old = self.answered is not self.scenario
         if not reason or is_old or self.way is None or self.way.path is not None:
@@ -107,7 +107,7 @@ class Shown:
 
     @property
     def needs_way(self) -> bool:
-        """Whether all candidates are refused, and no way around obstacles was searched yet."""
+        """True if all candidates are refused, and no way around obstacles was searched yet."""
         asked = self.scenario
         return (
             asked.recorded is None

@@ -4,13 +4,14 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import islice
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rover_physics.errors import RoverError
 from rover_physics.files.validation import Key
+from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
@@ -30,7 +31,7 @@ REFUSALS = (RoverError, PlanningError)
 
 
 class ViewSession:
-    """What is wanted and what is finished; both are frozen values that are replaced as a whole.
+    """The scenario that is wanted and what is shown: frozen values that are replaced as a whole.
 
     It judges at once, or in the background after `judge_in_background`. All changes belong to one
     thread, the owner's. A refused change alters nothing but `refusal`.
@@ -62,19 +63,19 @@ class ViewSession:
         self.wanted = Scenario(
             rover, rover, terrain, start, goal, options, {}, search=search or LatticeSettings()
         )
-        """What visitors want judged."""
+        """The scenario that visitors want judged."""
         self.ground_name = name_ground(terrain)
-        """What the page calls the ground; by default its size."""
+        """Name of the ground on the page; by default its size."""
         self.refusal = ""
-        """Why the last change was refused, empty if it was not."""
+        """Reason why the last change was refused, empty if it was not."""
         self.is_stopped = False
-        """Whether the judgement of `wanted` was cancelled or failed."""
+        """True if the judgement of `wanted` was cancelled or failed."""
         self._background: BackgroundWork[JudgeRequest, Shown] | None = None
         self._judge = partial(judge_request, memory=EdgeMemory())
-        self._asked = JudgeRequest(self.wanted, searches=False)
+        self._asked = JudgeRequest(self.wanted)
         """The newest request."""
-        *_, self.shown = _results(self._judge(self._asked))
-        """What was judged last."""
+        *_, self.shown = islice(_results(self._judge(self._asked)), 2)  # and not what it searches
+        """The last finding."""
         self._index = self.shown.index
         """Index of the candidate that is wanted."""
 
@@ -97,12 +98,12 @@ class ViewSession:
 
     @property
     def is_outdated(self) -> bool:
-        """Whether the shown verdict is of other values than those that are wanted."""
+        """True if the shown verdict is of other values than those that are wanted."""
         return self.shown.scenario is not self.wanted
 
     @property
     def has_old_candidates(self) -> bool:
-        """Whether the other candidates were judged for other values."""
+        """True if the other candidates were judged for other values."""
         return self.shown.answered is not self.wanted
 
     # What is wanted. All return whether the change was accepted; if not, `refusal` says why. In
@@ -121,18 +122,16 @@ class ViewSession:
             raise PlanningError("the listed paths are old; judge again first")
         return self._ask(self.wanted, index)
 
-    def plan_to(self, goal: NDArray[np.float64]) -> bool:
+    def plan_to(self, goal: Floats) -> bool:
         """Plan to a goal (2,) [m] with the yaw of the straight line there."""
         start = self.wanted.start
         return self._want(start=start, goal=_facing(start, goal), recorded=None)
 
-    def plan_from(self, start: NDArray[np.float64]) -> bool:
+    def plan_from(self, start: Floats) -> bool:
         """Plan from a start (2,) [m] with the yaw of the straight line to the goal."""
-        goal = self.wanted.goal
-        ahead = np.asarray(goal[:2]) - np.asarray(start)
-        yaw = float(np.arctan2(ahead[1], ahead[0]))
+        x, y, yaw = _facing(start, self.wanted.goal)
         pose = (float(start[0]), float(start[1]), yaw)
-        return self._want(start=pose, goal=(goal[0], goal[1], yaw), recorded=None)
+        return self._want(start=pose, goal=(x, y, yaw), recorded=None)
 
     def restore_rover(self, rover: Rover, arm_angles: Mapping[str, float]) -> bool:
         """Take other numbers of the same rover, such as those before a change.
@@ -150,14 +149,9 @@ class ViewSession:
             return False
         return self._want(options=options)
 
-    def take_rover(self, rover: Rover, loaded: Rover | None = None) -> bool:
-        """Take another rover, changed from a loaded one (default: not), and plan again.
-
-        Changed from the one that is loaded now, it is a change like those of sliders.
-        """
-        if loaded is not None and loaded == self.wanted.loaded:
-            loaded = self.wanted.loaded
-        return self._want(loaded=loaded or rover, rover=rover, arm_angles={})
+    def take_rover(self, rover: Rover) -> bool:
+        """Take another rover as it was loaded, and plan again."""
+        return self._want(loaded=rover, rover=rover, arm_angles={})
 
     def plan_again(self) -> bool:
         """Judge all candidates again, after a change of the rover."""
@@ -249,12 +243,12 @@ class ViewSession:
 
     @property
     def progress(self) -> Progress | None:
-        """How far the judgement in the background is; None if nothing is judged."""
+        """Progress of the judgement in the background; None if nothing is judged."""
         return self._background.progress if self._background is not None else None
 
     @property
     def has_news(self) -> bool:
-        """Whether there is something for `take_finished`."""
+        """True if there is something for `take_finished`."""
         return self._background is not None and self._background.has_news
 
     def take_finished(self) -> bool:
@@ -308,7 +302,7 @@ class ViewSession:
                 options=assumptions.change_options(wanted.options),
                 arm_angles=assumptions.joint_angles or {},
             )
-        start, goal = (_as_pose(poses[row]) for row in (0, -1))
+        start, goal = tuple(poses[0].tolist()), tuple(poses[-1].tolist())
         self.wanted = replace(wanted, start=start, goal=goal, recorded=poses)
         self.shown, self._index = show_recorded(self.wanted, prediction, reasons), 0
 
@@ -318,12 +312,7 @@ def _results(steps: Iterator[Progress | Shown]) -> Iterator[Shown]:
     return (step for step in steps if isinstance(step, Shown))
 
 
-def _as_pose(pose: NDArray[np.float64]) -> Pose:
-    x, y, yaw = pose.tolist()
-    return x, y, yaw
-
-
-def _facing(start: Pose, goal: NDArray[np.float64]) -> Pose:
-    """Return the pose at a goal (2,) with the yaw of the straight line from start to goal."""
-    ahead = np.asarray(goal, dtype=float) - np.asarray(start[:2])
-    return float(goal[0]), float(goal[1]), float(np.arctan2(ahead[1], ahead[0]))
+def _facing(start: Pose | Floats, goal: Pose | Floats) -> Pose:
+    """Return the pose at a goal x, y [m] with the yaw of the straight line from start to goal."""
+    yaw = np.arctan2(goal[1] - start[1], goal[0] - start[0])
+    return float(goal[0]), float(goal[1]), float(yaw)

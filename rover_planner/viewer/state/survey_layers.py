@@ -65,8 +65,8 @@ class ShownSurvey:
         """
         limits = number_limits()
         if name == CLASS:
-            numbers, labels = self._read_classes(limits), CLASS_LABELS
-            colours = list_class_colours()
+            numbers, colours = self._read_classes(limits), list_class_colours()
+            labels: tuple[str, ...] = CLASS_LABELS
         else:
             names = {number: code.replace("_", " ") for code, number in limits.items()}
             labels = tuple(names[k] or "none: all headings pass" for k in sorted(names))

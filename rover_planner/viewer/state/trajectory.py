@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.names import SERVO
+from rover_physics.names import SERVO, WHEELS
 from rover_physics.numerics.arrays import Floats
+from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_rpy
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.traversability.verdict import Verdict
@@ -86,36 +87,25 @@ class Trajectory:
         """Number of waypoints; 0 where the rover does not settle at the start."""
         self.notes = describe_exemptions(prediction, end)
         """Sentences on what lies between the waypoints, and on what the verdict did not ask."""
-        self._series = self._collect(rover, prediction.select(slice(end))) if end else {}
-
-    def _collect(self, rover: Rover, driven: PathPrediction) -> dict[str, Floats]:
-        """Return the values (n, ...) of each field of `RoverState`."""
-        moves = np.linalg.norm(np.diff(driven.wheel_centres, axis=0), axis=2)
-        rolled = moves / rover.wheel.radius / (1.0 - np.clip(driven.slip_ratio, 0, MAX_SLIP))[1:]
-        rolled *= np.where(driven.wheel_speed[1:] < 0.0, -1.0, 1.0)
-        spin = np.vstack([np.zeros(6), np.cumsum(np.nan_to_num(rolled), axis=0)])
-        return {**read_series(driven), "spin": spin}
+        self._series = dict.fromkeys(("time", "distance", "energy"), np.zeros(1))
+        if end:
+            self._series = _read_drive(rover, prediction.select(slice(end)))
 
     @property
     def has_slip(self) -> bool:
-        """Whether slip is predicted: on yielding soil, or with speed servos."""
+        """True if slip is predicted: on yielding soil, or with speed servos."""
         prediction = self.prediction
         return prediction.policy == SERVO or bool(np.any(prediction.sinkage > 0.0))
 
-    @staticmethod
-    def empty_times() -> Floats:
-        """Return the times of a trajectory without waypoints: the start alone."""
-        return np.zeros(1)
-
     @property
     def times(self) -> Floats:
-        """(length,) times of the waypoints [s]."""
-        return self._series["time"] if self.length else self.empty_times()
+        """(length,) times of the waypoints [s]; the start alone without waypoints."""
+        return self._series["time"]
 
     @property
     def distance(self) -> Floats:
-        """(length,) distances driven at the waypoints [m]."""
-        return self._series["distance"] if self.length else self.empty_times()
+        """(length,) distances driven at the waypoints [m]; as many as times."""
+        return self._series["distance"]
 
     @property
     def duration(self) -> float:
@@ -144,6 +134,15 @@ class Trajectory:
         )
 
 
+def _read_drive(rover: Rover, driven: PathPrediction) -> dict[str, Floats]:
+    """Return the values (n, ...) of each field of `RoverState`."""
+    moves = np.linalg.norm(np.diff(driven.wheel_centres, axis=0), axis=2)
+    rolled = moves / rover.wheel.radius / (1.0 - np.clip(driven.slip_ratio, 0, MAX_SLIP))[1:]
+    rolled *= np.where(driven.wheel_speed[1:] < 0.0, -1.0, 1.0)
+    spin = np.vstack([np.zeros(6), np.cumsum(np.nan_to_num(rolled), axis=0)])
+    return {**read_series(driven), "spin": spin}
+
+
 def read_series(prediction: PathPrediction) -> dict[str, Floats]:
     """Return the values (n, ...) of the fields of `RoverState` but for the spin of the wheels."""
     names = [field.name for field in fields(RoverState) if hasattr(prediction, field.name)]
@@ -163,3 +162,17 @@ def make_state(values: dict[str, Any]) -> RoverState:
         name: float(value) if np.ndim(value) == 0 else value for name, value in values.items()
     }
     return RoverState(**plain)
+
+
+def find_axles(rover: Rover, state: RoverState) -> Floats:
+    """Return the directions (6, 3) of the wheels' axles, map frame, positive to the left."""
+    R = matrix_from_xyzw(xyzw_from_rpy(*state.attitude))
+    axles = np.empty((6, 3))
+    for k, wheel in enumerate(WHEELS):
+        side = k // 3
+        link = state.rocker_angle[side]
+        if not wheel.startswith(rover.suspension.rocker_wheel):
+            link = link + state.bogie_angle[side]
+        s, c = np.sin(state.steering_angle[k]), np.cos(state.steering_angle[k])
+        axles[k] = R @ (-s * np.cos(link), c, s * np.sin(link))
+    return axles

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What visitors ask for, queued for the one thread that changes the page."""
+"""Requests of visitors, queued for the one thread that changes the page."""
 
 import threading
 from collections.abc import Callable

@@ -76,13 +76,6 @@ def test_a_limit_is_broken_on_a_lane_exactly_where_the_verdict_refuses_the_path(
         assert failure.is_settled == (failure.code != "unknown_ground")
 
 
-def test_a_limit_is_used_by_its_share():
-    _, _, why = why_on(wall_at(0.5))
-    friction = why.limits.lane("friction")
-    known = ~np.isnan(friction.values)
-    np.testing.assert_allclose(friction.used[known], friction.values[known] / friction.limit.bound)
-
-
 def test_the_worst_so_far_grows_and_ends_with_the_extremes_of_the_verdict():
     prediction, verdict, why = why_on(waves)
     times = np.linspace(0.0, prediction.time[-1], 7)
@@ -147,8 +140,7 @@ def test_a_refusal_on_unknown_ground_is_at_the_time_to_which_the_drive_is_played
     assert why.failure.time == shown.trajectory.duration
     assert (shown.trajectory.length == 0) == (start > 0.0) == (why.failure.time == 0.0)
     assert np.isfinite(why.limits.rows.time).all()
-    count = len(session.shown.candidates)
-    for row in list_candidates(session.shown.candidates, 0, [False] * count):
+    for row in list_candidates(session.shown, False):
         assert np.isfinite(row.energy)
 
 
@@ -157,15 +149,12 @@ def test_a_refusal_on_unknown_ground_is_at_the_time_to_which_the_drive_is_played
 
 def test_a_row_of_a_candidate_has_the_numbers_of_its_verdict():
     session = session_on(wall_at(0.5), goal=(1.5, 0.0, 0.0))
-    rows = list_candidates(session.shown.candidates, session.shown.answer.nearest, [False] * 5)
+    rows = list_candidates(session.shown, True)
     for row, candidate in zip(rows, session.shown.candidates, strict=True):
-        verdict = candidate.verdict
-        assert row.traversable == verdict.traversable and row.reason == verdict.reason
-        assert row.length == candidate.length
-        assert row.driven < row.length or row.traversable
-        assert row.utilisation == verdict.max_friction_utilisation
-        assert row.margin == verdict.min_tip_over_ratio
+        assert row.verdict is candidate.verdict
+        assert row.driven < candidate.length or row.verdict.traversable
     assert [row.number for row in rows if row.is_best] == [session.shown.answer.nearest + 1]
+    assert [row.number for row in rows if not row.is_old] == [session.shown.index + 1]
 
 
 @pytest.mark.parametrize("replayed", [False, True])

@@ -76,13 +76,16 @@ def test_lanes_have_a_strip_for_each_limit_that_is_broken_where_the_path_fails(r
 
 def test_the_table_has_a_row_for_each_candidate_with_its_numbers_and_marks_the_shown_one():
     session = session_on(wall_at(0.5), goal=(1.5, 0.0, 0.0))
-    rows = list_candidates(session.shown.candidates, session.shown.answer.nearest, [False] * 5)
+    rows = list_candidates(session.shown, False)
     text = draw_candidates(rows, 1)
     assert [int(n) for n in re.findall(r'<tbody data-say="show (\d)"', text)] == [1, 2, 3, 4, 5]
     for row in rows:
-        assert f"{row.driven:.2f} / {row.length:.2f}" in text and f"{row.energy:.1f}" in text
-    assert text.count("background:rgba") == 1
-    marked = text[text.index("background:rgba") - 40 : text.index("background:rgba")]
+        assert (
+            f"{row.driven:.2f} / {row.candidate.length:.2f}" in text
+            and f"{row.energy:.1f}" in text
+        )
+    assert text.count("background:rgba(0,114,178") == 1
+    marked = text[text.index("background:rgba(0") - 40 : text.index("background:rgba(0")]
     assert 'tbody data-say="show 2"' in marked and text.count('aria-selected="true"') == 1
 
 
@@ -149,7 +152,7 @@ def ground_colours() -> set[tuple[int, int, int]]:
     Also those of the layers of a survey, whose numbers have the same scale.
     """
     scale = {tuple(c) for c in map_colours(np.linspace(0.0, 1.0, 65), 0.0, 1.0).tolist()}
-    names = ("GOOD", "BEYOND", "UNKNOWN", "PASSABLE", "REFUSED", "SEARCHED")
+    names = ("GOOD", "BEYOND", "UNKNOWN", "PASSABLE", "REFUSED")
     scale |= {getattr(colours, name) for name in names}
     scale |= {*list_class_colours(), *list_limit_colours()}
     shades = np.linspace(0.3 * LINE_SHADE * HATCH_SHADE, 1.25, 12)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Why a path is refused and where: limits along it, its failure, candidates, before and after."""
+"""Reasons of a verdict: limits along the path, its failure, candidates, before and after."""

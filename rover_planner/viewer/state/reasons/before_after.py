@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a change of the rover has changed: the drive before and after it, in curves and numbers."""
+"""The rovers and drives before and after changes: history, undo, and differences in numbers."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ class Difference:
     """A number of the drive before and after a change; NaN where there is none."""
 
     name: str
-    """What it is."""
+    """Its name."""
     unit: str
     """Its unit, empty for none."""
     before: float
@@ -33,7 +33,7 @@ class Difference:
 
     @property
     def change(self) -> float:
-        """What was added."""
+        """The difference."""
         return self.after - self.before
 
 
@@ -126,4 +126,4 @@ def compare_drives(before: Trajectory, after: Trajectory) -> tuple[Difference, .
 
 
 def _last(trajectory: Trajectory, name: str) -> float:
-    return float(trajectory.series(name)[-1]) if trajectory.length else 0.0
+    return float(trajectory.series(name)[-1])

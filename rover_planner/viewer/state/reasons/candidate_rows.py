@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rover_physics.numerics.arrays import Floats
+from rover_physics.traversability.verdict import Verdict
 from rover_planner.planning.path_query import Candidate
+from rover_planner.viewer.state.scenario import Shown
 
 SHARES = np.linspace(0.2, 0.8, 13)
 """Shares of a path at which its number may stand."""
@@ -15,58 +17,48 @@ MAX_TRIED = 3
 """Rounds in which the places are improved."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CandidateRow:
-    """One candidate path in numbers; those of a refused one are up to its first failure."""
+    """One candidate path; the numbers of a refused one are up to its first failure."""
 
     number: int
     """Number of the path, from 1."""
-    traversable: bool
-    """Whether the rover can drive it."""
-    reason: str
-    """Why not; empty if it can."""
-    length: float
-    """Length of the whole path [m]."""
+    candidate: Candidate
+    """The path and its verdict."""
     driven: float
     """Length up to the first failure [m]."""
     energy: float
     """Energy up to there, or to the last waypoint before at which the rover settles [J]."""
-    utilisation: float
-    """Largest friction utilisation."""
-    margin: float
-    """Smallest stability margin."""
     is_best: bool
-    """Whether it is the one to drive, or that gets furthest."""
+    """True if it is the one to drive, or that gets furthest."""
     is_old: bool
-    """Whether it was judged for other values than those that are wanted."""
+    """True if it was judged for other values than those that are wanted."""
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict on it."""
+        return self.candidate.verdict
 
 
-def list_candidates(
-    candidates: Sequence[Candidate], best: int, old: Sequence[bool]
-) -> tuple[CandidateRow, ...]:
-    """Return the rows of candidates.
+def list_candidates(shown: Shown, others_are_old: bool) -> tuple[CandidateRow, ...]:
+    """Return the rows of all candidates.
 
     Args:
-        candidates: The candidates.
-        best: Index of the one to drive, or that gets furthest.
-        old: For each whether its verdict is old.
+        shown: What is shown.
+        others_are_old: True if the other candidates were judged for other values than are wanted.
     """
     rows = []
-    for k, candidate in enumerate(candidates):
-        verdict, prediction = candidate.verdict, candidate.prediction
-        last = min(verdict.first_failure, len(prediction.poses) - 1)
+    for k, candidate in enumerate(shown.candidates):
+        prediction = candidate.prediction
+        last = min(candidate.verdict.first_failure, len(prediction.poses) - 1)
         rows.append(
             CandidateRow(
                 number=k + 1,
-                traversable=verdict.traversable,
-                reason=verdict.reason,
-                length=candidate.length,
+                candidate=candidate,
                 driven=float(prediction.distance[last]),
                 energy=_last_known(prediction.energy[: last + 1 or None]),
-                utilisation=verdict.max_friction_utilisation,
-                margin=verdict.min_tip_over_ratio,
-                is_best=k == best,
-                is_old=old[k],
+                is_best=k == shown.answer.nearest,
+                is_old=others_are_old and k != shown.index,
             )
         )
     return tuple(rows)

@@ -31,7 +31,7 @@ TITLES = {
 }
 """Short names of the codes of a verdict that have no number."""
 ON_THE_WAY = "on the way here: "
-"""How the reason of a failure between waypoints begins."""
+"""Beginning of the reason of a failure between waypoints."""
 MAX_BETWEEN = 8
 """Most poses before a failure that are shown beside it."""
 
@@ -56,9 +56,9 @@ class Failure:
     time: float
     """Time since the start [s]."""
     is_between: bool
-    """Whether it is between two waypoints."""
+    """True if it is between two waypoints."""
     is_settled: bool
-    """Whether the rover stands there; if not, `state` is a level rover above the ground."""
+    """True if the rover stands there; if not, `state` is a level rover above the ground."""
     state: RoverState
     """The rover there."""
     between: tuple[RoverState, ...] = ()
@@ -193,10 +193,10 @@ def _find_lost_wheel(rover: Rover, terrain: Terrain, state: RoverState) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """Why a judged path can be driven or not: the limits along it and its first failure."""
+    """The reasons of a verdict: the limits along the path and its first failure."""
 
     limits: PathLimits
-    """How it uses the limits, up to the first failure."""
+    """Its uses of the limits, up to the first failure."""
     failure: Failure | None
     """The first failure; None if the path can be driven."""
 

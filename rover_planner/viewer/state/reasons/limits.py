@@ -29,7 +29,7 @@ class Limit:
     unit: Unit = RATIO
     """Unit of bound and values."""
     is_lowest: bool = False
-    """Whether the bound is the smallest good value, not the largest."""
+    """True if the bound is the smallest good value, not the largest."""
 
     def is_broken_by(self, value: float) -> bool:
         """Return whether a value is beyond the limit; False if it is no single number.

@@ -49,7 +49,7 @@ class Lane:
     values: Floats
     """The value nearest to the limit, in the limit's unit; NaN for none."""
     used: Floats
-    """How much of the limit is used: 1 at the limit, above 1 where it is broken, NaN where it does
+    """Use of the limit: 1 at the limit, above 1 where it is broken, NaN where it does
     not count or is not known."""
     wheel: NDArray[np.int64]
     """Index of the wheel concerned, -1 for none."""
@@ -89,15 +89,15 @@ class WorstUse:
     value: str = "?"
     """The value nearest to the limit, as text."""
     bound: str = ""
-    """What keeps the limit, with its unit, such as "max 1.00"; empty if it is no single number."""
+    """Good values with their unit, such as "max 1.00"; empty if it is no single number."""
     used: float = 0.0
-    """How much of the limit is used, above 1 if it is broken."""
+    """Use of the limit, above 1 if it is broken."""
     wheel: str = ""
     """The wheel concerned, empty for none."""
 
     @property
     def is_broken(self) -> bool:
-        """Whether the limit is broken."""
+        """True if the limit is broken."""
         return self.used > 1.0
 
 
