@@ -163,18 +163,15 @@ def test_a_click_sets_the_goal_one_into_the_sky_is_refused_and_one_on_a_number_s
     wait_for_rest(page)
     other = (session.shown.index + 1) % len(session.shown.candidates)
     camera = max(page.server.get_clients().items())[1].camera
-    camera.look_at = page.scene.paths._numbers[other]  # the number is in the middle
-    camera.position = camera.look_at + np.array([-2.0, 0.0, 2.0])
+    place, goal, told = page.scene.paths._numbers[other], session.scenario.goal, []
+    camera.on_update(told.append)
+    camera.position = place + np.array([-2.0, 0.0, 2.0])
+    camera.look_at = place  # the number is in the middle
+    wait_until(lambda: told, "the browser's camera")
+    visitor.tab.wait_for_timeout(1000)
     box = visitor.tab.locator("canvas").first.bounding_box()
-    middle = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
-
-    def is_shown() -> bool:
-        visitor.tab.mouse.click(*middle)
-        visitor.tab.wait_for_timeout(500)  # the browser moves its camera picture by picture
-        return session.shown.index == other
-
-    goal = session.scenario.goal
-    wait_until(is_shown, "the path of the number")
+    visitor.tab.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+    wait_until(lambda: session.shown.index == other, "the path of the number")
     assert session.scenario.goal == goal
 
 
