@@ -28,6 +28,7 @@ def page():
     """A page at rest; of its paths around a block one passes, and beyond the goal is a wall."""
     served = Page(blocked_session(), port=0)
     wait_for_rest(served)
+    served.home = served.session.wanted
     yield served
     served.close()
 
@@ -190,7 +191,8 @@ def test_what_is_shown_is_sent_as_a_link_and_as_a_file_that_needs_no_network(
     visitor, page, browser, tmp_path
 ):
     session = page.session
-    ask(page, lambda: page._restore(replace(LSR1, friction=0.6), {}))
+    changed = replace(page.home, rover=replace(LSR1, friction=0.6))
+    ask(page, lambda: session.take_scenario(changed))
     wait_for_rest(page)
     show_refused(page)
     ask(page, lambda: page.playback.go_to(2.0))
