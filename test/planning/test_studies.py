@@ -165,6 +165,8 @@ def test_the_command_writes_a_table_and_a_picture(tmp_path, capsys):
         rows = list(csv.reader(table))
     assert rows[0][0] == "suspension.bogie_pivot.x [m]" and len(rows) == 6
     assert (tmp_path / "out" / "loads.png").read_bytes()[:4] == b"\x89PNG"
+    best = load_rover(tmp_path / "out" / "loads_best.yaml")
+    assert best.suspension.bogie_pivot[0] == pytest.approx(0.2)
     assert main(["study", str(tmp_path / "none.yaml")]) == 2
 
 

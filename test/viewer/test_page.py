@@ -2,6 +2,7 @@
 """The page in a real browser: one visit to one page, from its opening until its program ends."""
 
 import re
+from dataclasses import replace
 from io import BytesIO
 
 import numpy as np
@@ -27,6 +28,7 @@ def page():
     """A page at rest; of its paths around a block one passes, and beyond the goal is a wall."""
     served = Page(blocked_session(), port=0)
     wait_for_rest(served)
+    served.home = served.session.wanted
     yield served
     served.close()
 
@@ -162,18 +164,15 @@ def test_a_click_sets_the_goal_one_into_the_sky_is_refused_and_one_on_a_number_s
     wait_for_rest(page)
     other = (session.shown.index + 1) % len(session.shown.candidates)
     camera = max(page.server.get_clients().items())[1].camera
-    camera.look_at = page.scene.paths._numbers[other]  # the number is in the middle
-    camera.position = camera.look_at + np.array([-2.0, 0.0, 2.0])
+    place, goal, told = page.scene.paths._numbers[other], session.scenario.goal, []
+    camera.on_update(told.append)
+    camera.position = place + np.array([-2.0, 0.0, 2.0])
+    camera.look_at = place  # the number is in the middle
+    wait_until(lambda: told, "the browser's camera")
+    visitor.tab.wait_for_timeout(1000)
     box = visitor.tab.locator("canvas").first.bounding_box()
-    middle = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
-
-    def is_shown() -> bool:
-        visitor.tab.mouse.click(*middle)
-        visitor.tab.wait_for_timeout(500)  # the browser moves its camera picture by picture
-        return session.shown.index == other
-
-    goal = session.scenario.goal
-    wait_until(is_shown, "the path of the number")
+    visitor.tab.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+    wait_until(lambda: session.shown.index == other, "the path of the number")
     assert session.scenario.goal == goal
 
 
@@ -192,7 +191,9 @@ def test_what_is_shown_is_sent_as_a_link_and_as_a_file_that_needs_no_network(
     visitor, page, browser, tmp_path
 ):
     session = page.session
-    ask(page, lambda: session.change_rover([("friction",)], 0.6))
+    changed = replace(page.home, rover=replace(LSR1, friction=0.6))
+    ask(page, lambda: session.take_scenario(changed))
+    wait_for_rest(page)
     show_refused(page)
     ask(page, lambda: page.playback.go_to(2.0))
     shown, at = session.shown, page.playback.time

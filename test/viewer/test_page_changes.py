@@ -81,7 +81,10 @@ def test_a_rover_file_is_loaded_and_presets_and_arm_follow(page):
     text = write_rover(replace(LSR1, name="bare", manipulator=None))
     file = SimpleNamespace(name="bare.yaml", content=text.encode())
     page.rover_tab._load_file(SimpleNamespace(target=SimpleNamespace(value=file)))
-    nodes = lambda: page.scene._visual._meshes  # noqa: E731
+
+    def nodes() -> dict:
+        return {} if page.scene._visual is None else page.scene._visual._meshes
+
     wait_until(lambda: page.session.rover.name == "bare", "the loaded rover", PATIENCE)
     wait_until(lambda: "arm" not in nodes() and "body" in nodes(), "no arm", PATIENCE)
     assert page.rover_tab._preset.value == "bare (file)" and not page.rover_tab.arm
@@ -98,7 +101,8 @@ def test_while_a_change_is_judged_the_old_verdict_is_grey_and_it_can_be_cancelle
         change_friction(page, 0.75)
         wait_until(lambda: notice._cancel.visible, "the notice", PATIENCE)
         assert "judging path" in notice._text.content and "old values</b>: judging" in verdict()
-        assert "(old values)" in page.header._box.content and session.shown is shown
+        wait_until(lambda: "(old values)" in page.header._box.content, "the chip", PATIENCE)
+        assert session.shown is shown
         grey = set(range(len(session.shown.candidates)))
         wait_until(lambda: page.scene.paths._old == grey, "grey paths", PATIENCE)
         ask(page, page._cancel)

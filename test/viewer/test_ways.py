@@ -21,6 +21,7 @@ from rover_planner.viewer.state.judging import (
     JudgeRequest,
     judge_request,
 )
+from rover_planner.viewer.state.scenario import Shown
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import wall_with_gap, whole_wall
 from support.viewer.sessions import LSR1, held, walled_session
@@ -37,12 +38,13 @@ BEGIN = [*[PATH] * 5, 5, *[POLICY] * 3, 5, WAY]
 """What is begun before and with a search, and how many candidates each result has."""
 
 
-def judge(session: ViewSession) -> list:
-    """Return what is begun when all is judged, and how many candidates each result has."""
-    steps = judge_request(JudgeRequest(session.wanted))
-    return [
-        step.what if isinstance(step, Progress) else len(step.answer.candidates) for step in steps
+def judge(session: ViewSession) -> tuple[list, Shown]:
+    """Judge all; return what is begun and how many candidates each result has, and the last."""
+    steps = list(judge_request(JudgeRequest(session.wanted)))
+    names = [
+        one.what if isinstance(one, Progress) else len(one.answer.candidates) for one in steps
     ]
+    return names, next(one for one in reversed(steps) if isinstance(one, Shown))
 
 
 def test_beyond_a_wall_with_a_gap_a_way_follows_the_refused_candidates_and_is_shown():
@@ -64,15 +66,13 @@ def test_beyond_a_wall_with_a_gap_a_way_follows_the_refused_candidates_and_is_sh
 
 def test_the_first_way_is_shown_before_a_better_one_is_searched():
     way = [6, *[POLICY] * 3, 6]
-    steps = judge(walled_session(wall_with_gap, GOAL, ends_at_first=False))
+    steps, _ = judge(walled_session(wall_with_gap, GOAL, ends_at_first=False))
     assert steps in ([*BEGIN, *way, BETTER], [*BEGIN, *way, BETTER, *way])
 
 
 def test_where_there_is_no_way_the_reason_is_told():
-    session = walled_session(whole_wall, GOAL)
-    assert judge(session) == [*BEGIN, 5]
-    assert session.plan_again()
-    shown = session.shown
+    steps, shown = judge(walled_session(whole_wall, GOAL))
+    assert steps == [*BEGIN, 5]
     assert shown.way.outcome == NO_WAY and len(shown.candidates) == 5
     assert not shown.verdict.traversable
     assert shown.reason.startswith("no way within the map: ") and "closed in by: " in shown.reason
@@ -84,7 +84,7 @@ def test_nothing_is_searched_where_a_candidate_passes_off_the_map_or_for_a_recor
     for goal, passes in (((-1.1, 0.1), True), ((9.0, 0.0), False)):
         assert session.plan_to(np.array(goal))
         assert session.shown.way is None and session.shown.answer.traversable == passes
-        assert WAY not in judge(session)
+        assert WAY not in judge(session)[0]
     assert session.plan_to(np.array([-1.1, 0.1]))
     session.replay(session.shown.candidate.prediction, session.shown.verdict.reasons)
     assert session.change_rover(FRICTION, 0.05) and session.plan_again()

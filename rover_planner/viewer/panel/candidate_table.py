@@ -21,7 +21,7 @@ def draw_candidates(rows: Sequence[CandidateRow], shown: int) -> str:
     body = "".join(_row(row, row.number - 1 == shown) for row in rows)
     return (
         '<div style="padding:0 8px"><style>#candidates tbody:is(:hover,:focus-within)'
-        "{background:rgba(240,228,66,.35)!important}</style>"
+        "{background:#f0e44259!important}</style>"
         '<table id="candidates" style="border-collapse:collapse;'
         f'width:100%;font-size:12px;line-height:1.35" role="grid"><tr>{head}</tr>{body}</table>'
         '<div style="font-size:12px;opacity:.75;padding-top:4px">Click a row to show its path. '

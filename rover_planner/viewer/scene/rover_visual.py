@@ -4,7 +4,6 @@
 import itertools
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import lru_cache
 from typing import Any, cast
 
 import numpy as np
@@ -14,7 +13,7 @@ from rover_physics.names import SIDES, WHEEL_POSITIONS, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import wxyz_about_y, wxyz_from_rpy
 from rover_physics.rover.manipulator import link_points
-from rover_physics.rover.model import Belly, Manipulator, Rover
+from rover_physics.rover.model import Manipulator, Rover
 from rover_planner.viewer.scene.local_frame import LocalFrame
 from rover_planner.viewer.state.colours import BODY, DARK, METAL, colour_utilisation
 from rover_planner.viewer.state.trajectory import RoverState
@@ -161,40 +160,23 @@ def make_bar(start: Floats, end: Floats, radius: float) -> trimesh.Trimesh:
 
 def make_beams(ends: list[Floats], radius: float) -> trimesh.Trimesh:
     """Return bars of a radius from the origin to ends (3,) [m]."""
-    return _make_beams(tuple(tuple(end.tolist()) for end in ends), radius)
-
-
-@lru_cache(maxsize=8)
-def _make_beams(ends: tuple[tuple[float, ...], ...], radius: float) -> trimesh.Trimesh:
-    """Make the beams; the ghost of a failure has the same, as in the functions below."""
-    return join_meshes([make_bar(np.zeros(3), np.array(end), radius) for end in ends])
+    return join_meshes([make_bar(np.zeros(3), end, radius) for end in ends])
 
 
 def make_body(rover: Rover) -> trimesh.Trimesh:
     """Return a box on the belly rectangle, 1.4 wheel radii high, and the axle of the rockers."""
-    return _make_body(rover.belly, rover.suspension.rocker_pivot, rover.wheel.radius)
-
-
-@lru_cache(maxsize=4)
-def _make_body(
-    belly: Belly, pivot: tuple[float, float, float], wheel_radius: float
-) -> trimesh.Trimesh:
+    belly, pivot, radius = rover.belly, rover.suspension.rocker_pivot, rover.wheel.radius
     low = np.array([belly.x[0], belly.y[0], belly.z])
-    high = np.array([belly.x[1], belly.y[1], belly.z + 1.4 * wheel_radius])
+    high = np.array([belly.x[1], belly.y[1], belly.z + 1.4 * radius])
     box = trimesh.creation.box(high - low)
     box.apply_translation(0.5 * (low + high))
-    axle = make_bar(on_side(pivot, "right"), on_side(pivot, "left"), 0.12 * wheel_radius)
+    axle = make_bar(on_side(pivot, "right"), on_side(pivot, "left"), 0.12 * radius)
     return join_meshes([box, axle])
 
 
 def make_wheel(rover: Rover) -> tuple[trimesh.Trimesh, trimesh.Trimesh]:
     """Return tyre and grousers of a wheel about its centre, with its axis along y."""
-    return _make_wheel(rover.wheel.radius, rover.wheel.width)
-
-
-@lru_cache(maxsize=4)
-def _make_wheel(radius: float, width: float) -> tuple[trimesh.Trimesh, trimesh.Trimesh]:
-    """Make a wheel of a radius and a width [m]."""
+    radius, width = rover.wheel.radius, rover.wheel.width
     across = [[0.0, -0.5 * width, 0.0], [0.0, 0.5 * width, 0.0]]
     tyre = trimesh.creation.cylinder(radius=0.96 * radius, segment=across, sections=32)
     grousers = []
