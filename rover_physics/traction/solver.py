@@ -166,10 +166,11 @@ def _describe_answer(
     """Return forces x (14,) in SI units, with what the run of the programs came to."""
     table = np.empty((len(WHEEL_FORCES), WHEEL_COUNT))
     peak, min_load, max_traction = write_wheel_forces(rows.packed, inputs.packed, x, table)
+    torques, loads, tractions, lateral, utilisation = table
     return TractionAnswer(
-        *table,
+        torques, loads, tractions, lateral, utilisation,
         friction_slack=max(peak - 1.0, 0.0),
         load_slack=max(-min_load, 0.0),
         torque_slack=max(inputs.radius * max_traction - inputs.max_torque, 0.0),
         **run,
-    )
+    )  # fmt: skip
