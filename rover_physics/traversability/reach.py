@@ -39,7 +39,7 @@ PER_WHEEL = ("wheel_loads", "tangential", "lateral", "torque", "friction_utilisa
 
 @dataclass(frozen=True, eq=False)
 class ReachAnswer:
-    """Whether the arm can reach a point and bear a load there, and the reason if it cannot."""
+    """Answer to a reach query: the arm reaches the point and bears the load, or why not."""
 
     possible: bool
     """True if the tip reaches the point and the rover holds still within all its limits."""

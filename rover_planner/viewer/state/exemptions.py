@@ -60,7 +60,7 @@ def _describe_falls(rows: AskedPoses, on_the_way_to: Floats) -> str:
         return ""
     limits = [
         code.replace("_", " ")
-        for code in dict.fromkeys(row.code for row in LIMITS if row.rests_in_a_fall)
+        for code in dict.fromkeys(row.code for row in LIMITS if row.exempt_on_edge)
     ]
     shown = "; ".join(
         f"{' and '.join(sorted(names))} {place}"
