@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The joint map: which joints of a URDF are the rover's, and the values that the URDF does not give."""
+"""The joint map: which joints of a URDF are the rover's, and values that it does not give."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
