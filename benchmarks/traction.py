@@ -19,7 +19,7 @@ from benchmarks.drives import (
     EQUAL_TORQUES,
     OBSTACLES,
     SERVO,
-    Drive,
+    DriveResult,
     Obstacle,
     drive,
     run_in_processes,
@@ -39,7 +39,7 @@ SUMS = {
 }
 """What is summed up: heading, digits, and whether the sum or the mean of all obstacles."""
 
-Drives = dict[tuple[Obstacle, str], Drive]
+Drives = dict[tuple[Obstacle, str], DriveResult]
 """Drives by obstacle and controller."""
 
 

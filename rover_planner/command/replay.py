@@ -15,7 +15,7 @@ from rover_planner.shell.poses import Pose, pose_option
 if TYPE_CHECKING:
     from rover_planner.parameters.traverse_server import TraverseServerParameters
     from rover_planner.ros.bags.bag_writer import BagWriter
-    from rover_planner.ros.bags.replay import Answer, Replay
+    from rover_planner.ros.bags.replay import Replay, ReplayAnswer
 
 NODE_KEYS = ("/**", "traverse_server", "/traverse_server")
 """Keys of a parameter file that are about traverse_server; later ones take precedence."""
@@ -108,7 +108,7 @@ class _Results:
         self.count = 0
         """Number of answers."""
 
-    def take(self, answer: "Answer") -> None:
+    def take(self, answer: "ReplayAnswer") -> None:
         """Write an answer and print it in one line."""
         from rover_planner.maps.known_map import stamp_text
 
@@ -126,7 +126,7 @@ class _Results:
         self._write_messages(answer)
         typer.echo(json.dumps(told))
 
-    def _save_map(self, answer: "Answer") -> str:
+    def _save_map(self, answer: "ReplayAnswer") -> str:
         """Write the map of an answer once; return its file's name."""
         from rover_physics.terrain.grid import save_terrain
 
@@ -138,7 +138,7 @@ class _Results:
             save_terrain(self._folder / self._maps[key], answer.terrain)
         return self._maps[key]
 
-    def _save_prediction(self, answer: "Answer", name: str) -> dict[str, Any]:
+    def _save_prediction(self, answer: "ReplayAnswer", name: str) -> dict[str, Any]:
         """Write prediction and measurements of an answer; return what is told of them."""
         from rover_physics.files.npz_file import write_npz
         from rover_planner.command.prediction_files import write_prediction
@@ -164,7 +164,7 @@ class _Results:
             told["suspension"] = measured.compare(candidate.prediction)
         return told
 
-    def _write_messages(self, answer: "Answer") -> None:
+    def _write_messages(self, answer: "ReplayAnswer") -> None:
         """Write the messages that a server would publish, under its topics."""
         from msg_adapters.paths import PoseStock
         from msg_adapters.stamps import ns_to_stamp

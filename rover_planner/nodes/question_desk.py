@@ -142,10 +142,10 @@ class QuestionDesk:
         """Return a watch that publishes the progress of a question's searches."""
         patience = self._service.settings.lattice.budget
 
-        def tell(report: dict[str, Any]) -> None:
+        def send_report(report: dict[str, Any]) -> None:
             self._handover.call(lambda: self._publish_progress(report))
 
-        return SearchWatch(lambda: self._service.known_map, tell, patience)
+        return SearchWatch(lambda: self._service.known_map, send_report, patience)
 
     def _publish_progress(self, report: dict[str, Any]) -> None:
         text = (

@@ -123,7 +123,7 @@ def report_path(
     if suspension is not None:
         entries |= asdict(suspension)
     if ground is not None:
-        entries["blind_share"] = ground.blind_share
+        entries["blind_share"] = ground.unobserved_share
         entries["footprint_share"] = ground.footprint_share
     if search is not None:
         entries |= _report_search(search)

@@ -184,9 +184,9 @@ class TractionSupervisor:
         update = self.service.rest(fault)
         torques, expiry = np.zeros(WHEEL_COUNT), float("inf")
         timeout, policy = parameters.joint_states_timeout, parameters.rest_policy
-        blind = now - self.service.joints.wheel_time > timeout
-        brake = policy == BRAKE or (policy == HOLD and blind)
-        if policy == HOLD and not blind:
+        joints_unknown = now - self.service.joints.wheel_time > timeout
+        brake = policy == BRAKE or (policy == HOLD and joints_unknown)
+        if policy == HOLD and not joints_unknown:
             torques, expiry = self._hold_wheels(duration), self.service.joints.wheel_time + timeout
         else:
             self._held = False

@@ -96,9 +96,9 @@ class PathJudgement:
     @cached_property
     def ground(self) -> UnobservedShare | None:
         """Never seen ground under the belly; None without a judged path. Computed on first use."""
-        if self.candidate is None or self.judge is None or self.judge.blind is None:
+        if self.candidate is None or self.judge is None or self.judge.unobserved_check is None:
             return None
-        return self.judge.blind.share(self.candidate)
+        return self.judge.unobserved_check.share(self.candidate)
 
     def changes(self) -> NDArray[np.intp]:
         """Return the indices (m,) of waypoints whose class differs from that of the one before."""

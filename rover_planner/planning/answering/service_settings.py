@@ -37,7 +37,7 @@ class ServiceSettings:
     """How paths around obstacles are searched."""
     max_map_age: float
     """Age from which a map is too old to be used [s]; 0 allows any age."""
-    blind_ground: str = ALLOW
+    unobserved_ground: str = ALLOW
     """What paths over never seen ground under the belly are, one of UNOBSERVED_GROUND."""
 
     @property
@@ -110,5 +110,5 @@ def load_service_settings(parameters: TraverseServerParameters) -> ServiceSettin
             frontier=parameters.search_frontier,
         ),
         max_map_age=parameters.max_map_age,
-        blind_ground=parameters.blind_ground,
+        unobserved_ground=parameters.blind_ground,
     )

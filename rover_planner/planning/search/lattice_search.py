@@ -43,7 +43,7 @@ NEAR_OPTIMAL = 0.02
 
 
 @dataclass
-class Progress:
+class SearchProgress:
     """What a search has found so far."""
 
     best: Candidate | None = None
@@ -105,7 +105,7 @@ class LatticeSearch:
     """(nodes,) doubt that the rover can be at a node, 0 for none; grows with the search."""
     difficulty: Difficulty
     """Estimates how likely edges are refused."""
-    progress: Progress = field(default_factory=Progress)
+    progress: SearchProgress = field(default_factory=SearchProgress)
     """What it has found."""
 
     def __post_init__(self) -> None:
@@ -121,7 +121,7 @@ class LatticeSearch:
             checked = self.judge.check(piece.poses, stop_at_failure=True)
             self._keep([replace(piece, cost=cost)], checked)
 
-    def run(self, allowed: Callable[["LatticeSearch"], bool]) -> Progress:
+    def run(self, allowed: Callable[["LatticeSearch"], bool]) -> SearchProgress:
         """Search until the best path is found, no path is left, or it is not allowed to go on."""
         try:
             for caution in CAUTIONS:

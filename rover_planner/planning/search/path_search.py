@@ -28,7 +28,7 @@ from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.edges import UNJUDGED
 from rover_planner.planning.search.ground_estimate import estimate_ground
 from rover_planner.planning.search.judge import PathJudge
-from rover_planner.planning.search.lattice_search import LatticeSearch, Progress, join_pieces
+from rover_planner.planning.search.lattice_search import LatticeSearch, SearchProgress, join_pieces
 from rover_planner.planning.search.nodes import HEADINGS, Nodes
 from rover_planner.planning.search.primitives import Gear, Piece
 from rover_planner.planning.search.query import (
@@ -133,7 +133,7 @@ def find_path(
     query: SearchQuery,
     settings: LatticeSettings | None = None,
     memory: EdgeMemory | None = None,
-    on_progress: Callable[[Progress], None] | None = None,
+    on_progress: Callable[[SearchProgress], None] | None = None,
 ) -> SearchResult:
     """Search a path from start to goal.
 
@@ -158,13 +158,13 @@ class _PathFinder:
         query: SearchQuery,
         settings: LatticeSettings,
         memory: EdgeMemory | None,
-        on_progress: Callable[[Progress], None] | None,
+        on_progress: Callable[[SearchProgress], None] | None,
     ):
         self._began = time.perf_counter()
         self._query, self._settings, self._on_progress = query, settings, on_progress
         self._start = _check_end("start", query, may_be_off_map=False)
         self._goal = _check_end("goal", query, may_be_off_map=settings.frontier)
-        self._judge = PathJudge(query.rover, query.terrain, query.options, query.blind)
+        self._judge = PathJudge(query.rover, query.terrain, query.options, query.unobserved_check)
         cell = settings.cell or 0.25 * query.rover.wheelbase
         self._nodes, self._is_limited = choose_window(query, cell)
         self._memory = memory or EdgeMemory()
@@ -291,7 +291,7 @@ class _PathFinder:
         path: tuple[Candidate | None, float] = (None, math.inf),
         closed: ClosedArea | None = None,
     ) -> SearchResult:
-        progress = Progress() if search is None else search.progress
+        progress = SearchProgress() if search is None else search.progress
         asked = np.zeros(self._nodes.shape, bool) if search is None else self._asked(search)
         known = progress.best is not None and progress.bound > 0.0
         bound = progress.cost / progress.bound if known else math.inf

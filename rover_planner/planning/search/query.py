@@ -12,8 +12,8 @@ from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.planning.search.blind_check import BlindCheck
 from rover_planner.planning.search.nodes import HEADINGS, Nodes, nodes_within
+from rover_planner.planning.search.unobserved_check import UnobservedCheck
 
 MAX_NODES = 1_500_000
 """Largest number of nodes of a window; each takes 70 bytes."""
@@ -33,7 +33,7 @@ class SearchQuery:
     """(3,) as `start`."""
     options: PathQueryOptions
     """How paths are judged."""
-    blind: BlindCheck | None = None
+    unobserved_check: UnobservedCheck | None = None
     """Refuses ground under the belly that was never seen; None allows it."""
 
 

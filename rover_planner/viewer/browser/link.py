@@ -29,7 +29,7 @@ HALF_TURN = 180.0
 
 
 @dataclass(frozen=True)
-class Link:
+class PageLink:
     """What a link holds."""
 
     rover: str
@@ -90,7 +90,7 @@ def change_values(loaded: Rover, values: Mapping[str, float]) -> Rover:
     return rover
 
 
-def write_link(link: Link) -> str:
+def write_link(link: PageLink) -> str:
     """Return a link as the query of an address.
 
     Raises:
@@ -121,7 +121,7 @@ def write_link(link: Link) -> str:
     return query
 
 
-def read_link(query: str) -> Link | None:
+def read_link(query: str) -> PageLink | None:
     """Return what the query of an address holds; None if it is not one of `write_link`.
 
     Raises:
@@ -133,7 +133,7 @@ def read_link(query: str) -> Link | None:
     missing = [name for name in ("start", "goal", "torques", "layer") if name not in words]
     if missing:
         raise PlanningError(f"the link has no {missing[0]}")
-    return Link(
+    return PageLink(
         rover=words["rover"],
         ground=words["map"],
         start=_read_pose("start", words["start"]),

@@ -131,7 +131,7 @@ class JudgedDisplay:
             self.history.take(now)
             if now.answered is not before.answered:
                 self._draw_predicted_ground()
-            if now.way is not before.way:
+            if now.around is not before.around:
                 self._ask("the closed area is not drawn", self._draw_closed_area)
             if now.candidate is not before.candidate:
                 self.show_path()
@@ -251,7 +251,7 @@ class JudgedDisplay:
 
     def _draw_closed_area(self) -> None:
         session = self._session
-        self._panels.scene.closed.show(session.rover, session.terrain, session.shown.way)
+        self._panels.scene.closed.show(session.rover, session.terrain, session.shown.around)
 
     def _old_paths(self) -> set[int]:
         """Return the indices of the paths whose verdicts are of old values."""

@@ -26,7 +26,7 @@ def describe_exemptions(prediction: PathPrediction, waypoints: int) -> tuple[str
     rows = merge_poses(prediction.cut(waypoints))
     next_waypoint = prediction.distance[rows.prediction.waypoint]
     largest = "" if prediction.policy == SERVO else _describe_largest(rows, next_waypoint)
-    return tuple(filter(None, (largest, _describe_falls(rows, next_waypoint))))
+    return tuple(filter(None, (largest, _describe_edges(rows, next_waypoint))))
 
 
 def _describe_largest(rows: AskedPoses, on_the_way_to: Floats) -> str:
@@ -46,7 +46,7 @@ def _describe_largest(rows: AskedPoses, on_the_way_to: Floats) -> str:
     )
 
 
-def _describe_falls(rows: AskedPoses, on_the_way_to: Floats) -> str:
+def _describe_edges(rows: AskedPoses, on_the_way_to: Floats) -> str:
     """Return where wheels roll off edges, and which limits are not asked there."""
     found: dict[str, list[float]] = {}
     for row, wheel in np.argwhere(rows.prediction.falling).tolist():

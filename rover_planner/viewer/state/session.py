@@ -215,11 +215,11 @@ class ViewSession:
         now, before = self.shown, request.before
         if (
             before is not None
-            and shown.way is before.way
+            and shown.around is before.around
             and request.scenario.has_paths_of(now.answered)
             and shown.index < len(now.answer.candidates)
         ):
-            shown = replace(shown, answer=now.answer, answered=now.answered, way=now.way)
+            shown = replace(shown, answer=now.answer, answered=now.answered, around=now.around)
         self.shown = shown
         if request is self._asked:
             self._index = shown.index
@@ -238,7 +238,7 @@ class ViewSession:
             wake: Called in that thread when there is something to take with `take_finished`.
         """
         self._background = BackgroundWork(self._judge, wake, "judge")
-        if self.shown.needs_way:
+        if self.shown.needs_search:
             self._ask(self.wanted, self._index)
 
     @property

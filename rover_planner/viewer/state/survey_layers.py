@@ -100,7 +100,7 @@ class ShownSurvey:
                 continue
             if (value or None) != (other or None):  # no joint angles are () or None
                 name = OPTION_NAMES.get(key, key.replace("_", " "))
-                found.append(f"{name} {_say(value)} in the survey, {_say(other)} here")
+                found.append(f"{name} {_describe(value)} in the survey, {_describe(other)} here")
         return tuple(found)
 
     def describe(self, name: str) -> str:
@@ -219,7 +219,7 @@ def _as_json(value: Any) -> Any:
     return json.loads(json.dumps(value))
 
 
-def _say(value: Any) -> str:
+def _describe(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:g}"
     return "as default" if value is None else f"{value!s:.40}"
