@@ -152,7 +152,7 @@ class MapSource:
 
 @dataclass(frozen=True)
 class Burst:
-    """What became of questions that were asked at once."""
+    """Times and codes of the answers to questions that were asked at once."""
 
     times: tuple[float, ...]
     """Time of each answer, after all questions were asked [s]."""
@@ -192,7 +192,7 @@ def burst(
 
 @dataclass
 class Soak:
-    """What happened in a time of questions without a pause."""
+    """Response times, lost answers and memory under questions without a pause."""
 
     times: list[float] = field(default_factory=list)
     """Response times [s]."""

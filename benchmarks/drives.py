@@ -89,7 +89,7 @@ class DriveResult:
     """Result of a drive; means are over time and wheels, up to the end or where it got stuck."""
 
     passed: bool
-    """Whether the rover reached the end."""
+    """True if the rover reached the end."""
     end: float
     """x of the body's origin at the end [m]."""
     duration: float

@@ -234,7 +234,7 @@ class Fuzzer:
         self.slowest: dict[str, float] = {}
         """Longest time for one input [s], by kind."""
         self.defects: list[str] = []
-        """What must not happen: deaths, hangs, internal errors, lost maps, memory."""
+        """Found defects: deaths, hangs, internal errors, lost maps, memory."""
         self.commands, self.worst_torque = 0, 0.0
         """Number of commands that came, and largest commanded torque [N m]."""
         self._start = {

@@ -156,8 +156,8 @@ def try_pair(case: SearchCase, pair: Pair, budget: float) -> dict[str, Any]:
 def try_warm(case: SearchCase, pair: Pair, budget: float, seed: int) -> SearchResult:
     """Return the answer after a change of the map near a path.
 
-    The path is searched first, then heights in a square on it change, and it is searched again with
-    what is known. Without a first path, the square lies midway between start and goal.
+    The path is searched first, then heights in a square on it change, and it is searched again
+    with what is known. Without a first path, the square lies midway between start and goal.
     """
     memory = EdgeMemory()
     before = case.search(pair, budget, memory)

@@ -37,7 +37,7 @@ SUMS = {
     "energy": ("energy [J]", 1, np.sum),
     "mean_utilisation": ("utilisation", 2, np.mean),
 }
-"""What is summed up: heading, digits, and whether the sum or the mean of all obstacles."""
+"""Columns of the summary: heading, digits, and sum or mean over all obstacles."""
 
 Drives = dict[tuple[Obstacle, str], DriveResult]
 """Drives by obstacle and controller."""

@@ -137,7 +137,7 @@ class Curve:
     start: np.ndarray
     """(3,) x, y [m], yaw [rad]."""
     kept: bool
-    """Whether it went all the way and ended within KEPT of its nominal end."""
+    """True if it went all the way and ended within KEPT of its nominal end."""
     poses: np.ndarray
     """(k, 3) poses of the trace."""
     forces: np.ndarray
@@ -152,7 +152,7 @@ class Curve:
 
     @property
     def steered(self) -> bool:
-        """Whether the end wheels steer."""
+        """True if the end wheels steer."""
         return self.mode in ("steered", "spot")
 
 

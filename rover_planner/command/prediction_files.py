@@ -39,7 +39,7 @@ ARRAYS: dict[str, Shape] = {
 NUMBER_TYPE: tuple[DTypeLike, str, str] = (np.float64, "fiu", "numbers")
 FLAGS: tuple[DTypeLike, str, str] = (np.bool_, "b", "bools")
 TYPES = {"settled": FLAGS, "falling": FLAGS, "status": (np.int8, "i", "whole numbers")}
-"""Arrays that do not hold NUMBER_TYPE: type when read, kinds of types in the file, and name."""
+"""Arrays that do not hold numbers: type when read, kinds of types in the file, and name."""
 SHOWN = ("position", "wheel_centres", "distance", "time")
 """Arrays that a replay cannot do without where the rover settled."""
 MAX_NUMBER = 1e9

@@ -51,7 +51,7 @@ class ChildProcess:
 
     @property
     def running(self) -> bool:
-        """Whether the process is still running."""
+        """True if the process is still running."""
         return self.exit_code is None
 
     @property

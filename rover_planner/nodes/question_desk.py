@@ -51,7 +51,7 @@ class Inquiry(Asked):
     reply: Reply
     """Takes the answer."""
     snapshot: Snapshot
-    """What is known; its map is that of the time of judging."""
+    """Map, settings, path and measurements; its map is that of the time of judging."""
     number: int
     """Number of the question."""
     ros_time: int

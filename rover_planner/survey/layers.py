@@ -35,7 +35,7 @@ class SurveyedQuantity(NamedTuple):
     name: str
     """Name without `worst_` or `best_`."""
     high_is_bad: bool
-    """Whether the worst value is the largest."""
+    """True if the worst value is the largest."""
     unit: str
     """Unit, empty for a ratio."""
     row: int

@@ -44,7 +44,7 @@ class TractionCommand:
     torques: Floats
     """(6,) torques, wheel order [N m]."""
     brake: bool
-    """Whether the brake is to be applied."""
+    """True if the brake is to be applied."""
     state: str
     """One of STATES."""
     update: TractionUpdate
@@ -59,9 +59,9 @@ class DrivePermission:
     def __init__(self, enabled: bool):
         """Start enabled or not, without an emergency stop."""
         self.enabled = enabled
-        """Whether an operator has enabled the rover."""
+        """True if an operator has enabled the rover."""
         self.emergency_stop = False
-        """Whether the emergency stop is pressed."""
+        """True if the emergency stop is pressed."""
 
     def set_enabled(self, enabled: bool) -> tuple[bool, str]:
         """Enable or disable; return whether that was done, and what holds now."""

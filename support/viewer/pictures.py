@@ -32,13 +32,13 @@ class PictureCase:
     file: str
     """Name of the picture."""
     ground: str
-    """What the page calls the ground."""
+    """The page's name of the ground."""
     make: Callable[[], Terrain]
     """Makes or loads the ground."""
     ends: tuple[Pose, Pose] | None = None
     """Start and goal; None: those that `rover_planner view` chooses."""
     refused: bool = True
-    """Whether it shows a refused path, at its failure; else the page as it opens, under way."""
+    """True if it shows a refused path, at its failure; else the page as it opens, under way."""
 
 
 MADE = f"made, seed {SEED}"

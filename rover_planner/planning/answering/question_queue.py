@@ -31,9 +31,9 @@ class Asked:
     budget: Budget
     """Its time."""
     has_begun: bool = False
-    """Whether the thread has begun to judge it."""
+    """True if the thread has begun to judge it."""
     is_closed: bool = False
-    """Whether it has its judgement."""
+    """True if it has its judgement."""
 
 
 Answered = tuple[Asked, Any]

@@ -35,8 +35,8 @@ class SearchWatch:
 
         Args:
             newest_map: Returns the newest map.
-            send_report: Takes a report, in the thread of the search: whether a path is `found`, its
-                `cost` (infinite without one) and the `bound` from below on that of any path of
+            send_report: Takes a report, in the thread of the search: True if a path is `found`,
+                its `cost` (infinite without one) and the `bound` from below on that of any path of
                 the lattice (0 while it is not known) in metres of level ground, the number of
                 `edges_judged`, and the `seconds` since the question's first search began.
             patience: Time from the first search on in which a changed map ends a search [s].

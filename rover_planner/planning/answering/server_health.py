@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a traverse server has done and what is wrong with it, for its diagnostics."""
+"""Counts and faults of a traverse server, for its diagnostics."""
 
 from collections import Counter, deque
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ class Health:
     level: str
     """OK, WARN or ERROR."""
     message: str
-    """What is wrong, in words."""
+    """The faults in words."""
     values: dict[str, Any]
     """Counts by name."""
 

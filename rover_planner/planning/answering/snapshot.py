@@ -65,7 +65,7 @@ class Snapshot:
     """Why the map is too old to be used; empty if it is not."""
 
     edge_memory: EdgeMemory = field(default_factory=EdgeMemory)
-    """What earlier searches have found of the ground; grows with each search."""
+    """Edges that earlier searches have judged; grows with each search."""
     watch: SearchWatch | None = None
     """Watches searches around obstacles."""
 

@@ -59,7 +59,7 @@ class Seeds(NamedTuple):
 
 
 class ToGoal(NamedTuple):
-    """What is known of the costs from the nodes to the goal."""
+    """Costs from the nodes to the goal, as far as they are known."""
 
     cost: np.ndarray
     """(nodes,) cost to the goal [m], too high or infinite where it is not known."""
@@ -72,7 +72,7 @@ class ToGoal(NamedTuple):
 
 
 class SearchTree(NamedTuple):
-    """What a search has reached."""
+    """Nodes that a search has reached, with their costs."""
 
     cost: np.ndarray
     """(nodes,) cost from the start [m], infinite where nothing leads, written."""

@@ -51,7 +51,7 @@ _QUERIES_PER_RING = 4
 
 
 class JudgedPiece(NamedTuple):
-    """What the model found of a piece of path."""
+    """Code and cost of a piece of path."""
 
     code: str
     """Code of the limit that fails first, empty if the rover may drive it."""
@@ -68,7 +68,7 @@ class PathJudge:
     terrain: Terrain
     """The ground, map frame."""
     options: PathQueryOptions
-    """How candidates are made and how paths are judged."""
+    """Options of candidates and of the judgement of paths."""
     unobserved_check: UnobservedCheck | None = None
     """Refuses ground under the belly that was never seen; None allows it."""
     poses: int = field(default=0, init=False)

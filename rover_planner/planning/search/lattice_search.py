@@ -44,7 +44,7 @@ NEAR_OPTIMAL = 0.02
 
 @dataclass
 class SearchProgress:
-    """What a search has found so far."""
+    """Progress of a search: its best path so far, and a bound on the cost of any path."""
 
     best: Candidate | None = None
     """The best path that passes as a whole."""
@@ -53,7 +53,7 @@ class SearchProgress:
     bound: float = 0.0
     """Bound from below on the cost of any path of the lattice [m]."""
     exhausted: bool = False
-    """Whether the lattice has no path left to look at."""
+    """True if the lattice has no path left to look at."""
     judged: int = 0
     """Number of edges that the model has judged."""
     first_time: float = np.nan
@@ -106,11 +106,11 @@ class LatticeSearch:
     difficulty: Difficulty
     """Estimates how likely edges are refused."""
     progress: SearchProgress = field(default_factory=SearchProgress)
-    """What it has found."""
+    """Its progress."""
 
     def __post_init__(self) -> None:
         self.ends = _Ends(self.starts), _Ends(self.goals)
-        """What is known of the connections of the start and of the goal."""
+        """Judged connections of the start and of the goal."""
         self.shortest = ShortestPaths(self.edges, self.doubt, self.difficulty, self.ends[0].seeds)
         self._refused: list[tuple[int, int, float]] = []
 

@@ -73,8 +73,8 @@ class SearchResult:
     cost: float
     """Its cost [m of level ground]; infinite without a path."""
     bound: float
-    """How much more it cost before smoothing, at most, than the best path of the lattice, as a
-    factor; infinite if that is not known."""
+    """Largest factor by which it cost more, before smoothing, than the best path of the lattice;
+    infinite if that is not known."""
     expanded: int
     """Number of expanded nodes."""
     edges_judged: int
@@ -86,13 +86,13 @@ class SearchResult:
     seconds: float
     """Time of the whole search [s]."""
     repeatable: bool
-    """Whether the same question gives the same answer to the bit: the clock did not end it."""
+    """True if the same question gives the same answer to the bit: the clock did not end it."""
     nodes: Nodes
     """The nodes of the lattice."""
     closed: ClosedArea | None
-    """What is closed in where no path exists; else None."""
+    """The closed-in area where no path exists; else None."""
     warning: str
-    """What may have hidden a path, such as a coarse lattice; empty if nothing has."""
+    """Condition that may have hidden a path, such as a coarse lattice; empty without one."""
     asked: NDArray[np.bool_]
     """(rows, columns) True for the places where the model was asked whether the rover can stand,
     in this search or in an earlier one that the memory holds; row 0 at the smallest y."""

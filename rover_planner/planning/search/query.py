@@ -32,24 +32,24 @@ class SearchQuery:
     goal: ArrayLike
     """(3,) as `start`."""
     options: PathQueryOptions
-    """How paths are judged."""
+    """Options of the judgement of paths."""
     unobserved_check: UnobservedCheck | None = None
     """Refuses ground under the belly that was never seen; None allows it."""
 
 
 @dataclass(frozen=True)
 class LatticeSettings:
-    """How a path is searched."""
+    """Settings of a search for a path."""
 
     budget: float = 2.0
     """Time for the search [s]."""
     cell: float | None = None
     """Distance of neighbouring nodes [m]; None: a quarter of the wheelbase."""
     frontier: bool = False
-    """Whether a path may end at the frontier of the known ground, as near as possible to a goal
+    """True if a path may end at the frontier of the known ground, as near as possible to a goal
     beyond it."""
     ends_at_first: bool = False
-    """Whether the first path is the answer; else better ones are searched for the whole budget."""
+    """True if the first path is the answer; else better ones are searched for the whole budget."""
 
     def __post_init__(self) -> None:
         for name in ("budget", "cell"):

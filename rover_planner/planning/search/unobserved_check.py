@@ -28,7 +28,7 @@ class UnobservedCheck:
     rover: Rover
     """The rover."""
     seen: ObservedGround
-    """What was seen of the map."""
+    """The seen part of the map."""
     rule: str
     """One of UNOBSERVED_GROUND."""
 

@@ -19,7 +19,7 @@ from rover_planner.viewer.state.reasons.before_after import list_changes
 from rover_planner.viewer.state.scenario import Pose
 
 VALUE, JOINT = "rover.", "arm."
-"""What comes before the keys of changed numbers and of the arm's joints."""
+"""Prefixes of the keys of changed numbers and of the arm's joints."""
 MAX_LENGTH = 8000
 """Most characters of a link; servers accept hardly more."""
 MAX_TEXT = 200_000
@@ -30,7 +30,7 @@ HALF_TURN = 180.0
 
 @dataclass(frozen=True)
 class PageLink:
-    """What a link holds."""
+    """Content of a link to the page."""
 
     rover: str
     """Name of the rover as it was loaded."""
@@ -57,7 +57,7 @@ class PageLink:
     joints: Mapping[str, float] = field(default_factory=dict)
     """Angles of the arm's joints by name [rad]."""
     along: bool = False
-    """Whether predicted layers are for the heading of the path, not for `heading`."""
+    """True if predicted layers are for the heading of the path, not for `heading`."""
     rover_file: str = ""
     """Text of the file of the rover as it was loaded; empty for a preset."""
 

@@ -23,7 +23,7 @@ from rover_planner.viewer.state.survey_layers import ColouredGround, ShownSurvey
 
 @dataclass(frozen=True, eq=False)
 class PaintRequest:
-    """What to draw."""
+    """Ground and layer to draw."""
 
     scenario: Scenario
     """Rover, ground and options."""
@@ -45,7 +45,7 @@ class PaintedGround:
     glb: bytes
     """The ground as a file for the scene."""
     scale: ColourScale | ColouredGround
-    """What its colours mean; the latter for a layer of a survey."""
+    """The values of its colours; the latter for a layer of a survey."""
 
 
 class GroundPainter:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the session judged, brought onto the page: verdict, paths, rover, ground and the drive."""
+"""Brings judged scenarios onto the page: verdict, paths, rover, ground and the drive."""
 
 import math
 import time

@@ -126,7 +126,7 @@ class Page(PageBase):
 
     @property
     def is_busy(self) -> bool:
-        """Whether something is judged, or judged and not shown yet."""
+        """True if something is judged, or judged and not shown yet."""
         works = self.session, self._painter.work
         is_judged = any(work.progress is not None or work.has_news for work in works)
         return is_judged or self.is_drawing  # in this order: what was taken is drawn

@@ -42,15 +42,15 @@ MAX_MARGIN = 1.2
 FONT = 12
 """Size of the smallest letters and digits [px]."""
 SLIP, TRACTION_RATIO = "slip ratio", "T/(&mu;N)"
-"""What the second bar of a wheel can show."""
+"""Quantities that the second bar of a wheel can show."""
 
 
 @dataclass(frozen=True)
 class BoardNotes:
-    """What the board shows besides the state."""
+    """Content of the board besides the state."""
 
     has_slip: bool = True
-    """Whether slip is predicted, on yielding soil or with speed servos. Else the second bar of a
+    """True if slip is predicted, on yielding soil or with speed servos. Else the second bar of a
     wheel is the paper's T/(mu N)."""
     worst: tuple[WorstUse, ...] = ()
     """The worst uses so far."""

@@ -30,7 +30,7 @@ class PlaybackControls:
         """Add the controls to the open tab `tab`."""
         self._gui, self._tab, self._playback, self._requests = gui, tab, playback, requests
         self.outdated = True
-        """Whether the playback has moved to a time that is not drawn yet."""
+        """True if the playback has moved to a time that is not drawn yet."""
         self._times = np.zeros(1)
         self._failure_at: float | None = None
         self._held_until: float | None = None

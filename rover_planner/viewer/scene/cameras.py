@@ -29,7 +29,7 @@ class Cameras:
         """Move no camera yet."""
         self._server, self._frame = server, frame
         self.follows = False
-        """Whether the cameras go along with the rover."""
+        """True if the cameras go along with the rover."""
 
     def look(self, client: Any, view: str, rover: Rover, path: Floats, at: Floats) -> None:
         """Let a visitor's camera look at a path or at the rover on it.
