@@ -118,9 +118,9 @@ def wait_for_log(server: ChildProcess, text: str) -> None:
     """Wait until a line of a server's log has a text in it; fail if the server ends before."""
 
     def heard() -> bool:
-        told = server.log.read_text(errors="replace")
-        assert text in told or server.running, f"the server has ended: {told}"
-        return text in told
+        log = server.log.read_text(errors="replace")
+        assert text in log or server.running, f"the server has ended: {log}"
+        return text in log
 
     wait_until(heard, f"the log line {text!r}", START_TIME)
 

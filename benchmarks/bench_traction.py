@@ -74,7 +74,7 @@ def measure() -> list[Figure]:
 def measure_alone() -> list[Figure]:
     """Measure a node that updates and publishes at RATE, on a drive over rocks."""
     prediction, motions, duration = drive_states(load_rover("lsr1"), rocky(1))
-    assert prediction.settled.all(), "the rover must settle everywhere on the way"
+    assert prediction.settled.all(), "the rover must settle everywhere on the path"
     context = Context()
     rclpy.init(context=context, domain_id=DOMAIN)
     enabled = [Parameter("enabled_at_start", value=True)]

@@ -128,8 +128,8 @@ def main(
             for event in EVENTS:
                 for direction, sign in (("up", 1.0), ("down", -1.0)):
                     rest = rest_on_slope(rover, policy, event, sign * np.radians(slope), seconds)
-                    told = f"{rest.peak:.3f}", f"{rest.end:+.3f}", f"{rest.speed:+.3f}"
-                    rows.append((rover, direction, policy, event, rest.state, rest.brake, *told))
+                    cells = f"{rest.peak:.3f}", f"{rest.end:+.3f}", f"{rest.speed:+.3f}"
+                    rows.append((rover, direction, policy, event, rest.state, rest.brake, *cells))
     headings = ("rover", "drives", "policy", "event", "state", "~/brake", "farthest [m]",
                 "end, uphill [m]", "speed [m/s]")  # fmt: skip
     title = f"Slope of {slope:g} deg, friction {FRICTION:g}, {seconds:g} s after the event"

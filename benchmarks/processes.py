@@ -170,8 +170,8 @@ class Client:
 
     def set_parameter(self, name: str, value: object) -> bool:
         """Set a parameter of the server; return whether it was accepted."""
-        told: ParameterMessage = Parameter(name, value=value).to_parameter_msg()
-        request = SetParameters.Request(parameters=[told])
+        message: ParameterMessage = Parameter(name, value=value).to_parameter_msg()
+        request = SetParameters.Request(parameters=[message])
         return finish(self._parameters.call_async(request), 10.0).results[0].successful
 
 

@@ -21,7 +21,7 @@ MAX_CELLS = 25_000_000
 """Largest map built from a cloud [cells]; one distant outlier must not exhaust the memory."""
 
 CELL_HEIGHTS = ("max", "mean", "median")
-"""Ways to combine several points of a cell into its height."""
+"""Methods that combine several points of a cell into its height."""
 
 _MIN_FILL = 0.05
 """Smallest share of cells with a point in a detected grid; below it the spacing is accidental."""

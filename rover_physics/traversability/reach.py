@@ -67,8 +67,8 @@ class ReachAnswer:
         names = ("possible", "reachable", "code", "reason", "target", "out_of_reach")
         answer = {name: getattr(self, name) for name in (*names, "joint_angles")}
         if self.verdict is not None:
-            told = asdict(self.verdict)
-            answer |= {name: told[name] for name in OF_THE_VERDICT}
+            fields = asdict(self.verdict)
+            answer |= {name: fields[name] for name in OF_THE_VERDICT}
         if self.prediction is not None:
             answer |= {name: getattr(self.prediction, name)[0] for name in PER_WHEEL}
         return to_plain(answer)

@@ -30,8 +30,10 @@ def replay(
     rover: Annotated[str, option("ROVER", "Preset name or rover file; sets the parameter.")] = "",
     map_frame: Annotated[str, option("NAME", "Frame of the map; sets the parameter.")] = "",
     resolution: Annotated[float, option("M", "Cell size of the map; sets map_resolution.")] = 0.0,
-    goal: Annotated[Pose | None, pose_option("Ask for a way to it after each new map.")] = None,
-    start: Annotated[Pose | None, pose_option("Start of that way; default: the odometry.")] = None,
+    goal: Annotated[Pose | None, pose_option("Ask for a path to it after each new map.")] = None,
+    start: Annotated[
+        Pose | None, pose_option("Start of that path; default: the odometry.")
+    ] = None,
     stretch: Annotated[float, option("M", "Length in which the drive is judged.", min=0.1)] = 5.0,
     map_topic: Annotated[str, option("TOPIC", "PointCloud2 or GridMap.")] = "",
     joints_topic: Annotated[str, option("TOPIC", "JointState.")] = "",
@@ -114,7 +116,7 @@ class _Results:
 
         self.count += 1
         name = f"{self.count:03d}_{answer.kind}"
-        told: dict[str, Any] = {
+        entries: dict[str, Any] = {
             "question": self.count,
             "kind": answer.kind,
             "stamp": stamp_text(answer.stamp),
@@ -122,9 +124,9 @@ class _Results:
             "reason": answer.judgement.reason,
             "map": self._save_map(answer),
         }
-        told |= self._save_prediction(answer, name)
+        entries |= self._save_prediction(answer, name)
         self._write_messages(answer)
-        typer.echo(json.dumps(told))
+        typer.echo(json.dumps(entries))
 
     def _save_map(self, answer: "ReplayAnswer") -> str:
         """Write the map of an answer once; return its file's name."""
@@ -139,7 +141,7 @@ class _Results:
         return self._maps[key]
 
     def _save_prediction(self, answer: "ReplayAnswer", name: str) -> dict[str, Any]:
-        """Write prediction and measurements of an answer; return what is told of them."""
+        """Write prediction and measurements of an answer; return their entries of the report."""
         from rover_physics.files.npz_file import write_npz
         from rover_planner.command.prediction_files import write_prediction
         from rover_planner.planning.answering.service_settings import load_service_settings
@@ -156,13 +158,16 @@ class _Results:
             candidate.verdict,
             assumptions=assume(self._rover, query.model, query.map_sigmas),
         )
-        told: dict[str, Any] = {"prediction": file, "waypoints": len(candidate.prediction.poses)}
+        entries: dict[str, Any] = {
+            "prediction": file,
+            "waypoints": len(candidate.prediction.poses),
+        }
         if answer.measured is not None:
             measured = answer.measured
             write_npz(self._folder / f"{name}_measured.npz", vars(measured))
-            told["measured"] = f"{name}_measured.npz"
-            told["suspension"] = measured.compare(candidate.prediction)
-        return told
+            entries["measured"] = f"{name}_measured.npz"
+            entries["suspension"] = measured.compare(candidate.prediction)
+        return entries
 
     def _write_messages(self, answer: "ReplayAnswer") -> None:
         """Write the messages that a server would publish, under its topics."""

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Takes the questions of a node's services and has them judged, within their budget.
 
-A question's way: a service makes a `Question` of its request; the desk notes when it came and what
-is known then; the queue judges it in its thread; the desk hands the `Answer` to the service, which
-makes messages of it.
+The course of a question: a service makes a `Question` of its request; the desk notes when it came
+and what is known then; the queue judges it in its thread; the desk hands the `Answer` to the
+service, which makes messages of it.
 """
 
 import contextlib
@@ -128,8 +128,8 @@ class QuestionDesk:
         for inquiry, judgement in answered:
             assert isinstance(inquiry, Inquiry)
             question, done = inquiry.question, time.monotonic()
-            told = f"{inquiry.number}, {question.service}"
-            self.health.take_answer(judgement.code, done, told, done - inquiry.arrival)
+            label = f"{inquiry.number}, {question.service}"
+            self.health.take_answer(judgement.code, done, label, done - inquiry.arrival)
             identity = self._register.identify(
                 inquiry.number, question.service, question.hash, inquiry.snapshot
             )

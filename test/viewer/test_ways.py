@@ -17,7 +17,7 @@ from rover_planner.viewer.state.judging import (
     BETTER,
     PATH,
     POLICY,
-    WAY,
+    SEARCH,
     JudgeRequest,
     judge_request,
 )
@@ -34,7 +34,7 @@ BEYOND = np.array(GOAL[:2])
 FRICTION = [("friction",)]
 
 
-BEGIN = [*[PATH] * 5, 5, *[POLICY] * 3, 5, WAY]
+BEGIN = [*[PATH] * 5, 5, *[POLICY] * 3, 5, SEARCH]
 """What is begun before and with a search, and how many candidates each result has."""
 
 
@@ -84,7 +84,7 @@ def test_nothing_is_searched_where_a_candidate_passes_off_the_map_or_for_a_recor
     for goal, passes in (((-1.1, 0.1), True), ((9.0, 0.0), False)):
         assert session.plan_to(np.array(goal))
         assert session.shown.around is None and session.shown.answer.traversable == passes
-        assert WAY not in judge(session)[0]
+        assert SEARCH not in judge(session)[0]
     assert session.plan_to(np.array([-1.1, 0.1]))
     session.replay(session.shown.candidate.prediction, session.shown.verdict.reasons)
     assert session.change_rover(FRICTION, 0.05) and session.plan_again()
@@ -123,9 +123,9 @@ def finish(session: ViewSession) -> None:
 @contextmanager
 def searching(session: ViewSession) -> Iterator[None]:
     """Plan beyond the wall, take what is finished before the search, and let that go on later."""
-    with held(session._background, WAY):
+    with held(session._background, SEARCH):
         assert session.plan_to(BEYOND)
-        wait_until(lambda: session.progress.what == WAY, "the search", 60.0)
+        wait_until(lambda: session.progress.what == SEARCH, "the search", 60.0)
         assert session.progress.describe() == "searching a way"
         session.take_finished()
         yield

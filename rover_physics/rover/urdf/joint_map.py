@@ -94,8 +94,8 @@ def load_joint_map(path: Path) -> UrdfJointMap:
 def map_of(rover: Rover) -> dict[str, Any]:
     """Return the contents of the map that reads a rover back from the URDF of `write_urdf`."""
     contents = rover_to_dict(rover)
-    told = ("gravity", "friction", "nominal_speed", "limits")
-    rest: dict[str, Any] = {key: contents[key] for key in told}
+    given = ("gravity", "friction", "nominal_speed", "limits")
+    rest: dict[str, Any] = {key: contents[key] for key in given}
     rest["wheel"] = {"servo_droop": rover.wheel.servo_droop}
     joints: dict[str, Any] = {
         "rocker": {side: f"rocker_{side}" for side in SIDES},

@@ -182,21 +182,21 @@ class PathJudge:
 
     def stand(self, poses: NDArray[np.float64]) -> tuple[str, ...]:
         """Return the codes (n,) of what fails at single poses (n, 3), wheels ahead; "" if none."""
-        codes = list(self._stand(poses).codes)
+        codes = list(self._judge_standing(poses).codes)
         for row in self._find_unobserved(poses[:, None, :], codes):
             codes[row] = UNOBSERVED_CODE
         return tuple(codes)
 
     def refuse(self, pose: Pose) -> tuple[str, str]:
         """Return code and reason why the rover cannot stand at a pose, empty if it can."""
-        verdict = self._stand(pose[None, :])
+        verdict = self._judge_standing(pose[None, :])
         if self.unobserved_check is not None and self._find_unobserved(
             [pose[None, :]], verdict.codes
         ):
             return UNOBSERVED_CODE, self.unobserved_check.describe()
         return verdict.codes[0], verdict.reasons[0]
 
-    def _stand(self, poses: NDArray[np.float64]) -> Verdict:
+    def _judge_standing(self, poses: NDArray[np.float64]) -> Verdict:
         """Judge single poses (n, 3), wheels ahead."""
         self.poses += len(poses)
         ahead, model, sigmas = np.zeros(len(poses)), self.options.model, self.options.map_sigmas

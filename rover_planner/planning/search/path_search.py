@@ -181,22 +181,24 @@ class _PathFinder:
             is_frontier = self._settings.frontier and outcome == GOAL_REFUSED
             self._to_frontier = is_frontier and code in BEYOND
             if code and not self._to_frontier:
-                return self._answer(outcome, f"the rover cannot stand at the {name}: {reason}")
+                return self._make_result(
+                    outcome, f"the rover cannot stand at the {name}: {reason}"
+                )
         search = self._prepare()
         if not self._to_frontier:
             self._try_directly(search)
         progress = search.run(self._allowed)
         if progress.best is not None:
             path = self._smooth(search)
-            return self._answer(FOUND, self._describe_rest(path[0]), search, path=path)
+            return self._make_result(FOUND, self._describe_rest(path[0]), search, path=path)
         where = self._describe_extent()
         if not progress.exhausted:
             budget = self._settings.budget
             reason = f"no way within {where} was found in the budget of {budget:g} s; "
-            return self._answer(OUT_OF_TIME, f"{reason}there may be one", search)
+            return self._make_result(OUT_OF_TIME, f"{reason}there may be one", search)
         closed = find_closed_area(search)
         reason = f"no way within {where}: {closed.describe()}"
-        return self._answer(NO_WAY, reason, search, closed=closed)
+        return self._make_result(NO_WAY, reason, search, closed=closed)
 
     def _warn(self) -> str:
         """Return what is wrong with the lattice, in words."""
@@ -283,7 +285,7 @@ class _PathFinder:
             return best, search.progress.cost
         return smoothed, sum(one.cost for one in pieces)
 
-    def _answer(
+    def _make_result(
         self,
         outcome: str,
         reason: str,
@@ -345,7 +347,7 @@ def smooth(judge: PathJudge, pieces: list[Piece], radius: float, most_poses: int
         first = 0
         while first + span <= len(pieces) and judge.poses < allowed:
             check_interruption()
-            found = _replace(judge, pieces[first : first + span], radius)
+            found = _find_shortcut(judge, pieces[first : first + span], radius)
             if found is not None:
                 pieces = [*pieces[:first], found, *pieces[first + span :]]
                 first += 1
@@ -354,7 +356,7 @@ def smooth(judge: PathJudge, pieces: list[Piece], radius: float, most_poses: int
     return pieces
 
 
-def _replace(judge: PathJudge, old: list[Piece], radius: float) -> Piece | None:
+def _find_shortcut(judge: PathJudge, old: list[Piece], radius: float) -> Piece | None:
     """Return one curve driven forwards that costs less than some pieces; None if none does."""
     start, end = old[0].poses[0], old[-1].poses[-1]
     spacing = judge.options.waypoint_spacing

@@ -96,8 +96,8 @@ class GroundPainter:
         elif request.survey is not None:
             survey, asked, name = request.survey, request.scenario, request.layer
             differences = survey.find_differences(asked.rover, asked.asked_options.model)
-            told = survey.describe(name)
-            self._tab.show_legend(draw_survey_legend(name, told, scale, differences))
+            description = survey.describe(name)
+            self._tab.show_legend(draw_survey_legend(name, description, scale, differences))
 
 
 def _paint(request: PaintRequest) -> Iterator[Progress | PaintedGround]:

@@ -167,7 +167,7 @@ class Sharing:
             self._playback.go_to(link.time)
         elif link.path <= len(session.shown.answer.candidates):
             session.show_candidate(link.path - 1)
-        elif session.progress is None:  # no way around was found this time
+        elif session.progress is None:  # no path around was found this time
             self._opening = None
 
     def _identify(self, terrain: Terrain) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Judges a scenario step by step: the shown path or all candidates, policies, a way around."""
+"""Judges a scenario step by step: the shown path or all candidates, policies, a path around."""
 
 import time
 from collections.abc import Generator, Iterator, Sequence
@@ -24,7 +24,7 @@ from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.scenario import PolicyVerdict, Scenario, Shown
 from rover_planner.viewer.state.trajectory import Trajectory
 
-PATH, POLICY, WAY = "judging path", "judging policy", "searching a way"
+PATH, POLICY, SEARCH = "judging path", "judging policy", "searching a way"
 BETTER = "way found, searching a better one"
 """Names of steps."""
 
@@ -170,7 +170,7 @@ def _search_around(shown: Shown, memory: EdgeMemory) -> Iterator[Step]:
 
     Without one, what is shown has the reason.
     """
-    yield Progress(WAY, 1, 1)
+    yield Progress(SEARCH, 1, 1)
     asked = shown.scenario
     ends = asked.start, asked.goal
     question = SearchQuery(asked.rover, asked.terrain, *ends, asked.asked_options)
@@ -187,9 +187,9 @@ def _search_around(shown: Shown, memory: EdgeMemory) -> Iterator[Step]:
 
 
 def _add_found_path(shown: Shown, around: SearchResult) -> Iterator[Step]:
-    """Yield what is shown with a way as one more candidate, or with why there is none.
+    """Yield what is shown with a path as one more candidate, or with why there is none.
 
-    The way is shown unless a visitor has chosen another path than the best.
+    The path is shown unless a visitor has chosen another path than the best.
     """
     answer, path = shown.answer, around.path
     if path is None:

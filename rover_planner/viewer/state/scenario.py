@@ -99,7 +99,7 @@ class Shown:
 
     @property
     def reason(self) -> str:
-        """The reason of a refusal, and before it why there is no way; empty if the path passes."""
+        """The reason of a refusal, after why no path was found; empty if the path passes."""
         reason = self.verdict.reason
         is_old = self.answered is not self.scenario
         if not reason or is_old or self.around is None or self.around.path is not None:
@@ -108,7 +108,7 @@ class Shown:
 
     @property
     def needs_search(self) -> bool:
-        """True if all candidates are refused, and no way around obstacles was searched yet."""
+        """True if all candidates are refused, and no search around obstacles was made yet."""
         asked = self.scenario
         return (
             asked.recorded is None

@@ -46,7 +46,7 @@ class ViewSession:
         options: PathQueryOptions | None = None,
         search: LatticeSettings | None = None,
     ):
-        """Plan from start to goal; no way around obstacles is searched yet.
+        """Plan from start to goal; no path around obstacles is searched yet.
 
         Args:
             rover: The rover.
@@ -54,7 +54,7 @@ class ViewSession:
             start: x, y [m] and yaw [rad], map frame.
             goal: The same.
             options: How candidates are made and judged (default: 5 candidates, 0.5 m apart).
-            search: How ways around obstacles are searched (default: for 2 s).
+            search: Settings of searches around obstacles (default: for 2 s).
 
         Raises:
             RoverError, PlanningError: The rover, the poses or the options are invalid.
@@ -232,7 +232,7 @@ class ViewSession:
     # In the background.
 
     def judge_in_background(self, wake: Callable[[], object]) -> None:
-        """Judge in a thread from now on, until `close`; begin with the way that is not searched.
+        """Judge in a thread from now on, until `close`; begin with the search that was not made.
 
         Args:
             wake: Called in that thread when there is something to take with `take_finished`.
