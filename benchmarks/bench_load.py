@@ -296,7 +296,7 @@ def time_signal(nodes: NodeProcesses) -> float:
     began = time.perf_counter()
     os.kill(server.pid, signal.SIGINT)
     wait_until(lambda: not server.running, "the end of the server")
-    assert server.exit_code == 0, server.last_words()
+    assert server.exit_code == 0, server.last_line()
     return time.perf_counter() - began
 
 
@@ -323,7 +323,7 @@ def time_restart(nodes: NodeProcesses) -> tuple[float, float]:
         try:
             plan = asker.plan(START, GOAL, patience)
         except LostAnswerError:
-            assert second.running, second.last_words()
+            assert second.running, second.last_line()
             patience *= 1.2  # a busy machine needs more time for an answer
             continue
         answer = answer or time.perf_counter() - began

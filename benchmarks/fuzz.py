@@ -307,7 +307,7 @@ class Fuzzer:
         """Check that both nodes live, answer and keep a good map."""
         for name, child in self._running.items():
             if not child.running:
-                self.defects.append(f"{where}: {name} died: {child.last_words()[:200]}")
+                self.defects.append(f"{where}: {name} died: {child.last_line()[:200]}")
                 self._running[name] = self._nodes.start(name, **self._start[name])
                 self._wait_for_nodes()
         if not self._reset_parameters():
