@@ -56,6 +56,8 @@ def allocating_kernel(function):
 class Kernel(CPUDispatcher):
     """A compiled function, called from Python or as part of another kernel, but not of itself."""
 
+    _cache: Any
+
     def __init__(self, function: Callable, **options: Any):
         """Compile nothing yet; `options` of `numba.njit` go before COMPILE_OPTIONS."""
         options = COMPILE_OPTIONS | options
