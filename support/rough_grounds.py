@@ -69,6 +69,13 @@ def bouldered(seed: int, half: float = 3.0, count: int = 150, highest: float = 0
     return Terrain(z, RESOLUTION, (x[0, 0], y[0, 0]))
 
 
+def bowl(depth: float, floor: float, slope: float, half: float = 6.0) -> Terrain:
+    """Return a round crater: a level floor of radius `floor` [m], then walls of `slope` [rad]."""
+    axis = np.arange(-half, half + 0.025, 0.05)
+    away = np.hypot(*np.meshgrid(axis, axis))
+    return Terrain(np.clip((away - floor) * np.tan(slope), 0.0, depth), 0.05, (-half, -half))
+
+
 def random_poses(seed: int, count: int, half: float) -> np.ndarray:
     """Return random poses (count, 3) within `half` [m] of the origin, with random headings."""
     rng = np.random.default_rng(seed)

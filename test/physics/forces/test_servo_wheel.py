@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from rover_physics.forces.servo_motion import SERVO
 from rover_physics.forces.servo_soil import roll_on_soil
-from rover_physics.forces.servo_wheel import D, S, T, roll_wheel
+from rover_physics.forces.servo_wheel import S, T, roll_wheel
 from rover_physics.forces.soil import (
     SHEAR_MODULUS,
     contact_length,
@@ -23,7 +23,6 @@ from rover_physics.forces.soil import (
     shear_strength,
 )
 from rover_physics.numerics.records import new_record
-from support.soil_thrust import thrust_at_slip
 
 CREEP, FULL = 0.01, 0.2
 RADIUS, WIDTH, WEIGHT = 0.1, 0.1, 80.0
@@ -101,16 +100,6 @@ def test_forces_are_those_of_servo_and_friction_law(grip, velocity, droop, limit
     assert abs(force[T]) <= limit + 1e-12
 
 
-def test_at_full_torque_the_servo_loses_its_droop():
-    servo = roll(10.0, (0.7, 0.0, 0.0), droop=0.3, limit=0.5)
-    assert servo.force[0, T] == pytest.approx(FULL, rel=1e-2)
-
-
-def test_a_wheel_without_load_has_no_force():
-    servo = roll(-0.1, (0.5, 0.2, 0.01))
-    assert not servo.force[0].any() and not servo.force_rate[0].any()
-
-
 # Soil
 
 
@@ -149,23 +138,3 @@ def test_forces_are_those_of_servo_and_soil(soil, load, velocity, droop, share):
     assert velocity[0] - servo.slip[0] == pytest.approx(rim, abs=1e-8)
     forces = share * (shear - [resistance, 0.0, 0.0])
     np.testing.assert_allclose(servo.force[0], forces, atol=1e-7)
-
-
-@many
-@given(soils, loads, velocities, st.floats(0.01, 0.5))
-def test_no_force_exceeds_the_strength_of_the_soil_or_the_torque(soil, load, velocity, limit):
-    assume(abs(velocity[0]) > CREEP)
-    force, row = roll_soft(soil, load, velocity, limit=limit).force[0], SOILS[soil]
-    resistance = motion_resistance(row, WIDTH, find_sinkage(row, RADIUS, WIDTH, load * WEIGHT))
-    thrust = force[T] + np.sign(velocity[0]) * resistance / WEIGHT
-    largest = thrust_at_slip(row, RADIUS, WIDTH, load * WEIGHT, 1.0) / WEIGHT
-    assert np.hypot(thrust, force[S]) <= largest * (1.0 + 1e-9)
-    assert abs(thrust) <= limit + 1e-9
-
-
-@pytest.mark.parametrize("turn", [0.02, -0.02])
-def test_a_turning_wheel_scrubs_against_the_turn(turn):
-    firm = roll(0.1, (1.0, 0.0, turn)).force[0]
-    assert firm[D] == pytest.approx(-0.1 * 2.0 / np.sqrt(5.0) * np.sign(turn), rel=1e-6)
-    assert firm[T] == pytest.approx(0.0, abs=1e-12)
-    assert roll_soft("dry_sand", 0.17, (0.8, 0.0, turn)).force[0, D] * turn < 0.0
