@@ -165,8 +165,7 @@ def test_ranges_are_empty_where_no_torques_keep_the_constraints():
     poses = [[0.0, 0.0, 0.0], [50.0, 0.0, 0.0]]
     ranges = find_torque_ranges(LSR1, plane(0.45, 0.0), poses, SweepOptions(friction=0.4))
     assert not ranges.feasible.any()
-    assert np.isnan(ranges.lowest).all()
-    assert np.isnan(ranges.highest).all()
+    assert np.isnan(ranges.lowest).all() and np.isnan(ranges.highest).all()
 
 
 def test_tighter_limits_leave_narrower_ranges():
@@ -187,11 +186,13 @@ def test_tighter_limits_leave_narrower_ranges():
     assert np.abs(find_torque_ranges(careful, ground, pose).highest).max() <= 1.0
 
 
-def test_the_policy_does_not_matter():
+def test_ranges_are_physical_neither_policy_nor_control_margin_matters():
     asked = LSR1, plane(0.1, 0.0), [[0.0, 0.0, 0.0]]
-    equal, optimal = (
-        find_torque_ranges(*asked, SweepOptions(policy=policy)) for policy in ("equal", "optimal")
+    equal, *others = (
+        find_torque_ranges(*asked, options)
+        for options in (SweepOptions(), SweepOptions("optimal"), SweepOptions(control_margin=0.4))
     )
     assert equal.feasible.all()
-    np.testing.assert_array_equal(equal.lowest, optimal.lowest)
-    np.testing.assert_array_equal(equal.highest, optimal.highest)
+    for other in others:
+        np.testing.assert_array_equal(equal.lowest, other.lowest)
+        np.testing.assert_array_equal(equal.highest, other.highest)

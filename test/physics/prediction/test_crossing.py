@@ -60,21 +60,17 @@ def test_a_wall_higher_than_the_wheel_is_climbed_through_contacts_near_90_degree
     assert angles.max() <= 90.0
 
 
-def test_what_happens_on_a_face_belongs_to_the_waypoint_that_follows():
-    prediction, _ = over_step(0.2)
+def test_what_happens_on_a_face_balances_and_counts_at_the_waypoint_that_follows():
+    prediction, verdict = over_step(0.2)
     between = prediction.between
     before = prediction.poses[between.waypoint - 1, 0]
     after = prediction.poses[between.waypoint, 0]
     assert len(between.poses) and (np.diff(between.waypoint) >= 0).all()
     assert (before <= between.poses[:, 0]).all() and (between.poses[:, 0] <= after).all()
-
-
-def test_the_forces_on_a_face_balance_too():
-    prediction, _ = over_step(0.2)
-    between = prediction.between
     residuals = [balance_residuals(LSR1, between, i) for i in np.flatnonzero(between.settled)]
-    assert len(residuals) > 10
-    assert np.abs(residuals).max() <= 1e-9
+    assert len(residuals) > 10 and np.abs(residuals).max() <= 1e-9
+    worst, at_waypoints = (np.nanmax(p.friction_utilisation) for p in (between, prediction))
+    assert verdict.max_friction_utilisation == max(worst, at_waypoints) > 0.0
 
 
 def test_a_failure_on_a_face_is_told_at_the_waypoint_that_follows():
@@ -85,13 +81,6 @@ def test_a_failure_on_a_face_is_told_at_the_waypoint_that_follows():
     assert verdict.first_failure == prediction.between.waypoint[0]
     place = prediction.poses[verdict.first_failure, 0] + LSR1.suspension.wheels["front"][0]
     assert place == pytest.approx(-RADIUS, abs=0.02), "the front wheels are at the face"
-
-
-def test_the_margins_of_a_verdict_count_what_is_between_waypoints():
-    prediction, verdict = over_step(0.2)
-    worst = np.nanmax(prediction.between.friction_utilisation[0])
-    at_waypoints = np.nanmax(prediction.friction_utilisation)
-    assert verdict.max_friction_utilisation >= max(worst, at_waypoints) > 0.0
 
 
 # The higher the harder

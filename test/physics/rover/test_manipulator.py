@@ -20,7 +20,6 @@ from support.rough_grounds import plane
 LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
 ARM = LSR1.manipulator
 LEVEL, POSE = plane(0.0, 0.0), [[0.0, 0.0, 0.0]]
-angles = st.floats(-3.0, 3.0)
 
 
 def pose_of(yaw=0.0, shoulder=0.0, elbow=0.0) -> dict[str, float]:

@@ -62,16 +62,13 @@ def test_rows_go_along_y_columns_along_x_and_cells_have_their_heights():
     assert terrain.bounds == (-1.0, 2.5, 2.0, 4.5)
 
 
-def test_look_up_is_unknown_off_the_map():
+def test_look_up_is_unknown_off_the_map_and_where_a_corner_is_unknown():
     terrain = plane()
     xmin, xmax, ymin, ymax = terrain.bounds
     x = [xmin - 0.01, xmax + 0.01, 0.0, 0.0, np.nan]
     y = [3.0, 3.0, ymin - 0.01, ymax + 0.01, 3.0]
     assert np.isnan(terrain.elevation_at(x, y)).all()
     assert not terrain.contains(x, y).any()
-
-
-def test_look_up_is_unknown_where_a_corner_is_unknown():
     heights = plane().elevation.copy()
     heights[2, 3] = np.nan
     terrain = Terrain(heights, 0.5, (-1.0, 2.0))

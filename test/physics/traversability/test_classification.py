@@ -21,7 +21,6 @@ from rover_physics.traversability.classification import (
     deciding_waypoint,
 )
 from rover_physics.traversability.judge import judge_path
-from rover_physics.traversability.torque_ranges import find_torque_ranges
 from rover_physics.traversability.verdict import hold_against_limits
 from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import bowl, plane, random_poses, rocky
@@ -227,12 +226,6 @@ def test_the_margin_holds_within_the_bounds_of_an_uncertain_map():
     assert judge_path(LSR1, STEEP, POSE, replace(options, control_margin=between))[1].traversable
     refused = judge_path(LSR1, ground, POSE, replace(options, control_margin=between))[1]
     assert "control margin" in refused.reason and "at worst" in refused.reason
-
-
-def test_the_ranges_of_the_torques_are_physical():
-    wide = find_torque_ranges(LSR1, STEEP, POSE)
-    asked = find_torque_ranges(LSR1, STEEP, POSE, SweepOptions(control_margin=0.4))
-    np.testing.assert_array_equal(asked.highest, wide.highest)
 
 
 @pytest.mark.parametrize("margin", [-0.1, 1.0, float("nan")])

@@ -68,6 +68,7 @@ def test_a_shallow_hole_traps_nobody(policy):
 def test_a_step_down_to_open_ground_is_no_trap(policy):
     """Back up may be impossible, but the way on is open."""
     assert verdict_on(edge(-0.15), -1.2, 1.2, policy=policy).traversable
+    assert verdict_on(edge(-0.15), -1.2, 1.2, rover=LSR1).code == "wheel_drop"
     assert not verdict_on(edge(0.15), -1.2, 1.2, max_torque=0.5).traversable
 
 
@@ -79,11 +80,6 @@ def test_an_end_below_an_edge_before_the_map_ends_is_a_trap():
     assert verdict.code == "trapped"
     assert "off the map" in verdict.reason
     assert verdict_on(whole, -1.2, 1.0, max_torque=0.5).traversable
-
-
-def test_a_drop_beyond_the_limit_is_refused_as_a_drop():
-    verdict = verdict_on(edge(-0.15), -1.2, 1.2, rover=LSR1)
-    assert verdict.code == "wheel_drop"
 
 
 def verdict_in(ground: Terrain, start: float, end: float, **arguments):
@@ -102,8 +98,7 @@ def test_a_crater_of_soft_soil_is_a_trap_that_has_no_edges(policy):
     passing = verdict_in(CRATER, -5.0, 5.0, soil="dry_sand", policy=policy)
     for verdict in (ending, passing):
         assert verdict.code == "trapped"
-        assert "no way on" in verdict.reason
-        assert "no way back" in verdict.reason
+        assert "no way on" in verdict.reason and "no way back" in verdict.reason
         assert -5.0 + 0.04 * verdict.first_failure < -1.0
 
 
@@ -112,8 +107,7 @@ def test_down_a_sandy_slope_to_a_wall_there_is_a_way_round_it():
     ramp = np.clip(-x * np.tan(0.3), 0.0, 0.7)
     wall = Terrain(np.where(x > 3.0, 1.0, ramp), 0.05, (-6.0, -6.0))
     verdict = verdict_in(wall, -4.5, 3.0, soil="dry_sand")
-    assert not verdict.traversable
-    assert verdict.code != "trapped"
+    assert verdict.code not in ("", "trapped")
     assert verdict_in(wall, -4.5, 1.4, soil="dry_sand").traversable
 
 
@@ -121,9 +115,7 @@ def test_down_a_sandy_slope_to_a_wall_there_is_a_way_round_it():
 def test_an_obstacle_ahead_on_level_ground_is_no_trap(soil):
     x = np.tile(np.arange(-6.0, 6.001, 0.05), (241, 1))
     wall = Terrain(np.where(x > 2.0, 1.0, 0.0), 0.05, (-6.0, -6.0))
-    verdict = verdict_in(wall, -2.0, 3.0, soil=soil)
-    assert not verdict.traversable
-    assert verdict.code != "trapped"
+    assert verdict_in(wall, -2.0, 3.0, soil=soil).code not in ("", "trapped")
 
 
 def test_backwards_into_a_crater_is_as_much_a_trap():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A path swept up to its failure, in parts or as a piece gets the verdict of the whole path."""
+"""What changes no verdict: stopping at a failure, parts, pieces, a shift, more waypoints."""
 
 from dataclasses import replace
 
@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.invariants import changes_of
 from rover_physics.bounds.path import BOUNDED_VALUES
 from rover_physics.prediction import sweep
 from rover_physics.prediction.packed_model import PackedModel, pack_model
@@ -279,3 +280,22 @@ def test_exposure_is_zero_up_to_half_of_all_limits_and_the_whole_time_at_one():
     at_limit = type(ROVER)(**{**ROVER.__dict__, "limits": tight})
     exposure = find_exposure(at_limit, judge_paths(at_limit, ground, [way])[0][0])
     assert exposure == pytest.approx(prediction.time[-1], rel=0.01)
+
+
+MAY_CHANGE = {"passes", "refining changes it"}
+"""Peaks of forces between waypoints are found to a few per cent of a limit."""
+
+
+@pytest.mark.parametrize("name", ["lsr1", "m2020"])
+@pytest.mark.parametrize("seed", [4, 78])
+def test_more_friction_or_torque_splitting_or_shifting_never_makes_a_verdict_worse(name, seed):
+    assert set(changes_of(load_rover(name), seed)) <= MAY_CHANGE
+
+
+@pytest.mark.parametrize(
+    "name, seed",
+    [("lsr1", seed) for seed in (34, 215, 830)] + [("m2020", seed) for seed in (57, 230, 695)],
+)
+def test_twice_as_many_waypoints_change_no_verdict(name, seed):
+    """Each of them hid a peak of friction, or the begin of a fall, between its waypoints."""
+    assert set(changes_of(load_rover(name), seed)) <= {"passes"}

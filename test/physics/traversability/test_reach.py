@@ -111,19 +111,15 @@ def test_too_far_says_by_how_much():
     assert answer.out_of_reach == pytest.approx(0.15, abs=1e-4)
     assert "0.150 m out of reach" in answer.reason
     assert "reaches 0.600 m" in answer.reason
-    assert answer.joint_angles is None
-    assert answer.verdict is None
+    assert answer.joint_angles is None and answer.verdict is None
 
 
-def test_too_near_says_by_how_much():
+def test_too_near_says_by_how_much_and_joint_limits_are_told_apart():
     rover = replace(LSR1, manipulator=replace(ARM, link_lengths=(0.1, 0.4, 0.2)))
     answer = judge_reach(rover, LEVEL, POSE, [0.25 + 0.12, 0.0, 0.15 + HEIGHT])
     assert (answer.reachable, answer.code) == (False, "too_near")
     assert answer.out_of_reach == pytest.approx(-0.08, abs=1e-4)
     assert "0.080 m too near" in answer.reason
-
-
-def test_joint_limits_are_told_from_the_length_of_the_arm():
     answer = judge_reach(limited(), LEVEL, POSE, [0.25, 0.0, 0.15 + HEIGHT + 0.55])
     assert (answer.reachable, answer.code) == (False, "joint_limits")
     assert "arm_shoulder at" in answer.reason

@@ -63,13 +63,9 @@ def test_a_path_over_level_ground_is_traversable(fine):
 )
 def test_a_broken_limit_is_told_at_its_waypoint(fine, code, name, column, value, words):
     verdict = hold_against_limits(LSR1, with_value(fine, name, 3, value, column))
-    assert not verdict.traversable
-    assert verdict.first_failure == 3
+    assert (verdict.traversable, verdict.first_failure, verdict.code) == (False, 3, code)
     assert verdict.codes == ("", "", "", code, "")
-    assert verdict.code == code
-    assert verdict.reason == verdict.reasons[3]
-    for word in words:
-        assert word in verdict.reason
+    assert verdict.reason == verdict.reasons[3] and all(w in verdict.reason for w in words)
 
 
 def test_a_value_at_its_limit_is_allowed(fine):
@@ -93,8 +89,7 @@ def test_a_value_at_its_limit_is_allowed(fine):
 )
 def test_a_waypoint_without_a_pose_is_told_by_its_cause(fine, status, code, word):
     verdict = hold_against_limits(LSR1, with_status(fine, 1, status))
-    assert not verdict.traversable
-    assert (verdict.first_failure, verdict.code) == (1, code)
+    assert (verdict.traversable, verdict.first_failure, verdict.code) == (False, 1, code)
     assert word in verdict.reason
 
 
@@ -107,14 +102,8 @@ def test_of_several_limits_the_first_along_the_path_and_then_of_the_codes_is_tol
     broken = with_value(broken, "friction_utilisation", 2, 3.0, (0,))
     broken = with_value(broken, "tip_over_ratio", 2, 0.1)
     assert hold_against_limits(LSR1, broken).code == "tip_over"
-    assert (
-        codes_of_verdicts().index("tip_over")
-        < codes_of_verdicts().index("friction")
-        < codes_of_verdicts().index("belly")
-    )
-
-
-def test_a_wheel_that_lifts_is_told_as_lifting_not_as_slipping(fine):
+    places = [codes_of_verdicts().index(code) for code in ("tip_over", "friction", "belly")]
+    assert places == sorted(places)
     lifted = with_value(fine, "wheel_loads", 0, -1.0, (0,))
     lifted = with_value(lifted, "friction_utilisation", 0, np.inf, (0,))
     assert hold_against_limits(LSR1, lifted).code == "wheel_lift"
