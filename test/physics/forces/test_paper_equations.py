@@ -117,17 +117,6 @@ def test_eqs_1_and_3_to_7_hold_in_3d_wherever_the_rover_settles():
 # Forces: eqs (8) to (15)
 
 
-class Sides(NamedTuple):
-    """What the two sides, right first, do to the body in the frame of the wheels' plane."""
-
-    force: np.ndarray
-    """(2, 3) forces on the body at the rocker pivots: Fx, Fy, Fz [N]."""
-    moment: np.ndarray
-    """(2, 3) moments on the body: Mx, My, Mz [N m]."""
-    bogie: np.ndarray
-    """(2,) moments about the bogie pivots of what hangs on the bogies [N m]."""
-
-
 def frame_of(prediction: PathPrediction, i: int) -> np.ndarray:
     """Return rows x ahead and level, y along the wheels' axis, z up in the wheels' plane."""
     axis = attitude_of(prediction, i)[:, 1]
@@ -135,8 +124,12 @@ def frame_of(prediction: PathPrediction, i: int) -> np.ndarray:
     return np.array([ahead, axis, np.cross(ahead, axis)])
 
 
-def planar_sides(rover: Rover, prediction: PathPrediction, i: int) -> Sides:
-    """Cut both rockers off the body: (12) to (15) in the plane, links without weight or width."""
+def planar_sides(rover: Rover, prediction: PathPrediction, i: int) -> tuple[np.ndarray, ...]:
+    """Cut both rockers off the body: (12) to (15) in the plane, links without weight or width.
+
+    Return what the sides, right first, do to the body at the rocker pivots, forces (2, 3) [N] and
+    moments (2, 3) [N m], and the moments (2,) about the bogie pivots of what hangs on the bogies.
+    """
     placed, frame = place_rover(rover, prediction, i), frame_of(prediction, i)
     angle, N, T, S = (
         getattr(prediction, name)[i]
@@ -153,7 +146,7 @@ def planar_sides(rover: Rover, prediction: PathPrediction, i: int) -> Sides:
         if placed.on_bogie[k]:
             x, _, z = frame @ (points[k] - placed.bogie_pivots[side])
             bogie[side] += z * fx[k] - x * fz[k]
-    return Sides(force, moment, bogie)
+    return force, moment, bogie
 
 
 @pytest.mark.parametrize("roll", [0.03, -0.1])

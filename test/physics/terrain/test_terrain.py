@@ -256,18 +256,6 @@ def test_a_preset_is_found_by_its_name_from_any_folder_and_keeps_its_licence(
         load_terrain(Path("spirit"))  # a path is a file, whatever the presets are called
 
 
-def test_a_real_map_is_loaded_and_known_at_its_known_cells():
-    terrain = load_terrain("spirit")
-    known = np.isfinite(terrain.elevation)
-    rows, columns = np.nonzero(known[:-1, :-1] & known[1:, :-1] & known[:-1, 1:] & known[1:, 1:])
-    x = terrain.origin[0] + terrain.resolution * columns
-    y = terrain.origin[1] + terrain.resolution * rows
-    z = terrain.elevation_at(x + 1e-9, y + 1e-9)
-    assert np.allclose(z, terrain.elevation[rows, columns], rtol=0.0, atol=1e-6)
-    filled = terrain.fill_gaps(0.3)
-    assert np.isnan(filled.elevation).sum() <= np.isnan(terrain.elevation).sum()
-
-
 @pytest.mark.parametrize("shape", [(8, 12), (2, 3), (41, 30)])
 def test_blocks_hold_the_highest_ground(shape):
     rng = np.random.default_rng(5)

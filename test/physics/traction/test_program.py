@@ -86,17 +86,13 @@ def test_the_wanted_push_acts_at_the_centre_of_mass(rover, push):
     assert moments == pytest.approx(np.zeros(3), abs=1e-9 * rover.weight)
 
 
-def test_straight_up_a_plane_all_wheels_use_the_same_share_and_too_little_friction_is_told():
+def test_up_a_plane_all_wheels_use_the_same_share_and_what_friction_and_motors_lack_is_told():
     prediction = judge_path(LSR1, plane(0.4, 0.0), [[0.0, 0.0, 0.0]])[0]
     answer = solve(LSR1, state_of(LSR1, prediction, 0))
     assert answer.utilisation == pytest.approx(np.full(6, 0.4 / 0.8), rel=2e-3)
     answer = solve(LSR1, state_of(LSR1, prediction, 0), friction=np.full(6, 0.2))
     assert not answer.fallback
     assert answer.friction_slack == pytest.approx(1.0, rel=0.02)
-
-
-def test_too_weak_motors_are_told_by_how_much_and_their_torques_are_cut_off():
-    prediction = judge_path(LSR1, plane(0.4, 0.0), [[0.0, 0.0, 0.0]])[0]
     needed = LSR1.weight * np.sin(np.arctan(0.4)) / 6.0 * LSR1.wheel.radius
     answer = solve(LSR1, state_of(LSR1, prediction, 0), torque=0.6 * needed)
     assert not answer.fallback
@@ -181,14 +177,13 @@ def test_equal_torques_are_those_of_the_sweep(rover):
 
 def test_shared_torques_of_turned_wheels_keep_the_balance_and_need_less_friction():
     writer, workspace = BalanceWriter(LSR1), TractionWorkspace()
-    inputs = ProgramInputs(np.full(6, 0.8), LSR1.wheel.max_torque, LSR1.wheel.radius)
     better = []
     for seed, curvature in enumerate(CURVATURES):
         _, prediction = curved_poses(LSR1, seed, curvature)
         for i in np.flatnonzero(prediction.settled):
             rows = writer.write(state_of(LSR1, prediction, i), 0.0)
-            equal = solve_traction(workspace, rows, inputs, max_programs=0)
-            answer = solve_traction(workspace, rows, inputs, max_programs=12)
+            equal = solve_traction(workspace, rows, INPUTS, max_programs=0)
+            answer = solve_traction(workspace, rows, INPUTS, max_programs=12)
             assert not answer.fallback
             A, b = free_balance_matrix(LSR1, prediction, i)
             forces = np.concatenate([answer.loads, answer.tractions, answer.lateral])

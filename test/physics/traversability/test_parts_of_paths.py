@@ -276,8 +276,7 @@ def test_exposure_is_zero_up_to_half_of_all_limits_and_the_whole_time_at_one():
     prediction, verdict = judge_paths(ROVER, ground, [way])[0]
     assert verdict.risk < SAFE
     assert find_exposure(ROVER, prediction) == 0.0
-    tight = ROVER.limits.__class__(**{**ROVER.limits.__dict__, "tip_over_ratio": 0.999})
-    at_limit = type(ROVER)(**{**ROVER.__dict__, "limits": tight})
+    at_limit = replace(ROVER, limits=replace(ROVER.limits, tip_over_ratio=0.999))
     exposure = find_exposure(at_limit, judge_paths(at_limit, ground, [way])[0][0])
     assert exposure == pytest.approx(prediction.time[-1], rel=0.01)
 
