@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Grounds for tests: rough grounds from a seed, planes, and rotated or mirrored grounds."""
+"""Grounds for tests: rough ones from a seed, planes, a crater; rotated and mirrored grounds."""
 
 from dataclasses import replace
 

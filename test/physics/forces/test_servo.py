@@ -128,7 +128,7 @@ def test_uphill_the_speed_lost_is_that_of_droop_and_creep(rover, slope):
     assert found.tangential.sum() == pytest.approx(weight_along, rel=1e-5)
 
 
-def test_backward_is_forward_turned_round_on_level_ground_and_downhill():
+def test_backward_up_a_slope_is_downhill():
     down = judge_path(LSR1, plane(0.2, 0.0), POSE, replace(SERVO, backward=True))[0]
     assert down.tangential.sum() == pytest.approx(LSR1.weight * np.sin(np.arctan(0.2)), rel=1e-5)
     assert down.speed_share[0] > 1.0  # gravity pulls, and droop lets it
