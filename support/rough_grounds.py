@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Grounds for tests: rough grounds from a seed, planes, and rotated or mirrored grounds."""
+"""Grounds for tests: rough ones from a seed, planes, a crater; rotated and mirrored grounds."""
 
 from dataclasses import replace
 
@@ -67,6 +67,13 @@ def bouldered(seed: int, half: float = 3.0, count: int = 150, highest: float = 0
         inside = np.clip(1.0 - ((x - cx) ** 2 + (y - cy) ** 2) / width**2, 0.0, None)
         z = np.maximum(z, relief + height * np.sqrt(inside))
     return Terrain(z, RESOLUTION, (x[0, 0], y[0, 0]))
+
+
+def bowl(depth: float, floor: float, slope: float, half: float = 6.0) -> Terrain:
+    """Return a round crater: a level floor of radius `floor` [m], then walls of `slope` [rad]."""
+    axis = np.arange(-half, half + 0.025, 0.05)
+    away = np.hypot(*np.meshgrid(axis, axis))
+    return Terrain(np.clip((away - floor) * np.tan(slope), 0.0, depth), 0.05, (-half, -half))
 
 
 def random_poses(seed: int, count: int, half: float) -> np.ndarray:

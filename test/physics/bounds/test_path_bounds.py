@@ -2,6 +2,8 @@
 """Bounds on uncertain maps hold the prediction and what maps drawn at random give."""
 
 from dataclasses import replace
+from functools import partial
+from itertools import product
 
 import numpy as np
 import pytest
@@ -49,37 +51,30 @@ def draw(rover, terrain, paths, cases):
     return counts
 
 
+GROUNDS = ("level", "slope", "rocks", "relief", "step")
+
+
 @pytest.mark.parametrize(
-    ("rover", "ground", "count"),
+    ("rover", "ground", "paths", "count"),
     [
-        (LSR1, "relief", 1),
+        (LSR1, "relief", "straight", 1),
         *[
-            pytest.param(rover, ground, 4, marks=pytest.mark.long)
-            for rover in (LSR1, M2020)
-            for ground in ("level", "slope", "rocks", "relief", "step")
+            pytest.param(*case, marks=pytest.mark.long)
+            for rover, ground in product((LSR1, M2020), GROUNDS)
+            for case in ((rover, ground, "straight", 4), (rover, ground, "arcs", 2))
         ],
     ],
 )
-def test_at_most_one_map_in_a_thousand_leaves_the_bounds(rover, ground, count):
+def test_at_most_one_map_in_a_thousand_leaves_the_bounds(rover, ground, paths, count):
     """Errors of each cell on its own, over a wheel and over the rover."""
-    cases = [(0.0, 0.005), (0.0, 0.001), (rover.wheel.radius, 0.003), (0.8, 0.005)]
-    terrain = uncertain_grounds(rover)[ground]
-    waypoints, outside, unbounded = draw(rover, terrain, path_across, cases[:count])
-    assert waypoints > 375 * count
-    assert unbounded <= 0.03 * len(PATH) * 8
-    assert outside <= 1e-3 * waypoints
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("rover", [LSR1, M2020], ids=["lsr1", "m2020"])
-def test_at_most_one_map_in_a_thousand_leaves_the_bounds_of_turned_wheels(rover):
     size = rover.wheel.radius / LSR1.wheel.radius
-    cases = [(0.0, 0.005), (rover.wheel.radius, 0.003)]
-    waypoints, outside, _ = sum(
-        draw(rover, terrain, lambda seed: arc_across(seed, size), cases)
-        for terrain in uncertain_grounds(rover).values()
-    )
-    assert waypoints > 1500
+    make = path_across if paths == "straight" else partial(arc_across, size=size)
+    cases = [(0.0, 0.005), (rover.wheel.radius, 0.003), (0.0, 0.001), (0.8, 0.005)]
+    terrain = uncertain_grounds(rover)[ground]
+    waypoints, outside, unbounded = draw(rover, terrain, make, cases[:count])
+    if paths == "straight":
+        assert waypoints > 375 * count and unbounded <= 0.03 * len(PATH) * 8
+    assert waypoints > 150 * count
     assert outside <= 1e-3 * waypoints
 
 
@@ -187,27 +182,24 @@ def limited(**limits) -> Rover:
     return replace(LSR1, limits=replace(LSR1.limits, **limits))
 
 
-def with_bogie_limits(low, high) -> Rover:
-    return replace(LSR1, suspension=replace(LSR1.suspension, bogie_limits=(low, high)))
+STIFF = replace(LSR1, suspension=replace(LSR1.suspension, bogie_limits=(-0.02, 0.9)))
 
 
 @pytest.mark.parametrize(
-    ("rover", "code", "said"),
+    ("rover", "code"),
     [
-        (limited(tilt=0.03), "tilt", ""),
-        (limited(belly_clearance=0.22), "belly", ""),
-        (limited(tip_over_ratio=0.97), "tip_over", ""),
-        (limited(torque_saturation=0.05), "torque", ""),
-        (with_bogie_limits(-0.02, 0.9), "suspension", "-0.02"),
-        (with_bogie_limits(-0.9, 0.02), "suspension", "0.02"),
+        (limited(tilt=0.03), "tilt"),
+        (limited(belly_clearance=0.22), "belly"),
+        (limited(tip_over_ratio=0.97), "tip_over"),
+        (limited(torque_saturation=0.05), "torque"),
+        (STIFF, "suspension"),
     ],
 )
-def test_each_limit_is_held_against_its_bound(rover, code, said):
+def test_each_limit_is_held_against_its_bound(rover, code):
     ground = plane(0.0, 0.0, half=3.0)
     assert judge_path(rover, ground, PATH)[1].traversable
     verdict = judge_path(rover, with_std(ground, 0.004), PATH)[1]
     assert (verdict.code, set(verdict.codes)) == (code, {code})
-    assert said in verdict.reason
 
 
 def test_the_foot_of_a_wall_has_no_bounds_and_says_why():
@@ -252,12 +244,9 @@ def test_a_map_without_the_layer_or_sigmas_has_no_bounds():
         assert prediction.bounds is None
         assert verdict.map_sigmas == 0.0
         assert np.isnan(verdict.tilt_bound)
-
-
-@pytest.mark.parametrize("sigmas", [-1.0, float("nan"), float("inf")])
-def test_impossible_sigmas_are_refused(sigmas):
-    with pytest.raises(ModelError, match=f"sigmas is {sigmas}"):
-        judge_path(LSR1, fractal(2), PATH, sigmas=sigmas)
+    for sigmas in (-1.0, float("nan"), float("inf")):
+        with pytest.raises(ModelError, match=f"sigmas is {sigmas}"):
+            judge_path(LSR1, certain, PATH, sigmas=sigmas)
 
 
 @pytest.mark.parametrize("policy", ["equal", "optimal"])

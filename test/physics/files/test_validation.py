@@ -69,19 +69,15 @@ def test_contents_become_the_type_with_lists_as_tuples_and_integers_as_floats():
         ({"legs": [{"length": 1}, {"lenght": 1}]}, "unknown key legs[1].lenght; did you mean "
          "length? legs[1] has length, swing"),
         ({"legs": [{}]}, "missing key legs[0].length; legs[0] needs length"),
-        ({"legs": [7]}, "legs[0] is 7; it must be a mapping with length"),
         ({"legs": []}, "legs is []; it must be a list of one mapping or more"),
-        ({"legs": {}}, "legs is {}; it must be a list of one mapping or more"),
         ({"tail": {"length": 1, "swing": (1, 0)}}, "tail.swing is [1, 0]; it must be [lowest, "
          "highest] in rad, the first below the second"),
         ({"gait": "run"}, "gait is 'run'; it must be walk or trot"),
-        ({"gait": None}, "gait is empty; it must be walk or trot"),
         ({"name": " "}, "name is ' '; it must be a text that is not empty"),
         ({"hip": {1, 2, 3}}, "hip is {1, 2, 3}; it must be a list of 3 numbers in m, [x, y, z] "
          "in the body frame"),
         ({"feet": {}}, "missing key feet.left; feet needs left"),
         ({"feet": {"left": 1, 7: 2}}, "unknown key feet.7; feet has left, right"),
-        ({"feet": []}, "feet is []; it must be a mapping with left"),
         ({"colour": "red"}, "unknown key colour; a walker file has name, hip, gait, legs, feet, "
          "tail"),
     ],
@@ -95,12 +91,6 @@ def test_an_unknown_key_is_named_before_the_missing_one_that_it_was_meant_for():
     del data["hip"]
     with pytest.raises(RoverFileError, match="unknown key hips; did you mean hip[?]"):
         read_as(Walker, data, "a walker file")
-
-
-def test_numbers_in_quotes_get_a_hint_in_lists_too():
-    assert "YAML reads it as text" in refusal(hip=[0.0, "1e3", 0.0])
-    assert "YAML" not in refusal(hip=[0.0, "up", 0.0])
-    assert "YAML" not in refusal(gait="1e3")
 
 
 def test_errors_name_the_part_of_a_file_from_the_top_and_open_with_the_file():
@@ -117,8 +107,6 @@ def test_errors_name_the_part_of_a_file_from_the_top_and_open_with_the_file():
     [
         (("wheel", "radius"), "m"),
         (("suspension", "wheels", "front", 2), "m"),
-        (("suspension", "rocker_limits", 1), "rad"),
-        (("masses", "body", "com", 0), "m"),
         (("manipulator", "link_masses", 0), "kg"),
         (("manipulator", "joint_limits", 2, 1), "rad"),
         (("limits", "tip_over_ratio"), ""),

@@ -10,10 +10,22 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 
-from rover_physics.errors import ModelError
 from rover_physics.forces.servo_balance import CREEP, write_residual
-from rover_physics.forces.soil import pack_soils
+from rover_physics.forces.servo_motion import SERVO as SERVO_RECORD
+from rover_physics.forces.servo_soil import roll_on_soil
+from rover_physics.forces.servo_wheel import S, T, roll_wheel
+from rover_physics.forces.soil import (
+    SHEAR_MODULUS,
+    contact_length,
+    find_sinkage,
+    mobilised_share,
+    motion_resistance,
+    pack_soils,
+    shear_strength,
+)
+from rover_physics.numerics.records import new_record
 from rover_physics.prediction.evaluation import evaluate_pose, new_works, set_pose
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
@@ -31,7 +43,6 @@ SERVO = SweepOptions(policy="servo")
 SOFT = ("lunar_nominal", "mars_simulant", "dry_sand", "lete_sand")
 SAND = replace(SERVO, soil="lete_sand", max_torque=20.0)
 POSE = np.zeros((1, 3))
-LEVEL = plane(0.0, 0.0)
 soils = st.sampled_from(SOFT)
 few = settings(max_examples=25)
 
@@ -60,8 +71,7 @@ def servos_at(rover, ground, poses, options, curvature):
 # The solution
 
 
-@pytest.mark.parametrize("rover", [LSR1, FIXED], ids=["steered", "fixed"])
-@pytest.mark.parametrize("curvature", [0.0, 0.8, np.inf])
+@pytest.mark.parametrize(("rover", "curvature"), [(LSR1, 0.0), (LSR1, 0.8), (FIXED, np.inf)])
 @pytest.mark.parametrize(
     ("ground", "half", "options", "least"),
     [(rocky(1), 2.0, SERVO, 25), (smooth(2), 0.6, SAND, 10)],
@@ -106,14 +116,6 @@ def test_the_jacobian_is_that_of_finite_differences(ground, half, options, apart
 # Firm ground
 
 
-def test_on_level_ground_straight_ahead_nothing_slips():
-    level, equal = judge_path(LSR1, LEVEL, POSE, SERVO)[0], judge_path(LSR1, LEVEL, POSE)[0]
-    np.testing.assert_allclose(level.wheel_loads, equal.wheel_loads, rtol=1e-6)
-    np.testing.assert_allclose(level.torque, 0.0, atol=1e-6)
-    np.testing.assert_allclose(level.slip_ratio, 0.0, atol=1e-6)
-    assert level.speed_share[0] == pytest.approx(1.0, abs=1e-6)
-
-
 @pytest.mark.parametrize(("rover", "slope"), [(LSR1, 0.1), (LSR1, 0.3), (M2020, 0.2)])
 def test_uphill_the_speed_lost_is_that_of_droop_and_creep(rover, slope):
     ground = plane(slope, 0.0, half=4.0)
@@ -126,59 +128,11 @@ def test_uphill_the_speed_lost_is_that_of_droop_and_creep(rover, slope):
     assert found.tangential.sum() == pytest.approx(weight_along, rel=1e-5)
 
 
-def test_backward_is_forward_turned_round_on_level_ground_and_downhill():
+def test_backward_up_a_slope_is_downhill():
     down = judge_path(LSR1, plane(0.2, 0.0), POSE, replace(SERVO, backward=True))[0]
     assert down.tangential.sum() == pytest.approx(LSR1.weight * np.sin(np.arctan(0.2)), rel=1e-5)
     assert down.speed_share[0] > 1.0  # gravity pulls, and droop lets it
     assert (down.slip_ratio < 0.0).all()
-
-
-def wide(rover, factor):
-    """Return a rover that is `factor` times as wide."""
-
-    def moved(point):
-        return (point[0], point[1] * factor, point[2])
-
-    suspension, masses = rover.suspension, rover.masses
-    return replace(
-        rover,
-        suspension=replace(
-            suspension,
-            rocker_pivot=moved(suspension.rocker_pivot),
-            bogie_pivot=moved(suspension.bogie_pivot),
-            wheels={name: moved(place) for name, place in suspension.wheels.items()},
-        ),
-        masses=replace(
-            masses,
-            rocker=replace(masses.rocker, com=moved(masses.rocker.com)),
-            bogie=replace(masses.bogie, com=moved(masses.bogie.com)),
-        ),
-    )
-
-
-@pytest.mark.parametrize("curvature", [0.5, np.inf])
-def test_a_turn_of_fixed_wheels_meets_the_textbook_moment_of_resistance(curvature):
-    """Lateral friction at each wheel: M = sum of mu N |x_i - x_c| (Wong, section 6.1).
-
-    The formula takes the wheels to slide across their headings alone, as on a vehicle that is wide
-    for its length; x_c is the centre of turning along x, where the lateral forces cancel.
-    """
-    rover = replace(wide(FIXED, 4.0), wheel=replace(FIXED.wheel, width=1e-3))  # no scrub
-    found = judge_poses(rover, plane(0.0, 0.0, half=2.5), POSE, [curvature], SERVO)[0]
-    x, y = (found.contact_points[0] - found.position[0])[:, :2].T
-    drive = -(y * found.tangential[0]).sum()
-    mu_N, ends = 0.8 * found.wheel_loads[0], np.abs(x) > 0.2
-    centre = np.interp(0.0, [-mu_N[x < -0.2].sum(), mu_N[x > 0.2].sum()], [-0.4, 0.4])
-    textbook = (mu_N * np.abs(x - centre))[ends].sum()
-    assert drive == pytest.approx(textbook, rel=0.05)
-
-
-def test_a_turn_on_the_spot_with_steered_wheels_needs_little_torque():
-    steered, fixed = (
-        judge_poses(rover, LEVEL, POSE, [np.inf], SERVO)[0] for rover in (LSR1, FIXED)
-    )
-    assert np.abs(steered.torque).max() < 0.15 * np.abs(fixed.torque).max()
-    assert steered.speed_share[0] > 0.95 > fixed.speed_share[0]
 
 
 def test_a_cross_slope_beyond_friction_slides():
@@ -189,12 +143,6 @@ def test_a_cross_slope_beyond_friction_slides():
     assert slides.speed_share[0] == 0.0
     assert holds.speed_share[0] > 0.9
     assert -0.1 < holds.deviation[0, 1] < 0.0  # a creep downhill
-
-
-@pytest.mark.parametrize("droop", [-0.1, 1.0, 1.5, np.nan])
-def test_a_droop_that_no_servo_has_is_refused(droop):
-    with pytest.raises(ModelError, match="servo_droop"):
-        judge_path(with_droop(LSR1, droop), LEVEL, POSE, SERVO)[0]
 
 
 # Firm ground and soil
@@ -302,8 +250,9 @@ def test_firm_patches_of_a_soil_layer_are_driven_as_coulomb_ground():
     assert found.tangential[0, left].sum() > found.tangential[0, right].sum()
 
 
-@pytest.mark.parametrize("soil", SOFT)
-@pytest.mark.parametrize("curvature", [0.0, 0.7, np.inf])
+@pytest.mark.parametrize(
+    ("soil", "curvature"), [("lunar_nominal", 0.0), ("dry_sand", 0.7), ("lete_sand", np.inf)]
+)
 def test_on_rough_soil_servos_drive_wherever_equal_torques_suffice(soil, curvature):
     held = refused = 0
     poses, bends = random_poses(3, 40, 0.8), np.full(40, curvature)
@@ -318,3 +267,116 @@ def test_on_rough_soil_servos_drive_wherever_equal_torques_suffice(soil, curvatu
             held += holds.sum()
             refused += (holds & ~(servo.speed_share > 0.0)).sum()
     assert held >= 20 and refused == 0
+
+
+BAND, FULL = 0.01, 0.2
+RADIUS, WIDTH, WEIGHT = 0.1, 0.1, 80.0
+SOILS = {
+    name: pack_soils((name,))[-1]
+    for name in ("lunar_nominal", "mars_simulant", "dry_sand", "lete_sand")
+}
+
+ways = st.floats(-1.5, 1.5)
+velocities = st.tuples(ways, ways, st.floats(-0.05, 0.05))
+"""Speeds of a wheel along and across, and of its turn about the contact [nominal speeds]."""
+grips = st.floats(1e-3, 0.5)
+loads = st.floats(0.01, 0.4)
+droops = st.floats(0.0, 0.9)
+limits = st.floats(0.02, 0.5)
+many = settings(max_examples=100)
+
+
+def servo_of(limit, droop=0.3, share=1.0):
+    """Return the SERVO of one wheel that is commanded to roll at the nominal speed."""
+    servo = new_record(
+        SERVO_RECORD, droop=droop, full_traction=FULL, max_traction=limit, creep=BAND,
+        friction_share=share, radius=RADIUS, width=WIDTH, weight=WEIGHT,
+    )  # fmt: skip
+    servo.command[0] = 1.0
+    return servo
+
+
+def roll(grip, velocity, droop=0.3, limit=0.2):
+    """Return the SERVO of a wheel on firm ground with the friction force `grip` [weights]."""
+    servo = servo_of(limit, droop)
+    roll_wheel(servo, 0, grip, velocity)
+    return servo
+
+
+def roll_soft(soil, load, velocity, droop=0.3, limit=0.2, share=1.0):
+    """Return the SERVO of a wheel on soil with a load [weights]."""
+    servo = servo_of(limit, droop, share)
+    servo.soil[0], servo.load[0], servo.slip[0] = SOILS[soil], load, np.nan
+    roll_on_soil(servo, 0, velocity)
+    return servo
+
+
+# One wheel on firm ground and on soil: its forces. Their derivatives are in the Jacobian above
+
+
+def expected(grip, velocity, droop, limit) -> np.ndarray:
+    """Return T, S, D by bisection."""
+    along, across, spin = velocity
+    wide = np.hypot(across, BAND)
+
+    def forces(slip):
+        ends = np.array([slip + spin, slip - spin])
+        size = np.hypot(ends, wide)
+        pulls = -0.5 * grip * ends / size
+        return np.array([pulls.sum(), -0.5 * grip * across * (1 / size).sum(), -np.diff(pulls)[0]])
+
+    def excess(slip):
+        return slip - (along - 1.0) - droop / FULL * forces(slip)[T]
+
+    slip = brentq(excess, -10.0, 10.0, xtol=1e-15)
+    if abs(forces(slip)[T]) > limit:
+        most = np.copysign(limit, forces(slip)[T])
+        slip = brentq(lambda s: forces(s)[T] - most, -1e4, 1e4, xtol=1e-15)
+    return forces(slip)
+
+
+@many
+@given(grips, velocities, droops, limits)
+def test_forces_are_those_of_servo_and_friction_law(grip, velocity, droop, limit):
+    assume(abs(limit - grip) >= 1e-3 * grip)  # all friction along the wheel: slip is unbounded
+    force = roll(grip, velocity, droop, limit).force[0]
+    np.testing.assert_allclose(force, expected(grip, velocity, droop, limit), atol=1e-7)
+    assert np.hypot(force[T], force[S]) <= grip + 1e-9
+    assert abs(force[T]) <= limit + 1e-12
+
+
+def soil_forces(soil, load, velocity, rim) -> tuple[np.ndarray, float]:
+    """Return F_x, S, D and R over the weight at the speed of the rim, by the notes on soil."""
+    row, N = SOILS[soil], load * WEIGHT
+    sinkage = find_sinkage(row, RADIUS, WIDTH, N)
+    length = contact_length(RADIUS, sinkage)
+    strength = shear_strength(row, WIDTH * length, N) / WEIGHT
+    along, across, spin = velocity
+    ends = []
+    for way in (along + spin, along - spin):
+        slide = np.array([rim - way, -across])
+        size = np.hypot(*slide)
+        slip = min(size / max(abs(rim), 1e-9), 1.0)
+        share = mobilised_share(slip * length / row[SHEAR_MODULUS])
+        ends.append(0.5 * strength * share * slide / max(size, 1e-12))
+    resistance = motion_resistance(row, WIDTH, sinkage) / WEIGHT * np.clip(along / BAND, -1, 1)
+    shear = np.array([ends[0][0] + ends[1][0], ends[0][1] + ends[1][1], ends[0][0] - ends[1][0]])
+    return shear, resistance
+
+
+@many
+@given(soils, loads, velocities, droops, st.floats(0.5, 1.0))
+def test_forces_are_those_of_servo_and_soil(soil, load, velocity, droop, share):
+    servo = roll_soft(soil, load, velocity, droop, 10.0, share)
+
+    def excess(rim):
+        shear, resistance = soil_forces(soil, load, velocity, rim)
+        thrust = share * (shear[0] - resistance) + resistance
+        return rim - 1.0 + droop / FULL * thrust
+
+    rim = brentq(excess, -50.0, 50.0, xtol=1e-14)
+    assume(abs(rim) > 0.05)  # where the rim stands, a creep keeps the slip regular
+    shear, resistance = soil_forces(soil, load, velocity, rim)
+    assert velocity[0] - servo.slip[0] == pytest.approx(rim, abs=1e-8)
+    forces = share * (shear - [resistance, 0.0, 0.0])
+    np.testing.assert_allclose(servo.force[0], forces, atol=1e-7)

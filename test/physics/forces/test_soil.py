@@ -15,12 +15,9 @@ from rover_physics.forces.soil import (
     contact_length,
     coulomb_slip,
     effective_friction,
-    find_mobilisation,
-    mobilised_share,
     pack_soils,
     solve_wheel,
 )
-from rover_physics.terrain.soil_file import load_soils
 from support.soil_thrust import thrust_at_slip
 
 MU = 0.8
@@ -117,28 +114,15 @@ def test_forces_within_the_effective_friction_are_within_the_strength(name, whee
         assert math.hypot(T + resistance, S) == pytest.approx(strength, rel=1e-9)
 
 
-@given(st.floats(0.0, 1.0, exclude_max=True), st.floats(0.0, 500.0), st.floats(1e-6, 1.0))
-def test_more_slip_mobilises_more_shear_and_the_inverse_is_one(share, x, more):
-    assert mobilised_share(find_mobilisation(share)) == pytest.approx(share, rel=1e-9, abs=1e-15)
-    assert 0.0 <= mobilised_share(x) < mobilised_share(x + more) < 1.0
-
-
 @pytest.mark.parametrize("name", RIGID)
-def test_slip_is_one_at_the_largest_pull_and_beyond(name):
+def test_from_pulling_beyond_its_most_to_being_dragged_slip_goes_from_one_to_minus_one(name):
     soil, wheel = packed(name), (0.2, 0.15, 80.0)
-    largest = solve(soil, *wheel, 0.0, 0.0).drawbar_pull
-    at = solve(soil, *wheel, largest * (1.0 - 1e-12), 0.0)
-    beyond = solve(soil, *wheel, largest * 1.5, 0.0)
-    assert at.slip_ratio == pytest.approx(1.0, abs=1e-9)
+    idle = solve(soil, *wheel, 0.0, 0.0)
+    beyond = solve(soil, *wheel, 1.5 * idle.drawbar_pull, 0.0)
     assert (beyond.slip_ratio, beyond.utilisation) == (1.0, pytest.approx(1.5))
-    assert beyond.torque == pytest.approx(0.2 * (1.5 * largest + beyond.resistance))
-    assert thrust_at_slip(soil, *wheel, 1.0) == pytest.approx(largest + beyond.resistance)
-
-
-@pytest.mark.parametrize("name", RIGID)
-def test_a_wheel_that_is_dragged_against_its_resistance_rolls_freely(name):
-    soil, wheel = packed(name), (0.2, 0.15, 80.0)
-    resistance = solve(soil, *wheel, 0.0, 0.0).resistance
+    most = thrust_at_slip(soil, *wheel, 1.0)
+    assert most == pytest.approx(idle.drawbar_pull + idle.resistance)
+    resistance = idle.resistance
     free = solve(soil, *wheel, -resistance, 0.0)
     braked = solve(soil, *wheel, -1.2 * resistance, 0.0)
     locked = solve(soil, *wheel, -10.0 * 80.0, 0.0)
@@ -147,17 +131,11 @@ def test_a_wheel_that_is_dragged_against_its_resistance_rolls_freely(name):
     assert locked.slip_ratio == -1.0 and locked.utilisation > 1.0
 
 
-def test_a_wheel_sunk_to_its_axle_gives_no_pull():
+def test_a_wheel_that_cannot_pull_itself_may_still_be_dragged_unless_sunk_to_its_axle():
     soil = packed("mars_simulant")
-    result = solve(soil, 0.1, 0.08, 2000.0, 1.0, 0.0)
-    assert result.sinkage > 0.1
-    assert result.drawbar_pull == -result.resistance < 0.0
-    assert result.slip_ratio == 1.0 and result.utilisation == np.inf
-    assert friction_of(soil, 0.1, 0.08, 2000.0) == MIN_FRICTION
-
-
-def test_a_wheel_that_cannot_pull_itself_may_still_be_dragged():
-    soil = packed("mars_simulant")
+    sunk = solve(soil, 0.1, 0.08, 2000.0, 1.0, 0.0)
+    assert sunk.sinkage > 0.1 and sunk.utilisation == np.inf
+    assert sunk.drawbar_pull == -sunk.resistance < 0.0
     wheel = (0.1, 0.08, 90.0)
     idle = solve(soil, *wheel, 0.0, 0.0)
     assert idle.sinkage < 0.1 and idle.drawbar_pull < 0.0
@@ -166,8 +144,9 @@ def test_a_wheel_that_cannot_pull_itself_may_still_be_dragged():
     assert dragged.utilisation == 0.0 and dragged.slip_ratio == 0.0
 
 
-@pytest.mark.parametrize("name", [None, *RIGID])
-@pytest.mark.parametrize("N", [0.0, -5.0, math.nan])
+@pytest.mark.parametrize(
+    ("name", "N"), [(None, 0.0), ("dry_sand", 0.0), ("dry_sand", -5.0), ("lete_sand", math.nan)]
+)
 def test_a_lifted_wheel_has_no_grip(name, N):
     soil = pack_soils(default=name)[0]
     assert tuple(solve(soil, 0.1, 0.08, N, 2.0, 0.0)) == (1.0, 0.0, 0.0, 0.0, 0.2, np.inf)
@@ -187,9 +166,3 @@ def test_coulomb_ground_sticks_or_slips(N, T, S):
     assert torque == 0.1 * T
     assert slip == coulomb_slip(utilisation) == (0.0 if utilisation <= 1.0 else 1.0)
     assert friction_of(soil, 0.1, 0.08, N) == MU
-
-
-def test_a_coulomb_soil_with_friction_of_its_own_keeps_it():
-    soil = packed("firm_ground")
-    own = load_soils()["firm_ground"].friction
-    assert friction_of(soil, 0.1, 0.08, 10.0, mu=0.3) == own

@@ -13,7 +13,6 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_poses
 from support.rough_grounds import (
-    fractal,
     mirrored,
     plane,
     quarter_turn,
@@ -42,14 +41,7 @@ few = settings(max_examples=25)
 def assert_mirrored(rover, ground, poses, curvature, options, loads=1e-3, torques=2e-3) -> int:
     """Compare answers on mirrored grounds; return how many poses settle and drive.
 
-    Args:
-        rover: The rover.
-        ground: The ground.
-        poses: (n, 3).
-        curvature: That of each motion [1/m].
-        options: A tool load is mirrored too.
-        loads: Tolerance of forces [weights].
-        torques: Tolerance of torques [N m].
+    Forces agree within `loads` [weights], torques within `torques` [N m].
     """
     bends = np.full(len(poses), curvature)
     other = options
@@ -98,7 +90,7 @@ def test_mirrored_ground_swaps_right_and_left(seed, curvature, loaded, data):
     assert assert_mirrored(LSR1, ground, poses, curvature, options, loads) == 4
 
 
-@pytest.mark.parametrize("curvature", [0.0, 0.5, np.inf])
+@pytest.mark.parametrize("curvature", [0.5, np.inf])
 @pytest.mark.parametrize(
     ("rover", "ground", "half", "options", "least"),
     [
@@ -132,18 +124,6 @@ def test_turned_by_quarters_and_moved_with_its_path_the_ground_changes_nothing(
         assert getattr(there, name) == pytest.approx(getattr(here, name), abs=ANGLE), name
     assert there.position[:, 2] == pytest.approx(here.position[:, 2] + dz, abs=2.0 * GAP)
     assert there.wheel_loads == pytest.approx(here.wheel_loads, abs=1e-3 * LSR1.weight)
-
-
-@few
-@given(seeds, st.floats(0.1, 10.0))
-def test_forces_grow_with_gravity_in_proportion(seed, factor):
-    ground, poses = fractal(seed % 20), random_poses(seed, 4, 1.5)
-    heavy = replace(LSR1, gravity=factor * LSR1.gravity)
-    here, there = (judge_poses(rover, ground, poses, AHEAD)[0] for rover in (LSR1, heavy))
-    for name in ("wheel_loads", "tangential", "lateral", "torque", "friction_utilisation"):
-        grows = 1.0 if name == "friction_utilisation" else factor
-        expected = pytest.approx(grows * getattr(here, name), rel=1e-9, nan_ok=True)
-        assert getattr(there, name) == expected, name
 
 
 @few

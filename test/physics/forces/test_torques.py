@@ -1,21 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Policy optimal: no torque set needs less friction, by linear programs of its own."""
+"""Optimal torques and the ranges of torques, by linear programs of their own."""
+
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import linprog
 
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traversability.judge import judge_path
+from rover_physics.traversability.torque_ranges import find_torque_ranges
 from rover_physics.traversability.verdict import hold_against_limits
 from support.best_torques import can_stand
 from support.reference_cases import reference_ground
 from support.rough_grounds import fractal, plane, random_poses, rocky, smooth
+from support.rover_geometry import balance_matrix, free_balance_matrix
 
 LSR1 = load_rover("lsr1")
-POSE = [[0.0, 0.0, 0.0]]
 STEP = reference_ground("settled_a/step")
 few = settings(max_examples=20)
 
@@ -46,23 +51,6 @@ def test_no_torques_within_the_limit_need_less_friction(ground, poses, max_torqu
     assert compared >= 4
 
 
-@pytest.mark.parametrize(
-    ("limits", "equal", "optimal"),
-    [
-        ({}, "friction", ""),
-        ({"friction": 0.4}, "friction", "friction"),
-        ({"friction": 5.0, "max_torque": 0.3}, "torque", "torque"),
-    ],
-    ids=["passes with traction control", "steeper than friction", "motors too weak"],
-)
-def test_a_slope_is_judged_by_what_each_policy_needs(limits, equal, optimal):
-    for policy, code in (("equal", equal), ("optimal", optimal)):
-        prediction = judge_path(
-            LSR1, plane(0.45, 0.0), POSE, SweepOptions(policy=policy, **limits)
-        )[0]
-        assert hold_against_limits(LSR1, prediction).code == code, policy
-
-
 @few
 @given(st.integers(0, 19), st.sampled_from([None, (-25.0, 0.0, 8.0)]))
 def test_optimal_torques_never_use_more_friction_than_equal_ones(seed, tool_force):
@@ -91,3 +79,115 @@ def test_neither_policy_nor_tool_load_moves_the_rover():
         for name in ("status", "position", "roll", "pitch", "wheel_centres"):
             assert getattr(here, name).tobytes() == getattr(there, name).tobytes(), name
         assert not np.array_equal(here.wheel_loads, there.wheel_loads)
+
+
+SIDES = 96
+
+
+def range_by_program(prediction, i, wheel, max_torque, *, inside: bool, shared: bool):
+    """Return the range [N m] of a wheel's torque by linear programs in N, T and lateral forces.
+
+    The friction cones are replaced by pyramids around them or inside them. Lateral forces are
+    s0 + s1 along where shared, else each wheel has its own.
+    """
+    A, b = free_balance_matrix(LSR1, prediction, i)
+    sideways = np.eye(6)
+    if shared:
+        A, b, along = balance_matrix(LSR1, prediction, i)
+        sideways = np.column_stack([np.ones(6), along])
+    turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    shrink = np.cos(np.pi / SIDES) if inside else 1.0
+    rows = np.zeros((6 * SIDES, A.shape[1]))
+    for w in range(6):
+        own = slice(w * SIDES, (w + 1) * SIDES)
+        rows[own, w] = -shrink * prediction.friction[i, w]
+        rows[own, 6 + w] = np.cos(turns)
+        rows[own, 12:] = np.outer(np.sin(turns), sideways[w])
+    pull = max_torque / (LSR1.wheel.radius * LSR1.weight)
+    lateral = [(None, None)] * sideways.shape[1]
+    bounds = [(0.0, None)] * 6 + [(-pull, pull)] * 6 + lateral
+    ends = []
+    for sign in (1.0, -1.0):
+        cost = np.zeros(A.shape[1])
+        cost[6 + wheel] = sign
+        answer = linprog(cost, rows, np.zeros(len(rows)), A, b, bounds, method="highs")
+        assert answer.status == 0, answer.message
+        ends.append(sign * answer.fun * LSR1.wheel.radius * LSR1.weight)
+    return np.array(ends)
+
+
+@pytest.mark.parametrize(
+    ("ground", "poses", "friction", "max_torque", "shared"),
+    [
+        (rocky(5), random_poses(2, 2, 0.5), 0.8, 0.8, True),
+        (fractal(13, roughness=0.12), random_poses(13, 12, 1.8), 0.4, 2.0, False),
+    ],
+)
+def test_ranges_lie_between_those_of_linear_programs(ground, poses, friction, max_torque, shared):
+    options = SweepOptions(friction=friction, max_torque=max_torque)
+    ranges = find_torque_ranges(LSR1, ground, poses, options)
+    optimal = judge_path(LSR1, ground, poses, replace(options, policy="optimal"))[0]
+    compared, slack = 0, 1e-5 * max_torque
+    for i in np.flatnonzero(ranges.feasible):
+        if has_equal_shares(optimal, i) != shared:
+            continue
+        for wheel in range(6):
+            compared += 1
+            program = partial(range_by_program, optimal, i, wheel, max_torque, shared=shared)
+            widest, within = program(inside=False), program(inside=True)
+            assert widest[0] - slack <= ranges.lowest[i, wheel] <= within[0] + slack
+            assert within[1] - slack <= ranges.highest[i, wheel] <= widest[1] + slack
+    assert compared >= 6
+
+
+def has_equal_shares(prediction, i) -> bool:
+    _, _, along = balance_matrix(LSR1, prediction, i)
+    S = prediction.lateral[i]
+    left = S - np.polyval(np.polyfit(along, S, 1), along)
+    return bool(np.abs(left).max() <= 1e-6 * LSR1.weight)
+
+
+@few
+@given(st.integers(0, 1000), st.floats(-3.0, 3.0), st.sampled_from([None, "dry_sand"]))
+def test_torques_that_a_policy_uses_are_within_the_ranges(seed, yaw, soil):
+    ground, pose = smooth(seed), [[0.1, 0.2, yaw]]
+    ranges = find_torque_ranges(LSR1, ground, pose, SweepOptions(soil=soil))
+    for policy in ("equal", "optimal"):
+        prediction = judge_path(LSR1, ground, pose, SweepOptions(policy=policy, soil=soil))[0]
+        if hold_against_limits(LSR1, prediction).code not in ("", "belly", "tilt"):
+            continue
+        assert ranges.feasible[0]
+        assert (prediction.torque >= ranges.lowest - 1e-4).all()
+        assert (prediction.torque <= ranges.highest + 1e-4).all()
+
+
+def test_ranges_are_empty_where_no_torques_keep_the_constraints():
+    poses = [[0.0, 0.0, 0.0], [50.0, 0.0, 0.0]]
+    ranges = find_torque_ranges(LSR1, plane(0.45, 0.0), poses, SweepOptions(friction=0.4))
+    assert not ranges.feasible.any()
+    assert np.isnan(ranges.lowest).all() and np.isnan(ranges.highest).all()
+
+
+def test_tighter_limits_leave_narrower_ranges():
+    ground, pose = plane(0.2, 0.0), [[0.0, 0.0, 0.2]]
+    wide = find_torque_ranges(LSR1, ground, pose)
+    careful = replace(
+        LSR1, limits=replace(LSR1.limits, friction_utilisation=0.8, torque_saturation=0.5)
+    )
+    narrow = find_torque_ranges(careful, ground, pose)
+    assert narrow.feasible.all() and np.abs(narrow.highest).max() <= 1.0
+    assert (narrow.lowest >= wide.lowest - 1e-4).all()
+    assert (narrow.highest <= wide.highest + 1e-4).all()
+    assert (narrow.highest - narrow.lowest < wide.highest - wide.lowest - 1e-3).any()
+
+
+def test_ranges_are_physical_neither_policy_nor_control_margin_matters():
+    asked = LSR1, plane(0.1, 0.0), [[0.0, 0.0, 0.0]]
+    equal, *others = (
+        find_torque_ranges(*asked, options)
+        for options in (SweepOptions(), SweepOptions("optimal"), SweepOptions(control_margin=0.4))
+    )
+    assert equal.feasible.all()
+    for other in others:
+        np.testing.assert_array_equal(equal.lowest, other.lowest)
+        np.testing.assert_array_equal(equal.highest, other.highest)

@@ -41,12 +41,6 @@ X = np.arange(-1.5, 1.5, 0.05)
 PATH = np.column_stack([X, np.full_like(X, 0.3), np.zeros_like(X)])
 
 
-@pytest.fixture
-def with_row(monkeypatch):
-    """Add the row to the table."""
-    monkeypatch.setattr(table, "LIMITS", (*table.LIMITS, HEAVIEST))
-
-
 def rover_with(newtons: float):
     """Return a rover whose file has the number."""
     contents = rover_to_dict(load_rover("lsr1"))
@@ -55,8 +49,9 @@ def rover_with(newtons: float):
 
 
 @pytest.fixture
-def strict(with_row):
-    """Return a rover that carries less than some waypoints of the path ask of a wheel."""
+def strict(monkeypatch):
+    """Add the row; return a rover that carries less than some waypoints ask of a wheel."""
+    monkeypatch.setattr(table, "LIMITS", (*table.LIMITS, HEAVIEST))
     loads = judge_path(load_rover("lsr1"), GROUND, PATH)[0].wheel_loads.max(axis=1)
     return rover_with(float(np.median(loads)))
 
@@ -66,11 +61,8 @@ def test_without_the_row_the_number_is_an_unknown_key():
         rover_with(20.0)
 
 
-def test_without_the_number_the_limit_is_not_asked(with_row):
+def test_the_number_survives_the_file_and_without_it_the_limit_is_not_asked(strict):
     assert judge_path(load_rover("lsr1"), GROUND, PATH)[1].traversable
-
-
-def test_the_number_survives_the_file(strict):
     again = rover_from_dict(rover_to_dict(strict), "again")
     assert again == strict and again.limits.further["wheel_load"] > 0.0
     with pytest.raises(RoverFileError, match=r"limits\.wheel_load is .many."):

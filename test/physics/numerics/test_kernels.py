@@ -11,42 +11,16 @@ import numpy as np
 import pytest
 
 from rover_physics.numerics.kernel_cache import KernelMissingError, loading_only
-from rover_physics.numerics.kernels import allocating_kernel, kernel
+from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.threads import CALLS_IN_WORK, run_chunks, run_in_turn
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 
 
 @kernel
-def add_one(values):
-    for i in range(values.size):
-        values[i] += 1.0
-
-
-@kernel
-def add_two(values):
-    add_one(values)
-    add_one(values)
-
-
-@allocating_kernel
-def threes(n):
-    values = np.ones(n)
-    add_two(values)
-    return values
-
-
-@kernel
 def write_number(numbers, part):
     for chunk in range(part[0], part[1]):
         numbers[chunk] += chunk
-
-
-def test_a_kernel_is_called_from_python_and_from_kernels():
-    values = np.zeros(3)
-    add_two(values)
-    add_one(values)
-    assert values.tolist() == [3.0, 3.0, 3.0] and threes(2).tolist() == [3.0, 3.0]
 
 
 def test_a_kernel_that_only_kernels_call_has_no_machine_code():

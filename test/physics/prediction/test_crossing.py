@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Between waypoints: faces are climbed through steep contacts, and what fails there is told."""
+"""Between waypoints: faces are climbed through steep contacts, and wheels drop off edges."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 import pytest
 
+from rover_physics.prediction.drops import FACE
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
+from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path
@@ -19,23 +22,13 @@ from support.rover_geometry import balance_residuals
 LSR1 = load_rover("lsr1")
 FREE = unlimited(LSR1)
 RADIUS = LSR1.wheel.radius
-SWAP = [3, 4, 5, 0, 1, 2]
 
 
-def sharp(kind: str, size: float, resolution: float = 0.005) -> Terrain:
-    """Return the step, or the bump under y > 0, of `size` [m] with a face one fine cell long."""
+def sharp_step(size: float, resolution: float = 0.005) -> Terrain:
+    """Return the step of `size` [m] with a face one fine cell long."""
     axis = -2.2 + resolution * np.arange(round(4.4 / resolution) + 1)
-    x, y = np.meshgrid(axis, axis)
-    if kind == "step":
-        height = size * np.clip(x / resolution + 0.5, 0.0, 1.0)
-    else:
-        height = np.where(y > 0.0, size * np.clip((0.15 - abs(x)) / resolution + 0.5, 0, 1), 0.0)
-    return Terrain(height, resolution, (-2.2, -2.2))
-
-
-def drive(ground: Terrain, spacing: float = 0.01, **options) -> tuple[PathPrediction, Verdict]:
-    prediction = judge_path(FREE, ground, drive_path(spacing), SweepOptions(**options))[0]
-    return prediction, hold_against_limits(FREE, prediction)
+    height = size * np.clip(axis / resolution + 0.5, 0.0, 1.0)
+    return Terrain(np.tile(height, (len(axis), 1)), resolution, (-2.2, -2.2))
 
 
 @lru_cache(maxsize=8)
@@ -60,37 +53,24 @@ def test_on_smooth_ground_there_is_nothing_between_waypoints(ground):
 # Faces
 
 
-@pytest.mark.parametrize("height", [0.15, 0.25])
-def test_a_wall_higher_than_the_wheel_is_climbed_through_contacts_near_90_degrees(height):
-    prediction, _ = drive(sharp("step", height))
+def test_a_wall_higher_than_the_wheel_is_climbed_through_contacts_near_90_degrees():
+    prediction, _ = drive(sharp_step(0.25))
     angles = np.degrees(prediction.between.contact_angle)
     assert (angles.max(axis=0) > 85.0).all(), "each wheel climbs the face"
     assert angles.max() <= 90.0
 
 
-def test_the_steepest_contact_is_the_slope_of_the_face():
-    for height in (0.15, 0.25):
-        face = np.degrees(np.arctan(height / 0.04))
-        prediction, _ = over_step(height)
-        assert np.degrees(prediction.between.contact_angle).max() == pytest.approx(face, abs=0.5)
-
-
-def test_what_happens_on_a_face_belongs_to_the_waypoint_that_follows():
-    prediction, _ = over_step(0.2)
+def test_what_happens_on_a_face_balances_and_counts_at_the_waypoint_that_follows():
+    prediction, verdict = over_step(0.2)
     between = prediction.between
     before = prediction.poses[between.waypoint - 1, 0]
     after = prediction.poses[between.waypoint, 0]
     assert len(between.poses) and (np.diff(between.waypoint) >= 0).all()
     assert (before <= between.poses[:, 0]).all() and (between.poses[:, 0] <= after).all()
-
-
-@pytest.mark.parametrize("policy", ["equal", "optimal"])
-def test_the_forces_on_a_face_balance_too(policy):
-    prediction, _ = over_step(0.2, policy)
-    between = prediction.between
     residuals = [balance_residuals(LSR1, between, i) for i in np.flatnonzero(between.settled)]
-    assert len(residuals) > 10
-    assert np.abs(residuals).max() <= 1e-9
+    assert len(residuals) > 10 and np.abs(residuals).max() <= 1e-9
+    worst, at_waypoints = (np.nanmax(p.friction_utilisation) for p in (between, prediction))
+    assert verdict.max_friction_utilisation == max(worst, at_waypoints) > 0.0
 
 
 def test_a_failure_on_a_face_is_told_at_the_waypoint_that_follows():
@@ -103,66 +83,32 @@ def test_a_failure_on_a_face_is_told_at_the_waypoint_that_follows():
     assert place == pytest.approx(-RADIUS, abs=0.02), "the front wheels are at the face"
 
 
-def test_the_margins_of_a_verdict_count_what_is_between_waypoints():
-    prediction, verdict = over_step(0.2)
-    worst = np.nanmax(prediction.between.friction_utilisation[0])
-    at_waypoints = np.nanmax(prediction.friction_utilisation)
-    assert verdict.max_friction_utilisation >= max(worst, at_waypoints) > 0.0
-
-
 # The higher the harder
 
 
-@pytest.mark.parametrize("height", [0.06, 0.12, 0.2])
-def test_friction_decides_between_passing_and_slipping(height):
-    outcomes = [over_step(height, "optimal", mu)[1] for mu in (0.2, 0.4, 0.6, 0.8, 1.2)]
+def test_friction_decides_between_passing_and_slipping():
+    outcomes = [over_step(0.12, "optimal", mu)[1] for mu in (0.2, 0.4, 0.6, 1.2)]
     assert outcomes[-1].traversable and not outcomes[0].traversable
     passable = [outcome.traversable for outcome in outcomes]
     assert passable == sorted(passable), "more friction never makes it worse"
     assert outcomes[0].code == "friction"
 
 
-@pytest.mark.parametrize("policy", ["equal", "optimal"])
-def test_torque_decides_between_passing_and_stalling(policy):
-    codes = []
-    for torque in (0.2, 0.5, 0.8, 1.6, 3.2):
-        ground = drive_ground("step", 0.12)
-        codes.append(drive(ground, policy=policy, friction=2.0, max_torque=torque)[1].code)
-    passable = [code == "" for code in codes]
-    assert passable == sorted(passable)
-    assert codes[0] == "torque" and codes[-1] == ""
-
-
-# One side, and ditches
-
-
-@pytest.mark.parametrize("height", [0.05])
-def test_an_obstacle_under_one_side_does_to_that_side_what_its_mirror_image_does(height):
-    left = sharp("bump", height, 0.02)
-    right = Terrain(left.elevation[::-1], left.resolution, left.origin)
-    (one, _), (other, _) = drive(left), drive(right)
-    assert one.settled.all() and other.settled.all()
-    assert one.wheel_loads == pytest.approx(other.wheel_loads[:, SWAP], abs=0.01)
-    assert one.roll == pytest.approx(-other.roll, abs=1e-4)
-    assert one.roll.max() > 0.25 * height / 0.62, "the left side goes up"
-    assert not np.degrees(one.between.contact_angle[:, :3]).any(), "the right side stays level"
-
-
 # Spacing
 
 
-@pytest.mark.parametrize("policy", ["equal", "optimal"])
 @pytest.mark.parametrize(
-    ("kind", "size"),
-    [("step", 0.15), ("ditch", 0.1), ("ditch", 0.26), ("bump_one_side", 0.07)],
-)  # fmt: skip
+    ("kind", "size", "policy"),
+    [("step", 0.15, "optimal"), ("ditch", 0.26, "equal"), ("bump_one_side", 0.07, "optimal")],
+)
 def test_waypoints_each_centimetre_and_each_other_centimetre_have_the_same_verdict(
     kind, size, policy
 ):
     ground = drive_ground(kind, size)
     for friction in (0.4, 0.9):
         fine, coarse = (
-            drive(ground, spacing, policy=policy, friction=friction)[1] for spacing in (0.01, 0.02)
+            drive(ground, spacing=spacing, policy=policy, friction=friction)[1]
+            for spacing in (0.01, 0.02)
         )
         assert fine.traversable == coarse.traversable
         assert fine.code == coarse.code
@@ -177,7 +123,7 @@ def test_a_wheel_that_meets_an_edge_is_judged_as_it_leaves_the_ground_wherever_w
     for shift in (0.0, 0.0034, 0.0068, 0.0071, 0.0142):
         poses = drive_path(0.02) + np.array([shift, 0.0, 0.0])
         prediction = judge_path(
-            FREE, sharp("step", height), poses, SweepOptions(policy="optimal", friction=0.5)
+            FREE, sharp_step(height), poses, SweepOptions(policy="optimal", friction=0.5)
         )[0]
         between = prediction.between
         front = (between.poses[:, 0] < -0.3) & (between.contact_angle[:, 2] > 0.0)
@@ -187,20 +133,18 @@ def test_a_wheel_that_meets_an_edge_is_judged_as_it_leaves_the_ground_wherever_w
     assert max(needed) < 1.01 * min(needed)
 
 
-@pytest.mark.parametrize("height", [0.06, 0.15])
-def test_at_the_foot_of_a_step_every_pose_settles(height):
+def test_at_the_foot_of_a_step_every_pose_settles(height=0.15):
     """Each 0.1 mm from 3 cm before the wheel touches the face to 3 cm after."""
     reach = np.sqrt(RADIUS**2 - max(RADIUS - height, 0.0) ** 2)
     place = -LSR1.suspension.wheels["front"][0] - reach
     x = place + np.arange(-0.03, 0.03, 0.0001)
-    prediction = judge_path(FREE, sharp("step", height), np.column_stack([x, 0 * x, 0 * x]))[0]
+    prediction = judge_path(FREE, sharp_step(height), np.column_stack([x, 0 * x, 0 * x]))[0]
     assert prediction.settled.all()
 
 
-@pytest.mark.parametrize("height", [0.12, 0.2])
-def test_at_the_foot_of_a_wall_a_wheel_touches_tread_and_face_at_once(height):
+def test_at_the_foot_of_a_wall_a_wheel_touches_tread_and_face_at_once(height=0.2):
     """Its centre is a radius above the tread and a radius before the face, and no higher yet."""
-    ground = sharp("step", height)
+    ground = sharp_step(height)
     place = -LSR1.suspension.wheels["front"][0] - RADIUS
     x = place + np.arange(-0.01, 0.02, 0.0005)
     prediction = judge_path(FREE, ground, np.column_stack([x, 0 * x, 0 * x]))[0]
@@ -213,3 +157,116 @@ def test_at_the_foot_of_a_wall_a_wheel_touches_tread_and_face_at_once(height):
     assert foot[0] == pytest.approx(-RADIUS, abs=0.5 * ground.resolution + 1e-3)
     assert prediction.between is not None
     assert np.degrees(prediction.between.contact_angle).max() > 85.0
+
+
+SLIPPERY = 0.27
+"""Friction that holds a wheel up to 15 degrees: it falls from the edge almost at once."""
+
+
+def edge_down(height: float) -> Terrain:
+    """Return a step of `height` [m] that goes down along +x."""
+    up = drive_ground("step", height)
+    return Terrain(height - up.elevation, up.resolution, up.origin)
+
+
+def drive(
+    ground: Terrain, rover: Rover = FREE, spacing: float = 0.01, **options
+) -> tuple[PathPrediction, Verdict]:
+    prediction = judge_path(rover, ground, drive_path(spacing), SweepOptions(**options))[0]
+    return prediction, hold_against_limits(rover, prediction)
+
+
+@pytest.mark.parametrize("height", [0.05, 0.2])
+def test_a_wheel_rolls_over_an_edge_and_drops_by_the_rest_of_its_height(height):
+    """It rolls until the forces do not balance, at most until the edge is a face below it."""
+    rolled = RADIUS * (1.0 - np.cos(FACE))
+    prediction, _ = drive(edge_down(height), friction=SLIPPERY)
+    drops = prediction.wheel_drop.max(axis=0)
+    assert (drops <= height + 1e-3).all() and (drops >= height - rolled - 1e-3).all()
+
+
+def test_with_more_friction_a_wheel_never_drops_deeper():
+    drops = [
+        drive(edge_down(0.2), friction=mu)[0].wheel_drop.max(axis=0) for mu in (0.27, 0.5, 1.0)
+    ]
+    assert (np.diff(drops, axis=0) <= 1e-9).all()
+
+
+@pytest.mark.parametrize(
+    ("policy", "friction"), [("equal", 0.2), ("equal", 1.5), ("servo", 1.5), ("optimal", 1.5)]
+)
+def test_no_friction_hides_a_fall_from_a_wall_that_is_too_high(policy, friction):
+    """Too high is the limit and what a wheel rolls over the edge before it falls."""
+    rolled = RADIUS * (1.0 - np.cos(FACE))
+    down = edge_down(LSR1.limits.wheel_drop + rolled + 5e-3)
+    assert "wheel_drop" in drive(down, LSR1, friction=friction, policy=policy)[1].codes
+
+
+def test_a_drop_does_not_depend_on_where_waypoints_are():
+    drops = []
+    for x in (0.0, 0.004, 0.009, 0.015):
+        path = drive_path(0.02) + np.array([x, 0.0, 0.0])
+        prediction = judge_path(FREE, edge_down(0.15), path, SweepOptions(friction=0.8))[0]
+        drops.append(prediction.wheel_drop.max(axis=0))
+    assert np.ptp(drops, axis=0).max() < 1e-3
+
+
+@pytest.mark.parametrize(("policy", "friction"), [("equal", 0.3), ("optimal", 0.2)])
+def test_a_wheel_rolls_down_a_smooth_bump_however_slippery_if_the_others_hold_it(policy, friction):
+    ground = plane(0.0, 0.0, half=3.0)
+    y, x = (ground.origin[k] + ground.resolution * np.arange(n) for k, n in ((1, 301), (0, 301)))
+    wave = 0.14 * np.cos(np.pi * x / 0.8) ** 2 * (np.abs(x) < 0.4)
+    bump = replace(ground, elevation=(y > 0.0)[:, None] * wave)
+    _, verdict = drive(bump, LSR1, friction=friction, policy=policy)
+    assert verdict.traversable and verdict.max_wheel_drop == 0.0
+
+
+def test_a_drop_is_told_where_the_wheel_lands():
+    prediction, _ = drive(edge_down(0.15))
+    for name, wheel in (("rear", 0), ("middle", 1), ("front", 2)):
+        where = prediction.poses[prediction.wheel_drop[:, wheel].argmax(), 0]
+        assert 0.0 < where + LSR1.suspension.wheels[name][0] <= 2.0 * RADIUS
+
+
+def test_a_drop_beyond_the_limit_is_refused_by_its_own_code():
+    allowed, refused = (
+        drive(edge_down(0.15), replace(FREE, limits=replace(FREE.limits, wheel_drop=limit)))[1]
+        for limit in (0.16, 0.05)
+    )
+    assert allowed.traversable
+    assert not refused.traversable and set(refused.codes) == {"", "wheel_drop"}
+    assert "drops off an edge" in refused.reason and "limit 0.050 m" in refused.reason
+    assert refused.max_wheel_drop == allowed.max_wheel_drop
+
+
+def test_while_a_wheel_falls_neither_friction_nor_torque_are_asked_for():
+    prediction, verdict = drive(edge_down(0.2), friction=0.4)
+    needed = prediction.friction_utilisation[prediction.falling.any(axis=1)]
+    assert len(needed) and needed.max() > 1.0
+    assert verdict.traversable and verdict.max_friction_utilisation < 1.0
+
+
+def test_up_a_step_no_wheel_drops():
+    prediction, _ = drive(drive_ground("step", 0.15))
+    assert not prediction.wheel_drop.any() and not prediction.falling.any()
+
+
+def test_into_a_ditch_the_wheels_drop_and_have_to_climb_out():
+    prediction, verdict = drive(drive_ground("ditch", 0.3), friction=0.8, policy="optimal")
+    assert (prediction.wheel_drop.max(axis=0) > 0.1).all()
+    assert np.degrees(prediction.between.contact_angle).max() > 70.0
+    assert verdict.max_wheel_drop <= 0.15 + 1e-3
+
+
+@pytest.mark.parametrize("degrees", [10.0, 35.0])
+def test_neither_the_crest_of_a_slope_nor_the_slope_is_an_edge(degrees):
+    level = plane(0.0, 0.0, half=2.2)
+    x = level.origin[0] + level.resolution * np.arange(level.elevation.shape[1])
+    fall = np.where(x > 0.0, -np.tan(np.radians(degrees)) * x, 0.0)
+    prediction, _ = drive(replace(level, elevation=np.broadcast_to(fall, level.elevation.shape)))
+    assert not prediction.falling.any() and not prediction.wheel_drop.any()
+
+
+def test_a_slope_too_slippery_to_stand_on_is_refused_for_friction_and_not_a_fall():
+    prediction, verdict = drive(plane(-0.5, 0.0, half=2.0), friction=0.3)
+    assert verdict.code == "friction" and not prediction.wheel_drop.any()

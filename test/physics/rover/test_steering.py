@@ -8,10 +8,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rover_physics.errors import ModelError
 from rover_physics.rover.linkage import pack_linkage
 from rover_physics.rover.model import Rover, Steering
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.rover.steered_drive import STAND_ERROR, SteeredDrive
 from rover_physics.rover.steering import steer_wheels
+from rover_physics.rover.steering_joints import (
+    can_turn_on_the_spot,
+    check_joint_limit,
+    steered_wheels,
+    steering_joints,
+    tightest_radius,
+)
 
 LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
 ALL_STEER = replace(LSR1, steering=Steering(("rear", "middle", "front"), np.pi / 2, 0.35))
@@ -32,14 +41,6 @@ def steer(rover: Rover, *motion: float) -> tuple[bool, np.ndarray, np.ndarray]:
 def wheels_of(rover: Rover) -> np.ndarray:
     left = np.array([rover.suspension.wheels[name][:2] for name in ("rear", "middle", "front")])
     return np.vstack([left * [1.0, -1.0], left])
-
-
-@pytest.mark.parametrize("speed", [0.03, -0.03])
-@pytest.mark.parametrize("rover", [LSR1, ALL_STEER, FIXED], ids=["ends", "all", "fixed"])
-def test_on_a_straight_way_no_wheel_is_turned_and_all_roll_alike(rover, speed):
-    can_follow, angles, rolling = steer(rover, speed, 0.0, 0.0)
-    assert can_follow
-    assert angles.tolist() == [0.0] * 6 and rolling.tolist() == [speed] * 6
 
 
 @few
@@ -71,14 +72,6 @@ def test_on_the_spot_the_right_wheels_roll_forwards_and_the_left_ones_back():
     assert rolling == pytest.approx(0.1 * np.hypot(*wheels_of(LSR1).T) * sides)
 
 
-def test_a_curve_beyond_the_limit_cannot_be_followed_and_the_angle_is_told():
-    stiff = replace(LSR1, steering=Steering(("rear", "front"), 0.4, 0.35))
-    can_follow, angles, _ = steer(stiff, 0.03, 0.0, 0.03)
-    assert not can_follow
-    assert np.abs(angles).max() == pytest.approx(np.arctan(0.4 / (1.0 - 0.31)))
-    assert steer(stiff, 0.03, 0.0, 0.006)[0]
-
-
 def test_a_limit_that_is_rounded_down_from_a_right_angle_allows_it():
     rounded = replace(ALL_STEER, steering=Steering(("rear", "middle", "front"), 1.57, 0.35))
     can_follow, angles, rolling = steer(rounded, 0.0, 0.03, 0.0)
@@ -86,8 +79,80 @@ def test_a_limit_that_is_rounded_down_from_a_right_angle_allows_it():
     assert angles.tolist() == [1.57] * 6 and rolling == pytest.approx([0.03] * 6)
 
 
-def test_fixed_wheels_of_a_steered_rover_cannot_go_sideways():
-    can_follow, angles, _ = steer(M2020, 0.03, 0.03, 0.0)
-    assert not can_follow
-    assert angles == pytest.approx([np.pi / 4] * 6)
-    assert steer(ALL_STEER, 0.03, 0.03, 0.0)[0]
+# How tightly a rover turns
+
+
+def with_limit(rover: Rover, limit: float) -> Rover:
+    return replace(rover, steering=replace(rover.steering, limit=limit))
+
+
+@pytest.mark.parametrize("rover", [LSR1, M2020], ids=lambda rover: rover.name)
+@pytest.mark.parametrize("limit", [0.2, 1.2])
+def test_the_wheels_reach_their_limit_on_the_tightest_curve(rover, limit):
+    narrow = with_limit(rover, limit)
+    radius = tightest_radius(narrow)
+    assert steer(narrow, 0.03, 0.0, 0.03 / (1.001 * radius))[0]
+    assert not steer(narrow, 0.03, 0.0, 0.03 / (0.99 * radius))[0]
+
+
+def test_fixed_wheels_curve_by_the_wheelbase_and_quarter_turns_let_the_inner_wheels_stand():
+    assert tightest_radius(FIXED) == pytest.approx(0.8)
+    assert tightest_radius(with_limit(LSR1, 1.57)) == pytest.approx(0.31)
+    assert tightest_radius(with_limit(M2020, np.pi)) == pytest.approx(1.063)
+
+
+def test_a_rover_turns_on_the_spot_if_its_wheels_reach_the_tangent():
+    needed = np.arctan2(0.40, 0.31)
+    assert can_turn_on_the_spot(with_limit(LSR1, needed + 1e-6))
+    assert not can_turn_on_the_spot(with_limit(LSR1, needed - 1e-6))
+    assert not can_turn_on_the_spot(FIXED)
+
+
+# Commands: the drive waits for wheels that steer
+
+
+def test_the_joints_are_those_of_the_steered_axles_in_wheel_order():
+    assert steering_joints(LSR1) == (
+        "rear_right_steering", "front_right_steering", "rear_left_steering", "front_left_steering",
+    )  # fmt: skip
+    assert steered_wheels(LSR1).tolist() == [0, 2, 3, 5]
+    assert steering_joints(FIXED) == ()
+
+
+def test_a_motion_beyond_the_limit_is_refused_by_wheel_and_angle():
+    narrow = with_limit(LSR1, 0.4)
+    aims = SteeredDrive(narrow).aim(0.0, 0.1)
+    assert "steering angle of" in aims.refusal and "22.9 deg" in aims.refusal
+    assert np.abs(aims.angles).max() == 0.4
+
+
+def test_wheels_turn_at_their_rate_and_the_drive_waits_for_them():
+    drive, angles = SteeredDrive(LSR1), np.zeros(6)
+    aims = drive.aim(0.0, 0.1).angles
+    assert drive.share(angles, aims) == 0.0
+    shares = []
+    for _ in range(200):
+        before, angles = angles, drive.turn(angles, aims, 0.02)
+        assert np.abs(angles - before).max() <= 0.35 * 0.02 + 1e-12
+        shares.append(drive.share(angles, aims))
+    moving = [share for share in shares if share > 0.0]
+    assert shares == sorted(shares) and shares[-1] == 1.0
+    assert moving[0] == pytest.approx(np.cos(STAND_ERROR), abs=0.01)
+
+
+def test_aims_are_those_of_the_arc_and_fixed_wheels_are_never_waited_for():
+    aims = SteeredDrive(LSR1).aim(0.06, 0.06)
+    assert aims.angles[5] == pytest.approx(np.arctan2(0.4, 1.0 - 0.31))
+    assert aims.speeds[2] == pytest.approx(0.06 * np.hypot(1.31, 0.4))
+    drive = SteeredDrive(FIXED)
+    aims = drive.aim(0.06, 0.1)
+    assert not aims.angles.any() and drive.share(np.zeros(6), aims.angles) == 1.0
+
+
+def test_joints_that_do_not_reach_what_is_planned_are_refused():
+    with pytest.raises(ModelError, match=r"reach 0\.52 rad.*up to 1\.57 rad.*at most 0\.52"):
+        check_joint_limit(LSR1, 0.52)
+    check_joint_limit(LSR1, 1.57)
+    check_joint_limit(FIXED, 0.1)
+    wide = with_limit(LSR1, 3.0)
+    check_joint_limit(wide, 1.571)  # no wheel needs more than a quarter turn

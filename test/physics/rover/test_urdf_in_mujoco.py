@@ -8,11 +8,7 @@ import numpy as np
 import pytest
 
 from rover_physics.names import WHEELS
-from rover_physics.numerics.quaternions import (
-    forward_from_xyzw,
-    wxyz_from_rpy,
-    xyzw_from_wxyz,
-)
+from rover_physics.numerics.quaternions import forward_from_xyzw, wxyz_from_rpy, xyzw_from_wxyz
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.urdf.write_urdf import write_urdf
 from rover_physics.terrain.grid import Terrain
@@ -32,14 +28,7 @@ class UrdfRover:
     """The rover of a URDF file above a terrain; its wheels are braked."""
 
     def __init__(self, urdf: Path, terrain: Terrain, gravity: float, held: dict[str, float]):
-        """Load the file.
-
-        Args:
-            urdf: A file of `write_urdf`.
-            terrain: The ground.
-            gravity: [m/s^2].
-            held: Angles at which joints of the arm are held [rad].
-        """
+        """Load a file of `write_urdf`, with joints of the arm `held` at angles [rad]."""
         spec = mujoco.MjSpec.from_file(str(urdf))
         spec.option.timestep, spec.option.gravity = TIMESTEP, [0.0, 0.0, -gravity]
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -64,11 +53,7 @@ class UrdfRover:
         self._wheels = [self.model.body(name).id for name in WHEELS]
 
     def settle(self, x: float, y: float, yaw: float) -> tuple[np.ndarray, np.ndarray]:
-        """Drop the level rover; return its pose (3,) x, y, yaw and wheel centres (6, 3) at rest.
-
-        Raises:
-            AssertionError: It does not come to rest.
-        """
+        """Drop the level rover; return x, y, yaw (3,) and wheel centres (6, 3) at rest."""
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
         for name, angle in self._held.items():
@@ -129,13 +114,3 @@ def test_mujoco_loads_the_urdf_and_settles_it_in_the_same_pose(name, ground, apa
         predicted = judge_poses(rover, ground, pose[None], np.zeros(1))[0]
         assert predicted.settled[0]
         np.testing.assert_allclose(predicted.wheel_centres[0], centres, rtol=0.0, atol=apart)
-
-
-def test_the_mimic_of_the_differential_binds_both_rockers_in_mujoco(tmp_path):
-    urdf = tmp_path / "rover.urdf"
-    write_urdf(urdf, load_rover("m2020"))
-    model = mujoco.MjModel.from_xml_path(str(urdf))
-    assert model.neq == 1 and model.eq_type[0] == mujoco.mjtEq.mjEQ_JOINT
-    names = {model.joint(int(obj[0])).name for obj in (model.eq_obj1id, model.eq_obj2id)}
-    assert names == {"rocker_right", "rocker_left"}
-    np.testing.assert_array_equal(model.eq_data[0, :5], [0.0, -1.0, 0.0, 0.0, 0.0])

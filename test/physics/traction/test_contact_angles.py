@@ -8,9 +8,7 @@ from rover_physics.errors import ModelError
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traction.balance import MeasuredState
-from rover_physics.traction.contact_ekf import (
-    MotionContactEstimator,
-)
+from rover_physics.traction.contact_ekf import MotionContactEstimator
 from rover_physics.traction.map_contacts import MapContactFinder
 from support.reference_drives import drive_ground
 from support.rough_grounds import fractal, plane, rocky
@@ -115,15 +113,6 @@ def test_an_estimate_stays_as_it_is_when_the_next_one_is_made():
     for one, (angles, covariance), other in zip(first, kept, second, strict=True):
         assert np.array_equal(one.angles, angles) and np.array_equal(one.covariance, covariance)
         assert not np.array_equal(one.angles, other.angles)
-
-
-def test_uncertain_odometry_makes_uncertain_angles():
-    ground = plane(0.1, 0.0, half=2.0)
-    prediction, _, _ = drive_states(LSR1, plane(0.1, 0.0, half=2.5))
-    finder = MapContactFinder(LSR1, ground)
-    pose = np.array([*prediction.position[600], 0.0])
-    well, badly = (finder.find(state_of(LSR1, prediction, 600), pose, d) for d in (0.01, 0.05))
-    assert badly.covariance[0, 0] > 2.0 * well.covariance[0, 0]
 
 
 def test_ground_that_the_map_does_not_have_is_refused_by_wheel():

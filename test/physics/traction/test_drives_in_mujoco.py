@@ -3,27 +3,12 @@
 
 import pytest
 
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.classification import classify_path
-from support.reference_drives import drive_ground, drive_path, unlimited
-
 pytest.importorskip("mujoco", reason="no mujoco: pip install '.[bench]'")
 from benchmarks.control_margin import MOST_TIME, TRIES, find_margin
 from benchmarks.drives import BY_MAP, EQUAL_TORQUES, Obstacle, drive
 
 STEP = Obstacle("step", 0.10, 0.5)
 """As high as a wheel radius, at a friction with which equal torques do not do."""
-
-
-def test_the_planner_calls_the_step_passable_but_not_with_equal_torques():
-    rover = unlimited(load_rover("lsr1"))
-    ground = drive_ground(STEP.kind, STEP.size)
-    classes = [
-        waypoint.traversability_class
-        for waypoint in classify_path(rover, ground, drive_path(), SweepOptions(friction=0.5))
-    ]
-    assert set(classes) == {"passable", "passable with speed servos"}
 
 
 @pytest.mark.long

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shared torques: they balance, need the least friction, and say what gives way."""
+"""Shared torques on straight and turned wheels: they balance and need the least friction."""
 
 from dataclasses import replace
 
@@ -9,27 +9,21 @@ import pytest
 from rover_physics.errors import ModelError
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traction.balance import BalanceWriter, MeasuredState
-from rover_physics.traction.layout import (
-    CONE_ROWS,
-    LOADS,
-    PEAK_LIMIT_ROW,
-    TRACTIONS,
-)
+from rover_physics.traction.contact_ekf import Motion, MotionContactEstimator
+from rover_physics.traction.layout import LOADS, TRACTIONS
 from rover_physics.traction.line_search import measure_peak
-from rover_physics.traction.program import (
-    ProgramInputs,
-)
+from rover_physics.traction.map_contacts import MapContactFinder
+from rover_physics.traction.program import ProgramInputs
 from rover_physics.traction.solver import TractionWorkspace, solve_traction
-from rover_physics.traversability.judge import judge_path
+from rover_physics.traversability.judge import judge_path, judge_poses
 from support.best_torques import can_stand
-from support.rough_grounds import plane
-from support.rover_geometry import balance_matrix, place_rover
+from support.rough_grounds import fractal, plane, random_poses
+from support.rover_geometry import balance_matrix, free_balance_matrix, place_rover
 from support.traction_states import rough_states, state_of
 
 LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
 FRICTION = np.full(6, 0.8)
 INPUTS = ProgramInputs(FRICTION, LSR1.wheel.max_torque, LSR1.wheel.radius)
-CONES = slice(CONE_ROWS, PEAK_LIMIT_ROW)
 
 
 def level(angles=(0.0,) * 6):
@@ -92,17 +86,13 @@ def test_the_wanted_push_acts_at_the_centre_of_mass(rover, push):
     assert moments == pytest.approx(np.zeros(3), abs=1e-9 * rover.weight)
 
 
-def test_straight_up_a_plane_all_wheels_use_the_same_share_and_too_little_friction_is_told():
+def test_up_a_plane_all_wheels_use_the_same_share_and_what_friction_and_motors_lack_is_told():
     prediction = judge_path(LSR1, plane(0.4, 0.0), [[0.0, 0.0, 0.0]])[0]
     answer = solve(LSR1, state_of(LSR1, prediction, 0))
     assert answer.utilisation == pytest.approx(np.full(6, 0.4 / 0.8), rel=2e-3)
     answer = solve(LSR1, state_of(LSR1, prediction, 0), friction=np.full(6, 0.2))
     assert not answer.fallback
     assert answer.friction_slack == pytest.approx(1.0, rel=0.02)
-
-
-def test_too_weak_motors_are_told_by_how_much_and_their_torques_are_cut_off():
-    prediction = judge_path(LSR1, plane(0.4, 0.0), [[0.0, 0.0, 0.0]])[0]
     needed = LSR1.weight * np.sin(np.arctan(0.4)) / 6.0 * LSR1.wheel.radius
     answer = solve(LSR1, state_of(LSR1, prediction, 0), torque=0.6 * needed)
     assert not answer.fallback
@@ -120,7 +110,7 @@ def test_a_wheel_that_has_to_lift_is_told_with_its_missing_load():
 
 def test_the_peak_never_rises_from_one_program_to_the_next():
     writer, workspace = BalanceWriter(LSR1), TractionWorkspace()
-    for prediction, i in rough_states(LSR1, 50):
+    for prediction, i in rough_states(LSR1, 20):
         rows = writer.write(state_of(LSR1, prediction, i), 0.0)
         last, peak = None, measure_peak(rows, INPUTS, rows.complete(np.zeros(6)))
         for _ in range(6):
@@ -148,15 +138,6 @@ def test_an_unsolved_program_falls_back_to_equal_torques_and_those_on_demand_are
     assert not wanted.fallback and np.ptp(wanted.torques) < 1e-12
 
 
-def test_a_start_from_the_last_answer_takes_less():
-    workspace = TractionWorkspace()
-    prediction, i = next(rough_states(LSR1, 1))
-    cold = solve(LSR1, state_of(LSR1, prediction, i), workspace=workspace)
-    warm = solve(LSR1, state_of(LSR1, prediction, i), workspace=workspace, last=cold.tractions)
-    assert warm.programs == 1 and warm.iterations < 0.5 * cold.iterations
-    assert warm.utilisation.max() == pytest.approx(cold.utilisation.max(), rel=5e-3)
-
-
 def test_what_makes_no_sense_is_refused():
     with pytest.raises(ModelError, match="friction"):
         solve(LSR1, level(), friction=np.zeros(6))
@@ -164,3 +145,112 @@ def test_what_makes_no_sense_is_refused():
         solve(LSR1, level(), torque=-1.0)
     with pytest.raises(ModelError, match="contact angles"):
         BalanceWriter(LSR1).write(level(np.full(6, np.pi / 2) * [1, 1, 1, -1, -1, -1]), 0.0)
+
+
+CURVATURES = (0.0, 0.5, -0.5, 1.2, -2.5, np.inf, -np.inf)
+BOTH = pytest.mark.parametrize("rover", [LSR1, M2020], ids=lambda rover: rover.name)
+
+
+def curved_poses(rover, seed, curvature, **options):
+    """Return settled random poses on rough ground with wheels turned for a curvature."""
+    poses = random_poses(seed, 12, 1.5)
+    curvatures = np.full(len(poses), curvature / (2.0 if rover is M2020 else 1.0))
+    ground = plane(0.15, 0.1, half=5.0) if rover is M2020 else fractal(seed)
+    return ground, judge_poses(rover, ground, poses, curvatures, **options)[0]
+
+
+@BOTH
+def test_equal_torques_are_those_of_the_sweep(rover):
+    writer, count = BalanceWriter(rover), 0
+    for seed, curvature in enumerate(CURVATURES):
+        _, prediction = curved_poses(rover, seed, curvature)
+        for i in np.flatnonzero(prediction.settled):
+            rows = writer.write(state_of(rover, prediction, i), 0.0)
+            x = rows.force_unit * rows.pull_equally()
+            found = x[LOADS], x[TRACTIONS], rows.lateral_forces(x)
+            for values, name in zip(found, ("wheel_loads", "tangential", "lateral"), strict=True):
+                right = getattr(prediction, name)[i]
+                assert values == pytest.approx(right, abs=1e-8 * rover.weight), (curvature, name)
+            count += 1
+    assert count > 40
+
+
+def test_shared_torques_of_turned_wheels_keep_the_balance_and_need_less_friction():
+    writer, workspace = BalanceWriter(LSR1), TractionWorkspace()
+    better = []
+    for seed, curvature in enumerate(CURVATURES):
+        _, prediction = curved_poses(LSR1, seed, curvature)
+        for i in np.flatnonzero(prediction.settled):
+            rows = writer.write(state_of(LSR1, prediction, i), 0.0)
+            equal = solve_traction(workspace, rows, INPUTS, max_programs=0)
+            answer = solve_traction(workspace, rows, INPUTS, max_programs=12)
+            assert not answer.fallback
+            A, b = free_balance_matrix(LSR1, prediction, i)
+            forces = np.concatenate([answer.loads, answer.tractions, answer.lateral])
+            assert np.abs(A @ forces / LSR1.weight - b).max() < 1e-6
+            better.append(answer.utilisation.max() / equal.utilisation.max())
+    assert max(better) < 1.001 and np.median(better) < 0.95
+
+
+@BOTH
+def test_a_push_does_its_work_along_the_way_of_the_wheels(rover):
+    writer = BalanceWriter(rover)
+    for curvature in (0.0, 0.4, -0.4, np.inf):
+        ground = plane(0.0, 0.0, half=5.0)
+        prediction = judge_poses(rover, ground, np.zeros((1, 3)), [curvature])[0]
+        state = state_of(rover, prediction, 0)
+        still, pushed = (writer.write(state, push) for push in (0.0, 6.0))
+        more = pushed.force_unit * (pushed.pull_equally() - still.pull_equally())[TRACTIONS]
+        assert more @ still.wheel_speeds == pytest.approx(6.0, rel=1e-9)
+        assert (more * still.directions > 0.0).all()
+        rolling = writer.find_rolling(state)
+        assert rolling.directions == pytest.approx(still.directions)
+        assert rolling.speeds == pytest.approx(still.wheel_speeds, abs=0.05)
+
+
+@pytest.mark.parametrize("drift", [0.0, 0.05])
+def test_the_map_tells_the_contact_angles_whatever_height_odometry_says(drift):
+    errors = []
+    for seed, curvature in enumerate(CURVATURES):
+        ground, prediction = curved_poses(LSR1, seed, curvature)
+        finder = MapContactFinder(LSR1, ground)
+        for i in np.flatnonzero(prediction.settled):
+            pose = np.array([*prediction.position[i], prediction.poses[i, 2]])
+            pose[2] += drift
+            directions = np.where(prediction.wheel_speed[i] < 0.0, -1.0, 1.0)
+            found = finder.find(state_of(LSR1, prediction, i), pose, 0.0, directions)
+            assert found.source == "map"
+            errors.append(found.angles - prediction.contact_angle[i])
+    assert np.median(np.abs(errors)) < 0.03
+
+
+@BOTH
+def test_motion_tells_the_contact_angles_on_an_arc_across_a_slope(rover):
+    ground, radius = plane(0.25, 0.1, half=6.0), 3.0
+    yaw = np.linspace(0.0, 1.2, 400)
+    path = np.column_stack([radius * np.sin(yaw) - 1.5, radius * (1 - np.cos(yaw)) - 1.0, yaw])
+    prediction = judge_path(rover, ground, path)[0]
+    duration, rates = 0.1, []
+    angles = prediction.rocker_angle, prediction.bogie_angle, prediction.roll, prediction.pitch
+    rocker, bogie, roll, pitch = (np.gradient(value, duration, axis=0) for value in angles)
+    turn = np.gradient(yaw, duration)
+    c, s = np.cos(prediction.roll), np.sin(prediction.roll)
+    nose = np.cos(prediction.pitch)
+    rates = np.column_stack(
+        [roll - np.sin(prediction.pitch) * turn, c * pitch + s * nose * turn,
+         -s * pitch + c * nose * turn]
+    )  # fmt: skip
+    speeds = np.linalg.norm(np.gradient(prediction.wheel_centres, duration, axis=0), axis=2)
+    estimator, found = MotionContactEstimator(rover), []
+    for i in range(len(path)):
+        steering = prediction.steering_angle[i]
+        # A link's rate about the axle; wheel joints turn relative to it.
+        about_axle = rates[i, 1] * np.cos(steering) - rates[i, 0] * np.sin(steering)
+        motion = Motion(
+            [prediction.roll[i], prediction.pitch[i]],
+            [prediction.rocker_angle[i, 0], *prediction.bogie_angle[i]], [rocker[i, 0], *bogie[i]],
+            speeds[i] / rover.wheel.radius - about_axle, rates[i], steering,
+        )  # fmt: skip
+        found.append(estimator.update(motion, duration).angles)
+    errors = np.abs(np.array(found) - prediction.contact_angle)[100:-1]
+    assert errors.max() < 0.05

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Classes: passable, or with speed servos, or with traction control, or not; and why."""
+"""Classes: what a waypoint needs to be passed, why, and with which margin of control."""
 
 from dataclasses import replace
 
@@ -10,8 +10,6 @@ from rover_physics.errors import ModelError
 from rover_physics.names import WHEELS
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability import classification
 from rover_physics.traversability.classification import (
     IMPASSABLE,
     PASSABLE,
@@ -25,7 +23,7 @@ from rover_physics.traversability.classification import (
 from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from support.reference_drives import drive_ground, drive_path, unlimited
-from support.rough_grounds import plane, random_poses, rocky
+from support.rough_grounds import bowl, plane, random_poses, rocky
 
 LSR1 = load_rover("lsr1")
 POSE = [[0.0, 0.0, 0.0]]
@@ -33,20 +31,6 @@ ONTO_A_BUMP = drive_path()[54:59]
 """Waypoints at which the right front wheel climbs a bump; the third one follows the climb."""
 WEAK = SweepOptions(friction=1.0, max_torque=1.0)
 """Motors with which speed servos stall at the bump, and optimal torques do not."""
-
-
-@pytest.mark.parametrize(
-    ("slope", "friction", "traversability_class"),
-    [
-        (0.2, 0.8, PASSABLE),
-        (0.45, 0.8, WITH_SPEED_SERVOS),
-        (0.45, 0.4, IMPASSABLE),
-    ],
-)
-def test_a_slope_is_classified_by_what_it_needs(slope, friction, traversability_class):
-    found = classify_path(LSR1, plane(slope, 0.0), POSE, SweepOptions(friction=friction))[0]
-    assert found.traversability_class == traversability_class
-    assert (found.reason == "") == (traversability_class == PASSABLE)
 
 
 def test_a_passable_waypoint_names_its_tightest_constraint():
@@ -86,9 +70,6 @@ def test_limits_that_are_no_wheels_name_no_wheel():
     found = classify_path(careful, plane(0.2, 0.0), POSE)[0]
     assert (found.traversability_class, found.constraint, found.wheel) == (IMPASSABLE, "tilt", "")
     assert found.margin == pytest.approx(1.0 - np.arctan(0.2) / 0.1, abs=1e-3)
-
-
-def test_a_waypoint_off_the_map_has_no_margin():
     found = classify_path(LSR1, plane(0.0, 0.0), [[50.0, 0.0, 0.0]])[0]
     assert (found.traversability_class, found.constraint) == (IMPASSABLE, "off_map")
     assert np.isnan(found.margin)
@@ -129,7 +110,8 @@ def xs(ground) -> np.ndarray:
 
 
 def test_where_the_rover_would_be_trapped_the_waypoint_is_impassable_for_that():
-    ground, poses = crater(), way_into_the_crater()
+    ground, x = bowl(0.7, 1.2, np.radians(18.0)), np.arange(-5.0, 0.0, 0.04)
+    poses = np.column_stack([x, 0.0 * x, 0.0 * x])
     verdict = judge_path(LSR1, ground, poses, SweepOptions(policy="optimal", soil="dry_sand"))[1]
     classes = classify_path(LSR1, ground, poses, SweepOptions(soil="dry_sand"))
     assert verdict.code == "trapped"
@@ -141,28 +123,12 @@ def test_where_the_rover_would_be_trapped_the_waypoint_is_impassable_for_that():
     assert np.isnan(classes[deciding].margin)
 
 
-@pytest.mark.parametrize(("slope", "friction"), [(0.2, 0.8), (0.45, 0.8), (0.45, 0.4)])
 @pytest.mark.parametrize("policy", ["equal", "servo", "optimal"])
-def test_classes_do_not_depend_on_the_policy_that_was_judged_first(slope, friction, policy):
-    ground = plane(slope, 0.0)
-    judged = judge_path(LSR1, ground, POSE, SweepOptions(policy=policy, friction=friction))
-    found = classify_judged(LSR1, ground, *judged, SweepOptions(friction=friction))
-    assert found == classify_path(LSR1, ground, POSE, SweepOptions(friction=friction))
-
-
-def test_what_a_simpler_drive_passes_is_not_asked_about_again(monkeypatch):
-    asked = []
-    monkeypatch.setattr(
-        classification,
-        "judge_path",
-        lambda *a, **k: asked.append(a[3].policy) or judge_path(*a, **k),
-    )
-    classify_path(LSR1, plane(0.2, 0.0), POSE)
-    assert asked == ["equal"]
-    classify_path(LSR1, plane(0.45, 0.0), POSE)
-    assert asked == ["equal", "equal", "servo"]
-    classify_path(LSR1, plane(0.45, 0.0), POSE, SweepOptions(friction=0.4))
-    assert asked[3:] == ["equal", "servo", "optimal"]
+def test_classes_do_not_depend_on_the_policy_that_was_judged_first(policy):
+    ground = plane(0.45, 0.0)
+    judged = judge_path(LSR1, ground, POSE, SweepOptions(policy=policy))
+    found = classify_judged(LSR1, ground, *judged, SweepOptions())
+    assert found == classify_path(LSR1, ground, POSE)
 
 
 def test_on_uncertain_ground_speed_servos_are_not_asked_about():
@@ -198,14 +164,79 @@ def test_a_path_hangs_on_its_worst_waypoint():
     assert deciding_waypoint(refused) == 4
 
 
-def crater() -> Terrain:
-    """Return a crater 0.7 m deep with walls of 18 degrees around a level floor."""
-    axis = np.arange(-6.0, 6.025, 0.05)
-    away = np.hypot(*np.meshgrid(axis, axis))
-    height = np.clip((away - 1.2) * np.tan(np.radians(18.0)), 0.0, 0.7)
-    return Terrain(height, 0.05, (-6.0, -6.0))
+OPTIMAL = SweepOptions(policy="optimal")
+STEEP = plane(0.45, 0.0)
+"""A slope on which equal torques slip and optimal ones use 0.58 of the friction of 0.8."""
 
 
-def way_into_the_crater() -> np.ndarray:
-    x = np.arange(-5.0, 0.0, 0.04)
-    return np.column_stack([x, 0.0 * x, 0.0 * x])
+@pytest.mark.parametrize(("margin", "passes"), [(0.0, True), (0.2, True), (0.3, False)])
+def test_a_waypoint_that_needs_traction_control_keeps_the_margin(margin, passes):
+    rover, bump = unlimited(LSR1), drive_ground("bump_one_side", 0.1)
+    options = replace(OPTIMAL, friction=1.0, max_torque=1.0, control_margin=margin)
+    verdict = judge_path(rover, bump, drive_path()[54:59], options)[1]
+    found = classify_path(rover, bump, drive_path()[54:59], options)[2]
+    assert verdict.traversable is passes
+    assert found.traversability_class == (WITH_TRACTION_CONTROL if passes else IMPASSABLE)
+    assert ("1 less control margin 0.3" in verdict.reason) is not passes
+    assert found.reason == verdict.reason or passes
+
+
+@pytest.mark.parametrize(("margin", "passes"), [(0.3, True), (0.5, False)])
+def test_what_speed_servos_pass_is_classed_so_whatever_the_margin(margin, passes):
+    options = replace(OPTIMAL, control_margin=margin)
+    assert judge_path(LSR1, STEEP, POSE, options)[1].traversable is passes
+    found = classify_path(LSR1, STEEP, POSE, options)[0]
+    assert found.traversability_class == WITH_SPEED_SERVOS
+
+
+def test_torques_keep_the_margin_where_they_can():
+    step = drive_ground("step", 0.08)
+    options = replace(OPTIMAL, friction=1.0, max_torque=0.85)
+    free = judge_path(LSR1, step, drive_path(), options)[0]
+    kept = judge_path(LSR1, step, drive_path(), replace(options, control_margin=0.2))[0]
+    assert free.between is not None and kept.between is not None
+    assert free.between.torque_saturation.max() > 0.8
+    assert kept.between.torque_saturation.max() <= 0.8 + 1e-9
+    assert kept.control_margin == 0.2
+
+
+def test_what_equal_torques_pass_needs_no_margin():
+    poses = random_poses(3, 300, 2.0)
+    ground, options = rocky(3), SweepOptions(friction=0.5, policy="optimal", control_margin=0.6)
+    equal = judge_path(LSR1, ground, poses, replace(options, policy="equal"))[1]
+    optimal = judge_path(LSR1, ground, poses, options)[1]
+    physical = judge_path(LSR1, ground, poses, replace(options, control_margin=0.0))[1]
+    passes = [
+        {i for i, code in enumerate(v.codes) if not code} for v in (equal, optimal, physical)
+    ]
+    assert passes[0] <= passes[1] < passes[2]
+    classes = classify_path(LSR1, ground, poses, options)
+    named = {i for i, c in enumerate(classes) if c.traversability_class == PASSABLE}
+    assert named == passes[0]
+
+
+def test_the_margin_holds_within_the_bounds_of_an_uncertain_map():
+    std = np.full(STEEP.elevation.shape, 2e-4)
+    ground = replace(STEEP, elevation_std=std)
+    options = replace(OPTIMAL, control_margin=0.0)
+    _, physical = judge_path(LSR1, ground, POSE, options)
+    bound = physical.friction_utilisation_bound
+    assert physical.traversable and bound > physical.max_friction_utilisation
+    between = 1.0 - 0.5 * (bound + physical.max_friction_utilisation)
+    assert judge_path(LSR1, STEEP, POSE, replace(options, control_margin=between))[1].traversable
+    refused = judge_path(LSR1, ground, POSE, replace(options, control_margin=between))[1]
+    assert "control margin" in refused.reason and "at worst" in refused.reason
+
+
+@pytest.mark.parametrize("margin", [-0.1, 1.0, float("nan")])
+def test_a_margin_outside_its_range_is_named(margin):
+    with pytest.raises(ModelError, match="control_margin"):
+        SweepOptions(control_margin=margin)
+
+
+def test_a_bump_that_takes_all_the_torque_of_one_side_is_not_promised():
+    rover, ground = unlimited(LSR1), drive_ground("bump_one_side", 0.16)
+    options = SweepOptions(friction=0.8, max_torque=0.81, policy="optimal")
+    assert judge_path(rover, ground, drive_path(), options)[1].traversable
+    promised = judge_path(rover, ground, drive_path(), replace(options, control_margin=0.1))[1]
+    assert not promised.traversable and "control margin" in promised.reason

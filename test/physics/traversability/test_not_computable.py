@@ -17,13 +17,12 @@ from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.sweep import predict_poses
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.record import QUANTITIES
-from rover_physics.rover.rover_file import load_rover, rover_from_dict, rover_to_dict
+from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.bounded_verdict import refuse_worst_case
 from rover_physics.traversability.classification import classify_path
 from rover_physics.traversability.judge import judge_path
-from rover_physics.traversability.reach import judge_reach
 from rover_physics.traversability.torque_ranges import find_torque_ranges
 from rover_physics.traversability.verdict import hold_against_limits
 from rover_planner.planning.path_query import path_cost
@@ -106,11 +105,8 @@ def test_no_rover_of_extreme_numbers_passes_without_numbers(places, number, sign
     [
         (("masses", "body", "mass"), 1.7e308, r"masses.body.mass is 1.7e\+308; .* to 1e\+09"),
         (("gravity",), 1e-310, "gravity is 1e-310; it must be from 1e-06 to 1000"),
-        (("gravity",), 1e308, "gravity is 1e.308; it must be from 1e-06 to 1000"),
         (("wheel", "radius"), -1e200, "wheel.radius is -1e.200; it must be from 0.001"),
         (("wheel", "width"), math.nan, "wheel.width is nan"),
-        (("wheel", "max_torque"), 5e-324, "wheel.max_torque is 5e-324"),
-        (("friction",), 5e-324, "friction is 5e-324; it must be from 1e-06"),
     ],
 )
 def test_an_impossible_rover_is_refused_by_name_even_without_a_file(place, number, right):
@@ -120,26 +116,17 @@ def test_an_impossible_rover_is_refused_by_name_even_without_a_file(place, numbe
             ask(rover, LEVEL, POSES, options)
 
 
-def model_of_infinite_weight():
-    """Return a model that no check has seen."""
+def test_a_pose_without_numbers_says_so_and_has_none_and_passes_nowhere():
     model = pack_model(LSR1, LEVEL)
     records = model.records.copy()
-    records["linkage"]["gravity"] = math.inf
-    return replace(model, records=records)
-
-
-def test_a_pose_without_numbers_says_so_and_has_none():
-    model = model_of_infinite_weight()
+    records["linkage"]["gravity"] = math.inf  # which no check lets through
+    model = replace(model, records=records)
     results = model.evaluate(POSES)
     assert (results["status"] == PoseStatus.NOT_COMPUTABLE).all()
     for one in QUANTITIES:
         if not (one.of_motion or one.of_path):
             assert np.isnan(results[one.name]).all(), one.name
     assert np.isnan(results["time"]).all() and np.isnan(results["energy"]).all()
-
-
-def test_a_pose_without_numbers_is_within_no_limits_and_a_reason_of_its_own():
-    model = model_of_infinite_weight()
     assert not score(model, POSES, (5,)).passable.any()
     motions = motions_of(model, POSES, np.zeros(5))
     verdict = hold_against_limits(LSR1, predict_poses(model, POSES, motions))
@@ -185,28 +172,6 @@ def test_a_path_of_unknown_energy_costs_more_than_any_other():
     prediction, verdict = judge_path(LSR1, LEVEL, POSES)
     unknown = prediction.change(energy=np.full(len(POSES), math.nan))
     assert path_cost(unknown, verdict) == (math.inf, math.inf)
-
-
-@pytest.mark.parametrize("gravity", [5.8e-5, 24.8])
-def test_bodies_from_bennu_to_jupiter_keep_their_gravity(gravity):
-    data = rover_to_dict(LSR1)
-    data["gravity"] = gravity
-    verdict = judge_path(rover_from_dict(data, "test"), LEVEL, POSES)[1]
-    assert verdict.code == ("" if gravity < 20.0 else verdict.code)
-
-
-@settings(max_examples=40, deadline=None)
-@given(
-    values=st.lists(st.floats(allow_nan=True, allow_infinity=True), min_size=6, max_size=6),
-)
-def test_no_target_or_load_of_the_arm_passes_without_numbers(values):
-    try:
-        answer = judge_reach(LSR1, LEVEL, POSES[0], values[:3], force=values[3:])
-    except RoverError:
-        return
-    if answer.possible:
-        assert answer.prediction is not None
-        assert np.isfinite(answer.prediction.wheel_loads).all()
 
 
 @settings(max_examples=40, deadline=None)

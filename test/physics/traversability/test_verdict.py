@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from rover_physics.numerics.interruption import interruptible
-from rover_physics.results.path_prediction import tilt_of
 from rover_physics.results.record import numbers_of
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import PoseStatus
@@ -53,46 +52,30 @@ def test_a_path_over_level_ground_is_traversable(fine):
     ("code", "name", "column", "value", "words"),
     [
         ("tilt", "roll", (), 0.53, ["30.4 deg", "29.8 deg"]),
-        ("tilt", "pitch", (), -0.53, ["30.4 deg", "29.8 deg"]),
         ("tip_over", "tip_over_ratio", (), 0.29, ["0.29", "0.30"]),
-        ("tip_over", "tip_over_ratio", (), -0.5, ["-0.50", "0.30"]),
         ("wheel_lift", "wheel_loads", (3,), -0.25, ["rear_left", "-0.25 N", "equal"]),
         ("friction", "friction_utilisation", (2,), 1.25, ["front_right", "1.25", "1.00"]),
         ("torque", "torque_saturation", (4,), 1.5, ["middle_left", "1.50", "1.00"]),
         ("belly", "belly_clearance", (), 0.011, ["0.011 m", "0.020 m"]),
-        ("belly", "belly_clearance", (), -0.1, ["-0.100 m", "0.020 m"]),
         ("suspension", "rocker_angle", (0,), 0.61, ["right rocker", "0.61", "0.60"]),
-        ("suspension", "rocker_angle", (1,), -0.61, ["left rocker", "-0.61", "-0.60"]),
-        ("suspension", "bogie_angle", (1,), 0.95, ["left bogie", "0.95", "0.90"]),
         ("suspension", "bogie_angle", (0,), -0.95, ["right bogie", "-0.95", "-0.90"]),
     ],
 )
 def test_a_broken_limit_is_told_at_its_waypoint(fine, code, name, column, value, words):
     verdict = hold_against_limits(LSR1, with_value(fine, name, 3, value, column))
-    assert not verdict.traversable
-    assert verdict.first_failure == 3
+    assert (verdict.traversable, verdict.first_failure, verdict.code) == (False, 3, code)
     assert verdict.codes == ("", "", "", code, "")
-    assert verdict.code == code
-    assert verdict.reason == verdict.reasons[3]
-    for word in words:
-        assert word in verdict.reason
+    assert verdict.reason == verdict.reasons[3] and all(w in verdict.reason for w in words)
 
 
-@pytest.mark.parametrize(
-    ("name", "column", "value"),
-    [
-        ("roll", (), 0.52),
-        ("tip_over_ratio", (), 0.3),
-        ("friction_utilisation", (1,), 1.0),
-        ("torque_saturation", (1,), 1.0),
-        ("belly_clearance", (), 0.02),
-        ("rocker_angle", (0,), -0.60),
-        ("bogie_angle", (1,), 0.90),
-        ("wheel_loads", (5,), 0.0),
-    ],
-)
-def test_a_value_at_its_limit_is_allowed(fine, name, column, value):
-    assert hold_against_limits(LSR1, with_value(fine, name, 2, value, column)).traversable
+def test_a_value_at_its_limit_is_allowed(fine):
+    for name, column, value in (
+        ("roll", (), 0.52), ("tip_over_ratio", (), 0.3), ("friction_utilisation", (1,), 1.0),
+        ("torque_saturation", (1,), 1.0), ("belly_clearance", (), 0.02),
+        ("rocker_angle", (0,), -0.60), ("bogie_angle", (1,), 0.90), ("wheel_loads", (5,), 0.0),
+    ):  # fmt: skip
+        at_limit = with_value(fine, name, 2, value, column)
+        assert hold_against_limits(LSR1, at_limit).traversable, name
 
 
 @pytest.mark.parametrize(
@@ -106,32 +89,21 @@ def test_a_value_at_its_limit_is_allowed(fine, name, column, value):
 )
 def test_a_waypoint_without_a_pose_is_told_by_its_cause(fine, status, code, word):
     verdict = hold_against_limits(LSR1, with_status(fine, 1, status))
-    assert not verdict.traversable
-    assert (verdict.first_failure, verdict.code) == (1, code)
+    assert (verdict.traversable, verdict.first_failure, verdict.code) == (False, 1, code)
     assert word in verdict.reason
 
 
-def test_the_first_failure_along_the_path_is_the_reason(fine):
-    broken = with_value(fine, "belly_clearance", 1, 0.0)
-    broken = with_value(broken, "tip_over_ratio", 4, 0.0)
-    verdict = hold_against_limits(LSR1, broken)
+def test_of_several_limits_the_first_along_the_path_and_then_of_the_codes_is_told(fine):
+    later = with_value(with_value(fine, "belly_clearance", 1, 0.0), "tip_over_ratio", 4, 0.0)
+    verdict = hold_against_limits(LSR1, later)
     assert (verdict.first_failure, verdict.code) == (1, "belly")
     assert verdict.codes == ("", "belly", "", "", "tip_over")
-
-
-def test_of_several_limits_at_one_waypoint_the_first_of_the_codes_is_told(fine):
     broken = with_value(fine, "belly_clearance", 2, 0.0)
     broken = with_value(broken, "friction_utilisation", 2, 3.0, (0,))
     broken = with_value(broken, "tip_over_ratio", 2, 0.1)
     assert hold_against_limits(LSR1, broken).code == "tip_over"
-    assert (
-        codes_of_verdicts().index("tip_over")
-        < codes_of_verdicts().index("friction")
-        < codes_of_verdicts().index("belly")
-    )
-
-
-def test_a_wheel_that_lifts_is_told_as_lifting_not_as_slipping(fine):
+    places = [codes_of_verdicts().index(code) for code in ("tip_over", "friction", "belly")]
+    assert places == sorted(places)
     lifted = with_value(fine, "wheel_loads", 0, -1.0, (0,))
     lifted = with_value(lifted, "friction_utilisation", 0, np.inf, (0,))
     assert hold_against_limits(LSR1, lifted).code == "wheel_lift"
@@ -149,11 +121,6 @@ def test_margins_are_the_worst_along_the_settled_part(fine):
     assert verdict.max_torque_saturation == 0.6
     assert verdict.min_belly_clearance == 0.05
     assert verdict.max_tilt == pytest.approx(0.2)
-
-
-def test_tilt_joins_roll_and_pitch(fine):
-    assert tilt_of(0.3, 0.4) == pytest.approx(np.arccos(np.cos(0.3) * np.cos(0.4)))
-    assert fine.tilt == pytest.approx(tilt_of(fine.roll, fine.pitch), abs=1e-6)
 
 
 def test_a_verdict_is_json_with_none_for_what_is_not_finite(fine):

@@ -1,0 +1,300 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What changes no verdict: stopping at a failure, parts, pieces, a shift, more waypoints."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from benchmarks.invariants import changes_of
+from rover_physics.bounds.path import BOUNDED_VALUES
+from rover_physics.prediction import sweep
+from rover_physics.prediction.packed_model import PackedModel, pack_model
+from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.results.path_prediction import PathPrediction
+from rover_physics.results.record import QUANTITIES
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.judge import judge_path, judge_paths
+from rover_physics.traversability.partwise import PartwiseJudge
+from rover_physics.traversability.pieces import SAFE, find_exposure, judge_pieces
+from rover_physics.traversability.verdict import Verdict, hold_against_limits
+from support.rough_grounds import bouldered, bowl, fractal, rocky
+
+ROVER = load_rover("lsr1")
+GROUND = bouldered(3, half=6.0, count=600)
+OPTIONS = {
+    "equal": SweepOptions(),
+    "slippery": SweepOptions(friction=0.35),
+    "sand": SweepOptions(soil="dry_sand"),
+    "backward": SweepOptions(friction=0.5, backward=True),
+    "margin": SweepOptions(policy="optimal", control_margin=0.2, friction=0.45),
+}
+
+
+def straight(x: float, y: float, length: float, yaw: float, spacing: float) -> np.ndarray:
+    """Return poses (n, 3) on a straight line with its middle at x, y."""
+    along = np.arange(-0.5 * length, 0.5 * length, spacing)
+    return np.column_stack([x + along * np.cos(yaw), y + along * np.sin(yaw), 0.0 * along + yaw])
+
+
+@st.composite
+def courses(draw) -> tuple[Terrain, np.ndarray]:
+    """Return a rough ground, perhaps inclined or with unknown cells, and a path on it."""
+    seed = draw(st.integers(0, 10_000))
+    make = draw(st.sampled_from((bouldered, rocky, fractal)))
+    ground = make(seed)
+    rows, columns = np.mgrid[: ground.elevation.shape[0], : ground.elevation.shape[1]]
+    rise = ground.elevation + ground.resolution * draw(st.floats(-0.5, 0.5)) * columns
+    hole = draw(st.booleans()) & (np.hypot(rows - 40, columns - 90) < 6)
+    ground = replace(ground, elevation=np.where(hole, np.nan, rise))
+    places = st.floats(-0.7, 0.7)
+    length, spacing = draw(st.floats(0.5, 3.9)), draw(st.sampled_from((0.01, 0.02, 0.05, 0.11)))
+    yaw = draw(st.floats(-np.pi, np.pi))
+    return ground, straight(draw(places), draw(places), length, yaw, spacing)
+
+
+def first_refusal(verdict: Verdict) -> tuple:
+    return verdict.traversable, verdict.first_failure, verdict.code, verdict.reason
+
+
+def assert_same(one: PathPrediction, other: PathPrediction) -> None:
+    for name in ("poses", "waypoint", "status", *(each.name for each in QUANTITIES)):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+
+
+@settings(max_examples=30, deadline=None)
+@given(courses(), st.sampled_from(sorted(OPTIONS)))
+def test_a_stopped_sweep_is_the_beginning_of_the_whole_one_to_the_last_bit(course, option):
+    ground, poses = course
+    whole = judge_path(ROVER, ground, poses, OPTIONS[option])[0]
+    verdict = hold_against_limits(ROVER, whole)
+    model = pack_model(ROVER, ground, OPTIONS[option])
+    swept = sweep.predict_paths(model, [poses], stop_at_failure=True)[0]
+    stopped = hold_against_limits(ROVER, swept.prediction)
+    assert first_refusal(stopped) == first_refusal(verdict)
+    count = len(poses) if verdict.traversable else verdict.first_failure + 1
+    assert len(swept.prediction.poses) == count
+    assert_same(swept.prediction, whole.cut(count))
+    assert_same(swept.prediction.between, whole.cut(count).between)
+    assert stopped.codes == verdict.codes[:count]
+
+
+def test_a_wheel_on_its_way_off_an_edge_at_the_end_of_a_block_is_no_failure(monkeypatch):
+    """A sweep that took the end of a block for that of the path would refuse the fall."""
+    ground = GROUND
+    poses = straight(0.0, -3.0, 9.0, 0.0, 0.02)
+    _, whole = judge_path(ROVER, ground, poses)
+    assert whole.traversable and whole.max_wheel_drop > 0.0
+    for block in (1, 2, 3, 5, 7, 11):
+        monkeypatch.setattr(sweep, "FIRST_BLOCK", block)
+        assert judge_path(ROVER, ground, poses, stop_at_failure=True)[1].traversable
+
+
+def test_several_paths_stop_each_at_its_own_failure():
+    ground = GROUND
+    paths = [straight(0.0, y, length, 0.0, 0.02) for y in (-3.0, -1.0, 3.0) for length in (4, 9)]
+    options = SweepOptions(friction=0.5)
+    together = judge_paths(ROVER, ground, paths, options, stop_at_failure=True)
+    for path, (prediction, verdict) in zip(paths, together, strict=True):
+        alone, own = judge_path(ROVER, ground, path, options, stop_at_failure=True)
+        assert first_refusal(verdict) == first_refusal(own)
+        assert_same(prediction, alone)
+    assert len({verdict.first_failure for _, verdict in together}) > 2
+
+
+def test_nothing_is_evaluated_or_searched_far_beyond_a_failure_at_the_start(monkeypatch):
+    ground = GROUND
+    unknown = np.where(np.arange(ground.elevation.shape[1]) < 60, np.nan, ground.elevation)
+    poses = straight(0.0, -3.0, 9.0, 0.0, 0.02)
+    evaluated = []
+    evaluate = PackedModel.evaluate
+
+    def counting(model, at, *held, **motions):
+        evaluated.append(len(at))
+        return evaluate(model, at, *held, **motions)
+
+    monkeypatch.setattr(PackedModel, "evaluate", counting)
+    _, verdict = judge_path(ROVER, replace(ground, elevation=unknown), poses, stop_at_failure=True)
+    assert verdict.first_failure == 0
+    assert sum(evaluated) == sweep.FIRST_BLOCK
+
+
+def test_bounds_refuse_the_same_waypoint_with_and_without_stopping():
+    ground = replace(GROUND, elevation_std=np.full_like(GROUND.elevation, 0.004))
+    poses = straight(0.0, -3.0, 3.0, 0.0, 0.05)
+    options = SweepOptions(policy="optimal", friction=0.6)
+    whole, verdict = judge_path(ROVER, ground, poses, options)
+    cut, stopped = judge_path(ROVER, ground, poses, options, stop_at_failure=True)
+    assert first_refusal(stopped) == first_refusal(verdict)
+    np.testing.assert_array_equal(cut.bounds.status, whole.bounds.status[: len(cut.poses)])
+
+
+def line(y: float = -3.0, length: float = 9.0) -> np.ndarray:
+    """Return poses (n, 3) along x, 2 cm apart."""
+    x = np.arange(-0.5 * length, 0.5 * length, 0.02)
+    return np.column_stack([x, np.full_like(x, y), np.zeros_like(x)])
+
+
+def inclined(slope: float) -> Terrain:
+    columns = np.arange(GROUND.elevation.shape[1]) * GROUND.resolution
+    return replace(GROUND, elevation=GROUND.elevation + slope * columns)
+
+
+def steps_down(step: float) -> Terrain:
+    """Return stairs down along x, 0.4 m from edge to edge, so that wheels fall again and again."""
+    x = np.arange(-6.0, 6.001, 0.04)
+    heights = -step * np.floor(np.clip(x + 4.0, 0.0, None) / 0.4)
+    return Terrain(np.tile(heights, (len(x), 1)), 0.04, (-6.0, -6.0))
+
+
+def unknown(start: float) -> Terrain:
+    hidden = np.arange(GROUND.elevation.shape[1]) * GROUND.resolution > start
+    return replace(GROUND, elevation=np.where(hidden, np.nan, GROUND.elevation))
+
+
+CASES = {
+    "rocks": (GROUND, line(), SweepOptions()),
+    "downhill": (inclined(-0.25), line(1.0), SweepOptions(friction=0.8)),
+    "backwards down": (inclined(0.2), line()[::-1].copy(), SweepOptions(backward=True)),
+    "slippery": (GROUND, line(-1.0), SweepOptions(friction=0.4)),
+    "sand": (GROUND, line(3.0), SweepOptions(soil="dry_sand")),
+    "margin": (GROUND, line(3.0), SweepOptions("optimal", control_margin=0.3, friction=0.5)),
+    "high stairs": (steps_down(0.05), line(0.0), SweepOptions("optimal", friction=0.9)),
+    "ledges": (steps_down(0.16), line(0.0), SweepOptions()),
+    "unknown ground": (unknown(8.0), line(), SweepOptions()),
+}
+
+
+def judge_in_parts(terrain, poses, options, **more):
+    """Return the predictions of all parts, and the verdict."""
+    judge = PartwiseJudge(ROVER, terrain, poses, options, **more)
+    taken = list(judge.parts())
+    return taken, judge.verdict()
+
+
+def assert_same_in_parts(whole: PathPrediction, taken: list[PathPrediction]) -> None:
+    for name in ("poses", "status", *(one.name for one in QUANTITIES)):
+        found = np.concatenate([getattr(part, name) for part in taken])
+        np.testing.assert_array_equal(found, getattr(whole, name), err_msg=name)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_all_numbers_and_the_verdict_are_those_of_the_whole_path(case, monkeypatch):
+    monkeypatch.setattr(sweep, "PART", 17)
+    terrain, poses, options = CASES[case]
+    whole, verdict = judge_path(ROVER, terrain, poses, options)
+    taken, found = judge_in_parts(terrain, poses, options)
+    assert_same_in_parts(whole, taken)
+    assert found.to_dict() == verdict.to_dict()
+
+
+def test_bounds_are_those_of_the_whole_path(monkeypatch):
+    monkeypatch.setattr(sweep, "PART", 16)
+    ground = replace(GROUND, elevation_std=np.full_like(GROUND.elevation, 0.003))
+    options, poses = SweepOptions(friction=0.7), line(length=2.0)
+    whole, verdict = judge_path(ROVER, ground, poses, options, sigmas=2.0)
+    taken, found = judge_in_parts(ground, poses, options, sigmas=2.0)
+    assert found.to_dict() == verdict.to_dict()
+    for name in BOUNDED_VALUES:
+        bounds = np.concatenate([getattr(part.bounds, name) for part in taken])
+        np.testing.assert_array_equal(bounds, getattr(whole.bounds, name))
+
+
+def test_a_trap_at_the_end_of_a_long_path_is_found(monkeypatch):
+    monkeypatch.setattr(sweep, "PART", 32)
+    ground, poses, options = (
+        bowl(0.37, 1.5, 0.35),
+        line(0.0, 10.0)[:250],
+        SweepOptions(soil="dry_sand"),
+    )
+    _, verdict = judge_path(ROVER, ground, poses, options)
+    _, found = judge_in_parts(ground, poses, options)
+    assert verdict.code == "trapped"
+    assert found.to_dict() == verdict.to_dict()
+
+
+def test_no_part_is_much_longer_than_asked_even_where_nothing_settles(monkeypatch):
+    monkeypatch.setattr(sweep, "PART", 50)
+    taken, verdict = judge_in_parts(unknown(0.0), line(), SweepOptions())
+    assert verdict.code == "unknown_ground"
+    assert max(len(part.poses) for part in taken) <= 50
+
+
+def random_pieces(count, seed, half=2.0):
+    """Return straight pieces, arcs, turns on the spot and pieces driven backwards."""
+    rng = np.random.default_rng(seed)
+    found = []
+    for _ in range(count):
+        x, y, yaw = *rng.uniform(-half, half, 2), rng.uniform(-np.pi, np.pi)
+        way = np.linspace(0.0, rng.uniform(0.2, 0.8), 30)
+        bend = rng.choice([0.0, 0.0, rng.uniform(-1.5, 1.5)])
+        if rng.random() < 0.2:
+            found.append(np.column_stack([np.tile([x, y], (30, 1)), yaw + 1.2 * way]))
+            continue
+        yaws = yaw + bend * way
+        steps = np.diff(way)[:, None] * np.column_stack([np.cos(yaws), np.sin(yaws)])[:-1]
+        places = np.array([x, y]) + np.vstack([np.zeros(2), np.cumsum(steps, axis=0)])
+        back = np.pi if rng.random() < 0.3 else 0.0
+        found.append(np.column_stack([places, yaws + back]))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("ground", "options"),
+    [
+        (fractal(3, roughness=0.05), SweepOptions()),
+        (rocky(2), SweepOptions()),
+        (fractal(4, roughness=0.09), SweepOptions(policy="servo")),
+        (rocky(5, count=60), SweepOptions(policy="optimal", control_margin=0.3)),
+        (fractal(6, roughness=0.05), SweepOptions(soil="mars_simulant")),
+    ],
+    ids=["fractal", "rocks", "servos", "margin", "soil"],
+)
+def test_a_piece_passes_where_its_path_does_and_costs_the_same(ground, options):
+    pieces = random_pieces(60, 1)
+    found = judge_pieces(ROVER, ground, pieces, options)
+    judged = judge_paths(
+        ROVER, ground, pieces, options, stop_at_failure=True, check_entrapment=False
+    )
+    passed = [verdict.traversable for _, verdict in judged]
+    assert [not piece.code for piece in found] == passed
+    assert 5 < sum(passed) < 60
+    for piece, (prediction, verdict) in zip(found, judged, strict=True):
+        if verdict.traversable:
+            assert piece.time == pytest.approx(prediction.time[-1], rel=1e-6)
+            assert piece.energy == pytest.approx(prediction.energy[-1], rel=1e-5, abs=1e-9)
+            expected = find_exposure(ROVER, prediction)
+            assert piece.exposure == pytest.approx(expected, rel=1e-5, abs=1e-6)
+
+
+def test_exposure_is_zero_up_to_half_of_all_limits_and_the_whole_time_at_one():
+    ground = fractal(1, roughness=1e-6)
+    way = np.column_stack([np.linspace(0.0, 1.0, 51), np.zeros((51, 2))])
+    prediction, verdict = judge_paths(ROVER, ground, [way])[0]
+    assert verdict.risk < SAFE
+    assert find_exposure(ROVER, prediction) == 0.0
+    at_limit = replace(ROVER, limits=replace(ROVER.limits, tip_over_ratio=0.999))
+    exposure = find_exposure(at_limit, judge_paths(at_limit, ground, [way])[0][0])
+    assert exposure == pytest.approx(prediction.time[-1], rel=0.01)
+
+
+MAY_CHANGE = {"passes", "refining changes it"}
+"""Peaks of forces between waypoints are found to a few per cent of a limit."""
+
+
+@pytest.mark.parametrize("name", ["lsr1", "m2020"])
+@pytest.mark.parametrize("seed", [4, 78])
+def test_more_friction_or_torque_splitting_or_shifting_never_makes_a_verdict_worse(name, seed):
+    assert set(changes_of(load_rover(name), seed)) <= MAY_CHANGE
+
+
+@pytest.mark.parametrize(
+    "name, seed",
+    [("lsr1", seed) for seed in (34, 215, 830)] + [("m2020", seed) for seed in (57, 230, 695)],
+)
+def test_twice_as_many_waypoints_change_no_verdict(name, seed):
+    """Each of them hid a peak of friction, or the begin of a fall, between its waypoints."""
+    assert set(changes_of(load_rover(name), seed)) <= {"passes"}
