@@ -124,11 +124,6 @@ def test_an_impossible_study_is_refused_in_one_short_line(files, capfd, study, n
     assert_one_short_line(capfd, ["study", "s.yaml"], names)
 
 
-def test_a_bad_rover_file_is_one_line_that_names_the_key(files, capfd):
-    (files / "rover.yaml").write_text("name: half\ngravity: 9.81\n")
-    assert_one_short_line(capfd, predict(rover="rover.yaml"), "wheel")
-
-
 @pytest.mark.parametrize(
     ("arrays", "names"),
     [

@@ -58,18 +58,3 @@ def test_without_a_way_no_file_is_written_and_the_reason_is_told(ground, tmp_pat
     assert report["found"] is False and report["outcome"] == "goal_refused"
     assert "cannot stand at the goal" in report["reason"] and report["length"] is None
     assert not out.exists()
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--start=1,2", "--goal=2.5,0,0"], "'1,2' is no pose; it must be X,Y,YAW or X Y YAW"),
-        (["--start=-2.5,0,0", "--goal=a,b,c"], "'--goal': 'a,b,c' is no pose"),
-        (["--start=-25,0,0", "--goal=2.5,0,0"], "start is at (-25, 0), off the map"),
-        ([*ENDS, "--budget", "0"], "budget is 0.0; it must be a finite number above 0"),
-    ],
-)
-def test_bad_input_is_one_line_and_exit_code_2(ground, tmp_path, words, said, capfd):
-    assert main(["plan", "lsr1", str(ground), str(tmp_path / "o.npz"), *words]) == 2
-    err = capfd.readouterr().err
-    assert said in err and err.count("\n") == 1 and not (tmp_path / "o.npz").exists()

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics.files.config_files import find_config
 from rover_physics.names import WHEELS
 from rover_physics.terrain.grid import load_terrain, save_terrain
 from rover_planner.cli import main
@@ -133,16 +132,6 @@ def test_classes_and_torque_ranges_are_added_on_demand(files):
         assert (low < 0.0).all() and (high > 0.0).all()
 
 
-def test_on_soil_the_file_has_sinkage_and_resistance_too(files):
-    assert main([*predict_words(files), "--soil", "dry_sand"]) == 0
-    with np.load(files / "out.npz") as out:
-        assert set(out.files) == SHAPES.keys() | REPLAY_SHAPES.keys()
-        assert out["sinkage"].shape == out["motion_resistance"].shape == (N, 6)
-        assert (out["sinkage"] > 0.001).all()
-        assert (out["motion_resistance"] > 0.5).all()
-        assert (out["slip_ratio"] > 0.0).all()
-
-
 def test_each_option_changes_the_prediction_as_it_should(files):
     loads, uses = {}, {}
     stretched = ["arm_yaw=0", "arm_shoulder=0", "arm_elbow=0"]
@@ -215,21 +204,3 @@ def test_poses_with_curvature_are_taken_one_by_one_and_part_by_part(files, monke
         assert angles[2] == pytest.approx(-angles[1, [3, 4, 5, 0, 1, 2]])
         assert speeds[3] == pytest.approx(-speeds[4]) and (speeds[3, :3] > 0.0).all()
         assert out["time"].tolist() == [0.0] * 5 == out["energy"].tolist()
-
-
-def test_a_curve_tighter_than_the_wheels_allow_is_refused_at_its_pose(files):
-    rover = (find_config("rovers/lsr1.yaml")).read_text(encoding="utf-8")
-    (files / "stiff.yaml").write_text(rover.replace("limit: 1.57", "limit: 0.4"), encoding="utf-8")
-    poses = np.column_stack([np.linspace(1.0, 3.0, 3), np.full(3, 2.0), np.zeros(3)])
-    np.savez(files / "poses.npz", poses=poses, curvature=np.array([0.5, 1.0, 0.0]))
-    words = predict_words(files, rover=files / "stiff.yaml")
-    assert main([*words, "--classes", "--torque-ranges"]) == 0
-    with np.load(files / "out.npz") as out:
-        said = "rear_left wheel needs a steering angle of -30.1 deg, limit 22.9 deg"
-        assert out["reason"].tolist() == ["", said, ""]
-        assert int(out["first_failure"]) == 1
-        assert out["settled"].tolist() == [True, False, True]
-        for name in ("steering_angle", "wheel_speed", "wheel_loads", "torque_range"):
-            assert np.isnan(out[name][1]).all(), name
-        assert out["traversability_class"].tolist() == ["passable", "impassable", "passable"]
-        assert out["class_constraint"].tolist()[1] == "steering"

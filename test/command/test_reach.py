@@ -6,7 +6,7 @@ import json
 import pytest
 
 from rover_planner.cli import main
-from support.command_line import assert_refused, write_ground_and_path
+from support.command_line import write_ground_and_path
 
 
 @pytest.fixture
@@ -36,18 +36,3 @@ def test_reach_answers_in_json_whatever_the_answer(capfd, files):
     assert answer["reachable"] and not answer["possible"] and answer["reason"]
     assert ask_reach(files, "-9.0", *there[1:]) == 0
     assert json.loads(capfd.readouterr().out)["code"] == "off_map"
-
-
-@pytest.mark.parametrize(
-    ("change", "names"),
-    [
-        ({"target": "inf"}, "target"),
-        ({"place": "here"}, "'X'"),
-        ({"more": ["--moment", "0", "nan", "0"]}, "moment"),
-        ({"rover": "m2020"}, "no manipulator"),
-    ],
-)
-def test_impossible_questions_to_the_arm_are_one_line(capfd, files, change, names):
-    place, target = change.get("place", "2"), change.get("target", "2.5")
-    words = [place, "2", "0.5", target, "2.3", "0.3", *change.get("more", [])]
-    assert_refused(capfd, ask_reach(files, *words, rover=change.get("rover", "lsr1")), names)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is put off runs after the callback, requests first; messages wait for listeners."""
 
-import threading
 import time
 from functools import partial
 
@@ -15,7 +14,7 @@ from rover_planner.ros.deferred_work import MAX_WAITING, DeferredWork
 from rover_planner.ros.lazy_publisher import LazyPublisher
 from rover_planner.ros.qos import result_qos
 from support.ros_fixtures import call
-from support.waiting import TIMEOUT, wait_until
+from support.waiting import wait_until
 
 
 @pytest.fixture
@@ -34,18 +33,6 @@ def serve(ros, client, busy):
         return client.create_client(Trigger, "ask")
 
     return start
-
-
-def test_the_answer_does_not_wait_for_the_work(busy, serve):
-    deferred_work, answered, waited = DeferredWork(busy), threading.Event(), []
-
-    def answer(_request, response):
-        deferred_work.do(lambda: waited.append(answered.wait(TIMEOUT)))
-        return response
-
-    call(serve(answer), Trigger.Request())
-    answered.set()
-    wait_until(lambda: waited == [True], "the work")
 
 
 def test_a_request_goes_before_what_is_left_of_the_work(busy, serve):

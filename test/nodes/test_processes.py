@@ -9,17 +9,11 @@ import time
 
 import numpy as np
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray
-from nav_msgs.srv import GetPlan
-from rclpy.node import Node
 
-from msg_adapters.paths import stamped_pose
 from rover_physics.terrain.grid import Terrain, save_terrain
 from rover_planner.nodes.traverse_server import main
-from support.grounds import make_terrain, waves
 from support.project.without_disk import fill_disk
 from support.ros_fixtures import domain_id
-from support.waiting import wait_until
 
 
 @pytest.fixture
@@ -86,38 +80,6 @@ def test_a_server_says_what_it_does_answers_another_process_and_ends_cleanly(
 
 
 @pytest.mark.long
-def test_a_signal_ends_a_server_in_the_middle_of_a_question_which_is_refused(
-    start_process, ros, tmp_path
-):
-    save_terrain(tmp_path / "waves.npz", make_terrain(waves))
-    asker, open_counts = ros.spin(Node("asker", context=ros.context)), []
-
-    def note(message):
-        values = {entry.key: entry.value for entry in message.status[0].values}
-        open_counts.append(values["open questions"])
-
-    asker.create_subscription(DiagnosticArray, "diagnostics", note, 10)
-    process = start_process(
-        "traverse_server",
-        f"terrain_file:={tmp_path / 'waves.npz'}",
-        "time_budget:=600.0",
-        "waypoint_spacing:=0.001",
-        "candidate_count:=99",
-        "candidate_spacing:=0.01",
-    )
-    read_until(process, "ready for rover lsr1")
-    service = asker.create_client(GetPlan, "/traverse_server/can_traverse")
-    assert service.wait_for_service(20.0)
-    start, goal = (stamped_pose((x, 0.0, 0.0), "map") for x in (-3.0, 3.0))
-    future = service.call_async(GetPlan.Request(start=start, goal=goal))
-    wait_until(lambda: open_counts and open_counts[-1] == "1", "the question in work")
-    assert not future.done()
-    end(process, signal.SIGTERM)
-    wait_until(future.done, "the refusal")
-    assert future.result().plan.poses == []
-
-
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "how"),
     [("traverse_server", signal.SIGTERM), ("traction_controller", signal.SIGINT)],
@@ -149,15 +111,8 @@ def test_a_server_starts_on_a_full_disk_without_a_log_file_and_says_so(start_pro
     read_until(process, "no log file is written: File too large")
 
 
-@pytest.mark.parametrize(
-    ("parameter", "text"),
-    [
-        ("friction:=.nan", "friction is nan"),
-        ("terrain_file:=/no/such/file.npz", "/no/such/file.npz"),
-    ],
-)
-def test_a_wrong_parameter_ends_a_server_with_one_line(parameter, text, monkeypatch, capfd):
+def test_a_wrong_parameter_ends_a_server_with_one_line(monkeypatch, capfd):
     monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id()))
-    assert main(["--ros-args", "-p", parameter]) == 2
+    assert main(["--ros-args", "-p", "terrain_file:=/no/such/file.npz"]) == 2
     output = capfd.readouterr().err
-    assert "Traceback" not in output and text in output.strip().splitlines()[-1]
+    assert "Traceback" not in output and "/no/such/file.npz" in output.strip().splitlines()[-1]

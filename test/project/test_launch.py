@@ -16,9 +16,9 @@ import pytest
 import yaml
 
 from rover_planner.nodes.programs import PROGRAMS
-from support.project.checkout import TOP, console_scripts, setup_arguments
+from support.project.checkout import TOP, console_scripts
+from support.project.command_checks import check_parameter_file, check_parameters
 
-LAUNCH_FILES = sorted(path.name for path in (TOP / "launch").glob("*.py"))
 PARAMETER_FILES = sorted((TOP / "config" / "parameters").glob("*.yaml"))
 LAYOUTS = sorted((TOP / "config" / "views").iterdir())
 OF_OTHERS = {"robot_description", "diagnostics"}
@@ -77,14 +77,6 @@ def start_rover(**given: str) -> list[Any]:
     return opaque.function(defaults | given)
 
 
-def check_parameters(node: str, parameters: dict[str, Any]) -> None:
-    """Hold parameters against the table of a node."""
-    specs = {spec.name: spec for spec in PROGRAMS[node].parameters}
-    for name, value in parameters.items():
-        assert name in specs, f"{node} has no parameter {name}"
-        specs[name].check(value)
-
-
 def test_the_rover_starts_as_its_parameter_files_say(launch_modules):
     nodes = start_rover()
     assert [node.executable for node in nodes] == ["traverse_server", "traction_controller"]
@@ -138,9 +130,9 @@ def test_the_simulation_is_the_rover_with_a_simulator(launch_modules):
 
 @pytest.mark.parametrize("path", PARAMETER_FILES, ids=lambda path: path.stem)
 def test_a_parameter_file_has_parameters_that_exist_for_any_namespace(path):
-    (pattern, content), *others = yaml.safe_load(path.read_text()).items()
-    assert (pattern, others, list(content)) == ("/**", [], ["ros__parameters"])
-    check_parameters(path.stem.removeprefix("simulated_"), content["ros__parameters"])
+    ((pattern, content),) = yaml.safe_load(path.read_text()).items()
+    assert (pattern, list(content)) == ("/**", ["ros__parameters"])
+    check_parameter_file(path.stem.removeprefix("simulated_"), path)
 
 
 def test_a_parameter_file_has_the_defaults_where_it_is_not_for_a_simulation():
@@ -175,11 +167,3 @@ def test_a_layout_shows_topics_that_the_nodes_publish(path):
     shown = topics_of(path)
     assert {"elevation_cloud", "traverse_server/plan", "traverse_server/markers"} <= shown
     assert shown <= published | OF_OTHERS
-
-
-def test_launch_and_configuration_files_are_installed():
-    installed = dict(setup_arguments()["data_files"])
-    assert installed["share/rover_planner/launch"] == [f"launch/{name}" for name in LAUNCH_FILES]
-    for path in (*PARAMETER_FILES, *LAYOUTS):
-        relative = path.relative_to(TOP)
-        assert relative.as_posix() in installed[f"share/rover_planner/{relative.parent}"]

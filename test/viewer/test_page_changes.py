@@ -77,6 +77,16 @@ def test_a_changed_number_is_marked_with_what_it_changes_and_can_be_undone_and_r
     assert f"{CHANGED}{FRICTION}" not in labels_of(page)
 
 
+@pytest.mark.long  # a browser drags a few of them in test_page
+def test_sliders_at_both_ends_leave_the_page_without_an_error(page):
+    for value in list(page.rover_tab.sliders):
+        for number in (value.low, value.high):
+            ask(page, lambda value=value, number=number: page._change_value(value, number))
+            wait_for_rest(page)
+            assert page.errors.messages == {}, value.label
+        ask(page, lambda: page._restore(LSR1, {}))
+
+
 def test_a_rover_file_is_loaded_and_presets_and_arm_follow(page):
     text = write_rover(replace(LSR1, name="bare", manipulator=None))
     file = SimpleNamespace(name="bare.yaml", content=text.encode())

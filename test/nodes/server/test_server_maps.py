@@ -32,7 +32,8 @@ def local_map(column, row, height=0.0, cells=20):
 def test_the_map_is_published_with_source_and_age_of_each_cell(server, client, tmp_path):
     file = tmp_path / "prior.npz"
     save_terrain(file, PRIOR)
-    assert client.load_map(file).result == 0
+    response = client.load_map(file)
+    assert response.result == 0 and len(response.map.data) == PRIOR.elevation.size
     client.send_terrain(local_map(10, 10, 0.5))
     heard = []
     client.create_subscription(PointCloud2, f"{SERVER}/map", heard.append, map_qos())
