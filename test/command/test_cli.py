@@ -41,8 +41,6 @@ def params_of(name, *words):
 @pytest.mark.parametrize(
     ("words", "name", "value"),
     [
-        (["plan", "lsr1", "a", "b", "--start", "-3,0,0", "--goal", "-.5,-1e-1,0"],
-         "start", (-3.0, 0.0, 0.0)),
         (["reachable", "s.zarr", "--from", "-3,-0.5"], "start", "-3,-0.5"),
         (["reachable", "s.zarr", "--from", "-3", "-0.5"], "start", "-3,-0.5"),
     ],

@@ -5,12 +5,8 @@ import lzma
 import os
 from pathlib import Path
 
-import numpy as np
 import pytest
-from rclpy.serialization import deserialize_message
-from sensor_msgs.msg import PointCloud2
 
-from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.grid_map import terrain_from_grid_map
 from support.messages.grid_maps import move_buffer
 
@@ -57,27 +53,3 @@ def test_a_grid_map_of_legged_robots_is_read_from_its_bag(recorded_grid_map):
         assert terrain.elevation[row, column] == stored[k]
     moved = terrain_from_grid_map(move_buffer(recorded_grid_map, 11, 97))
     assert moved.elevation.tobytes() == terrain.elevation.tobytes()
-
-
-def test_hazcam_points_of_spirit_become_ground_with_the_height_that_was_asked_for():
-    from rosbags.highlevel import AnyReader
-
-    clouds = []
-    with AnyReader([bag("mer_spirit_sol1352_hazcam_mcap")]) as reader:
-        for connection, _, raw in reader.messages():
-            assert connection.msgtype == "sensor_msgs/msg/PointCloud2"
-            clouds.append(deserialize_message(bytes(raw), PointCloud2))
-    assert [cloud.height * cloud.width for cloud in clouds] == [29_746, 24_880]
-    for cloud in clouds:
-        high, middle, mean = (
-            terrain_from_point_cloud(cloud, 0.05, how) for how in ("max", "median", "mean")
-        )
-        known = np.isfinite(high.elevation)
-        np.testing.assert_array_equal(known, np.isfinite(middle.elevation))
-        assert (middle.elevation[known] <= high.elevation[known]).all()
-        assert (mean.elevation[known] <= high.elevation[known] + 1e-12).all()
-        # Stereo noise lifts the highest point of a cell, not the middle one.
-        lifted = high.elevation[known] - middle.elevation[known]
-        several = lifted > 0.0
-        assert 0.1 < several.mean() < 0.9 and 0.002 < lifted[several].mean() < 0.1
-        assert abs(np.mean(mean.elevation[known] - middle.elevation[known])) < 0.003

@@ -110,13 +110,6 @@ def test_another_checkout_is_measured_in_turns_and_ratios_are_of_medians(tmp_pat
     assert (figure.name, figure.value, figure.unit, figure.repeats) == ("both", 2.0, "x", 3)
 
 
-def test_the_fan_has_as_many_paths_as_enav():
-    poses = importlib.import_module("benchmarks.bench_poses")
-    fan = poses.enav_fan(0.0).reshape(14 * 11 * 11, 24, 3)
-    steps = np.linalg.norm(np.diff(fan[:, :, :2], axis=1), axis=2)
-    np.testing.assert_allclose(steps, 0.25)
-
-
 @pytest.mark.slow
 @pytest.mark.long
 def test_ways_are_compared_with_the_best_of_the_lattice_in_a_small_size(capsys):

@@ -24,7 +24,7 @@ from rover_planner.viewer.state.playback import FAST, Playback
 from rover_planner.viewer.state.trajectory import Trajectory
 from rover_planner.viewer.state.visitor_requests import VisitorRequests
 from support.grounds import gap, make_terrain, wall_at, waves
-from support.viewer.sessions import FAR, LSR1, shift, straight
+from support.viewer.sessions import LSR1, straight
 
 pytest.importorskip("trimesh", reason="no trimesh: pip install '.[view]'")
 
@@ -68,15 +68,6 @@ def test_a_trajectory_without_waypoints_has_no_state():
     trajectory = trajectory_on(gap, np.add(straight(), [1.75, 0.0, 0.0]))
     assert trajectory.length == 0
     assert trajectory.state_at(0.0) is None
-
-
-def test_a_rover_at_the_northing_of_a_map_stays_where_it_is():
-    far = shift(make_terrain(waves), FAR)
-    poses = straight() + np.array([*FAR, 0.0])
-    state = Trajectory(LSR1, *judge_path(LSR1, far, poses)).state_at(0.0)
-    assert state is not None
-    np.testing.assert_allclose(state.position[:2], poses[0, :2], atol=1e-6)
-    np.testing.assert_allclose(state.wheel_centres.mean(axis=0)[:2], poses[0, :2], atol=0.2)
 
 
 @pytest.mark.parametrize(

@@ -24,14 +24,6 @@ def drive(poses, ground=lambda x, y: 0.0 * x):
     return rover, trajectory.state_at(0.5 * trajectory.duration)
 
 
-@pytest.mark.parametrize("radius", [0.8, -1.5])
-def test_the_axles_of_steered_wheels_point_at_the_centre_of_the_arc(radius):
-    rover, state = drive(arc(radius))
-    away = [0.0, radius, float(state.contact_points[:, 2].mean())] - state.wheel_centres
-    aside = np.cross(find_axles(rover, state), away)[:, 2] / np.linalg.norm(away[:, :2], axis=1)
-    assert np.abs(aside).max() < 0.03
-
-
 def test_the_axles_are_those_of_the_model_on_rough_ground():
     rover, state = drive(arc(1.0), waves)
     outwards = state.wheel_centres - state.contact_points
