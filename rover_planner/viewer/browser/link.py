@@ -15,7 +15,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import list_values, with_value
-from rover_planner.viewer.state.reasons.before_after import list_changes
+from rover_planner.viewer.state.before_after import list_changes
 from rover_planner.viewer.state.scenario import Pose
 
 VALUE, JOINT = "rover.", "arm."

@@ -26,15 +26,15 @@ from rover_planner.viewer.panel.plots import PLOTS, Curves, Plots
 from rover_planner.viewer.panel.rover_tab import RoverTab
 from rover_planner.viewer.scene.cameras import find_radius
 from rover_planner.viewer.scene.scene import Scene
-from rover_planner.viewer.state.playback import Playback
-from rover_planner.viewer.state.reasons.before_after import (
+from rover_planner.viewer.state.before_after import (
     ChangeHistory,
     compare_drives,
     list_changes,
 )
-from rover_planner.viewer.state.reasons.candidate_rows import list_candidates
-from rover_planner.viewer.state.reasons.failure import Explanation, Failure, explain
-from rover_planner.viewer.state.reasons.path_limits import find_worst
+from rover_planner.viewer.state.candidate_rows import list_candidates
+from rover_planner.viewer.state.failure import Explanation, Failure, explain
+from rover_planner.viewer.state.path_limits import find_worst
+from rover_planner.viewer.state.playback import Playback
 from rover_planner.viewer.state.scenario import Scenario
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.trajectory import MAX_VALUE, RoverState, Trajectory

@@ -18,7 +18,7 @@ from rover_planner.viewer.state.colours import (
     colour_utilisation,
     to_css,
 )
-from rover_planner.viewer.state.reasons.path_limits import WorstUse
+from rover_planner.viewer.state.path_limits import WorstUse
 from rover_planner.viewer.state.trajectory import RoverState
 
 WIDTH, HEIGHT = 364, 232

@@ -18,7 +18,7 @@ from rover_planner.studies.rover_values import (
 )
 from rover_planner.viewer.panel.changes import draw_changes
 from rover_planner.viewer.panel.controls import on_slider_input
-from rover_planner.viewer.state.reasons.before_after import Difference
+from rover_planner.viewer.state.before_after import Difference
 from rover_planner.viewer.state.visitor_requests import Action
 
 FULL_TURN = 3.15

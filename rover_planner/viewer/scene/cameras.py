@@ -9,7 +9,7 @@ from rover_physics.names import WHEEL_POSITIONS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_planner.viewer.scene.local_frame import LocalFrame
-from rover_planner.viewer.state.reasons.failure import Failure
+from rover_planner.viewer.state.failure import Failure
 
 FIT, TOP, SIDE = "Fit", "Top", "Side"
 VIEWS = (FIT, TOP, SIDE)

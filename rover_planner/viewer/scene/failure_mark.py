@@ -20,7 +20,7 @@ from rover_planner.viewer.scene.rover_visual import (
     make_wheel,
 )
 from rover_planner.viewer.state.colours import BODY, CASING, METAL, REFUSED
-from rover_planner.viewer.state.reasons.failure import Failure
+from rover_planner.viewer.state.failure import Failure
 from rover_planner.viewer.state.trajectory import RoverState
 
 NAME, LABELS = "/failure", "/reasons"

@@ -14,8 +14,8 @@ from rover_planner.planning.path_query import Candidate
 from rover_planner.viewer.scene.labels import Label, Labels
 from rover_planner.viewer.scene.local_frame import LocalFrame
 from rover_planner.viewer.scene.ribbons import Ribbon, Strand
+from rover_planner.viewer.state.candidate_rows import place_numbers
 from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN, Colour, blend
-from rover_planner.viewer.state.reasons.candidate_rows import place_numbers
 
 MAX_POINTS = 250
 """Most points of a path that are drawn."""

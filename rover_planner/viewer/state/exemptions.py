@@ -7,7 +7,7 @@ from rover_physics.limits.table import LIMITS
 from rover_physics.names import SERVO, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_prediction import PathPrediction
-from rover_planner.viewer.state.reasons.path_limits import AskedPoses, merge_poses
+from rover_planner.viewer.state.path_limits import AskedPoses, merge_poses
 
 MAX_PLACES = 3
 """Most places that are named in a sentence."""

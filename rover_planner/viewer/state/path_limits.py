@@ -19,7 +19,7 @@ from rover_physics.results.uses import ABOVE, Uses, find_uses, limits_of
 from rover_physics.rover.model import Rover
 from rover_physics.traversability.classification import find_wheel
 from rover_physics.traversability.verdict import Verdict
-from rover_planner.viewer.state.reasons.limits import GROUND, Limit, list_limits
+from rover_planner.viewer.state.limits import GROUND, Limit, list_limits
 
 NOT_ON_THE_BOARD = (GROUND, "suspension", "wheel_lift")
 """Codes of limits whose worst use the board does not list."""
