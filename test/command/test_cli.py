@@ -1,13 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line as a whole: usage errors, help, negative numbers, and what it says it wrote."""
 
+import json
+
 import pytest
 import typer
 
 import rover_physics
+from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import load_terrain
 from rover_planner.cli import app, main
 from rover_planner.shell.poses import join_poses
+from support.command_line import write_ground_and_path
 
 COMMANDS = typer.main.get_command(app).commands
 
@@ -87,3 +91,43 @@ def test_reach_takes_places_with_commas():
     assert [params[name] for name in ("x", "y", "yaw", "tx", "ty", "tz")] == [
         -1.0, -0.5, -0.3, -2.0, 0.0, -0.2,
     ]  # fmt: skip
+
+
+def test_a_preset_goes_to_urdf_and_back(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["urdf", "lsr1", "lsr1.urdf", "--map", "joints.yaml"]) == 0
+    words = ["rover", "--from-urdf", "lsr1.urdf", "--map", "joints.yaml", "again.yaml"]
+    assert main(words) == 0
+    assert (
+        "wrote again.yaml: lsr1, 8.3 kg, left and right differ by 0 mm" in capsys.readouterr().out
+    )
+    assert load_rover("again.yaml") == load_rover("lsr1")
+
+
+@pytest.fixture
+def files(tmp_path):
+    return write_ground_and_path(tmp_path)
+
+
+def ask_reach(files, *words, rover="lsr1"):
+    return main(["reach", rover, str(files / "terrain.npz"), *words])
+
+
+def test_reach_answers_in_json_whatever_the_answer(capfd, files):
+    there = ["2.0", "2.0", "0.5", "2.5", "2.3", "0.3"]
+    assert ask_reach(files, *there) == 0
+    answer = json.loads(capfd.readouterr().out)
+    assert answer["possible"] and answer["reachable"] and answer["code"] == ""
+    assert set(answer["joint_angles"]) == {"arm_yaw", "arm_shoulder", "arm_elbow"}
+    free = answer["wheel_loads"]
+    assert ask_reach(files, *there, "--force", "0", "0", "-10", "--payload", "0") == 0
+    pushed = json.loads(capfd.readouterr().out)["wheel_loads"]
+    assert sum(pushed) == pytest.approx(sum(free) + 10.0)
+    assert ask_reach(files, *there[:3], "-3.5", "2.0", "0.3") == 0
+    answer = json.loads(capfd.readouterr().out)
+    assert not answer["possible"] and answer["code"] == "too_far" and answer["out_of_reach"] > 4.0
+    assert ask_reach(files, *there, "--force", "-500", "0", "0") == 0
+    answer = json.loads(capfd.readouterr().out)
+    assert answer["reachable"] and not answer["possible"] and answer["reason"]
+    assert ask_reach(files, "-9.0", *there[1:]) == 0
+    assert json.loads(capfd.readouterr().out)["code"] == "off_map"

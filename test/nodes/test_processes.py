@@ -12,6 +12,7 @@ import pytest
 
 from rover_physics.terrain.grid import Terrain, save_terrain
 from rover_planner.nodes.traverse_server import main
+from rover_planner.ros.process import take_priority
 from support.project.without_disk import fill_disk
 from support.ros_fixtures import domain_id
 
@@ -116,3 +117,30 @@ def test_a_wrong_parameter_ends_a_server_with_one_line(monkeypatch, capfd):
     assert main(["--ros-args", "-p", "terrain_file:=/no/such/file.npz"]) == 2
     output = capfd.readouterr().err
     assert "Traceback" not in output and "/no/such/file.npz" in output.strip().splitlines()[-1]
+
+
+PROGRAM = """
+import os, threading
+from rover_planner.ros.process import init_ros
+from rover_planner.ros.process import take_priority
+init_ros([])
+threading.Thread(target=threading.Event().wait, daemon=True).start()
+print(take_priority(3))
+names = os.listdir("/proc/self/task")
+print({os.sched_getscheduler(int(name)) == os.SCHED_FIFO for name in names})
+print([line for line in open("/proc/self/status") if line.startswith("THP_enabled")])
+"""
+
+
+def test_all_threads_take_it_or_the_reason_is_told_and_memory_is_not_collected_into_huge_pages():
+    ran = subprocess.run(
+        [sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=60, check=True
+    )
+    reason, policies, pages = ran.stdout.splitlines()
+    assert policies == "{True}" if reason == "" else "CAP_SYS_NICE" in reason
+    assert "THP_enabled:\\t0" in pages
+
+
+def test_zero_asks_for_nothing_and_what_no_system_grants_is_told():
+    assert take_priority(0) == ""
+    assert "realtime_priority 1000" in take_priority(1000)

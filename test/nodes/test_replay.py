@@ -7,23 +7,31 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from nav_msgs.msg import Path as PathMessage
 from rclpy.serialization import deserialize_message
 from rosbags.rosbag2 import Reader
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory
 
+from msg_adapters.stamps import ns_to_stamp
 from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
 from rover_planner.cli import main
 from rover_planner.nodes.result_topics import RESULT_KINDS
+from rover_planner.planning.navigation.transforms import Rigid
+from support.messages.grid_maps import grid_map_of
 from support.messages.recorded_drives import (
     BEGIN,
     STORAGES,
     cloud,
     drive,
+    imu_at,
+    joints_of,
     odometry_at,
     path_to,
     record,
     replay,
+    transforms_of,
     waves,
 )
 
@@ -155,3 +163,117 @@ def test_an_answer_is_never_written_over(tmp_path, capsys):
     (tmp_path / "out").mkdir()
     assert main(["replay", str(bag), str(tmp_path / "out")]) == 2
     assert "exists already" in capsys.readouterr().err
+
+
+def test_ground_under_the_rover_is_filled_as_the_imu_says(tmp_path, capsys):
+    X, Y = np.meshgrid(np.arange(-1.0, 4.0, 0.04), np.arange(-2.0, 2.0, 0.04))
+    unseen = (np.abs(X - 1.0) < 0.5) & (np.abs(Y) < 0.45)
+    terrain = Terrain(np.where(unseen, np.nan, 0.0), 0.04, (-1.0, -2.0))
+    standing = dict.fromkeys(("rocker_right", "rocker_left", "bogie_right", "bogie_left"), 0.0)
+    messages = [
+        ("/joint_states", joints_of(standing)),
+        ("/odometry", odometry_at(1.0)),
+        ("/imu", imu_at(0.2)),
+        ("/other/imu_raw", imu_at(-0.5)),
+        ("/elevation_cloud", cloud(terrain)),
+    ]
+    bag, file = record(tmp_path / "bag", messages), tmp_path / "server.yaml"
+    file.write_text("/**: {ros__parameters: {imu_attitude: true, planner: fan}}\n")
+    words = ["--parameters", str(file), "--goal", "3,0,0"]
+    (answer,), total = replay(capsys, bag, tmp_path / "out", *words)
+    assert total["topics"]["imu"] == "/imu"
+    ground = load_terrain(tmp_path / "out" / answer["map"])
+    left, right = ground.elevation_at(np.array([1.0, 1.0]), np.array([0.3, -0.3]))
+    assert left - right == pytest.approx(0.6 * np.tan(0.2), abs=0.03)
+
+
+def test_recorded_transforms_place_odometry_and_clouds_on_the_map(tmp_path, capsys):
+    map_odom = Rigid.from_rpy(2.0, -1.0, 0.3, 0.0, 0.0, 1.1)
+    mount = Rigid.from_rpy(0.4, 0.0, 0.6, 0.0, 0.5, 0.0)
+    on_map = Rigid.from_rpy(1.0, 0.0, 0.25, 0.0, 0.0, 0.0)
+    in_odom, in_camera = map_odom.inverse().then(on_map), on_map.then(mount).inverse()
+    odometry = odometry_at(0.0, "odom")
+    place, turn = odometry.pose.pose.position, odometry.pose.pose.orientation
+    place.x, place.y, place.z = in_odom.translation.tolist()
+    turn.x, turn.y, turn.z, turn.w = in_odom.rotation.as_quat().tolist()
+    odometry.header.stamp = ns_to_stamp(BEGIN)
+    plain, seen = cloud(waves()), cloud(waves(), frame="camera")
+    points = np.frombuffer(plain.data, "<f4").reshape(-1, 3)
+    moved = in_camera.rotation.apply(points) + in_camera.translation
+    seen.data = moved.astype("<f4").tobytes()
+    transforms = {
+        "/tf": transforms_of("map", "odom", map_odom),
+        "/tf_static": transforms_of("base_link", "camera", mount),
+    }
+    messages = [("/odometry", odometry), ("/elevation_cloud", seen)]
+    bag = record(tmp_path / "bag", [*transforms.items(), *messages])
+    words = ["--resolution", "0.04", "--goal", "3,0.2,0"]
+    (answer,), total = replay(capsys, bag, tmp_path / "out", *words)
+    assert total["refused_messages"] == {} and total["topics"]["tf"] == "/tf"
+    ground, right = load_terrain(tmp_path / "out" / answer["map"]), waves()
+    x, y = np.meshgrid(np.arange(0.0, 4.0, 0.1), np.arange(-1.0, 1.0, 0.1))
+    np.testing.assert_allclose(ground.elevation_at(x, y), right.elevation_at(x, y), atol=2e-3)
+    poses = np.load(tmp_path / "out" / answer["prediction"])["poses"]
+    np.testing.assert_allclose(poses[0], [1.0, 0.0, 0.0], atol=1e-6)
+
+
+def test_a_grid_map_in_odom_is_laid_onto_the_loaded_map(tmp_path, capsys):
+    save_terrain(tmp_path / "prior.npz", Terrain(np.zeros((100, 250)), 0.04, (-1.0, -2.0)))
+    file = tmp_path / "server.yaml"
+    file.write_text(f"/**: {{ros__parameters: {{terrain_file: {tmp_path / 'prior.npz'}}}}}\n")
+    map_odom = Rigid.from_rpy(2.0, -0.5, 0.02, 0.0, 0.0, 0.7)
+    x, y = np.meshgrid(np.arange(-25, 26) * 0.04, np.arange(-25, 26) * 0.04)
+    message = grid_map_of({"elevation": 0.05 * np.sin(2.0 * x) * np.cos(y)}, 0.04)
+    message.header.frame_id = "odom"
+    transforms = {"/tf_static": transforms_of("map", "odom", map_odom)}
+    messages = [("/odometry", odometry_at(1.0)), ("/elevation_map", message)]
+    bag = record(tmp_path / "bag", [*transforms.items(), *messages])
+    words = ["--parameters", str(file), "--goal", "3,0.2,0"]
+    (answer,), total = replay(capsys, bag, tmp_path / "out", *words)
+    assert total["refused_messages"] == {}
+    ground = load_terrain(tmp_path / "out" / answer["map"])
+    assert (ground.origin, ground.elevation.shape) == ((-1.0, -2.0), (100, 250))
+    for own in ((0.0, 0.0), (0.4, -0.3), (-0.5, 0.6)):
+        there = map_odom.rotation.apply((*own, 0.0)) + map_odom.translation
+        height = 0.02 + 0.05 * np.sin(2.0 * own[0]) * np.cos(own[1])
+        assert ground.elevation_at(*there[:2]) == pytest.approx(height, abs=1e-3)
+    assert ground.elevation_at(6.0, 1.0) == 0.0
+
+
+def messages_on(bag, topic, kind):
+    """Return the messages of a topic."""
+    with Reader(bag) as reader:
+        connections = [one for one in reader.connections if one.topic == topic]
+        found = reader.messages(connections)
+        return [deserialize_message(bytes(raw), kind) for _, _, raw in found]
+
+
+def test_paths_goals_and_answers_are_those_of_the_robot_with_its_offset_and_joints(
+    tmp_path, capsys
+):
+    messages = [("/elevation_cloud", cloud(waves())), ("/traverse_server/path", path_to(2.0))]
+    bag, file = record(tmp_path / "bag", messages), tmp_path / "server.yaml"
+    file.write_text(
+        "/**: {ros__parameters: {base_offset: [0.2, 0.1, 0.3, 0.0, 0.0, 0.0], "
+        "joint_map: ['bogie_right:bogie_r:-1']}}\n"
+    )
+    words = ["--parameters", str(file), "--start", "1,0,0", "--goal", "2,0,0"]
+    answers, _ = replay(capsys, bag, tmp_path / "out", *words)
+    assert [answer["kind"] for answer in answers] == ["can_traverse", "check_path"]
+    sent = path_to(2.0).poses[0].pose.position
+    for answer, begin in zip(answers, ((1.0, 0.0), (sent.x, sent.y)), strict=True):
+        poses = np.load(tmp_path / "out" / answer["prediction"])["poses"]
+        np.testing.assert_allclose(poses[0, :2], np.add(begin, (0.2, 0.1)), atol=1e-6)
+    told = tmp_path / "out" / "predictions"
+    plan = messages_on(told, "/traverse_server/plan", PathMessage)[0].poses[0].pose.position
+    np.testing.assert_allclose([plan.x, plan.y], [1.0, 0.0], atol=0.1)  # the rover leans
+    for joints in messages_on(told, "/traverse_server/predicted_joints", JointTrajectory):
+        assert "bogie_r" in joints.joint_names and "bogie_right" not in joints.joint_names
+
+
+def test_a_goal_without_a_start_is_told(tmp_path, capsys):
+    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves()))])
+    assert main(["replay", str(bag), str(tmp_path / "out"), "--goal", "2,0,0"]) == 0
+    assert "no odometry before them tells where it starts" in capsys.readouterr().err
+    assert main(["replay", str(bag), str(tmp_path / "no"), "--start", "2,0,0"]) == 2
+    assert "--goal, which is not given" in capsys.readouterr().err

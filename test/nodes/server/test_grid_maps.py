@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """GridMaps: their layers are used, and those of other frames are placed by /tf."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 
@@ -26,8 +24,10 @@ def offer(monkeypatch):
     messages = {}
     monkeypatch.setattr(map_intake, "read_message", lambda raw, _: messages[raw])
 
-    def offer_map(server, frame="odom", name="elevation", **others):
-        message = grid_map_of({name: PRIOR.elevation} | others, CELL, CENTRE)
+    def offer_map(server, frame="odom"):
+        ones = np.ones(PRIOR.elevation.shape)
+        layers = {"height": PRIOR.elevation, "variance": 4.0 * ones, "mu": 0.3 * ones}
+        message = grid_map_of(layers, CELL, CENTRE, basic=("height",))
         message.header.frame_id = frame
         messages[bytes([len(messages)])] = move_buffer(message, 5, 3)
         server._maps._intake.offer(bytes([len(messages) - 1]), type(message))
@@ -38,7 +38,8 @@ def offer(monkeypatch):
 def test_a_map_is_refused_with_the_reason_until_its_transform_has_come(
     start_server, client, offer
 ):
-    server = start_server(transform_timeout=30.0)
+    layers = {"elevation_layer": "height", "variance_layer": "none", "friction_layer": "mu"}
+    server = start_server(transform_timeout=30.0, **layers)
     take = server.frames.take
     offer(server, frame="")
     client.wait_for_log(f"{REFUSED}elevation_map is without a frame_id; it must be in 'map'")
@@ -56,26 +57,21 @@ def test_a_map_is_refused_with_the_reason_until_its_transform_has_come(
     assert server.service.terrain is None
     send_transforms(server, take, ("map", "moon", Rigid.from_rpy(0, 0, 1.0, 0, 0, 0)), age=0)
     wait_until(lambda: server.service.terrain is not None, "the map")
-    right = PRIOR.elevation.astype(np.float32) + 1.0
-    np.testing.assert_allclose(server.service.terrain.elevation, right, atol=1e-12)
+    found, right = server.service.terrain, PRIOR.elevation.astype(np.float32) + 1.0
+    np.testing.assert_allclose(found.elevation, right, atol=1e-12)
+    assert found.elevation_std is None and found.friction.max() == pytest.approx(0.3)
 
 
-def test_a_turned_map_in_odom_is_the_same_ground_in_the_map_frame(start_server, offer):
-    layers = {"elevation_layer": "height", "variance_layer": "none", "friction_layer": "mu"}
-    server = start_server(transform_timeout=30.0, **layers)
-    here = Rigid.from_rpy(12.0, -7.0, 0.4, 0.0, 0.0, 0.7)
-    send_transforms(
-        server, partial(server.frames.take, is_static=True), ("map", "odom", here), age=0.0
+def test_a_map_of_a_sensor_is_placed_by_its_mount_and_odometry(
+    start_server, client, offer, lasting
+):
+    layers = {"elevation_layer": "height", "friction_layer": "none", "variance_layer": "none"}
+    server = start_server(
+        sensor_mounts=["scanner:0.0:0.0:0.5:0.0:0.0:0.0"], transform_timeout=30.0, **layers
     )
-    ones = np.ones(PRIOR.elevation.shape)
-    offer(server, name="height", variance=4.0 * ones, mu=0.3 * ones)
+    client.send_odometry((2.0, -1.0, 0.0))
+    wait_until(lambda: server.service.fresh_pose() is not None, "odometry")
+    offer(server, frame="scanner")
     found = wait_until(lambda: server.service.terrain, "the map")
-    assert found.elevation_std is None and np.nanmax(found.friction) == pytest.approx(0.3)
-    rows, columns = np.nonzero(np.isfinite(found.elevation))
-    at = np.column_stack([
-        found.origin[0] + CELL * columns, found.origin[1] + CELL * rows, 0.0 * rows
-    ])  # fmt: skip
-    own = here.inverse().rotation.apply(at) + here.inverse().translation
-    right = PRIOR.elevation_at(own[:, 0], own[:, 1]) + 0.4
-    np.testing.assert_allclose(found.elevation[rows, columns], right, atol=1e-6)
-    assert 0.95 * PRIOR.elevation.size < len(rows) <= PRIOR.elevation.size
+    assert found.origin == pytest.approx(np.add(PRIOR.origin, (2.0, -1.0)))
+    np.testing.assert_allclose(found.elevation, PRIOR.elevation + 0.5, atol=1e-6)

@@ -114,9 +114,6 @@ def test_unknown_ground_under_the_standing_rover_is_filled(start_server, client)
     _, verdict, _ = ask(client, start, goal)
     assert verdict["traversable"] == "true"
     assert 0.0 < float(verdict["footprint_share"]) == float(verdict["blind_share"]) < 0.5
-    assert client.set_parameter("blind_ground", "refuse")[0]
-    _, verdict, _ = ask(client, start, goal)
-    assert verdict["code"] == "blind_ground" and verdict["first_failure"] == "0"
 
 
 def test_roll_and_pitch_of_the_standing_rover_are_those_of_the_imu(start_server, client):

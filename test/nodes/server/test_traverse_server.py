@@ -169,24 +169,6 @@ def test_the_class_is_named_and_drawn_whichever_policy_is_assumed(shared):
     assert drawn == pytest.approx((LIME.r, LIME.g, LIME.b))
 
 
-def test_soil_and_payload_of_the_server_count(shared):
-    client = shared.client
-
-    def judge():
-        answer, results = client.next_results(lambda: client.check_poses(shared.server, AHEAD))
-        return json.loads(answer.message), float(np.sum(results["wheel_loads"].data[:6]))
-
-    firm, light = judge()
-    assert client.set_parameter("soil", "dry_sand") == (True, "")
-    assert client.set_parameter("payload", 2.0) == (True, "")
-    sandy, heavy = judge()
-    assert client.set_parameter("soil", "") == (True, "")
-    assert client.set_parameter("payload", -1.0) == (True, "")
-    assert firm["max_sinkage"] == 0.0 and sandy["max_sinkage"] > 0.001
-    assert sandy["energy"] > 2.0 * firm["energy"]
-    assert heavy == pytest.approx(light + 2.0 * 9.81, rel=0.01)
-
-
 def test_the_measured_suspension_raises_a_warning_where_it_disagrees(shared, lasting):
     server, client = shared.server, shared.client
     client.send_joints(["camera", "rocker_left"], [math.nan, 0.5])
