@@ -8,7 +8,7 @@ import pytest
 
 from rover_physics.terrain.grid import save_terrain
 from rover_planner.cli import main
-from support.grounds import make_terrain, waves
+from support.grounds import long_wall, make_terrain
 
 ENDS = ("--start=-2.5,0,0", "--goal=2.5,0,0")
 
@@ -16,12 +16,8 @@ ENDS = ("--start=-2.5,0,0", "--goal=2.5,0,0")
 @pytest.fixture(scope="module")
 def ground(tmp_path_factory):
     """Return a terrain file with a wall that is open at one end."""
-
-    def height(x, y):
-        return waves(x, y) + np.where((np.abs(x) < 0.1) & (y < 2.0), 1.0, 0.0)
-
     path = tmp_path_factory.mktemp("plan") / "ground.npz"
-    save_terrain(path, make_terrain(height))
+    save_terrain(path, make_terrain(long_wall))
     return path
 
 

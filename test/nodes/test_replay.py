@@ -94,22 +94,6 @@ def test_each_new_map_is_asked_for_a_goal_from_the_odometry(tmp_path, capsys):
     np.testing.assert_allclose(first[[0, -1], 0], [1.0, 3.0], atol=1e-6)
 
 
-def test_local_maps_merge_into_a_loaded_one_as_in_the_server(tmp_path, capsys):
-    prior = Terrain(np.zeros((100, 250)), 0.04, (-1.0, -2.0))
-    save_terrain(tmp_path / "prior.npz", prior)
-    file = tmp_path / "server.yaml"
-    file.write_text(f"/**: {{ros__parameters: {{terrain_file: {tmp_path / 'prior.npz'}}}}}\n")
-    local = Terrain(np.full((25, 25), 0.1), 0.04, (3.0, -0.52))
-    messages = [("/odometry", odometry_at(0.0)), ("/elevation_cloud", cloud(local))]
-    bag = record(tmp_path / "bag", messages)
-    words = ["--parameters", str(file), "--goal", "1.5,0,0"]
-    (answer,), _ = replay(capsys, bag, tmp_path / "out", *words)
-    ground = load_terrain(tmp_path / "out" / answer["map"])
-    assert ground.elevation.shape == prior.elevation.shape
-    assert ground.elevation_at(np.array([3.4]), np.array([0.0]))[0] > 0.05
-    assert ground.elevation_at(np.array([0.0]), np.array([0.0]))[0] == 0.0
-
-
 def test_messages_that_cannot_be_used_are_counted_and_told(tmp_path, capsys):
     messages = [
         ("/elevation_cloud", cloud(waves(), frame="odom")),

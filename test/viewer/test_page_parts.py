@@ -19,7 +19,6 @@ from rover_planner.viewer.state.colours import (
     colour_utilisation,
     map_colours,
 )
-from rover_planner.viewer.state.layers import LAYERS
 from rover_planner.viewer.state.playback import FAST, Playback
 from rover_planner.viewer.state.trajectory import Trajectory
 from rover_planner.viewer.state.visitor_requests import VisitorRequests
@@ -208,17 +207,6 @@ def test_a_ray_into_the_sky_or_onto_unknown_ground_meets_nothing():
     assert intersect_ground(terrain, np.array([0.0, 0.0, 2.0]), np.array([1.0, 0.0, 0.5])) is None
     down = np.array([0.0, 0.0, -1.0])
     assert intersect_ground(terrain, np.array([0.75, 0.0, 2.0]), down) is None
-
-
-@pytest.mark.parametrize("layer", LAYERS)
-def test_the_ground_has_a_texture_of_every_layer(layer):
-    ground = build_ground_mesh(LSR1, make_terrain(waves, half=2.0), layer, 0.3)
-    assert (
-        np.isfinite([ground.scale.low, ground.scale.high]).all()
-        and ground.scale.low < ground.scale.high
-    )
-    picture = np.asarray(ground.mesh.visual.material.baseColorTexture)
-    assert picture.reshape(-1, 3).std(axis=0).max() > 1.0
 
 
 def test_unknown_ground_is_left_out_of_the_mesh():

@@ -5,13 +5,10 @@ import numpy as np
 import pytest
 
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.traction.balance import BalanceWriter
 from rover_physics.traversability.judge import judge_path
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
-from rover_planner.simulator.driving_forces import find_driving_forces
 from rover_planner.simulator.mujoco_plant import MujocoPlant
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
@@ -213,19 +210,6 @@ def test_a_rover_whose_wheels_spin_says_so():
         if plant.state().stopped:
             break
     assert "slip" in plant.state().stopped and "rear_right" in plant.state().stopped
-
-
-def test_driving_forces_are_those_of_the_model_and_more_torque_pushes_by_as_much():
-    ground, optimal = wavy(), SweepOptions(policy="optimal")
-    here = judge_path(LSR1, ground, np.array([[-0.4, 0.1, 0.3]]), optimal)[0]
-    forces = find_driving_forces(BalanceWriter(LSR1), 0.1, here, here.torque[0], 0.0)
-    assert forces.push == pytest.approx(0.0, abs=0.01) and not forces.sliding.any()
-    assert forces.loads == pytest.approx(here.wheel_loads[0], abs=0.05)
-    here = judge_path(LSR1, plane(0.0, 0.0, half=2.0), np.zeros((1, 3)))[0]
-    forces = find_driving_forces(BalanceWriter(LSR1), 0.1, here, np.full(6, 0.3), 0.0)
-    assert forces.push == pytest.approx(18.0, rel=1e-6)
-    assert forces.loads.sum() == pytest.approx(LSR1.weight)
-    assert forces.loads[0] > here.wheel_loads[0, 0]
 
 
 def follow(path, start, speed=0.05, step=0.2, most=4000):
