@@ -4,22 +4,9 @@
 import subprocess
 import sys
 
-import numpy as np
 import pytest
 
 import rover_physics
-
-
-def test_a_path_is_judged_with_names_of_the_package_alone():
-    from rover_physics import SweepOptions, Terrain, judge_path, load_rover, score_poses
-
-    terrain = Terrain(np.zeros((120, 120)), 0.05, (-3.0, -3.0))
-    poses = [[0.02 * k, 0.0, 0.0] for k in range(4)]
-    prediction, verdict = judge_path(
-        load_rover("lsr1"), terrain, poses, SweepOptions(policy="optimal")
-    )
-    assert verdict.traversable and prediction.settled.all()
-    assert score_poses(load_rover("lsr1"), terrain, poses).tilt.shape == (4,)
 
 
 def test_every_name_of_the_api_is_there():

@@ -15,10 +15,8 @@ from sensor_msgs.msg import PointCloud2
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import path_to_poses, stamped_pose
 from msg_adapters.results.markers import WITH_SPEED_SERVOS as LIME
-from msg_adapters.results.predictions import JOINTS, MEASURES, array_values
+from msg_adapters.results.predictions import MEASURES, array_values
 from rover_physics.names import WHEELS
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.rover.steering_joints import steering_joints
 from rover_physics.traversability.classification import (
     IMPASSABLE,
     PASSABLE,
@@ -62,11 +60,9 @@ def test_who_comes_after_the_answer_hears_all_results_of_the_last_one(start_serv
         last = {topic: messages[-1] for topic, messages in late.items()}
         headers = [last[topic].header for topic in ("predicted_joints", "verdict")]
         headers += [marker.header for marker in last["markers"].markers]
-        arrays = [array_values(last[topic]) for topic in (*WHEEL_TOPICS, "tip_over_margin")]
         waypoints = int(verdict_of(last)["waypoints"])
-        return all(header == plan.header for header in headers) and all(
-            len(values) == waypoints for values in arrays
-        )
+        counts = {len(array_values(last[topic])) for topic in (*WHEEL_TOPICS, "tip_over_margin")}
+        return counts == {waypoints} and all(header == plan.header for header in headers)
 
     wait_until(heard_all, "all results of the last answer")
 
@@ -105,19 +101,15 @@ def test_a_passable_goal_gets_a_plan_and_the_results_of_the_model_with_one_stamp
     expected = service.answer(np.array(START), np.array(GOAL)).candidate.prediction
     for topic, field in WHEEL_TOPICS.items():
         np.testing.assert_array_equal(array_values(results[topic]), getattr(expected, field))
-        assert [dim.label for dim in results[topic].layout.dim] == ["waypoint", "wheel"]
     assert float(verdict["energy"]) == pytest.approx(expected.energy[-1])
     headers = [results[topic].header for topic in ("plan", "predicted_joints", "verdict")]
     headers += [marker.header for marker in results["markers"].markers]
     headers += [pose.header for pose in plan.poses]
     assert all(header == plan.header for header in headers)
     assert plan.header.frame_id == "map" and plan.header.stamp.sec > 0
-    joints, waypoints = results["predicted_joints"], int(verdict["waypoints"])
+    waypoints = int(verdict["waypoints"])
     assert array_values(results["tip_over_margin"]).shape == (waypoints, len(MEASURES))
-    assert tuple(joints.joint_names) == JOINTS + steering_joints(load_rover("lsr1"))
-    assert len(joints.points) == waypoints
-    last = joints.points[-1].time_from_start
-    assert last.sec + last.nanosec * 1e-9 == pytest.approx(float(verdict["time"]), abs=1e-6)
+    assert len(results["predicted_joints"].points) == waypoints
 
 
 def test_a_map_from_a_volatile_publisher_is_heard(shared):
