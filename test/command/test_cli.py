@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command line as a whole: usage errors, help, negative numbers, and what it says it wrote."""
+"""The command line: help, negative numbers, what it wrote; and the commands urdf, rover, reach."""
 
 import json
 
@@ -104,30 +104,26 @@ def test_a_preset_goes_to_urdf_and_back(tmp_path, monkeypatch, capsys):
     assert load_rover("again.yaml") == load_rover("lsr1")
 
 
-@pytest.fixture
-def files(tmp_path):
-    return write_ground_and_path(tmp_path)
+def test_reach_answers_in_json_whatever_the_answer(capfd, tmp_path):
+    write_ground_and_path(tmp_path)
 
+    def ask_reach(*words):
+        return main(["reach", "lsr1", str(tmp_path / "terrain.npz"), *words])
 
-def ask_reach(files, *words, rover="lsr1"):
-    return main(["reach", rover, str(files / "terrain.npz"), *words])
-
-
-def test_reach_answers_in_json_whatever_the_answer(capfd, files):
     there = ["2.0", "2.0", "0.5", "2.5", "2.3", "0.3"]
-    assert ask_reach(files, *there) == 0
+    assert ask_reach(*there) == 0
     answer = json.loads(capfd.readouterr().out)
     assert answer["possible"] and answer["reachable"] and answer["code"] == ""
     assert set(answer["joint_angles"]) == {"arm_yaw", "arm_shoulder", "arm_elbow"}
     free = answer["wheel_loads"]
-    assert ask_reach(files, *there, "--force", "0", "0", "-10", "--payload", "0") == 0
+    assert ask_reach(*there, "--force", "0", "0", "-10", "--payload", "0") == 0
     pushed = json.loads(capfd.readouterr().out)["wheel_loads"]
     assert sum(pushed) == pytest.approx(sum(free) + 10.0)
-    assert ask_reach(files, *there[:3], "-3.5", "2.0", "0.3") == 0
+    assert ask_reach(*there[:3], "-3.5", "2.0", "0.3") == 0
     answer = json.loads(capfd.readouterr().out)
     assert not answer["possible"] and answer["code"] == "too_far" and answer["out_of_reach"] > 4.0
-    assert ask_reach(files, *there, "--force", "-500", "0", "0") == 0
+    assert ask_reach(*there, "--force", "-500", "0", "0") == 0
     answer = json.loads(capfd.readouterr().out)
     assert answer["reachable"] and not answer["possible"] and answer["reason"]
-    assert ask_reach(files, "-9.0", *there[1:]) == 0
+    assert ask_reach("-9.0", *there[1:]) == 0
     assert json.loads(capfd.readouterr().out)["code"] == "off_map"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Local maps merge into a loaded one cell by cell, and nothing that was known is lost."""
+"""Local maps merge into a loaded one cell by cell; cells in which two maps differ are found."""
 
 from dataclasses import replace
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""GridMap messages become terrains cell by cell, wherever their circular buffer starts."""
+"""GridMaps, made and recorded, become terrains cell by cell, wherever their buffer starts."""
 
 import lzma
 import os

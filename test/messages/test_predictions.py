@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Predictions become flat labelled arrays, a trajectory by joint name, and markers."""
+"""Predictions become arrays, a trajectory, markers; verdicts become a status and strict JSON."""
 
 import array
 import math

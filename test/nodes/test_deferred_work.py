@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is put off runs after the callback, requests first; messages wait for listeners."""
+"""What is put off runs after the callback; messages wait for listeners, responses for a pause."""
 
 import time
 from functools import partial
@@ -147,11 +147,6 @@ def test_whoever_comes_after_a_listener_has_left_never_gets_what_is_out_of_date(
     assert heard == [2]
 
 
-@pytest.fixture
-def node(ros):
-    return Node("sender", context=ros.context)
-
-
 class Clock:
     """The steady clock as the sender reads it; at first it stands, however late a thread is."""
 
@@ -163,15 +158,15 @@ class Clock:
         return self.now
 
 
-def test_a_few_responses_leave_at_once_and_many_in_groups(ros, node, monkeypatch):
+def test_a_few_responses_leave_at_once_and_many_in_groups(ros, busy, monkeypatch):
     clock = Clock()
     monkeypatch.setattr(paced_sender, "time", SimpleNamespace(monotonic=clock.monotonic))
-    sender, sent = PacedSender(node, Guard(node.get_logger())), []
+    sender, sent = PacedSender(busy, Guard(busy.get_logger())), []
     for number in range(50):
         sender.send(lambda number=number: sent.append((number, clock.now)))
     assert [number for number, _ in sent] == list(range(AT_ONCE))
     clock.stands = False
-    ros.spin(node)
+    ros.spin(busy)
     wait_until(lambda: len(sent) == 50, "all responses")
     assert [number for number, _ in sent] == list(range(50))
     times = [when for _, when in sent]
@@ -179,9 +174,9 @@ def test_a_few_responses_leave_at_once_and_many_in_groups(ros, node, monkeypatch
         assert later - first >= PAUSE
 
 
-def test_all_that_wait_leave_at_the_end_and_an_error_stops_none(node):
-    guard, sent = Guard(node.get_logger()), []
-    sender = PacedSender(node, guard)
+def test_all_that_wait_leave_at_the_end_and_an_error_stops_none(busy):
+    guard, sent = Guard(busy.get_logger()), []
+    sender = PacedSender(busy, guard)
     for number in range(20):
         sender.send(lambda number=number: sent.append(1 / (number - 7)))
     sender.send_all()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Nodes as processes of their own: they start, answer, and end cleanly when they are told to."""
+"""Nodes as processes: they start, answer, end cleanly when told to, and take precedence."""
 
 import os
 import signal

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Launch files, parameter files and layouts name nodes, parameters and topics that exist.
+"""Launch, parameter and Nav2 files and layouts name nodes, parameters and topics that exist.
 
 PyPI has no launch: the files run with stand-ins for its actions, which keep what they are given.
 """

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Speed servos with droop in MuJoCo: a rover that steers keeps its steering, and speed is lost."""
+"""Speed servos with droop, and a rover that is held on a slope, in MuJoCo."""
 
 import numpy as np
 import pytest

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""GridMaps: their layers are used, and those of other frames are placed by /tf."""
+"""GridMaps: their layers are used; those of other frames are placed by /tf, mount, odometry."""
 
 import numpy as np
 import pytest

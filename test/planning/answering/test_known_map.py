@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The age of a map counts from its stamp and from its arrival; its content has a hash."""
+"""A map's age, hash and description, and the health of a server: questions and latencies."""
 
 import dataclasses
 import time

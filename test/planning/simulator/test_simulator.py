@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The simulated rover: it stands where the model says, stops where it must, sees what it can."""
+"""The simulated rover: where it stands, stops and drives, what it sees, how it follows a path."""
 
 import numpy as np
 import pytest
