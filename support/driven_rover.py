@@ -30,14 +30,6 @@ QUEUE = 1000
 LATENESS = ("waiting for ", " stale: none for ", "updates came too late", "the clock was stepped")
 """Texts of faults that come at the start, and on a machine that stalls."""
 
-Stamp = Callable[[], int]
-"""Returns a header stamp [ns]."""
-
-
-def no_stamp() -> int:
-    """Return the stamp of a driver that has none."""
-    return 0
-
 
 class DrivenRover(Node):
     """A rover whose wheels turn at a constant rate, whatever the torques are."""
@@ -53,7 +45,8 @@ class DrivenRover(Node):
         self.imu = Imu()
         self.twist: TwistStamped | Twist = TwistStamped()
         self.speed = 0.03
-        self.stamp: Stamp = no_stamp
+        self.stamp: Callable[[], int] = lambda: 0
+        """Returns a header stamp [ns]."""
         self.silent: set[str] = set()
         """Topics that are not sent."""
         self.commands: list[tuple[float, float, float]] = []

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages for tests, and message packages that PyPI lacks."""
+"""Messages for tests."""

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from std_msgs.msg import Float32MultiArray, MultiArrayDimension
 
 
 def grid_map_of(
@@ -61,29 +60,6 @@ def store_by_rows(message: Any) -> Any:
         array.layout = _array(cells.ravel(), ("row_index", rows), ("column_index", columns)).layout
         array.data = cells.ravel()
     return stored
-
-
-def to_message(kind: type, plain: Any, frame: str = "map", stamp: Any = None) -> Any:
-    """Return a GridMap message with the fields of a stand-in."""
-    message = kind(layers=plain.layers, basic_layers=plain.basic_layers)
-    message.header.frame_id = frame
-    if stamp is not None:
-        message.header.stamp = stamp
-    for name in ("resolution", "length_x", "length_y"):
-        setattr(message.info, name, getattr(plain.info, name))
-    for name in "xy":
-        setattr(message.info.pose.position, name, getattr(plain.info.pose.position, name))
-    for array in plain.data:
-        layer = Float32MultiArray()
-        layer.layout.dim = [
-            MultiArrayDimension(label=dim.label, size=dim.size, stride=dim.stride)
-            for dim in array.layout.dim
-        ]
-        layer.data = np.asarray(array.data, np.float32).tolist()
-        message.data.append(layer)
-    message.outer_start_index = plain.outer_start_index
-    message.inner_start_index = plain.inner_start_index
-    return message
 
 
 def _array(values: np.ndarray, *dims: tuple[str, int]) -> Any:

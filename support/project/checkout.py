@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The project's checkout for tests: its files, its entry points, copies of it."""
 
+import ast
 import runpy
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -25,6 +27,16 @@ def console_scripts() -> dict[str, tuple[str, str]]:
     return {
         name: tuple(target.split(":")) for name, target in (line.split(" = ") for line in lines)
     }
+
+
+def imported_names(path: Path) -> Iterator[str]:
+    """Yield the dotted names that a file imports, wherever in the file it does."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
 def copy_checkout(folder: Path) -> Path:

@@ -72,26 +72,24 @@ def _check_node(name: str, words: tuple[str, ...]) -> None:
         if option == "--params-file":
             check_parameter_file(name, TOP / value)
         if option == "-p":
-            _check_parameter(name, *value.split(":="))
+            parameter, given = value.split(":=")
+            check_parameters(name, {parameter: yaml.safe_load(given)})
 
 
 def check_parameter_file(node: str, path: Path) -> None:
     """Hold the parameters of a file for a node against its table; `/**` is every node."""
     values = yaml.safe_load(path.read_text(encoding="utf-8"))
     assert set(values) & {"/**", node}, f"{path.name} has nothing for {node}"
-    specs = {spec.name: spec for spec in PROGRAMS[node].parameters}
     for section in ("/**", node):
-        for name, value in values.get(section, {}).get("ros__parameters", {}).items():
-            assert name in specs, f"{path.name}: {node} has no parameter {name}"
-            specs[name].check(tuple(value) if isinstance(value, list) else value)
+        check_parameters(node, values.get(section, {}).get("ros__parameters", {}))
 
 
-def _check_parameter(node: str, name: str, value: str) -> None:
-    """Hold a parameter against the table of its node."""
+def check_parameters(node: str, values: dict[str, Any]) -> None:
+    """Hold parameters against the table of their node."""
     specs = {spec.name: spec for spec in PROGRAMS[node].parameters}
-    assert name in specs, f"{node} has no parameter {name}"
-    given = yaml.safe_load(value)
-    specs[name].check(tuple(given) if isinstance(given, list) else given)
+    for name, value in values.items():
+        assert name in specs, f"{node} has no parameter {name}"
+        specs[name].check(tuple(value) if isinstance(value, list) else value)
 
 
 def _check_python(words: tuple[str, ...]) -> None:
@@ -151,7 +149,7 @@ def _check_ros2(words: tuple[str, ...]) -> None:
     elif verb == "param":
         assert rest[0] in ("set", "get", "describe"), rest
         if rest[0] == "set":
-            _check_parameter(rest[1].lstrip("/"), rest[2], rest[3])
+            check_parameters(rest[1].lstrip("/"), {rest[2]: yaml.safe_load(rest[3])})
     elif (verb, rest[0]) == ("node", "info"):
         assert rest[1].lstrip("/") in PROGRAMS, rest
     elif (verb, rest[0]) == ("topic", "echo"):

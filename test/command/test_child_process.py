@@ -63,15 +63,6 @@ def test_a_child_that_ignores_sigterm_is_killed_with_its_own_child(
     wait_until_gone(inner)
 
 
-def test_a_failure_in_the_block_stops_the_children(tmp_path, environment):
-    with pytest.raises(ZeroDivisionError), stopping_children() as children:
-        child = ChildProcess("polite", (), environment, tmp_path / "log")
-        children.append(child)
-        next(child.lines(lambda: None))
-        raise ZeroDivisionError
-    assert child.exit_code == -signal.SIGTERM
-
-
 def test_a_failed_child_leaves_its_exit_code_and_last_words(tmp_path, environment):
     child = ChildProcess("failing", (), environment, tmp_path / "log")
     assert list(child.lines(lambda: None)) == []

@@ -1,24 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command line as a whole: usage errors, help, negative numbers, and what it says it wrote."""
+"""The command line: help, poses, what it wrote; the commands urdf, rover, reach and plan."""
+
+import json
 
 import numpy as np
 import pytest
 import typer
 
 import rover_physics
-from rover_physics.terrain.grid import load_terrain
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import load_terrain, save_terrain
 from rover_planner.cli import app, main
 from rover_planner.shell.poses import join_poses
+from support.command_line import write_ground_and_path
+from support.grounds import long_wall, make_terrain
 
 COMMANDS = typer.main.get_command(app).commands
-
-
-def test_terrain_command_makes_the_same_map_for_the_same_seed(tmp_path, capfd):
-    for name in ("a.npz", "b.npz"):
-        words = ["terrain", str(tmp_path / name), "--seed", "5", "--size", "4"]
-        assert main(words) == 0
-    a, b = load_terrain(tmp_path / "a.npz"), load_terrain(tmp_path / "b.npz")
-    assert np.array_equal(a.elevation, b.elevation)
 
 
 def test_terrain_says_what_it_wrote(tmp_path, capfd):
@@ -50,8 +47,6 @@ def params_of(name, *words):
 @pytest.mark.parametrize(
     ("words", "name", "value"),
     [
-        (["plan", "lsr1", "a", "b", "--start", "-3,0,0", "--goal", "-.5,-1e-1,0"],
-         "start", (-3.0, 0.0, 0.0)),
         (["reachable", "s.zarr", "--from", "-3,-0.5"], "start", "-3,-0.5"),
         (["reachable", "s.zarr", "--from", "-3", "-0.5"], "start", "-3,-0.5"),
     ],
@@ -98,3 +93,85 @@ def test_reach_takes_places_with_commas():
     assert [params[name] for name in ("x", "y", "yaw", "tx", "ty", "tz")] == [
         -1.0, -0.5, -0.3, -2.0, 0.0, -0.2,
     ]  # fmt: skip
+
+
+def test_a_preset_goes_to_urdf_and_back(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["urdf", "lsr1", "lsr1.urdf", "--map", "joints.yaml"]) == 0
+    words = ["rover", "--from-urdf", "lsr1.urdf", "--map", "joints.yaml", "again.yaml"]
+    assert main(words) == 0
+    assert (
+        "wrote again.yaml: lsr1, 8.3 kg, left and right differ by 0 mm" in capsys.readouterr().out
+    )
+    assert load_rover("again.yaml") == load_rover("lsr1")
+
+
+def test_reach_answers_in_json_whatever_the_answer(capfd, tmp_path):
+    write_ground_and_path(tmp_path)
+
+    def ask_reach(*words):
+        return main(["reach", "lsr1", str(tmp_path / "terrain.npz"), *words])
+
+    there = ["2.0", "2.0", "0.5", "2.5", "2.3", "0.3"]
+    assert ask_reach(*there) == 0
+    answer = json.loads(capfd.readouterr().out)
+    assert answer["possible"] and answer["reachable"] and answer["code"] == ""
+    assert set(answer["joint_angles"]) == {"arm_yaw", "arm_shoulder", "arm_elbow"}
+    free = answer["wheel_loads"]
+    assert ask_reach(*there, "--force", "0", "0", "-10", "--payload", "0") == 0
+    pushed = json.loads(capfd.readouterr().out)["wheel_loads"]
+    assert sum(pushed) == pytest.approx(sum(free) + 10.0)
+    assert ask_reach(*there[:3], "-3.5", "2.0", "0.3") == 0
+    answer = json.loads(capfd.readouterr().out)
+    assert not answer["possible"] and answer["code"] == "too_far" and answer["out_of_reach"] > 4.0
+    assert ask_reach(*there, "--force", "-500", "0", "0") == 0
+    answer = json.loads(capfd.readouterr().out)
+    assert answer["reachable"] and not answer["possible"] and answer["reason"]
+    assert ask_reach("-9.0", *there[1:]) == 0
+    assert json.loads(capfd.readouterr().out)["code"] == "off_map"
+
+
+ENDS = ("--start=-2.5,0,0", "--goal=2.5,0,0")
+
+
+@pytest.fixture(scope="module")
+def ground(tmp_path_factory):
+    """Return a terrain file with a wall that is open at one end."""
+    path = tmp_path_factory.mktemp("plan") / "ground.npz"
+    save_terrain(path, make_terrain(long_wall))
+    return path
+
+
+def test_a_way_is_written_with_its_predictions_and_predict_passes_it(ground, tmp_path, capfd):
+    out, picture, dump = (tmp_path / name for name in ("way.npz", "way.png", "asked.npz"))
+    words = ["plan", "lsr1", str(ground), str(out), *ENDS, "--budget", "60"]
+    assert main([*words, "--picture", str(picture), "--dump", str(dump)]) == 0
+    report = json.loads(capfd.readouterr().out)
+    assert report["found"] is True and report["reason"] == ""
+    for name in ("length", "energy", "time", "risk", "seconds_first", "seconds", "bound"):
+        assert report[name] > 0.0
+    assert 0 < report["edges_judged"] < report["edges"] and report["expanded"] > 0
+    with np.load(out) as way:
+        assert bool(way["traversable"]) and way["wheel_loads"].shape == (len(way["poses"]), 6)
+        steps = np.hypot(*np.diff(way["poses"][:, :2], axis=0).T)
+        assert steps.max() <= 0.02 + 1e-9
+        assert steps.sum() == pytest.approx(report["length"], rel=1e-3)
+        poses = way["poses"]
+    assert picture.stat().st_size > 10_000
+    assert main(["predict", "lsr1", str(ground), str(out), str(tmp_path / "p.npz")]) == 0
+    assert "traversable" in capfd.readouterr().out
+    assert main(["replay-plan", str(dump), str(tmp_path / "again.npz")]) == 0
+    again = json.loads(capfd.readouterr().out)
+    assert again["cost"] == report["cost"] and again["repeatable"] is True
+    with np.load(tmp_path / "again.npz") as way:
+        np.testing.assert_array_equal(way["poses"], poses)
+
+
+def test_without_a_way_no_file_is_written_and_the_reason_is_told(ground, tmp_path, capfd):
+    out = tmp_path / "way.npz"
+    words = ["plan", "lsr1", str(ground), str(out), "--start=-2.5,0,0", "--goal=0,0,0"]
+    assert main(words) == 0
+    report = json.loads(capfd.readouterr().out)
+    assert report["found"] is False and report["outcome"] == "goal_refused"
+    assert "cannot stand at the goal" in report["reason"] and report["length"] is None
+    assert not out.exists()

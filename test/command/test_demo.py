@@ -122,18 +122,6 @@ def test_the_kernels_are_compiled_before_the_server_starts(tmp_path):
         compiler.kill()
 
 
-@pytest.mark.parametrize("content", [None, b"no map"])
-def test_a_bad_map_is_refused_with_one_line(tmp_path, capfd, content):
-    path = tmp_path / "bad.npz"
-    if content is not None:
-        path.write_bytes(content)
-    code = main(["demo", "--map", str(path), "--out", str(tmp_path / "demo.png")])
-    err = capfd.readouterr().err
-    assert code == 2
-    assert err.count("\n") == 1
-    assert "bad.npz" in err
-
-
 @pytest.mark.parametrize("out", ["picture.txt", "map.npz/demo.png"])
 def test_a_picture_that_cannot_be_written_is_refused_with_one_line(tmp_path, map_file, capfd, out):
     code = main(["demo", "--map", str(map_file), "--out", str(tmp_path / out)])

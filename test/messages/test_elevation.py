@@ -150,22 +150,6 @@ def test_a_map_is_taken_as_it_comes_whichever_way_its_rows_run(height, x_step, y
     assert_same(terrain_from_point_cloud(cloud_of(columns.reshape(-1, 3))), terrain)
 
 
-def test_what_is_no_complete_map_is_not_taken_for_one():
-    rows = points_of(rough_terrain()).reshape(7, 11, 3)
-    shifted, unplaced = rows.copy(), rows.copy()
-    shifted[3, 4, 0] += 0.01
-    unplaced[3, 4, :2] = np.nan
-    twice = np.repeat(rows, 2, axis=1)
-    gap = np.delete(rows, 3, axis=1)
-    uneven = rows + np.array([0.02, 0.0, 0.0]) * (np.arange(11) > 5)[:, None]
-    for points in (shifted, unplaced, twice, gap, uneven):
-        assert detect_raster(points[:, :, 0], points[:, :, 1]) is None
-    expected = rough_terrain().elevation.copy()
-    expected[3, 4] = np.nan
-    terrain = terrain_from_point_cloud(cloud_of(unplaced.reshape(-1, 3), height=7))
-    np.testing.assert_array_equal(terrain.elevation, expected)
-
-
 def test_missing_and_infinite_points_are_unknown_ground():
     terrain = rough_terrain()
     points = points_of(terrain)

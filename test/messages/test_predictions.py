@@ -1,17 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Predictions become flat labelled arrays, a trajectory by joint name, and markers."""
+"""Predictions become arrays, a trajectory, markers; verdicts become a status and strict JSON."""
 
 import array
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import Float64MultiArray
 from visualization_msgs.msg import Marker
 
 from msg_adapters.errors import MessageError
 from msg_adapters.paths import PoseStock, settled_path
+from msg_adapters.results.diagnostics import to_json, verdict_to_diagnostics
 from msg_adapters.results.markers import IMPASSABLE, PASSABLE, path_markers
 from msg_adapters.results.predictions import (
     JOINTS,
@@ -171,3 +174,31 @@ def test_markers_colour_the_path_and_show_where_it_fails(prediction):
         [[p.x, p.y, p.z] for p in contacts[:6]], prediction.contact_points[0]
     )
     assert all(marker.header.stamp == STAMP for marker in markers)
+
+
+def test_every_entry_of_a_verdict_becomes_a_key_and_a_value():
+    entries = {
+        "traversable": False,
+        "code": "tilt",
+        "first_failure": 7,
+        "mismatch": {"rocker_left": 0.25},
+        "goal": [1.0, None],
+    }
+    message = verdict_to_diagnostics("error", "tilt 0.6 rad", entries, "lsr1", "map", Time(sec=5))
+    assert message.header.frame_id == "map" and message.header.stamp.sec == 5
+    (status,) = message.status
+    assert status.level == DiagnosticStatus.ERROR and status.message == "tilt 0.6 rad"
+    assert status.hardware_id == "lsr1" and status.name
+    assert {entry.key: entry.value for entry in status.values} == {
+        "traversable": "false",
+        "code": "tilt",
+        "first_failure": "7",
+        "mismatch": '{"rocker_left": 0.25}',
+        "goal": "[1.0, null]",
+    }
+
+
+@pytest.mark.parametrize("number", [math.nan, -math.inf])
+def test_json_has_no_nan_and_no_infinity(number):
+    with pytest.raises(ValueError):
+        to_json({"number": number})

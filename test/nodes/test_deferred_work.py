@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is put off runs after the callback, requests first; messages wait for listeners."""
+"""What is put off runs after the callback; messages wait for listeners, responses for a pause."""
 
-import threading
 import time
 from functools import partial
+from types import SimpleNamespace
 
 import pytest
 from rclpy.node import Node
@@ -11,11 +11,14 @@ from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 
 import rover_planner.ros.deferred_work
+from rover_planner.ros import paced_sender
 from rover_planner.ros.deferred_work import MAX_WAITING, DeferredWork
+from rover_planner.ros.guard import Guard
 from rover_planner.ros.lazy_publisher import LazyPublisher
+from rover_planner.ros.paced_sender import AT_ONCE, PAUSE, PacedSender
 from rover_planner.ros.qos import result_qos
 from support.ros_fixtures import call
-from support.waiting import TIMEOUT, wait_until
+from support.waiting import wait_until
 
 
 @pytest.fixture
@@ -34,18 +37,6 @@ def serve(ros, client, busy):
         return client.create_client(Trigger, "ask")
 
     return start
-
-
-def test_the_answer_does_not_wait_for_the_work(busy, serve):
-    deferred_work, answered, waited = DeferredWork(busy), threading.Event(), []
-
-    def answer(_request, response):
-        deferred_work.do(lambda: waited.append(answered.wait(TIMEOUT)))
-        return response
-
-    call(serve(answer), Trigger.Request())
-    answered.set()
-    wait_until(lambda: waited == [True], "the work")
 
 
 def test_a_request_goes_before_what_is_left_of_the_work(busy, serve):
@@ -154,3 +145,39 @@ def test_whoever_comes_after_a_listener_has_left_never_gets_what_is_out_of_date(
 
     wait_until(catch_up, "the latest")
     assert heard == [2]
+
+
+class Clock:
+    """The steady clock as the sender reads it; at first it stands, however late a thread is."""
+
+    def __init__(self):
+        self.now, self.stands = time.monotonic(), True
+
+    def monotonic(self) -> float:
+        self.now = self.now if self.stands else time.monotonic()
+        return self.now
+
+
+def test_a_few_responses_leave_at_once_and_many_in_groups(ros, busy, monkeypatch):
+    clock = Clock()
+    monkeypatch.setattr(paced_sender, "time", SimpleNamespace(monotonic=clock.monotonic))
+    sender, sent = PacedSender(busy, Guard(busy.get_logger())), []
+    for number in range(50):
+        sender.send(lambda number=number: sent.append((number, clock.now)))
+    assert [number for number, _ in sent] == list(range(AT_ONCE))
+    clock.stands = False
+    ros.spin(busy)
+    wait_until(lambda: len(sent) == 50, "all responses")
+    assert [number for number, _ in sent] == list(range(50))
+    times = [when for _, when in sent]
+    for first, later in zip(times, times[AT_ONCE:], strict=False):
+        assert later - first >= PAUSE
+
+
+def test_all_that_wait_leave_at_the_end_and_an_error_stops_none(busy):
+    guard, sent = Guard(busy.get_logger()), []
+    sender = PacedSender(busy, guard)
+    for number in range(20):
+        sender.send(lambda number=number: sent.append(1 / (number - 7)))
+    sender.send_all()
+    assert len(sent) == 19 and guard.total == 1

@@ -80,7 +80,6 @@ def test_defaults_are_of_the_type_of_their_field_and_allowed(table):
             ("friction", "rough", "friction is 'rough'; it must be of type double"),
             ("friction", 1, "friction is 1; it must be of type double, such as 0.0"),
             ("candidate_count", 0, "candidate_count is 0; it must be in 1 to 99"),
-            ("candidate_count", True, "candidate_count is True; it must be of type integer"),
             ("waypoint_spacing", 0.0, r"waypoint_spacing is 0.0; it must be in 0.001 to 1 m"),
             ("plan_spacing", 0.0009, r"it must be 0, or at least 0\.001 m"),
             ("policy", "fair", "policy is 'fair'; it must be one of equal, servo, optimal"),
@@ -92,7 +91,6 @@ def test_defaults_are_of_the_type_of_their_field_and_allowed(table):
         for name, value, text in [
             ("joints", ("a", ""), r"joints is \['a', ''\]; it must hold texts"),
             ("imu_mounting", (0.0, 0.0), "imu_mounting is .*; it must hold 3 finite numbers"),
-            ("imu_mounting", (0.0, 0.0, 9.0), "it must hold 3 finite numbers"),
         ]
     ],
 )
@@ -119,7 +117,6 @@ def test_parameters_are_declared_as_the_table_says(make_node, table):
     [
         ("friction:=-1.0", r"^parameter friction is -1.0; it must be in 0 to 10$"),
         ("friction:=1", "^parameter friction is 1; it must be of type double, such as 0.0$"),
-        ("friction:=[]", r"parameter friction is \[\]; it must be of type double"),
         ("joint_map:=[]", r"is \[\], which has no type in ROS; leave it out, its default is "),
         ("base_offset:=[]", r"is \[\]; it must hold 6 finite numbers"),
     ],

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Nodes as processes of their own: they start, answer, and end cleanly when they are told to."""
+"""Nodes as processes: they start, answer, end cleanly when told to, and take precedence."""
 
 import os
 import signal
@@ -9,17 +9,12 @@ import time
 
 import numpy as np
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray
-from nav_msgs.srv import GetPlan
-from rclpy.node import Node
 
-from msg_adapters.paths import stamped_pose
 from rover_physics.terrain.grid import Terrain, save_terrain
 from rover_planner.nodes.traverse_server import main
-from support.grounds import make_terrain, waves
+from rover_planner.ros.process import take_priority
 from support.project.without_disk import fill_disk
 from support.ros_fixtures import domain_id
-from support.waiting import wait_until
 
 
 @pytest.fixture
@@ -86,38 +81,6 @@ def test_a_server_says_what_it_does_answers_another_process_and_ends_cleanly(
 
 
 @pytest.mark.long
-def test_a_signal_ends_a_server_in_the_middle_of_a_question_which_is_refused(
-    start_process, ros, tmp_path
-):
-    save_terrain(tmp_path / "waves.npz", make_terrain(waves))
-    asker, open_counts = ros.spin(Node("asker", context=ros.context)), []
-
-    def note(message):
-        values = {entry.key: entry.value for entry in message.status[0].values}
-        open_counts.append(values["open questions"])
-
-    asker.create_subscription(DiagnosticArray, "diagnostics", note, 10)
-    process = start_process(
-        "traverse_server",
-        f"terrain_file:={tmp_path / 'waves.npz'}",
-        "time_budget:=600.0",
-        "waypoint_spacing:=0.001",
-        "candidate_count:=99",
-        "candidate_spacing:=0.01",
-    )
-    read_until(process, "ready for rover lsr1")
-    service = asker.create_client(GetPlan, "/traverse_server/can_traverse")
-    assert service.wait_for_service(20.0)
-    start, goal = (stamped_pose((x, 0.0, 0.0), "map") for x in (-3.0, 3.0))
-    future = service.call_async(GetPlan.Request(start=start, goal=goal))
-    wait_until(lambda: open_counts and open_counts[-1] == "1", "the question in work")
-    assert not future.done()
-    end(process, signal.SIGTERM)
-    wait_until(future.done, "the refusal")
-    assert future.result().plan.poses == []
-
-
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "how"),
     [("traverse_server", signal.SIGTERM), ("traction_controller", signal.SIGINT)],
@@ -149,15 +112,35 @@ def test_a_server_starts_on_a_full_disk_without_a_log_file_and_says_so(start_pro
     read_until(process, "no log file is written: File too large")
 
 
-@pytest.mark.parametrize(
-    ("parameter", "text"),
-    [
-        ("friction:=.nan", "friction is nan"),
-        ("terrain_file:=/no/such/file.npz", "/no/such/file.npz"),
-    ],
-)
-def test_a_wrong_parameter_ends_a_server_with_one_line(parameter, text, monkeypatch, capfd):
+def test_a_wrong_parameter_ends_a_server_with_one_line(monkeypatch, capfd):
     monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id()))
-    assert main(["--ros-args", "-p", parameter]) == 2
+    assert main(["--ros-args", "-p", "terrain_file:=/no/such/file.npz"]) == 2
     output = capfd.readouterr().err
-    assert "Traceback" not in output and text in output.strip().splitlines()[-1]
+    assert "Traceback" not in output and "/no/such/file.npz" in output.strip().splitlines()[-1]
+
+
+PROGRAM = """
+import os, threading
+from rover_planner.ros.process import init_ros
+from rover_planner.ros.process import take_priority
+init_ros([])
+threading.Thread(target=threading.Event().wait, daemon=True).start()
+print(take_priority(3))
+names = os.listdir("/proc/self/task")
+print({os.sched_getscheduler(int(name)) == os.SCHED_FIFO for name in names})
+print([line for line in open("/proc/self/status") if line.startswith("THP_enabled")])
+"""
+
+
+def test_all_threads_take_it_or_the_reason_is_told_and_memory_is_not_collected_into_huge_pages():
+    ran = subprocess.run(
+        [sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=60, check=True
+    )
+    reason, policies, pages = ran.stdout.splitlines()
+    assert policies == "{True}" if reason == "" else "CAP_SYS_NICE" in reason
+    assert "THP_enabled:\\t0" in pages
+
+
+def test_zero_asks_for_nothing_and_what_no_system_grants_is_told():
+    assert take_priority(0) == ""
+    assert "realtime_priority 1000" in take_priority(1000)

@@ -24,7 +24,7 @@ from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.nodes.traverse_server import main as traverse_server
 from rover_planner.shell.extras import PLAIN
 from support.command_line import REPOSITORY
-from support.project.checkout import console_scripts, setup_arguments
+from support.project.checkout import setup_arguments
 from support.waiting import wait_until
 
 MAINS = {
@@ -182,9 +182,3 @@ def test_a_node_in_a_namespace_has_the_topics_of_the_help_and_tells_of_wrong_par
     optional = (commands | hazards) & told
     wait_until(lambda: told - optional <= names(), f"{told - optional}")
     assert names() <= told | {"/tf"}
-
-
-def test_every_program_is_installed_by_its_entry_point():
-    scripts = console_scripts()
-    for name in PROGRAMS:
-        assert scripts[name] == (start.__name__, f"start_{name}")

@@ -1,31 +1,144 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recorded drives are judged again: from SQLite and MCAP, with maps, joints and odometry."""
+"""Recorded drives are judged again: SQLite and MCAP, maps, joints, IMU, cameras, transforms."""
 
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
-from rclpy.serialization import deserialize_message
-from rosbags.rosbag2 import Reader
-from sensor_msgs.msg import JointState
+from geometry_msgs.msg import Point, PoseStamped, Quaternion
+from nav_msgs.msg import Odometry
+from nav_msgs.msg import Path as PathMessage
+from rclpy.serialization import deserialize_message, serialize_message
+from rosbags.rosbag2 import Reader, StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory
 
+from msg_adapters.elevation import terrain_to_point_cloud
+from msg_adapters.stamps import ns_to_stamp
+from rover_physics.names import SUSPENSION_JOINTS
+from rover_physics.numerics.quaternions import xyzw_from_rpy
+from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
+from rover_physics.traversability.judge import judge_path
 from rover_planner.cli import main
 from rover_planner.nodes.result_topics import RESULT_KINDS
-from support.messages.recorded_drives import (
-    BEGIN,
-    STORAGES,
-    cloud,
-    drive,
-    odometry_at,
-    path_to,
-    record,
-    replay,
-    waves,
-)
+from rover_planner.planning.navigation.transforms import Rigid
+from rover_planner.ros.bags.bag_reader import GRID_MAP, GRID_MAP_FIELDS, GRID_MAP_INFO_FIELDS
+from support.messages.grid_maps import grid_map_of
+
+LSR1 = load_rover("lsr1")
+BEGIN = 1_700_000_000_000_000_000
+"""Time of the first message [ns]."""
+STORAGES = {"sqlite": StoragePlugin.SQLITE3, "mcap": StoragePlugin.MCAP}
+
+
+def waves() -> Terrain:
+    """Return ground 10 m x 4 m with waves that turn the suspension."""
+    X, Y = np.meshgrid(np.arange(-1.0, 9.0, 0.04), np.arange(-2.0, 2.0, 0.04))
+    return Terrain(0.03 * np.sin(4.0 * X + 0.8 * Y), 0.04, (-1.0, -2.0))
+
+
+def odometry_at(x: float, frame: str = "map") -> Odometry:
+    """Return a level rover at x [m] on the x axis of a frame."""
+    message = Odometry()
+    message.header.frame_id = frame
+    message.pose.pose.position = Point(x=x)
+    message.pose.pose.orientation.w = 1.0
+    return message
+
+
+def joints_of(angles: dict[str, float]) -> JointState:
+    """Return joint angles [rad] by name."""
+    return JointState(name=list(angles), position=list(angles.values()))
+
+
+def drive(length: float) -> list[tuple[str, object]]:
+    """Return the messages of a drive along x: odometry and the model's suspension each 2 cm."""
+    x = np.arange(0.5, 0.5 + length, 0.02)
+    poses = np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
+    prediction = judge_path(LSR1, waves(), poses)[0]
+    messages: list[tuple[str, object]] = []
+    for k, place in enumerate(x.tolist()):
+        values = np.concatenate([prediction.rocker_angle[k], prediction.bogie_angle[k]])
+        angles = dict(zip(SUSPENSION_JOINTS, values.tolist(), strict=True))
+        messages += [("/joint_states", joints_of(angles)), ("/odometry", odometry_at(place))]
+    return messages
+
+
+def cloud(terrain: Terrain, stamp: int = BEGIN, frame: str = "map") -> PointCloud2:
+    """Return a terrain as a cloud of a time [ns]."""
+    return terrain_to_point_cloud(terrain, frame, ns_to_stamp(stamp))
+
+
+def path_to(x: float) -> PathMessage:
+    """Return a path along the x axis from 1 m to x [m]."""
+    message = PathMessage()
+    message.header.frame_id = "map"
+    message.header.stamp = ns_to_stamp(BEGIN + 5)
+    for place in (1.0, x):
+        pose = PoseStamped()
+        pose.pose.position.x = place
+        pose.pose.orientation = Quaternion(w=1.0)
+        message.poses.append(pose)
+    return message
+
+
+def record(folder: Path, messages: list[tuple[str, Any]], storage: str = "mcap") -> Path:
+    """Write messages 10 ms apart to a new bag: those of ROS, of the bag's library, or GridMaps."""
+    types = get_typestore(Stores.ROS2_JAZZY)
+    for name, fields in (("GridMapInfo", GRID_MAP_INFO_FIELDS), ("GridMap", GRID_MAP_FIELDS)):
+        types.register(get_types_from_msg(fields, f"grid_map_msgs/msg/{name}"))
+    with Writer(folder, version=9, storage_plugin=STORAGES[storage]) as writer:
+        connections = {}
+        for k, (topic, message) in enumerate(messages):
+            module, name = type(message).__module__.split(".")[0], type(message).__name__
+            is_grid_map = isinstance(message, SimpleNamespace)
+            kind = GRID_MAP if is_grid_map else getattr(message, "__msgtype__", "")
+            raw = types.serialize_cdr(message, kind) if kind else serialize_message(message)
+            if topic not in connections:
+                connections[topic] = writer.add_connection(
+                    topic, kind or f"{module}/msg/{name}", typestore=types
+                )
+            writer.write(connections[topic], BEGIN + 10_000_000 * k, raw)
+    return folder
+
+
+def replay(capsys, bag: Path, out: Path, *words: str) -> tuple[list[dict], dict]:
+    """Replay a bag; return its answers and the total."""
+    assert main(["replay", str(bag), str(out), *words]) == 0, capsys.readouterr().err
+    *answers, total = map(json.loads, capsys.readouterr().out.splitlines())
+    return answers, total
+
+
+def imu_at(roll: float) -> Imu:
+    """Return the attitude of a rover that leans by a roll [rad]."""
+    message = Imu()
+    x, y, z, w = xyzw_from_rpy(roll, 0.0, 0.0).tolist()
+    message.orientation = Quaternion(x=x, y=y, z=z, w=w)
+    return message
+
+
+def transforms_of(parent: str, child: str, rigid: Rigid):
+    """Return a TFMessage of the bag's library; tf2_msgs is not on PyPI."""
+    types = get_typestore(Stores.ROS2_JAZZY).types
+    geometry = {
+        name: types[f"geometry_msgs/msg/{name}"]
+        for name in ("TransformStamped", "Transform", "Vector3", "Quaternion")
+    }
+    time = types["builtin_interfaces/msg/Time"](BEGIN // 10**9, BEGIN % 10**9)
+    transform = geometry["Transform"](
+        geometry["Vector3"](*rigid.translation.tolist()),
+        geometry["Quaternion"](*rigid.rotation.as_quat().tolist()),
+    )
+    header = types["std_msgs/msg/Header"](time, parent)
+    stamped = geometry["TransformStamped"](header, child, transform)
+    return types["tf2_msgs/msg/TFMessage"]([stamped])
 
 
 @pytest.mark.parametrize("storage", STORAGES)
@@ -86,22 +199,6 @@ def test_each_new_map_is_asked_for_a_goal_from_the_odometry(tmp_path, capsys):
     np.testing.assert_allclose(first[[0, -1], 0], [1.0, 3.0], atol=1e-6)
 
 
-def test_local_maps_merge_into_a_loaded_one_as_in_the_server(tmp_path, capsys):
-    prior = Terrain(np.zeros((100, 250)), 0.04, (-1.0, -2.0))
-    save_terrain(tmp_path / "prior.npz", prior)
-    file = tmp_path / "server.yaml"
-    file.write_text(f"/**: {{ros__parameters: {{terrain_file: {tmp_path / 'prior.npz'}}}}}\n")
-    local = Terrain(np.full((25, 25), 0.1), 0.04, (3.0, -0.52))
-    messages = [("/odometry", odometry_at(0.0)), ("/elevation_cloud", cloud(local))]
-    bag = record(tmp_path / "bag", messages)
-    words = ["--parameters", str(file), "--goal", "1.5,0,0"]
-    (answer,), _ = replay(capsys, bag, tmp_path / "out", *words)
-    ground = load_terrain(tmp_path / "out" / answer["map"])
-    assert ground.elevation.shape == prior.elevation.shape
-    assert ground.elevation_at(np.array([3.4]), np.array([0.0]))[0] > 0.05
-    assert ground.elevation_at(np.array([0.0]), np.array([0.0]))[0] == 0.0
-
-
 def test_messages_that_cannot_be_used_are_counted_and_told(tmp_path, capsys):
     messages = [
         ("/elevation_cloud", cloud(waves(), frame="odom")),
@@ -155,3 +252,117 @@ def test_an_answer_is_never_written_over(tmp_path, capsys):
     (tmp_path / "out").mkdir()
     assert main(["replay", str(bag), str(tmp_path / "out")]) == 2
     assert "exists already" in capsys.readouterr().err
+
+
+def test_ground_under_the_rover_is_filled_as_the_imu_says(tmp_path, capsys):
+    X, Y = np.meshgrid(np.arange(-1.0, 4.0, 0.04), np.arange(-2.0, 2.0, 0.04))
+    unseen = (np.abs(X - 1.0) < 0.5) & (np.abs(Y) < 0.45)
+    terrain = Terrain(np.where(unseen, np.nan, 0.0), 0.04, (-1.0, -2.0))
+    standing = dict.fromkeys(SUSPENSION_JOINTS, 0.0)
+    messages = [
+        ("/joint_states", joints_of(standing)),
+        ("/odometry", odometry_at(1.0)),
+        ("/imu", imu_at(0.2)),
+        ("/other/imu_raw", imu_at(-0.5)),
+        ("/elevation_cloud", cloud(terrain)),
+    ]
+    bag, file = record(tmp_path / "bag", messages), tmp_path / "server.yaml"
+    file.write_text("/**: {ros__parameters: {imu_attitude: true, planner: fan}}\n")
+    words = ["--parameters", str(file), "--goal", "3,0,0"]
+    (answer,), total = replay(capsys, bag, tmp_path / "out", *words)
+    assert total["topics"]["imu"] == "/imu"
+    ground = load_terrain(tmp_path / "out" / answer["map"])
+    left, right = ground.elevation_at(np.array([1.0, 1.0]), np.array([0.3, -0.3]))
+    assert left - right == pytest.approx(0.6 * np.tan(0.2), abs=0.03)
+
+
+def test_recorded_transforms_place_odometry_and_clouds_on_the_map(tmp_path, capsys):
+    map_odom = Rigid.from_rpy(2.0, -1.0, 0.3, 0.0, 0.0, 1.1)
+    mount = Rigid.from_rpy(0.4, 0.0, 0.6, 0.0, 0.5, 0.0)
+    on_map = Rigid.from_rpy(1.0, 0.0, 0.25, 0.0, 0.0, 0.0)
+    in_odom, in_camera = map_odom.inverse().then(on_map), on_map.then(mount).inverse()
+    odometry = odometry_at(0.0, "odom")
+    place, turn = odometry.pose.pose.position, odometry.pose.pose.orientation
+    place.x, place.y, place.z = in_odom.translation.tolist()
+    turn.x, turn.y, turn.z, turn.w = in_odom.rotation.as_quat().tolist()
+    odometry.header.stamp = ns_to_stamp(BEGIN)
+    plain, seen = cloud(waves()), cloud(waves(), frame="camera")
+    points = np.frombuffer(plain.data, "<f4").reshape(-1, 3)
+    moved = in_camera.rotation.apply(points) + in_camera.translation
+    seen.data = moved.astype("<f4").tobytes()
+    transforms = {
+        "/tf": transforms_of("map", "odom", map_odom),
+        "/tf_static": transforms_of("base_link", "camera", mount),
+    }
+    messages = [("/odometry", odometry), ("/elevation_cloud", seen)]
+    bag = record(tmp_path / "bag", [*transforms.items(), *messages])
+    words = ["--resolution", "0.04", "--goal", "3,0.2,0"]
+    (answer,), total = replay(capsys, bag, tmp_path / "out", *words)
+    assert total["refused_messages"] == {} and total["topics"]["tf"] == "/tf"
+    ground, right = load_terrain(tmp_path / "out" / answer["map"]), waves()
+    x, y = np.meshgrid(np.arange(0.0, 4.0, 0.1), np.arange(-1.0, 1.0, 0.1))
+    np.testing.assert_allclose(ground.elevation_at(x, y), right.elevation_at(x, y), atol=2e-3)
+    poses = np.load(tmp_path / "out" / answer["prediction"])["poses"]
+    np.testing.assert_allclose(poses[0], [1.0, 0.0, 0.0], atol=1e-6)
+
+
+def test_a_grid_map_in_odom_is_laid_onto_the_loaded_map(tmp_path, capsys):
+    save_terrain(tmp_path / "prior.npz", Terrain(np.zeros((100, 250)), 0.04, (-1.0, -2.0)))
+    file = tmp_path / "server.yaml"
+    file.write_text(f"/**: {{ros__parameters: {{terrain_file: {tmp_path / 'prior.npz'}}}}}\n")
+    map_odom = Rigid.from_rpy(2.0, -0.5, 0.02, 0.0, 0.0, 0.7)
+    x, y = np.meshgrid(np.arange(-25, 26) * 0.04, np.arange(-25, 26) * 0.04)
+    message = grid_map_of({"elevation": 0.05 * np.sin(2.0 * x) * np.cos(y)}, 0.04)
+    message.header.frame_id = "odom"
+    transforms = {"/tf_static": transforms_of("map", "odom", map_odom)}
+    messages = [("/odometry", odometry_at(1.0)), ("/elevation_map", message)]
+    bag = record(tmp_path / "bag", [*transforms.items(), *messages])
+    words = ["--parameters", str(file), "--goal", "3,0.2,0"]
+    (answer,), total = replay(capsys, bag, tmp_path / "out", *words)
+    assert total["refused_messages"] == {}
+    ground = load_terrain(tmp_path / "out" / answer["map"])
+    assert (ground.origin, ground.elevation.shape) == ((-1.0, -2.0), (100, 250))
+    for own in ((0.0, 0.0), (0.4, -0.3), (-0.5, 0.6)):
+        there = map_odom.rotation.apply((*own, 0.0)) + map_odom.translation
+        height = 0.02 + 0.05 * np.sin(2.0 * own[0]) * np.cos(own[1])
+        assert ground.elevation_at(*there[:2]) == pytest.approx(height, abs=1e-3)
+    assert ground.elevation_at(6.0, 1.0) == 0.0
+
+
+def messages_on(bag, topic, kind):
+    """Return the messages of a topic."""
+    with Reader(bag) as reader:
+        connections = [one for one in reader.connections if one.topic == topic]
+        found = reader.messages(connections)
+        return [deserialize_message(bytes(raw), kind) for _, _, raw in found]
+
+
+def test_paths_goals_and_answers_are_those_of_the_robot_with_its_offset_and_joints(
+    tmp_path, capsys
+):
+    messages = [("/elevation_cloud", cloud(waves())), ("/traverse_server/path", path_to(2.0))]
+    bag, file = record(tmp_path / "bag", messages), tmp_path / "server.yaml"
+    file.write_text(
+        "/**: {ros__parameters: {base_offset: [0.2, 0.1, 0.3, 0.0, 0.0, 0.0], "
+        "joint_map: ['bogie_right:bogie_r:-1']}}\n"
+    )
+    words = ["--parameters", str(file), "--start", "1,0,0", "--goal", "2,0,0"]
+    answers, _ = replay(capsys, bag, tmp_path / "out", *words)
+    assert [answer["kind"] for answer in answers] == ["can_traverse", "check_path"]
+    sent = path_to(2.0).poses[0].pose.position
+    for answer, begin in zip(answers, ((1.0, 0.0), (sent.x, sent.y)), strict=True):
+        poses = np.load(tmp_path / "out" / answer["prediction"])["poses"]
+        np.testing.assert_allclose(poses[0, :2], np.add(begin, (0.2, 0.1)), atol=1e-6)
+    told = tmp_path / "out" / "predictions"
+    plan = messages_on(told, "/traverse_server/plan", PathMessage)[0].poses[0].pose.position
+    np.testing.assert_allclose([plan.x, plan.y], [1.0, 0.0], atol=0.1)  # the rover leans
+    for joints in messages_on(told, "/traverse_server/predicted_joints", JointTrajectory):
+        assert "bogie_r" in joints.joint_names and "bogie_right" not in joints.joint_names
+
+
+def test_a_goal_without_a_start_is_told(tmp_path, capsys):
+    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves()))])
+    assert main(["replay", str(bag), str(tmp_path / "out"), "--goal", "2,0,0"]) == 0
+    assert "no odometry before them tells where it starts" in capsys.readouterr().err
+    assert main(["replay", str(bag), str(tmp_path / "no"), "--start", "2,0,0"]) == 2
+    assert "--goal, which is not given" in capsys.readouterr().err

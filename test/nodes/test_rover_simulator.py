@@ -132,13 +132,10 @@ def test_bad_parameters_are_refused_by_name(start_simulator, capfd):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "engine", ["quasi_static", pytest.param("mujoco", marks=pytest.mark.long)]
-)
 def test_simulator_server_controller_and_planner_drive_together_to_a_goal(
-    ros, start_simulator, start_server, engine
+    ros, start_simulator, start_server
 ):
-    simulator = start_simulator(follow_commands=True, engine=engine)
+    simulator = start_simulator(follow_commands=True)
     server, controller = start_server(planner="fan"), start_controller(ros)
     planner = ros.spin(MissionPlanner(context=ros.context))
     planner.wait_for_server()

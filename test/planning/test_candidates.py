@@ -107,11 +107,8 @@ def test_start_equal_to_goal_is_a_single_pose():
     [
         ({"start": (np.nan, 0, 0)}, "start"),
         ({"goal": (0, np.inf, 0)}, "goal"),
-        ({"goal": (0, 0)}, "goal"),
         ({"count": 0}, "count"),
-        ({"count": 2.5}, "count"),
         ({"spacing": 0.0}, "spacing"),
-        ({"spacing": np.nan}, "spacing"),
         ({"waypoint_spacing": -0.02}, "waypoint_spacing"),
         ({"goal": (1e9, 0, 0)}, "waypoints"),
     ],
@@ -147,18 +144,6 @@ def test_a_point_turn_is_a_candidate_where_it_is_shorter_than_all_curves():
     ahead = (0.0, 0.0, 0.0), (3.0, 0.0, 0.0)
     plain, turning = (generate_candidates(*ahead, swing_radius=swing) for swing in (None, SWING))
     assert all(np.array_equal(a, b) for a, b in zip(plain, turning, strict=True))
-
-
-@FEW
-@given(POSES, POSES, st.floats(0.2, 3.0))
-def test_every_dubins_word_ends_at_the_goal(start, goal, radius):
-    start, goal = np.array(start), np.array(goal)
-    paths = dubins_paths(start, goal, radius, 0.1)
-    assert 2 <= len(paths) <= 6
-    for x, y, yaw in paths:
-        assert x[-1] == pytest.approx(goal[0], abs=1e-6)
-        assert y[-1] == pytest.approx(goal[1], abs=1e-6)
-        assert np.cos(yaw[-1] - goal[2]) == pytest.approx(1.0, abs=1e-12)
 
 
 def test_the_shortest_dubins_path_of_a_known_case_has_the_known_length():

@@ -6,10 +6,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rover_physics.errors import ModelError, PoseError
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.errors import PlanningError
 from rover_planner.planning.path_query import (
     PathQueryOptions,
     answer_path_query,
@@ -115,16 +113,3 @@ def test_on_an_uncertain_map_the_bounds_are_the_risk(rover):
     ]
     assert risks[0] == sure
     assert sure < risks[1] < risks[2] < 1.0
-
-
-def test_bad_requests_are_refused(rover):
-    with pytest.raises(PlanningError, match="start"):
-        answer_path_query(rover, flat(), (np.nan, 0, 0), (1, 0, 0))
-    with pytest.raises(PlanningError, match="count"):
-        options = PathQueryOptions(count=0)
-        answer_path_query(rover, flat(), (0, 0, 0), (1, 0, 0), options)
-    with pytest.raises(ModelError, match="policy"):
-        options = COARSE.change(policy="lucky")
-        answer_path_query(rover, flat(), (0, 0, 0), (1, 0, 0), options)
-    with pytest.raises(PoseError):
-        check_path(rover, flat(), np.zeros((3, 2)), COARSE)

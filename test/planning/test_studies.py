@@ -9,6 +9,7 @@ import pytest
 from rover_physics.errors import RoverFileError
 from rover_physics.rover.rover_file import load_rover, rover_to_dict
 from rover_planner.cli import main
+from rover_planner.errors import PlanningError
 from rover_planner.studies.objectives import climbs, tallest_step
 from rover_planner.studies.rover_values import find_key, vary
 from rover_planner.studies.runner import find_rover, run_study
@@ -131,6 +132,28 @@ def test_files_are_looked_for_beside_the_study(tmp_path):
 def test_what_a_study_file_must_not_say_is_refused_by_name(changes, text):
     with pytest.raises(RoverFileError, match=r".*".join(text.split())):
         study(**changes)
+
+
+WHEEL = {"name": "wheel.radius", "from": 1e8, "to": 1e9, "count": 2}
+MANY = [
+    {"name": name, "from": 0.5, "to": 0.9, "count": 1000}
+    for name in ("wheel.radius", "wheel.width", "wheel.mass", "masses.body.mass")
+]
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"drives": [{"slope": 0.1, "length": 1e300}]}, r"a drive is 1e\+300 m long; it must be"),
+        ({"drives": [{"slope": 0.1, "length": 1e3}]}, r"a ground of 2e\+03 m in cells of 0.02 m"),
+        ({"parameters": MANY}, r"parameters have 1e\+12 combinations"),
+        ({"parameters": [WHEEL], "objective": "tallest_step"}, "no rover of .* could be judged"),
+    ],
+)
+def test_an_impossible_study_is_refused(changes, text):
+    objective = {"objective": "worst_utilisation"} if "drives" in changes else {}
+    with pytest.raises((PlanningError, RoverFileError), match=text):
+        _ = run_study(study(**objective, **changes)).best
 
 
 def test_every_number_of_a_rover_has_a_name_and_a_unit():

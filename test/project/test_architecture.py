@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The house: no circle of imports, and they run one way between rooms."""
 
-import ast
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
 
-TOP = Path(__file__).resolve().parents[2]
+from support.project.checkout import TOP, imported_names
+
 PACKAGES = ("rover_physics", "msg_adapters", "rover_planner")
 
 
@@ -22,19 +22,12 @@ def modules() -> dict[str, Path]:
 
 
 def imported_by(path: Path) -> Iterator[str]:
-    """Yield the modules of the packages that a file imports, wherever in the file it does."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            names = [f"{node.module}.{alias.name}" for alias in node.names]
-        else:
-            continue
-        for name in names:
-            while name and name not in modules():
-                name = name.rpartition(".")[0]
-            if name:
-                yield name
+    """Yield the modules of the packages that a file imports."""
+    for name in imported_names(path):
+        while name and name not in modules():
+            name = name.rpartition(".")[0]
+        if name:
+            yield name
 
 
 @lru_cache
@@ -92,12 +85,3 @@ def test_imports_run_one_way_between_rooms():
 def test_a_circle_would_be_found():
     assert find_circle({"a": {"b"}, "b": {"c"}, "c": {"a"}}) == ["a", "b", "c", "a"]
     assert find_circle({"a": {"b", "c"}, "b": {"c"}}) == []
-
-
-def kernels() -> Iterator[tuple[str, ast.FunctionDef]]:
-    for name, path in modules().items():
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.FunctionDef):
-                decorators = [getattr(item, "id", "") for item in node.decorator_list]
-                if any(decorator.endswith("kernel") for decorator in decorators):
-                    yield f"{name}.{node.name}", node

@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip("rclpy", reason="benchmarks start nodes")
 from benchmarks.measure import Figure, median_times, print_figures, quantile, write_figures
-from benchmarks.run import TOPICS, compare
+from benchmarks.run import TOPICS
 from rover_physics import load_rover
 
 SMALL = {
@@ -87,34 +87,6 @@ def test_figures_say_whether_their_target_is_met_and_become_a_file(
     assert row["met"] is met and row["value"] == value and row["repeats"] >= 5
     print_figures([figure])
     assert ("\u2713" in capsys.readouterr().out) == bool(met)
-
-
-def test_another_checkout_is_measured_in_turns_and_ratios_are_of_medians(tmp_path):
-    """A checkout need not have the same figures; its module answers as this one's does."""
-    here, there = tmp_path / "here", tmp_path / "there"
-    for checkout, name in ((here, "slow"), (there, "fast")):
-        (checkout / "benchmarks").mkdir(parents=True)
-        (checkout / "benchmarks" / "run.py").write_text(
-            "import json, pathlib, sys\n"
-            f"log = pathlib.Path({str(tmp_path / 'log')!r})\n"
-            f"said = log.read_text() if log.exists() else ''\n"
-            f"log.write_text(said + '{name[0]}')\n"
-            f"value = {6.0 if name == 'slow' else 3.0} * (1 + said.count('{name[0]}'))\n"
-            "rows = [dict(topic='t', name=n, value=value, unit='s', met=None)\n"
-            f"        for n in ('both', '{name}')]\n"
-            "assert sys.argv[1:3] == ['--only', 'bench_t']\n"
-            "pathlib.Path(sys.argv[3]).write_text(json.dumps(rows))\n"
-        )
-    (figure,) = compare("t", there, 3, here)
-    assert (tmp_path / "log").read_text() == "fssffs"
-    assert (figure.name, figure.value, figure.unit, figure.repeats) == ("both", 2.0, "x", 3)
-
-
-def test_the_fan_has_as_many_paths_as_enav():
-    poses = importlib.import_module("benchmarks.bench_poses")
-    fan = poses.enav_fan(0.0).reshape(14 * 11 * 11, 24, 3)
-    steps = np.linalg.norm(np.diff(fan[:, :, :2], axis=1), axis=2)
-    np.testing.assert_allclose(steps, 0.25)
 
 
 @pytest.mark.slow

@@ -1,17 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What README and docs name exists: files, modules, links, options, and rooms in import order."""
 
-import ast
-import importlib.util
 import re
-import runpy
 from collections.abc import Iterator
 from pathlib import Path
-from unittest import mock
 
 import pytest
 
-TOP = Path(__file__).resolve().parents[2]
+from support.project.checkout import TOP, console_scripts, imported_names
+
 PAGES = sorted(
     path.relative_to(TOP)
     for path in [*TOP.glob("*.md"), *(TOP / "docs").rglob("*.md"), TOP / "examples/README.md"]
@@ -106,18 +103,6 @@ def is_module_or_name(dotted: str) -> bool:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=str)
-def test_every_module_that_a_page_runs_can_be_run(page):
-    for name in re.findall(r"python -m ((?:rover_|benchmarks)[\w.]*)", read(page)):
-        spec = importlib.util.find_spec(name.rstrip("."))
-        assert spec is not None and spec.origin, name
-        path = Path(spec.origin)
-        if path.name == "__init__.py":
-            path = path.with_name("__main__.py")
-        text = path.read_text(encoding="utf-8")
-        assert "__main__" in text or path.name == "__main__.py", name
-
-
-@pytest.mark.parametrize("page", PAGES, ids=str)
 def test_every_make_target_that_a_page_names_is_in_the_makefile(page):
     targets = re.findall(r"^(\w+):", (TOP / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
     named = set(re.findall(r"(?:`|^)make (\w+)", read(page), re.MULTILINE))
@@ -165,11 +150,10 @@ def imports_between_rooms(package: str) -> Iterator[tuple[str, str]]:
     """Yield pairs of rooms of which the first imports the second."""
     for path in (TOP / package).rglob("*.py"):
         room = path.relative_to(TOP / package).parts[0]
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ImportFrom) and node.module:
-                parts = node.module.split(".")
-                if parts[0] == package and len(parts) > 1 and parts[1] != room:
-                    yield room, parts[1]
+        for name in imported_names(path):
+            parts = name.split(".")
+            if parts[0] == package and len(parts) > 1 and parts[1] != room:
+                yield room, parts[1]
 
 
 @pytest.mark.parametrize("package", ["rover_physics", "rover_planner"])
@@ -183,8 +167,5 @@ def test_readme_lists_every_room_after_the_rooms_that_it_imports(package):
 
 
 def test_every_node_and_command_that_is_installed_is_in_the_docs():
-    with mock.patch("setuptools.setup") as setup:
-        runpy.run_path(str(TOP / "setup.py"))
-    scripts = setup.call_args.kwargs["entry_points"]["console_scripts"]
     text = "".join(read(page) for page in PAGES)
-    assert not [line for line in scripts if f"`{line.split(' = ')[0]}" not in text]
+    assert not [name for name in console_scripts() if f"`{name}" not in text]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Launch files, parameter files and layouts name nodes, parameters and topics that exist.
+"""Launch, parameter and Nav2 files and layouts name nodes, parameters and topics that exist.
 
 PyPI has no launch: the files run with stand-ins for its actions, which keep what they are given.
 """
@@ -15,10 +15,15 @@ from typing import Any
 import pytest
 import yaml
 
+from msg_adapters.commands import joint_order
+from msg_adapters.joints import read_joint_map
+from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.rover.steering_joints import steering_joints
 from rover_planner.nodes.programs import PROGRAMS
-from support.project.checkout import TOP, console_scripts, setup_arguments
+from support.project.checkout import TOP, console_scripts
+from support.project.command_checks import check_parameter_file, check_parameters
 
-LAUNCH_FILES = sorted(path.name for path in (TOP / "launch").glob("*.py"))
 PARAMETER_FILES = sorted((TOP / "config" / "parameters").glob("*.yaml"))
 LAYOUTS = sorted((TOP / "config" / "views").iterdir())
 OF_OTHERS = {"robot_description", "diagnostics"}
@@ -77,14 +82,6 @@ def start_rover(**given: str) -> list[Any]:
     return opaque.function(defaults | given)
 
 
-def check_parameters(node: str, parameters: dict[str, Any]) -> None:
-    """Hold parameters against the table of a node."""
-    specs = {spec.name: spec for spec in PROGRAMS[node].parameters}
-    for name, value in parameters.items():
-        assert name in specs, f"{node} has no parameter {name}"
-        specs[name].check(value)
-
-
 def test_the_rover_starts_as_its_parameter_files_say(launch_modules):
     nodes = start_rover()
     assert [node.executable for node in nodes] == ["traverse_server", "traction_controller"]
@@ -138,9 +135,9 @@ def test_the_simulation_is_the_rover_with_a_simulator(launch_modules):
 
 @pytest.mark.parametrize("path", PARAMETER_FILES, ids=lambda path: path.stem)
 def test_a_parameter_file_has_parameters_that_exist_for_any_namespace(path):
-    (pattern, content), *others = yaml.safe_load(path.read_text()).items()
-    assert (pattern, others, list(content)) == ("/**", [], ["ros__parameters"])
-    check_parameters(path.stem.removeprefix("simulated_"), content["ros__parameters"])
+    ((pattern, content),) = yaml.safe_load(path.read_text()).items()
+    assert (pattern, list(content)) == ("/**", ["ros__parameters"])
+    check_parameter_file(path.stem.removeprefix("simulated_"), path)
 
 
 def test_a_parameter_file_has_the_defaults_where_it_is_not_for_a_simulation():
@@ -177,9 +174,41 @@ def test_a_layout_shows_topics_that_the_nodes_publish(path):
     assert shown <= published | OF_OTHERS
 
 
-def test_launch_and_configuration_files_are_installed():
-    installed = dict(setup_arguments()["data_files"])
-    assert installed["share/rover_planner/launch"] == [f"launch/{name}" for name in LAUNCH_FILES]
-    for path in (*PARAMETER_FILES, *LAYOUTS):
-        relative = path.relative_to(TOP)
-        assert relative.as_posix() in installed[f"share/rover_planner/{relative.parent}"]
+CONFIG = TOP / "config"
+
+
+@pytest.mark.parametrize(
+    ("file", "node"),
+    [
+        ("nav2/watch.yaml", "traverse_server"),
+        ("ros2_control/joints.yaml", "traverse_server"),
+        ("ros2_control/joints.yaml", "traction_controller"),
+    ],
+)
+def test_every_parameter_of_a_file_is_one_of_its_node(file, node):
+    check_parameter_file(node, CONFIG / file)
+
+
+def test_the_groups_of_ros2_control_have_the_joints_and_order_of_the_map():
+    def read(name):
+        return yaml.safe_load((CONFIG / "ros2_control" / name).read_text(encoding="utf-8"))
+
+    groups, nodes = read("controllers.yaml"), read("joints.yaml")
+    known = (*SUSPENSION_JOINTS, *WHEEL_JOINTS, *STEERING_JOINTS)
+    names = read_joint_map(nodes["/**"]["ros__parameters"]["joint_map"], known)
+    wheels = nodes["traction_controller"]["ros__parameters"]["joints"]
+    assert sorted(joint_order(wheels, names).tolist()) == list(range(6))
+    for group in ("wheel_efforts", "wheel_velocities"):
+        assert groups[group]["ros__parameters"]["joints"] == wheels
+    for preset in ("lsr1", "m2020"):
+        steered = names.robot_names(steering_joints(load_rover(preset)))
+        assert groups["steering_positions"]["ros__parameters"]["joints"] == list(steered)
+    kinds = groups["controller_manager"]["ros__parameters"]
+    assert {"wheel_efforts", "wheel_velocities", "steering_positions"} <= set(kinds)
+
+
+@pytest.mark.parametrize("file", ["hazard_layer.yaml", "hazard_filter.yaml"])
+def test_the_files_for_nav2_read_the_topics_of_the_server(file):
+    text = (CONFIG / "nav2" / file).read_text(encoding="utf-8")
+    assert yaml.safe_load(text)["global_costmap"]["global_costmap"]["ros__parameters"]
+    assert ": /traverse_server/hazard_map/worst" in text

@@ -1,22 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The package as a whole: one version, entry points that exist, imports one way only."""
+"""The package: one version, entry points that exist, imports one way only, and its API."""
 
 import ast
 import re
-import runpy
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
-from unittest import mock
 
 import pytest
 
 import rover_physics
+from rover_planner.nodes.programs import PROGRAMS
+from support.project.checkout import TOP, console_scripts, imported_names, setup_arguments
 
-TOP = Path(__file__).resolve().parents[2]
 ROS_FREE = {
     "numpy",
     "scipy",
@@ -30,24 +27,6 @@ ROS_FREE = {
 }
 
 
-@pytest.fixture(scope="module")
-def setup_arguments() -> dict[str, Any]:
-    """Run setup.py and return what it hands to setuptools."""
-    with mock.patch("setuptools.setup") as setup:
-        runpy.run_path(str(TOP / "setup.py"))
-    return setup.call_args.kwargs
-
-
-def imported_modules(path: Path) -> Iterator[str]:
-    """Yield the modules that a file imports, wherever in the file."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{path}: relative import"
-            yield node.module or ""
-
-
 def sources(package: str) -> list[Path]:
     return sorted((TOP / package).rglob("*.py"))
 
@@ -56,8 +35,8 @@ def package_xml() -> ElementTree.Element:
     return ElementTree.parse(TOP / "package.xml").getroot()
 
 
-def test_manifest_and_setup_have_the_version_of_the_code(setup_arguments):
-    assert setup_arguments["version"] == rover_physics.__version__
+def test_manifest_and_setup_have_the_version_of_the_code():
+    assert setup_arguments()["version"] == rover_physics.__version__
     assert package_xml().findtext("version") == rover_physics.__version__
 
 
@@ -73,52 +52,45 @@ def test_the_manifest_depends_on_every_ros_package_that_is_imported():
         module.split(".")[0]
         for package in ("msg_adapters", "rover_planner")
         for path in sources(package)
-        for module in imported_modules(path)
+        for module in imported_names(path)
     }
     ros = {name for name in used if name == "rclpy" or name.endswith(("_msgs", "_srvs"))}
     ros |= used & {"rcl_interfaces", "builtin_interfaces"}
     assert ros - {"grid_map_msgs", "nav2_msgs"} <= declared
 
 
-def test_every_console_script_is_a_function_that_exists(setup_arguments):
-    scripts = setup_arguments["entry_points"]["console_scripts"]
-    assert {line.split(" = ")[0] for line in scripts} == {
-        "rover_planner",
-        "traverse_server",
-        "mission_planner",
-        "traction_controller",
-        "rover_simulator",
-    }
-    for line in scripts:
-        module, function = line.split(" = ")[1].split(":")
+def test_every_console_script_is_a_function_that_exists():
+    scripts = console_scripts()
+    assert scripts.keys() == {"rover_planner", *PROGRAMS}
+    for module, function in scripts.values():
         tree = ast.parse((TOP / (module.replace(".", "/") + ".py")).read_text(encoding="utf-8"))
         assert function in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
 
 
-def test_every_package_is_installed(setup_arguments):
+def test_every_package_is_installed():
     there = {path.parent.relative_to(TOP) for path in TOP.glob("[rm]*/**/__init__.py")}
-    assert setup_arguments["packages"] == sorted(
-        (".".join(path.parts) for path in there), key=setup_arguments["packages"].index
+    assert setup_arguments()["packages"] == sorted(
+        (".".join(path.parts) for path in there), key=setup_arguments()["packages"].index
     )
 
 
-def test_every_configuration_file_is_installed_with_the_ament_marker(setup_arguments):
-    installed = dict(setup_arguments["data_files"])
+def test_every_configuration_and_launch_file_is_installed_with_the_ament_marker():
+    installed = dict(setup_arguments()["data_files"])
     assert installed["share/ament_index/resource_index/packages"] == ["resource/rover_planner"]
-    for path in (TOP / "config").rglob("*"):
+    for path in (*(TOP / "config").rglob("*"), *(TOP / "launch").glob("*.py")):
         if path.is_file():
             relative = path.relative_to(TOP)
             assert relative.as_posix() in installed[f"share/rover_planner/{relative.parent}"]
 
 
-def test_every_requirement_is_bounded_on_both_sides_and_locked(setup_arguments):
-    extras = setup_arguments["extras_require"]
+def test_every_requirement_is_bounded_on_both_sides_and_locked():
+    extras = setup_arguments()["extras_require"]
     names = ("ros", "plots", "view", "bags", "survey", "test")
     assert extras["all"] == [line for name in names for line in extras[name]]
     locked = (TOP / "constraints.txt").read_text(encoding="utf-8")
     names = set(re.findall(r"^([a-z0-9.-]+)==", locked, re.MULTILINE))
     asked_for = [extras[name] for name in ("all", "bench", "dev")]
-    for requirement in sum(asked_for, setup_arguments["install_requires"]):
+    for requirement in sum(asked_for, setup_arguments()["install_requires"]):
         match = re.fullmatch(r"([\w.-]+)>=[\d.]+,<[\d.]+", requirement)
         assert match, requirement
         assert match[1].lower() in names
@@ -129,7 +101,7 @@ def imports_of(package: str) -> set[str]:
     return {
         f"{path.relative_to(TOP)}: {module.split('.')[0]}"
         for path in sources(package)
-        for module in imported_modules(path)
+        for module in imported_names(path)
     }
 
 
@@ -157,3 +129,25 @@ def test_every_file_opens_with_a_sentence_that_says_what_it_holds():
         for path in sources(name):
             docstring = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
             assert docstring.split("\n\n")[0].rstrip().endswith("."), path
+
+
+def test_every_name_of_the_api_is_there():
+    for name in rover_physics.__all__:
+        assert getattr(rover_physics, name) is not None, name
+    assert set(rover_physics.__all__) <= set(dir(rover_physics))
+
+
+def test_a_name_that_is_not_there_is_refused_by_name():
+    with pytest.raises(AttributeError, match="jugde_path"):
+        _ = rover_physics.jugde_path
+
+
+def test_nothing_is_imported_before_its_use():
+    code = (
+        "import sys, rover_physics; print('numba' in sys.modules); "
+        "from rover_physics import load_rover; load_rover('lsr1'); print('numba' in sys.modules)"
+    )
+    ran = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=300, check=True
+    )
+    assert ran.stdout.split() == ["False", "False"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A program always ends with an exit code and at most one short line on stderr."""
+"""A program ends with an exit code and at most one short line, also where a library lacks."""
 
 import os
 import subprocess
@@ -9,6 +9,7 @@ import warnings
 import pytest
 
 from rover_physics.errors import RoverError
+from rover_planner.cli import main
 from rover_planner.errors import DemoError, PlanningError
 from rover_planner.shell.exit_codes import (
     EXIT_BAD_INPUT,
@@ -110,3 +111,26 @@ def test_output_into_a_closed_pipe_or_a_full_disk_leaves_no_traceback(script):
     assert ended.returncode == EXIT_FAILED
     name = "rover" if script is PRINT else "rover_planner"
     assert ended.stderr == f"{name}: the system refused: [Errno 28] No space left on device\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "module", "install"),
+    [
+        (("figure4", "out.png"), "matplotlib", "rover_planner[plots]"),
+        (("study", "study.yaml"), "matplotlib", "rover_planner[plots]"),
+        (("replay", "bag", "out"), "rosbags", "rover_planner[bags]"),
+        (("replay", "bag", "out"), "rclpy", "rover_planner[ros]"),
+        (("view",), "viser", "rover_planner[view]"),
+        (("view", "--follow"), "rclpy", "rover_planner[ros]"),
+    ],
+)
+def test_a_missing_library_is_named_with_what_installs_it(
+    words, module, install, monkeypatch, tmp_path, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(sys.modules, module, None)
+    assert main(words) == 2
+    told = capsys.readouterr().err
+    assert module in told or "ROS 2" in told
+    assert install in told and "\n" not in told.strip()
+    assert not list(tmp_path.iterdir())

@@ -9,16 +9,14 @@ import pytest
 pytest.importorskip("zarr", reason="install the extra survey")
 
 from rover_physics.traversability.judge import judge_poses
-from rover_planner.survey.chunk_survey import compute_chunk
 from rover_planner.survey.layers import unpack_bits
-from rover_planner.survey.layout import SurveyLayout, choose_chunk, find_halo
+from rover_planner.survey.layout import choose_chunk, find_halo
 from rover_planner.survey.tile_survey import survey_tile
 from support.survey_maps import (
     assert_same_bits,
     layers_of,
     make_request,
     make_rough_map,
-    prepare_here,
     survey_here,
 )
 
@@ -55,13 +53,6 @@ def test_ground_beyond_the_halo_is_not_looked_at(policy):
     assert_same_bits(whole, survey_tile(request, replace(terrain, elevation=heights), places))
 
 
-def test_ground_within_the_halo_matters(tmp_path):
-    job = prepare_here(tmp_path, make_rough_map(), make_request(step=4), chunk=16).job
-    nearer = replace(job, layout=replace(job.layout, halo=4))
-    ours, theirs = (compute_chunk(one, (1, 1)) for one in (job, nearer))
-    assert (ours["first_limit"] != theirs["first_limit"]).any()
-
-
 def test_a_survey_is_what_predict_says_on_the_whole_map(tmp_path):
     terrain = make_rough_map()
     friction = np.where(np.arange(170) < 40, 0.2, np.nan) * np.ones((150, 1))
@@ -86,28 +77,6 @@ def test_a_survey_is_what_predict_says_on_the_whole_map(tmp_path):
     both = (found & passes).all(axis=2)
     close = np.isclose(layers["worst_friction_utilisation"], use.max(axis=2), rtol=1e-3)
     assert both.sum() > 100 and close[both].mean() > 0.98
-
-
-def test_every_cell_is_in_one_tile_of_one_chunk():
-    layout = SurveyLayout((301, 517), step=3, chunk=42, halo=20)
-    seen = np.zeros(layout.shape, int)
-    for chunk in layout.all_chunks:
-        rows, columns = layout.cells_of(chunk)
-        for tile in layout.tiles_of(chunk):
-            seen[tile] += 1
-            assert rows.start <= tile[0].start and tile[1].stop <= columns.stop
-            low, left = layout.window_of(tile)
-            assert 0 <= low.start <= max(tile[0].start * 3 - 20, 0)
-            assert min((tile[1].stop - 1) * 3 + 21, 517) == left.stop
-    assert (seen == 1).all()
-
-
-def test_the_halo_holds_the_rover_at_any_angle_of_its_linkage():
-    rover = make_request().rover
-    reach = max(np.hypot(x, y) for x, y, _ in rover.suspension.wheels.values())
-    halo = find_halo(rover, 0.05)
-    assert halo % 4 == 0 and halo * 0.05 > reach + rover.wheel.radius
-    assert find_halo(rover, 0.1) < halo
 
 
 def test_chunks_take_some_seconds_and_are_not_too_many():

@@ -264,7 +264,6 @@ def test_a_scheduler_without_workers_or_with_small_ones_is_refused(ground, monke
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--chunk", "-5"], "chunk is -5"),
         (["--max-gap", "-1"], "max_gap is -1.0"),
         (["--workers", "0"], "--workers"),
         (["--workers", "100000"], "100000 workers need "),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Speed servos with droop in MuJoCo: a rover that steers keeps its steering, and speed is lost."""
+"""Speed servos with droop, and a rover that is held on a slope, in MuJoCo."""
 
 import numpy as np
 import pytest
@@ -9,6 +9,10 @@ from rover_physics.rover.steered_drive import SteeredDrive
 from support.rough_grounds import plane
 
 pytest.importorskip("mujoco", reason="install the extra bench")
+import importlib
+
+import pytest
+
 from rover_planner.simulator.mujoco_rover import MujocoRover
 
 LSR1 = load_rover("lsr1")
@@ -36,3 +40,22 @@ def test_servos_with_droop_lose_speed_by_their_torque():
     assert torques.sum() == pytest.approx(needed, rel=0.03)
     lost = 1.0 - plant.wheel_rates / rate
     np.testing.assert_allclose(lost, 0.3 * torques / most, atol=5e-3)
+
+
+pytest.importorskip("mujoco", reason="install the extra bench")
+SLOPE = np.radians(20.0)
+
+
+def test_hold_stops_a_rover_that_climbs_and_keeps_it_there():
+    hold = importlib.import_module("benchmarks.hold")
+    rest = hold.rest_on_slope("m2020", "hold", "imu lost", SLOPE, 2.0)
+    assert rest.state != "driving" and not rest.brake
+    assert rest.peak < 0.04 and abs(rest.speed) < 0.003
+
+
+def test_the_brake_holds_and_a_rover_without_torque_and_brake_rolls_away():
+    hold = importlib.import_module("benchmarks.hold")
+    rest = hold.rest_on_slope("lsr1", "brake", "wheel rates lost", SLOPE, 1.0)
+    assert rest.brake and rest.peak < 0.02
+    rest = hold.rest_on_slope("lsr1", "coast", "imu lost", SLOPE, 1.0)
+    assert rest.end < -0.5 and not rest.brake

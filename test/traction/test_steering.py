@@ -99,18 +99,10 @@ def test_a_command_beyond_the_steering_limit_is_named_and_not_driven():
     assert "steering angle of" in update.warning and not update.torques.any()
 
 
-@pytest.mark.parametrize(
-    ("policy", "command"),
-    [
-        pytest.param("optimal", (0.05, 0.05), marks=pytest.mark.long),
-        ("equal", (0.0, -0.1)),
-    ],
-)
-def test_controller_and_simulator_drive_curves_and_turns_on_a_slope(policy, command):
+def test_controller_and_simulator_turn_on_a_slope():
     plant = QuasiStaticPlant(LSR1, plane(0.1, 0.0, half=3.0), (0.0, 0.0, 0.0))
-    service = TractionService(with_policy(policy))
+    service, command = TractionService(with_policy("equal")), (0.0, -0.1)
     service.take_terrain(plane(0.1, 0.0, half=3.0))
-    travelled = 0.0
     for step in range(round(8.0 / PERIOD)):
         now, state = step * PERIOD, plant.state()
         service.take_joints(state.joint_positions, state.joint_velocities, now)
@@ -123,8 +115,6 @@ def test_controller_and_simulator_drive_curves_and_turns_on_a_slope(policy, comm
         update = service.update(now)
         assert update.fault == "" and update.warning == ""
         plant.pull(update.torques, command, PERIOD)
-        travelled += PERIOD * np.hypot(*state.velocity[:2])
     # Two seconds go into steering and the start.
     assert plant.pose()[2] == pytest.approx(command[1] * 7.0, abs=0.2 * abs(command[1] * 7.0))
-    if command[0] == 0.0:
-        assert plant.pose()[:2] == pytest.approx([0.0, 0.0], abs=0.05)
+    assert plant.pose()[:2] == pytest.approx([0.0, 0.0], abs=0.05)

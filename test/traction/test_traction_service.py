@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Torques from measurements: zero at once when anything is missing, back when it is there."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import rover_planner.traction
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.traction.settings import load_traction_settings
@@ -190,3 +195,16 @@ def test_two_wheels_that_spin_do_not_hide_that_the_rover_stands():
     standing = [0, 1, 3, 4]
     before, after = rig.run(10).torques, rig.run(200).torques
     assert after[standing].min() > 2.0 * before[standing].max() > 0.0
+
+
+def test_no_module_of_the_controller_needs_ros():
+    names = sorted(path.stem for path in Path(rover_planner.traction.__file__).parent.glob("*.py"))
+    code = (
+        "import importlib, sys\n"
+        "for name in ('rclpy', 'sensor_msgs', 'std_msgs', 'diagnostic_msgs'):\n"
+        "    sys.modules[name] = None\n"
+        f"for name in {names}:\n"
+        "    importlib.import_module(f'rover_planner.traction.{name}')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr

@@ -5,7 +5,6 @@ import subprocess
 import sys
 import threading
 import time
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,7 +18,6 @@ from rover_planner.viewer.state.background_work import BackgroundWork, Progress
 from rover_planner.viewer.state.judging import PATH, JudgeRequest, judge_request
 from rover_planner.viewer.state.scenario import Scenario
 from rover_planner.viewer.state.session import ViewSession
-from support.grounds import waves
 from support.viewer.sessions import LSR1, ramp, session_on, slow_scenario
 from support.waiting import start_watch, wait_until
 
@@ -64,10 +62,6 @@ def busy_judge(judge):
     """A thread that does not end with SLOW by itself."""
     judge._work = judge_without_end
     return judge
-
-
-def with_friction(scenario: Scenario, friction: float) -> JudgeRequest:
-    return JudgeRequest(replace(scenario, rover=replace(scenario.rover, friction=friction)))
 
 
 def wait_for_idle(work) -> None:
@@ -252,22 +246,3 @@ def test_a_path_of_an_old_list_is_not_chosen_while_others_are_planned(session):
     assert session.show_candidate(1)
     finish(session)
     assert session.shown.index == 1
-
-
-def test_a_session_on_waves_is_right_after_a_storm_of_changes():
-    session = session_on(waves)
-    session.judge_in_background(lambda: None)
-    try:
-        for k in range(200):
-            session.change_rover([("friction",)], 0.3 + 0.001 * k)
-            if k % 7 == 0:
-                session.plan_again()
-            if k % 11 == 0:
-                session.take_finished()
-            time.sleep(0.002)
-        finish(session)
-        assert session.rover.friction == pytest.approx(0.499)
-        _, verdict = judge_path(session.rover, session.terrain, session.shown.candidate.poses)
-        assert session.shown.verdict.max_friction_utilisation == verdict.max_friction_utilisation
-    finally:
-        assert session.close()

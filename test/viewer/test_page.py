@@ -9,7 +9,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from support.viewer.browser import LAPTOP, SCALE, WAIT, Visitor, needs_browser, wait_until
+from support.viewer.browser import (
+    LAPTOP,
+    SCALE,
+    WAIT,
+    Visitor,
+    needs_browser,
+    open_browser,
+    wait_until,
+)
 from support.viewer.sessions import LSR1, ask, blocked_session, wait_for_rest
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
@@ -31,6 +39,12 @@ def page():
     served.home = served.session.wanted
     yield served
     served.close()
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with open_browser() as chromium:
+        yield chromium
 
 
 @pytest.fixture(scope="module")

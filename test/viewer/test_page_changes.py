@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Changes on a page without a browser: marks, undo, files, old verdicts, cameras, other maps."""
+"""Changes on a page without a browser: marks, undo, files, links, old verdicts, cameras, maps."""
 
 import re
 from collections.abc import Iterator
@@ -11,8 +11,11 @@ import pytest
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
+import pytest
+
 from rover_physics.rover.rover_file import load_rover
 from rover_planner.studies.rover_values import write_rover
+from rover_planner.viewer.browser.link import Link
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.panel.rover_tab import CHANGED
 from rover_planner.viewer.state.session import ViewSession
@@ -75,6 +78,16 @@ def test_a_changed_number_is_marked_with_what_it_changes_and_can_be_undone_and_r
         values = {one.label: slider.value for one, slider in page.rover_tab.sliders.items()}
         assert values[FRICTION] == friction
     assert f"{CHANGED}{FRICTION}" not in labels_of(page)
+
+
+@pytest.mark.long  # a browser drags a few of them in test_page
+def test_sliders_at_both_ends_leave_the_page_without_an_error(page):
+    for value in list(page.rover_tab.sliders):
+        for number in (value.low, value.high):
+            ask(page, lambda value=value, number=number: page._change_value(value, number))
+            wait_for_rest(page)
+            assert page.errors.messages == {}, value.label
+        ask(page, lambda: page._restore(LSR1, {}))
 
 
 def test_a_rover_file_is_loaded_and_presets_and_arm_follow(page):
@@ -169,3 +182,41 @@ def test_on_a_far_map_the_rover_is_where_it_is_on_a_near_one_and_a_click_lands_w
         finally:
             page.close()
     np.testing.assert_allclose(places[FAR[0]], places[0.0], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"ground": "00000000"}, "the link is about another map"),
+        ({"policy": "magic"}, "no torque policy 'magic'; policies are equal, servo, optimal"),
+        ({"soil": "mud"}, "no soil 'mud'; soils are "),
+        ({"joints": {"wing": 1.0}}, "the link turns the joint 'wing', which lsr1 lacks"),
+    ],
+)
+def test_a_link_with_unknown_names_is_refused_and_nothing_else_changes(page, change, reason):
+    wanted, shown = page.session.wanted, []
+    choose = page.ground_tab.show_options
+    page.ground_tab.show_options = lambda options: (shown.append(options), choose(options))
+    link: Link = replace(page.sharing.make_link(), **change)
+    ask(page, lambda: page.open_link(link))
+    assert page.session.refusal.startswith(reason)
+    assert page.session.wanted is wanted and page.errors.messages == {}
+    assert shown == []
+
+
+def test_path_and_time_of_a_link_to_fewer_paths_do_not_come_with_a_later_goal(page):
+    link = replace(page.sharing.make_link(), goal=(-2.0, 0.0, 0.0), path=5, time=20.0)
+    ask(page, lambda: page.open_link(link))
+    wait_for_rest(page)
+    assert len(page.session.shown.candidates) < 5  # it stays where it is: nothing to choose from
+    ask(page, lambda: page.plan(np.array([1.0, 0.5])))
+    wait_for_rest(page)
+    assert page.session.shown.index == page.session.shown.answer.nearest != 4
+    assert page.playback.time == 0.0
+
+
+def test_path_and_time_of_a_link_come_with_its_paths(page):
+    link = replace(page.sharing.make_link(), goal=(1.0, 0.5, 0.1), path=4, time=20.0)
+    ask(page, lambda: page.open_link(link))
+    wait_until(lambda: page.session.shown.index == 3, "the path", PATIENCE)
+    wait_until(lambda: page.playback.time == 20.0, "the time", PATIENCE)

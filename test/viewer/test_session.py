@@ -138,6 +138,25 @@ def test_a_file_without_predictions_is_refused_by_name(tmp_path):
         read_prediction(tmp_path / "poses.npz")
 
 
+@pytest.mark.parametrize(
+    ("changes", "names"),
+    [
+        ({"assumptions": np.float64(1.0)}, "assumptions must be one text"),
+        ({"roll": np.float64(1.0)}, r"roll has shape \(\); it must be \(101,\)"),
+        ({"settled": np.zeros(101)}, "settled is of type float64; it must hold bools"),
+        ({"reason": np.zeros(101)}, r"reason must be an array \(n,\) of texts"),
+        ({"position": np.full((101, 3), np.nan)}, "position has a value that is NaN or beyond"),
+    ],
+)
+def test_a_file_of_other_shapes_or_types_is_refused(tmp_path, changes, names):
+    recorded(tmp_path, straight())
+    with np.load(tmp_path / "out.npz") as out:
+        np.savez(tmp_path / "bad.npz", **(dict(out) | changes))
+    with pytest.raises(PlanningError, match=names):
+        read_recorded_assumptions(tmp_path / "bad.npz")
+        read_prediction(tmp_path / "bad.npz")
+
+
 def test_a_change_of_the_rover_judges_the_recorded_path_again(tmp_path):
     session, prediction, _ = recorded(tmp_path, straight())
     assert session.change_rover([("friction",)], 0.4)

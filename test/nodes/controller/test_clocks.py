@@ -104,12 +104,3 @@ def test_the_watchdog_sends_zeros_and_the_brake_while_the_executor_hangs(rover, 
         return int(values["watchdog_trips"])
 
     wait_until(trips, "the trip in the diagnostics")
-
-
-@pytest.mark.timed
-def test_a_silent_sensor_is_a_fault_in_time(rover, drive):
-    drive()
-    began = time.time_ns()
-    rover.silent.add("imu")
-    assert wait_for_rest(rover, began) < BOUND
-    wait_until(lambda: "imu stale" in rover.status.message, "the reason")

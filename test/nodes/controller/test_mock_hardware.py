@@ -48,10 +48,10 @@ def read_config(name, node):
     return yaml.safe_load((CONFIG / name).read_text())[node]["ros__parameters"]
 
 
-class MockHardware(Node):
-    """The joints of a robot and the controllers of a group of them."""
+class KinematicRobot(Node):
+    """The joints of a robot whose motors reach every commanded rate and angle at once."""
 
-    def __init__(self, ros):
+    def __init__(self, ros, speed, yaw_rate):
         super().__init__("hardware", context=ros.context)
         self.angles = dict.fromkeys((model for model, _, _ in HARDWARE.values()), 0.0)
         self.rates = dict.fromkeys(self.angles, 0.0)
@@ -64,6 +64,10 @@ class MockHardware(Node):
             self.create_subscription(
                 Float64MultiArray, f"/{group}/commands", self._taker(group, joints), topic_qos()
             )
+        self._wanted = self.create_publisher(TwistStamped, "cmd_vel", sensor_qos())
+        self.twist = TwistStamped()
+        self.twist.twist.linear.x, self.twist.twist.angular.z = speed, yaw_rate
+        self.create_timer(0.02, self._step)
 
     def _taker(self, group, joints):
         def take(message):
@@ -76,65 +80,45 @@ class MockHardware(Node):
 
         return take
 
-    def send(self, imu=None):
+    def _step(self):
         """Send the state of all joints as the robot names them, in an order of its own."""
+        self.angles |= self.commands.get("steering_positions", {})
+        self.rates |= self.commands.get("wheel_velocities", {})
         state = JointState(name=sorted(HARDWARE))
         for robot in state.name:
             model, sign, offset = HARDWARE[robot]
             state.position.append(sign * (self.angles[model] - offset))
             state.velocity.append(sign * self.rates[model])
         self._states.publish(state)
-        self._imu.publish(imu or Imu())
-
-
-class KinematicRobot(MockHardware):
-    """Hardware whose motors reach every commanded rate and angle at once."""
-
-    def __init__(self, ros, speed, yaw_rate):
-        super().__init__(ros)
-        self._wanted = self.create_publisher(TwistStamped, "cmd_vel", sensor_qos())
-        self.twist = TwistStamped()
-        self.twist.twist.linear.x, self.twist.twist.angular.z = speed, yaw_rate
-        self.create_timer(0.02, self._step)
-
-    def _step(self):
-        self.angles |= self.commands.get("steering_positions", {})
-        self.rates |= self.commands.get("wheel_velocities", {})
-        self.send()
+        self._imu.publish(Imu())
         self._wanted.publish(self.twist)
 
 
-@pytest.fixture
-def start(ros):
-    """Return a function that starts a controller of the shipped configuration."""
-
-    def start_controller(**others):
-        own = {
-            "joint_map": read_config("joints.yaml", "/**")["joint_map"],
-            "joints": read_config("joints.yaml", "traction_controller")["joints"],
-            "enabled_at_start": True,
-        }
-        values = own | PATIENT | others
-        groups = {
-            "commands": "wheel_efforts",
-            "velocity_commands": "wheel_velocities",
-            "steering_commands": "steering_positions",
-        }
-        words = ["--ros-args"]
-        for topic, group in groups.items():
-            words += ["-r", f"~/{topic}:=/{group}/commands"]
-        parameters = [Parameter(name, value=value) for name, value in values.items()]
-        return ros.spin(
-            TractionController(context=ros.context, parameter_overrides=parameters, cli_args=words)
-        )
-
-    return start_controller
+def start_controller(ros):
+    """Start a controller of the shipped configuration."""
+    groups = {
+        "commands": "wheel_efforts",
+        "velocity_commands": "wheel_velocities",
+        "steering_commands": "steering_positions",
+    }
+    words = ["--ros-args"]
+    for topic, group in groups.items():
+        words += ["-r", f"~/{topic}:=/{group}/commands"]
+    values = PATIENT | {
+        "joint_map": read_config("joints.yaml", "/**")["joint_map"],
+        "joints": read_config("joints.yaml", "traction_controller")["joints"],
+        "enabled_at_start": True,
+    }
+    parameters = [Parameter(name, value=value) for name, value in values.items()]
+    return ros.spin(
+        TractionController(context=ros.context, parameter_overrides=parameters, cli_args=words)
+    )
 
 
-def test_rates_and_steering_angles_are_those_of_the_commanded_motion(ros, start):
+def test_rates_and_steering_angles_are_those_of_the_commanded_motion(ros):
     speed, yaw_rate = 0.03, 0.03
     robot = ros.spin(KinematicRobot(ros, speed, yaw_rate))
-    controller = start()
+    controller = start_controller(ros)
     aims = SteeredDrive(load_rover("lsr1")).aim(speed, yaw_rate)
     rates = aims.speeds / load_rover("lsr1").wheel.radius
 

@@ -67,17 +67,6 @@ def test_a_path_on_the_map_is_judged_in_odom(in_odom, client):
     assert replies[0].is_valid
 
 
-def test_a_stale_or_missing_transform_is_refused_with_the_reason(in_odom, client):
-    send(in_odom, ("map", "odom", MAP_ODOM), age=100.0)
-    plan, results = client.next_results(lambda: client.plan(on_map(START), on_map(GOAL)))
-    verdict = verdict_of(results)
-    assert plan.poses == [] and verdict["code"] == "bad_request"
-    assert "the transform from 'odom' to 'map' is stale: it is 10" in verdict["reason"]
-    assert "transform_timeout is 30 s" in verdict["reason"]
-    _, results = client.next_results(lambda: client.can_traverse(START, GOAL, frame="moon"))
-    assert "it must be in 'odom'" in verdict_of(results)["reason"]
-
-
 def test_an_empty_start_is_where_odometry_says_the_rover_is(mapped, client, lasting):
     plan, results = client.next_results(
         lambda: client.plan(PoseStamped(), stamped_pose(GOAL, "map"))
@@ -90,14 +79,6 @@ def test_an_empty_start_is_where_odometry_says_the_rover_is(mapped, client, last
     nowhere = stamped_pose((1.0, 0.0, 0.0), "")  # has no frame, but is not empty
     _, results = client.next_results(lambda: client.plan(nowhere, stamped_pose(GOAL, "map")))
     assert "start is without a frame_id" in verdict_of(results)["reason"]
-
-
-def test_odometry_in_another_frame_is_transformed(mapped, client, lasting):
-    send(mapped, ("map", "odom", MAP_ODOM), is_static=True)
-    client.send_odometry((1.0, 2.0, 0.5), "odom")
-    wait_until(lambda: mapped.service.fresh_pose() is not None, "odometry")
-    right = MAP_ODOM.then(Rigid.from_rpy(1.0, 2.0, 0.0, 0.0, 0.0, 0.5)).xyyaw
-    np.testing.assert_allclose(mapped.service.fresh_pose(), right, atol=1e-9)
 
 
 def test_a_robot_with_another_origin_gets_plans_of_its_own_frame(start_server, client, lasting):

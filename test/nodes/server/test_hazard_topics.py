@@ -20,14 +20,9 @@ from support.waiting import wait_until
 PASSABLE, IMPASSABLE, UNKNOWN = VALUES[0], VALUES[-1], -1
 
 
-def slope_and_rock(x, y):
-    """Return waves with a rock of 0.5 m at (2, 2)."""
-    return waves(x, y) + 0.5 * ((abs(x - 2.0) < 0.3) & (abs(y - 2.0) < 0.3))
-
-
-def rock_in_the_middle(x, y):
-    """Return waves with such a rock at (0, 0)."""
-    return waves(x, y) + 0.5 * ((abs(x) < 0.3) & (abs(y) < 0.3))
+def rock_at(place):
+    """Return waves with a rock of 0.5 m at (place, place)."""
+    return lambda x, y: waves(x, y) + 0.5 * ((abs(x - place) < 0.3) & (abs(y - place) < 0.3))
 
 
 class Costmap(Node):
@@ -85,7 +80,7 @@ def test_a_late_subscriber_gets_the_map_and_a_change_changes_the_grid_around_it(
     # A grid may be published before all its cells are judged.
     wait_until(lambda: is_free(worst, *away) and is_free(best, *away), "the map", 60.0)
     before = cells(worst[-1], *away)
-    client.send_terrain(make_terrain(slope_and_rock, half=3.0))
+    client.send_terrain(make_terrain(rock_at(2.0), half=3.0))
     wait_until(lambda: (cells(worst[-1], *there) == IMPASSABLE).any(), "the rock", 60.0)
     np.testing.assert_array_equal(cells(worst[-1], *away), before)
     wait_until(lambda: (cells(best[-1], *there) == IMPASSABLE).any(), "the rock", 60.0)
@@ -102,7 +97,7 @@ def test_switched_off_no_cell_is_free_and_switched_on_it_is_that_of_the_newest_m
     assert client.set_parameter("hazard_map", False)[0]
     for grids in (worst, first):
         wait_until(lambda grids=grids: set(grids[-1].data) == {UNKNOWN}, "the withdrawal")
-    client.send_terrain(make_terrain(slope_and_rock, half=3.0))
+    client.send_terrain(make_terrain(rock_at(2.0), half=3.0))
     wait_until(lambda: mapping.service.terrain.elevation.max() > 0.4, "the rock in the map")
     assert client.set_parameter("hazard_map", True)[0]
     asked = []
@@ -134,7 +129,7 @@ def test_what_was_judged_before_a_withdrawal_is_not_shown_after_it(
     assert judged.wait(60.0), "the classes on the second map"
     assert client.set_parameter("hazard_map", False)[0]
     wait_until(lambda: set(worst[-1].data) == {UNKNOWN}, "the withdrawal")
-    client.send_terrain(make_terrain(rock_in_the_middle, half=3.0))
+    client.send_terrain(make_terrain(rock_at(0.0), half=3.0))
     assert client.set_parameter("hazard_map", True)[0]
     before = len(worst)
     go_on.set()

@@ -165,20 +165,16 @@ def test_a_path_is_not_judged_by_what_was_known_before_it_was_accepted(
     rover.wait_for_stop(False)
 
 
-def test_the_service_turns_the_monitor_on_and_off(start_server, client, ros):
-    server = start_server(**WATCHFUL)
-    rover = ros.spin(Rover(ros))
-    client.send_terrain(make_terrain(waves))
-    wait_until(lambda: server.service.fresh_pose() is not None, "odometry")
-    plan = client.can_traverse(START, GOAL)
-    assert plan.poses
+def test_the_service_turns_the_monitor_on_and_off(watched, client):
+    server, rover = watched
     switch = rover.create_client(SetBool, f"{SERVER}/monitor")
-    assert call(switch, SetBool.Request(data=True)).success
-    assert server.get_parameter("monitor").value is True
-    rover.wait_for_stop(False)
-    wait_until(lambda: server.watch.finding.state == "watching", "the watch")
-    assert server.watch.finding.path_hash == path_hash(plan)
     client.send_terrain(make_terrain(wall_at(0.5)))
     rover.wait_for_stop()
     assert call(switch, SetBool.Request(data=False)).success
     rover.wait_for_stop(False)
+    client.send_terrain(make_terrain(waves))
+    plan = client.can_traverse(START, GOAL)
+    assert call(switch, SetBool.Request(data=True)).success
+    assert server.get_parameter("monitor").value is True
+    wait_until(lambda: server.watch.finding.state == "watching", "the watch")
+    assert server.watch.finding.path_hash == path_hash(plan)

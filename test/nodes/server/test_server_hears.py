@@ -90,32 +90,22 @@ def test_diagnostics_tell_what_is_wrong_and_a_no_is_not_an_error(start_server, c
     heard: list[DiagnosticArray] = []
     client.create_subscription(DiagnosticArray, "diagnostics", heard.append, 10)
 
-    def last() -> DiagnosticStatus:
-        return heard[-1].status[0]
-
-    def wait_for(level) -> DiagnosticStatus:
+    def wait_for(level, text) -> dict[str, str]:
         def is_told():
-            now = last() if heard else None
-            return now is not None and now.level == level and now
+            last = heard[-1].status[0] if heard else DiagnosticStatus(level=b"\x09")
+            values = {value.key: value.value for value in last.values}
+            told = f"{last.message}, {values.get('last question')}"
+            return values if last.level == level and text in told else None
 
-        return wait_until(is_told, f"a status of level {level}")
+        return wait_until(is_told, f"a status of level {level} with {text!r}")
 
-    assert "no map" in wait_for(DiagnosticStatus.WARN).message
+    wait_for(DiagnosticStatus.WARN, "no map")
     client.send_terrain(make_terrain(wall_at(0.5)))
     assert client.can_traverse(START, GOAL).poses == []
-    assert wait_for(DiagnosticStatus.OK).message == "ready"
-
-    def told() -> dict[str, str] | None:
-        values = {value.key: value.value for value in last().values}
-        return values if values["last question"] == "1, can_traverse" else None
-
-    values = wait_until(told, "the question")
-    assert values["map"] == "elevation_cloud" and values["map coverage [%]"] == "100.0"
-    assert 0.0 <= float(values["map age [s]"]) < 60.0
-    assert values["last answer"] != "traversable"
-    assert float(values["last latency [ms]"]) > 0.0
+    values = wait_for(DiagnosticStatus.OK, "ready, 1, can_traverse")
+    assert values["map"] == "elevation_cloud" and float(values["last latency [ms]"]) > 0.0
     server.guard.report("a test", ZeroDivisionError("made up"))
-    assert "ZeroDivisionError" in wait_for(DiagnosticStatus.ERROR).message
+    wait_for(DiagnosticStatus.ERROR, "ZeroDivisionError")
 
 
 def test_a_question_keeps_the_map_it_was_asked_about(shared, monkeypatch):

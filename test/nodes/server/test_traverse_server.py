@@ -15,11 +15,8 @@ from sensor_msgs.msg import PointCloud2
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import path_to_poses, stamped_pose
 from msg_adapters.results.markers import WITH_SPEED_SERVOS as LIME
-from msg_adapters.results.predictions import JOINTS, MEASURES, array_values
+from msg_adapters.results.predictions import MEASURES, array_values
 from rover_physics.names import WHEELS
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.rover.steering_joints import steering_joints
-from rover_physics.terrain.grid import save_terrain
 from rover_physics.traversability.classification import (
     IMPASSABLE,
     PASSABLE,
@@ -27,7 +24,7 @@ from rover_physics.traversability.classification import (
 )
 from rover_planner.nodes.result_topics import WHEEL_TOPICS
 from rover_planner.ros.qos import map_qos
-from support.grounds import gap, make_terrain, wall_at, waves
+from support.grounds import gap, make_terrain, waves
 from support.planner_client import GOAL, SERVER, START, PlannerClient, ask, verdict_of
 from support.ros_fixtures import call
 from support.waiting import wait_until
@@ -63,11 +60,9 @@ def test_who_comes_after_the_answer_hears_all_results_of_the_last_one(start_serv
         last = {topic: messages[-1] for topic, messages in late.items()}
         headers = [last[topic].header for topic in ("predicted_joints", "verdict")]
         headers += [marker.header for marker in last["markers"].markers]
-        arrays = [array_values(last[topic]) for topic in (*WHEEL_TOPICS, "tip_over_margin")]
         waypoints = int(verdict_of(last)["waypoints"])
-        return all(header == plan.header for header in headers) and all(
-            len(values) == waypoints for values in arrays
-        )
+        counts = {len(array_values(last[topic])) for topic in (*WHEEL_TOPICS, "tip_over_margin")}
+        return counts == {waypoints} and all(header == plan.header for header in headers)
 
     wait_until(heard_all, "all results of the last answer")
 
@@ -91,18 +86,6 @@ def test_a_plan_has_a_pose_where_the_class_changes(start_server, client):
     np.testing.assert_allclose(found, -1.5 + 0.02 * changes, atol=1e-9)
 
 
-def test_a_terrain_file_is_loaded_by_its_url(server, client, tmp_path):
-    terrain, file = make_terrain(gap), tmp_path / "some terrain.npz"
-    save_terrain(file, terrain)
-    for url in (str(file), "file://localhost" + str(file).replace(" ", "%20")):
-        response = client.load_map(url)
-        assert response.result == response.RESULT_SUCCESS
-    assert response.map.header.frame_id == "map"
-    unknown = np.array(response.map.data).reshape(terrain.elevation.shape) == -1
-    np.testing.assert_array_equal(unknown, np.isnan(terrain.elevation))
-    np.testing.assert_array_equal(server.service.terrain.elevation, terrain.elevation)
-
-
 def test_a_passable_goal_gets_a_plan_and_the_results_of_the_model_with_one_stamp(shared):
     plan, verdict, results = ask(shared.client)
     assert verdict["traversable"] == "true" and verdict["reason"] == ""
@@ -118,30 +101,15 @@ def test_a_passable_goal_gets_a_plan_and_the_results_of_the_model_with_one_stamp
     expected = service.answer(np.array(START), np.array(GOAL)).candidate.prediction
     for topic, field in WHEEL_TOPICS.items():
         np.testing.assert_array_equal(array_values(results[topic]), getattr(expected, field))
-        assert [dim.label for dim in results[topic].layout.dim] == ["waypoint", "wheel"]
     assert float(verdict["energy"]) == pytest.approx(expected.energy[-1])
     headers = [results[topic].header for topic in ("plan", "predicted_joints", "verdict")]
     headers += [marker.header for marker in results["markers"].markers]
     headers += [pose.header for pose in plan.poses]
     assert all(header == plan.header for header in headers)
     assert plan.header.frame_id == "map" and plan.header.stamp.sec > 0
-    joints, waypoints = results["predicted_joints"], int(verdict["waypoints"])
+    waypoints = int(verdict["waypoints"])
     assert array_values(results["tip_over_margin"]).shape == (waypoints, len(MEASURES))
-    assert tuple(joints.joint_names) == JOINTS + steering_joints(load_rover("lsr1"))
-    assert len(joints.points) == waypoints
-    last = joints.points[-1].time_from_start
-    assert last.sec + last.nanosec * 1e-9 == pytest.approx(float(verdict["time"]), abs=1e-6)
-
-
-def test_a_wall_is_refused_for_a_physical_reason(shared):
-    shared.client.send_terrain(make_terrain(wall_at(0.5)))
-    plan, verdict, results = ask(shared.client)
-    assert plan.poses == [] and results["plan"].poses == []
-    assert verdict["traversable"] == "false" and verdict["reason"]
-    assert verdict["code"] not in ("", "off_map", "unknown_ground", "bad_request")
-    assert -0.5 < json.loads(verdict["failure_pose"])[0] < 0.6
-    namespaces = [marker.ns for marker in results["markers"].markers]
-    assert "failing_pose" in namespaces and "reason" in namespaces
+    assert len(results["predicted_joints"].points) == waypoints
 
 
 def test_a_map_from_a_volatile_publisher_is_heard(shared):
@@ -177,7 +145,7 @@ def test_check_path_answers_in_json_with_all_results_and_says_why_not(shared):
 def test_the_class_is_named_and_drawn_whichever_policy_is_assumed(shared):
     server, client = shared.server, shared.client
     client.send_terrain(make_terrain(lambda x, y: 0.45 * x))  # 24 degrees: servos climb it
-    for policy, traversable in (("equal", False), ("servo", True), ("optimal", True)):
+    for policy, traversable in (("servo", True), ("optimal", True), ("equal", False)):
         assert client.set_parameter("policy", policy)[0]
         answer, results = client.next_results(lambda: client.check_poses(server, AHEAD))
         verdict = json.loads(answer.message)
@@ -186,28 +154,11 @@ def test_the_class_is_named_and_drawn_whichever_policy_is_assumed(shared):
         assert verdict["class_constraint"] == "friction" and verdict["class_wheel"] in WHEELS
         assert 0.0 < verdict["class_margin"] < 1.0
         assert set(verdict["traversability_classes"]) == {WITH_SPEED_SERVOS}
-    assert client.set_parameter("policy", "equal")[0]
-    line = next(marker for marker in results["markers"].markers if marker.ns == "path")
+    markers = {marker.ns: marker for marker in results["markers"].markers}
+    assert markers.keys() >= {"failing_pose", "reason"}
+    line = markers["path"]
     (drawn,) = {(colour.r, colour.g, colour.b) for colour in line.colors}
     assert drawn == pytest.approx((LIME.r, LIME.g, LIME.b))
-
-
-def test_soil_and_payload_of_the_server_count(shared):
-    client = shared.client
-
-    def judge():
-        answer, results = client.next_results(lambda: client.check_poses(shared.server, AHEAD))
-        return json.loads(answer.message), float(np.sum(results["wheel_loads"].data[:6]))
-
-    firm, light = judge()
-    assert client.set_parameter("soil", "dry_sand") == (True, "")
-    assert client.set_parameter("payload", 2.0) == (True, "")
-    sandy, heavy = judge()
-    assert client.set_parameter("soil", "") == (True, "")
-    assert client.set_parameter("payload", -1.0) == (True, "")
-    assert firm["max_sinkage"] == 0.0 and sandy["max_sinkage"] > 0.001
-    assert sandy["energy"] > 2.0 * firm["energy"]
-    assert heavy == pytest.approx(light + 2.0 * 9.81, rel=0.01)
 
 
 def test_the_measured_suspension_raises_a_warning_where_it_disagrees(shared, lasting):

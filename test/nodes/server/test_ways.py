@@ -7,45 +7,16 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 
-from msg_adapters.paths import path_to_poses
 from msg_adapters.results.grids import NOT_REACHED, REACHED
 from rover_planner.ros.qos import topic_qos
-from support.grounds import make_terrain, waves
+from support.grounds import make_terrain, pen, waves
 from support.planner_client import SERVER, ask
 from support.waiting import wait_until
 
-START, GOAL = (-2.5, 0.0, 0.0), (2.5, 0.0, 0.0)
 INSIDE, BEYOND = (0.0, 0.0, 0.0), (3.0, 0.0, 0.0)
 """Poses inside and outside of the pen."""
 LONG = {"search_budget": 60.0, "time_budget": 120.0}
 """Time enough for a busy machine."""
-
-
-def wall_with_gap(x, y):
-    """Return waves with a wall of 1 m along y at x = 0, open beyond y = 2."""
-    return waves(x, y) + np.where((np.abs(x) < 0.1) & (y < 2.0), 1.0, 0.0)
-
-
-def pen(x, y):
-    """Return waves with a wall of 1 m around a square of 2.6 m."""
-    edge = np.maximum(np.abs(x), np.abs(y))
-    return waves(x, y) + np.where(np.abs(edge - 1.3) < 0.1, 1.0, 0.0)
-
-
-def test_where_all_candidates_are_refused_a_path_around_is_the_plan_which_passes(
-    start_server, client
-):
-    server = start_server(waypoint_spacing=0.05, candidate_count=3, **LONG)
-    client.send_terrain(make_terrain(wall_with_gap))
-    plan, verdict, results = ask(client, start=START, goal=GOAL)
-    assert verdict["traversable"] == "true" and verdict["code"] == ""
-    poses = path_to_poses(plan, "map")
-    assert poses[:, 1].max() > 2.0
-    np.testing.assert_allclose(poses[[0, -1]], [START, GOAL], atol=1e-9)
-    assert int(verdict["chosen_candidate"]) == int(verdict["candidates"]) > 1
-    assert len(results["closed_area"].data) == 0
-    answer = client.check_poses(server, poses)
-    assert answer.success, answer.message
 
 
 def test_without_a_path_the_code_says_so_and_the_closed_area_is_a_grid(start_server, client):
@@ -65,7 +36,7 @@ def test_without_a_path_the_code_says_so_and_the_closed_area_is_a_grid(start_ser
     assert len(rows) > 0 and set(np.unique(values)) == {REACHED, NOT_REACHED}
     resolution, origin = grid.info.resolution, grid.info.origin.position
     for values, first in ((columns, origin.x), (rows, origin.y)):
-        assert np.abs(first + resolution * (values + 0.5)).max() < 1.4
+        assert np.abs(first + resolution * (values + 0.5)).max() < 1.6
 
 
 @pytest.mark.long  # the search alone is held by test/planning/answering

@@ -110,11 +110,6 @@ def test_answers_come_in_the_order_of_the_questions(desk):
     assert desk.wait(20) == [(str(k), k) for k in range(20)]
 
 
-def test_work_beyond_the_budget_is_too_long(desk):
-    desk.work("long", work_on, seconds=0.05)
-    assert desk.wait(1) == [("long", TOO_LONG)]
-
-
 def test_a_sweep_stops_at_the_deadline_of_its_question(desk):
     rover, ground = load_rover("lsr1"), make_terrain(waves)
     poses = np.zeros((2_000_000, 3))

@@ -46,6 +46,19 @@ def test_an_uncertain_map_is_judged_by_its_bounds_as_the_settings_say():
     assert passed == make_service(certain).answer(start, goal).report.to_dict()
 
 
+def test_soil_and_payload_of_the_settings_count():
+    path = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    loads, sinkages = [], []
+    for parameters in ({}, {"soil": "dry_sand", "payload": 2.0}):
+        service = make_service(make_terrain(waves), **parameters)
+        service.take_path(path)
+        judged = service.check_last_path().candidate
+        loads.append(judged.prediction.wheel_loads[0].sum())
+        sinkages.append(judged.verdict.max_sinkage)
+    assert sinkages[0] == 0.0 and sinkages[1] > 0.001
+    assert loads[1] == pytest.approx(loads[0] + 2.0 * 9.81, rel=0.01)
+
+
 def test_gaps_are_filled_or_not_as_the_settings_say_even_afterwards():
     terrain = make_terrain(waves)
     elevation = terrain.elevation.copy()

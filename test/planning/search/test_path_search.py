@@ -30,24 +30,13 @@ from rover_planner.planning.search.query import (
     choose_window,
     cut_out,
 )
-from support.grounds import make_terrain, waves
+from support.grounds import long_wall, make_terrain, pen, waves
 from support.rough_grounds import rocky
 
 LSR1 = load_rover("lsr1")
 OPTIONS = PathQueryOptions(waypoint_spacing=0.04).change(control_margin=0.0)
 LONG = LatticeSettings(budget=60.0)
 START, GOAL = (-2.5, 0.0, 0.0), (2.5, 0.0, 0.0)
-
-
-def wall_with_gap(x, y):
-    """Return waves with a wall of 1 m along y at x = 0, open beyond y = 2."""
-    return waves(x, y) + np.where((np.abs(x) < 0.1) & (y < 2.0), 1.0, 0.0)
-
-
-def pen(x, y):
-    """Return waves with a wall of 1 m around a square of 3 m."""
-    edge = np.maximum(np.abs(x), np.abs(y))
-    return waves(x, y) + np.where(np.abs(edge - 1.5) < 0.1, 1.0, 0.0)
 
 
 def ask(terrain, start=START, goal=GOAL, rover=LSR1, **options):
@@ -57,7 +46,7 @@ def ask(terrain, start=START, goal=GOAL, rover=LSR1, **options):
 @pytest.fixture(scope="module")
 def around():
     """Return question and answer of a way around a wall."""
-    question = ask(make_terrain(wall_with_gap))
+    question = ask(make_terrain(long_wall))
     return question, find_path(question, LONG)
 
 
@@ -153,14 +142,14 @@ def test_impossible_ends_and_settings_are_refused_by_name(start, goal, said):
 
 def test_a_rover_with_fixed_wheels_finds_a_way_too():
     fixed = replace(LSR1, steering=None)
-    answer = find_path(ask(make_terrain(wall_with_gap), rover=fixed), LONG)
+    answer = find_path(ask(make_terrain(long_wall), rover=fixed), LONG)
     assert answer.outcome == FOUND
     steps = np.diff(answer.path.poses, axis=0)
     assert np.hypot(steps[:, 0], steps[:, 1]).min() > 0.0
 
 
 def test_after_a_change_of_the_map_what_is_remembered_gives_the_way_of_a_new_search():
-    before = make_terrain(wall_with_gap)
+    before = make_terrain(long_wall)
     elevation = np.array(before.elevation)
     x = before.origin[0] + before.resolution * np.arange(elevation.shape[1])
     elevation[np.ix_((x > 1.9) & (x < 2.3), np.abs(x) < 0.1)] += 1.0  # a longer wall

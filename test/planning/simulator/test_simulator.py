@@ -1,17 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The simulated rover: it stands where the model says, stops where it must, sees what it can."""
+"""The simulated rover: where it stands, stops and drives, what it sees, how it follows a path."""
 
 import numpy as np
 import pytest
 
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.traction.balance import BalanceWriter
 from rover_physics.traversability.judge import judge_path
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
-from rover_planner.simulator.driving_forces import find_driving_forces
 from rover_planner.simulator.mujoco_plant import MujocoPlant
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
@@ -215,14 +212,40 @@ def test_a_rover_whose_wheels_spin_says_so():
     assert "slip" in plant.state().stopped and "rear_right" in plant.state().stopped
 
 
-def test_driving_forces_are_those_of_the_model_and_more_torque_pushes_by_as_much():
-    ground, optimal = wavy(), SweepOptions(policy="optimal")
-    here = judge_path(LSR1, ground, np.array([[-0.4, 0.1, 0.3]]), optimal)[0]
-    forces = find_driving_forces(BalanceWriter(LSR1), 0.1, here, here.torque[0], 0.0)
-    assert forces.push == pytest.approx(0.0, abs=0.01) and not forces.sliding.any()
-    assert forces.loads == pytest.approx(here.wheel_loads[0], abs=0.05)
-    here = judge_path(LSR1, plane(0.0, 0.0, half=2.0), np.zeros((1, 3)))[0]
-    forces = find_driving_forces(BalanceWriter(LSR1), 0.1, here, np.full(6, 0.3), 0.0)
-    assert forces.push == pytest.approx(18.0, rel=1e-6)
-    assert forces.loads.sum() == pytest.approx(LSR1.weight)
-    assert forces.loads[0] > here.wheel_loads[0, 0]
+def follow(path, start, speed=0.05, step=0.2, most=4000):
+    """Return the poses (n, 3) of a rover that follows a path, and the commands (n, 2)."""
+    follower, pose = PathFollower(path, 0.3, 0.5), np.array(start, float)
+    poses, commands = [pose.copy()], []
+    for _ in range(most):
+        v, rate = follower.steer(pose, speed)
+        if follower.has_arrived(pose):
+            return np.array(poses), np.array(commands)
+        pose += step * np.array([v * np.cos(pose[2]), v * np.sin(pose[2]), rate])
+        poses.append(pose.copy()), commands.append((v, rate))
+    raise AssertionError(f"did not arrive; it is at {pose}")
+
+
+def line(start, end, yaw, count=30):
+    return np.column_stack([np.linspace(start, end, count), np.full(count, yaw)])
+
+
+def test_a_path_driven_backwards_is_followed_backwards_from_beside_it():
+    yaw = 2.0
+    heading = np.array([np.cos(yaw), np.sin(yaw)])
+    aside = 0.1 * np.array([-heading[1], heading[0]])
+    poses, commands = follow(line((0.0, 0.0), -2.0 * heading, yaw), [*aside, yaw])
+    assert (commands[:-1, 0] < 0.0).all()
+    assert np.hypot(*(poses[-1, :2] + 2.0 * heading)) < 0.1
+    assert abs(aside @ poses[-1, :2]) < 0.1 * 0.03
+
+
+def test_a_change_from_forwards_to_backwards_is_driven_to_its_corner():
+    there = line((0.0, 0.0), (1.0, 0.0), 0.0)
+    angle = np.linspace(0.0, 0.8, 40)[1:]
+    back = np.column_stack([1.0 - np.sin(angle), np.cos(angle) - 1.0, angle])  # arc to the right
+    path = np.vstack([there, back])
+    poses, commands = follow(path, (0.0, 0.0, 0.0))
+    gears = np.sign(commands[:, 0])
+    assert np.count_nonzero(np.diff(gears)) == 1 and gears[0] > 0.0 > gears[-1]
+    assert poses[:, 0].max() == pytest.approx(1.0, abs=0.08)
+    assert np.hypot(*(poses[-1, :2] - path[-1, :2])) < 0.1

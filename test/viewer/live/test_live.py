@@ -2,6 +2,7 @@
 """The page follows a live graph: it shows what a rover, its server and controller publish."""
 
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -22,7 +23,8 @@ from rover_planner.nodes.rover_simulator import RoverSimulator
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.ros.qos import result_qos, sensor_qos, topic_qos
 from rover_planner.viewer.live.listener import LiveLink, LiveListener
-from rover_planner.viewer.live.live_state import StateBuilder
+from rover_planner.viewer.live.live_state import MAX_AGE, StateBuilder, TopicAge
+from rover_planner.viewer.panel.dashboard import draw_topics
 from support.grounds import make_terrain, wall_at
 from support.waiting import wait_until
 
@@ -204,3 +206,19 @@ def test_a_rover_its_map_and_the_answers_of_its_server_are_followed(ros, listene
     wait_until(lambda: not listener.latest().verdict.traversable, "the refusal")
     assert listener.latest().verdict.reason
     wait_until(lambda: listener.latest().plan is None, "no plan")  # it is another topic
+
+
+def test_a_stream_gets_stale_and_a_result_never():
+    now = time.monotonic()
+    odometry, plan, none, fresh = (
+        TopicAge("odometry", now - MAX_AGE - 22.0, True),
+        TopicAge("plan", now - MAX_AGE - 22.0, False),
+        TopicAge("odometry", None, True),
+        TopicAge("odometry", now, True),
+    )
+    assert [one.is_stale for one in (odometry, plan, none, fresh)] == [True, False, False, False]
+    assert odometry.describe() == plan.describe() == f"{MAX_AGE + 22.0:.0f} s"
+    assert none.describe() == "nothing yet"
+    text = draw_topics((odometry, plan))
+    assert 'data-topic="odometry" data-stale="true"' in text
+    assert 'data-topic="plan" data-stale="false"' in text

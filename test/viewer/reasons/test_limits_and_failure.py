@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Why and where a path is refused: limits along it, the failure, candidates, before and after."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.viewer.panel.dashboard import describe_verdict
 from rover_planner.viewer.state.before_after import (
     ChangeHistory,
     compare_drives,
@@ -17,6 +20,7 @@ from rover_planner.viewer.state.before_after import (
 from rover_planner.viewer.state.candidate_rows import list_candidates, place_numbers
 from rover_planner.viewer.state.failure import explain
 from rover_planner.viewer.state.path_limits import find_worst
+from rover_planner.viewer.state.scenario import PolicyVerdict
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import gap, make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, ramp, session_on
@@ -274,3 +278,35 @@ def test_changed_numbers_and_differences_of_the_drive_are_those_of_the_rovers():
     assert friction.before == before.verdict.max_friction_utilisation
     assert friction.after == session.shown.verdict.max_friction_utilisation
     assert found["driven"].change < 0.0
+
+
+def verdicts(session) -> dict[str, bool | None]:
+    return {one.policy: one.traversable for one in session.shown.by_policy}
+
+
+def test_a_path_is_judged_under_all_policies_and_changes_with_the_rover():
+    session = session_on(ramp)
+    assert verdicts(session) == {"equal": True, "servo": True, "optimal": True}
+    assert session.change_rover([("friction",)], 0.1)
+    assert verdicts(session) == {"equal": False, "servo": False, "optimal": False}
+    assert all(one.reason for one in session.shown.by_policy)
+
+
+def test_a_policy_that_cannot_judge_the_ground_says_so():
+    ground = make_terrain(ramp)
+    ground = replace(ground, elevation_std=np.full(ground.elevation.shape, 1e-3))
+    session = ViewSession(LSR1, ground, (-2.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    judged = {one.policy: one for one in session.shown.by_policy}
+    assert judged["servo"].traversable is None and "no bounds" in judged["servo"].reason
+    assert judged["equal"].traversable is not None
+
+
+def test_the_page_shows_a_box_for_each_policy_with_its_reason():
+    compared = (
+        PolicyVerdict("equal", False, "a <wheel> slips"),
+        PolicyVerdict("servo", True, ""),
+        PolicyVerdict("optimal", None, "no"),
+    )
+    text = describe_verdict(False, "a wheel slips", "", "", compared)
+    assert text.count("<b>passes</b>") == text.count("<b>not judged</b>") == 1
+    assert 'title="a &lt;wheel&gt; slips"' in text

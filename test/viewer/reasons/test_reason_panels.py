@@ -189,7 +189,10 @@ def test_layers_with_limits_have_them_on_their_scales_and_classes_have_a_legend(
         assert words in text
     assert "gradient(90deg" not in text and "1.00" not in text
     for name, layer in LAYERS.items():
-        scale = build_ground_mesh(LSR1, ground, name).scale
+        drawn = build_ground_mesh(LSR1, ground, name, 0.3)
+        picture, scale = np.asarray(drawn.mesh.visual.material.baseColorTexture), drawn.scale
+        assert picture.reshape(-1, 3).std(axis=0).max() > 1.0
+        assert -np.inf < scale.low < scale.high < np.inf
         assert (scale.limit is not None) == (layer.find_limit(LSR1) is not None)
         if scale.limit is not None:
             assert scale.low <= scale.limit <= scale.high
