@@ -47,7 +47,8 @@ JOINT_MAP: tuple[str, ...] = parameter(
 )
 STEERING_LIMIT: float = parameter(
     0.0,
-    "Angle that the steering joints reach; 0 is that of the rover file, which may not ask for more.",
+    "Angle that the steering joints reach; a rover file that asks for more is refused. 0 takes "
+    "that of the rover file.",
     unit="rad",
     bounds=(0.0, 3.2),
 )
