@@ -100,5 +100,5 @@ def measure_fault(
 
 def _errors(rover: DrivenRover, text: str, since: float) -> list[float]:
     """Return when diagnostics had an error with a text, after a time [s]."""
-    told = list(rover.diagnostics)
-    return [at for at, s in told if at > since and text in s.message and s.level != b"\0"]
+    statuses = list(rover.diagnostics)
+    return [at for at, s in statuses if at > since and text in s.message and s.level != b"\0"]

@@ -28,7 +28,7 @@ from benchmarks.processes import (
     START_TIME,
     Client,
     LostAnswerError,
-    Nodes,
+    NodeProcesses,
     finish,
     memory_of,
     open_nodes,
@@ -103,7 +103,9 @@ def _spread(
     ]
 
 
-def start_server(nodes: Nodes, terrain: Terrain | None = None, **parameters: Any) -> ChildProcess:
+def start_server(
+    nodes: NodeProcesses, terrain: Terrain | None = None, **parameters: Any
+) -> ChildProcess:
     """Start a server that tries candidates only; wait until it is ready."""
     if terrain is not None:
         parameters["terrain_file"] = terrain
@@ -116,9 +118,9 @@ def wait_for_log(server: ChildProcess, text: str) -> None:
     """Wait until a line of a server's log has a text in it; fail if the server ends before."""
 
     def heard() -> bool:
-        told = server.log.read_text(errors="replace")
-        assert text in told or server.running, f"the server has ended: {told}"
-        return text in told
+        log = server.log.read_text(errors="replace")
+        assert text in log or server.running, f"the server has ended: {log}"
+        return text in log
 
     wait_until(heard, f"the log line {text!r}", START_TIME)
 
@@ -126,7 +128,7 @@ def wait_for_log(server: ChildProcess, text: str) -> None:
 class MapSource:
     """A node that publishes maps transient-local, and hears the server's log."""
 
-    def __init__(self, nodes: Nodes):
+    def __init__(self, nodes: NodeProcesses):
         context = nodes.ros.context
         self.node = nodes.ros.spin(Node("map_source", context=context))
         self.logs: list[str] = []
@@ -150,7 +152,7 @@ class MapSource:
 
 @dataclass(frozen=True)
 class Burst:
-    """What became of questions that were asked at once."""
+    """Times and codes of the answers to questions that were asked at once."""
 
     times: tuple[float, ...]
     """Time of each answer, after all questions were asked [s]."""
@@ -158,7 +160,9 @@ class Burst:
     """Answers by code, "traversable" for a yes."""
 
 
-def burst(nodes: Nodes, count: int, budget: float, half_length: float, spacing: float) -> Burst:
+def burst(
+    nodes: NodeProcesses, count: int, budget: float, half_length: float, spacing: float
+) -> Burst:
     """Start a server and ask `count` questions at once about a straight path.
 
     Args:
@@ -188,7 +192,7 @@ def burst(nodes: Nodes, count: int, budget: float, half_length: float, spacing: 
 
 @dataclass
 class Soak:
-    """What happened in a time of questions without a pause."""
+    """Response times, lost answers and memory under questions without a pause."""
 
     times: list[float] = field(default_factory=list)
     """Response times [s]."""
@@ -200,7 +204,7 @@ class Soak:
     """Memory of the server, once a second [MB]."""
 
 
-def soak(nodes: Nodes, seconds: float, clients: int) -> Soak:
+def soak(nodes: NodeProcesses, seconds: float, clients: int) -> Soak:
     """Ask without a pause, with maps of new content at 1 Hz and joint states at 100 Hz."""
     server = start_server(nodes, make_terrain(waves), candidate_count=1, time_budget=30.0)
     askers = [nodes.client(f"asker{k}").connect() for k in range(clients)]
@@ -251,13 +255,13 @@ def make_soak_figures(found: Soak) -> list[Figure]:
     return [Figure("soak", *row, repeats=count) for row in rows]
 
 
-def start_heavy(nodes: Nodes) -> tuple[ChildProcess, Client]:
+def start_heavy(nodes: NodeProcesses) -> tuple[ChildProcess, Client]:
     """Start a server whose questions take minutes; return it and an asker."""
     server = start_server(nodes, make_terrain(waves), time_budget=600.0, **HEAVY)
     return server, nodes.client("asker").connect()
 
 
-def time_hearing(nodes: Nodes, repeats: int) -> list[Figure]:
+def time_hearing(nodes: NodeProcesses, repeats: int) -> list[Figure]:
     """Time requests during questions that would take minutes."""
     _, asker = start_heavy(nodes)
     other, maps = nodes.client("other").connect(), MapSource(nodes)
@@ -283,7 +287,7 @@ def time_hearing(nodes: Nodes, repeats: int) -> list[Figure]:
     ]
 
 
-def time_signal(nodes: Nodes) -> float:
+def time_signal(nodes: NodeProcesses) -> float:
     """Return the time from SIGINT, during a question, to the end of the process [s]."""
     server, asker = start_heavy(nodes)
     future = asker.begin_plan(START, GOAL)
@@ -292,11 +296,11 @@ def time_signal(nodes: Nodes) -> float:
     began = time.perf_counter()
     os.kill(server.pid, signal.SIGINT)
     wait_until(lambda: not server.running, "the end of the server")
-    assert server.exit_code == 0, server.last_words()
+    assert server.exit_code == 0, server.last_line()
     return time.perf_counter() - began
 
 
-def time_restart(nodes: Nodes) -> tuple[float, float]:
+def time_restart(nodes: NodeProcesses) -> tuple[float, float]:
     """Kill a server during a question and start it again; its map is latched by its publisher.
 
     Returns:
@@ -319,7 +323,7 @@ def time_restart(nodes: Nodes) -> tuple[float, float]:
         try:
             plan = asker.plan(START, GOAL, patience)
         except LostAnswerError:
-            assert second.running, second.last_words()
+            assert second.running, second.last_line()
             patience *= 1.2  # a busy machine needs more time for an answer
             continue
         answer = answer or time.perf_counter() - began

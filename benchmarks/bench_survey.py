@@ -33,14 +33,14 @@ POSES = 20_000
 
 @dataclass(frozen=True)
 class Run:
-    """What a command took."""
+    """Times and report of a command."""
 
     seconds: float
     """Time by the clock [s]."""
     cpu: float
     """CPU time of all its processes [s]."""
     report: dict
-    """What it printed."""
+    """The printed report."""
 
 
 def run(*words: object) -> Run:

@@ -38,7 +38,7 @@ ALONE_TIME = 20.0
 """Time for which updates are measured alone [s]."""
 PRIORITY = 50
 """Real-time priority (SCHED_FIFO) of the controller, as in ros2_control, if it is granted."""
-NUMBERS = ("updates", "missed_cycles", "fallbacks", "update_time_median_ms", "update_time_p99_ms")
+REPORTED = ("updates", "missed_cycles", "fallbacks", "update_time_median_ms", "update_time_p99_ms")
 """Values of the diagnostics that are read."""
 START, GOAL = (-5.0, -6.0, 0.0), (5.0, -6.0, 0.0)
 """Poses of the query that keeps the server busy: x, y [m], yaw [rad]."""
@@ -63,7 +63,7 @@ class DiagnosticsReader:
             if time.monotonic() > end:
                 raise TimeoutError(f"the controller made {self.values.get('updates', 0)} updates")
             time.sleep(0.1)
-        return {key: float(self.values[key]) for key in NUMBERS}
+        return {key: float(self.values[key]) for key in REPORTED}
 
 
 def measure() -> list[Figure]:
@@ -74,7 +74,7 @@ def measure() -> list[Figure]:
 def measure_alone() -> list[Figure]:
     """Measure a node that updates and publishes at RATE, on a drive over rocks."""
     prediction, motions, duration = drive_states(load_rover("lsr1"), rocky(1))
-    assert prediction.settled.all(), "the rover must settle everywhere on the way"
+    assert prediction.settled.all(), "the rover must settle everywhere on the path"
     context = Context()
     rclpy.init(context=context, domain_id=DOMAIN)
     enabled = [Parameter("enabled_at_start", value=True)]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra
 
-from benchmarks.ways import Case, Pair
+from benchmarks.path_search import Pair, SearchCase
 from rover_planner.planning.search.connections import Connection, connect_goal, connect_start
 from rover_planner.planning.search.edges import Edges
 from rover_planner.planning.search.judge import PathJudge
@@ -36,7 +36,7 @@ class NoTruthError(Exception):
 class Truth:
     """The lattice of one case with what the model finds of it."""
 
-    case: Case
+    case: SearchCase
     """The rover on its ground."""
     judge: PathJudge = field(init=False)
     """The model."""

@@ -85,11 +85,11 @@ class Obstacle:
 
 
 @dataclass(frozen=True)
-class Drive:
+class DriveResult:
     """Result of a drive; means are over time and wheels, up to the end or where it got stuck."""
 
     passed: bool
-    """Whether the rover reached the end."""
+    """True if the rover reached the end."""
     end: float
     """x of the body's origin at the end [m]."""
     duration: float
@@ -121,7 +121,7 @@ OBSTACLES = tuple(
 """Obstacles of the benchmarks: frictions from 0.4 to 1.0."""
 
 
-class Steering:
+class DriveSteering:
     """Follows the x axis: what a path follower commands, and what this asks of the wheels."""
 
     def __init__(self, plant: MujocoRover, tries: int):
@@ -149,7 +149,7 @@ class Steering:
 
 
 def make_controller(
-    name: str, plant: MujocoRover, obstacle: Obstacle, steering: Steering
+    name: str, plant: MujocoRover, obstacle: Obstacle, steering: DriveSteering
 ) -> Callable[[], np.ndarray]:
     """Return a function that advances the plant by PERIOD and returns its torques (6,) [N m]."""
     if name == SERVO:
@@ -184,7 +184,7 @@ def drive(
     tries: int = 1,
     most_time: float = 2.0,
     timestep: float = TIMESTEP,
-) -> Drive:
+) -> DriveResult:
     """Drive the rover lsr1 over an obstacle.
 
     Args:
@@ -196,7 +196,7 @@ def drive(
     """
     rover = obstacle.rover
     plant = MujocoRover(rover, obstacle.ground, (START, 0.0, 0.0), obstacle.friction, timestep)
-    steering = Steering(plant, tries)
+    steering = DriveSteering(plant, tries)
     control = make_controller(name, plant, obstacle, steering)
     slip = torque = energy = 0.0
     peaks: list[float] = []
@@ -213,7 +213,7 @@ def drive(
         peaks.append(float(used.max(initial=0.0)))
     if not peaks:
         raise ValueError(f"the rover cannot stand at the start of {obstacle.label}")
-    return Drive(
+    return DriveResult(
         passed=bool(plant.pose[0] >= END),
         end=float(plant.pose[0]),
         duration=plant.time,

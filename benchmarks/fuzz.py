@@ -34,7 +34,7 @@ from benchmarks.processes import (
     SERVER,
     START_TIME,
     LostAnswerError,
-    Nodes,
+    NodeProcesses,
     finish,
     memory_of,
     open_nodes,
@@ -49,7 +49,7 @@ from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.ros.qos import map_qos, topic_qos
 from support.waiting import wait_until
 
-NUMBERS = (
+ODD_NUMBERS = (
     0.0, -0.0, 5e-324, 1e-310, 1e-154, 1e-9, 1e-3, 1.0, -1.0, 3.15, 1e6, 4.6e6, -1e9, 1.1e9, 1e19,
     3.4e38, 1e154, -1e200, 1.79e308, math.inf, -math.inf, math.nan,
 )  # fmt: skip
@@ -200,7 +200,7 @@ class Mutator:
             low = 0 if kind[0] in "ubo" else -(2 ** (bits - 1))
             return self.pick([one for one in WHOLE if low <= one < low + 2**bits])
         if isinstance(value, float):
-            return self.pick(NUMBERS)
+            return self.pick(ODD_NUMBERS)
         if isinstance(value, list) and value:
             odd = [*value[1:], self.pick(NAMES) if isinstance(value[0], str) else value[0]]
             return self.pick((value[: len(value) // 2], value + value[:1], value[::-1], odd))
@@ -217,7 +217,7 @@ class Mutator:
         numbers = changed[: len(changed) // 4 * 4].view(kind)
         with np.errstate(all="ignore"):
             numbers[self.rng.integers(len(numbers), size=self.pick((1, 3, len(numbers))))] = (
-                self.pick(NUMBERS)
+                self.pick(ODD_NUMBERS)
             )
         if isinstance(value, np.ndarray):
             return changed
@@ -227,14 +227,14 @@ class Mutator:
 class Fuzzer:
     """Throws batches of inputs at both nodes and probes them after each."""
 
-    def __init__(self, nodes: Nodes, seed: int):
+    def __init__(self, nodes: NodeProcesses, seed: int):
         self._mutator, self._nodes = Mutator(seed), nodes
         self.counts: Counter[str] = Counter()
         """Inputs by kind."""
         self.slowest: dict[str, float] = {}
         """Longest time for one input [s], by kind."""
         self.defects: list[str] = []
-        """What must not happen: deaths, hangs, internal errors, lost maps, memory."""
+        """Found defects: deaths, hangs, internal errors, lost maps, memory."""
         self.commands, self.worst_torque = 0, 0.0
         """Number of commands that came, and largest commanded torque [N m]."""
         self._start = {
@@ -307,7 +307,7 @@ class Fuzzer:
         """Check that both nodes live, answer and keep a good map."""
         for name, child in self._running.items():
             if not child.running:
-                self.defects.append(f"{where}: {name} died: {child.last_words()[:200]}")
+                self.defects.append(f"{where}: {name} died: {child.last_line()[:200]}")
                 self._running[name] = self._nodes.start(name, **self._start[name])
                 self._wait_for_nodes()
         if not self._reset_parameters():

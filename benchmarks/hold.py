@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a rover on a slope does when it stops to be driven, by rest policy, in MuJoCo.
+"""Measures in MuJoCo how a rover on a slope rests when it is no longer driven, by rest policy.
 
 Run from the repository: python -m benchmarks.hold [--slope DEG] [--seconds S]
 It needs the extra `bench`. Its results are in docs/validation.md. The rover rests, is enabled and
@@ -44,16 +44,16 @@ ROVERS = {"lsr1": 6.0, "m2020": 12.0}
 
 @dataclass(frozen=True)
 class Rest:
-    """What a rover did after an event."""
+    """State and motion of a rover after an event."""
 
     state: str
     """State of the controller at the end."""
     brake: bool
-    """Whether the controller commanded the brake at the end."""
+    """True if the controller commanded the brake at the end."""
     peak: float
     """Largest distance from the place of the event [m]."""
     end: float
-    """Way along the slope since the event, positive uphill [m]."""
+    """Distance along the slope since the event, positive uphill [m]."""
     speed: float
     """Speed at the end [m/s]."""
 
@@ -128,8 +128,8 @@ def main(
             for event in EVENTS:
                 for direction, sign in (("up", 1.0), ("down", -1.0)):
                     rest = rest_on_slope(rover, policy, event, sign * np.radians(slope), seconds)
-                    told = f"{rest.peak:.3f}", f"{rest.end:+.3f}", f"{rest.speed:+.3f}"
-                    rows.append((rover, direction, policy, event, rest.state, rest.brake, *told))
+                    cells = f"{rest.peak:.3f}", f"{rest.end:+.3f}", f"{rest.speed:+.3f}"
+                    rows.append((rover, direction, policy, event, rest.state, rest.brake, *cells))
     headings = ("rover", "drives", "policy", "event", "state", "~/brake", "farthest [m]",
                 "end, uphill [m]", "speed [m/s]")  # fmt: skip
     title = f"Slope of {slope:g} deg, friction {FRICTION:g}, {seconds:g} s after the event"

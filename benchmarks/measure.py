@@ -32,7 +32,7 @@ class Figure:
     topic: str
     """Part of the product, such as "pose"."""
     name: str
-    """What was measured."""
+    """Name of the measured quantity."""
     value: float
     """Median of the repeats."""
     unit: str
@@ -40,7 +40,7 @@ class Figure:
     target: float | None = None
     """Target; None if there is none."""
     at_least: bool = False
-    """Whether the target is a minimum; otherwise it is a maximum."""
+    """True if the target is a minimum; otherwise it is a maximum."""
     against: str = ""
     """Reference of a ratio or difference, measured in turns with it."""
     repeats: int = REPEATS
@@ -48,7 +48,7 @@ class Figure:
 
     @property
     def met(self) -> bool | None:
-        """Whether the target is met; None without a target."""
+        """True if the target is met; None without a target."""
         if self.target is None:
             return None
         return self.value >= self.target if self.at_least else self.value <= self.target

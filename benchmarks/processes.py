@@ -51,7 +51,7 @@ class LostAnswerError(Exception):
     """A client has waited in vain for an answer."""
 
 
-class Nodes:
+class NodeProcesses:
     """Starts nodes and clients; `open_nodes` ends them."""
 
     def __init__(self, ros: RosRun, children: list[ChildProcess], folder: Path):
@@ -101,12 +101,12 @@ class Nodes:
 
 
 @contextlib.contextmanager
-def open_nodes() -> Iterator[Nodes]:
+def open_nodes() -> Iterator[NodeProcesses]:
     """Yield what starts nodes; all processes and nodes are ended at the end of the block."""
     with tempfile.TemporaryDirectory() as folder, stopping_children() as children:
         ros = RosRun(DOMAIN)
         try:
-            yield Nodes(ros, children, Path(folder))
+            yield NodeProcesses(ros, children, Path(folder))
         finally:
             ros.close()
 
@@ -170,8 +170,8 @@ class Client:
 
     def set_parameter(self, name: str, value: object) -> bool:
         """Set a parameter of the server; return whether it was accepted."""
-        told: ParameterMessage = Parameter(name, value=value).to_parameter_msg()
-        request = SetParameters.Request(parameters=[told])
+        message: ParameterMessage = Parameter(name, value=value).to_parameter_msg()
+        request = SetParameters.Request(parameters=[message])
         return finish(self._parameters.call_async(request), 10.0).results[0].successful
 
 

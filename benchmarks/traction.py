@@ -19,7 +19,7 @@ from benchmarks.drives import (
     EQUAL_TORQUES,
     OBSTACLES,
     SERVO,
-    Drive,
+    DriveResult,
     Obstacle,
     drive,
     run_in_processes,
@@ -37,9 +37,9 @@ SUMS = {
     "energy": ("energy [J]", 1, np.sum),
     "mean_utilisation": ("utilisation", 2, np.mean),
 }
-"""What is summed up: heading, digits, and whether the sum or the mean of all obstacles."""
+"""Columns of the summary: heading, digits, and sum or mean over all obstacles."""
 
-Drives = dict[tuple[Obstacle, str], Drive]
+Drives = dict[tuple[Obstacle, str], DriveResult]
 """Drives by obstacle and controller."""
 
 

@@ -69,8 +69,8 @@ def print_drives(policy: str) -> None:
             continue
         wrongly_passed += verdict.traversable
         numbers = f"{drive.friction}", f"{drive.max_torque:.2f}"
-        told = drive.outcome, f"{drive.end:.2f}", verdict.reason or "passable"
-        rows.append((drive.label, *numbers, *told))
+        cells = drive.outcome, f"{drive.end:.2f}", verdict.reason or "passable"
+        rows.append((drive.label, *numbers, *cells))
     print_table(
         f"Drives under {policy} torques: {agree} of {agree + len(rows)} agree, "
         f"{wrongly_passed} passable that got stuck or tipped",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How much do better torques buy? The tallest step that the rover climbs under three policies.
+"""Compares three torque policies by the tallest step that the rover climbs.
 
 `equal`: all wheels pull alike. `servo`: each wheel has a speed servo, so torque goes where there
 is grip. `optimal`: a traction controller shares the torques so that the least friction is needed.

@@ -62,8 +62,8 @@ try:
         stamp = plan.header.stamp.sec, plan.header.stamp.nanosec
         while stamp not in verdicts:
             rclpy.spin_once(node)
-        told = verdicts[stamp]
-        words = f"{float(told['length']):.1f} m" if plan.poses else f"no: {told['reason']}"
+        verdict = verdicts[stamp]
+        words = f"{float(verdict['length']):.1f} m" if plan.poses else f"no: {verdict['reason']}"
         print(f"to {x}, {y}: {words}")
         axis.plot(x, y, "go" if plan.poses else "rx", markersize=9)
         axis.plot(*np.array([[p.pose.position.x, p.pose.position.y] for p in plan.poses]).T)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What traction control saves: the same drive over rocks in MuJoCo, with and without it.
+"""Compares the same drive over rocks in MuJoCo with and without traction control.
 
 MuJoCo simulates bodies, contacts and slip, and shares only the rover's numbers with the model of
 this package. First each wheel has a speed servo. Then the traction controller shares the torques

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
 from msg_adapters.errors import MessageError
-from msg_adapters.joints import OWN_NAMES, JointMap
+from msg_adapters.joints import OWN_NAMES, JointNames
 from rover_physics.names import WHEEL_JOINTS, WHEELS
 
 
@@ -30,7 +30,7 @@ def twist_to_speeds(twist: TwistStamped | Twist) -> tuple[float, float]:
     return forward, yaw
 
 
-def joint_order(joints: Sequence[str], names: JointMap = OWN_NAMES) -> NDArray[np.int64]:
+def joint_order(joints: Sequence[str], names: JointNames = OWN_NAMES) -> NDArray[np.int64]:
     """Return the index (6,) of the wheel that each named joint drives.
 
     Args:

@@ -19,7 +19,7 @@ from sensor_msgs.msg import PointCloud2, PointField
 from msg_adapters.errors import MessageError
 from msg_adapters.gridding import (
     CELL_HEIGHTS,
-    CellGrid,
+    CloudGrid,
     Raster,
     check_extent,
     check_precision,
@@ -129,7 +129,7 @@ def terrain_from_point_cloud(
     return _terrain_of_scatter(read_points(cloud), resolution, cell_height)
 
 
-def _is_wanted(grid: CellGrid, resolution: float) -> bool:
+def _is_wanted(grid: CloudGrid, resolution: float) -> bool:
     """Return whether a detected grid has the requested resolution; 0 accepts any."""
     return resolution == 0.0 or abs(grid.resolution - resolution) <= 1e-3 * resolution
 

@@ -21,7 +21,7 @@ MAX_CELLS = 25_000_000
 """Largest map built from a cloud [cells]; one distant outlier must not exhaust the memory."""
 
 CELL_HEIGHTS = ("max", "mean", "median")
-"""Ways to combine several points of a cell into its height."""
+"""Methods that combine several points of a cell into its height."""
 
 _MIN_FILL = 0.05
 """Smallest share of cells with a point in a detected grid; below it the spacing is accidental."""
@@ -31,7 +31,7 @@ _MAX_OFF_CENTRE = 0.02
 
 
 @dataclass(frozen=True)
-class CellGrid:
+class CloudGrid:
     """Square cells that hold all points of a cloud."""
 
     resolution: float
@@ -49,7 +49,7 @@ class CellGrid:
 class Raster:
     """A regular grid whose points are stored row by row or column by column."""
 
-    grid: CellGrid
+    grid: CloudGrid
     """The cells; each has one point."""
     shape: tuple[int, int]
     """Shape (h, w) of the points in the message."""
@@ -96,7 +96,7 @@ def detect_raster(x: NDArray[Any], y: NDArray[Any]) -> Raster | None:
     return Raster(grid, inner.shape, by_columns, descending)
 
 
-def detect_grid(xy: NDArray[np.float64], precision: float) -> CellGrid | None:
+def detect_grid(xy: NDArray[np.float64], precision: float) -> CloudGrid | None:
     """Detect the regular grid along x and y of points (n, 2); return None if there is none.
 
     Args:
@@ -138,7 +138,7 @@ def rounding_error(*coordinates: NDArray[Any]) -> float:
     return float(np.finfo(np.float32 if single else np.float64).eps * extent)
 
 
-def _fit_grid(x, y, points: int, noise: float) -> CellGrid | None:
+def _fit_grid(x, y, points: int, noise: float) -> CloudGrid | None:
     """Fit cells to the distinct x and y values of a number of points; return None if none fit."""
     along_x, along_y = _detect_axis(x, noise), _detect_axis(y, noise)
     if along_x is None or along_y is None:
@@ -161,7 +161,7 @@ def _fit_grid(x, y, points: int, noise: float) -> CellGrid | None:
     _check_size(counts[0] * counts[1], spans, fitted)
     resolution = _round_within(fitted, noise / max(counts))
     origin = (_round_within(along_x[0], noise), _round_within(along_y[0], noise))
-    return CellGrid(resolution, origin, counts[0], counts[1])
+    return CloudGrid(resolution, origin, counts[0], counts[1])
 
 
 def _tolerance(resolution: float, noise: float) -> float:
@@ -188,17 +188,17 @@ def _detect_axis(values: NDArray[np.float64], noise: float) -> tuple[float, floa
     return float(first), float(step)
 
 
-def lay_out_cells(xy: NDArray[np.float64], resolution: float) -> CellGrid:
+def lay_out_cells(xy: NDArray[np.float64], resolution: float) -> CloudGrid:
     """Return cells for points (n, 2) [m], centred on multiples of the resolution [m]."""
     low, high = xy.min(axis=0), xy.max(axis=0)
     first = np.rint(low / resolution)
     counts = np.rint(high / resolution) - first + 1.0
     _check_size(float(counts.prod()), high - low, resolution)
     origin = first * resolution
-    # `CellGrid.cells` rounds halves of a cell otherwise than the lines above.
+    # `CloudGrid.cells` rounds halves of a cell otherwise than the lines above.
     origin += np.minimum(np.rint((low - origin) / resolution), 0.0) * resolution
     counts = np.maximum(counts, np.rint((high - origin) / resolution) + 1.0)
-    return CellGrid(
+    return CloudGrid(
         resolution, (float(origin[0]), float(origin[1])), int(counts[0]), int(counts[1])
     )
 
@@ -233,7 +233,7 @@ def check_precision(xy: NDArray[np.float64], precision: float, cell: float) -> N
         )
 
 
-def combine(cells, values, grid: CellGrid, how: str) -> NDArray[np.float64]:
+def combine(cells, values, grid: CloudGrid, how: str) -> NDArray[np.float64]:
     """Combine the values (n,) of each cell; NaN in cells without a value."""
     size = grid.rows * grid.columns
     if how == "max":

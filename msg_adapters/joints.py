@@ -71,7 +71,7 @@ class JointLink:
     """Angle of the model where the angle in messages is 0 [rad]."""
 
 
-class JointMap:
+class JointNames:
     """Converts joint values of messages; joints that it does not name are the same in both."""
 
     def __init__(self, links: Sequence[JointLink] = ()):
@@ -139,11 +139,11 @@ class JointMap:
         return np.array([self.link(name).offset for name in names])
 
 
-OWN_NAMES = JointMap()
+OWN_NAMES = JointNames()
 """The map of a robot whose joints have the names, signs and zeros of the model."""
 
 
-def read_joint_map(entries: Sequence[str], known: Collection[str]) -> JointMap:
+def read_joint_map(entries: Sequence[str], known: Collection[str]) -> JointNames:
     """Return the map of the parameter joint_map.
 
     Args:
@@ -155,7 +155,7 @@ def read_joint_map(entries: Sequence[str], known: Collection[str]) -> JointMap:
             joint has.
     """
     links = [_read_link(entry, known) for entry in entries]
-    joints = JointMap(links)
+    joints = JointNames(links)
     own = {name for name in known if name not in {link.model for link in links}}
     for link in links:
         if link.robot in own:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether any torques do with a friction utilisation, by independent linear programs."""
+"""Decides by independent linear programs if any torques keep to a friction utilisation."""
 
 import numpy as np
 from scipy.optimize import linprog

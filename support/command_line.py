@@ -22,7 +22,7 @@ def write_ground_and_path(folder: Path) -> Path:
     return folder
 
 
-def predict_words(
+def predict_arguments(
     folder: Path, rover="lsr1", terrain="terrain.npz", poses="poses.npz", out="out.npz"
 ) -> list[str]:
     """Return the arguments of `rover_planner predict` for files of a folder."""

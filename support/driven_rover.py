@@ -28,7 +28,7 @@ CONTROLLER = "traction_controller"
 QUEUE = 1000
 """Messages that wait for a listener that is late; none is lost."""
 LATENESS = ("waiting for ", " stale: none for ", "updates came too late", "the clock was stepped")
-"""What faults say that come at the start, and on a machine that stalls."""
+"""Texts of faults that come at the start, and on a machine that stalls."""
 
 Stamp = Callable[[], int]
 """Returns a header stamp [ns]."""

@@ -148,7 +148,7 @@ class PlannerClient(Node):
         self._counts[topic] += 1
 
     def _has_all(self) -> bool:
-        """Return whether each topic has told the same number of answers, and all of this node."""
+        """Return whether all topics have the same number of answers, and all of this node."""
         return len(set(self._counts.values())) == 1 and self._counts["plan"] >= self._answers
 
     def wait_for_log(self, text: str) -> None:

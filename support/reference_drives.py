@@ -29,7 +29,7 @@ LENGTH, TURN = 2.4, np.pi
 
 
 @dataclass(frozen=True)
-class Drive:
+class ReferenceDrive:
     """One drive of the rover lsr1 over an obstacle, from x = -1.2 to 1.2 along +x."""
 
     kind: str
@@ -53,11 +53,13 @@ class Drive:
         )
 
 
-def read_drives() -> tuple[Drive, ...]:
+def read_drives() -> tuple[ReferenceDrive, ...]:
     """Return all drives."""
     rows = json.loads(DRIVES.read_text())["rows"]
     return tuple(
-        Drive(row["kind"], row["size"], row["mu"], row["tau_max"], row["outcome"], row["x"])
+        ReferenceDrive(
+            row["kind"], row["size"], row["mu"], row["tau_max"], row["outcome"], row["x"]
+        )
         for row in rows
     )
 
@@ -98,7 +100,7 @@ def unlimited(rover: Rover) -> Rover:
     return replace(rover, limits=limits)
 
 
-def judge_drive(drive: Drive, policy: str) -> tuple[PathPrediction, Verdict]:
+def judge_drive(drive: ReferenceDrive, policy: str) -> tuple[PathPrediction, Verdict]:
     """Return prediction and verdict of a drive."""
     rover = unlimited(load_rover("lsr1"))
     prediction = judge_path(
@@ -110,7 +112,7 @@ def judge_drive(drive: Drive, policy: str) -> tuple[PathPrediction, Verdict]:
     return prediction, hold_against_limits(rover, prediction)
 
 
-def judge_drives(policy: str) -> Iterator[tuple[Drive, PathPrediction, Verdict]]:
+def judge_drives(policy: str) -> Iterator[tuple[ReferenceDrive, PathPrediction, Verdict]]:
     """Yield every drive with its prediction and verdict."""
     for drive in read_drives():
         yield (drive, *judge_drive(drive, policy))
@@ -135,7 +137,7 @@ class Curve:
     start: np.ndarray
     """(3,) x, y [m], yaw [rad]."""
     kept: bool
-    """Whether it went all the way and ended within KEPT of its nominal end."""
+    """True if it went all the way and ended within KEPT of its nominal end."""
     poses: np.ndarray
     """(k, 3) poses of the trace."""
     forces: np.ndarray
@@ -150,7 +152,7 @@ class Curve:
 
     @property
     def steered(self) -> bool:
-        """Whether the end wheels steer."""
+        """True if the end wheels steer."""
         return self.mode in ("steered", "spot")
 
 

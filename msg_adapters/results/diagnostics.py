@@ -56,7 +56,7 @@ def diagnostics(statuses: Sequence[DiagnosticStatus], stamp: Any) -> DiagnosticA
 def search_diagnostics(
     values: Mapping[str, Any], text: str, hardware_id: str, stamp: Any
 ) -> DiagnosticArray:
-    """Return the progress of a search for a way as one status; arguments as for `make_status`."""
+    """Return the progress of a search for a path as one status; arguments as for `make_status`."""
     return diagnostics([make_status(SEARCH, "ok", text, values, hardware_id)], stamp)
 
 
@@ -97,8 +97,8 @@ def traction_diagnostics(
         text = f"{state}: contact angles from {values['contact_source']}"
     else:
         text = ADVICE.get(state, state)
-    told = {"state": state, **values, "warning": "; ".join(problems)}
-    return diagnostics([make_status(TRACTION, level, text, told, hardware_id)], stamp)
+    entries = {"state": state, **values, "warning": "; ".join(problems)}
+    return diagnostics([make_status(TRACTION, level, text, entries, hardware_id)], stamp)
 
 
 def verdict_to_diagnostics(
@@ -120,11 +120,11 @@ def verdict_to_diagnostics(
         frame_id: Map frame.
         stamp: builtin_interfaces/Time.
     """
-    told = {
+    entries = {
         key: value if isinstance(value, str) else json.dumps(value)
         for key, value in summary.items()
     }
-    status = make_status(VERDICT, level, reason or "traversable", told, hardware_id)
+    status = make_status(VERDICT, level, reason or "traversable", entries, hardware_id)
     message = diagnostics([status], stamp)
     message.header.frame_id = frame_id
     return message

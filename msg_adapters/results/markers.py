@@ -54,8 +54,8 @@ def path_markers(
     failures = [i for i, reason in enumerate(reasons) if reason]
     rows = np.unique(np.concatenate([rows, failures[:1]]).astype(np.intp))
     settled = rows[prediction.settled[rows]]
-    told = [(reasons[i], waypoint_classes[i] if waypoint_classes else "") for i in rows]
-    colours = [_colour(reason, traversability_class) for reason, traversability_class in told]
+    outcomes = [(reasons[i], waypoint_classes[i] if waypoint_classes else "") for i in rows]
+    colours = [_colour(reason, traversability_class) for reason, traversability_class in outcomes]
     markers.markers.append(_path_line(positions[rows], colours, frame_id, stamp))
     markers.markers.append(_contact_points(prediction.contact_points[settled], frame_id, stamp))
     if failures:

@@ -10,7 +10,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from msg_adapters.commands import doubles
 from msg_adapters.errors import MessageError
-from msg_adapters.joints import OWN_NAMES, JointMap
+from msg_adapters.joints import OWN_NAMES, JointNames
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
@@ -75,7 +75,7 @@ def joint_trajectory(
     stock: list[JointTrajectoryPoint] | None = None,
     *,
     positive_steering: str = LEFT,
-    names: JointMap = OWN_NAMES,
+    names: JointNames = OWN_NAMES,
 ) -> JointTrajectory:
     """Return the joints along a path, up to the first waypoint that did not settle.
 
@@ -126,7 +126,7 @@ def joint_trajectory(
 
 
 def empty_trajectory(
-    rover: Rover, frame_id: str, stamp, names: JointMap = OWN_NAMES
+    rover: Rover, frame_id: str, stamp, names: JointNames = OWN_NAMES
 ) -> JointTrajectory:
     """Return a trajectory of the JOINTS and the rover's steering joints without points."""
     joints = names.robot_names([*JOINTS, *steering_joints(rover)])

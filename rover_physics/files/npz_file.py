@@ -28,7 +28,7 @@ MAX_CODE_POINT = 0x10FFFF
 
 @dataclass(frozen=True)
 class ArrayHeader:
-    """What the header of an array claims."""
+    """Type and shape of an array as its header claims them."""
 
     dtype: np.dtype[Any]
     """Type of the elements: numbers, bools or texts."""

@@ -53,7 +53,7 @@ def read_as(kind: Any, data: object, what: str, at: Key = ()) -> Any:
     # A misspelt key is both unknown and missing; the error of the unknown key has a suggestion.
     order = (*UNKNOWN_KEY, MISSING_KEY)
     first = min(faults, key=lambda fault: (fault["type"] not in order, fault["type"] == order[-1]))
-    raise RoverFileError(_say(kind, first, what, at))
+    raise RoverFileError(_describe_fault(kind, first, what, at))
 
 
 def find_unit(kind: Any, key: Key) -> str:
@@ -124,7 +124,7 @@ def _json_schema(kind: Any) -> dict[str, Any]:
     return _adapter(kind).json_schema()
 
 
-def _say(kind: Any, fault: Any, what: str, at: Key) -> str:
+def _describe_fault(kind: Any, fault: Any, what: str, at: Key) -> str:
     """Return one line about a fault that pydantic has found."""
     found, place = fault["loc"], fault["loc"][:-1]
     key = show_key((*at, *found))

@@ -17,7 +17,7 @@ MAX_NODES = 100_000
 MAX_REASON = 200
 """Largest number of characters of PyYAML's reason in an error text."""
 UNNAMED = '"<unicode string>", '
-"""What PyYAML calls the text; who reads a file puts its name before the error."""
+"""PyYAML's name of the text, left out: who reads a file puts its name before the error."""
 BAD_SCALAR = (ArithmeticError, AttributeError, LookupError, TypeError, ValueError)
 """Exceptions that PyYAML raises, besides its own, for a value that does not fit its tag."""
 

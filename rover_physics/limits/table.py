@@ -22,8 +22,8 @@ MAX_TURN_OFF = 0.1
 """Largest turn [rad] off its path that a rover with speed servos may make within its wheelbase: a
 curvature error that would double the width of its track within about two lengths."""
 MAX_SLIDE = 0.2
-"""Largest way [wheelbases] that it may slide off its path within its wheelbase: a slip angle of 11
-degrees."""
+"""Largest distance [wheelbases] that it may slide off its path within its wheelbase: a slip angle
+of 11 degrees."""
 TOLERANCE = 1e-9
 """Excess over a limit, in its SI unit, that counts as rounding."""
 TRAPPED = "trapped"
@@ -37,7 +37,7 @@ Bound = float | tuple[float, float] | None
 
 
 class Sense(IntEnum):
-    """How a value is held against its bound, and what its use is."""
+    """Comparison of a value with its bound, which defines the use of the limit."""
 
     MOST = 0
     """The bound is the largest good value; use = value / bound."""
@@ -51,7 +51,7 @@ class Sense(IntEnum):
 
 @dataclass(frozen=True)
 class Unit:
-    """How people read a number."""
+    """Unit, factor and digits in which a number is shown to people."""
 
     name: str = ""
     """Unit, empty for a ratio."""
@@ -98,7 +98,7 @@ class Limit:
     """Returns the bound for a `Rover` in SI units, two of them for a RANGE, or None where it is
     not asked; absent: the number `key` of the rover file."""
     sense: Sense = Sense.MOST
-    """How the value is held against it."""
+    """Comparison of the value with its bound."""
     key: str = ""
     """Its optional number below `limits:` of a rover file; empty if its bound is none."""
     unit: Unit = RATIO
@@ -106,7 +106,7 @@ class Limit:
     shown: Unit | None = None
     """Unit on the page; None: as in reasons."""
     has_number: bool = True
-    """Whether value and bound are numbers that people compare."""
+    """True if value and bound are numbers that people compare."""
     wheel_of: str = ""
     """Quantity whose largest value names a wheel, if the limit reads no values of wheels."""
     elements: tuple[str, ...] = ()
@@ -116,15 +116,15 @@ class Limit:
     only_if: tuple[str, float] | None = None
     """A quantity and its value: the limit is asked only where the quantity has it."""
     needs_forces: bool = False
-    """Whether it depends on the torque policy; without, what fails fails under every policy."""
-    rests_in_a_fall: bool = False
-    """Whether it does not count while a wheel rolls off an edge, which needs no equilibrium."""
+    """True if it depends on the torque policy; else a failure is one under every policy."""
+    exempt_on_edge: bool = False
+    """True if it is not asked while a wheel rolls off an edge, which needs no equilibrium."""
     keeps_margin: bool = False
-    """Whether a control margin reduces it."""
+    """True if a control margin reduces its bound."""
     is_risk: bool = False
-    """Whether coming near it counts as risk when paths are compared."""
+    """True if its use counts as risk when paths are compared."""
     may_be_unknown: bool = False
-    """Whether NaN is not asked; else it breaks the limit."""
+    """True if the limit is not asked where its value is NaN; else NaN breaks it."""
 
     def find_bound(self, rover: Any) -> Bound:
         """Return the bound for a `Rover`, None where it is not asked."""
@@ -133,7 +133,7 @@ class Limit:
         return self.bound(rover)
 
 
-FORCES: dict[str, Any] = {"needs_forces": True, "rests_in_a_fall": True}
+FORCES: dict[str, Any] = {"needs_forces": True, "exempt_on_edge": True}
 ON_TORQUES: dict[str, Any] = {"policies": CONTROL_POLICIES, **FORCES}
 ON_SERVOS: dict[str, Any] = {"policies": (SERVO,), **FORCES}
 SIDE_NAMES = ("right", "left")

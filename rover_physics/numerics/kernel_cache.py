@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
+from numba.core.runtime import rtsys
 
 PACKAGE = Path(__file__).parents[1]
 """Folder of the package whose kernels are cached."""
@@ -102,7 +103,9 @@ class KernelCache(FunctionCache):
             KernelMissingError: There is none, and kernels are only to be loaded.
         """
         try:
-            found = super().load_overload(sig, target_context)
+            # Numba's own method first prepares to compile, which takes a third of a second.
+            rtsys.initialize(target_context)
+            found = self._load_overload(sig, target_context)
         except Exception:
             with contextlib.suppress(OSError):
                 self.flush()  # a damaged index would also prevent that the kernel is saved

@@ -13,6 +13,7 @@ later start and a pose take the same time.
 
 import inspect
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 from numba import _dynfunc
@@ -59,9 +60,18 @@ class Kernel(CPUDispatcher):
         """Compile nothing yet; `options` of `numba.njit` go before COMPILE_OPTIONS."""
         options = COMPILE_OPTIONS | options
         super().__init__(function, {}, options, _WholeCompiler)
-        # What njit(cache=True) does, but its own cache raises where it cannot write.
-        self._cache = KernelCache(function)
-        self._part = CPUDispatcher(function, {}, options, _PartCompiler)
+
+    def compile(self, sig: Any) -> Any:
+        """Load or compile the kernel for a signature, with a cache that any disk will do for."""
+        if not isinstance(self._cache, KernelCache):  # most kernels are never called from Python
+            # What njit(cache=True) does, but its own cache raises where it cannot write.
+            self._cache = KernelCache(self.py_func)
+        return super().compile(sig)
+
+    @cached_property
+    def _part(self) -> CPUDispatcher:
+        """What other kernels call."""
+        return CPUDispatcher(self.py_func, {}, self.targetoptions, _PartCompiler)
 
     @property
     def _numba_type_(self) -> types.Dispatcher:

@@ -138,7 +138,7 @@ def find_turns(
 
 
 def _steps(here: np.ndarray, there: np.ndarray) -> Floats:
-    """Return the steps (n, 3) from poses to others: x, y [m] and turn [rad], the shorter way."""
+    """Return the steps (n, 3) from poses to others: x, y [m] and the shorter turn [rad]."""
     steps = np.asarray(there - here)
     steps[:, 2] = (steps[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
     return steps

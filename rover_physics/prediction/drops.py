@@ -32,29 +32,30 @@ MIN_ANGLE = np.radians(15.0)
 """Least steepness [rad] of a contact behind a wheel from which it falls."""
 WALL = np.radians(60.0)
 """Steepness [rad] of such a contact from which the ground is no slope."""
-MAX_FALLING = 2
-"""Most wheels that can fall at once: one axle. If there are more, the rover slides downhill."""
+MAX_ROLLING_OFF_EDGE = 2
+"""Most wheels that can roll off an edge at once: one axle. If there are more, the rover slides
+downhill."""
 
 
 @dataclass(frozen=True, eq=False)
-class Falls:
-    """Where wheels fall along a path."""
+class Drops:
+    """Wheels that roll off edges along a path, and how far they drop."""
 
     at_waypoints: np.ndarray
-    """(n, 6) True for wheels that fall at a waypoint."""
+    """(n, 6) True for wheels that roll off an edge at a waypoint."""
     between: np.ndarray
-    """(m, 6) True for wheels that fall at a pose between waypoints."""
-    drops: np.ndarray
-    """(n, 6) largest drop of each wheel at a waypoint or on the way to it [m]."""
+    """(m, 6) True for wheels that do so at a pose between waypoints."""
+    heights: np.ndarray
+    """(n, 6) largest drop of each wheel at a waypoint or since the one before [m]."""
     decided: int
-    """Number of waypoints, from the first, whose falls no later pose of the path can change."""
+    """Number of waypoints, from the first, whose drops no later pose of the path can change."""
     restart: int
-    """Last of these waypoints from which the falls can be found without those before it; 0 if
+    """Last of these waypoints from which the drops can be found without those before it; 0 if
     there is none."""
 
 
-def find_falls(wheels: Wheels, poses: np.ndarray, results: Any, crossings: Crossings) -> Falls:
-    """Find where wheels fall along a path, and how far they drop.
+def find_drops(wheels: Wheels, poses: np.ndarray, results: Any, crossings: Crossings) -> Drops:
+    """Find where wheels roll off edges along a path, and how far they drop.
 
     Args:
         wheels: Size of wheels and rover, and the limits of the forces.
@@ -63,17 +64,17 @@ def find_falls(wheels: Wheels, poses: np.ndarray, results: Any, crossings: Cross
         crossings: Poses between the waypoints.
     """
     path = view_read_only(poses), view_read_only(results)
-    return Falls(*_find_falls(wheels, *path, crossings.views))
+    return Drops(*_find_drops(wheels, *path, crossings.views))
 
 
 @allocating_kernel
-def _find_falls(wheels, poses, results, between):
-    """Return the fields of `Falls`; `wheels` are Wheels, `between` Crossings."""
+def _find_drops(wheels, poses, results, between):
+    """Return the fields of `Drops`; `wheels` are Wheels, `between` Crossings."""
     n, m = len(poses), len(between.place)
     order = np.empty(n + m, np.int64)
     _merge(n, between.place, order)
     steps = np.zeros(n + m)
-    height, falling = np.empty((n + m, 6)), np.zeros((n + m, 6), np.bool_)
+    height, rolling_off_edge = np.empty((n + m, 6)), np.zeros((n + m, 6), np.bool_)
     at_wall = np.zeros((n + m, 6), np.bool_)
     angle, last = np.empty((n + m, 6)), poses[0]
     for k in range(n + m):
@@ -92,12 +93,12 @@ def _find_falls(wheels, poses, results, between):
             lowest = min(lowest, angle[k, wheel])
         if lowest < -MIN_ANGLE:
             result = results[i] if i < n else between.results[i - n]
-            _find_falling(angle[k], result, wheels, falling[k])
-    first_open = _find_first_open(falling)
-    _clear_open_runs(falling)
-    _clear_slides(height, at_wall, wheels.drop_limit, falling)
-    fallen, drops = np.zeros((n + m, 6)), np.zeros((n, 6))
-    _measure_drops(wheels.radius, (height, angle, steps), falling, fallen)
+            _find_rolling_off_edge(angle[k], result, wheels, rolling_off_edge[k])
+    first_open = _find_first_open(rolling_off_edge)
+    _clear_open_runs(rolling_off_edge)
+    _clear_slides(height, at_wall, wheels.drop_limit, rolling_off_edge)
+    descents, drops = np.zeros((n + m, 6)), np.zeros((n, 6))
+    _measure_drops(wheels.radius, (height, angle, steps), rolling_off_edge, descents)
     at_waypoints, at_between = np.empty((n, 6), np.bool_), np.empty((m, 6), np.bool_)
     decided, restart = 0, 0
     for k in range(n + m):
@@ -106,16 +107,16 @@ def _find_falls(wheels, poses, results, between):
             decided += 1
             some = False
             for wheel in range(6):
-                some = some or falling[k, wheel] or fallen[k, wheel] > 0.0
+                some = some or rolling_off_edge[k, wheel] or descents[k, wheel] > 0.0
             if not some:
                 restart = i
         owner = i if i < n else between.waypoint[i - n]
         for wheel in range(6):
-            drops[owner, wheel] = max(drops[owner, wheel], fallen[k, wheel])
+            drops[owner, wheel] = max(drops[owner, wheel], descents[k, wheel])
             if i < n:
-                at_waypoints[i, wheel] = falling[k, wheel]
+                at_waypoints[i, wheel] = rolling_off_edge[k, wheel]
             else:
-                at_between[i - n, wheel] = falling[k, wheel]
+                at_between[i - n, wheel] = rolling_off_edge[k, wheel]
     return at_waypoints, at_between, drops, decided, restart
 
 
@@ -132,16 +133,16 @@ def _is_held(result, wheels, wheel):
 
 
 @exact_kernel
-def _find_first_open(falling):
-    """Return the first row (of k) whose falls depend on poses after the last row.
+def _find_first_open(rolling_off_edge):
+    """Return the first row (of k) whose drops depend on poses after the last row.
 
-    These are the rows of a run in `falling` (k, 6) that may still end with a landing.
+    These are the rows of a run in `rolling_off_edge` (k, 6) that may still end with a landing.
     """
-    rows = falling.shape[0]
+    rows = rolling_off_edge.shape[0]
     first = rows
     for wheel in range(6):
         start = rows
-        while start > 0 and falling[start - 1, wheel]:
+        while start > 0 and rolling_off_edge[start - 1, wheel]:
             start -= 1
         if 0 < start < first:
             first = start
@@ -179,10 +180,10 @@ def _read_contacts(result, angle, height):
 
 
 @exact_kernel
-def _find_falling(angle, result, wheels, falling):
-    """Write (6,) True for wheels that fall.
+def _find_rolling_off_edge(angle, result, wheels, rolling_off_edge):
+    """Write (6,) True for wheels that roll off an edge.
 
-    None falls if the rover as a whole goes downhill: it then slides.
+    None does if the rover as a whole goes downhill: it then slides.
     """
     on_edges = True
     for wheel in range(6):
@@ -193,54 +194,54 @@ def _find_falling(angle, result, wheels, falling):
         mu = result.friction[wheel]
         least_held = min(least_held, np.arctan(mu) if mu == mu else np.arctan(1.0))
         slips = angle[wheel] < -MIN_ANGLE and not _is_held(result, wheels, wheel)
-        falling[wheel] = angle[wheel] < -FACE or (on_edges and slips)
-        if falling[wheel]:
+        rolling_off_edge[wheel] = angle[wheel] < -FACE or (on_edges and slips)
+        if rolling_off_edge[wheel]:
             count += 1
         elif angle[wheel] == angle[wheel]:
             others += angle[wheel]
-    if count > MAX_FALLING or others / max(6 - count, 1) < -0.5 * least_held:
-        falling[:] = False
+    if count > MAX_ROLLING_OFF_EDGE or others / max(6 - count, 1) < -0.5 * least_held:
+        rolling_off_edge[:] = False
 
 
 @exact_kernel
-def _clear_open_runs(falling):
-    """Clear runs in `falling` (k, 6) that touch an end of the path: no edge, or no landing."""
-    rows = falling.shape[0]
+def _clear_open_runs(rolling_off_edge):
+    """Clear runs in `rolling_off_edge` (k, 6) at an end of the path: no edge, or no landing."""
+    rows = rolling_off_edge.shape[0]
     for wheel in range(6):
         k = 0
-        while k < rows and falling[k, wheel]:
-            falling[k, wheel] = False
+        while k < rows and rolling_off_edge[k, wheel]:
+            rolling_off_edge[k, wheel] = False
             k += 1
         k = rows - 1
-        while k >= 0 and falling[k, wheel]:
-            falling[k, wheel] = False
+        while k >= 0 and rolling_off_edge[k, wheel]:
+            rolling_off_edge[k, wheel] = False
             k -= 1
 
 
 @exact_kernel
-def _clear_slides(height, at_wall, limit, falling):
-    """Clear runs in `falling` (k, 6) without a wall that go down by more than `limit` [m]."""
-    rows = falling.shape[0]
+def _clear_slides(height, at_wall, limit, rolling_off_edge):
+    """Clear runs (k, 6) without a wall that go down by more than `limit` [m]."""
+    rows = rolling_off_edge.shape[0]
     for wheel in range(6):
         start = 0
         while start < rows:
             end, walls = start, False
-            while end < rows and falling[end, wheel]:
+            while end < rows and rolling_off_edge[end, wheel]:
                 walls = walls or at_wall[end, wheel]
                 end += 1
             if start < end < rows and start > 0 and not walls:
-                fallen, most = 0.0, 0.0
+                so_far, most = 0.0, 0.0
                 for k in range(start, end + 1):
-                    fallen = max(fallen + height[k - 1, wheel] - height[k, wheel], 0.0)
-                    most = max(most, fallen)
+                    so_far = max(so_far + height[k - 1, wheel] - height[k, wheel], 0.0)
+                    most = max(most, so_far)
                 if most > limit:
-                    falling[start:end, wheel] = False
+                    rolling_off_edge[start:end, wheel] = False
             start = end + 1
 
 
 @exact_kernel
-def _measure_drops(radius, course, falling, fallen):
-    """Add up the descent [m] of each falling wheel; a sudden descent at one place also counts.
+def _measure_drops(radius, course, rolling_off_edge, descents):
+    """Add up the descent [m] of wheels that roll off edges; a sudden one at one place also counts.
 
     What a wheel rises meanwhile, such as when the one beside it falls, is subtracted. Where a fall
     begins or ends between two poses, the share of the step in which the wheel falls counts.
@@ -254,21 +255,21 @@ def _measure_drops(radius, course, falling, fallen):
             if not abs(descent) >= ROUNDING:
                 descent = 0.0
             sudden = descent > HEIGHT_JUMP * radius and steps[k] <= 2.0 * MIN_SPACING
-            before, here = falling[k - 1, wheel], falling[k, wheel]
+            before, here = rolling_off_edge[k - 1, wheel], rolling_off_edge[k, wheel]
             if not (before or here or sudden):
                 so_far = 0.0
                 continue
             share = 1.0
             if here != before and not sudden:
-                share = _share_of_fall(angle[k - 1, wheel], angle[k, wheel])
+                share = _share_of_drop(angle[k - 1, wheel], angle[k, wheel])
             so_far = max(so_far + share * descent, 0.0)
-            fallen[k, wheel] = so_far
+            descents[k, wheel] = so_far
             if before and not here:
                 so_far = 0.0
 
 
 @exact_kernel
-def _share_of_fall(angle, other):
+def _share_of_drop(angle, other):
     """Return the share of a step in which a wheel falls that falls at one of its ends only.
 
     It does from where its contact angle passes FACE, else for half the step.

@@ -119,7 +119,7 @@ def evaluate_poses(models, limits, places, works, written, part):
         limits: (k,) LIMIT.
         places: `poses`, `motions` and `held` of `PackedModel.evaluate`.
         works: (chunks,) WORK.
-        written: (n,) RESULT and the same as numbers (n, NUMBERS), written.
+        written: (n,) RESULT and the same as numbers (n, RESULT_COLUMNS), written.
         part: The first chunk and the one after the last.
     """
     (poses, motions, held), (results, numbers), chunks = places, written, works.size
@@ -167,7 +167,7 @@ def evaluate_row(models, limits, work, written, i):
         models: (1,) MODEL, or these three.
         limits: (k,) LIMIT.
         work: WORK.
-        written: (n,) RESULT and the same as numbers (n, NUMBERS), written.
+        written: (n,) RESULT and the same as numbers (n, RESULT_COLUMNS), written.
         i: The row.
     """
     results, numbers = written
@@ -373,15 +373,15 @@ def _write_forces(model, work, result):
         result.torque_saturation[wheel] = abs(torque) / settings.max_torque
         result.sinkage[wheel] = sinkage
         result.motion_resistance[wheel] = resistance
-        way = abs(work.rolling[wheel])
+        rolled = abs(work.rolling[wheel])
         most = settings.max_wheel_speed
-        power += max(direction * torque, 0.0) * _spin(linkage.radius, slip, way, most)
+        power += max(direction * torque, 0.0) * _spin(linkage.radius, slip, rolled, most)
     result.power = power
 
 
 @kernel
-def _spin(radius, slip, way, most):
-    """Return the rate [rad/s] of a wheel that goes `way` [m/s] over the ground, at most `most`."""
+def _spin(radius, slip, rolled, most):
+    """Return the rate [rad/s], at most `most`, of a wheel that rolls at `rolled` [m/s]."""
     if slip >= 1.0:
         return most
-    return min(way / (radius * (1.0 - slip)), most)
+    return min(rolled / (radius * (1.0 - slip)), most)

@@ -28,7 +28,7 @@ BATCH = 32_768
 """Approximate number of poses of a map that are scored at a time."""
 PART = 4096
 """Number of poses whose results are in memory at a time."""
-NUMBERS = 6
+SCORE_ROWS = 6
 """Numbers in a score, without the status and the uses."""
 
 
@@ -122,7 +122,7 @@ def sweep_map(
 def score(model: PackedModel, poses: np.ndarray, shape: tuple[int, ...]) -> PoseScores:
     """Score poses (n, 3) and return scores of `shape`, which has n elements."""
     n, limits = len(poses), model.limits
-    status, numbers = np.empty(n, np.int8), np.empty((NUMBERS, n), np.float32)
+    status, numbers = np.empty(n, np.int8), np.empty((SCORE_ROWS, n), np.float32)
     uses = np.empty((n, len(limits)), np.float32)
     with limit_threads(model.relative_cost(n)):
         for first in range(0, n, PART):
@@ -135,7 +135,7 @@ def score(model: PackedModel, poses: np.ndarray, shape: tuple[int, ...]) -> Pose
 
 
 def find_scores(results: Any) -> Floats:
-    """Return the numbers (NUMBERS, n) of RESULTs (n,), in the order of `PoseScores`."""
+    """Return the numbers (SCORE_ROWS, n) of RESULTs (n,), in the order of `PoseScores`."""
     settled = results["status"] == PoseStatus.SETTLED
     use = results["friction_utilisation"].max(axis=1)
     use[~(results["speed_share"] > 0.0)] = np.inf

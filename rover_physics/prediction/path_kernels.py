@@ -15,7 +15,7 @@ HEIGHT_JUMP = 0.25
 """Change of a wheel's height between two poses [wheel radii] above which it is a jump."""
 MIN_SPACING = 1e-4
 """Distance between poses [m] below which a jump counts as at one place."""
-PEAK_SPACING, FALL_SPACING = 0.01, 0.02
+PEAK_SPACING, EDGE_SPACING = 0.01, 0.02
 """Distances [wheel radii] below which peaks of forces at a limit are not searched, and smaller
 peaks and ends of falls. With 0.06 for smaller peaks, twice as many waypoints change 5 verdicts in
 1,000, not 2, and rough ground costs less than 1 % less."""
@@ -50,7 +50,7 @@ class Wheels(NamedTuple):
     drop_limit: float
     """Largest drop of a wheel [m]."""
     on_servos: bool
-    """Whether wheels may be at their limits, as under policy "servo"."""
+    """True if wheels may be at their limits, as under policy "servo"."""
 
 
 class Crossings(NamedTuple):
@@ -172,8 +172,8 @@ def sort_pieces(ends, pieces, known, wheels, sorted_ends):
                 skipped = True
                 continue
             if _jumps(results[before], results[after], wheels):
-                way = distance_between(poses[before], poses[after], wheels.swing_radius)
-                if skipped or way < MIN_SPACING:
+                distance = distance_between(poses[before], poses[after], wheels.swing_radius)
+                if skipped or distance < MIN_SPACING:
                     sorted_ends[1, n_closed, 0], sorted_ends[1, n_closed, 1] = before, after
                     n_closed += 1
                 else:
@@ -190,13 +190,13 @@ def sort_pieces(ends, pieces, known, wheels, sorted_ends):
 
 
 @exact_kernel
-def distance_between(here, there, reach):
-    """Return the way [m] from a pose to another: of the body or, if it turns, of a wheel.
+def distance_between(here, there, swing_radius):
+    """Return the distance [m] from a pose to another: of the body or, if it turns, of a wheel.
 
-    `reach` is the distance [m] of the outermost wheel from the body origin.
+    `swing_radius` is the distance [m] of the outermost wheel from the body origin.
     """
-    way = np.hypot(there[0] - here[0], there[1] - here[1])
-    return max(way, reach * abs(turn_between(here, there)))
+    distance = np.hypot(there[0] - here[0], there[1] - here[1])
+    return max(distance, swing_radius * abs(turn_between(here, there)))
 
 
 @exact_kernel
@@ -223,7 +223,7 @@ def _jumps(here, there, wheels):
 
 @exact_kernel
 def _finest(here, there, wheels):
-    """Return the way [m] to which to divide a stretch in which a limit may be passed, else inf.
+    """Return the spacing [m] for a stretch in which a limit may be passed, else inf.
 
     Forces change as contacts turn, and may peak while they do. Where they are beyond at one of the
     poses, a wheel may fall there; until it does, they count. Where a fall begins or ends between
@@ -231,20 +231,20 @@ def _finest(here, there, wheels):
     """
     if here.status != PoseStatus.SETTLED or there.status != PoseStatus.SETTLED:
         return np.inf
-    turn, falls = 0.0, False
+    turn, passes_edge = 0.0, False
     for wheel in range(6):
         angle, other = here.contact_angle[wheel], there.contact_angle[wheel]
         turn = max(turn, abs(other - angle))
         ahead = -1.0 if there.wheel_speed[wheel] < 0.0 else 1.0
-        falls = falls or (ahead * angle < -FACE) != (ahead * other < -FACE)
+        passes_edge = passes_edge or (ahead * angle < -FACE) != (ahead * other < -FACE)
     use, other_use = 0.0, 0.0
     if not wheels.on_servos:
         use, other_use = _largest_use(here, wheels), _largest_use(there, wheels)
     largest = max(use, other_use)
     rises = largest > LEAST_USE and largest * (1.0 + PEAK * turn) > 1.0
     if min(use, other_use) <= 1.0 and (rises or (largest > NEAR_LIMIT and turn > LEAST_TURN)):
-        return (PEAK_SPACING if largest > AT_LIMIT else FALL_SPACING) * wheels.radius
-    return FALL_SPACING * wheels.radius if falls else np.inf
+        return (PEAK_SPACING if largest > AT_LIMIT else EDGE_SPACING) * wheels.radius
+    return EDGE_SPACING * wheels.radius if passes_edge else np.inf
 
 
 @exact_kernel

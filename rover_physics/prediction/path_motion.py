@@ -43,7 +43,7 @@ STRAIGHT = 1e-6
 
 
 class StepKind(IntEnum):
-    """What is known of the way from a waypoint to the next."""
+    """Kind of the step from a waypoint to the next."""
 
     RESTS = 0
     """Both are the same pose."""
@@ -77,7 +77,7 @@ def motions_of(
     Args:
         model: The model.
         poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
-        curvature: (n,) curvature of the way of the body origin at each pose [1/m], positive to the
+        curvature: (n,) curvature of the body origin's path at each pose [1/m], positive to the
             left, infinite on the spot; None if the poses are a path.
 
     Raises:

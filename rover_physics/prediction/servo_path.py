@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What only the whole path shows of a rover with speed servos: lifts, wedged wheels, and drift.
+"""Effects of speed servos that only the whole path shows: lifts, wedged wheels, and drift.
 
 A wheel may lift while the others drive the rover on, and touch down again. How high it gets is the
 sum of its speeds of lifting.
@@ -70,10 +70,10 @@ def find_lift_heights(
         order = _in_order(n, crossings.place)
         share = np.concatenate([results["speed_share"], crossings.results["speed_share"]])[order]
         rate = rates[order] / np.where(share > 0.0, share, 1.0)[:, None]
-        way = _ways(wheels, np.concatenate([poses, crossings.poses])[order])
+        distances = _distances_between(wheels, np.concatenate([poses, crossings.poses])[order])
         for k in 1 + np.flatnonzero((rate[1:] > 0.0).any(axis=1)):  # height is 0 at the others
             lifted = rate[k] > 0.0
-            rise = 0.5 * (rate[k] + np.fmax(rate[k - 1], 0.0)) * way[k - 1]
+            rise = 0.5 * (rate[k] + np.fmax(rate[k - 1], 0.0)) * distances[k - 1]
             heights[order[k]] = np.where(lifted, heights[order[k - 1]] + rise, 0.0)
     return heights[:n], heights[n:]
 
@@ -94,8 +94,8 @@ def climb_costs(poses: np.ndarray, results: Any, crossings: Crossings) -> Floats
         i, power, share = step.waypoint, step.values("power"), step.speed_shares()
         energy = 0.5 * (power[1:] + power[:-1]) * step.durations
         rise = results["q"][i, 0] - results["q"][i - 1, 0]
-        way = np.hypot(*(poses[i, :2] - poses[i - 1, :2]))
-        counted = np.hypot(way, rise) / (0.5 * step.speed * (share[0] + share[-1]))
+        level_distance = np.hypot(*(poses[i, :2] - poses[i - 1, :2]))
+        counted = np.hypot(level_distance, rise) / (0.5 * step.speed * (share[0] + share[-1]))
         extra[i] = max(step.durations.sum() - counted, 0.0), 0.0
         extra[i, 1] = max(energy.sum() - 0.5 * (power[0] + power[-1]) * counted, 0.0)
     return np.asarray(np.cumsum(extra, axis=0))
@@ -126,12 +126,12 @@ def add_up_rate(name: str, time: Floats, results: Any, crossings: Crossings) -> 
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """The way to a waypoint over poses between it and the one before."""
+    """The step to a waypoint over poses between it and the one before."""
 
     waypoint: int
     """Index of the waypoint at its end."""
     rows: np.ndarray
-    """Rows of the crossings on the way."""
+    """Rows of the crossings between these waypoints."""
     speed: float
     """Nominal speed of the body [m/s]."""
     results: Any
@@ -151,13 +151,13 @@ class _Step:
     def durations(self) -> Floats:
         """Time [s] from each of these poses to the next.
 
-        The way of the rover is the mean way of its wheel centres. A wheel that goes down more
-        steeply than 45 degrees falls, which takes no time.
+        The distance that the rover goes is the mean of those of its wheel centres. A wheel that
+        goes down more steeply than 45 degrees falls, which takes no time.
         """
         moved, share = np.diff(self.values("wheel_centres"), axis=0), self.speed_shares()
         level = np.hypot(moved[..., 0], moved[..., 1])
-        way = np.where(moved[..., 2] < -level, level, np.linalg.norm(moved, axis=2))
-        return np.asarray(way.mean(axis=1) / (0.5 * self.speed * (share[1:] + share[:-1])))
+        distances = np.where(moved[..., 2] < -level, level, np.linalg.norm(moved, axis=2))
+        return np.asarray(distances.mean(axis=1) / (0.5 * self.speed * (share[1:] + share[:-1])))
 
 
 def _steps_with_crossings(results: Any, crossings: Crossings) -> Iterator[_Step]:
@@ -181,7 +181,7 @@ def _steps_with_crossings(results: Any, crossings: Crossings) -> Iterator[_Step]
 def find_drift(
     wheels: Wheels, window: float, poses: np.ndarray, results: Any, crossings: Crossings
 ) -> Floats:
-    """Return the drift (n, 2) at waypoints: turn [rad] and way aside [m] that built up.
+    """Return the drift (n, 2) at waypoints: the turn [rad] and the slide [m] that built up.
 
     Args:
         wheels: Sizes of wheels and rover.
@@ -195,7 +195,7 @@ def find_drift(
     n = len(poses)
     if not wheels.on_servos:
         return np.zeros((n, 2))
-    long_steps = np.append(False, _ways(wheels, poses) > wheels.radius)
+    long_steps = np.append(False, _distances_between(wheels, poses) > wheels.radius)
     turns = crossings.select(long_steps[crossings.waypoint] & ~crossings.climbing)
     order = _in_order(n, turns.place)
     at = np.concatenate([poses, turns.poses])[order]
@@ -209,10 +209,10 @@ def find_drift(
     c, s = np.cos(at[:, 2]), np.sin(at[:, 2])
     x, y = c * rate[:, 0] - s * rate[:, 1], s * rate[:, 0] + c * rate[:, 1]
     rate = np.column_stack([x, y, rate[:, 2]])
-    way = _ways(wheels, at)
+    distances = _distances_between(wheels, at)
     sums = np.zeros(rate.shape)
-    sums[1:] = np.cumsum(0.5 * (rate[1:] + rate[:-1]) * way[:, None], axis=0)
-    place = np.append(0.0, np.cumsum(way))
+    sums[1:] = np.cumsum(0.5 * (rate[1:] + rate[:-1]) * distances[:, None], axis=0)
+    place = np.append(0.0, np.cumsum(distances))
     built_up = sums - sums[np.searchsorted(place, place - window)]
     drift = np.zeros((n, 2))
     owner = np.append(np.arange(n), turns.waypoint)[order]
@@ -227,8 +227,8 @@ def _in_order(n: int, place: np.ndarray) -> np.ndarray:
     return np.lexsort((np.arange(len(places)) >= n, places))
 
 
-def _ways(wheels: Wheels, poses: np.ndarray) -> Floats:
-    """Return the ways (n - 1,) between poses [m]: of the body or, if it turns, of a wheel."""
+def _distances_between(wheels: Wheels, poses: np.ndarray) -> Floats:
+    """Return the distances (n - 1,) between poses [m]: of the body or, if it turns, of a wheel."""
     steps = np.diff(poses, axis=0)
     swing = wheels.swing_radius * np.abs((steps[:, 2] + np.pi) % (2.0 * np.pi) - np.pi)
     return np.maximum(np.hypot(steps[:, 0], steps[:, 1]), swing)

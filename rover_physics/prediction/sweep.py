@@ -23,7 +23,7 @@ from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import view_read_only
 from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.crossing import find_crossings
-from rover_physics.prediction.drops import MIN_ANGLE, Falls, find_falls
+from rover_physics.prediction.drops import MIN_ANGLE, Drops, find_drops
 from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import Crossings, add_up, join_crossings
 from rover_physics.prediction.path_motion import path_motions
@@ -116,7 +116,7 @@ def predict_in_parts(model: PackedModel, path: np.ndarray) -> Iterator[PathPart]
     """Sweep a path (n, 3), as `check_poses` returns it, part by part.
 
     A part ends before wheels whose fall depends on poses that are not yet swept. The next one
-    begins before it, at a waypoint where no wheel falls.
+    begins before it, at a waypoint where no wheel rolls off an edge.
     """
     motions = path_motions(model, path)
     start, done, size, sums = 0, 0, PART, NO_SUMS
@@ -127,15 +127,15 @@ def predict_in_parts(model: PackedModel, path: np.ndarray) -> Iterator[PathPart]
         with limit_threads(model.relative_cost(len(here))):
             results = model.evaluate(here, motions=motions[start:end])
             crossings = find_crossings(model, here, results)
-        swept, falls = make_prediction(model, here, results, crossings, sums)
-        decided = end - start if end == len(path) else falls.decided
+        swept, drops = make_prediction(model, here, results, crossings, sums)
+        decided = end - start if end == len(path) else drops.decided
         if start + decided > done:
             yield PathPart(done, done - start, swept.prediction.cut(decided))
             done = start + decided
-        if falls.restart:
-            first = slice(falls.restart + 1)
+        if drops.restart:
+            first = slice(drops.restart + 1)
             sums = _sum_up(model, here[first], results[first], crossings, sums)
-            start, size = start + falls.restart, PART
+            start, size = start + drops.restart, PART
         else:
             size *= 2  # no waypoint to begin from: the next part is longer
 
@@ -222,14 +222,14 @@ class _StartedPath:
         if not (complete or self._suspicious):
             if not len(crossings.place):
                 return
-            falls = find_falls(self._model.wheels, here, results, crossings)
-            if not falls.drops.max() > self._model.wheels.drop_limit:
+            drops = find_drops(self._model.wheels, here, results, crossings)
+            if not drops.heights.max() > self._model.wheels.drop_limit:
                 return
-        swept, falls = make_prediction(self._model, here, results, crossings)
+        swept, drops = make_prediction(self._model, here, results, crossings)
         failure = find_first_failure(self._model.limits, swept.prediction)
         if complete and failure < 0:
             self.swept = swept
-        elif failure >= 0 and (complete or failure < falls.decided):
+        elif failure >= 0 and (complete or failure < drops.decided):
             self.swept = swept.cut(failure + 1)
 
 
@@ -243,23 +243,23 @@ def find_suspects(results, numbers, limits):
 
     Args:
         results: (n,) RESULT.
-        numbers: The same as numbers (n, NUMBERS).
+        numbers: The same as numbers (n, RESULT_COLUMNS).
         limits: (k,) LIMIT.
     """
     suspect = -1
     for row in range(results.size):
-        broken, in_a_fall = 0, 0
+        broken, in_any_case = 0, 0
         if results[row].status == PoseStatus.SETTLED:
-            broken, in_a_fall = find_broken(numbers, row, limits)
+            broken, in_any_case = find_broken(numbers, row, limits)
         if broken >= 0:
             suspect = row if suspect < 0 else suspect
-            if in_a_fall >= 0 or not _may_fall(results[row]):
+            if in_any_case >= 0 or not _may_roll_off_edge(results[row]):
                 return suspect, row
     return suspect, -1
 
 
 @exact_kernel
-def _may_fall(result):
+def _may_roll_off_edge(result):
     """Return whether a contact is so far behind its wheel that the wheel may roll off an edge."""
     steepest = 0.0
     for wheel in range(6):
@@ -269,7 +269,7 @@ def _may_fall(result):
 
 
 def find_first_failure(limits: RoverLimits, prediction: PathPrediction) -> int:
-    """Return the first waypoint that breaks a limit, itself or on the way to it; -1 for none."""
+    """Return the first waypoint at or just before which a limit is broken; -1 for none."""
     first = len(prediction.poses)
     for part in (prediction, prediction.between):
         if part is not None and len(part.poses):
@@ -321,21 +321,21 @@ def make_prediction(
     results: Any,
     crossings: Crossings,
     start: Sums = NO_SUMS,
-) -> tuple[SweptPath, Falls]:
-    """Return the prediction of one path from its results, and its falls.
+) -> tuple[SweptPath, Drops]:
+    """Return the prediction of one path from its results, and its drops.
 
     What the path decides is written into the results. Distance, time and energy at the first pose
     are `start`.
     """
     wheels = model.wheels
-    falls = find_falls(wheels, poses, results, crossings)
+    drops = find_drops(wheels, poses, results, crossings)
     if wheels.on_servos:
         results = results.copy()
         crossings = crossings._replace(results=crossings.results.copy())
         stop_in_slots(poses, results, crossings)
     between = crossings.results
-    results["wheel_drop"] = falls.drops
-    results["falling"], between["falling"] = falls.at_waypoints, falls.between
+    results["wheel_drop"] = drops.heights
+    results["falling"], between["falling"] = drops.at_waypoints, drops.between
     _write_sums(model, crossings.poses, between, NO_SUMS)
     _write_sums(model, poses, results, start)
     if wheels.on_servos:
@@ -346,9 +346,9 @@ def make_prediction(
         time, energy = climb_costs(poses, results, crossings).T
         results["time"] += time
         results["energy"] += energy
-    on_the_way = _collect(model, crossings.poses, between, crossings.waypoint)
-    prediction = _collect(model, poses, results, np.arange(len(poses)), on_the_way)
-    return SweptPath(poses, prediction, crossings), falls
+    at_crossings = _collect(model, crossings.poses, between, crossings.waypoint)
+    prediction = _collect(model, poses, results, np.arange(len(poses)), at_crossings)
+    return SweptPath(poses, prediction, crossings), drops
 
 
 def check_poses(poses: ArrayLike) -> np.ndarray:

@@ -60,7 +60,7 @@ class SweepOptions:
     """(3,) moment of the surroundings on the arm's tip [N m], body frame, stored as a tuple
     (default: none)."""
     backward: bool = False
-    """Whether the rover drives backwards along the poses."""
+    """True if the rover drives backwards along the poses."""
 
     def __post_init__(self) -> None:
         if self.policy not in POLICIES:

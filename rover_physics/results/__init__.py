@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is predicted at a pose, and how much of each limit it uses."""
+"""The record of predicted quantities at a pose, and the share of each limit that they use."""

@@ -104,7 +104,7 @@ class PathPrediction:
         return _seal(np.where(asked[:, None], self.results["steering_angle"], np.nan))
 
     def cut(self, waypoints: int) -> "PathPrediction":
-        """Return the prediction of the first waypoints of the path and of the way to them."""
+        """Return the prediction of the first waypoints and of the poses between them."""
         between, bounds = self.between, self.bounds
         if between is not None:
             between = between.select(between.waypoint < waypoints)

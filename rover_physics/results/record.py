@@ -19,13 +19,13 @@ class Quantity(NamedTuple):
     unit: str
     """SI unit, empty for ratios."""
     meaning: str
-    """What it is; its frame and signs."""
+    """Meaning, frame and signs."""
     is_kept: bool = True
-    """Whether files keep it; else it follows from the others."""
+    """True if files keep it; else it follows from the others."""
     of_path: bool = False
-    """Whether the path around the pose decides it; 0 at a pose that is on no path."""
+    """True if the path around the pose decides it; 0 at a pose that is on no path."""
     of_motion: bool = False
-    """Whether it is also known where the rover does not settle."""
+    """True if it is also known where the rover does not settle."""
 
 
 QUANTITIES = (
@@ -101,7 +101,7 @@ QUANTITIES = (
     Quantity(
         "deviation", (3,), "rad/m",
         'motion beyond the share of the commanded one under policy "servo": forward and to the '
-        "left, over the nominal speed, and turning left, per metre of nominal way",
+        "left, over the nominal speed, and turning left, per metre of nominal path",
     ),
     Quantity(
         "lift_rate", (6,), "",
@@ -113,7 +113,7 @@ QUANTITIES = (
     ),
     Quantity(
         "motion", (3,), "m/s, rad/s",
-        "nominal motion of the body origin on the way to the pose, body frame: vx, vy and yaw "
+        "nominal motion of the body origin on the path to the pose, body frame: vx, vy and yaw "
         "rate; that of the first waypoint leads on from there", of_motion=True,
     ),
     Quantity(
@@ -139,7 +139,7 @@ QUANTITIES = (
     ),
     Quantity(
         "drift", (2,), "rad, m",
-        'turn and way off the path that build up within the last wheelbase under policy "servo"',
+        'turn and slide off the path that build up within the last wheelbase under policy "servo"',
         of_path=True,
     ),
     Quantity("distance", (), "m", "horizontal distance since the first waypoint", of_path=True),
@@ -159,7 +159,7 @@ QUANTITIES = (
 
 RESULT = record_type(("status", np.int8), *((one.name, float, one.shape) for one in QUANTITIES))
 """Results at one pose: its PoseStatus and the QUANTITIES."""
-NUMBERS = RESULT.itemsize // 8
+RESULT_COLUMNS = RESULT.itemsize // 8
 """Columns of RESULTs as numbers; the first holds the status."""
 VIEWS = {
     "roll": ("q", 1, ()),
@@ -184,7 +184,7 @@ def find_column(name: str) -> tuple[int, int]:
 
 def unwritten_results(n: int) -> Any:
     """Return RESULTs (n,) of any content: the system provides their memory when it is written."""
-    return np.empty((n, NUMBERS)).view(RESULT)[:, 0]
+    return np.empty((n, RESULT_COLUMNS)).view(RESULT)[:, 0]
 
 
 def new_results(n: int) -> Any:
@@ -201,8 +201,8 @@ def clear_results(results: Any) -> None:
 
 
 def numbers_of(results: Any) -> np.ndarray:
-    """Return RESULTs (n,) as floats (n, NUMBERS), which numpy copies faster than records."""
-    return results.view(np.float64).reshape(len(results), NUMBERS)
+    """Return RESULTs as floats (n, RESULT_COLUMNS), which numpy copies faster than records."""
+    return results.view(np.float64).reshape(len(results), RESULT_COLUMNS)
 
 
 def select_results(results: Any, rows: Any) -> Any:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How much of each limit a result uses: 0 far away, 1 at the limit, above 1 broken.
+"""Uses of the limits by results: 0 far away, 1 at the limit, above 1 broken.
 
 The use is infinite where the rover does not settle or a value cannot be computed, and NaN where
 the limit is not asked. A row passes if no use is above 1; nothing else compares a value with a
@@ -27,7 +27,7 @@ from rover_physics.status import PoseStatus
 ABOVE = 1.0 + 2.0**-23
 """Least use of a broken limit, so that it is above 1 in single precision, too."""
 MOST, LEAST, RANGE, SHARE = (int(sense) for sense in Sense)
-KEPT, FALLING = find_column("kept_share")[0], find_column("falling")[0]
+KEPT, ROLLING_OFF_EDGE = find_column("kept_share")[0], find_column("falling")[0]
 
 LIMIT = record_type(
     ("column", np.int64),  # first of the values in `numbers_of` a result
@@ -38,7 +38,7 @@ LIMIT = record_type(
     ("if_column", np.int64),  # column of the quantity that decides whether it is asked, or -1
     ("if_value", float),  # value of that quantity where it is asked
     ("needs_forces", np.int64),
-    ("rests_in_a_fall", np.int64),
+    ("exempt_on_edge", np.int64),
     ("keeps_margin", np.int64),
     ("is_risk", np.int64),
     ("may_be_unknown", np.int64),
@@ -112,7 +112,7 @@ def _pack(row: Limit, bound: Any) -> Any:
         if_column=find_column(if_quantity)[0] if if_quantity else -1,
         if_value=float(if_value),
         needs_forces=row.needs_forces,
-        rests_in_a_fall=row.rests_in_a_fall,
+        exempt_on_edge=row.exempt_on_edge,
         keeps_margin=row.keeps_margin,
         is_risk=row.is_risk,
         may_be_unknown=row.may_be_unknown,
@@ -161,7 +161,7 @@ def find_codes(limits: RoverLimits, results: Any) -> list[str]:
 
 
 def readable(results: Any) -> tuple[Any, np.ndarray]:
-    """Return RESULTs (n,) as kernels read them: read-only, and as numbers (n, NUMBERS)."""
+    """Return RESULTs (n,) as kernels read them: read-only, and as numbers (n, RESULT_COLUMNS)."""
     return view_read_only(results), view_read_only(numbers_of(results))
 
 
@@ -169,30 +169,30 @@ def readable(results: Any) -> tuple[Any, np.ndarray]:
 def fill_uses(results, numbers, limits, use, element):
     """Write use and deciding element (n, k) of LIMITs (k,) at RESULTs (n,).
 
-    `numbers` (n, NUMBERS) are the same results.
+    `numbers` (n, RESULT_COLUMNS) are the same results.
     """
     for row in range(results.size):
-        falls = is_falling(numbers, row)
+        rolling_off_edge = is_rolling_off_edge(numbers, row)
         for k in range(limits.size):
             if results[row].status == PoseStatus.SETTLED:
-                use[row, k], element[row, k] = find_use(numbers, row, limits[k], falls)
+                use[row, k], element[row, k] = find_use(numbers, row, limits[k], rolling_off_edge)
             else:
                 use[row, k], element[row, k] = np.inf, -1
 
 
 @exact_kernel
-def is_falling(numbers, row):
+def is_rolling_off_edge(numbers, row):
     """Return whether a wheel rolls off an edge at a row of results."""
-    falls = False
+    rolling_off_edge = False
     for wheel in range(6):
-        falls = falls or numbers[row, FALLING + wheel] > 0.0
-    return falls
+        rolling_off_edge = rolling_off_edge or numbers[row, ROLLING_OFF_EDGE + wheel] > 0.0
+    return rolling_off_edge
 
 
 @exact_kernel
-def find_use(numbers, row, limit, falls):
+def find_use(numbers, row, limit, rolling_off_edge):
     """Return the use of a LIMIT at a settled row of results, and the index of what decides it."""
-    if falls and limit.rests_in_a_fall:
+    if rolling_off_edge and limit.exempt_on_edge:
         return np.nan, -1
     if limit.if_column >= 0 and numbers[row, limit.if_column] != limit.if_value:
         return np.nan, -1
@@ -237,14 +237,14 @@ def find_broken(numbers, row, limits):
 
     Also return that of the first which would be broken if a wheel rolled off an edge, too.
     """
-    first, in_a_fall, falls = -1, -1, is_falling(numbers, row)
+    first, in_any_case, rolling_off_edge = -1, -1, is_rolling_off_edge(numbers, row)
     for k in range(limits.size):
-        if find_use(numbers, row, limits[k], falls)[0] > 1.0:
+        if find_use(numbers, row, limits[k], rolling_off_edge)[0] > 1.0:
             if first < 0:
                 first = k
-            if in_a_fall < 0 and not limits[k].rests_in_a_fall:
-                in_a_fall = k
-    return first, in_a_fall
+            if in_any_case < 0 and not limits[k].exempt_on_edge:
+                in_any_case = k
+    return first, in_any_case
 
 
 @exact_kernel
@@ -257,10 +257,10 @@ def passes(results, numbers, row, limits):
 @exact_kernel
 def find_risk(numbers, row, limits):
     """Return the largest use of the limits that count as risk at a settled row of results."""
-    risk, falls = 0.0, is_falling(numbers, row)
+    risk, rolling_off_edge = 0.0, is_rolling_off_edge(numbers, row)
     for k in range(limits.size):
         if limits[k].is_risk:
-            use = find_use(numbers, row, limits[k], falls)[0]
+            use = find_use(numbers, row, limits[k], rolling_off_edge)[0]
             if use > risk:
                 risk = use
     return risk

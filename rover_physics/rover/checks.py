@@ -31,7 +31,7 @@ RANGES = {
 
 
 Demand = tuple[bool, str, object, str]
-"""Whether it is met, the key, its value, and what it must be."""
+"""True if it is met; the key, its value, and the text on what that must be."""
 
 
 def check_rover(rover: Rover) -> None:

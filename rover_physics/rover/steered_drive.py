@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How wheels that steer follow a commanded motion: their angles, and when the rover may drive.
+"""Steers wheels to a commanded motion: their angles, and when the rover may drive.
 
 The rover drives on while its wheels are near their angles, slowed by the cosine of the largest
 error, as the steering controllers of ros2_control do. If an error is larger, it stands and steers.
@@ -25,7 +25,7 @@ STAND_ERROR = float(np.radians(20.0))
 
 @dataclass(frozen=True, eq=False)
 class WheelAims:
-    """What a commanded motion asks of the wheels."""
+    """Angles and speeds of the wheels that a commanded motion asks for."""
 
     angles: Floats
     """(6,) steering angles within the limit [rad], positive to the left; 0 for fixed wheels."""
@@ -42,7 +42,7 @@ class SteeredDrive:
         """Prepare for a rover; one without steering has all angles at 0 and skids in curves."""
         self._linkages: Any = array_of(pack_linkage(rover, *body_mass_and_com(rover)))
         self.steers = np.array(self._linkages["steers"][0], dtype=bool)
-        """(6,) whether each wheel steers."""
+        """(6,) True for wheels that steer."""
         self._limit = float(self._linkages["steering_limit"][0])
         self._rate = float(self._linkages["steering_rate"][0])
 

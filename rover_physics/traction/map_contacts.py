@@ -157,7 +157,7 @@ def _scan_profile(ground, linkage, search, wheel, profile):
         distances[profile, k] = angles[profile, k] = np.inf
     step = PROFILE_LENGTH * linkage.radius / PROFILE_STEPS
     x0 = z0 = 0.0
-    count, falling, last, last_angle = 0, False, np.inf, 0.0
+    count, approaches, last, last_angle = 0, False, np.inf, 0.0
     for k in range(-PROFILE_STEPS, PROFILE_STEPS + 1):
         x1 = k * step
         gx = (cx + x1 * forward[0] - ground.x0) * ground.inverse_resolution
@@ -173,11 +173,11 @@ def _scan_profile(ground, linkage, search, wheel, profile):
             distance, angle = _find_nearest_on_segment(x0, z0, x1, z1)
             if distance < distances[profile, 0]:
                 distances[profile, 0], angles[profile, 0] = distance, angle
-            if falling and distance >= last and count < MAX_PLACES - 1:
+            if approaches and distance >= last and count < MAX_PLACES - 1:
                 count += 1
                 distances[profile, count], angles[profile, count] = last, last_angle
             if distance != last:
-                falling = distance < last
+                approaches = distance < last
             last, last_angle = distance, angle
         x0, z0 = x1, z1
 

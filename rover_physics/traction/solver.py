@@ -70,7 +70,7 @@ class TractionAnswer:
     programs: int
     """Programs solved."""
     fallback: bool
-    """Whether OSQP failed and torques are equal; see `solve_traction`."""
+    """True if OSQP failed and torques are equal; see `solve_traction`."""
     status: str
     """OSQP's last status in its own words."""
 

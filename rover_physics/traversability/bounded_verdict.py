@@ -16,7 +16,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.status import BoundStatus
 from rover_physics.traversability.verdict import (
     BOUNDS,
-    REST_IN_A_FALL,
+    EXEMPT_ON_EDGE,
     Verdict,
     explain_rows,
     find_largest_risk,
@@ -56,8 +56,8 @@ def refuse_worst_case(
         if not codes[i] and status in _UNBOUNDED:
             codes[i], what = _UNBOUNDED[status]
             reasons[i] = f"{what} {within}"
-    falls = np.asarray(prediction.falling.any(axis=1))
-    needed = bounds.bounded & ~falls
+    rolling_off_edge = np.asarray(prediction.falling.any(axis=1))
+    needed = bounds.bounded & ~rolling_off_edge
     for name in BOUNDED_VALUES:
         # Where the value itself is not known, as the clearance over unknown ground, no bound is.
         missing = np.isnan(getattr(bounds, name)).any(axis=-1) & ~np.isnan(
@@ -70,7 +70,7 @@ def refuse_worst_case(
     extremes: dict[str, Any] = {}
     for name, worse in BOUNDS.items():
         quantity, end = name.removesuffix("_bound"), 0 if worse is np.fmin else 1
-        rows = needed if quantity in REST_IN_A_FALL else bounds.bounded
+        rows = needed if quantity in EXEMPT_ON_EDGE else bounds.bounded
         values = getattr(bounds, quantity)[rows][..., end]
         extremes[name] = float(worse.reduce(values, axis=None)) if values.size else np.nan
     refused = with_refusals(verdict, codes, reasons)

@@ -37,7 +37,7 @@ TRAVERSABILITY_CLASSES = (PASSABLE, WITH_SPEED_SERVOS, WITH_TRACTION_CONTROL, IM
 
 @dataclass(frozen=True)
 class ClassifiedWaypoint:
-    """Class of one waypoint, including the way to it, and the constraint that decides it."""
+    """Class of one waypoint, including the step to it, and the constraint that decides it."""
 
     traversability_class: str
     """One of TRAVERSABILITY_CLASSES."""
@@ -170,13 +170,13 @@ def _decide(
 ) -> list[ClassifiedWaypoint]:
     """Return the decision of each waypoint under one policy; its reason is empty if it passes.
 
-    Where the way to it is worse than the waypoint, that counts.
+    Where the step to it is worse than the waypoint, that counts.
     """
     decisions = list(_decide_rows(rover, prediction))
     between = prediction.between
     if between is not None and len(between.poses):
-        on_the_way = zip(between.waypoint.tolist(), _decide_rows(rover, between), strict=True)
-        for i, other in on_the_way:
+        at_crossings = zip(between.waypoint.tolist(), _decide_rows(rover, between), strict=True)
+        for i, other in at_crossings:
             own = decisions[i]
             if own.reason:
                 continue

@@ -50,25 +50,27 @@ UNKNOWN_CODES = ("off_map", "unknown_ground")
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """What the check for entrapment needs to know of a path, at least up to its first failure."""
+    """The part of a judged path that is checked for entrapment; reaches its first failure."""
 
     path: np.ndarray
     """(k, 3) all poses of the path."""
     distance: np.ndarray
     """(n,) horizontal distance of the judged waypoints since the first [m]."""
-    one_way: np.ndarray
-    """(n,) True where the way back has to be judged, see `find_one_way`."""
+    irreversible: np.ndarray
+    """(n,) True where the way back has to be judged, see `find_irreversible`."""
     drop: np.ndarray
-    """(n,) largest drop of a wheel at a waypoint or on the way to it [m]."""
+    """(n,) largest drop of a wheel at a waypoint or since the one before [m]."""
     swept: SweptPath | None
-    """What the way in was judged by; None if it was not kept."""
+    """The sweep of the way in; None if it was not kept."""
 
 
 def course_of(model: PackedModel, swept: SweptPath) -> Course:
     """Return the course of a path that the model has swept."""
     prediction = swept.prediction
     drop = prediction.wheel_drop.max(axis=1)
-    return Course(swept.path, prediction.distance, find_one_way(model, prediction), drop, swept)
+    return Course(
+        swept.path, prediction.distance, find_irreversible(model, prediction), drop, swept
+    )
 
 
 def refuse_if_trapped(model: PackedModel, course: Course, verdict: Verdict) -> Verdict:
@@ -81,37 +83,37 @@ def refuse_if_trapped(model: PackedModel, course: Course, verdict: Verdict) -> V
     """
     rover, distance = model.rover, course.distance
     end = len(distance) if verdict.first_failure < 0 else verdict.first_failure
-    one_way = np.flatnonzero(course.one_way[:end])
-    if not one_way.size:
+    irreversible = np.flatnonzero(course.irreversible[:end])
+    if not irreversible.size:
         return verdict
-    run_up = distance[one_way[0]] - RUN_UP * rover.wheelbase
+    run_up = distance[irreversible[0]] - RUN_UP * rover.wheelbase
     inside = slice(int(np.searchsorted(distance, max(run_up, 0.0))), end)
     back = _judge_way_back(model, course, inside)
     if back.traversable:
         return verdict
     stop = end - 1 - back.first_failure  # the way back is blocked here
-    on = _find_way_on(model, course, slice(stop, end))
+    on = _explain_no_way_on(model, course, slice(stop, end))
     if not on:
         return verdict
     drop = course.drop[stop:end].max(initial=0.0)
     fell = drop > DROP * rover.wheel.radius
     what = f"a wheel drops {drop:.3f} m" if fell else "from here the rover goes in but not out"
-    ways = f"no way on: {verdict.reason or on}; no way back: {back.reason}"
+    exits = f"no way on: {verdict.reason or on}; no way back: {back.reason}"
     codes, reasons = list(verdict.codes), list(verdict.reasons)
-    codes[stop], reasons[stop] = TRAPPED, f"trapped: {what}; {ways}"
+    codes[stop], reasons[stop] = TRAPPED, f"trapped: {what}; {exits}"
     return with_refusals(verdict, codes, reasons)
 
 
-def find_one_way(model: PackedModel, prediction: PathPrediction) -> np.ndarray:
+def find_irreversible(model: PackedModel, prediction: PathPrediction) -> np.ndarray:
     """Return (n,) True at or just after places where the forces of the way in allow no return.
 
     Under policy "optimal" other torques may allow it; these are only the places to check.
     """
-    one_way = np.any(prediction.wheel_drop > DROP * model.rover.wheel.radius, axis=1)
+    irreversible = np.any(prediction.wheel_drop > DROP * model.rover.wheel.radius, axis=1)
     for part in (prediction, prediction.between):
         if part is not None:
-            one_way[part.waypoint[_resists_way_back(model, part)]] = True
-    return np.asarray(one_way)
+            irreversible[part.waypoint[_resists_way_back(model, part)]] = True
+    return np.asarray(irreversible)
 
 
 def _resists_way_back(model: PackedModel, prediction: PathPrediction) -> np.ndarray:
@@ -150,14 +152,14 @@ def _judge_way_back(model: PackedModel, course: Course, waypoints: slice) -> Ver
     """
     reverse = model.change(backward=not model.options.backward)
     if course.swept is None or reverse.settings.on_soil or reverse.options.policy == SERVO:
-        return _judge_way(reverse, course.path[waypoints][::-1])
+        return _judge_escape(reverse, course.path[waypoints][::-1])
     back = predict_way_back(reverse, course.swept, waypoints)
     return hold_against_limits(model.rover, back)
 
 
-def _judge_way(model: PackedModel, poses: np.ndarray) -> Verdict:
-    """Judge a way under the first of `policies_of_ways` that passes it, else under the last."""
-    for policy in policies_of_ways(model.options):
+def _judge_escape(model: PackedModel, poses: np.ndarray) -> Verdict:
+    """Judge a path out by the first of `escape_policies` that passes it, else by the last."""
+    for policy in escape_policies(model.options):
         verdict = _judge_to_failure(model.change(policy=policy), np.ascontiguousarray(poses))
         if verdict.traversable:
             break
@@ -165,7 +167,7 @@ def _judge_way(model: PackedModel, poses: np.ndarray) -> Verdict:
 
 
 def _judge_to_failure(model: PackedModel, poses: np.ndarray) -> Verdict:
-    """Judge a way up to its first failure; long ones in parts, to keep little in memory."""
+    """Judge a path out up to its first failure; long ones in parts, to keep little in memory."""
     if len(poses) <= PART:
         swept = predict_paths(model, [poses], stop_at_failure=True)[0]
         return hold_against_limits(model.rover, swept.prediction)
@@ -177,7 +179,7 @@ def _judge_to_failure(model: PackedModel, poses: np.ndarray) -> Verdict:
     return verdict
 
 
-def policies_of_ways(options: SweepOptions) -> tuple[str, ...]:
+def escape_policies(options: SweepOptions) -> tuple[str, ...]:
     """Return the policies under which ways on and back are judged, in this order.
 
     What equal torques pass, optimal ones pass too, and equal ones are faster. Speed servos have
@@ -186,7 +188,7 @@ def policies_of_ways(options: SweepOptions) -> tuple[str, ...]:
     return (EQUAL, OPTIMAL) if options.policy == OPTIMAL else (options.policy,)
 
 
-def _find_way_on(model: PackedModel, course: Course, inside: slice) -> str:
+def _explain_no_way_on(model: PackedModel, course: Course, inside: slice) -> str:
     """Return why the first way on, straight ahead from the end, is closed; empty if any is open.
 
     The rover can move within the waypoints `inside`.
@@ -203,10 +205,10 @@ def _find_way_on(model: PackedModel, course: Course, inside: slice) -> str:
     ahead = np.linspace(0.0, length, steps + 1)
     closed = ""
     for start in starts:
-        for way in _ways_ahead(course.path[start], wheelbase, ahead, model.options.direction):
+        for path in _paths_ahead(course.path[start], wheelbase, ahead, model.options.direction):
             # From the pose before it, so that the wheels of a curve are turned on the ground.
-            poses = np.vstack([course.path[max(start - 1, 0)], way])
-            verdict = _judge_way(model, poses)
+            poses = np.vstack([course.path[max(start - 1, 0)], path])
+            verdict = _judge_escape(model, poses)
             if verdict.traversable:
                 return ""
             far = verdict.first_failure * (length / steps) > LOOK_AHEAD * wheelbase
@@ -216,10 +218,10 @@ def _find_way_on(model: PackedModel, course: Course, inside: slice) -> str:
     return closed
 
 
-def _ways_ahead(
+def _paths_ahead(
     pose: np.ndarray, wheelbase: float, ahead: np.ndarray, direction: float
 ) -> Iterator[np.ndarray]:
-    """Yield ways on (n, 3) from a pose (3,): straight, then curves that end straight.
+    """Yield paths (n, 3) on from a pose (3,): straight, then curves that end straight.
 
     `ahead` (n,) are the distances of their poses [m], from 0 on.
     """
@@ -234,7 +236,7 @@ def _ways_ahead(
 
 
 def count_steps(path: np.ndarray, length: float) -> int:
-    """Return the number of steps of a way of `length` [m], about as long as those of a path.
+    """Return the number of steps of a path of `length` [m], about as long as those of a path.
 
     Their median counts, of poses that are apart.
     """

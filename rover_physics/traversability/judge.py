@@ -80,7 +80,7 @@ def judge_paths(
 ) -> list[tuple[PathPrediction, Verdict]]:
     """Judge several paths at once, faster than one by one; see `judge_path`.
 
-    Without `check_entrapment`, ways out are not looked for: pieces of a longer path are judged,
+    Without `check_entrapment`, entrapment is not looked for: pieces of a longer path are judged,
     and the whole of it later.
     """
     check_sigmas(sigmas)

@@ -17,7 +17,7 @@ from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.entrapment import Course, find_one_way, refuse_if_trapped
+from rover_physics.traversability.entrapment import Course, find_irreversible, refuse_if_trapped
 from rover_physics.traversability.judge import add_bounds, judge_poses
 from rover_physics.traversability.verdict import (
     Verdict,
@@ -82,7 +82,7 @@ class PartwiseJudge:
         course = Course(
             self._poses,
             np.concatenate([one.distance for one in self._courses]),
-            np.concatenate([one.one_way for one in self._courses]),
+            np.concatenate([one.irreversible for one in self._courses]),
             np.concatenate([one.drop for one in self._courses]),
             None,
         )
@@ -94,14 +94,17 @@ class PartwiseJudge:
         model = self._model
         for part in predict_in_parts(model, self._poses):
             verdict = hold_against_limits(model.rover, part.prediction)
-            one_way, new = find_one_way(model, part.prediction), slice(part.context, None)
+            irreversible, new = (
+                find_irreversible(model, part.prediction),
+                slice(part.context, None),
+            )
             if self._failure[0] < 0 <= verdict.first_failure:
                 waypoint = part.first - part.context + verdict.first_failure
                 self._failure = (waypoint, verdict.code, verdict.reason)
             prediction = part.prediction.select(new)
             drop = prediction.wheel_drop.max(axis=1)
             self._courses.append(
-                Course(prediction.poses, prediction.distance.copy(), one_way[new], drop, None)
+                Course(prediction.poses, prediction.distance.copy(), irreversible[new], drop, None)
             )
             verdict = with_refusals(verdict, verdict.codes[new], verdict.reasons[new])
             yield add_bounds(model, prediction, verdict, self._sigmas)

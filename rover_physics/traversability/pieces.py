@@ -50,7 +50,7 @@ STRIDE = 8
 
 @dataclass(frozen=True)
 class PieceVerdict:
-    """What is found of a piece of path; time, energy and exposure are NaN if it fails."""
+    """Verdict on a piece of path; time, energy and exposure are NaN if it fails."""
 
     code: str
     """Code of a limit that fails, empty if the rover may drive the piece."""
@@ -71,7 +71,7 @@ def judge_pieces(
     *,
     sigmas: float | None = SIGMAS,
 ) -> list[PieceVerdict]:
-    """Judge pieces of path as `judge_paths` does without asking for ways out.
+    """Judge pieces of path as `judge_paths` does without the check for entrapment.
 
     The code of a piece that fails is that of one of its failures, not always of the first.
 
@@ -227,7 +227,7 @@ def sum_up_pieces(path, turns, look, steering_rate, sums, found):
 
 @exact_kernel
 def add_exposure(numbers, time, limits):
-    """Return the exposure [s] as `find_exposure`, of results (n, NUMBERS) at times (n,) [s]."""
+    """Return the exposure [s] as `find_exposure`, of results as numbers at times (n,) [s]."""
     exposure, before = 0.0, 0.0
     for row in range(numbers.shape[0]):
         excess = (find_risk(numbers, row, limits) - SAFE) / (1.0 - SAFE)
@@ -256,15 +256,15 @@ def _is_easy(results, numbers, limits, wheels):
 
 
 @exact_kernel
-def _keeps_to_path(poses, results, reach, wheelbase):
+def _keeps_to_path(poses, results, swing_radius, wheelbase):
     """Return whether the deviations from the path stay small, whatever their directions."""
     turn, slide = 0.0, 0.0
     for row in range(1, results.size):
-        way = distance_between(poses[row - 1], poses[row], reach)
+        distance = distance_between(poses[row - 1], poses[row], swing_radius)
         for i in range(row - 1, row + 1):
             x, y, rate = results[i].deviation[0], results[i].deviation[1], results[i].deviation[2]
             if x != 0.0 or y != 0.0 or rate != 0.0:
-                share = 0.5 * way / results[i].speed_share
+                share = 0.5 * distance / results[i].speed_share
                 turn += share * abs(rate)
                 slide += share * np.hypot(x, y)
     return turn <= MAX_TURN_OFF and slide <= MAX_SLIDE * wheelbase

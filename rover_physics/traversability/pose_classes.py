@@ -59,7 +59,7 @@ class RoverOnMap:
 
     @property
     def is_uncertain(self) -> bool:
-        """Whether heights may be wrong."""
+        """True if the map has deviations of its heights that are allowed for."""
         return bool(self.sigmas) and self.terrain.elevation_std is not None
 
 

@@ -39,7 +39,7 @@ PER_WHEEL = ("wheel_loads", "tangential", "lateral", "torque", "friction_utilisa
 
 @dataclass(frozen=True, eq=False)
 class ReachAnswer:
-    """Whether the arm can reach a point and bear a load there, and the reason if it cannot."""
+    """Answer to a reach query: the arm reaches the point and bears the load, or why not."""
 
     possible: bool
     """True if the tip reaches the point and the rover holds still within all its limits."""
@@ -67,8 +67,8 @@ class ReachAnswer:
         names = ("possible", "reachable", "code", "reason", "target", "out_of_reach")
         answer = {name: getattr(self, name) for name in (*names, "joint_angles")}
         if self.verdict is not None:
-            told = asdict(self.verdict)
-            answer |= {name: told[name] for name in OF_THE_VERDICT}
+            fields = asdict(self.verdict)
+            answer |= {name: fields[name] for name in OF_THE_VERDICT}
         if self.prediction is not None:
             answer |= {name: getattr(self.prediction, name)[0] for name in PER_WHEEL}
         return to_plain(answer)

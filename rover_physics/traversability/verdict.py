@@ -54,13 +54,13 @@ BOUNDS = {
     "belly_clearance_bound": np.fmin,
 }
 """Fields of a verdict that are the worst case on an uncertain map."""
-REST_IN_A_FALL = ("friction_utilisation", "torque_saturation")
+EXEMPT_ON_EDGE = ("friction_utilisation", "torque_saturation")
 """Quantities that do not count while a wheel rolls off an edge."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Whether a path is traversable, and the physical reason if it is not."""
+    """Verdict on a path: traversable or not, with the physical reason if it is not."""
 
     traversable: bool
     """True if every waypoint is passable."""
@@ -133,8 +133,8 @@ def hold_against_limits(rover: Rover, prediction: PathPrediction) -> Verdict:
         for row, (code, reason) in explain_rows(rover, part, uses).items():
             waypoint = int(part.waypoint[row])
             if not codes[waypoint]:
-                way = "" if part is prediction else "on the way here: "
-                codes[waypoint], reasons[waypoint] = code, f"{way}{reason}"
+                where = "" if part is prediction else "on the way here: "
+                codes[waypoint], reasons[waypoint] = code, f"{where}{reason}"
         for name, value in _find_extremes(part).items():
             extremes[name] = float(EXTREMES[name][1](value, extremes.get(name, np.nan)))
         risk = max(risk, find_largest_risk(uses, part.settled))
@@ -217,12 +217,12 @@ def worst_of(verdict: Verdict, other: Verdict) -> Verdict:
 
 def _find_extremes(prediction: PathPrediction) -> dict[str, float]:
     """Return the EXTREMES of a prediction; NaN where no row has the quantity."""
-    falls = prediction.falling.any(axis=1)
+    rolling_off_edge = prediction.falling.any(axis=1)
     found = {}
     for name, (quantity, worse) in EXTREMES.items():
         values = getattr(prediction, quantity)
-        if quantity in REST_IN_A_FALL and falls.any():
-            values = values[~falls]
+        if quantity in EXEMPT_ON_EDGE and rolling_off_edge.any():
+            values = values[~rolling_off_edge]
         found[name] = float(worse.reduce(values, axis=None)) if values.size else np.nan
     return found
 

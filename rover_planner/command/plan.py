@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The commands `rover_planner plan` and `replay-plan`: search a way between two poses."""
+"""The commands `rover_planner plan` and `replay-plan`: search a path between two poses."""
 
 import json
 from pathlib import Path
@@ -27,7 +27,7 @@ from rover_planner.shell.poses import GOAL, START, Pose
 if TYPE_CHECKING:
     from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 
-Out = Annotated[Path, argument("OUT", "The way with its predictions, .npz; written if found.")]
+Out = Annotated[Path, argument("OUT", "The path with its predictions, .npz; written if found.")]
 Picture = Annotated[Path | None, option("FILE", "Draw the answer on the map (.png, .svg).")]
 
 
@@ -57,7 +57,7 @@ def plan(
     ] = None,
     max_cells: MaxCells = MAX_CELLS,
 ) -> None:
-    """Search a way around obstacles; write it with its predictions, and print a report as JSON.
+    """Search a path around obstacles; write it with its predictions, and print a report as JSON.
 
     Exit code 0: it ran, with any answer. 2: bad input.
     """
@@ -92,7 +92,7 @@ def replay_plan(
     picture: Picture = None,
     max_cells: MaxCells = MAX_CELLS,
 ) -> None:
-    """Search the way of a question again that `plan --dump` has written."""
+    """Search the path of a question again that `plan --dump` has written."""
     from rover_planner.planning.search.query_file import read_query
 
     asked, settings = read_query(question, max_cells)
@@ -102,16 +102,16 @@ def replay_plan(
 def _ask(
     question: "SearchQuery", settings: "LatticeSettings", out: Path, picture: Path | None
 ) -> None:
-    """Search the way, write it and print the report."""
+    """Search the path, write it and print the report."""
     from rover_planner.command.prediction_files import write_prediction
-    from rover_planner.nodes.warm_up import search_ways
+    from rover_planner.nodes.warm_up import search_paths
     from rover_planner.planning.assumptions import assume
     from rover_planner.planning.search.path_search import find_path
     from rover_planner.shell.progress import show_progress
 
     with show_progress() as progress:
         progress("load the model (the first run compiles it)")
-        search_ways()  # so that the budget is not spent on it
+        search_paths()  # so that the budget is not spent on it
         progress(f"search a way for {question.rover.name}")
         answer = find_path(question, settings)
     if answer.path is not None:

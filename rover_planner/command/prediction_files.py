@@ -36,10 +36,10 @@ ARRAYS: dict[str, Shape] = {
     "bogie_angle": (2,),
 } | {one.name: one.shape for one in QUANTITIES if one.is_kept}
 """Arrays of a prediction in the output file, under the same names: shape of a waypoint's part."""
-NUMBERS: tuple[DTypeLike, str, str] = (np.float64, "fiu", "numbers")
+NUMBER_TYPE: tuple[DTypeLike, str, str] = (np.float64, "fiu", "numbers")
 FLAGS: tuple[DTypeLike, str, str] = (np.bool_, "b", "bools")
 TYPES = {"settled": FLAGS, "falling": FLAGS, "status": (np.int8, "i", "whole numbers")}
-"""Arrays that do not hold NUMBERS: type when read, kinds of types in the file, and name."""
+"""Arrays that do not hold numbers: type when read, kinds of types in the file, and name."""
 SHOWN = ("position", "wheel_centres", "distance", "time")
 """Arrays that a replay cannot do without where the rover settled."""
 MAX_NUMBER = 1e9
@@ -119,7 +119,7 @@ def read_prediction(path: Path) -> tuple[PathPrediction, tuple[str, ...]]:
             _check_header(archive.read_header(name), name, (reason.size, *shape))
         arrays: dict[str, Any] = {
             name: archive.read(
-                name, TYPES.get(name, NUMBERS)[0], most=8 * reason.size * math.prod(shape)
+                name, TYPES.get(name, NUMBER_TYPE)[0], most=8 * reason.size * math.prod(shape)
             )
             for name, shape in ARRAYS.items()
         }
@@ -166,7 +166,7 @@ def _check_count(name: str, count: int) -> None:
 
 def _check_header(header: ArrayHeader, name: str, shape: Shape) -> None:
     """Check type and shape of an array of a prediction."""
-    _, kinds, what = TYPES.get(name, NUMBERS)
+    _, kinds, what = TYPES.get(name, NUMBER_TYPE)
     if header.dtype.kind not in kinds:
         raise RoverFileError(f"{name} is of type {header.dtype}; it must hold {what}")
     if header.shape != shape:

@@ -19,7 +19,7 @@ def reachable(
     start: Annotated[str, option("X,Y", "Start in m, in the map's coordinates.", "--from")],
     picture: Annotated[Path | None, option("FILE", "Draw the area on the map, .png.")] = None,
     geotiff: Annotated[
-        Path | None, option("FILE", "Write the length of the ways as GeoTIFF (COG).")
+        Path | None, option("FILE", "Write the length of the paths as GeoTIFF (COG).")
     ] = None,
 ) -> None:
     """Find the cells that the rover can reach from a place and return from.

@@ -15,7 +15,7 @@ from rover_planner.shell.poses import Pose, pose_option
 if TYPE_CHECKING:
     from rover_planner.parameters.traverse_server import TraverseServerParameters
     from rover_planner.ros.bags.bag_writer import BagWriter
-    from rover_planner.ros.bags.replay import Answer, Replay
+    from rover_planner.ros.bags.replay import Replay, ReplayAnswer
 
 NODE_KEYS = ("/**", "traverse_server", "/traverse_server")
 """Keys of a parameter file that are about traverse_server; later ones take precedence."""
@@ -30,8 +30,10 @@ def replay(
     rover: Annotated[str, option("ROVER", "Preset name or rover file; sets the parameter.")] = "",
     map_frame: Annotated[str, option("NAME", "Frame of the map; sets the parameter.")] = "",
     resolution: Annotated[float, option("M", "Cell size of the map; sets map_resolution.")] = 0.0,
-    goal: Annotated[Pose | None, pose_option("Ask for a way to it after each new map.")] = None,
-    start: Annotated[Pose | None, pose_option("Start of that way; default: the odometry.")] = None,
+    goal: Annotated[Pose | None, pose_option("Ask for a path to it after each new map.")] = None,
+    start: Annotated[
+        Pose | None, pose_option("Start of that path; default: the odometry.")
+    ] = None,
     stretch: Annotated[float, option("M", "Length in which the drive is judged.", min=0.1)] = 5.0,
     map_topic: Annotated[str, option("TOPIC", "PointCloud2 or GridMap.")] = "",
     joints_topic: Annotated[str, option("TOPIC", "JointState.")] = "",
@@ -108,13 +110,13 @@ class _Results:
         self.count = 0
         """Number of answers."""
 
-    def take(self, answer: "Answer") -> None:
+    def take(self, answer: "ReplayAnswer") -> None:
         """Write an answer and print it in one line."""
         from rover_planner.maps.known_map import stamp_text
 
         self.count += 1
         name = f"{self.count:03d}_{answer.kind}"
-        told: dict[str, Any] = {
+        entries: dict[str, Any] = {
             "question": self.count,
             "kind": answer.kind,
             "stamp": stamp_text(answer.stamp),
@@ -122,11 +124,11 @@ class _Results:
             "reason": answer.judgement.reason,
             "map": self._save_map(answer),
         }
-        told |= self._save_prediction(answer, name)
+        entries |= self._save_prediction(answer, name)
         self._write_messages(answer)
-        typer.echo(json.dumps(told))
+        typer.echo(json.dumps(entries))
 
-    def _save_map(self, answer: "Answer") -> str:
+    def _save_map(self, answer: "ReplayAnswer") -> str:
         """Write the map of an answer once; return its file's name."""
         from rover_physics.terrain.grid import save_terrain
 
@@ -138,8 +140,8 @@ class _Results:
             save_terrain(self._folder / self._maps[key], answer.terrain)
         return self._maps[key]
 
-    def _save_prediction(self, answer: "Answer", name: str) -> dict[str, Any]:
-        """Write prediction and measurements of an answer; return what is told of them."""
+    def _save_prediction(self, answer: "ReplayAnswer", name: str) -> dict[str, Any]:
+        """Write prediction and measurements of an answer; return their entries of the report."""
         from rover_physics.files.npz_file import write_npz
         from rover_planner.command.prediction_files import write_prediction
         from rover_planner.planning.answering.service_settings import load_service_settings
@@ -156,15 +158,18 @@ class _Results:
             candidate.verdict,
             assumptions=assume(self._rover, query.model, query.map_sigmas),
         )
-        told: dict[str, Any] = {"prediction": file, "waypoints": len(candidate.prediction.poses)}
+        entries: dict[str, Any] = {
+            "prediction": file,
+            "waypoints": len(candidate.prediction.poses),
+        }
         if answer.measured is not None:
             measured = answer.measured
             write_npz(self._folder / f"{name}_measured.npz", vars(measured))
-            told["measured"] = f"{name}_measured.npz"
-            told["suspension"] = measured.compare(candidate.prediction)
-        return told
+            entries["measured"] = f"{name}_measured.npz"
+            entries["suspension"] = measured.compare(candidate.prediction)
+        return entries
 
-    def _write_messages(self, answer: "Answer") -> None:
+    def _write_messages(self, answer: "ReplayAnswer") -> None:
         """Write the messages that a server would publish, under its topics."""
         from msg_adapters.paths import PoseStock
         from msg_adapters.stamps import ns_to_stamp

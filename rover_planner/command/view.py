@@ -141,10 +141,10 @@ def _compile() -> None:
     """Compile the kernels or load them from the cache before the page is served."""
     from rover_physics.compilation import Compilation
     from rover_physics.warm_up import EXACT, UNCERTAIN
-    from rover_planner.nodes.warm_up import WAYS
+    from rover_planner.nodes.warm_up import PATH_SEARCH
     from rover_planner.shell.progress import show_progress
 
-    steps = (*EXACT, *UNCERTAIN, *WAYS)
+    steps = (*EXACT, *UNCERTAIN, *PATH_SEARCH)
     with show_progress() as progress, Compilation(steps) as compilation:
         progress("load the model")
         compilation.run(lambda name: progress(f"compile {name} (only the first time)"))

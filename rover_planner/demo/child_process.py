@@ -51,7 +51,7 @@ class ChildProcess:
 
     @property
     def running(self) -> bool:
-        """Whether the process is still running."""
+        """True if the process is still running."""
         return self.exit_code is None
 
     @property
@@ -82,7 +82,7 @@ class ChildProcess:
             *whole, pending = (pending + received).split(b"\n")
             yield from (line.decode(errors="replace") for line in whole)
 
-    def last_words(self) -> str:
+    def last_line(self) -> str:
         """Return the last non-empty line of the log."""
         lines = self.log.read_text(errors="replace").splitlines()
         return next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")

@@ -251,7 +251,7 @@ def _events(planner: ChildProcess, server: ChildProcess) -> Iterator[dict[str, A
     def watch() -> None:
         if not server.running:
             raise DemoError(
-                f"{server.name} ended with code {server.exit_code}: {server.last_words()} "
+                f"{server.name} ended with code {server.exit_code}: {server.last_line()} "
                 f"(see {server.log})"
             )
 
@@ -272,7 +272,7 @@ def _expect_success(child: ChildProcess, codes: tuple[int, ...] = (EXIT_OK,)) ->
         time.sleep(0.02)
     if child.exit_code not in codes:
         raise DemoError(
-            f"{child.name} ended with code {child.exit_code}: {child.last_words()} "
+            f"{child.name} ended with code {child.exit_code}: {child.last_line()} "
             f"(see {child.log})"
         )
 

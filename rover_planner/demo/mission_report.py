@@ -10,7 +10,7 @@ from rich.text import Text
 from rover_physics.rover.model import Rover
 from rover_planner.planning.goals import Mission
 
-NUMBERS = (
+ANSWER_COLUMNS = (
     ("length\n[m]", "length", 2),
     ("time\n[s]", "time", 0),
     ("energy\n[J]", "energy", 1),
@@ -38,7 +38,7 @@ def answer_table(rover: Rover, mission: Mission, answers: list[dict[str, Any]]) 
     )
     for heading in ("goal", "verdict", "reason"):
         table.add_column(heading, overflow="fold")
-    for heading, _, _ in NUMBERS:
+    for heading, _, _ in ANSWER_COLUMNS:
         table.add_column(escape(heading), justify="right", no_wrap=True)
     for goal, answer in zip(mission.goals, answers, strict=True):
         passable = answer["traversable"]
@@ -48,7 +48,7 @@ def answer_table(rover: Rover, mission: Mission, answers: list[dict[str, Any]]) 
             if passable
             else Text("refused", style="bold red"),
             "" if passable else answer["reason"],
-            *(_number(answer.get(key), digits) for _, key, digits in NUMBERS),
+            *(_number(answer.get(key), digits) for _, key, digits in ANSWER_COLUMNS),
         )
     return table
 

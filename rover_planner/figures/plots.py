@@ -36,7 +36,7 @@ SIDE_STYLES = {"right": "-", "left": (0, (3, 1.5))}
 # Ground is drawn in warm greys, so that the coloured paths stand out.
 _GROUND = LinearSegmentedColormap.from_list("ground", ["#6E6259", "#B5A99C", "#F1EAE0"])
 _COLUMNS = 3
-_FALL = "#E4E1DC"
+_EDGE = "#E4E1DC"
 
 
 @dataclass(frozen=True)
@@ -237,7 +237,7 @@ def _draw_panels(figure, rover: Rover, shown: Sequence[LabelledAnswer]) -> None:
             axes = panels[row, column]
             _draw_quantity(axes, candidate, name)
             if name != "tip_over_ratio":
-                _shade_falls(axes, candidate)
+                _shade_edges(axes, candidate)
             if limit is not None:
                 axes.axhline(limit, color=INK, lw=1.0, ls=":")
             if column == 0:
@@ -291,13 +291,13 @@ def _measure_distance(candidate: Candidate) -> NDArray[np.float64]:
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
-def _shade_falls(axes: Axes, candidate: Candidate) -> None:
+def _shade_edges(axes: Axes, candidate: Candidate) -> None:
     """Shade where a wheel rolls off an edge: the verdict does not ask for forces there."""
     distance, prediction = _measure_distance(candidate), candidate.prediction
     parts = filter(None, (prediction, prediction.between))
-    falls = [part.waypoint[part.falling.any(axis=1)] for part in parts]
-    for waypoint in np.unique(np.concatenate(falls)):
-        axes.axvspan(distance[max(waypoint - 1, 0)], distance[waypoint], color=_FALL, zorder=0)
+    off_edge = [part.waypoint[part.falling.any(axis=1)] for part in parts]
+    for waypoint in np.unique(np.concatenate(off_edge)):
+        axes.axvspan(distance[max(waypoint - 1, 0)], distance[waypoint], color=_EDGE, zorder=0)
 
 
 def _wheel_legend() -> list[Line2D | Patch]:
@@ -310,5 +310,5 @@ def _wheel_legend() -> list[Line2D | Patch]:
         ),
         _key("rover, or all wheels alike", color=INK, lw=1.3),
         _key("safety limit", color=INK, lw=1.0, ls=":"),
-        Patch(color=_FALL, label="a wheel rolls off an edge: not asked"),
+        Patch(color=_EDGE, label="a wheel rolls off an edge: not asked"),
     ]

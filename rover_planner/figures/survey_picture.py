@@ -64,7 +64,7 @@ def draw_survey(path: Path, store: SurveyStore) -> None:
 
 
 def draw_reachable(path: Path, store: SurveyStore, area: ReachableArea) -> None:
-    """Draw the cells that can be reached and returned from, coloured by the length of the way.
+    """Draw the cells that can be reached and returned from, coloured by the length of the path.
 
     Args:
         path: Picture to write; its suffix sets the format, such as .png.

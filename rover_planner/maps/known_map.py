@@ -37,7 +37,7 @@ class KnownMap:
 
     @cached_property
     def seen(self) -> ObservedGround:
-        """What was seen of the map; interpolated gaps were not. Computed on first use."""
+        """The seen part of the map, without interpolated gaps. Computed on first use."""
         return observed_ground(self.received, self.cells)
 
     @cached_property

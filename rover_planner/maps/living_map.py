@@ -85,12 +85,12 @@ class LivingMap:
 
     @property
     def has_loaded(self) -> bool:
-        """Whether there is a loaded map."""
+        """True if there is a loaded map."""
         return self._loaded is not None
 
     @property
     def has_cells(self) -> bool:
-        """Whether there is any map."""
+        """True if there is any map."""
         return self._window is not None
 
     def load(self, terrain: Terrain, time: float) -> None:

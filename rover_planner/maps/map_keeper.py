@@ -24,7 +24,7 @@ class KeeperSettings:
     rules: MergeRules = field(default_factory=MergeRules)
     """Rules by which maps merge."""
     fill: bool = True
-    """Whether unknown cells under the standing rover are filled."""
+    """True if unknown cells under the standing rover are filled."""
     margin: float = 0.0
     """Width around the wheels' outline that is filled where the rover started [m]."""
     std: float = 0.02
@@ -47,7 +47,7 @@ class MapKeeper:
 
     @property
     def merges(self) -> bool:
-        """Whether the next local map merges."""
+        """True if the next local map merges."""
         updates = self._settings.updates
         return updates == MERGE or (updates == AUTO and self._living.has_loaded)
 

@@ -16,7 +16,7 @@ ALLOW, ALLOW_FOOTPRINT, REFUSE = "allow", "allow_footprint", "refuse"
 UNOBSERVED_GROUND = (ALLOW, ALLOW_FOOTPRINT, REFUSE)
 """Values of the parameter blind_ground: paths whose belly passes over ground that was never seen
 are allowed, allowed over the start footprint only, or refused."""
-CODE = "blind_ground"
+UNOBSERVED_CODE = "blind_ground"
 """Code of the refusal."""
 SEEN, ASSUMED, UNSEEN = range(3)
 """Kinds of cells: measured, filled in as part of the start footprint, or nothing."""
@@ -30,7 +30,7 @@ CHUNK = 500_000
 class UnobservedShare:
     """Ground under the belly along a path."""
 
-    blind_share: float
+    unobserved_share: float
     """Share of the cells under the belly that were never seen, 0 to 1."""
     footprint_share: float
     """Share of the cells under the belly that were filled in as start footprint."""

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Takes the questions of a node's services and has them judged, within their budget.
 
-A question's way: a service makes a `Question` of its request; the desk notes when it came and what
-is known then; the queue judges it in its thread; the desk hands the `Answer` to the service, which
-makes messages of it.
+The course of a question: a service makes a `Question` of its request; the desk notes when it came
+and what is known then; the queue judges it in its thread; the desk hands the `Answer` to the
+service, which makes messages of it.
 """
 
 import contextlib
@@ -51,7 +51,7 @@ class Inquiry(Asked):
     reply: Reply
     """Takes the answer."""
     snapshot: Snapshot
-    """What is known; its map is that of the time of judging."""
+    """Map, settings, path and measurements; its map is that of the time of judging."""
     number: int
     """Number of the question."""
     ros_time: int
@@ -128,8 +128,8 @@ class QuestionDesk:
         for inquiry, judgement in answered:
             assert isinstance(inquiry, Inquiry)
             question, done = inquiry.question, time.monotonic()
-            told = f"{inquiry.number}, {question.service}"
-            self.health.take_answer(judgement.code, done, told, done - inquiry.arrival)
+            label = f"{inquiry.number}, {question.service}"
+            self.health.take_answer(judgement.code, done, label, done - inquiry.arrival)
             identity = self._register.identify(
                 inquiry.number, question.service, question.hash, inquiry.snapshot
             )
@@ -142,10 +142,10 @@ class QuestionDesk:
         """Return a watch that publishes the progress of a question's searches."""
         patience = self._service.settings.lattice.budget
 
-        def tell(report: dict[str, Any]) -> None:
+        def send_report(report: dict[str, Any]) -> None:
             self._handover.call(lambda: self._publish_progress(report))
 
-        return SearchWatch(lambda: self._service.known_map, tell, patience)
+        return SearchWatch(lambda: self._service.known_map, send_report, patience)
 
     def _publish_progress(self, report: dict[str, Any]) -> None:
         text = (

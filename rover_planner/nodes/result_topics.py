@@ -17,7 +17,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from visualization_msgs.msg import MarkerArray
 
 from msg_adapters.identity import path_hash
-from msg_adapters.joints import JointMap
+from msg_adapters.joints import JointNames
 from msg_adapters.paths import PoseStock, decimate, empty_path, settled_path
 from msg_adapters.results.diagnostics import verdict_to_diagnostics
 from msg_adapters.results.grids import area_to_grid, empty_grid
@@ -72,7 +72,7 @@ class ResultTopics:
         deferred_work: DeferredWork,
         map_frame: str,
         positive_steering: str,
-        joint_names: JointMap,
+        joint_names: JointNames,
         to_base: Callable[[Path], Path],
     ):
         """Create the topics.
@@ -188,7 +188,7 @@ class ResultMessages:
     poses: PoseStock
     points: list[JointTrajectoryPoint]
     positive_steering: str
-    joint_names: JointMap
+    joint_names: JointNames
     to_base: Callable[[Path], Path]
 
     @cached_property

@@ -42,7 +42,7 @@ from rover_planner.nodes.navigation.path_watch import MAX_POSE_AGE, PathWatch
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.nodes.result_topics import ResultTopics
 from rover_planner.nodes.running import run_node
-from rover_planner.nodes.warm_up import HAZARDS, WAYS
+from rover_planner.nodes.warm_up import HAZARDS, PATH_SEARCH
 from rover_planner.parameters.declare import (
     declare_parameters,
     follow_changes,
@@ -91,7 +91,7 @@ class TraverseServer(Node):
     def __init__(self, **node_arguments: Any):
         super().__init__(NODE_NAME, **node_arguments)
         self._values = declare_parameters(self, TraverseServerParameters)
-        behind = UNCERTAIN if self._values.planner == FAN else (*UNCERTAIN, *WAYS)
+        behind = UNCERTAIN if self._values.planner == FAN else (*UNCERTAIN, *PATH_SEARCH)
         behind = (*behind, *HAZARDS) if self._values.hazard_map else behind
         # Other nodes discover this one meanwhile, which may take DDS three seconds.
         self._behind = load_kernels(EXACT, behind, self.get_logger().info)

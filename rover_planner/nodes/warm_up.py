@@ -20,7 +20,7 @@ from rover_planner.traction.traction_service import TractionService
 
 CANDIDATES = (CompilationStep("candidate paths", "rover_planner.nodes.warm_up:plan_candidates"),)
 """All that candidates of a question need."""
-WAYS = (CompilationStep("search of ways", "rover_planner.nodes.warm_up:search_ways"),)
+PATH_SEARCH = (CompilationStep("path search", "rover_planner.nodes.warm_up:search_paths"),)
 """All that searches around obstacles need."""
 HAZARDS = (CompilationStep("classes of poses", "rover_planner.nodes.warm_up:classify_pose"),)
 """All that the hazard map needs."""
@@ -28,7 +28,7 @@ TRACTION = (
     CompilationStep("traction controller", "rover_planner.nodes.warm_up:control_traction"),
 )
 """All that updates of the traction controller need."""
-GROUPS = ((*EXACT, *SCORES, *SINGLE, *HAZARDS, *WAYS), (*UNCERTAIN, *TRACTION, *CANDIDATES))
+GROUPS = ((*EXACT, *SCORES, *SINGLE, *HAZARDS, *PATH_SEARCH), (*UNCERTAIN, *TRACTION, *CANDIDATES))
 """All kernels in two groups that take about the same time to compile: the first compiles the model
 of a pose once for all that use it."""
 
@@ -40,8 +40,8 @@ def plan_candidates() -> None:
     generate_candidates((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
 
 
-def search_ways() -> None:
-    """Search a way on level ground, around the end of a wall, and where a wall leaves none."""
+def search_paths() -> None:
+    """Search a path on level ground, around the end of a wall, and where a wall leaves none."""
     ends = (0.7, 1.5, 0.0), (2.3, 1.5, 0.0)
     for rows in (0, 35, 60):
         elevation = np.zeros((60, 60))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a prediction in a file was made for, so that it can be judged again under the same."""
+"""Assumptions of a prediction in a file, so that it can be judged again under the same."""
 
 from dataclasses import dataclass, replace
 
@@ -36,7 +36,7 @@ class Assumptions:
     joint_angles: dict[str, float] | None = None
     """Arm angles [rad] by joint name; None is stowed."""
     has_tool_load: bool = False
-    """Whether a force or moment acted on the arm's tip."""
+    """True if a force or moment acted on the arm's tip."""
     map_sigmas: float = SIGMAS
     """Standard deviations that were allowed for."""
 

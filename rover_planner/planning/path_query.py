@@ -63,14 +63,14 @@ class Candidate:
     """The model's outputs at each waypoint; those of a refused candidate may end at its first
     failure or a little beyond it."""
     verdict: Verdict
-    """Whether the rover may drive the path, and the reason if not."""
+    """Verdict on the path, with the reason if the rover may not drive it."""
     cost: tuple[float, float]
     """Risk (used share of a safety limit, in steps of RISK_STEP) and energy [J]; both infinite
     if the path is not traversable."""
 
     @property
     def is_complete(self) -> bool:
-        """Whether all waypoints were judged, also those beyond the first failure."""
+        """True if all waypoints were judged, also those beyond the first failure."""
         return len(self.prediction.poses) == len(self.poses)
 
     @property
@@ -110,7 +110,7 @@ class PathAnswer:
 
     @property
     def traversable(self) -> bool:
-        """Whether any candidate is traversable."""
+        """True if any candidate is traversable."""
         return self.best >= 0
 
     def explain(self) -> str:

@@ -23,12 +23,12 @@ class SuspensionReport:
     suspension_mismatch: Mapping[str, float]
     """Measured minus predicted angle [rad] by joint, for the joints that were measured."""
     suspension_agrees: bool
-    """Whether all of them are within the tolerance."""
+    """True if all of them are within the tolerance."""
 
 
 @dataclass(frozen=True)
 class IdentityReport:
-    """What an answer is about: which question, which path, and which map."""
+    """Identity of an answer: its question, path and map."""
 
     request: int
     """Number of the question; it rises strictly while the server runs, over all its services."""
@@ -62,11 +62,11 @@ class VerdictReport:
     """Verdict and class of each waypoint. If there was no time for the waypoints beyond the first
     failure, the lists are without them."""
     identity: IdentityReport | None = None
-    """What the answer is about; None if it was not asked for over ROS."""
+    """Its question, path and map; None if it was not asked for over ROS."""
 
     @property
     def traversable(self) -> bool:
-        """Whether the rover may drive the path."""
+        """True if the rover may drive the path."""
         return bool(self.entries["traversable"])
 
     @property
@@ -76,7 +76,7 @@ class VerdictReport:
 
     @property
     def has_warning(self) -> bool:
-        """Whether the measured suspension disagrees with the prediction."""
+        """True if the measured suspension disagrees with the prediction."""
         return not self.entries.get("suspension_agrees", True)
 
     def to_dict(self) -> dict[str, Any]:
@@ -123,7 +123,7 @@ def report_path(
     if suspension is not None:
         entries |= asdict(suspension)
     if ground is not None:
-        entries["blind_share"] = ground.blind_share
+        entries["blind_share"] = ground.unobserved_share
         entries["footprint_share"] = ground.footprint_share
     if search is not None:
         entries |= _report_search(search)

@@ -19,7 +19,7 @@ from rover_planner.errors import PlanningError
 INPUT_ERRORS = (MessageError, PlanningError, RoverError)
 """Errors of the input; any other error is an internal error."""
 
-Answer = TypeVar("Answer")
+Refusal = TypeVar("Refusal")
 
 
 class Guard:
@@ -62,8 +62,8 @@ class Guard:
 
 
 def refuse_error(
-    guard: Guard, request: str, error: Exception, refuse: Callable[[str, str], Answer]
-) -> Answer:
+    guard: Guard, request: str, error: Exception, refuse: Callable[[str, str], Refusal]
+) -> Refusal:
     """Return `refuse(code, reason)` for an error; the guard counts and logs internal errors."""
     if isinstance(error, INPUT_ERRORS):
         return refuse("bad_request", str(error))

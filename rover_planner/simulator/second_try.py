@@ -47,7 +47,7 @@ class SecondTry:
 
     @property
     def given_up(self) -> bool:
-        """Whether the rover stood still in its last attempt."""
+        """True if the rover stood still in its last attempt."""
         return self._tries > self._max_tries > 1
 
     def has_arrived(self, pose: Floats) -> bool:

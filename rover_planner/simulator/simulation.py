@@ -136,7 +136,7 @@ class Simulation:
 
     @property
     def follows_path(self) -> bool:
-        """Whether there is an unfinished path."""
+        """True if there is an unfinished path."""
         return self._follower is not None
 
     def advance(self, now: float, duration: float) -> PlantState:

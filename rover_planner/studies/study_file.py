@@ -121,7 +121,7 @@ class StudyOptions:
     method: Annotated[str, choice("sweep", "optimise")] = "sweep"
     """A sweep tries all combinations of the parameters; an optimisation searches the best one."""
     policy: Annotated[str, choice("equal", "optimal")] = "equal"
-    """How the wheels share the traction."""
+    """Torque policy: the shares of the wheels in the traction."""
     friction: Annotated[float, number("", above=0.0)] | None = None
     """Coulomb friction; None takes that of the rover."""
     soil: Text | None = None
@@ -143,7 +143,7 @@ class Study(StudyOptions):
 
     @property
     def wants_largest(self) -> bool:
-        """Whether larger values of the objective are better."""
+        """True if larger values of the objective are better."""
         return OBJECTIVES[self.objective][0] == "largest"
 
     @property

@@ -92,9 +92,9 @@ class GeoTiffMap:
         GDAL word it differently.
         """
         with self._open() as file:
-            told = repr((tuple(file.transform), file.nodata, file.scales, file.offsets))
+            properties = repr((tuple(file.transform), file.nodata, file.scales, file.offsets))
             masks = [Path(name) for name in file.files if name.endswith(".msk")]
-        found = hashlib.sha256(told.encode())
+        found = hashlib.sha256(properties.encode())
         for path in (self.path, *masks):
             with path.open("rb") as content:
                 found.update(hashlib.file_digest(content, "sha256").digest())

@@ -29,13 +29,13 @@ Layers = Mapping[str, NDArray]
 """Layers by name, all of one shape."""
 
 
-class Quantity(NamedTuple):
+class SurveyedQuantity(NamedTuple):
     """A number of a pose whose worst and best value over the headings are kept."""
 
     name: str
     """Name without `worst_` or `best_`."""
     high_is_bad: bool
-    """Whether the worst value is the largest."""
+    """True if the worst value is the largest."""
     unit: str
     """Unit, empty for a ratio."""
     row: int
@@ -43,11 +43,11 @@ class Quantity(NamedTuple):
 
 
 QUANTITIES = (
-    Quantity("friction_utilisation", True, "", 0),
-    Quantity("torque_saturation", True, "", 1),
-    Quantity("tip_over_ratio", False, "", 3),
-    Quantity("tilt", True, "rad", 4),
-    Quantity("belly_clearance", False, "m", 5),
+    SurveyedQuantity("friction_utilisation", True, "", 0),
+    SurveyedQuantity("torque_saturation", True, "", 1),
+    SurveyedQuantity("tip_over_ratio", False, "", 3),
+    SurveyedQuantity("tilt", True, "rad", 4),
+    SurveyedQuantity("belly_clearance", False, "m", 5),
 )
 
 

@@ -38,7 +38,7 @@ class SurveyRequest:
     step: int = 1
     """Distance of surveyed cells [map cells]."""
     turns: bool = False
-    """Whether to judge turns on the spot, too."""
+    """True to judge turns on the spot, too."""
     sigmas: float = SIGMAS
     """Standard deviations to allow for where the map has them."""
 

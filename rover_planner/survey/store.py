@@ -63,7 +63,7 @@ class StoreNotes:
 
     @property
     def turns(self) -> bool:
-        """Whether turns on the spot were judged."""
+        """True if turns on the spot were judged."""
         return bool(self.description["turns"])
 
     @property

@@ -211,7 +211,7 @@ def _sum_up(
     """Return the layers of cells from the numbers of their poses, all headings of a cell in turn.
 
     Args:
-        numbers: (NUMBERS, n) scores of `map_sweep`.
+        numbers: (SCORE_ROWS, n) scores of `map_sweep`.
         limits: (n,) numbers of limits.
         classes: (n,) numbers of classes.
         headings: Number of headings.

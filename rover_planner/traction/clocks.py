@@ -78,7 +78,7 @@ class ClockWatch:
         self._last: tuple[float, int] | None = None
         self._advanced_at = 0.0
         self.stepped = False
-        """Whether the last check found a step; stamps from before it mean nothing now."""
+        """True if the last check found a step; stamps from before it mean nothing now."""
 
     def check(self, now: float, clock: int, simulated: bool) -> str:
         """Return what is wrong with the clock; empty if nothing is.

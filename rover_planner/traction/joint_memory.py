@@ -91,7 +91,7 @@ class JointMemory:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no joint has a value."""
+        """True if no joint has a value."""
         return max(self._positions.times.max(), self._velocities.times.max()) == NEVER
 
     def find_suspension_rates(self, earliest: float) -> Floats | None:

@@ -137,7 +137,7 @@ class WheelMotion:
     wanted: float
     """Wanted mean rate [rad/s]."""
     from_map: bool = False
-    """Whether the ratios come from a map; from motion they may miss a face."""
+    """True if the ratios come from a map; from motion they may miss a face."""
     level_ratios: Floats = field(default_factory=lambda: np.ones(WHEEL_COUNT))
     """(6,) speeds of the wheels over their mean on level ground, 1 straight ahead."""
 
@@ -155,9 +155,9 @@ class StallDetector:
         self._share, self._servo_time = 0.0, 0.0
         self._seen = np.zeros(len(SUSPENSION_JOINTS))
         self.stalled = False
-        """Whether the rover was stalled at the last update."""
+        """True if the rover was stalled at the last update."""
         self.climbs = False
-        """Whether the suspension has moved by CLIMBING_ANGLE with the last update."""
+        """True if the suspension has moved by CLIMBING_ANGLE with the last update."""
 
     def update(self, motion: WheelMotion, duration: float) -> float:
         """Return the share of the speed servos, 0 to 1.

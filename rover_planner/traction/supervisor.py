@@ -44,7 +44,7 @@ class TractionCommand:
     torques: Floats
     """(6,) torques, wheel order [N m]."""
     brake: bool
-    """Whether the brake is to be applied."""
+    """True if the brake is to be applied."""
     state: str
     """One of STATES."""
     update: TractionUpdate
@@ -59,9 +59,9 @@ class DrivePermission:
     def __init__(self, enabled: bool):
         """Start enabled or not, without an emergency stop."""
         self.enabled = enabled
-        """Whether an operator has enabled the rover."""
+        """True if an operator has enabled the rover."""
         self.emergency_stop = False
-        """Whether the emergency stop is pressed."""
+        """True if the emergency stop is pressed."""
 
     def set_enabled(self, enabled: bool) -> tuple[bool, str]:
         """Enable or disable; return whether that was done, and what holds now."""
@@ -184,9 +184,9 @@ class TractionSupervisor:
         update = self.service.rest(fault)
         torques, expiry = np.zeros(WHEEL_COUNT), float("inf")
         timeout, policy = parameters.joint_states_timeout, parameters.rest_policy
-        blind = now - self.service.joints.wheel_time > timeout
-        brake = policy == BRAKE or (policy == HOLD and blind)
-        if policy == HOLD and not blind:
+        joints_unknown = now - self.service.joints.wheel_time > timeout
+        brake = policy == BRAKE or (policy == HOLD and joints_unknown)
+        if policy == HOLD and not joints_unknown:
             torques, expiry = self._hold_wheels(duration), self.service.joints.wheel_time + timeout
         else:
             self._held = False

@@ -160,7 +160,7 @@ class TractionService:
 
     @property
     def climbs(self) -> bool:
-        """Whether the suspension shows that the rover climbs, at the last update."""
+        """True if the suspension shows that the rover climbs, at the last update."""
         return self._slip.detector.climbs
 
     @property

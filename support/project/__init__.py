@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What tests of the project as a whole share: the checkout, its pages, their commands."""
+"""Shared parts of tests of the whole project: the checkout, its pages, their commands."""

@@ -26,13 +26,13 @@ class Block:
     line: int
     """Line of the page where its text begins."""
     language: str
-    """What stands behind the opening backquotes."""
+    """Language named behind the opening backquotes."""
     text: str
-    """What it holds."""
+    """Content of the block."""
     not_run: str
     """Why the page says that it is not run, in a comment before it; empty without one."""
     output: str | None
-    """What it prints, where a block of text follows at once; else None."""
+    """Its printed output, where a block of text follows at once; else None."""
 
     def __str__(self) -> str:
         """Return page and line, as tools write them."""
@@ -46,7 +46,7 @@ class Command:
     words: tuple[str, ...]
     """Its words, quotes and redirections removed."""
     in_background: bool
-    """Whether & follows."""
+    """True if & follows."""
 
 
 def read_blocks(page: Path, top: Path = TOP) -> list[Block]:

@@ -18,7 +18,7 @@ class ProcessToken:
 
     @property
     def environment(self) -> dict[str, str]:
-        """What to add to the environment of the first process."""
+        """Variables to add to the environment of the first process."""
         return {_NAME: self._value}
 
     def find(self, module: str = "") -> list[int]:

@@ -26,32 +26,34 @@ MAX_GAP = 0.2
 
 
 @dataclass(frozen=True)
-class Case:
+class PictureCase:
     """A picture of the page."""
 
     file: str
     """Name of the picture."""
     ground: str
-    """What the page calls the ground."""
+    """The page's name of the ground."""
     make: Callable[[], Terrain]
     """Makes or loads the ground."""
     ends: tuple[Pose, Pose] | None = None
     """Start and goal; None: those that `rover_planner view` chooses."""
     refused: bool = True
-    """Whether it shows a refused path, at its failure; else the page as it opens, under way."""
+    """True if it shows a refused path, at its failure; else the page as it opens, under way."""
 
 
 MADE = f"made, seed {SEED}"
 CASES = (
-    Case("viewer.png", MADE, lambda: make_mars_terrain(SEED, TERRAIN_SIZE, 0.05), refused=False),
-    Case("viewer_made.png", MADE, lambda: make_mars_terrain(SEED, TERRAIN_SIZE, 0.05)),
-    Case(
+    PictureCase(
+        "viewer.png", MADE, lambda: make_mars_terrain(SEED, TERRAIN_SIZE, 0.05), refused=False
+    ),
+    PictureCase("viewer_made.png", MADE, lambda: make_mars_terrain(SEED, TERRAIN_SIZE, 0.05)),
+    PictureCase(
         "viewer_spirit.png",
         "spirit",
         lambda: load_terrain("spirit").fill_gaps(MAX_GAP),
         ((-47.2, -21.0, 1.2), (-45.7, -17.1, 1.2)),
     ),
-    Case(
+    PictureCase(
         "viewer_otira.png",
         "otira_tls_boulders_3cm",
         lambda: real_maps()["otira_tls_boulders_3cm"].fill_gaps(MAX_GAP),
@@ -70,7 +72,7 @@ def write_pictures(folder: Path, names: list[str]) -> Iterator[str]:
         browser.close()
 
 
-def _write(browser: Any, case: Case, file: Path) -> str:
+def _write(browser: Any, case: PictureCase, file: Path) -> str:
     """Write one picture; return what it shows."""
     rover, ground = load_rover("lsr1"), case.make()
     session = ViewSession(rover, ground, *(case.ends or choose_ends(rover, ground)))

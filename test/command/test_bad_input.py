@@ -12,7 +12,7 @@ import pytest
 from rover_planner.cli import main
 from rover_planner.shell.exit_codes import EXIT_INTERRUPTED
 from rover_planner.shell.one_line import MAX_LINE
-from support.command_line import REPOSITORY, predict_words, write_ground_and_path
+from support.command_line import REPOSITORY, predict_arguments, write_ground_and_path
 
 LONG = "n" * 300
 DIGITS = "9" * 400
@@ -150,7 +150,7 @@ def test_impossible_poses_are_one_line(capfd, files, arrays, names):
 def predicted(tmp_path_factory):
     """Return the arrays of a prediction."""
     folder = write_ground_and_path(tmp_path_factory.mktemp("predicted"))
-    assert main(predict_words(folder)) == 0
+    assert main(predict_arguments(folder)) == 0
     with np.load(folder / "out.npz") as out:
         return dict(out)
 

@@ -78,7 +78,7 @@ def test_a_failed_child_leaves_its_exit_code_and_last_words(tmp_path, environmen
     while child.running:
         time.sleep(0.02)
     assert child.exit_code == 1
-    assert child.last_words() == "no luck today"
+    assert child.last_line() == "no luck today"
     child.stop()
     child.stop()
 

@@ -68,7 +68,7 @@ def test_the_first_drive_is_accepted_and_reaches_its_goal():
     drive.look()
     first = drive.service.answer(START, GOAL)
     assert first.traversable, first.reason
-    assert 0.1 < first.ground.footprint_share <= first.ground.blind_share < 0.5
+    assert 0.1 < first.ground.footprint_share <= first.ground.unobserved_share < 0.5
     path = first.candidate.poses
     drive.simulation.take_path(path)
     while drive.simulation.follows_path:
@@ -98,7 +98,7 @@ def test_blind_ground_is_refused_where_the_parameter_says_so():
     report = refused.report.to_dict()
     assert "never seen" in refused.reason and report["first_failure"] == 0
     assert report["traversability_class"] == "passable"
-    assert f"{100.0 * refused.ground.blind_share:.1f} %" in refused.reason
+    assert f"{100.0 * refused.ground.unobserved_share:.1f} %" in refused.reason
 
     allowed = Drive(make_terrain(waves), footprint_margin=MARGIN, blind_ground="allow_footprint")
     allowed.look()

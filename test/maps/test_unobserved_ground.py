@@ -37,7 +37,7 @@ def with_holes(x_low, x_high, value=np.nan):
 def test_the_share_is_that_of_the_cells_under_the_belly():
     share = observed_ground(with_holes(1.0, 1.5), None).share(LSR1, PATH)
     # The belly sweeps x from -0.3 to 2.28 m: 53 columns of cells, of which 10 are unknown.
-    assert share.blind_share == pytest.approx(10 / 53, abs=0.01)
+    assert share.unobserved_share == pytest.approx(10 / 53, abs=0.01)
     assert share.footprint_share == 0.0
     assert PATH[share.first, 0] == pytest.approx(0.7, abs=0.04)
 
@@ -49,7 +49,7 @@ def test_the_start_footprint_is_told_apart():
     source[:, x < 0.5] = FOOTPRINT
     sources = CellSources(source, np.zeros(source.shape))
     share = observed_ground(terrain, sources).share(LSR1, PATH)
-    assert share.blind_share == share.footprint_share == pytest.approx(16 / 53, abs=0.02)
+    assert share.unobserved_share == share.footprint_share == pytest.approx(16 / 53, abs=0.02)
     assert share.first == 0 and share.first_beyond_footprint == -1
     assert [share.first_refused(rule) for rule in (ALLOW, ALLOW_FOOTPRINT, REFUSE)] == [-1, -1, 0]
 
@@ -60,9 +60,9 @@ def test_ground_off_the_map_was_not_seen():
     share = ObservedGround(ground(), kinds).share(LSR1, far)
     assert share.first == share.first_beyond_footprint
     assert 5.6 < far[share.first, 0] + 0.3 + 0.06 < 6.2
-    assert share.blind_share == 0.0  # the shares are those of cells on the map
+    assert share.unobserved_share == 0.0  # the shares are those of cells on the map
     away = ObservedGround(ground(), kinds).share(LSR1, PATH + np.array([1e7, 0.0, 0.0]))
-    assert (away.blind_share, away.first) == (1.0, 0)
+    assert (away.unobserved_share, away.first) == (1.0, 0)
 
 
 def test_a_long_path_off_the_map_takes_no_time():
@@ -80,7 +80,7 @@ def test_a_long_path_counts_each_cell_once():
     seen = ObservedGround(ground(), kinds)
     beside = np.full((81, 161), SEEN, np.uint8)
     beside[46:] = UNSEEN  # y of 0.3 m and more; the belly ends at 0.2 m
-    assert ObservedGround(ground(), beside).share(LSR1, PATH).blind_share == 0.0
+    assert ObservedGround(ground(), beside).share(LSR1, PATH).unobserved_share == 0.0
     often = np.vstack([PATH] * 30)
     whole, once = seen.share(LSR1, often), seen.share(LSR1, PATH)
-    assert whole.blind_share == once.blind_share > 0.0 and whole.first == once.first
+    assert whole.unobserved_share == once.unobserved_share > 0.0 and whole.first == once.first

@@ -120,10 +120,10 @@ def test_the_fan_has_as_many_paths_as_enav():
 @pytest.mark.slow
 @pytest.mark.long
 def test_ways_are_compared_with_the_best_of_the_lattice_in_a_small_size(capsys):
-    from benchmarks.ways import Case, run_case, show
+    from benchmarks.path_search import SearchCase, run_case, show
     from rover_planner.worlds.mars_terrain import make_mars_terrain
 
-    case = Case("small", load_rover("lsr1"), make_mars_terrain(3, 8.0))
+    case = SearchCase("small", load_rover("lsr1"), make_mars_terrain(3, 8.0))
     asked = {"count": 2, "seed": 0, "budget": 2.0, "truth": 2, "truth_seconds": 100.0, "warm": 1}
     rows = list(run_case(case, asked))
     assert [row["outcome"] for row in rows] == ["found", "found"]

@@ -58,12 +58,12 @@ def count_rows(page: Page) -> int:
 def test_a_click_beyond_a_wall_shows_the_way_or_the_closed_area_on_the_page(page):
     session = page.session
     page.requests.add(lambda: page.click(BEYOND, False))
-    wait_until(lambda: session.shown.way is not None and not page.is_busy, "a way", PATIENCE)
+    wait_until(lambda: session.shown.around is not None and not page.is_busy, "a way", PATIENCE)
     area = page.scene.closed
-    closes = session.shown.way.closed is not None
+    closes = session.shown.around.closed is not None
     wait_until(lambda: (area.layer is not None) == closes, "the layer")
     if closes:
-        colour = REFUSED if session.shown.way.closed.around_goal else PASSABLE
+        colour = REFUSED if session.shown.around.closed.around_goal else PASSABLE
         for is_old, wanted in ((True, UNKNOWN), (False, colour)):
             area.mark_old(is_old)
             assert tuple(area.layer.color) == wanted
@@ -75,5 +75,5 @@ def test_a_click_beyond_a_wall_shows_the_way_or_the_closed_area_on_the_page(page
         assert "passable, best" in page.candidates.content
         assert page.playback.duration == session.shown.trajectory.duration
     page.requests.add(lambda: page.click(np.array([-1.1, 0.0]), False))
-    wait_until(lambda: session.shown.way is None and area.layer is None, "no layer", PATIENCE)
+    wait_until(lambda: session.shown.around is None and area.layer is None, "no layer", PATIENCE)
     assert not page.errors.messages

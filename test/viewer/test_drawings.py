@@ -29,8 +29,8 @@ from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.scene.ribbons import Ribbon, Strand
 from rover_planner.viewer.scene.rover_visual import RoverVisual
 from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN
+from rover_planner.viewer.state.failure import explain
 from rover_planner.viewer.state.judging import POLICY
-from rover_planner.viewer.state.reasons.failure import explain
 from rover_planner.viewer.state.session import ViewSession
 
 MAX_PAUSE = 1.0

@@ -17,7 +17,7 @@ from rover_planner.viewer.state.judging import (
     BETTER,
     PATH,
     POLICY,
-    WAY,
+    SEARCH,
     JudgeRequest,
     judge_request,
 )
@@ -34,7 +34,7 @@ BEYOND = np.array(GOAL[:2])
 FRICTION = [("friction",)]
 
 
-BEGIN = [*[PATH] * 5, 5, *[POLICY] * 3, 5, WAY]
+BEGIN = [*[PATH] * 5, 5, *[POLICY] * 3, 5, SEARCH]
 """What is begun before and with a search, and how many candidates each result has."""
 
 
@@ -53,7 +53,7 @@ def test_beyond_a_wall_with_a_gap_a_way_follows_the_refused_candidates_and_is_sh
     shown = session.shown
     *direct, way = shown.candidates
     assert len(direct) == 5 and not any(one.verdict.traversable for one in direct)
-    assert shown.way.outcome == FOUND and shown.candidate is way
+    assert shown.around.outcome == FOUND and shown.candidate is way
     assert shown.index == shown.answer.best == shown.answer.nearest == 5
     poses = way.poses
     np.testing.assert_allclose(poses[[0, -1], :2], [session.scenario.start[:2], BEYOND], atol=1e-9)
@@ -73,7 +73,7 @@ def test_the_first_way_is_shown_before_a_better_one_is_searched():
 def test_where_there_is_no_way_the_reason_is_told():
     steps, shown = judge(walled_session(whole_wall, GOAL))
     assert steps == [*BEGIN, 5]
-    assert shown.way.outcome == NO_WAY and len(shown.candidates) == 5
+    assert shown.around.outcome == NO_WAY and len(shown.candidates) == 5
     assert not shown.verdict.traversable
     assert shown.reason.startswith("no way within the map: ") and "closed in by: " in shown.reason
     assert shown.reason.endswith(shown.verdict.reason)
@@ -83,23 +83,23 @@ def test_nothing_is_searched_where_a_candidate_passes_off_the_map_or_for_a_recor
     session = walled_session(wall_with_gap)
     for goal, passes in (((-1.1, 0.1), True), ((9.0, 0.0), False)):
         assert session.plan_to(np.array(goal))
-        assert session.shown.way is None and session.shown.answer.traversable == passes
-        assert WAY not in judge(session)[0]
+        assert session.shown.around is None and session.shown.answer.traversable == passes
+        assert SEARCH not in judge(session)[0]
     assert session.plan_to(np.array([-1.1, 0.1]))
     session.replay(session.shown.candidate.prediction, session.shown.verdict.reasons)
     assert session.change_rover(FRICTION, 0.05) and session.plan_again()
-    assert not session.shown.verdict.traversable and session.shown.way is None
+    assert not session.shown.verdict.traversable and session.shown.around is None
 
 
 def test_a_slider_judges_the_shown_way_again_and_then_searches_another():
     session = walled_session(wall_with_gap)
     session.plan_to(BEYOND)
-    poses, way = session.shown.candidate.poses, session.shown.way
+    poses, way = session.shown.candidate.poses, session.shown.around
     assert session.change_rover(FRICTION, 0.7)
-    assert session.shown.index == 5 and session.shown.way is way
+    assert session.shown.index == 5 and session.shown.around is way
     np.testing.assert_array_equal(session.shown.candidate.poses, poses)
     assert session.plan_again()
-    assert session.shown.index == 5 and session.shown.way is not way
+    assert session.shown.index == 5 and session.shown.around is not way
     assert session.shown.verdict.traversable
 
 
@@ -123,9 +123,9 @@ def finish(session: ViewSession) -> None:
 @contextmanager
 def searching(session: ViewSession) -> Iterator[None]:
     """Plan beyond the wall, take what is finished before the search, and let that go on later."""
-    with held(session._background, WAY):
+    with held(session._background, SEARCH):
         assert session.plan_to(BEYOND)
-        wait_until(lambda: session.progress.what == WAY, "the search", 60.0)
+        wait_until(lambda: session.progress.what == SEARCH, "the search", 60.0)
         assert session.progress.describe() == "searching a way"
         session.take_finished()
         yield
@@ -150,10 +150,10 @@ def test_a_cancelled_search_leaves_the_verdict_on_the_candidates_and_can_be_begu
         shown = session.shown
         session.cancel()
         session.take_finished()
-        assert session.is_stopped and session.shown is shown and session.shown.way is None
+        assert session.is_stopped and session.shown is shown and session.shown.around is None
     assert session.plan_again()
     finish(session)
-    assert session.shown.way.outcome == FOUND
+    assert session.shown.around.outcome == FOUND
 
 
 def test_the_way_of_a_rover_that_slips_is_no_candidate_once_it_can_climb_the_wall():
@@ -182,7 +182,7 @@ def test_the_way_of_a_rover_that_slips_is_no_candidate_once_it_can_climb_the_wal
 
 def test_a_session_that_begins_before_a_wall_searches_as_soon_as_it_has_a_thread():
     session = walled_session(wall_with_gap, GOAL)
-    assert session.shown.needs_way and len(session.shown.candidates) == 5
+    assert session.shown.needs_search and len(session.shown.candidates) == 5
     session.judge_in_background(lambda: None)
     try:
         finish(session)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The joint map: which joints of a URDF are the rover's, and what the URDF does not tell."""
+"""The joint map: which joints of a URDF are the rover's, and values that it does not give."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -57,7 +57,7 @@ class Axes:
 
 
 @dataclass(frozen=True)
-class JointMap:
+class UrdfJointMap:
     """Names of a URDF's joints by their part in the rover."""
 
     rocker: Annotated[dict[str, Text], Keys(dict.fromkeys(SIDES, Text))]
@@ -77,25 +77,25 @@ class JointMap:
     arm: ArmMap | None = None
     """The arm; None: it is a part of the body, at `angles`."""
     rover: dict[str, Any] = field(default_factory=dict)
-    """Keys of a rover file that the URDF does not tell or tells wrongly."""
+    """Keys of a rover file that the URDF does not give or gives wrongly."""
 
 
-def load_joint_map(path: Path) -> JointMap:
+def load_joint_map(path: Path) -> UrdfJointMap:
     """Load a joint map from a YAML file.
 
     Raises:
         RoverFileError: Not a YAML file, or a key is missing, unknown or invalid.
     """
     with errors_of(path):
-        joint_map: JointMap = read_as(JointMap, read_yaml(path), "a joint map")
+        joint_map: UrdfJointMap = read_as(UrdfJointMap, read_yaml(path), "a joint map")
     return joint_map
 
 
 def map_of(rover: Rover) -> dict[str, Any]:
     """Return the contents of the map that reads a rover back from the URDF of `write_urdf`."""
     contents = rover_to_dict(rover)
-    told = ("gravity", "friction", "nominal_speed", "limits")
-    rest: dict[str, Any] = {key: contents[key] for key in told}
+    given = ("gravity", "friction", "nominal_speed", "limits")
+    rest: dict[str, Any] = {key: contents[key] for key in given}
     rest["wheel"] = {"servo_droop": rover.wheel.servo_droop}
     joints: dict[str, Any] = {
         "rocker": {side: f"rocker_{side}" for side in SIDES},

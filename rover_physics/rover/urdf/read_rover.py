@@ -15,8 +15,8 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.manipulator import link_points
 from rover_physics.rover.model import Manipulator, Rover
 from rover_physics.rover.rover_file import rover_from_dict
-from rover_physics.rover.urdf.joint_map import ArmMap, JointMap, load_joint_map
-from rover_physics.rover.urdf.robot import Joint, Lump, Robot, Solid, Tree, read_robot
+from rover_physics.rover.urdf.joint_map import ArmMap, UrdfJointMap, load_joint_map
+from rover_physics.rover.urdf.robot import Joint, JointTree, Lump, Robot, Solid, read_robot
 
 MAX_TILT = 0.02
 """Largest angle between a pivot or axle and the body's y axis [rad]."""
@@ -38,7 +38,7 @@ ROUNDS = 20
 
 @dataclass(frozen=True)
 class Levelling:
-    """How the axes and the bogies of a URDF stand on level ground."""
+    """Pitch of the axes and angle of the bogies of a URDF on level ground."""
 
     pitch: float = 0.0
     """Pitch of the axes of the URDF [rad], positive nose down; that of the body frame is 0."""
@@ -58,7 +58,7 @@ class ReadRover:
     asymmetry: float
     """Largest distance between points of the left side and mirrored ones of the right [m]."""
     levelling: Levelling
-    """How the axes and the bogies of the URDF stand on level ground."""
+    """Pitch of the axes and angle of the bogies of the URDF on level ground."""
 
 
 def rover_from_urdf(urdf: Path, joint_map: Path) -> ReadRover:
@@ -93,7 +93,7 @@ def rover_from_urdf(urdf: Path, joint_map: Path) -> ReadRover:
 class _Reading:
     """A URDF with its links placed in the body frame."""
 
-    def __init__(self, robot: Robot, joints: JointMap, levelling: Levelling = NOT_LEVELLED):
+    def __init__(self, robot: Robot, joints: UrdfJointMap, levelling: Levelling = NOT_LEVELLED):
         stowed = (
             {}
             if joints.arm is None
@@ -104,7 +104,7 @@ class _Reading:
         self._frame = joints.axes.rotation()
         if levelling != NOT_LEVELLED:
             self._level(levelling)
-        self._tree = Tree(robot, self._angles, self._find_body_frame())
+        self._tree = JointTree(robot, self._angles, self._find_body_frame())
         self.asymmetry = 0.0
         """Largest distance found so far between both sides [m]."""
         tree = self._tree
@@ -114,7 +114,7 @@ class _Reading:
         self._steering = {name: tree.joint(joint) for name, joint in joints.steering.items()}
 
     def contents(self) -> dict[str, Any]:
-        """Return what the URDF tells of a rover file; keys that it does not tell are left out."""
+        """Return the keys of a rover file that the URDF gives; the others are left out."""
         found: dict[str, Any] = {"name": self._robot.name}
         found["wheel"] = self._wheel()
         found["suspension"] = self._suspension()
@@ -137,7 +137,7 @@ class _Reading:
 
     def _level(self, levelling: Levelling) -> None:
         """Turn the body frame and the bogies."""
-        tree = Tree(self._robot, self._angles, _pose(self._frame))
+        tree = JointTree(self._robot, self._angles, _pose(self._frame))
         for name in self._joints.bogie.values():
             axis = tree.axis(tree.joint(name))
             turn = levelling.bogie if axis[1] > 0.0 else -levelling.bogie
@@ -147,7 +147,7 @@ class _Reading:
     def _find_body_frame(self) -> Floats:
         """Return the pose (4, 4) of the root link in the body frame."""
         frame = _pose(self._frame)
-        tree = Tree(self._robot, self._angles, frame)
+        tree = JointTree(self._robot, self._angles, frame)
         pivots = [tree.origin(tree.joint(self._joints.rocker[side])) for side in SIDES]
         frame[:3, 3] = -0.5 * (pivots[0] + pivots[1])
         return frame
@@ -351,7 +351,7 @@ class _Reading:
         return {"z": low[2], "x": [low[0], high[0]], "y": [low[1], high[1]]}
 
 
-def level_wheels(robot: Robot, joints: JointMap) -> Levelling:
+def level_wheels(robot: Robot, joints: UrdfJointMap) -> Levelling:
     """Find the pitch and the bogie angle at which all wheels are level.
 
     Returns:
@@ -392,7 +392,7 @@ def level_wheels(robot: Robot, joints: JointMap) -> Levelling:
     return Levelling(*angles.tolist())
 
 
-def _read_arm(tree: Tree, arm: ArmMap) -> dict[str, Any]:
+def _read_arm(tree: JointTree, arm: ArmMap) -> dict[str, Any]:
     """Return the contents of `manipulator` of a rover file.
 
     Args:

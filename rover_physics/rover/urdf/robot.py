@@ -55,7 +55,7 @@ class Link:
 
 @dataclass(frozen=True)
 class JointLimit:
-    """What a joint reaches; inf where the file sets no limit."""
+    """Limits of a joint; inf where the file sets none."""
 
     lower: float = -math.inf
     """[rad] or [m]."""
@@ -191,7 +191,7 @@ def _read_joint(element: ElementTree.Element, links: dict[str, Link]) -> Joint:
 
 
 def _read_limit(element: ElementTree.Element, name: str, kind: str) -> JointLimit:
-    """Return the limits of a joint; 0 as torque or speed counts as not told."""
+    """Return the limits of a joint; 0 as torque or speed counts as not given."""
     limit = element.find("limit")
     if limit is None:
         return JointLimit()
@@ -290,7 +290,7 @@ class Lump:
         return self.moment / self.mass if self.mass > 0.0 else missing
 
 
-class Tree:
+class JointTree:
     """A robot in one posture; all positions are in one frame of choice."""
 
     def __init__(self, robot: Robot, angles: Mapping[str, float], frame: Floats):

@@ -16,11 +16,11 @@ from rover_planner.planning.navigation.watched_path import TURN_LENGTH, WatchedP
 Poses = NDArray[np.float64]
 """(n, 3) x, y [m] and yaw [rad], map frame."""
 MAX_PLANS = 100
-"""Largest number of plans on the way to one goal."""
+"""Largest number of plans to one goal."""
 MAX_STOPS = 3
 """Largest number of stops at one place before the drive is given up."""
 RETREAT = 0.5
-"""Distance by which the rover drives back where no way begins [m]."""
+"""Distance by which the rover drives back where no path begins [m]."""
 REST_TIME, LOOK_TIME, LONGEST_BRAKING = 1.0, 0.2, 10.0
 """A rover that is to stand rests when it has not moved for so long; time between two looks at it;
 time after which it is taken to rest, whatever it does [s]."""
@@ -38,7 +38,7 @@ class RoverClient(Protocol):
     """The part of server and rover that a drive needs."""
 
     def ask(self, start: Sequence[float], goal: Sequence[float]) -> dict[str, Any]:
-        """Return `traversable`, `reason` and the `poses` of a way from start to goal."""
+        """Return `traversable`, `reason` and the `poses` of a path from start to goal."""
 
     def send_path(self, poses: Poses) -> None:
         """Let the rover follow a path."""
@@ -59,9 +59,9 @@ class DriveSettings:
     period: float = 2.0
     """Time between two looks at the rest of the plan [s]."""
     timeout: float = 3600.0
-    """Longest time for the way to a goal [s]."""
+    """Longest time for the drive to a goal [s]."""
     patience: float = 15.0
-    """Time for which a rover may stand before another way is asked for [s]."""
+    """Time for which a rover may stand before another path is asked for [s]."""
 
 
 class Stretch(NamedTuple):
@@ -85,7 +85,7 @@ def drive_to(
     """Drive a plan, and ask for another one where it cannot be driven to the goal.
 
     That is where the newest map refuses the rest of it, where the rover stands although it is to
-    drive, and where the plan ends before the goal. Where no way begins, and where the rover stops
+    drive, and where the plan ends before the goal. Where no path begins, and where the rover stops
     again, it first drives back along its plan.
 
     Args:
@@ -96,7 +96,7 @@ def drive_to(
         report: Takes events in words.
 
     Raises:
-        DriveFailedError: There is no way from where the rover is, it does not get on, or it takes
+        DriveFailedError: There is no path from where the rover is, it does not get on, or it takes
             too long.
     """
     _Drive(client, goal, settings, report).run(np.array(plan))
@@ -152,7 +152,7 @@ class _Drive:
         return np.array(answer["poses"])
 
     def _ask(self, pose: Poses) -> dict[str, Any]:
-        """Ask for a way to the goal from a pose (3,)."""
+        """Ask for a path to the goal from a pose (3,)."""
         return self._client.ask(pose.tolist(), self._goal)
 
     def _follow(self, plan: Poses) -> Stretch:
@@ -187,7 +187,7 @@ class _Drive:
     def _go_back(self) -> bool:
         """Let the rover drive back along the waypoints that it has passed, if they pass that way.
 
-        Where it stands at a limit, by the width of its deviation from the plan, no way begins.
+        Where it stands at a limit, by the width of its deviation from the plan, no path begins.
         """
         if len(self._trail) < 2:
             return False

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a traverse server knows, and its answers to questions; without ROS."""
+"""Knowledge of a traverse server, and its answers to questions; without ROS."""

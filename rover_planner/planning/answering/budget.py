@@ -42,7 +42,7 @@ class Budget:
 
     @property
     def is_over(self) -> bool:
-        """Whether the deadline has passed or the question was cancelled."""
+        """True if the deadline has passed or the question was cancelled."""
         return self._stopped is not None or self.remaining <= 0.0
 
     def stop(self, code: str, reason: str) -> None:

@@ -41,11 +41,11 @@ class PathJudgement:
     around: SearchResult | None = None
     """The search around obstacles; None if there was none."""
     is_brief: bool = False
-    """Whether there was no time for classes and for waypoints beyond the first failure."""
+    """True if there was no time for classes and for waypoints beyond the first failure."""
 
     @property
     def traversable(self) -> bool:
-        """Whether the rover may drive the path."""
+        """True if the rover may drive the path."""
         return self.candidate is not None and self.candidate.verdict.traversable
 
     @cached_property
@@ -80,7 +80,7 @@ class PathJudgement:
 
     @property
     def _is_equal_and_traversable(self) -> bool:
-        """Whether all waypoints are passable with equal torques, which needs no other sweep."""
+        """True if all waypoints are passable with equal torques, which needs no other sweep."""
         candidate = self.candidate
         return candidate is not None and self.traversable and candidate.verdict.policy == EQUAL
 
@@ -96,9 +96,9 @@ class PathJudgement:
     @cached_property
     def ground(self) -> UnobservedShare | None:
         """Never seen ground under the belly; None without a judged path. Computed on first use."""
-        if self.candidate is None or self.judge is None or self.judge.blind is None:
+        if self.candidate is None or self.judge is None or self.judge.unobserved_check is None:
             return None
-        return self.judge.blind.share(self.candidate)
+        return self.judge.unobserved_check.share(self.candidate)
 
     def changes(self) -> NDArray[np.intp]:
         """Return the indices (m,) of waypoints whose class differs from that of the one before."""

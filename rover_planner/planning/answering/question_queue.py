@@ -31,9 +31,9 @@ class Asked:
     budget: Budget
     """Its time."""
     has_begun: bool = False
-    """Whether the thread has begun to judge it."""
+    """True if the thread has begun to judge it."""
     is_closed: bool = False
-    """Whether it has its judgement."""
+    """True if it has its judgement."""
 
 
 Answered = tuple[Asked, Any]
@@ -80,7 +80,7 @@ class QuestionQueue:
 
     def finished(self) -> list[Answered]:
         """Take what the thread has judged."""
-        return self._close([self._judged.get() for _ in range(self._judged.qsize())])
+        return self._take_open([self._judged.get() for _ in range(self._judged.qsize())])
 
     def overdue(self, grace: float) -> list[Answered]:
         """Refuse waiting questions just before their deadline, one in work `grace` [s] after."""
@@ -91,20 +91,22 @@ class QuestionQueue:
                 refused.append((asked, _refuse_stopped(asked)))
             elif not asked.has_begun and budget.remaining < HOPELESS * budget.seconds:
                 refused.append((asked, _refuse_waiting(asked)))
-        return self._close(refused)
+        return self._take_open(refused)
 
     def stop_all(self, code: str, reason: str) -> list[Answered]:
         """Stop all open questions with a code and reason."""
         for asked in self._open:
             asked.budget.stop(code, reason)
-        return self._close([(asked, asked.question.refuse(code, reason)) for asked in self._open])
+        return self._take_open(
+            [(asked, asked.question.refuse(code, reason)) for asked in self._open]
+        )
 
     def close(self) -> None:
         """End the thread; stop all questions before."""
         self._waiting.put(None)
         self._thread.join(END_TIME)
 
-    def _close(self, answered: list[Answered]) -> list[Answered]:
+    def _take_open(self, answered: list[Answered]) -> list[Answered]:
         """Take questions from the open ones; return those that were open."""
         closed = [(asked, judgement) for asked, judgement in answered if not asked.is_closed]
         for asked, _ in closed:

@@ -101,9 +101,9 @@ class Answer:
     judgement: Any
     """A `PathJudgement` or `ArmJudgement`."""
     snapshot: Snapshot
-    """What it was judged by."""
+    """Map, settings, path and measurements that it was judged by."""
     identity: IdentityReport
-    """What it is about."""
+    """Its question, path and map."""
 
 
 @dataclass

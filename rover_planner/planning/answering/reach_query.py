@@ -17,7 +17,7 @@ class ArmJudgement:
     """The answer of the model, or a refusal before the model was used."""
 
     possible: bool
-    """Whether the tip reaches the target and the rover holds still within all its limits."""
+    """True if the tip reaches the target and the rover holds still within all its limits."""
     code: str
     """Code of the reason why not, as in a `ReachAnswer` or a refusal; empty if possible."""
     reason: str

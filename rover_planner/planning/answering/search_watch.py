@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Watches a search for a path: tells of its progress, and ends it when the map has changed."""
+"""Watches a search for a path: reports its progress, and ends it when the map has changed."""
 
 import time
 from collections.abc import Callable
@@ -7,7 +7,7 @@ from typing import Any
 
 from rover_planner.errors import PlanningError
 from rover_planner.maps.known_map import KnownMap
-from rover_planner.planning.search.lattice_search import Progress
+from rover_planner.planning.search.lattice_search import SearchProgress
 
 PERIOD = 0.2
 """Least time between two reports [s]."""
@@ -28,25 +28,25 @@ class SearchWatch:
     def __init__(
         self,
         newest_map: Callable[[], KnownMap | None],
-        tell: Callable[[dict[str, Any]], object],
+        send_report: Callable[[dict[str, Any]], object],
         patience: float,
     ):
         """Watch the searches of a question.
 
         Args:
             newest_map: Returns the newest map.
-            tell: Takes a report, in the thread of the search: whether a path is `found`, its
-                `cost` (infinite without one) and the `bound` from below on that of any path of
+            send_report: Takes a report, in the thread of the search: True if a path is `found`,
+                its `cost` (infinite without one) and the `bound` from below on that of any path of
                 the lattice (0 while it is not known) in metres of level ground, the number of
                 `edges_judged`, and the `seconds` since the question's first search began.
             patience: Time from the first search on in which a changed map ends a search [s].
         """
-        self._newest_map, self._tell, self._patience = newest_map, tell, patience
+        self._newest_map, self._send_report, self._patience = newest_map, send_report, patience
         self._began: float | None = None
-        self._told = 0.0
+        self._sent_at = 0.0
 
-    def look(self, searched: KnownMap, progress: Progress) -> None:
-        """Tell how far the search on a map is.
+    def look(self, searched: KnownMap, progress: SearchProgress) -> None:
+        """Report how far the search on a map is.
 
         Raises:
             NewerMapError: The map has changed.
@@ -55,9 +55,9 @@ class SearchWatch:
         if self._began is None:
             self._began = now
         seconds = now - self._began
-        if now - self._told >= PERIOD:
-            self._told = now
-            self._tell(
+        if now - self._sent_at >= PERIOD:
+            self._sent_at = now
+            self._send_report(
                 {
                     "found": progress.best is not None,
                     "cost": progress.cost,

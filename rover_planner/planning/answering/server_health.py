@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a traverse server has done and what is wrong with it, for its diagnostics."""
+"""Counts and faults of a traverse server, for its diagnostics."""
 
 from collections import Counter, deque
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ class Health:
     level: str
     """OK, WARN or ERROR."""
     message: str
-    """What is wrong, in words."""
+    """The faults in words; "ready" without any."""
     values: dict[str, Any]
     """Counts by name."""
 
@@ -80,8 +80,8 @@ class ServerHealth:
             f"last map refused: {self._map_refusal}" if self._map_refusal else "",
             f"questions refused: {self._overload}" if overload else "",
         ]
-        told = "; ".join(fault for fault in faults if fault)
-        return Health(WARN if told else OK, told or "ready", values)
+        text = "; ".join(fault for fault in faults if fault)
+        return Health(WARN if text else OK, text or "ready", values)
 
     def _describe_last(self, now: float) -> dict[str, Any]:
         """Return the last question, its age and times of the last LATENCIES answers."""

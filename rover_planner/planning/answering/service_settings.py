@@ -26,7 +26,7 @@ class ServiceSettings:
     rover: Rover
     """The rover of all queries."""
     query: PathQueryOptions
-    """How candidates are generated and judged."""
+    """Options of the generation and judgement of candidates."""
     largest_gap: float
     """Widest unknown region of a map that is interpolated [m]; 0 interpolates none."""
     suspension_tolerance: float
@@ -34,11 +34,11 @@ class ServiceSettings:
     planner: str
     """FAN, LATTICE or AUTO."""
     lattice: LatticeSettings
-    """How paths around obstacles are searched."""
+    """Settings of searches around obstacles."""
     max_map_age: float
     """Age from which a map is too old to be used [s]; 0 allows any age."""
-    blind_ground: str = ALLOW
-    """What paths over never seen ground under the belly are, one of UNOBSERVED_GROUND."""
+    unobserved_ground: str = ALLOW
+    """Rule for paths over never seen ground under the belly, one of UNOBSERVED_GROUND."""
 
     @property
     def manipulator_joints(self) -> tuple[str, ...]:
@@ -110,5 +110,5 @@ def load_service_settings(parameters: TraverseServerParameters) -> ServiceSettin
             frontier=parameters.search_frontier,
         ),
         max_map_age=parameters.max_map_age,
-        blind_ground=parameters.blind_ground,
+        unobserved_ground=parameters.blind_ground,
     )

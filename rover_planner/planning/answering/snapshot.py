@@ -12,19 +12,19 @@ from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.maps.known_map import KnownMap
-from rover_planner.maps.unobserved_ground import CODE as BLIND
+from rover_planner.maps.unobserved_ground import UNOBSERVED_CODE
 from rover_planner.parameters.traverse_server import FAN, LATTICE
 from rover_planner.planning.answering.judgement import PathJudgement, refusal
 from rover_planner.planning.answering.search_watch import SearchWatch
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.path_geometry import densify
 from rover_planner.planning.path_query import Candidate, PathSearch, Pose, add_path
-from rover_planner.planning.search.blind_check import BlindCheck
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.judge import PathJudge
-from rover_planner.planning.search.lattice_search import Progress
+from rover_planner.planning.search.lattice_search import SearchProgress
 from rover_planner.planning.search.path_search import GOAL_REFUSED, START_REFUSED, find_path
 from rover_planner.planning.search.query import SearchQuery
+from rover_planner.planning.search.unobserved_check import UnobservedCheck
 from rover_planner.planning.verdict_report import SuspensionReport
 
 NO_PATH = "no path was received yet; publish one on ~/path"
@@ -65,7 +65,7 @@ class Snapshot:
     """Why the map is too old to be used; empty if it is not."""
 
     edge_memory: EdgeMemory = field(default_factory=EdgeMemory)
-    """What earlier searches have found of the ground; grows with each search."""
+    """Edges that earlier searches have judged; grows with each search."""
     watch: SearchWatch | None = None
     """Watches searches around obstacles."""
 
@@ -100,8 +100,10 @@ class Snapshot:
         search = judge.search(*ends, tolerance)
         judged = self._describe(judge, search.answer.chosen, search)
         are_on_map = all(judge.terrain.contains(*end[:2]) for end in ends)
-        starts_blind = judged.code == BLIND and search.answer.chosen.verdict.first_failure == 0
-        is_final = judged.traversable or starts_blind or not are_on_map
+        starts_unobserved = (
+            judged.code == UNOBSERVED_CODE and search.answer.chosen.verdict.first_failure == 0
+        )
+        is_final = judged.traversable or starts_unobserved or not are_on_map
         if is_final or self.settings.planner == FAN:
             return judged
         return self._search_around(judge, ends, judged)
@@ -116,7 +118,9 @@ class Snapshot:
             ends: Start and goal.
             refused: The judgement on the candidates; None if none were tried.
         """
-        query = SearchQuery(judge.rover, judge.terrain, *ends, judge.options, judge.blind)
+        query = SearchQuery(
+            judge.rover, judge.terrain, *ends, judge.options, judge.unobserved_check
+        )
         found = find_path(query, self.settings.lattice, self.edge_memory, self._look)
         if found.path is not None:
             search = add_path(None if refused is None else refused.search, found.path, ends[1])
@@ -130,7 +134,7 @@ class Snapshot:
         reason = f"{why}; the best candidate: {refused.reason}"
         return replace(refused, code=code, reason=reason, around=found)
 
-    def _look(self, progress: Progress) -> None:
+    def _look(self, progress: SearchProgress) -> None:
         """Let the watch look at a search."""
         if self.watch is not None and self.known_map is not None:
             self.watch.look(self.known_map, progress)
@@ -180,8 +184,8 @@ class Snapshot:
         assert self.known_map is not None
         settings = self.settings
         options = settings.query.change(joint_angles=self._manipulator_angles())
-        blind = BlindCheck(settings.rover, self.known_map.seen, settings.blind_ground)
-        return PathJudge(settings.rover, self.known_map.terrain, options, blind)
+        check = UnobservedCheck(settings.rover, self.known_map.seen, settings.unobserved_ground)
+        return PathJudge(settings.rover, self.known_map.terrain, options, check)
 
     def _describe(
         self, judge: PathJudge, candidate: Candidate, search: PathSearch | None = None

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a drive needs without ROS: watch of the path, hazard map, frames."""
+"""Support of a drive without ROS: watch of the path, hazard map, frames."""

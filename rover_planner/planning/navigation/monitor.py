@@ -49,7 +49,7 @@ class WatchSettings:
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """What a monitor looks at."""
+    """Map, settings and pose of the rover at the time of a check."""
 
     snapshot: Snapshot
     """Settings, map and measured suspension."""
@@ -61,7 +61,7 @@ class Sight:
 
 @dataclass(frozen=True, eq=False)
 class Finding:
-    """What a monitor has found."""
+    """State of the watch, and the judgement on the rest of the path that it follows from."""
 
     state: str
     """IDLE, WATCHING, STOPPED or ARRIVED."""
@@ -131,7 +131,7 @@ class PathMonitor:
 
     @property
     def finding(self) -> Finding:
-        """What was found last."""
+        """The last finding."""
         return self._finding
 
     def take_path(self, path: WatchedPath, sight: Sight) -> bool:

@@ -28,7 +28,7 @@ class ClosedArea:
     """The places that the start, or the goal, is connected with."""
 
     around_goal: bool
-    """Whether it lies around the goal; else around the start."""
+    """True if it lies around the goal; else around the start."""
     places: NDArray[np.bool_]
     """(rows, columns) True for its places, row 0 at the smallest y."""
     area: float

@@ -58,12 +58,16 @@ def _is_alike(asked: SearchQuery, edges: Edges, query: SearchQuery, nodes: Nodes
 
 def _rule_of(query: SearchQuery) -> str:
     """Return the rule of UNOBSERVED_GROUND of a query."""
-    return ALLOW if query.blind is None else query.blind.rule
+    return ALLOW if query.unobserved_check is None else query.unobserved_check.rule
 
 
 def _seen(query: SearchQuery) -> NDArray[np.uint8] | None:
     """Return (ny, nx) what was seen of each cell; None if the rule does not ask."""
-    return None if query.blind is None or _rule_of(query) == ALLOW else query.blind.seen.kinds
+    return (
+        None
+        if query.unobserved_check is None or _rule_of(query) == ALLOW
+        else query.unobserved_check.seen.kinds
+    )
 
 
 def _find_touching(

@@ -59,7 +59,7 @@ class Seeds(NamedTuple):
 
 
 class ToGoal(NamedTuple):
-    """What is known of the costs from the nodes to the goal."""
+    """Costs from the nodes to the goal, as far as they are known."""
 
     cost: np.ndarray
     """(nodes,) cost to the goal [m], too high or infinite where it is not known."""
@@ -71,8 +71,8 @@ class ToGoal(NamedTuple):
     """Distance of neighbouring nodes [m]."""
 
 
-class Tree(NamedTuple):
-    """What a search has reached."""
+class SearchTree(NamedTuple):
+    """Nodes that a search has reached, with their costs."""
 
     cost: np.ndarray
     """(nodes,) cost from the start [m], infinite where nothing leads, written."""
@@ -219,7 +219,7 @@ def find_shortest(graph, starts, goals, to_goal, tree):
         starts: Seeds with the costs from the start to the nodes.
         goals: Seeds with the costs from the nodes to the goal.
         to_goal: ToGoal, and the limit up to which it is measured.
-        tree: Tree, written.
+        tree: SearchTree, written.
 
     Returns:
         Index of the goal's seed that the path ends with, -1 if there is no path; its cost [m]; and
@@ -353,7 +353,7 @@ class ShortestPaths:
         nodes, count = edges.nodes, edges.nodes.count
         self._to_goal = ToGoal(np.empty(count), *nodes.surround(starts.nodes), nodes.cell)
         self._limit, self._measured = np.inf, 0
-        self._tree = Tree(np.empty(count), np.empty(count, np.int64))
+        self._tree = SearchTree(np.empty(count), np.empty(count, np.int64))
         self._caution, self._misled = -1.0, 0
         self.expanded = 0
         """Number of nodes expanded by all searches."""

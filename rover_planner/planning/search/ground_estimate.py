@@ -3,7 +3,7 @@
 
 Nodes where the centre of a wheel is over unknown ground however the rover tilts are refused, as
 the model does. Nodes with unknown ground below a wheel on level ground are only doubted: the model
-decides, but it is asked about other ways first.
+decides, but it is asked about other paths first.
 """
 
 import math

@@ -28,7 +28,7 @@ from rover_physics.traversability.classification import ClassifiedWaypoint, clas
 from rover_physics.traversability.judge import judge_poses
 from rover_physics.traversability.pieces import PieceVerdict, judge_pieces
 from rover_physics.traversability.verdict import Verdict
-from rover_planner.maps.unobserved_ground import CODE
+from rover_planner.maps.unobserved_ground import UNOBSERVED_CODE
 from rover_planner.planning.path_geometry import rings_within
 from rover_planner.planning.path_query import (
     Candidate,
@@ -39,8 +39,8 @@ from rover_planner.planning.path_query import (
     answer_path_query,
     check_path,
 )
-from rover_planner.planning.search.blind_check import BlindCheck, physical
 from rover_planner.planning.search.primitives import PRICES, Gear, Piece
+from rover_planner.planning.search.unobserved_check import UnobservedCheck, physical
 
 CLIMB = 2.0
 """Metres of level ground that cost as much as the energy that lifts the rover by one metre."""
@@ -51,7 +51,7 @@ _QUERIES_PER_RING = 4
 
 
 class JudgedPiece(NamedTuple):
-    """What the model found of a piece of path."""
+    """Code and cost of a piece of path."""
 
     code: str
     """Code of the limit that fails first, empty if the rover may drive it."""
@@ -68,8 +68,8 @@ class PathJudge:
     terrain: Terrain
     """The ground, map frame."""
     options: PathQueryOptions
-    """How candidates are made and how paths are judged."""
-    blind: BlindCheck | None = None
+    """Options of candidates and of the judgement of paths."""
+    unobserved_check: UnobservedCheck | None = None
     """Refuses ground under the belly that was never seen; None allows it."""
     poses: int = field(default=0, init=False)
     """Number of poses that searches have asked for so far, a measure of the work done."""
@@ -103,7 +103,7 @@ class PathJudge:
         return answer_path_query(self.rover, self.terrain, start, goal, self.options)
 
     def _hold(self, answer: PathAnswer) -> PathAnswer:
-        return answer if self.blind is None else self.blind.choose(answer)
+        return answer if self.unobserved_check is None else self.unobserved_check.choose(answer)
 
     def _fails_at(self, answer: PathAnswer, goal: Pose, tolerance: float) -> bool:
         """Return whether another goal within `tolerance` [m] may help.
@@ -138,7 +138,7 @@ class PathJudge:
         """
         self.poses += len(poses)
         checked = self._judge_path(poses, stop_at_failure=stop_at_failure)
-        return checked if self.blind is None else self.blind.hold(checked)
+        return checked if self.unobserved_check is None else self.unobserved_check.hold(checked)
 
     def _judge_path(self, poses: Pose, *, stop_at_failure: bool = False) -> Candidate:
         return check_path(
@@ -176,38 +176,40 @@ class PathJudge:
             JudgedPiece(verdict.code, find_cost(self.rover, piece.gear, verdict))
             for piece, verdict in zip(pieces, found, strict=True)
         ]
-        for row in self._find_blind(poses, [one.code for one in judged]):
-            judged[row] = JudgedPiece(CODE, math.inf)
+        for row in self._find_unobserved(poses, [one.code for one in judged]):
+            judged[row] = JudgedPiece(UNOBSERVED_CODE, math.inf)
         return judged
 
     def stand(self, poses: NDArray[np.float64]) -> tuple[str, ...]:
         """Return the codes (n,) of what fails at single poses (n, 3), wheels ahead; "" if none."""
-        codes = list(self._stand(poses).codes)
-        for row in self._find_blind(poses[:, None, :], codes):
-            codes[row] = CODE
+        codes = list(self._judge_standing(poses).codes)
+        for row in self._find_unobserved(poses[:, None, :], codes):
+            codes[row] = UNOBSERVED_CODE
         return tuple(codes)
 
     def refuse(self, pose: Pose) -> tuple[str, str]:
         """Return code and reason why the rover cannot stand at a pose, empty if it can."""
-        verdict = self._stand(pose[None, :])
-        if self.blind is not None and self._find_blind([pose[None, :]], verdict.codes):
-            return CODE, self.blind.describe()
+        verdict = self._judge_standing(pose[None, :])
+        if self.unobserved_check is not None and self._find_unobserved(
+            [pose[None, :]], verdict.codes
+        ):
+            return UNOBSERVED_CODE, self.unobserved_check.describe()
         return verdict.codes[0], verdict.reasons[0]
 
-    def _stand(self, poses: NDArray[np.float64]) -> Verdict:
+    def _judge_standing(self, poses: NDArray[np.float64]) -> Verdict:
         """Judge single poses (n, 3), wheels ahead."""
         self.poses += len(poses)
         ahead, model, sigmas = np.zeros(len(poses)), self.options.model, self.options.map_sigmas
         return judge_poses(self.rover, self.terrain, poses, ahead, model, sigmas=sigmas)[1]
 
-    def _find_blind(
+    def _find_unobserved(
         self, pieces: Sequence[NDArray[np.float64]] | NDArray[np.float64], codes: Sequence[str]
     ) -> list[int]:
         """Return the indices of pieces that pass by their codes, but are over unseen ground."""
         passing = [row for row, code in enumerate(codes) if not code]
-        if self.blind is None or not passing:
+        if self.unobserved_check is None or not passing:
             return []
-        refused = self.blind.refuses([pieces[row] for row in passing])
+        refused = self.unobserved_check.refuses([pieces[row] for row in passing])
         return [passing[row] for row in np.flatnonzero(refused).tolist()]
 
 

@@ -43,8 +43,8 @@ NEAR_OPTIMAL = 0.02
 
 
 @dataclass
-class Progress:
-    """What a search has found so far."""
+class SearchProgress:
+    """Progress of a search: its best path so far, and a bound on the cost of any path."""
 
     best: Candidate | None = None
     """The best path that passes as a whole."""
@@ -53,7 +53,7 @@ class Progress:
     bound: float = 0.0
     """Bound from below on the cost of any path of the lattice [m]."""
     exhausted: bool = False
-    """Whether the lattice has no path left to look at."""
+    """True if the lattice has no path left to look at."""
     judged: int = 0
     """Number of edges that the model has judged."""
     first_time: float = np.nan
@@ -105,12 +105,12 @@ class LatticeSearch:
     """(nodes,) doubt that the rover can be at a node, 0 for none; grows with the search."""
     difficulty: Difficulty
     """Estimates how likely edges are refused."""
-    progress: Progress = field(default_factory=Progress)
-    """What it has found."""
+    progress: SearchProgress = field(default_factory=SearchProgress)
+    """Its progress."""
 
     def __post_init__(self) -> None:
         self.ends = _Ends(self.starts), _Ends(self.goals)
-        """What is known of the connections of the start and of the goal."""
+        """Judged connections of the start and of the goal."""
         self.shortest = ShortestPaths(self.edges, self.doubt, self.difficulty, self.ends[0].seeds)
         self._refused: list[tuple[int, int, float]] = []
 
@@ -121,7 +121,7 @@ class LatticeSearch:
             checked = self.judge.check(piece.poses, stop_at_failure=True)
             self._keep([replace(piece, cost=cost)], checked)
 
-    def run(self, allowed: Callable[["LatticeSearch"], bool]) -> Progress:
+    def run(self, allowed: Callable[["LatticeSearch"], bool]) -> SearchProgress:
         """Search until the best path is found, no path is left, or it is not allowed to go on."""
         try:
             for caution in CAUTIONS:

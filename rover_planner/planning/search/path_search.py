@@ -28,7 +28,7 @@ from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.edges import UNJUDGED
 from rover_planner.planning.search.ground_estimate import estimate_ground
 from rover_planner.planning.search.judge import PathJudge
-from rover_planner.planning.search.lattice_search import LatticeSearch, Progress, join_pieces
+from rover_planner.planning.search.lattice_search import LatticeSearch, SearchProgress, join_pieces
 from rover_planner.planning.search.nodes import HEADINGS, Nodes
 from rover_planner.planning.search.primitives import Gear, Piece
 from rover_planner.planning.search.query import (
@@ -73,8 +73,8 @@ class SearchResult:
     cost: float
     """Its cost [m of level ground]; infinite without a path."""
     bound: float
-    """How much more it cost before smoothing, at most, than the best path of the lattice, as a
-    factor; infinite if that is not known."""
+    """Largest factor by which it cost more, before smoothing, than the best path of the lattice;
+    infinite if that is not known."""
     expanded: int
     """Number of expanded nodes."""
     edges_judged: int
@@ -86,13 +86,13 @@ class SearchResult:
     seconds: float
     """Time of the whole search [s]."""
     repeatable: bool
-    """Whether the same question gives the same answer to the bit: the clock did not end it."""
+    """True if the same question gives the same answer to the bit: the clock did not end it."""
     nodes: Nodes
     """The nodes of the lattice."""
     closed: ClosedArea | None
-    """What is closed in where no path exists; else None."""
+    """The closed-in area where no path exists; else None."""
     warning: str
-    """What may have hidden a path, such as a coarse lattice; empty if nothing has."""
+    """Condition that may have hidden a path, such as a coarse lattice; empty without one."""
     asked: NDArray[np.bool_]
     """(rows, columns) True for the places where the model was asked whether the rover can stand,
     in this search or in an earlier one that the memory holds; row 0 at the smallest y."""
@@ -133,7 +133,7 @@ def find_path(
     query: SearchQuery,
     settings: LatticeSettings | None = None,
     memory: EdgeMemory | None = None,
-    on_progress: Callable[[Progress], None] | None = None,
+    on_progress: Callable[[SearchProgress], None] | None = None,
 ) -> SearchResult:
     """Search a path from start to goal.
 
@@ -158,13 +158,13 @@ class _PathFinder:
         query: SearchQuery,
         settings: LatticeSettings,
         memory: EdgeMemory | None,
-        on_progress: Callable[[Progress], None] | None,
+        on_progress: Callable[[SearchProgress], None] | None,
     ):
         self._began = time.perf_counter()
         self._query, self._settings, self._on_progress = query, settings, on_progress
         self._start = _check_end("start", query, may_be_off_map=False)
         self._goal = _check_end("goal", query, may_be_off_map=settings.frontier)
-        self._judge = PathJudge(query.rover, query.terrain, query.options, query.blind)
+        self._judge = PathJudge(query.rover, query.terrain, query.options, query.unobserved_check)
         cell = settings.cell or 0.25 * query.rover.wheelbase
         self._nodes, self._is_limited = choose_window(query, cell)
         self._memory = memory or EdgeMemory()
@@ -181,22 +181,24 @@ class _PathFinder:
             is_frontier = self._settings.frontier and outcome == GOAL_REFUSED
             self._to_frontier = is_frontier and code in BEYOND
             if code and not self._to_frontier:
-                return self._answer(outcome, f"the rover cannot stand at the {name}: {reason}")
+                return self._make_result(
+                    outcome, f"the rover cannot stand at the {name}: {reason}"
+                )
         search = self._prepare()
         if not self._to_frontier:
             self._try_directly(search)
         progress = search.run(self._allowed)
         if progress.best is not None:
             path = self._smooth(search)
-            return self._answer(FOUND, self._describe_rest(path[0]), search, path=path)
+            return self._make_result(FOUND, self._describe_rest(path[0]), search, path=path)
         where = self._describe_extent()
         if not progress.exhausted:
             budget = self._settings.budget
             reason = f"no way within {where} was found in the budget of {budget:g} s; "
-            return self._answer(OUT_OF_TIME, f"{reason}there may be one", search)
+            return self._make_result(OUT_OF_TIME, f"{reason}there may be one", search)
         closed = find_closed_area(search)
         reason = f"no way within {where}: {closed.describe()}"
-        return self._answer(NO_WAY, reason, search, closed=closed)
+        return self._make_result(NO_WAY, reason, search, closed=closed)
 
     def _warn(self) -> str:
         """Return what is wrong with the lattice, in words."""
@@ -283,7 +285,7 @@ class _PathFinder:
             return best, search.progress.cost
         return smoothed, sum(one.cost for one in pieces)
 
-    def _answer(
+    def _make_result(
         self,
         outcome: str,
         reason: str,
@@ -291,7 +293,7 @@ class _PathFinder:
         path: tuple[Candidate | None, float] = (None, math.inf),
         closed: ClosedArea | None = None,
     ) -> SearchResult:
-        progress = Progress() if search is None else search.progress
+        progress = SearchProgress() if search is None else search.progress
         asked = np.zeros(self._nodes.shape, bool) if search is None else self._asked(search)
         known = progress.best is not None and progress.bound > 0.0
         bound = progress.cost / progress.bound if known else math.inf
@@ -345,7 +347,7 @@ def smooth(judge: PathJudge, pieces: list[Piece], radius: float, most_poses: int
         first = 0
         while first + span <= len(pieces) and judge.poses < allowed:
             check_interruption()
-            found = _replace(judge, pieces[first : first + span], radius)
+            found = _find_shortcut(judge, pieces[first : first + span], radius)
             if found is not None:
                 pieces = [*pieces[:first], found, *pieces[first + span :]]
                 first += 1
@@ -354,7 +356,7 @@ def smooth(judge: PathJudge, pieces: list[Piece], radius: float, most_poses: int
     return pieces
 
 
-def _replace(judge: PathJudge, old: list[Piece], radius: float) -> Piece | None:
+def _find_shortcut(judge: PathJudge, old: list[Piece], radius: float) -> Piece | None:
     """Return one curve driven forwards that costs less than some pieces; None if none does."""
     start, end = old[0].poses[0], old[-1].poses[-1]
     spacing = judge.options.waypoint_spacing

@@ -27,7 +27,7 @@ _SEARCH_RADIUS = 40
 
 
 class Gear(IntEnum):
-    """How a primitive is driven."""
+    """Gear of a primitive: forward, backward or a turn on the spot."""
 
     FORWARD = 0
     BACKWARD = 1
@@ -45,7 +45,7 @@ class Piece:
     poses: NDArray[np.float64]
     """(n, 3) waypoints in the order of the drive, x, y [m], yaw [rad], map frame."""
     gear: Gear
-    """How it is driven."""
+    """Gear in which it is driven."""
     cost: float = np.nan
     """Its cost [m of level ground], NaN if it is not judged."""
 
@@ -59,7 +59,7 @@ class Primitive:
     end_heading: int
     """Heading at its end."""
     gear: Gear
-    """How it is driven."""
+    """Gear in which it is driven."""
     length: float
     """Distance driven by the body origin, or by the outermost wheel on the spot [m]."""
     poses: NDArray[np.float64]

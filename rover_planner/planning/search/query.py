@@ -12,8 +12,8 @@ from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.planning.search.blind_check import BlindCheck
 from rover_planner.planning.search.nodes import HEADINGS, Nodes, nodes_within
+from rover_planner.planning.search.unobserved_check import UnobservedCheck
 
 MAX_NODES = 1_500_000
 """Largest number of nodes of a window; each takes 70 bytes."""
@@ -32,24 +32,24 @@ class SearchQuery:
     goal: ArrayLike
     """(3,) as `start`."""
     options: PathQueryOptions
-    """How paths are judged."""
-    blind: BlindCheck | None = None
+    """Options of the judgement of paths."""
+    unobserved_check: UnobservedCheck | None = None
     """Refuses ground under the belly that was never seen; None allows it."""
 
 
 @dataclass(frozen=True)
 class LatticeSettings:
-    """How a path is searched."""
+    """Settings of a search for a path."""
 
     budget: float = 2.0
     """Time for the search [s]."""
     cell: float | None = None
     """Distance of neighbouring nodes [m]; None: a quarter of the wheelbase."""
     frontier: bool = False
-    """Whether a path may end at the frontier of the known ground, as near as possible to a goal
+    """True if a path may end at the frontier of the known ground, as near as possible to a goal
     beyond it."""
     ends_at_first: bool = False
-    """Whether the first path is the answer; else better ones are searched for the whole budget."""
+    """True if the first path is the answer; else better ones are searched for the whole budget."""
 
     def __post_init__(self) -> None:
         for name in ("budget", "cell"):

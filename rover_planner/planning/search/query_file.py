@@ -39,7 +39,7 @@ class _Options:
 
 @dataclass(frozen=True)
 class _Content:
-    """What the entry holds."""
+    """Content of the entry: a question for a path and the settings of its search."""
 
     rover: dict[str, Any]
     start: tuple[float, float, float]

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash
 from msg_adapters.imu import ImuMounting, imu_to_attitude
-from msg_adapters.joints import JointMap, read_joint_map
+from msg_adapters.joints import JointNames, read_joint_map
 from msg_adapters.odometry import odometry_to_pose, odometry_to_tilt
 from msg_adapters.paths import path_to_poses
 from msg_adapters.sensing import BASE_FRAME
@@ -66,7 +66,7 @@ class Questions:
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
+class ReplayAnswer:
     """An answer to a question of a replay."""
 
     kind: str
@@ -117,7 +117,7 @@ class Replay:
         self.joint_names = _read_joint_map(values, self._service.all_joint_names)
         """Names of the joints in messages."""
         self._imu = ImuMounting(values.imu_frame or BASE_FRAME, values.imu_mounting)
-        self._take: dict[str, Callable[[Recorded], Iterator[Answer]]] = {
+        self._take: dict[str, Callable[[Recorded], Iterator[ReplayAnswer]]] = {
             MAP: self._take_map,
             JOINTS: self._take_joints,
             ODOMETRY: self._take_odometry,
@@ -127,7 +127,7 @@ class Replay:
             PATH: self._take_path,
         }
 
-    def take(self, recorded: Recorded) -> Iterator[Answer]:
+    def take(self, recorded: Recorded) -> Iterator[ReplayAnswer]:
         """Take a message; yield the answers to the questions that it causes."""
         self._time = recorded.stamp
         try:
@@ -137,12 +137,12 @@ class Replay:
             if len(self.notes) < MAX_NOTES:
                 self.notes.append(f"{recorded.topic} at {stamp_text(recorded.stamp)}: {error}")
 
-    def finish(self) -> Iterator[Answer]:
+    def finish(self) -> Iterator[ReplayAnswer]:
         """Yield the answer about the rest of the drive."""
         if len(self._drive.poses) > 1:
             yield self._judge_drive()
 
-    def _take_map(self, recorded: Recorded) -> Iterator[Answer]:
+    def _take_map(self, recorded: Recorded) -> Iterator[ReplayAnswer]:
         header = recorded.message.header
         stamp = stamp_to_ns(header.stamp)
         source = self.frames.find_source(header.frame_id, stamp, recorded.topic)
@@ -166,25 +166,25 @@ class Replay:
         frame = self.parameters.map_frame
         return self._service.take_terrain(snapshot.terrain, source, stamp, snapshot.sources, frame)
 
-    def _take_joints(self, recorded: Recorded) -> Iterator[Answer]:
+    def _take_joints(self, recorded: Recorded) -> Iterator[ReplayAnswer]:
         positions = self.joint_names.positions(recorded.message, self._service.joint_names)
         self._service.take_joints(positions)
         self._measured.take_joints(positions, recorded.stamp / NANOSECONDS)
         yield from ()
 
-    def _take_transforms(self, recorded: Recorded) -> Iterator[Answer]:
+    def _take_transforms(self, recorded: Recorded) -> Iterator[ReplayAnswer]:
         for transform in recorded.message.transforms:
             self.frames.take_transform(transform, is_static=recorded.kind == TF_STATIC)
         yield from ()
 
-    def _take_imu(self, recorded: Recorded) -> Iterator[Answer]:
+    def _take_imu(self, recorded: Recorded) -> Iterator[ReplayAnswer]:
         if self.parameters.imu_attitude:
             attitude = imu_to_attitude(recorded.message, self._imu)
             now = recorded.stamp / NANOSECONDS
             self._measured.take_tilt(attitude.roll, attitude.pitch, now)
         yield from ()
 
-    def _take_odometry(self, recorded: Recorded) -> Iterator[Answer]:
+    def _take_odometry(self, recorded: Recorded) -> Iterator[ReplayAnswer]:
         here = self.frames.localise_odometry(recorded.message)
         pose, _ = odometry_to_pose(here, self.parameters.map_frame)
         body = float(pose[2]), *odometry_to_tilt(here)
@@ -213,14 +213,14 @@ class Replay:
         if filled is not None:
             self._service.amend_map(filled.terrain, filled.sources)
 
-    def _take_path(self, recorded: Recorded) -> Iterator[Answer]:
+    def _take_path(self, recorded: Recorded) -> Iterator[ReplayAnswer]:
         there = self.frames.localise_path(recorded.message)
         poses = path_to_poses(there, self.parameters.map_frame)
         about = path_hash(recorded.message), stamp_text(stamp_to_ns(recorded.message.header.stamp))
         self._service.take_path(poses, *about)
         yield self._ask(CHECKED, recorded.stamp, Snapshot.check_path)
 
-    def _judge_drive(self) -> Answer:
+    def _judge_drive(self) -> ReplayAnswer:
         """Judge the drive on the map that was known when it began; begin the next stretch."""
         drive, self._drive = self._drive, self._drive.rest()
         self._service.take_path(np.array(drive.poses))
@@ -238,7 +238,7 @@ class Replay:
         stamp: int,
         ask: Callable[[Snapshot], PathJudgement],
         snapshot: Snapshot | None = None,
-    ) -> Answer:
+    ) -> ReplayAnswer:
         """Ask a question; an invalid one is refused with its reason."""
         now = self._service.snapshot(stamp) if snapshot is None else snapshot
         number = self._register.next_number()
@@ -248,10 +248,10 @@ class Replay:
             judgement = refusal("bad_request", str(error))
         identity = self._register.identify(number, kind, "", now)
         identity = replace(identity, path_hash=now.path.hash, path_stamp=now.path.stamp)
-        return Answer(kind, stamp, judgement, identity, now.terrain)
+        return ReplayAnswer(kind, stamp, judgement, identity, now.terrain)
 
 
-def _read_joint_map(values: TraverseServerParameters, known: tuple[str, ...]) -> JointMap:
+def _read_joint_map(values: TraverseServerParameters, known: tuple[str, ...]) -> JointNames:
     """Return the joint map of the parameters; a wrong one is bad input, not a bad message."""
     try:
         return read_joint_map(values.joint_map, known)

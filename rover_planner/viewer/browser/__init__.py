@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the page needs of the browser itself: keys, boxes, the address, and files to send."""
+"""Access to the browser itself: keys, boxes, the address, and files to send."""

@@ -15,11 +15,11 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import list_values, with_value
-from rover_planner.viewer.state.reasons.before_after import list_changes
+from rover_planner.viewer.state.before_after import list_changes
 from rover_planner.viewer.state.scenario import Pose
 
 VALUE, JOINT = "rover.", "arm."
-"""What comes before the keys of changed numbers and of the arm's joints."""
+"""Prefixes of the keys of changed numbers and of the arm's joints."""
 MAX_LENGTH = 8000
 """Most characters of a link; servers accept hardly more."""
 MAX_TEXT = 200_000
@@ -29,8 +29,8 @@ HALF_TURN = 180.0
 
 
 @dataclass(frozen=True)
-class Link:
-    """What a link holds."""
+class PageLink:
+    """Content of a link to the page."""
 
     rover: str
     """Name of the rover as it was loaded."""
@@ -57,7 +57,7 @@ class Link:
     joints: Mapping[str, float] = field(default_factory=dict)
     """Angles of the arm's joints by name [rad]."""
     along: bool = False
-    """Whether predicted layers are for the heading of the path, not for `heading`."""
+    """True if predicted layers are for the heading of the path, not for `heading`."""
     rover_file: str = ""
     """Text of the file of the rover as it was loaded; empty for a preset."""
 
@@ -90,7 +90,7 @@ def change_values(loaded: Rover, values: Mapping[str, float]) -> Rover:
     return rover
 
 
-def write_link(link: Link) -> str:
+def write_link(link: PageLink) -> str:
     """Return a link as the query of an address.
 
     Raises:
@@ -121,7 +121,7 @@ def write_link(link: Link) -> str:
     return query
 
 
-def read_link(query: str) -> Link | None:
+def read_link(query: str) -> PageLink | None:
     """Return what the query of an address holds; None if it is not one of `write_link`.
 
     Raises:
@@ -133,7 +133,7 @@ def read_link(query: str) -> Link | None:
     missing = [name for name in ("start", "goal", "torques", "layer") if name not in words]
     if missing:
         raise PlanningError(f"the link has no {missing[0]}")
-    return Link(
+    return PageLink(
         rover=words["rover"],
         ground=words["map"],
         start=_read_pose("start", words["start"]),

@@ -58,7 +58,7 @@ class Drawings:
 
     @property
     def waiting(self) -> bool:
-        """Whether something is still to be drawn, or is being drawn."""
+        """True if something is still to be drawn, or is being drawn."""
         return bool(self._asked)
 
     def ask(self, failure: str, draw: Action) -> None:
@@ -132,7 +132,7 @@ class PageBase(ABC):
 
     @property
     def is_drawing(self) -> bool:
-        """Whether the page acts on requests, or has still to draw what they have changed."""
+        """True if the page acts on requests, or has still to draw what they have changed."""
         return self._fulfils or self.drawings.waiting
 
     def start(self) -> None:

@@ -23,7 +23,7 @@ from rover_planner.viewer.state.survey_layers import ColouredGround, ShownSurvey
 
 @dataclass(frozen=True, eq=False)
 class PaintRequest:
-    """What to draw."""
+    """Ground and layer to draw."""
 
     scenario: Scenario
     """Rover, ground and options."""
@@ -45,7 +45,7 @@ class PaintedGround:
     glb: bytes
     """The ground as a file for the scene."""
     scale: ColourScale | ColouredGround
-    """What its colours mean; the latter for a layer of a survey."""
+    """The values of its colours; the latter for a layer of a survey."""
 
 
 class GroundPainter:
@@ -96,8 +96,8 @@ class GroundPainter:
         elif request.survey is not None:
             survey, asked, name = request.survey, request.scenario, request.layer
             differences = survey.find_differences(asked.rover, asked.asked_options.model)
-            told = survey.describe(name)
-            self._tab.show_legend(draw_survey_legend(name, told, scale, differences))
+            description = survey.describe(name)
+            self._tab.show_legend(draw_survey_legend(name, description, scale, differences))
 
 
 def _paint(request: PaintRequest) -> Iterator[Progress | PaintedGround]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the session judged, brought onto the page: verdict, paths, rover, ground and the drive."""
+"""Brings judged scenarios onto the page: verdict, paths, rover, ground and the drive."""
 
 import math
 import time
@@ -26,15 +26,15 @@ from rover_planner.viewer.panel.plots import PLOTS, Curves, Plots
 from rover_planner.viewer.panel.rover_tab import RoverTab
 from rover_planner.viewer.scene.cameras import find_radius
 from rover_planner.viewer.scene.scene import Scene
-from rover_planner.viewer.state.playback import Playback
-from rover_planner.viewer.state.reasons.before_after import (
+from rover_planner.viewer.state.before_after import (
     ChangeHistory,
     compare_drives,
     list_changes,
 )
-from rover_planner.viewer.state.reasons.candidate_rows import list_candidates
-from rover_planner.viewer.state.reasons.failure import Explanation, Failure, explain
-from rover_planner.viewer.state.reasons.path_limits import find_worst
+from rover_planner.viewer.state.candidate_rows import list_candidates
+from rover_planner.viewer.state.failure import Explanation, Failure, explain
+from rover_planner.viewer.state.path_limits import find_worst
+from rover_planner.viewer.state.playback import Playback
 from rover_planner.viewer.state.scenario import Scenario
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.trajectory import MAX_VALUE, RoverState, Trajectory
@@ -131,7 +131,7 @@ class JudgedDisplay:
             self.history.take(now)
             if now.answered is not before.answered:
                 self._draw_predicted_ground()
-            if now.way is not before.way:
+            if now.around is not before.around:
                 self._ask("the closed area is not drawn", self._draw_closed_area)
             if now.candidate is not before.candidate:
                 self.show_path()
@@ -251,7 +251,7 @@ class JudgedDisplay:
 
     def _draw_closed_area(self) -> None:
         session = self._session
-        self._panels.scene.closed.show(session.rover, session.terrain, session.shown.way)
+        self._panels.scene.closed.show(session.rover, session.terrain, session.shown.around)
 
     def _old_paths(self) -> set[int]:
         """Return the indices of the paths whose verdicts are of old values."""

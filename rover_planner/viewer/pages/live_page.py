@@ -69,7 +69,7 @@ class LivePage(PageBase):
         self._updated_at = self._ground_at = 0.0
         self._camera_aimed = False
         self._given_ground = session.ground_name if has_ground else "map not known yet"
-        """What the page calls the ground until a map comes."""
+        """The page's name of the ground until a map comes."""
         self._freshness = _describe_freshness(NO_ODOMETRY)
         super().__init__(session, host, port)
         self._builder = StateBuilder(session.rover)

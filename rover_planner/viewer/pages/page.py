@@ -8,7 +8,7 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import RoverValue
-from rover_planner.viewer.browser.link import Link, read_link
+from rover_planner.viewer.browser.link import PageLink, read_link
 from rover_planner.viewer.pages.base import PageBase
 from rover_planner.viewer.pages.ground_painter import GroundPainter
 from rover_planner.viewer.pages.judged_display import JudgedDisplay, Panels
@@ -126,7 +126,7 @@ class Page(PageBase):
 
     @property
     def is_busy(self) -> bool:
-        """Whether something is judged, or judged and not shown yet."""
+        """True if something is judged, or judged and not shown yet."""
         works = self.session, self._painter.work
         is_judged = any(work.progress is not None or work.has_news for work in works)
         return is_judged or self.is_drawing  # in this order: what was taken is drawn
@@ -162,7 +162,7 @@ class Page(PageBase):
         elif word == "seek":
             self.judged.seek_share(float(rest))
 
-    def open_link(self, link: Link) -> None:
+    def open_link(self, link: PageLink) -> None:
         """Judge what a link holds, and show it."""
         self.sharing.open(link)
         self.judged.show_inputs()

@@ -12,7 +12,7 @@ from rover_physics.terrain.soil_file import soil_named
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import read_rover, write_rover
 from rover_planner.viewer.browser.link import (
-    Link,
+    PageLink,
     change_values,
     fingerprint,
     list_changed_values,
@@ -51,7 +51,7 @@ class Sharing:
         self._server, self._session, self._playback = server, session, playback
         self._ground_tab = ground_tab
         self._fingerprint: tuple[Terrain | None, str] = (None, "")
-        self._opening: tuple[Link, Scenario] | None = None
+        self._opening: tuple[PageLink, Scenario] | None = None
         """The link whose path and time are not shown yet, and what it asks for."""
         gui = server.gui
         gui.add_html(_text(FILE_WORDS))
@@ -92,10 +92,10 @@ class Sharing:
             f'<a id="link" href="{safe}" style="overflow-wrap:anywhere">{safe}</a>'
         )
 
-    def make_link(self) -> Link:
+    def make_link(self) -> PageLink:
         """Return the link to what is shown."""
         session, now = self._session, self._session.shown.scenario
-        return Link(
+        return PageLink(
             rover=now.loaded.name,
             ground=self._identify(now.terrain),
             start=now.start,
@@ -112,7 +112,7 @@ class Sharing:
             rover_file="" if _is_preset(now.loaded) else write_rover(now.loaded),
         )
 
-    def open(self, link: Link) -> None:
+    def open(self, link: PageLink) -> None:
         """Judge what a link holds; `go_on` then shows its path and time.
 
         Raises:
@@ -128,7 +128,7 @@ class Sharing:
         self._ground_tab.choose_layer(link.layer, link.heading, along=link.along)
         self._opening = link, asked
 
-    def _read(self, link: Link, wanted: Scenario) -> Scenario:
+    def _read(self, link: PageLink, wanted: Scenario) -> Scenario:
         loaded = _read_loaded(link)
         if loaded == wanted.loaded:
             loaded = wanted.loaded
@@ -167,7 +167,7 @@ class Sharing:
             self._playback.go_to(link.time)
         elif link.path <= len(session.shown.answer.candidates):
             session.show_candidate(link.path - 1)
-        elif session.progress is None:  # no way around was found this time
+        elif session.progress is None:  # no path around was found this time
             self._opening = None
 
     def _identify(self, terrain: Terrain) -> str:
@@ -181,7 +181,7 @@ def _text(text: str) -> str:
     return f'<div style="font-size:12px;padding:4px 8px">{text}</div>'
 
 
-def _check_joints(link: Link, rover: Rover) -> None:
+def _check_joints(link: PageLink, rover: Rover) -> None:
     """Check that the rover of a link has the joints that the link turns."""
     known = () if rover.manipulator is None else rover.manipulator.joints
     for joint in link.joints:
@@ -193,7 +193,7 @@ def _is_preset(rover: Rover) -> bool:
     return rover.name in preset_names() and load_rover(rover.name) == rover
 
 
-def _read_loaded(link: Link) -> Rover:
+def _read_loaded(link: PageLink) -> Rover:
     """Return the rover that was loaded when a link was made."""
     if link.rover_file:
         return read_rover(link.rover_file, "the rover file in the link")

@@ -18,7 +18,7 @@ from rover_planner.viewer.state.colours import (
     colour_utilisation,
     to_css,
 )
-from rover_planner.viewer.state.reasons.path_limits import WorstUse
+from rover_planner.viewer.state.path_limits import WorstUse
 from rover_planner.viewer.state.trajectory import RoverState
 
 WIDTH, HEIGHT = 364, 232
@@ -42,15 +42,15 @@ MAX_MARGIN = 1.2
 FONT = 12
 """Size of the smallest letters and digits [px]."""
 SLIP, TRACTION_RATIO = "slip ratio", "T/(&mu;N)"
-"""What the second bar of a wheel can show."""
+"""Quantities that the second bar of a wheel can show."""
 
 
 @dataclass(frozen=True)
 class BoardNotes:
-    """What the board shows besides the state."""
+    """Content of the board besides the state."""
 
     has_slip: bool = True
-    """Whether slip is predicted, on yielding soil or with speed servos. Else the second bar of a
+    """True if slip is predicted, on yielding soil or with speed servos. Else the second bar of a
     wheel is the paper's T/(mu N)."""
     worst: tuple[WorstUse, ...] = ()
     """The worst uses so far."""

@@ -5,8 +5,8 @@ import html
 import math
 from collections.abc import Sequence
 
+from rover_planner.viewer.state.candidate_rows import CandidateRow
 from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN, to_css
-from rover_planner.viewer.state.reasons.candidate_rows import CandidateRow
 
 
 def draw_candidates(rows: Sequence[CandidateRow], shown: int) -> str:

@@ -5,8 +5,8 @@ import html
 import math
 from collections.abc import Mapping, Sequence
 
+from rover_planner.viewer.state.before_after import Difference
 from rover_planner.viewer.state.colours import NOTICE, to_css
-from rover_planner.viewer.state.reasons.before_after import Difference
 
 SAME = "0"
 """Change of a number that stays the same."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What visitors give the page's controls, as it is received."""
+"""Reads the values that visitors give the page's controls."""
 
 from collections.abc import Callable
 from typing import Any

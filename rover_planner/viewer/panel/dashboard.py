@@ -10,7 +10,7 @@ from rover_planner.viewer.live.live_state import TopicAge
 from rover_planner.viewer.panel.board import BoardNotes, draw_board, draw_legend
 from rover_planner.viewer.state.colours import NOTICE, PASSABLE, REFUSED, UNKNOWN, to_css
 from rover_planner.viewer.state.context import POLICY_TITLES
-from rover_planner.viewer.state.reasons.failure import Failure
+from rover_planner.viewer.state.failure import Failure
 from rover_planner.viewer.state.scenario import PolicyVerdict
 from rover_planner.viewer.state.trajectory import RoverState
 

@@ -10,8 +10,8 @@ from rover_physics.rover.model import Rover
 from rover_planner.viewer.panel.board import BoardNotes
 from rover_planner.viewer.panel.controls import on_slider_input
 from rover_planner.viewer.panel.dashboard import draw_dashboard, draw_empty_dashboard
+from rover_planner.viewer.state.failure import Failure
 from rover_planner.viewer.state.playback import SPEEDS, Playback
-from rover_planner.viewer.state.reasons.failure import Failure
 from rover_planner.viewer.state.trajectory import RoverState, Trajectory
 from rover_planner.viewer.state.visitor_requests import Action, VisitorRequests
 
@@ -30,7 +30,7 @@ class PlaybackControls:
         """Add the controls to the open tab `tab`."""
         self._gui, self._tab, self._playback, self._requests = gui, tab, playback, requests
         self.outdated = True
-        """Whether the playback has moved to a time that is not drawn yet."""
+        """True if the playback has moved to a time that is not drawn yet."""
         self._times = np.zeros(1)
         self._failure_at: float | None = None
         self._held_until: float | None = None

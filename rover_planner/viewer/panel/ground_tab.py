@@ -23,7 +23,7 @@ POLICIES = {
 
 @dataclass(frozen=True)
 class GroundActions:
-    """What the controls of the tab do."""
+    """Actions of the controls of the tab."""
 
     recolour: Action
     """Colours the ground again."""
@@ -107,7 +107,7 @@ class GroundTab:
 
     @property
     def click_sets(self) -> str:
-        """What a click sets, "goal" or "start"."""
+        """The end of the path that a click sets, "goal" or "start"."""
         return str(self._clicks.value)
 
     @property
@@ -122,12 +122,12 @@ class GroundTab:
 
     @property
     def is_predicted(self) -> bool:
-        """Whether the layer is predicted for the rover."""
+        """True if the layer is predicted for the rover."""
         return not self.is_surveyed and LAYERS[self.layer].is_predicted
 
     @property
     def is_surveyed(self) -> bool:
-        """Whether the layer is one of a survey."""
+        """True if the layer is one of a survey."""
         return self.layer in self._surveyed
 
     @property
@@ -137,7 +137,7 @@ class GroundTab:
 
     @property
     def is_along_path(self) -> bool:
-        """Whether predicted layers are for the heading of the shown path."""
+        """True if predicted layers are for the heading of the shown path."""
         return bool(self._along.value)
 
     def show_legend(self, legend: str) -> None:

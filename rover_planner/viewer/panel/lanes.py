@@ -11,7 +11,7 @@ import numpy as np
 from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_planner.viewer.state.colours import LOAD, MIDDLE, REFUSED, blend, to_css
-from rover_planner.viewer.state.reasons.path_limits import Lane, PathLimits
+from rover_planner.viewer.state.path_limits import Lane, PathLimits
 
 ROW_HEIGHT = 14
 """Height of a lane [px]."""

@@ -41,18 +41,18 @@ def draw_scale(name: str, scale: ColourScale) -> str:
 
 
 def draw_survey_legend(
-    name: str, told: str, meaning: ColouredGround, differences: Sequence[str]
+    name: str, description: str, meaning: ColouredGround, differences: Sequence[str]
 ) -> str:
     """Return the legend of a survey's layer as HTML.
 
     Args:
         name: Name of the layer.
-        told: What it is about.
+        description: What it is about.
         meaning: What its colours mean.
         differences: In what the survey differs from what the page shows.
     """
     parts = [_key(to_css(colour), text) for colour, text in meaning.keys]
-    parts.append(f'<div style="opacity:.75">{html.escape(told)}</div>')
+    parts.append(f'<div style="opacity:.75">{html.escape(description)}</div>')
     if differences:
         parts.append(
             f'<div id="survey-differs" style="border-left:5px solid {to_css(NOTICE)};'

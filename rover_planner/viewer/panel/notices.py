@@ -65,7 +65,7 @@ class ErrorNotice:
 
 
 class JudgingNotice:
-    """What is judged, with buttons; hidden while there is nothing to say, else in every tab."""
+    """Progress of the judging, with buttons, in every tab; hidden while there is none."""
 
     def __init__(self, gui: Any, cancel: Action, judge_again: Action):
         """Add the notice to the container that is open.

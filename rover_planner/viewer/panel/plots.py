@@ -30,16 +30,16 @@ WHITE = (255, 255, 255)
 
 @dataclass(frozen=True)
 class Plot:
-    """What one plot shows."""
+    """Description of one plot."""
 
     title: str
     """Its title, with the unit."""
     per_wheel: bool
-    """Whether it has a curve for each wheel."""
+    """True if it has a curve for each wheel."""
     max_value: float = np.inf
     """Larger values are cut off: a wheel that lifts off has infinite friction utilisation."""
     from_zero: bool = True
-    """Whether its axis begins at zero."""
+    """True if its axis begins at zero."""
 
 
 PLOTS = {

@@ -18,7 +18,7 @@ from rover_planner.studies.rover_values import (
 )
 from rover_planner.viewer.panel.changes import draw_changes
 from rover_planner.viewer.panel.controls import on_slider_input
-from rover_planner.viewer.state.reasons.before_after import Difference
+from rover_planner.viewer.state.before_after import Difference
 from rover_planner.viewer.state.visitor_requests import Action
 
 FULL_TURN = 3.15
@@ -28,12 +28,12 @@ VERDICT_HEIGHT = 104
 OPEN_FOLDERS = ("Ground and drive", "Links")
 """Folders of sliders that are open at first."""
 CHANGED = "\u25cf "
-"""What stands before the label of a number that differs from that of the loaded rover."""
+"""Prefix of the label of a number that differs from that of the loaded rover."""
 
 
 @dataclass(frozen=True)
 class RoverActions:
-    """What the controls of the tab do."""
+    """Actions of the controls of the tab."""
 
     load: Callable[[Callable[[], Rover]], None]
     """Shows the rover that a function reads."""

@@ -9,7 +9,7 @@ from rover_physics.names import WHEEL_POSITIONS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_planner.viewer.scene.local_frame import LocalFrame
-from rover_planner.viewer.state.reasons.failure import Failure
+from rover_planner.viewer.state.failure import Failure
 
 FIT, TOP, SIDE = "Fit", "Top", "Side"
 VIEWS = (FIT, TOP, SIDE)
@@ -29,7 +29,7 @@ class Cameras:
         """Move no camera yet."""
         self._server, self._frame = server, frame
         self.follows = False
-        """Whether the cameras go along with the rover."""
+        """True if the cameras go along with the rover."""
 
     def look(self, client: Any, view: str, rover: Rover, path: Floats, at: Floats) -> None:
         """Let a visitor's camera look at a path or at the rover on it.

@@ -21,7 +21,7 @@ OPACITY = 0.5
 """Opacity of the layer."""
 
 
-class ClosedArea:
+class ClosedAreaOverlay:
     """The area that a search found closed in: blue about the start, vermillion about the goal."""
 
     def __init__(self, scene: Any, frame: LocalFrame):
@@ -31,16 +31,16 @@ class ClosedArea:
         """The layer's node; None if nothing is drawn."""
         self._colour = UNKNOWN
 
-    def show(self, rover: Rover, terrain: Terrain, way: SearchResult | None) -> None:
+    def show(self, rover: Rover, terrain: Terrain, around: SearchResult | None) -> None:
         """Draw the area that a search found instead of what was drawn; None draws nothing."""
         if self.layer is not None:
             self.layer.remove()
             self.layer = None
-        if way is None or way.closed is None:
+        if around is None or around.closed is None:
             return
-        vertices, faces = cover_places(terrain, way.nodes, way.closed.places)
+        vertices, faces = cover_places(terrain, around.nodes, around.closed.places)
         if len(faces):
-            self._colour = REFUSED if way.closed.around_goal else PASSABLE
+            self._colour = REFUSED if around.closed.around_goal else PASSABLE
             self.layer = self._scene.add_mesh_simple(
                 "/closed", self._frame.to_scene(vertices), faces, color=self._colour,
                 opacity=OPACITY, flat_shading=False, side="double", cast_shadow=False,

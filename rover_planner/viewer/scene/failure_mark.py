@@ -20,7 +20,7 @@ from rover_planner.viewer.scene.rover_visual import (
     make_wheel,
 )
 from rover_planner.viewer.state.colours import BODY, CASING, METAL, REFUSED
-from rover_planner.viewer.state.reasons.failure import Failure
+from rover_planner.viewer.state.failure import Failure
 from rover_planner.viewer.state.trajectory import RoverState
 
 NAME, LABELS = "/failure", "/reasons"
@@ -47,12 +47,12 @@ class FailureMark:
         self._failure: Failure | None = None
         self._root: Any = None
         self._nodes: list[Any] = []
-        """What belongs to one failure; the ghost stays for the next one."""
+        """Scene nodes of one failure; the ghost stays for the next one."""
         self._ghost: RoverVisual | None = None
         self._arrows: ForceArrows | None = None
         self._near = 0.0
         self._is_alone = True
-        """Whether the played rover is elsewhere."""
+        """True if the played rover is elsewhere."""
         self._between_shown = True
         self._between: list[Any] = []
         self._forces_shown = True

@@ -48,7 +48,7 @@ class ForceArrows:
 
     @property
     def visible(self) -> bool:
-        """Whether the arrows are shown."""
+        """True if the arrows are shown."""
         return bool(self._normal.visible)
 
     @visible.setter

@@ -50,7 +50,7 @@ class GroundMesh:
     mesh: trimesh.Trimesh
     """The surface with its texture."""
     scale: ColourScale
-    """What its colours mean."""
+    """The values of its colours."""
 
 
 def build_ground_mesh(

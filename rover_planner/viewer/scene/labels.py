@@ -19,7 +19,7 @@ class Label:
     size: float = 1.0
     """Size of its letters, 1 for 12 px."""
     stands: bool = True
-    """Whether it stands on its place; else its middle is there."""
+    """True if it stands on its place; else its middle is there."""
 
 
 class Labels:

@@ -8,7 +8,7 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_rpy
 from rover_physics.rover.model import Rover
 from rover_planner.viewer.scene.rover_visual import on_side
-from rover_planner.viewer.state.reasons.failure import BODY
+from rover_planner.viewer.state.failure import BODY
 from rover_planner.viewer.state.trajectory import RoverState, find_axles
 
 CORNERS = 32

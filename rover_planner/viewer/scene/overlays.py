@@ -14,8 +14,8 @@ from rover_planner.planning.path_query import Candidate
 from rover_planner.viewer.scene.labels import Label, Labels
 from rover_planner.viewer.scene.local_frame import LocalFrame
 from rover_planner.viewer.scene.ribbons import Ribbon, Strand
+from rover_planner.viewer.state.candidate_rows import place_numbers
 from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN, Colour, blend
-from rover_planner.viewer.state.reasons.candidate_rows import place_numbers
 
 MAX_POINTS = 250
 """Most points of a path that are drawn."""
@@ -28,7 +28,7 @@ CROSS = 0.7
 """Half the width of the cross where a path is refused [wheel radii]."""
 WIDE, NARROW = 0.5, 0.22
 """Widths of the shown path and of the others [wheel radii]."""
-NUMBERS, FLAGS = "/numbers", "/flags"
+NUMBER_LABELS, FLAGS = "/numbers", "/flags"
 """Groups of labels."""
 NUMBER_HEIGHT = 1.5
 """Height of a path's number above the ground [wheel radii]."""
@@ -91,7 +91,7 @@ class PathOverlay:
             self._draw_flags(terrain, {"goal": plan[-1]}, rover.wheel.radius)
         else:
             self._labels.show(FLAGS, {})
-        self._labels.show(NUMBERS, {})
+        self._labels.show(NUMBER_LABELS, {})
 
     def find_number(self, origin: Floats, direction: Floats) -> int | None:
         """Return the index of the path whose number a ray (3,) of the scene hits; None for none.
@@ -188,7 +188,7 @@ class PathOverlay:
             )
             for index, place in self._numbers.items()
         }
-        self._labels.show(NUMBERS, labels)
+        self._labels.show(NUMBER_LABELS, labels)
 
     def _draw_flags(self, terrain: Terrain, flags: Mapping[str, Floats], radius: float) -> None:
         """Draw poles of six wheel radii [m] with names at poses (3,)."""

@@ -52,7 +52,7 @@ class Ribbon:
         """Draw nothing yet; the nodes will have names that begin with `name`."""
         self._scene, self.name = scene, name
         self.strands: tuple[Strand, ...] = ()
-        """What is drawn, in its own colours."""
+        """The drawn strands, in their own colours."""
         self._paint: Colour | None = None
         self._core: Any = None
         self._band: Any = None

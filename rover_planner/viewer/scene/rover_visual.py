@@ -116,7 +116,7 @@ class RoverVisual:
 
     @property
     def visible(self) -> bool:
-        """Whether the rover is shown."""
+        """True if the rover is shown."""
         return bool(self._root.visible)
 
     @visible.setter

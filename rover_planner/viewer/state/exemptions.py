@@ -7,7 +7,7 @@ from rover_physics.limits.table import LIMITS
 from rover_physics.names import SERVO, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_prediction import PathPrediction
-from rover_planner.viewer.state.reasons.path_limits import AskedPoses, merge_poses
+from rover_planner.viewer.state.path_limits import AskedPoses, merge_poses
 
 MAX_PLACES = 3
 """Most places that are named in a sentence."""
@@ -26,7 +26,7 @@ def describe_exemptions(prediction: PathPrediction, waypoints: int) -> tuple[str
     rows = merge_poses(prediction.cut(waypoints))
     next_waypoint = prediction.distance[rows.prediction.waypoint]
     largest = "" if prediction.policy == SERVO else _describe_largest(rows, next_waypoint)
-    return tuple(filter(None, (largest, _describe_falls(rows, next_waypoint))))
+    return tuple(filter(None, (largest, _describe_edges(rows, next_waypoint))))
 
 
 def _describe_largest(rows: AskedPoses, on_the_way_to: Floats) -> str:
@@ -46,7 +46,7 @@ def _describe_largest(rows: AskedPoses, on_the_way_to: Floats) -> str:
     )
 
 
-def _describe_falls(rows: AskedPoses, on_the_way_to: Floats) -> str:
+def _describe_edges(rows: AskedPoses, on_the_way_to: Floats) -> str:
     """Return where wheels roll off edges, and which limits are not asked there."""
     found: dict[str, list[float]] = {}
     for row, wheel in np.argwhere(rows.prediction.falling).tolist():
@@ -60,7 +60,7 @@ def _describe_falls(rows: AskedPoses, on_the_way_to: Floats) -> str:
         return ""
     limits = [
         code.replace("_", " ")
-        for code in dict.fromkeys(row.code for row in LIMITS if row.rests_in_a_fall)
+        for code in dict.fromkeys(row.code for row in LIMITS if row.exempt_on_edge)
     ]
     shown = "; ".join(
         f"{' and '.join(sorted(names))} {place}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Judges a scenario step by step: the shown path or all candidates, policies, a way around."""
+"""Judges a scenario step by step: the shown path or all candidates, policies, a path around."""
 
 import time
 from collections.abc import Generator, Iterator, Sequence
@@ -24,7 +24,7 @@ from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.scenario import PolicyVerdict, Scenario, Shown
 from rover_planner.viewer.state.trajectory import Trajectory
 
-PATH, POLICY, WAY = "judging path", "judging policy", "searching a way"
+PATH, POLICY, SEARCH = "judging path", "judging policy", "searching a way"
 BETTER = "way found, searching a better one"
 """Names of steps."""
 
@@ -65,8 +65,8 @@ def judge_request(request: JudgeRequest, memory: EdgeMemory | None = None) -> It
     if judged.scenario.recorded is not None:
         return
     judged = yield from _add_policies(judged)
-    if judged.needs_way:
-        yield from _search_ways(judged, memory or EdgeMemory())
+    if judged.needs_search:
+        yield from _search_around(judged, memory or EdgeMemory())
 
 
 def show_recorded(scenario: Scenario, prediction: PathPrediction, reasons: Sequence[str]) -> Shown:
@@ -117,7 +117,7 @@ def _judge_one(request: JudgeRequest) -> Generator[Step, None, Shown]:
         summary = f"path of {candidate.length:.1f} m judged again in {_milliseconds(began)}"
     old = before.by_policy if index == before.index else ()
     shown = _show(scenario, before.answer, index, summary, candidate, old)
-    return replace(shown, answered=before.answered, way=before.way)
+    return replace(shown, answered=before.answered, around=before.around)
 
 
 def _show(
@@ -165,17 +165,17 @@ def _add_policies(shown: Shown) -> Generator[Step, None, Shown]:
     return shown
 
 
-def _search_ways(shown: Shown, memory: EdgeMemory) -> Iterator[Step]:
+def _search_around(shown: Shown, memory: EdgeMemory) -> Iterator[Step]:
     """Yield what is shown with the first path around obstacles, and with a better one if there is.
 
     Without one, what is shown has the reason.
     """
-    yield Progress(WAY, 1, 1)
+    yield Progress(SEARCH, 1, 1)
     asked = shown.scenario
     ends = asked.start, asked.goal
     question = SearchQuery(asked.rover, asked.terrain, *ends, asked.asked_options)
     first = find_path(question, replace(asked.search, ends_at_first=True), memory)
-    yield from _add_way(shown, first)
+    yield from _add_found_path(shown, first)
     left = asked.search.budget - first.seconds
     if first.path is None or left <= 0.0:
         return
@@ -183,29 +183,29 @@ def _search_ways(shown: Shown, memory: EdgeMemory) -> Iterator[Step]:
     better = find_path(question, replace(asked.search, budget=left), memory)
     if better.cost < first.cost:
         seconds = first.seconds + better.seconds
-        yield from _add_way(shown, replace(better, seconds=seconds))
+        yield from _add_found_path(shown, replace(better, seconds=seconds))
 
 
-def _add_way(shown: Shown, way: SearchResult) -> Iterator[Step]:
-    """Yield what is shown with a way as one more candidate, or with why there is none.
+def _add_found_path(shown: Shown, around: SearchResult) -> Iterator[Step]:
+    """Yield what is shown with a path as one more candidate, or with why there is none.
 
-    The way is shown unless a visitor has chosen another path than the best.
+    The path is shown unless a visitor has chosen another path than the best.
     """
-    answer, path = shown.answer, way.path
+    answer, path = shown.answer, around.path
     if path is None:
-        yield replace(shown, way=way)
+        yield replace(shown, around=around)
         return
     candidates = (*answer.candidates, path)
     last = len(candidates) - 1
     longer = PathAnswer(candidates, last, last)
     if shown.index != answer.nearest:
-        yield replace(shown, answer=longer, way=way)
+        yield replace(shown, answer=longer, around=around)
         return
-    found = f"way of {path.length:.1f} m around, found in {way.seconds:.1f} s"
+    found = f"way of {path.length:.1f} m around, found in {around.seconds:.1f} s"
     summary = f"none of {last} candidate paths passable; {found}"
-    with_way = replace(_show(shown.scenario, longer, last, summary), way=way)
-    yield with_way
-    yield from _add_policies(with_way)
+    with_path = replace(_show(shown.scenario, longer, last, summary), around=around)
+    yield with_path
+    yield from _add_policies(with_path)
 
 
 def _judge_under(policy: str, scenario: Scenario, candidate: Candidate) -> PolicyVerdict:

@@ -89,7 +89,7 @@ class Shown:
     """Sentence on what was judged and for how long; empty for a recorded path."""
     by_policy: tuple[PolicyVerdict, ...] = ()
     """Its verdicts under all torque policies; empty for a replay, whose soil is not known."""
-    way: SearchResult | None = None
+    around: SearchResult | None = None
     """The finding of a search around obstacles for `answered`; None if none was made."""
 
     @property
@@ -99,21 +99,21 @@ class Shown:
 
     @property
     def reason(self) -> str:
-        """The reason of a refusal, and before it why there is no way; empty if the path passes."""
+        """The reason of a refusal, after why no path was found; empty if the path passes."""
         reason = self.verdict.reason
         is_old = self.answered is not self.scenario
-        if not reason or is_old or self.way is None or self.way.path is not None:
+        if not reason or is_old or self.around is None or self.around.path is not None:
             return reason
-        return f"{self.way.reason}; the shown path: {reason}"
+        return f"{self.around.reason}; the shown path: {reason}"
 
     @property
-    def needs_way(self) -> bool:
-        """True if all candidates are refused, and no way around obstacles was searched yet."""
+    def needs_search(self) -> bool:
+        """True if all candidates are refused, and no search around obstacles was made yet."""
         asked = self.scenario
         return (
             asked.recorded is None
             and self.answered is asked
-            and self.way is None
+            and self.around is None
             and not self.answer.traversable
             and all(asked.terrain.contains(*end[:2]) for end in (asked.start, asked.goal))
         )

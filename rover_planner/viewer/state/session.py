@@ -46,7 +46,7 @@ class ViewSession:
         options: PathQueryOptions | None = None,
         search: LatticeSettings | None = None,
     ):
-        """Plan from start to goal; no way around obstacles is searched yet.
+        """Plan from start to goal; no path around obstacles is searched yet.
 
         Args:
             rover: The rover.
@@ -54,7 +54,7 @@ class ViewSession:
             start: x, y [m] and yaw [rad], map frame.
             goal: The same.
             options: How candidates are made and judged (default: 5 candidates, 0.5 m apart).
-            search: How ways around obstacles are searched (default: for 2 s).
+            search: Settings of searches around obstacles (default: for 2 s).
 
         Raises:
             RoverError, PlanningError: The rover, the poses or the options are invalid.
@@ -215,11 +215,11 @@ class ViewSession:
         now, before = self.shown, request.before
         if (
             before is not None
-            and shown.way is before.way
+            and shown.around is before.around
             and request.scenario.has_paths_of(now.answered)
             and shown.index < len(now.answer.candidates)
         ):
-            shown = replace(shown, answer=now.answer, answered=now.answered, way=now.way)
+            shown = replace(shown, answer=now.answer, answered=now.answered, around=now.around)
         self.shown = shown
         if request is self._asked:
             self._index = shown.index
@@ -232,13 +232,13 @@ class ViewSession:
     # In the background.
 
     def judge_in_background(self, wake: Callable[[], object]) -> None:
-        """Judge in a thread from now on, until `close`; begin with the way that is not searched.
+        """Judge in a thread from now on, until `close`; begin with the search that was not made.
 
         Args:
             wake: Called in that thread when there is something to take with `take_finished`.
         """
         self._background = BackgroundWork(self._judge, wake, "judge")
-        if self.shown.needs_way:
+        if self.shown.needs_search:
             self._ask(self.wanted, self._index)
 
     @property

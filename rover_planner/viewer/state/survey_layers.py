@@ -88,19 +88,21 @@ class ShownSurvey:
 
     def find_differences(self, rover: Rover, options: SweepOptions) -> tuple[str, ...]:
         """Return in what the survey differs from a rover and options that are shown."""
-        told = self._store.notes.description
+        recorded = self._store.notes.description
         found = []
-        if told["rover"] != _as_json(asdict(rover)):
+        if recorded["rover"] != _as_json(asdict(rover)):
             found.append("the rover was changed since")
         shown = _as_json(asdict(options))
-        policies = told["options"]["policy"], options.policy
-        for key, value in told["options"].items():
+        policies = recorded["options"]["policy"], options.policy
+        for key, value in recorded["options"].items():
             other = shown.get(key)
             if key == "control_margin" and OPTIMAL not in policies:
                 continue
             if (value or None) != (other or None):  # no joint angles are () or None
                 name = OPTION_NAMES.get(key, key.replace("_", " "))
-                found.append(f"{name} {_say(value)} in the survey, {_say(other)} here")
+                found.append(
+                    f"{name} {_write_value(value)} in the survey, {_write_value(other)} here"
+                )
         return tuple(found)
 
     def describe(self, name: str) -> str:
@@ -153,14 +155,14 @@ def open_survey(path: Path, rover: Rover, terrain: Terrain | None) -> ShownSurve
         PlanningError: It is no survey, or one of another rover or map.
     """
     store = SurveyStore(path)
-    told = store.notes.description
-    if told["rover"] != _as_json(asdict(rover)):
-        other = told["rover"]["name"]
+    recorded = store.notes.description
+    if recorded["rover"] != _as_json(asdict(rover)):
+        other = recorded["rover"]["name"]
         what = "another " + rover.name if other == rover.name else f"{other}, not {rover.name}"
         raise PlanningError(
             f"{show_file(path)} is a survey of {what}; name the rover that was surveyed"
         )
-    if terrain is not None and told["map"] != fingerprint(terrain):
+    if terrain is not None and recorded["map"] != fingerprint(terrain):
         raise PlanningError(
             f"{show_file(path)} is a survey of another map, or of one with other gaps; give the "
             "map and the --max-gap that were surveyed (default 0), or leave TERRAIN out"
@@ -219,7 +221,7 @@ def _as_json(value: Any) -> Any:
     return json.loads(json.dumps(value))
 
 
-def _say(value: Any) -> str:
+def _write_value(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:g}"
     return "as default" if value is None else f"{value!s:.40}"

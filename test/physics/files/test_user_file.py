@@ -10,7 +10,6 @@ from rover_physics.errors import RoverError, RoverFileError
 from rover_physics.files.user_file import read_regular_file, write_file
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import load_terrain
-from rover_physics.terrain.soil_file import load_soils
 from rover_planner.command.prediction_files import read_poses, read_prediction
 from rover_planner.errors import PlanningError
 from rover_planner.studies.study_file import load_study
@@ -24,7 +23,7 @@ KINDS = {
     "loop": "Too many levels of symbolic links",
     "dangling": "No such file",
 }
-READERS = (load_rover, load_soils, load_study, load_terrain, read_poses, read_prediction)
+READERS = (load_rover, load_study, load_terrain, read_poses, read_prediction)
 
 
 @pytest.fixture

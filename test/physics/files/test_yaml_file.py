@@ -9,7 +9,6 @@ from rover_physics.errors import RoverError, RoverFileError
 from rover_physics.files.config_files import find_config
 from rover_physics.files.yaml_file import parse_yaml
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.soil_file import load_soils
 
 PRESET = find_config("rovers/lsr1.yaml").read_text(encoding="utf-8")
 HOSTILE = [
@@ -48,13 +47,12 @@ PLACES = {
     "key": PRESET.replace("belly: {z: -0.06,", "belly: {z: -0.06, ? %s : 1,"),
     "file": "%s",
 }
-SOILS = ("? %s\n: 3", "dune: %s")
 
 
 @pytest.mark.parametrize("value", HOSTILE, ids=lambda value: value[:20])
 def test_a_hostile_value_ends_in_one_short_line_wherever_it_stands(tmp_path, value):
     cases = [(form, load_rover) for form in PLACES.values()]
-    for form, load in cases + [(form, load_soils) for form in SOILS]:
+    for form, load in cases:
         assert "%s" in form
         text = error_of(tmp_path, form.replace("%s", value), load)
         assert len(text) <= 300

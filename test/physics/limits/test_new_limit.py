@@ -23,7 +23,7 @@ from rover_physics.traversability.pose_classes import (
 from rover_planner.survey.layers import NO_LIMIT, number_limits
 from rover_planner.survey.request import SurveyRequest
 from rover_planner.survey.tile_survey import survey_tile
-from rover_planner.viewer.state.reasons.path_limits import find_path_limits
+from rover_planner.viewer.state.path_limits import find_path_limits
 from support.grounds import make_terrain, waves
 
 HEAVIEST = Limit(

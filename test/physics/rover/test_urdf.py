@@ -22,7 +22,7 @@ from rover_physics.rover.rover_file import (
 )
 from rover_physics.rover.urdf.joint_map import map_of
 from rover_physics.rover.urdf.read_rover import Levelling, rover_from_urdf
-from rover_physics.rover.urdf.robot import Tree, parse_robot, read_robot
+from rover_physics.rover.urdf.robot import JointTree, parse_robot, read_robot
 from rover_physics.rover.urdf.write_urdf import write_urdf
 
 
@@ -302,7 +302,7 @@ def test_xacro_and_circles_are_refused():
     links = b'<link name="a"/><link name="b"/><link name="c"/>'
     robot = parse_robot(b"<robot>" + links + circle + b"</robot>")
     with pytest.raises(RoverFileError, match="hangs on itself"):
-        Tree(robot, {}, np.eye(4))
+        JointTree(robot, {}, np.eye(4))
 
 
 def test_a_file_of_many_links_is_refused_at_once():

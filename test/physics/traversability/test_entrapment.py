@@ -202,11 +202,11 @@ def test_poses_close_together_before_an_edge_do_not_take_the_time_and_the_memory
 def test_ways_of_speed_servos_are_judged_by_their_own_tractions():
     """On fixed wheels, servos turn less than the way asks; equal tractions balance there."""
     fixed = replace(LSR1, steering=None)
-    _, curve, _ = trap._ways_ahead(np.zeros(3), 0.8, np.linspace(0.0, 1.2, 61), 1.0)
+    _, curve, _ = trap._paths_ahead(np.zeros(3), 0.8, np.linspace(0.0, 1.2, 61), 1.0)
     on_servos, level = SweepOptions(policy="servo"), edge(0.0)
     assert judge_path(fixed, level, curve)[1].traversable
     assert not judge_path(fixed, level, curve, on_servos)[1].traversable
-    assert not trap._judge_way(pack_model(fixed, level, on_servos), curve).traversable
+    assert not trap._judge_escape(pack_model(fixed, level, on_servos), curve).traversable
 
 
 @pytest.mark.parametrize("slope, checked", [(0.0, False), (-0.3, False), (-0.55, True)])
@@ -214,7 +214,7 @@ def test_the_way_back_of_speed_servos_is_checked_where_they_pull_hard(slope, che
     ground = Terrain(slope * X, RESOLUTION, (-3.0, -3.0))
     options = SweepOptions(policy="servo", friction=0.6)
     prediction = judge_path(LSR1, ground, way(-0.3, 0.3), options)[0]
-    assert trap.find_one_way(pack_model(LSR1, ground, options), prediction).any() == checked
+    assert trap.find_irreversible(pack_model(LSR1, ground, options), prediction).any() == checked
 
 
 @pytest.mark.parametrize("spacing", [0.03, 0.01 + 1e-12, 0.01 - 1e-12])
@@ -223,6 +223,6 @@ def test_ways_on_end_at_the_same_place_whatever_the_spacing(spacing):
     path[:, 0] = spacing * np.arange(40)
     steps = trap.count_steps(path, 1.2)
     ahead = np.linspace(0.0, 1.2, steps + 1)
-    ends = [way[-1] for way in trap._ways_ahead(path[0], 0.8, ahead, 1.0)]
+    ends = [ahead_path[-1] for ahead_path in trap._paths_ahead(path[0], 0.8, ahead, 1.0)]
     assert ends[0] == pytest.approx([1.2, 0.0, 0.0], abs=1e-12)
     assert 1.2 / steps <= spacing * (1.0 + 1e-6)

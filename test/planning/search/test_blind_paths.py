@@ -8,8 +8,8 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.maps.unobserved_ground import (
     ALLOW_FOOTPRINT,
     ASSUMED,
-    CODE,
     REFUSE,
+    UNOBSERVED_CODE,
     ObservedGround,
     observed_ground,
 )
@@ -17,12 +17,12 @@ from rover_planner.parameters.traverse_server import LATTICE, TraverseServerPara
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.planning.search.blind_check import BlindCheck
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import START_REFUSED, find_path
 from rover_planner.planning.search.primitives import Gear, Piece
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+from rover_planner.planning.search.unobserved_check import UnobservedCheck
 
 LSR1 = load_rover("lsr1")
 OPTIONS = PathQueryOptions(waypoint_spacing=0.04).change(control_margin=0.0)
@@ -39,7 +39,7 @@ def flat_with_hole() -> Terrain:
 
 def ask(rule: str, seen: ObservedGround | None = None, start=START) -> SearchQuery:
     ground = flat_with_hole()
-    check = BlindCheck(LSR1, seen or observed_ground(ground, None), rule)
+    check = UnobservedCheck(LSR1, seen or observed_ground(ground, None), rule)
     return SearchQuery(LSR1, ground, start, GOAL, OPTIONS, check)
 
 
@@ -58,21 +58,21 @@ def test_a_search_leads_around_what_the_rule_refuses():
     poses = judged.candidate.poses
     assert np.abs(poses[:, 1]).max() > 0.2
     share = observed_ground(flat_with_hole(), None).share(LSR1, poses)
-    assert share.blind_share == 0.0 and share.first_refused(rule) == -1
+    assert share.unobserved_share == 0.0 and share.first_refused(rule) == -1
 
 
 def test_pieces_and_single_poses_are_refused_by_the_rule_as_paths_are():
     question = ask(REFUSE)
-    judge = PathJudge(LSR1, question.terrain, OPTIONS, blind=question.blind)
+    judge = PathJudge(LSR1, question.terrain, OPTIONS, unobserved_check=question.unobserved_check)
     straight = np.zeros((40, 3))
     straight[:, 0] = np.linspace(0.0, 1.5, 40)
     aside = straight + np.array([0.0, 1.0, 0.0])
     pieces = [Piece(poses, Gear.FORWARD) for poses in (straight, aside)]
     over, beside = judge.judge_pieces(pieces)
-    assert (over.code, over.cost) == (CODE, np.inf) and beside.code == ""
+    assert (over.code, over.cost) == (UNOBSERVED_CODE, np.inf) and beside.code == ""
     codes = judge.stand(np.array([(1.5, 0.0, 0.0), (1.5, 1.0, 0.0), (-0.9, 1.0, 0.0)]))
-    assert codes == (CODE, "", "off_map")
-    assert judge.check(straight).verdict.code == CODE
+    assert codes == (UNOBSERVED_CODE, "", "off_map")
+    assert judge.check(straight).verdict.code == UNOBSERVED_CODE
     assert judge.check(aside).verdict.traversable
 
 

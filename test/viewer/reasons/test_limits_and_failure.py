@@ -9,14 +9,14 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.viewer.state.reasons.before_after import (
+from rover_planner.viewer.state.before_after import (
     ChangeHistory,
     compare_drives,
     list_changes,
 )
-from rover_planner.viewer.state.reasons.candidate_rows import list_candidates, place_numbers
-from rover_planner.viewer.state.reasons.failure import explain
-from rover_planner.viewer.state.reasons.path_limits import find_worst
+from rover_planner.viewer.state.candidate_rows import list_candidates, place_numbers
+from rover_planner.viewer.state.failure import explain
+from rover_planner.viewer.state.path_limits import find_worst
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import gap, make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, ramp, session_on

@@ -19,6 +19,8 @@ from rover_planner.viewer.panel.plots import (
     choose_rows,
 )
 from rover_planner.viewer.state import colours
+from rover_planner.viewer.state.before_after import Difference
+from rover_planner.viewer.state.candidate_rows import list_candidates
 from rover_planner.viewer.state.colours import (
     MIN_CONTRAST,
     blend,
@@ -26,11 +28,9 @@ from rover_planner.viewer.state.colours import (
     find_contrast,
     map_colours,
 )
+from rover_planner.viewer.state.failure import explain
 from rover_planner.viewer.state.layers import LAYERS, predict_layer
-from rover_planner.viewer.state.reasons.before_after import Difference
-from rover_planner.viewer.state.reasons.candidate_rows import list_candidates
-from rover_planner.viewer.state.reasons.failure import explain
-from rover_planner.viewer.state.reasons.path_limits import find_worst
+from rover_planner.viewer.state.path_limits import find_worst
 from rover_planner.viewer.state.survey_layers import list_class_colours, list_limit_colours
 from support.grounds import make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, ramp, session_on

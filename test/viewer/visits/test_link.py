@@ -10,7 +10,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import read_rover, write_rover
 from rover_planner.viewer.browser.link import (
-    Link,
+    PageLink,
     change_values,
     list_changed_values,
     pack_text,
@@ -19,7 +19,7 @@ from rover_planner.viewer.browser.link import (
 )
 from support.viewer.sessions import FAR
 
-LINK = Link(
+LINK = PageLink(
     rover="lsr1",
     ground="00ab12cd",
     start=(FAR[0] - 1.25, FAR[1], -0.1),

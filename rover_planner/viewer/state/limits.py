@@ -17,7 +17,7 @@ MAX_DIGITS = 6
 
 
 @dataclass(frozen=True)
-class Limit:
+class ShownLimit:
     """One limit of a rover; its numbers are in the unit that people read."""
 
     code: str
@@ -58,22 +58,22 @@ class Limit:
         return f"{self.title} {shown} {word} {bound} {self.unit.name}".strip()
 
 
-def list_limits(rover: Rover, prediction: PathPrediction) -> dict[str, Limit]:
+def list_limits(rover: Rover, prediction: PathPrediction) -> dict[str, ShownLimit]:
     """Return the limits by code for a prediction, in the order in which they become reasons.
 
     Those of friction and torque are less the control margin. Sinkage is left out where nothing
     sinks. Rows of the table with one code are one limit, which is a number if it is one row's.
     """
     asked = limits_of(rover, prediction.policy)
-    found: dict[str, Limit] = {}
+    found: dict[str, ShownLimit] = {}
     for row, bound in zip(asked.rows, asked.bounds, strict=True):
         if row.code == "sinkage" and not np.any(prediction.sinkage > 0.0):
             continue
         if row.code in found or row.sense == Sense.RANGE:
-            found[row.code] = Limit(row.code, row.title)
+            found[row.code] = ShownLimit(row.code, row.title)
             continue
         unit = row.shown or row.unit
         bound *= unit.factor * (1.0 - prediction.control_margin if row.keeps_margin else 1.0)
         is_lowest = row.sense in (Sense.LEAST, Sense.SHARE)
-        found[row.code] = Limit(row.code, row.title, bound, unit, is_lowest)
-    return {GROUND: Limit(GROUND, "ground"), **found}
+        found[row.code] = ShownLimit(row.code, row.title, bound, unit, is_lowest)
+    return {GROUND: ShownLimit(GROUND, "ground"), **found}

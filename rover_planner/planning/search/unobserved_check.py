@@ -11,8 +11,8 @@ from rover_physics.rover.model import Rover
 from rover_physics.traversability.verdict import with_refusals
 from rover_planner.maps.unobserved_ground import (
     ALLOW,
-    CODE,
     REFUSE,
+    UNOBSERVED_CODE,
     ObservedGround,
     UnobservedShare,
 )
@@ -22,13 +22,13 @@ _REFUSED_COST = (float("inf"), float("inf"))
 
 
 @dataclass(frozen=True, eq=False)
-class BlindCheck:
+class UnobservedCheck:
     """Holds paths of one rover against what was seen of one map."""
 
     rover: Rover
     """The rover."""
     seen: ObservedGround
-    """What was seen of the map."""
+    """The seen part of the map."""
     rule: str
     """One of UNOBSERVED_GROUND."""
 
@@ -44,9 +44,9 @@ class BlindCheck:
         first = share.first_refused(self.rule)
         if first < 0:
             return candidate
-        counted = share.blind_share - (0.0 if self.rule == REFUSE else share.footprint_share)
+        counted = share.unobserved_share - (0.0 if self.rule == REFUSE else share.footprint_share)
         codes, reasons = [""] * len(candidate.poses), [""] * len(candidate.poses)
-        codes[first] = CODE
+        codes[first] = UNOBSERVED_CODE
         reasons[first] = (
             f"ground under the belly that was never seen: {100.0 * counted:.1f} % of that along "
             f"the path {self._name_rule()}"
@@ -86,8 +86,8 @@ class BlindCheck:
 
 
 def physical(candidate: Candidate) -> Candidate:
-    """Return a path as the model judged it, without a refusal by `BlindCheck.hold`."""
-    if CODE not in candidate.verdict.codes:
+    """Return a path as the model judged it, without a refusal by `UnobservedCheck.hold`."""
+    if UNOBSERVED_CODE not in candidate.verdict.codes:
         return candidate
     none = [""] * len(candidate.poses)
     return replace(candidate, verdict=with_refusals(candidate.verdict, none, none))

@@ -11,8 +11,8 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.verdict import Verdict
-from rover_planner.viewer.state.reasons.limits import Limit
-from rover_planner.viewer.state.reasons.path_limits import AskedPoses, PathLimits, find_path_limits
+from rover_planner.viewer.state.limits import ShownLimit
+from rover_planner.viewer.state.path_limits import AskedPoses, PathLimits, find_path_limits
 from rover_planner.viewer.state.scenario import Shown
 from rover_planner.viewer.state.trajectory import RoverState, make_state, read_series
 
@@ -44,7 +44,7 @@ class Failure:
     """Code of the verdict."""
     reason: str
     """Reason of the verdict."""
-    limit: Limit
+    limit: ShownLimit
     """The broken limit."""
     value: float
     """The value that breaks it, in its unit; NaN if there is none."""

@@ -19,7 +19,7 @@ from rover_physics.results.uses import ABOVE, Uses, find_uses, limits_of
 from rover_physics.rover.model import Rover
 from rover_physics.traversability.classification import find_wheel
 from rover_physics.traversability.verdict import Verdict
-from rover_planner.viewer.state.reasons.limits import GROUND, Limit, list_limits
+from rover_planner.viewer.state.limits import GROUND, ShownLimit, list_limits
 
 NOT_ON_THE_BOARD = (GROUND, "suspension", "wheel_lift")
 """Codes of limits whose worst use the board does not list."""
@@ -44,7 +44,7 @@ class AskedPoses:
 class Lane:
     """One limit along the path; arrays (m,) as in `AskedPoses`."""
 
-    limit: Limit
+    limit: ShownLimit
     """The limit."""
     values: Floats
     """The value nearest to the limit, in the limit's unit; NaN for none."""
@@ -115,7 +115,7 @@ def find_path_limits(rover: Rover, prediction: PathPrediction, verdict: Verdict)
     rows = merge_poses(prediction)
     uses = find_uses(limits_of(rover, prediction.policy), rows.prediction.results)
     lanes = tuple(
-        _ground_lane(limit, rows) if code == GROUND else _lane(limit, rows, uses)
+        _make_ground_lane(limit, rows) if code == GROUND else _make_lane(limit, rows, uses)
         for code, limit in list_limits(rover, prediction).items()
     )
     found = PathLimits(rows, lanes)
@@ -166,14 +166,14 @@ def _places(poses: Floats, between: PathPrediction) -> Floats:
     return np.asarray(before + np.clip(part / np.maximum(whole, 1e-12), 1e-6, 1.0 - 1e-6))
 
 
-def _ground_lane(limit: Limit, rows: AskedPoses) -> Lane:
+def _make_ground_lane(limit: ShownLimit, rows: AskedPoses) -> Lane:
     """Return the lane of poses at which the rover cannot be judged at all."""
     m = len(rows.distance)
     used = np.where(rows.prediction.settled, 0.0, np.inf)
     return Lane(limit, np.full(m, np.nan), used, np.full(m, -1))
 
 
-def _lane(limit: Limit, rows: AskedPoses, uses: Uses) -> Lane:
+def _make_lane(limit: ShownLimit, rows: AskedPoses, uses: Uses) -> Lane:
     """Return the lane of a limit; of several rows of the table that which is used most counts."""
     prediction, every = rows.prediction, np.arange(len(rows.distance))
     of_limit = np.array([k for k, row in enumerate(uses.limits.rows) if row.code == limit.code])

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Searches ways between random poses on real and made maps: the tables of docs/performance.md.
+"""Searches paths between random poses on real and made maps: the tables of docs/performance.md.
 
-Run from the repository, on one core: taskset -c 0 python -m benchmarks.ways --count 100
+Run from the repository, on one core: taskset -c 0 python -m benchmarks.path_search --count 100
 """
 
 import time
@@ -45,7 +45,7 @@ SIDE, CHANGE = 1.0, 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class SearchCase:
     """A rover on a ground."""
 
     name: str
@@ -68,7 +68,7 @@ class Case:
         return PathJudge(self.rover, self.terrain, self.options)
 
     def question(self, pair: Pair, terrain: Terrain | None = None) -> SearchQuery:
-        """Return the question for a way between two poses."""
+        """Return the question for a path between two poses."""
         return SearchQuery(self.rover, terrain or self.terrain, *pair, self.options)
 
     def search(
@@ -78,7 +78,7 @@ class Case:
         memory: EdgeMemory | None = None,
         terrain: Terrain | None = None,
     ) -> SearchResult:
-        """Search a way; CPU time is its clock, so that other programs do not cut its budget."""
+        """Search a path; CPU time is its clock, so that other programs do not cut its budget."""
         with mock.patch("time.perf_counter", time.process_time):
             question, settings = self.question(pair, terrain), LatticeSettings(budget=budget)
             return find_path(question, settings, memory)
@@ -108,7 +108,7 @@ class Case:
             yield from poses[stands]
 
 
-def run_case(case: Case, asked: dict[str, Any]) -> Iterator[dict[str, Any]]:
+def run_case(case: SearchCase, asked: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield what is found of each pair of a ground.
 
     `asked` has the options of `main`: count, seed, budget, truth, truth_seconds and warm.
@@ -131,8 +131,8 @@ def run_case(case: Case, asked: dict[str, Any]) -> Iterator[dict[str, Any]]:
         yield row
 
 
-def try_pair(case: Case, pair: Pair, budget: float) -> dict[str, Any]:
-    """Search a way, judge it once more as `predict` does, and return what was found."""
+def try_pair(case: SearchCase, pair: Pair, budget: float) -> dict[str, Any]:
+    """Search a path, judge it once more as `predict` does, and return what was found."""
     answer = case.search(pair, budget)
     passes = None
     if answer.path is not None:
@@ -153,11 +153,11 @@ def try_pair(case: Case, pair: Pair, budget: float) -> dict[str, Any]:
     }
 
 
-def try_warm(case: Case, pair: Pair, budget: float, seed: int) -> SearchResult:
-    """Return the answer after a change of the map near a way.
+def try_warm(case: SearchCase, pair: Pair, budget: float, seed: int) -> SearchResult:
+    """Return the answer after a change of the map near a path.
 
-    The way is searched first, then heights in a square on it change, and it is searched again with
-    what is known. Without a first way, the square lies midway between start and goal.
+    The path is searched first, then heights in a square on it change, and it is searched again
+    with what is known. Without a first path, the square lies midway between start and goal.
     """
     memory = EdgeMemory()
     before = case.search(pair, budget, memory)
@@ -177,7 +177,7 @@ def change_heights(terrain: Terrain, middle: np.ndarray, seed: int) -> Terrain:
     return replace(terrain, elevation=terrain.elevation + height * shape)
 
 
-def tell(values: Sequence[float], digits: int = 2) -> str:
+def describe(values: Sequence[float], digits: int = 2) -> str:
     """Return the median and the 95th percentile of values as text."""
     known = [value for value in values if np.isfinite(value)]
     if not known:
@@ -191,17 +191,17 @@ def summarise(rows: Rows) -> Iterator[tuple[str, str]]:
     def column(name: str, rows: Rows = rows) -> list[Any]:
         return [row[name] for row in rows]
 
-    outcomes, ways = column("outcome"), [row for row in rows if row["outcome"] == FOUND]
-    far = [row for row in ways if row["distance"] > 12.0]
+    outcomes, found = column("outcome"), [row for row in rows if row["outcome"] == FOUND]
+    far = [row for row in found if row["distance"] > 12.0]
     yield "pairs", str(len(rows))
     yield "outcomes", ", ".join(f"{name} {outcomes.count(name)}" for name in sorted({*outcomes}))
-    yield "ways that judge_path passes", f"{sum(column('passes', ways))} of {len(ways)}"
-    yield "first way [s]: median; 95 %", tell(column("seconds_first", ways))
-    yield "first way beyond 12 m [s]", f"{tell(column('seconds_first', far))} ({len(far)})"
-    yield "whole search [s]", tell(column("seconds"))
-    yield "judged edges [%]: median; 95 %", tell([100 * v for v in column("judged_share")])
+    yield "paths that judge_path passes", f"{sum(column('passes', found))} of {len(found)}"
+    yield "first path [s]: median; 95 %", describe(column("seconds_first", found))
+    yield "first path beyond 12 m [s]", f"{describe(column('seconds_first', far))} ({len(far)})"
+    yield "whole search [s]", describe(column("seconds"))
+    yield "judged edges [%]: median; 95 %", describe([100 * v for v in column("judged_share")])
     yield "judged edges [%]: mean", f"{100 * np.mean(column('judged_share')):.3f}"
-    yield "bound: median; 95 %", tell(column("bound", ways))
+    yield "bound: median; 95 %", describe(column("bound", found))
     yield "not ended by the clock", f"{sum(column('repeatable'))} of {len(rows)}"
     known = [row for row in rows if not np.isnan(row.get("best", np.nan))]
     if known:
@@ -212,10 +212,10 @@ def summarise(rows: Rows) -> Iterator[tuple[str, str]]:
         yield "found of connected", f"{len(found)} of {len(connected)}"
         yield "found though not connected", str(beyond)
         over = [100.0 * (row["cost"] / row["best"] - 1.0) for row in found]
-        yield "cost over the best [%]", tell(over, 1)
+        yield "cost over the best [%]", describe(over, 1)
     warm = [row for row in rows if row.get("warm_outcome") == FOUND]
     if warm:
-        yield "warm: first way [s]", f"{tell(column('warm_first', warm))} ({len(warm)})"
+        yield "warm: first path [s]", f"{describe(column('warm_first', warm))} ({len(warm)})"
 
 
 def show(rows: Rows) -> None:
@@ -243,14 +243,14 @@ def main(
     warm: Annotated[int, typer.Option(help="Pairs asked again after a change of the map.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Write all rows as JSON.")] = None,
 ) -> None:
-    """Search ways between random poses and print what was found, in what time."""
+    """Search paths between random poses and print what was found, in what time."""
     asked, rows = dict(locals()), []
     made = {name: make_mars_terrain(**arguments) for name, arguments in MADE.items()}
     for name, terrain in {**real_maps(), **made}.items():
         if ground and not any(name.startswith(beginning) for beginning in ground):
             continue
         began = time.perf_counter()
-        for row in run_case(Case(name, load_rover(rover), terrain, policy), asked):
+        for row in run_case(SearchCase(name, load_rover(rover), terrain, policy), asked):
             rows.append(row)
             taken = time.perf_counter() - began
             console(stderr=True).print(f"{name} {len(rows)}, {taken:.0f} s", row)
