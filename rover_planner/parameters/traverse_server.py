@@ -94,7 +94,7 @@ class TraverseServerParameters(ParameterTable):
     )
     search_frontier: bool = parameter(
         False,
-        "Whether a goal beyond the known ground is answered with a way to near it.",
+        "Whether a goal beyond the known ground is answered with a path to near it.",
     )
     plan_spacing: float = parameter(
         0.1,
