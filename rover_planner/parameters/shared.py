@@ -42,14 +42,13 @@ BASE_OFFSET: tuple[float, ...] = parameter(
 JOINT_MAP: tuple[str, ...] = parameter(
     tuple(f"{name}:{name}" for name in SUSPENSION_JOINTS),
     "Names of the robot's joints: model_joint:robot_joint, then :-1 if it turns the other "
-    "way, then :offset, the model's angle in rad where the robot's is 0. Others have the "
-    "model's name.",
+    "way, then :offset, the model's angle in rad where the robot's is 0.",
     read_only=True,
 )
 STEERING_LIMIT: float = parameter(
     0.0,
-    "Largest angle that the steering joints reach; 0 takes that of the rover file. A rover "
-    "file that asks for more is refused.",
+    "Angle that the steering joints reach; a rover file that asks for more is refused. 0 takes "
+    "that of the rover file.",
     unit="rad",
     bounds=(0.0, 3.2),
 )
@@ -121,8 +120,8 @@ MAP_DURABILITY: str = parameter(
 )
 INPUT_RELIABILITY: str = parameter(
     RELIABLE,
-    "Reliability of the subscriptions to maps, paths and tool targets; best_effort also "
-    "hears best-effort publishers, and may lose messages.",
+    "Reliability of the subscriptions to maps, paths and tool targets; best_effort may lose "
+    "messages.",
     choices=RELIABILITIES,
     read_only=True,
 )

@@ -49,7 +49,7 @@ class TractionControllerParameters(ParameterTable):
     )
     rest_policy: str = parameter(
         HOLD,
-        "What the wheels do when the node does not drive: hold, brake or coast.",
+        "What the wheels do when the node does not drive.",
         choices=REST_POLICIES,
     )
     stall_time: float = parameter(
@@ -84,14 +84,13 @@ class TractionControllerParameters(ParameterTable):
     )
     stamp_tolerance: float = parameter(
         0.05,
-        "Time that a stamp may be ahead of the node's clock; messages further ahead are ignored.",
+        "Time that a stamp may be ahead of the node's clock; others are ignored.",
         unit="s",
         bounds=(0.0, 1.0),
     )
     watchdog_timeout: float = parameter(
         0.08,
-        "Time without an update after which the watchdog sends zero torques; at least two periods "
-        "of rate.",
+        "Time without an update until the watchdog sends zero torques; at least two periods.",
         unit="s",
         bounds=(0.01, 1.0),
     )
@@ -107,8 +106,7 @@ class TractionControllerParameters(ParameterTable):
     )
     torque_rate: float = parameter(
         0.0,
-        "Largest change of a torque while driving; 0 is ten times the rover's largest torque per "
-        "second.",
+        "Largest change of a torque while driving; 0 is ten times the largest torque a second.",
         unit="N m/s",
         bounds=(0.0, 1e6),
     )

@@ -79,8 +79,8 @@ class TraverseServerParameters(ParameterTable):
     )
     planner: str = parameter(
         AUTO,
-        "How ~/can_traverse finds a path: candidate curves (fan), a search around obstacles "
-        "(lattice), or the search if all candidates are refused (auto).",
+        "Candidate curves (fan), a search around obstacles (lattice), or a search if all "
+        "candidates are refused (auto).",
         choices=(FAN, LATTICE, AUTO),
     )
     search_budget: float = parameter(
@@ -94,7 +94,7 @@ class TraverseServerParameters(ParameterTable):
     )
     search_frontier: bool = parameter(
         False,
-        "Whether a goal beyond the known ground is answered with a way that ends near to it.",
+        "Whether a goal beyond the known ground is answered with a path to near it.",
     )
     plan_spacing: float = parameter(
         0.1,
@@ -147,8 +147,7 @@ class TraverseServerParameters(ParameterTable):
     )
     map_updates: str = parameter(
         AUTO_UPDATES,
-        "Whether a received map merges with the one that is there (merge), replaces it "
-        "(replace), or merges only if a map was loaded from a file (auto).",
+        "What a received map does: merge, replace, or merge only if a map was loaded (auto).",
         choices=MAP_UPDATES,
     )
     map_merge: str = parameter(
@@ -199,8 +198,8 @@ class TraverseServerParameters(ParameterTable):
     imu_mounting: tuple[float, ...] = IMU_MOUNTING
     blind_ground: str = parameter(
         ALLOW,
-        "Whether the belly may pass over ground that was never seen: allow, over filled ground "
-        "only (allow_footprint), or refuse.",
+        "Ground below the belly that was never seen: allow, only if filled (allow_footprint), or "
+        "refuse.",
         choices=UNOBSERVED_GROUND,
     )
     unknown_cells: str = parameter(
@@ -229,18 +228,18 @@ class TraverseServerParameters(ParameterTable):
     )
     time_budget: float = parameter(
         5.0,
-        "Time from the arrival of a question to its answer, which else is too_long or busy.",
+        "Longest time from a question's arrival to its answer.",
         unit="s",
         bounds=(0.05, 600.0),
     )
     max_waiting: int = parameter(
         50,
-        "Largest number of questions that wait; further ones are refused as busy.",
+        "Questions that may wait; further ones are busy.",
         bounds=(0, 1000),
     )
     map_folder: str = parameter(
         "/",
-        "Folder below which ~/load_map reads; / is every file: a robot sets that of its maps.",
+        "Folder below which ~/load_map reads; / is every file.",
     )
     max_map_bytes: int = parameter(
         1_000_000_000,
@@ -258,25 +257,24 @@ class TraverseServerParameters(ParameterTable):
 
     monitor: bool = parameter(
         False,
-        "Whether the rest of the accepted path is judged again with each map, and ~/stop is "
-        "published.",
+        "Whether the accepted path is judged again with each map, and ~/stop is published.",
     )
     monitor_offset: float = parameter(
         0.5,
-        "Largest distance of the rover from its path; beyond it ~/stop is published.",
+        "Distance of the rover from its path above which it is to stop.",
         unit="m",
         bounds=(0.01, 100.0),
     )
     monitor_timeout: float = parameter(
         1.0,
-        "Time without a pose of the rover after which ~/stop is published.",
+        "Time without a pose of the rover after which it is to stop.",
         unit="s",
         bounds=(0.1, 60.0),
     )
     monitor_mismatch: float = parameter(
         0.3,
-        "Difference of measured and predicted suspension angles that stops the rover if it lasts "
-        "a second; 0 never.",
+        "Difference of measured and predicted suspension angles that stops the rover after a "
+        "second; 0 never.",
         unit="rad",
         bounds=(0.0, 3.2),
     )

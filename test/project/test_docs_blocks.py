@@ -46,7 +46,7 @@ SERVERS = ("traverse_server", "traction_controller", "rover_simulator")
 LONGEST, GRACE = 300.0, 20.0
 """Longest time for a block, and for its processes to end after it [s]."""
 
-QUICK_PAGES = ("README.md", "docs/python.md", "docs/soil.md", "docs/integration/robot.md")
+QUICK_PAGES = ("README.md", "docs/python.md", "docs/integration/robot.md")
 """Pages whose blocks `make test` runs; those of the others take `make test-long`."""
 
 BLOCKS = [block for page in PAGES for block in read_blocks(page)]
