@@ -12,7 +12,7 @@ from rover_planner.cli import main
 from support.command_line import (
     N,
     assert_refused,
-    predict_words,
+    predict_arguments,
     write_ground_and_path,
 )
 
@@ -57,7 +57,7 @@ def test_an_uncertain_map_adds_bounds_unless_told_not_to(files):
     terrain = load_terrain(files / "terrain.npz")
     std = np.full(terrain.elevation.shape, 0.004)
     save_terrain(files / "uncertain.npz", replace(terrain, elevation_std=std))
-    words = predict_words(files, terrain="uncertain.npz")
+    words = predict_arguments(files, terrain="uncertain.npz")
     assert main([*words, "--sigmas", "2", "--friction", "0.2"]) == 0
     with np.load(files / "out.npz") as out:
         assert out["map_sigmas"] == 2.0
@@ -76,7 +76,7 @@ def test_an_uncertain_map_adds_bounds_unless_told_not_to(files):
 
 
 def test_prediction_has_every_array_of_the_contract(files, capfd):
-    assert main(predict_words(files)) == 0
+    assert main(predict_arguments(files)) == 0
     told = f"wrote {files / 'out.npz'}: {N} waypoints, traversable\n"
     assert capfd.readouterr() == (told, "")
     with np.load(files / "out.npz", allow_pickle=False) as out:
@@ -96,7 +96,7 @@ def test_prediction_has_every_array_of_the_contract(files, capfd):
 def test_a_refused_path_is_still_exit_code_0_with_the_reason_and_nan(files, capfd):
     poses = np.column_stack([np.linspace(1, 7, N), np.full(N, 2.0), np.zeros(N)])
     np.savez(files / "poses.npz", poses=poses)
-    assert main(predict_words(files)) == 0
+    assert main(predict_arguments(files)) == 0
     with np.load(files / "out.npz") as out:
         first = int(out["first_failure"])
         assert not out["traversable"]
@@ -119,7 +119,7 @@ CLASS_SHAPES = by_name(
 
 
 def test_classes_and_torque_ranges_are_added_on_demand(files):
-    assert main([*predict_words(files), "--classes", "--torque-ranges"]) == 0
+    assert main([*predict_arguments(files), "--classes", "--torque-ranges"]) == 0
     with np.load(files / "out.npz", allow_pickle=False) as out:
         assert {
             name: out[name].shape for name in out.files
@@ -144,7 +144,7 @@ def test_each_option_changes_the_prediction_as_it_should(files):
         "force": ["--tool-force", "0", "0", "5.5"],
         "moment": ["--tool-moment", "0", "-2", "0"],
     }.items():
-        assert main([*predict_words(files), *words]) == 0
+        assert main([*predict_arguments(files), *words]) == 0
         with np.load(files / "out.npz") as out:
             loads[name] = out["wheel_loads"][0].copy()
             uses[name] = out["friction_utilisation"].copy()
@@ -166,11 +166,11 @@ def test_a_long_path_that_is_written_in_parts_gives_the_same_file(files, monkeyp
         terrain = load_terrain(files / "terrain.npz")
         std = np.full(terrain.elevation.shape, 0.004)
         save_terrain(files / "terrain.npz", replace(terrain, elevation_std=std))
-    assert main([*predict_words(files), *words]) == 0
+    assert main([*predict_arguments(files), *words]) == 0
     monkeypatch.setattr("rover_planner.command.predict.MAX_IN_MEMORY", 0)
     monkeypatch.setattr("rover_planner.command.prediction_files.BLOCK", 7)
     monkeypatch.setattr("rover_physics.prediction.sweep.PART", 10)
-    assert main([*predict_words(files, out="parts.npz"), *words]) == 0
+    assert main([*predict_arguments(files, out="parts.npz"), *words]) == 0
     with np.load(files / "out.npz") as whole, np.load(files / "parts.npz") as parts:
         assert set(parts.files) == set(whole.files)
         for name in whole.files:
@@ -183,7 +183,7 @@ def test_a_long_path_that_is_written_in_parts_gives_the_same_file(files, monkeyp
 def test_a_disk_that_is_full_is_one_line_and_leaves_no_temporary_file(files, monkeypatch, capfd):
     monkeypatch.setattr("rover_planner.command.predict.MAX_IN_MEMORY", 0)
     (files / "out.npz").symlink_to("/dev/full")
-    assert_refused(capfd, main(predict_words(files)), "No space left on device")
+    assert_refused(capfd, main(predict_arguments(files)), "No space left on device")
     assert [path.name for path in files.iterdir() if path.name.startswith(".")] == []
 
 
@@ -191,9 +191,9 @@ def test_poses_with_curvature_are_taken_one_by_one_and_part_by_part(files, monke
     bends = [0.0, 1.0, -1.0, np.inf, -np.inf]
     poses = np.column_stack([np.linspace(1.0, 3.0, 5), np.full(5, 2.0), np.zeros(5)])
     np.savez(files / "poses.npz", poses=poses, curvature=np.array(bends))
-    assert main(predict_words(files)) == 0
+    assert main(predict_arguments(files)) == 0
     monkeypatch.setattr("rover_planner.command.predict.MAX_IN_MEMORY", 2)
-    assert main(predict_words(files, out="parts.npz")) == 0
+    assert main(predict_arguments(files, out="parts.npz")) == 0
     with np.load(files / "out.npz") as out, np.load(files / "parts.npz") as parts:
         for name in out.files:
             np.testing.assert_array_equal(parts[name], out[name], err_msg=name)

@@ -15,7 +15,7 @@ import pytest
 
 from rover_physics.rover.rover_file import load_rover
 from rover_planner.studies.rover_values import write_rover
-from rover_planner.viewer.browser.link import Link
+from rover_planner.viewer.browser.link import PageLink
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.panel.rover_tab import CHANGED
 from rover_planner.viewer.state.session import ViewSession
@@ -197,7 +197,7 @@ def test_a_link_with_unknown_names_is_refused_and_nothing_else_changes(page, cha
     wanted, shown = page.session.wanted, []
     choose = page.ground_tab.show_options
     page.ground_tab.show_options = lambda options: (shown.append(options), choose(options))
-    link: Link = replace(page.sharing.make_link(), **change)
+    link: PageLink = replace(page.sharing.make_link(), **change)
     ask(page, lambda: page.open_link(link))
     assert page.session.refusal.startswith(reason)
     assert page.session.wanted is wanted and page.errors.messages == {}

@@ -16,10 +16,10 @@ from rover_planner.parameters.traverse_server import LATTICE, TraverseServerPara
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.planning.search.blind_check import BlindCheck
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.path_search import START_REFUSED, find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+from rover_planner.planning.search.unobserved_check import UnobservedCheck
 
 LSR1 = load_rover("lsr1")
 OPTIONS = PathQueryOptions(waypoint_spacing=0.04).change(control_margin=0.0)
@@ -36,7 +36,7 @@ def flat_with_hole() -> Terrain:
 
 def ask(rule: str, seen: ObservedGround | None = None, start=START) -> SearchQuery:
     ground = flat_with_hole()
-    check = BlindCheck(LSR1, seen or observed_ground(ground, None), rule)
+    check = UnobservedCheck(LSR1, seen or observed_ground(ground, None), rule)
     return SearchQuery(LSR1, ground, start, GOAL, OPTIONS, check)
 
 
@@ -55,7 +55,7 @@ def test_a_search_leads_around_what_the_rule_refuses():
     poses = judged.candidate.poses
     assert np.abs(poses[:, 1]).max() > 0.2
     share = observed_ground(flat_with_hole(), None).share(LSR1, poses)
-    assert share.blind_share == 0.0 and share.first_refused(rule) == -1
+    assert share.unobserved_share == 0.0 and share.first_refused(rule) == -1
 
 
 def test_what_is_seen_later_is_judged_anew():
