@@ -136,7 +136,8 @@ def _find_classes(
         for policy in policies
     ]
     models = np.array([model.record for model in packed], MODEL)
-    limits = tuple(_without_forces_first(model.limits) for model in packed)
+    orders = [_without_forces_first(model.limits) for model in packed]
+    limits = view_read_only(np.concatenate(orders)), np.cumsum([0, *map(len, orders)])
     ranks = np.array([TORQUE_POLICIES.index(policy) for policy in policies])
 
     def parts(works: NDArray[np.void]) -> Iterator[Callable[[], None]]:
@@ -156,7 +157,7 @@ def _find_classes(
 def _without_forces_first(limits: RoverLimits) -> NDArray[np.void]:
     """Return LIMITs (k,), those that fail under every policy if they do under one first."""
     order = np.argsort(limits.records["needs_forces"], kind="stable")
-    return view_read_only(limits.records[order])
+    return np.asarray(limits.records[order])
 
 
 @kernel
@@ -164,14 +165,15 @@ def classify_all(asked, places, spaces, classes):
     """Find the classes of poses; each pose is settled once only.
 
     Args:
-        asked: (k,) MODELs of one rover on one ground, the LIMITs of each, those without forces
-            first, and (k,) the class of a pose that passes under it.
+        asked: (k,) MODELs of one rover on one ground; the LIMITs of all, those without forces
+            first, and (k + 1,) where those of each begin; (k,) the class of a pose that passes.
         places: (n, 3) x, y [m] and yaw [rad] of the body origin, and their motions, as for
             `evaluate`.
         spaces: (1,) WORK, (1,) RESULT and this result as numbers.
         classes: (n,) written.
     """
-    (models, limits, ranks), (poses, motions), (works, results, numbers) = asked, places, spaces
+    (models, (limits, starts), ranks), (poses, motions) = asked, places
+    works, results, numbers = spaces
     work = works[0]
     for i in range(poses.shape[0]):
         set_pose(models[0], poses, motions, i, work)
@@ -185,9 +187,10 @@ def classify_all(asked, places, spaces, classes):
             evaluate_stance(models[k], work, status, results[0])
             if results[0].status != PoseStatus.SETTLED:
                 continue
-            broken = find_broken(numbers, 0, limits[k])[0]
+            own = limits[starts[k] : starts[k + 1]]
+            broken = find_broken(numbers, 0, own)[0]
             if broken < 0:
                 classes[i] = ranks[k]
                 break
-            if not limits[k][broken].needs_forces:
+            if not own[broken].needs_forces:
                 break

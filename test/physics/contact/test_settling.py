@@ -114,8 +114,9 @@ def test_on_a_plane_the_rover_lies_like_the_plane(slope_x, slope_y, height, yaw)
     assert attitude_of(prediction, 0)[:, 2] == pytest.approx(normal, abs=ANGLE)
     assert prediction.rocker_angle[0] == pytest.approx([0.0, 0.0], abs=ANGLE)
     assert prediction.bogie_angle[0] == pytest.approx([0.0, 0.0], abs=ANGLE)
-    along = slope_x * np.cos(yaw) + slope_y * np.sin(yaw)
-    assert np.tan(prediction.contact_angle[0]) == pytest.approx(along, abs=0.02)
+    axle = attitude_of(prediction, 0)[:, 1]
+    ahead = np.array([axle[1], -axle[0], 0.0]) / np.hypot(axle[0], axle[1])  # level, across the axle
+    assert np.sin(prediction.contact_angle[0]) == pytest.approx(-normal @ ahead, abs=0.01)
     foot = prediction.position[0] - normal * 0.30
     assert foot[2] == pytest.approx(slope_x * foot[0] + slope_y * foot[1] + height, abs=2.0 * GAP)
 
