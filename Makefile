@@ -55,7 +55,7 @@ test: $(READY) ## lint, type check and all tests
 	exit $$failed
 
 .PHONY: test-long
-test-long: $(READY) kernels ## the tests that take a minute or more each: lowest versions, killed workers, long drives
+test-long: $(READY) kernels ## the tests that take long: lowest versions, killed workers, long drives, every page of the docs
 	@$(LIMIT) $(BIN)/python -m pytest $(END_HANGS) --durations 25 -m long test
 
 .PHONY: quick

@@ -32,7 +32,13 @@
   });
 
   // Space and arrows belong to the drive, not to the camera nor to a button pressed before.
+  // Whoever comes to a button by the tab key means the button.
   const KEYS = ["Space", "ArrowLeft", "ArrowRight", "Home"];
+  let byPointer = false;
+  window.addEventListener("pointerdown", () => { byPointer = true; }, true);
+  window.addEventListener("keydown", (event) => {
+    if (event.code === "Tab") byPointer = false;
+  }, true);
   document.body.addEventListener("keydown", (event) => {
     const at = event.target;
     const row = at.closest("tr[tabindex]");
@@ -46,9 +52,10 @@
       (rows[rows.indexOf(row) + step] || row).focus();
       event.preventDefault();
     }
-    const byKeys = at !== document.body && at.matches(":focus-visible");
-    if (KEYS.includes(event.code) && (byKeys || at.matches('[role="slider"]')))
-      event.stopPropagation();
+    if (!KEYS.includes(event.code)) return;
+    const byKeys = !byPointer && at !== document.body && at.matches(":focus-visible");
+    if (byKeys || at.matches('[role="slider"]')) event.stopPropagation();
+    else if (at.matches('button, [role="tab"]')) at.blur();
   });
   document.documentElement.addEventListener("keydown", (event) => {
     if (KEYS.includes(event.code)) event.stopPropagation();
