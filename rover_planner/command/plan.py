@@ -112,7 +112,7 @@ def _ask(
     with show_progress() as progress:
         progress("load the model (the first run compiles it)")
         search_paths()  # so that the budget is not spent on it
-        progress(f"search a way for {question.rover.name}")
+        progress(f"search a path for {question.rover.name}")
         answer = find_path(question, settings)
     if answer.path is not None:
         options = question.options.model
