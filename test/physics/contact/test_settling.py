@@ -114,8 +114,8 @@ def test_on_a_plane_the_rover_lies_like_the_plane(slope_x, slope_y, height, yaw)
     assert attitude_of(prediction, 0)[:, 2] == pytest.approx(normal, abs=ANGLE)
     assert prediction.rocker_angle[0] == pytest.approx([0.0, 0.0], abs=ANGLE)
     assert prediction.bogie_angle[0] == pytest.approx([0.0, 0.0], abs=ANGLE)
-    axle = attitude_of(prediction, 0)[:, 1]
-    ahead = np.array([axle[1], -axle[0], 0.0]) / np.hypot(axle[0], axle[1])  # level, across the axle
+    axle = attitude_of(prediction, 0)[:, 1]  # contact angles are about it, from the level
+    ahead = np.array([axle[1], -axle[0], 0.0]) / np.hypot(axle[0], axle[1])
     assert np.sin(prediction.contact_angle[0]) == pytest.approx(-normal @ ahead, abs=0.01)
     foot = prediction.position[0] - normal * 0.30
     assert foot[2] == pytest.approx(slope_x * foot[0] + slope_y * foot[1] + height, abs=2.0 * GAP)
