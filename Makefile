@@ -23,6 +23,8 @@ TIMED_TESTS := $(filter-out $(BROWSER_TESTS),$(shell grep -rl mark.timed test --
 # Tests, demo and nodes talk to this machine only.
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
+# Demo, nodes and tests start some hundred processes: none of them compiles again what one has compiled.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: help
 help: ## list what there is
@@ -38,7 +40,7 @@ view: $(READY) kernels ## watch the rover on a terrain in a web page; MAP as for
 
 .PHONY: test
 test: $(READY) ## lint, type check and all tests
-	@$(MAKE) --no-print-directory --jobs 2 --output-sync lint kernels
+	@$(MAKE) --no-print-directory --jobs 3 --output-sync lint kernels collect
 	run() { # a second run of what fails tells whether it needs other tests to fail; it mends nothing
 	  echo "== $$1"; shift
 	  $(LIMIT) $(BIN)/python -m pytest $(END_HANGS) --durations 25 --durations-min 10 --cache-clear "$$@" && return
@@ -74,6 +76,11 @@ lint: $(READY) ## ruff and mypy
 	$(BIN)/python -m ruff check .
 	echo "== mypy"
 	$(BIN)/python -m mypy
+
+.PHONY: collect
+collect: $(READY)
+	@echo "== reading the tests: once, and not by each worker"
+	$(BIN)/python -m pytest -q --collect-only -m long test | tail -1
 
 .PHONY: kernels
 kernels: $(READY) ## compile the numba kernels into their cache
