@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rover_physics.numerics.kernel_cache import KernelMissingError, loading_only
+from rover_physics.numerics.kernel_cache import KernelCache, KernelMissingError, loading_only
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.threads import CALLS_IN_WORK, run_chunks, run_in_turn
 
@@ -41,7 +41,7 @@ def test_where_kernels_are_only_loaded_a_missing_one_raises_an_error():
     def unknown(x):
         return x
 
-    unknown._cache.flush()  # an earlier run has kept it on disk
+    KernelCache(unknown.py_func).flush()  # an earlier run has kept it on disk
     with loading_only(), pytest.raises(KernelMissingError, match="unknown"):
         unknown(1.0)
     assert unknown(1.0) == 1.0
