@@ -4,7 +4,7 @@
 import numpy as np
 
 from rover_physics.contact.contact_record import NOTICED
-from rover_physics.contact.intrusion import ROUNDING, is_below, take_point
+from rover_physics.contact.intrusion import ROUNDING, is_below, is_beside, take_point
 from rover_physics.numerics.kernels import kernel
 from rover_physics.terrain.ground import elevation_of
 
@@ -21,44 +21,51 @@ GENTLE = 0.8
 
 
 @kernel
-def look_into_cells(ground, search, vertex, there):
-    """Search the four cells around a vertex (i, j) where they are twisted so that it may pay.
+def look_into_cells(ground, search, i, j):
+    """Search the four cells around vertex (i, j) where they are twisted so that it may pay.
 
-    A cell is searched at the vertex that comes nearest, by the wheel's parabola. `there` is s, t
-    and the elevation [m] of the vertex.
+    A cell is searched at the vertex that comes nearest, by the wheel's parabola.
     """
-    (i, j), (s, t, here) = vertex, there
     ex, ey, scale = search.ahead_x, search.ahead_y, ground.inverse_resolution
-    curl, tangent, gentle_s = search.curl, search.tangent, GENTLE * search.radius
-    left, right = search.left + ROUNDING, search.right - ROUNDING
-    # Along the axle the ground bends by -2 twist ex ey; the gain over the edges is a quarter.
-    bends, noticed = 0.5 * ex * ey, NOTICED * search.radius
+    here = elevation_of(ground, i, j)
+    x, y = j - search.x, i - search.y
+    s, t, curl = x * ex + y * ey, y * ex - x * ey, 0.5 / (search.radius * search.cosine)
+    gentle = abs(s) < GENTLE * search.radius
     for cell in range(4):
         row, column = i - cell // 2, j - cell % 2
         if row < 0 or column < 0 or row > ground.rows - 2 or column > ground.columns - 2:
             continue
         di, dj = 1 - 2 * (cell // 2), 1 - 2 * (cell % 2)
+        along, aside = di * ex, -dj * ey
+        if is_beside(
+            search, t + min(along, 0.0) + min(aside, 0.0), t + max(along, 0.0) + max(aside, 0.0)
+        ):
+            continue
         beside = (elevation_of(ground, i, j + dj) - here) * scale
         above = (elevation_of(ground, i + di, j) - here) * scale
         across = (elevation_of(ground, i + di, j + dj) - here) * scale
         twist = (across - beside - above) * (di * dj)
-        along, aside = di * ex, -dj * ey
-        low, high = t + min(along, 0.0) + min(aside, 0.0), t + max(along, 0.0) + max(aside, 0.0)
-        below = (low <= left) & (high >= right)
-        s_beside, s_above, bend = s + dj * ex, s + di * ey, curl * s * s
+        # Along the axle the ground bends by -2 twist ex ey; the gain over the edges is a quarter.
+        if not twist * ex * ey * 0.5 > NOTICED * search.radius:
+            continue
+        s_beside, s_above = s + dj * ex, s + di * ey
         s_across = s_beside + di * ey
-        owned = (
-            (beside + tangent * dj * ey - curl * s_beside * s_beside <= -bend)
-            & (above - tangent * di * ex - curl * s_above * s_above <= -bend)
-            & (across + tangent * (dj * ey - di * ex) - curl * s_across * s_across <= -bend)
-        )
-        if (twist * bends > noticed) & below & (owned | (abs(s) >= gentle_s)):
-            a = elevation_of(ground, row, column)
-            b = (elevation_of(ground, row, column + 1) - a) * scale
-            c = (elevation_of(ground, row + 1, column) - a) * scale
-            dx, dy = column - search.x, row - search.y
-            corner = dx * ex + dy * ey, dy * ex - dx * ey
-            _look_into_cell(search, corner, ((a - search.z) * scale, b, c, twist))
+        beside += search.tangent * dj * ey
+        above -= search.tangent * di * ex
+        across += search.tangent * (dj * ey - di * ex)
+        bend = curl * s * s
+        if gentle and (
+            beside - curl * s_beside * s_beside > -bend
+            or above - curl * s_above * s_above > -bend
+            or across - curl * s_across * s_across > -bend
+        ):
+            continue
+        a = elevation_of(ground, row, column)
+        b = (elevation_of(ground, row, column + 1) - a) * scale
+        c = (elevation_of(ground, row + 1, column) - a) * scale
+        dx, dy = column - search.x, row - search.y
+        corner = dx * ex + dy * ey, dy * ex - dx * ey
+        _look_into_cell(search, corner, ((a - search.z) * scale, b, c, twist))
 
 
 @kernel

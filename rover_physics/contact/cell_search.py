@@ -11,12 +11,12 @@ import numpy as np
 from numba import int64
 
 from rover_physics.contact.cell_peaks import GENTLE, look_into_cells
-from rover_physics.contact.intrusion import ROUNDING, begin_search, is_below, take_point
+from rover_physics.contact.intrusion import begin_search, is_below, is_beside, take_point
 from rover_physics.contact.rim_search import LEVEL, RIM_BEND, cross_rim, look_along_rims
 from rover_physics.contact.tracking import keep_contact
 from rover_physics.numerics.kernels import kernel
 from rover_physics.status import ContactStatus
-from rover_physics.terrain.ground import elevation_of, height_in_row, is_cell_on_map, row_of
+from rover_physics.terrain.ground import elevation_of, is_cell_on_map
 
 BEND = 0.19
 """Intrusion of an edge above that of its ends, over the curvature of the wheel: 1/8 for a
@@ -25,8 +25,6 @@ STEEP = 0.64
 """(s / R)^2 beyond which the wheel's curvature is too large for that estimate."""
 MIN_COSINE = 0.3
 """Cosine of the contact angle below which no bound is tried."""
-TINY = 1e-30
-"""Least curvature of the intrusion along an edge [1/cells]: along the axle there is none."""
 LEAST_UPRIGHT = 0.1
 """Cosine of the camber below which a wheel lies on its side and is not searched."""
 
@@ -75,7 +73,8 @@ def _take_peak(ground, search, contacts, wheel):
 def _look_at_vertices(ground, search, tops):
     """Look at all vertices of cells that may come near, and around those that do."""
     ex, ey, R = search.ahead_x, search.ahead_y, search.radius
-    tangent, scale, z = search.tangent, ground.inverse_resolution, search.z
+    cosine, tangent, scale = search.cosine, search.tangent, ground.inverse_resolution
+    inverse = 1.0 / cosine
     lean = search.sine * R
     low_t = -search.half_width + min(lean, 0.0)
     high_t = search.half_width + max(lean, 0.0)
@@ -94,7 +93,7 @@ def _look_at_vertices(ground, search, tops):
     last = min(int64(np.floor(search.y + high_y)), ground.rows - 1)
     slant_x = 1.0 / ex if abs(ex) > 1e-9 else 0.0
     slant_y = 1.0 / ey if abs(ey) > 1e-9 else 0.0
-    dome = _bound_dome(search)
+    flat = 1.0 / (R * R)
     for i in range(first, last + 1):
         dy = i - search.y
         low_x, high_x = -np.inf, np.inf
@@ -110,12 +109,11 @@ def _look_at_vertices(ground, search, tops):
             continue
         start = max(int64(np.ceil(search.x + low_x)), 0)
         end = min(int64(np.floor(search.x + high_x)), ground.columns - 1)
-        row = row_of(ground, i)
         for j in range(start, end + 1):
             dx = j - search.x
             s, t = dx * ex + dy * ey, dy * ex - dx * ey
-            base = (height_in_row(row, j) - z) * scale - tangent * t
-            if base + _most_of_dome(dome, s * s) > search.best:
+            base = (elevation_of(ground, i, j) - search.z) * scale - tangent * t
+            if base + _bound_dome(s, R, flat) * inverse > search.best:
                 _look_around(ground, search, (i, j), (s, t, base))
             elif base != base and abs(s) < R and is_below(search, s, t):
                 status = ContactStatus.UNKNOWN_GROUND
@@ -123,32 +121,17 @@ def _look_at_vertices(ground, search, tops):
 
 
 @kernel
-def _bound_dome(search):
-    """Return the coefficients of a bound of the wheel's dome, over that of its edges.
+def _bound_dome(s, R, flat):
+    """Return an upper bound of sqrt(R^2 - s^2), and of what an edge next to s may add to it.
 
-    The first four, of powers of s^2, are those of sqrt(R^2 - s^2), all but the first of which are
-    negative, and of the curvature of the circle over that at the bottom: an edge next to s adds to
-    it. The others are those of the circle alone, and its radius up to which the first hold.
+    `flat` is 1 / R^2. A parabola is above the circle; the polynomial is above the curvature of the
+    circle over that at the bottom.
     """
-    R, inverse = search.radius, search.inverse
-    flat, bend = 1.0 / (R * R), BEND / R
-    square, fourth, sixth = -0.5 * R * flat, -0.125 * R * flat * flat, -0.0625 * R * flat**3
-    return (
-        ((R + bend) * inverse, (square + 1.5 * bend * flat) * inverse),
-        ((fourth + 6.5 * bend * flat * flat) * inverse, sixth * inverse),
-        (R * inverse, square * inverse, fourth * inverse, STEEP * R * R),
-    )
-
-
-@kernel
-def _most_of_dome(dome, square):
-    """Return an upper bound of the wheel's dome at s^2, and of what an edge may add to it."""
-    (level, second), (fourth, sixth), (top, slope, bend, gentle) = dome
-    if square < gentle:
-        return level + square * (second + square * (fourth + square * sixth))
-    inward = max(np.sqrt(square) - 1.0, 0.0)
-    inward *= inward
-    return top + inward * (slope + inward * bend)
+    x = s * s * flat
+    if x < STEEP:
+        return R * (1.0 - 0.5 * x) + BEND * (1.0 + x * (1.5 + 6.5 * x)) / R
+    inward = max(abs(s) - 1.0, 0.0)
+    return R * (1.0 - 0.5 * inward * inward * flat)
 
 
 @kernel
@@ -166,25 +149,24 @@ def _find_extent(search, top, tilt, scale):
 def _look_around(ground, search, vertex, there):
     """Search a vertex (i, j), those of its edges that may pay, and its cells if they are twisted.
 
-    `there` is s, t and the intrusion of the vertex without the wheel's dome. The end of an edge
-    that comes nearer, by the wheel's parabola, owns it. All that decides is computed at each edge:
-    a branch that the processor cannot foresee takes longer.
+    `there` is s, t and the intrusion of the vertex without the wheel's dome.
     """
     i, j = vertex
     s, t, base = there
-    ex, ey, R, curl = search.ahead_x, search.ahead_y, search.radius, search.curl
-    scale, inverse, width = ground.inverse_resolution, search.inverse, search.half_width
+    ex, ey, R = search.ahead_x, search.ahead_y, search.radius
+    scale, inverse = ground.inverse_resolution, 1.0 / search.cosine
     q = np.sqrt(max(R * R - s * s, 0.0))
     intrusion = base + q * inverse
     if intrusion > search.best and q > 0.0 and is_below(search, s, t):
         take_point(search, s, t, base)
-    steep, gentle_s, lean = q < MIN_COSINE * R, GENTLE * R, search.sine * q
-    inside, fall, rim_bend = abs(t - lean) <= width, 0.0, 0.0
+    steep, curl, gentle_s = q < MIN_COSINE * R, 0.5 * inverse / R, GENTLE * R
+    lean = search.sine * q
+    inside = abs(t - lean) <= search.half_width
+    rim_bend = 0.0
     if not steep:
-        rim_bend = RIM_BEND * R * R / (q * q * q * search.side_on) * inverse
-        fall = s / q * inverse
+        rim_bend = RIM_BEND * R * R / (q * q * q * max(ex * ex, ey * ey)) * inverse
+    fall = 0.0 if steep else s / q * inverse
     here = elevation_of(ground, i, j)
-    left, right, tangent = search.left + ROUNDING, search.right - ROUNDING, search.tangent
     for edge in range(4):
         di, dj = 0, 1
         along_s, along_t = ex, -ey
@@ -193,26 +175,32 @@ def _look_around(ground, search, vertex, there):
             along_s, along_t = ey, ex
         if edge % 2 == 1:
             di, dj, along_s, along_t = -di, -dj, -along_s, -along_t
+        if is_beside(search, t + min(along_t, 0.0), t + max(along_t, 0.0)):
+            continue
         if not is_cell_on_map(ground, j + dj, i + di):
             continue
-        rise = (elevation_of(ground, i + di, j + dj) - here) * scale - tangent * along_t
-        beyond = t + along_t
-        below = (min(t, beyond) <= left) & (max(t, beyond) >= right)
-        gentle = (abs(s) < gentle_s) & (abs(s + along_s) < gentle_s)
-        owned = (rise - curl * along_s * (2.0 * s + along_s) <= 0.0) | (not gentle)
-        # The wheel bends at least as at its bottom, so a parabola is above the intrusion: it is
-        # more than the best if least * (gain - least / 2) / bend is more than what lacks.
-        gain, bend = max(rise - fall * along_s, 0.0), max(2.0 * curl * along_s * along_s, TINY)
-        least, lacks = min(gain, bend), search.best - intrusion
-        more = least * (gain - 0.5 * least)
-        crosses = inside != (abs(beyond - lean) <= width)
-        pays = below & owned & (steep | (more > lacks * bend))
-        near = below & crosses & (steep | (owned & (more > (lacks - rim_bend) * bend)))
-        if near:
+        rise = (elevation_of(ground, i + di, j + dj) - here) * scale - search.tangent * along_t
+        # The end that comes nearer, by the wheel's parabola, owns the edge.
+        crosses = inside != (abs(t + along_t - lean) <= search.half_width)
+        if crosses and steep:
             cross_rim(search, (s, t, base), (along_s, along_t, rise))
-        if pays:
-            look_along_edge(search, (s, t, base), (along_s, along_t, rise))
-    look_into_cells(ground, search, vertex, (s, t, here))
+        gentle = abs(s) < gentle_s and abs(s + along_s) < gentle_s
+        if gentle and rise - curl * along_s * (2.0 * s + along_s) > 0.0:
+            continue
+        if not steep:
+            # The wheel bends at least as at its bottom, so a parabola is above the intrusion.
+            gain, bend = rise - fall * along_s, along_s * along_s * inverse / R
+            if gain > bend:
+                gain -= 0.5 * bend
+            elif gain > 0.0:
+                gain *= 0.5 * gain / bend
+            most = intrusion + max(gain, 0.0)
+            if crosses and most + rim_bend > search.best:
+                cross_rim(search, (s, t, base), (along_s, along_t, rise))
+            if not most > search.best:
+                continue
+        look_along_edge(search, (s, t, base), (along_s, along_t, rise))
+    look_into_cells(ground, search, i, j)
 
 
 @kernel

@@ -65,9 +65,6 @@ CELL_SEARCH = record_type(
     ("sine", float),  # of the camber
     ("cosine", float),
     ("tangent", float),
-    ("inverse", float),  # 1 / cosine
-    ("curl", float),  # half the curvature of the intrusion at the bottom [1/cells]
-    ("side_on", float),  # larger squared part of the heading along x or y
     ("best", float),  # largest intrusion of the ground so far [cells]
     ("best_s", float),  # its place along the heading [cells]
     ("best_t", float),  # its place to the left [cells]

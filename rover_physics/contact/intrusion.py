@@ -29,9 +29,6 @@ def begin_search(model, work, wheel):
     search.ahead_x, search.ahead_y = placement.forward[wheel, 0], placement.forward[wheel, 1]
     search.cosine, search.sine = placement.up[wheel, 2], placement.axis[wheel, 2]
     search.tangent = search.sine / search.cosine
-    search.inverse = 1.0 / search.cosine
-    search.curl = 0.5 * search.inverse / search.radius
-    search.side_on = max(search.ahead_x * search.ahead_x, search.ahead_y * search.ahead_y)
     search.half_width = samples.half_width * scale * search.cosine
     lean = search.sine * search.radius
     search.right = min(lean, 0.0) - search.half_width
@@ -51,6 +48,12 @@ def is_below(search, s, t):
     """Return whether the point (s, t) is below the wheel; |s| must be below R."""
     lean = search.sine * np.sqrt(search.radius * search.radius - s * s)
     return abs(t - lean) <= search.half_width
+
+
+@kernel
+def is_beside(search, low, high):
+    """Return whether all that is at places `low` <= t <= `high` is beside the wheel for sure."""
+    return low > search.left + ROUNDING or high < search.right - ROUNDING
 
 
 @kernel

@@ -165,18 +165,6 @@ def elevation_of(ground, i, j):
 
 
 @kernel
-def row_of(ground, i):
-    """Return the address of row i of the elevation, for `height_in_row`."""
-    return ground.elevation + 8 * i * ground.columns
-
-
-@kernel
-def height_in_row(row, j):
-    """Return the elevation [m] in column j of a row; NaN if unknown."""
-    return read_float(row, j)
-
-
-@kernel
 def known_max_of_block(ground, bi, bj):
     """Return the highest known elevation [m] of block [bi, bj], -inf if none is known."""
     return read_float(ground.known_block_max, bi * ground.block_columns + bj)
@@ -199,7 +187,9 @@ def find_block_max(ground, gx, gy, half_x, half_y):
     for i in range(int64(low_y) >> BLOCK_BITS, (int64(high_y + 1.0) >> BLOCK_BITS) + 1):
         row = i * ground.block_columns
         for j in range(first, last + 1):
-            block_max = max(block_max, read_float(ground.block_max, row + j))
+            height = read_float(ground.block_max, row + j)
+            if height > block_max:
+                block_max = height
     return block_max
 
 
