@@ -13,9 +13,10 @@ later start and a pose take the same time.
 
 import inspect
 from collections.abc import Callable
-from functools import cached_property
+from functools import cached_property, update_wrapper
 from typing import Any
 
+from llvmlite.binding import parse_assembly
 from numba import _dynfunc
 from numba.core import types
 from numba.core.codegen import JITCodeLibrary
@@ -53,31 +54,41 @@ def allocating_kernel(function):
     return Kernel(function)
 
 
-class Kernel(CPUDispatcher):
-    """A compiled function, called from Python or as part of another kernel, but not of itself."""
+class Kernel:
+    """A compiled function, called from Python or as part of another kernel, but not of itself.
 
-    _cache: Any
+    Most kernels are parts of one that is loaded from disk: Numba never hears of them.
+    """
 
     def __init__(self, function: Callable, **options: Any):
         """Compile nothing yet; `options` of `numba.njit` go before COMPILE_OPTIONS."""
-        options = COMPILE_OPTIONS | options
-        super().__init__(function, {}, options, _WholeCompiler)
+        update_wrapper(self, function)
+        self.py_func, self._options = function, COMPILE_OPTIONS | options
 
-    def compile(self, sig: Any) -> Any:
-        """Load or compile the kernel for a signature, with a cache that any disk will do for."""
-        if not isinstance(self._cache, KernelCache):  # most kernels are never called from Python
-            # What njit(cache=True) does, but its own cache raises where it cannot write.
-            self._cache = KernelCache(self.py_func)
-        return super().compile(sig)
+    def __call__(self, *arguments: Any) -> Any:
+        """Call the machine code, which is loaded or compiled first if need be."""
+        return self.whole(*arguments)
+
+    @property
+    def signatures(self) -> list[Any]:
+        """Types of arguments with which Python has called it."""
+        return self.whole.signatures if "whole" in vars(self) else []
+
+    @cached_property
+    def whole(self) -> CPUDispatcher:
+        """What Python calls, kept on disk: numba.njit(cache=True) raises where it cannot write."""
+        whole = CPUDispatcher(self.py_func, {}, self._options, _WholeCompiler)
+        whole._cache = KernelCache(self.py_func)
+        return whole
 
     @cached_property
     def _part(self) -> CPUDispatcher:
-        """What other kernels call."""
-        return CPUDispatcher(self.py_func, {}, self.targetoptions, _PartCompiler)
+        """What other kernels call: no machine code is made of it alone."""
+        return CPUDispatcher(self.py_func, {}, self._options, _PartCompiler)
 
     @property
     def _numba_type_(self) -> types.Dispatcher:
-        """The type by which other kernels know this one: they call the part."""
+        """The type by which other kernels know this one."""
         return types.Dispatcher(self._part)
 
 
@@ -93,6 +104,18 @@ class _PartLibrary(JITCodeLibrary):
 
 class _WholeLibrary(JITCodeLibrary):
     """Machine code of a kernel that Python calls, with all that it calls."""
+
+    def _get_module_for_linking(self) -> Any:
+        """Return the names of its functions alone: no kernel links this one.
+
+        The disk keeps this beside the machine code; whole functions take a third of a load.
+        """
+        self._ensure_finalized()
+        if self._shared_module is None:
+            names = [one.name for one in self._final_module.functions if not one.is_declaration]
+            text = "".join(f'define void @"{name}"() {{ ret void }}\n' for name in names)
+            self._shared_module = parse_assembly(text)
+        return self._shared_module
 
     def add_linking_library(self, library: JITCodeLibrary) -> None:
         """Link a library and, if machine code of it does not exist, those of its callees."""

@@ -43,7 +43,7 @@ import some_kernels
 
 steps = [CompilationStep(name, f"some_kernels:{name}") for name in ("first", "second")]
 print(Compilation(steps).run(lambda name: print(name, end=" ")), end=" ")
-print(sum(some_kernels.twice.stats.cache_hits.values()))
+print(sum(some_kernels.twice.whole.stats.cache_hits.values()))
 """
 PARENT = """
 from rover_physics.compilation import Compilation, CompilationStep

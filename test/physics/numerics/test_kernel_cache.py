@@ -32,7 +32,7 @@ from rover_physics.caller import twice_and_one
 from rover_physics.numerics.kernel_cache import kernel_cache_note
 
 value = twice_and_one(3.0)
-print(value, sum(twice_and_one.stats.cache_hits.values()), kernel_cache_note(), sep="|")
+print(value, sum(twice_and_one.whole.stats.cache_hits.values()), kernel_cache_note(), sep="|")
 """
 
 
