@@ -68,14 +68,14 @@ def map_colours(values: NDArray[np.float64], low: float, high: float) -> NDArray
     return colours
 
 
-def colour_utilisation(utilisation: float) -> Colour:
-    """Return the colour of a friction utilisation: blue at 0, yellow at 0.5, vermillion from 1.
+def colour_use(use: float) -> Colour:
+    """Return the colour of the use of a limit: blue at 0, yellow at 0.5, vermillion from 1.
 
     NaN is grey.
     """
-    if np.isnan(utilisation):
+    if np.isnan(use):
         return UNKNOWN
-    t = float(np.clip(utilisation, 0.0, 1.0))
+    t = float(np.clip(use, 0.0, 1.0))
     return blend(PASSABLE, MIDDLE, 2 * t) if t < 0.5 else blend(MIDDLE, REFUSED, 2 * t - 1)
 
 

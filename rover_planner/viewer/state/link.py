@@ -12,10 +12,10 @@ import numpy as np
 
 from rover_physics.files.validation import describe
 from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_file import rover_to_dict
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
-from rover_planner.studies.rover_values import list_values, with_value
-from rover_planner.viewer.state.before_after import list_changes
+from rover_planner.studies.rover_values import get_value, list_values, with_value
 from rover_planner.viewer.state.scenario import Pose
 
 VALUE, JOINT = "rover.", "arm."
@@ -71,7 +71,12 @@ def fingerprint(terrain: Terrain) -> str:
 
 def list_changed_values(loaded: Rover, rover: Rover) -> dict[str, float]:
     """Return the numbers, by label, in which a rover differs from the one that was loaded."""
-    return {label: now for label, (_, now) in list_changes(loaded, rover).items()}
+    old, new, found = rover_to_dict(loaded), rover_to_dict(rover), {}
+    for one in (value for part in list_values(loaded).values() for value in part):
+        was, now = (get_value(data, one.keys[0]) for data in (old, new))
+        if abs(was - now) > 1e-9:
+            found[one.label] = now
+    return found
 
 
 def change_values(loaded: Rover, values: Mapping[str, float]) -> Rover:
