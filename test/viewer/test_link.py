@@ -9,7 +9,7 @@ import pytest
 from rover_physics.rover.rover_file import load_rover
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import read_rover, write_rover
-from rover_planner.viewer.browser.link import (
+from rover_planner.viewer.state.link import (
     PageLink,
     change_values,
     list_changed_values,

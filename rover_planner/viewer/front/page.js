@@ -433,9 +433,9 @@ document.addEventListener("keydown", (event) => {
   target.blur();
   ask(question);
 });
-document.addEventListener("pointerup", () => setTimeout(() => {
-  if (document.activeElement?.matches("button")) document.activeElement.blur();
-}));
+document.addEventListener("click", (event) => {
+  if (event.detail > 0) event.target.closest("button")?.blur(); // pressed with the pointer
+});
 
 openTab(chosen.tab);
 const told = at("told");

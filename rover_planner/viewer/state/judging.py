@@ -214,4 +214,5 @@ def _judge_under(policy: str, path: Judged) -> PolicyVerdict:
 def _judge(scenario: Scenario, poses: Floats) -> Judged:
     """Judge a path up to its first failure, where its playback ends."""
     rover, terrain, options = scenario.rover, scenario.terrain, scenario.asked_options
-    return Judged(scenario, check_path(rover, terrain, poses, options, stop_at_failure=True))
+    candidate = check_path(rover, terrain, poses, options, stop_at_failure=True)
+    return Judged(scenario, replace(candidate, poses=poses))

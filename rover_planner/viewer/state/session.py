@@ -207,9 +207,9 @@ class ViewSession:
 
     def _refuse(self, error: Exception) -> None:
         """Want again what was judged last, and judge what was left of it."""
-        back = self.shown.scenario
-        if not self.is_complete or self.wanted is not back:
-            self._ask(back, self.shown.index)
+        self.wanted, self._index = self.shown.scenario, self.shown.index
+        if self._background is not None or self.shown.old:
+            self._ask(self.wanted)
         self.refusal = str(error)
 
     # In the background.
