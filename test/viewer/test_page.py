@@ -23,6 +23,7 @@ pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
 from rover_planner.viewer.documents.limits import describe_uses
 from rover_planner.viewer.pages.page import Page
+from rover_planner.viewer.state.link import KEY
 
 pytestmark = [needs_browser, pytest.mark.slow]
 
@@ -222,7 +223,7 @@ def test_what_is_shown_is_sent_as_a_link_and_as_a_file_that_needs_no_network(
     visitor.open_tab("Share")
     visitor.press("Link to what is shown")
     address = visitor.tab.get_attribute("#link", "href")
-    assert address.startswith(f"{page.url}/?") and f"path={shown.index + 1}" in address
+    assert address.startswith(f"{page.url}/?{KEY}=")
     with visitor.tab.expect_download() as download:
         visitor.press("Save as HTML file")
     download.value.save_as(tmp_path / "refusal.html")

@@ -24,8 +24,6 @@ from support.viewer.sessions import LSR1, session_on, straight
 
 pytest.importorskip("trimesh", reason="no trimesh: pip install '.[view]'")
 
-from rover_planner.planning.search.nodes import nodes_within
-from rover_planner.viewer.scene.closed_area import cover_places
 from rover_planner.viewer.scene.ground_mesh import build_ground_mesh, intersect_ground
 
 # Trajectories.
@@ -66,30 +64,6 @@ def test_a_trajectory_without_waypoints_has_no_state():
     trajectory = trajectory_on(gap, np.add(straight(), [1.75, 0.0, 0.0]))
     assert trajectory.length == 0
     assert trajectory.state_at(0.0) is None
-
-
-@pytest.mark.parametrize(
-    ("height", "told"),
-    [
-        (lambda x, y: 0.0 * x, ()),
-        (lambda x, y: -0.1 * (x > 0.5), ("between waypoints the utilisation", "not asked while")),
-    ],
-    ids=["level", "edge"],
-)
-def test_what_lies_between_waypoints_and_what_is_exempt_is_said(height, told):
-    trajectory = trajectory_on(height, straight(3.0))
-    assert trajectory.verdict.traversable
-    prediction = trajectory.prediction
-    pairs = zip(trajectory.notes, told, strict=True)
-    assert all(note.startswith(begin) for note, begin in pairs)
-    if told:
-        between = prediction.between
-        largest = np.nanmax(between.friction_utilisation)
-        assert largest > 1.0  # more than the limit, though traversable
-        first, second = trajectory.notes
-        assert f"reaches {largest:.2f}" in first and "not asked" in first
-        assert "wheel lift, sinkage, friction and torque" in second
-        assert "front left and front right 1.20 to 1.26 m" in second
 
 
 # Playback.
@@ -208,24 +182,6 @@ def test_unknown_ground_is_left_out_of_the_mesh():
     assert len(holed.mesh.faces) < len(whole.mesh.faces)
     centres = holed.mesh.triangles_center
     assert not ((centres[:, 0] > 0.55) & (centres[:, 0] < 0.95)).any()
-
-
-def test_a_layer_covers_the_known_ground_of_its_places_and_nothing_else():
-    ground = make_terrain(gap)
-    nodes = nodes_within(0.2, (-4.0, -4.0), (4.0, 4.0))
-    places = np.zeros(nodes.shape, bool)
-    places[10:21, 20:31] = True  # x 0 to 2 m, y -2 to 0 m, and half a cell around
-    vertices, faces = cover_places(ground, nodes, places)
-    x, y, z = vertices.T
-    assert len(faces) and set(np.unique(faces)) == set(range(len(vertices)))
-    np.testing.assert_allclose([x.min(), x.max()], [-0.1, 2.1], atol=0.051)
-    np.testing.assert_allclose([y.min(), y.max()], [-2.1, 0.1], atol=0.051)
-    assert not np.any((x > 0.51) & (x < 0.99))  # unknown ground
-    column, row = np.rint((vertices[:, :2] - ground.origin) / ground.resolution).astype(int).T
-    np.testing.assert_array_equal(z, ground.elevation[row, column])
-    unknown = np.zeros(nodes.shape, bool)
-    unknown[:, 24] = True  # x = 0.8 m
-    assert not len(cover_places(ground, nodes, unknown)[1])
 
 
 def test_the_numbers_of_paths_stand_on_them_and_apart_from_each_other():

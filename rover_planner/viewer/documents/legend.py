@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rover_planner.viewer.state.colours import BEYOND, UNKNOWN, ColourScale, map_colours, to_css
+from rover_planner.viewer.state.colours import UNKNOWN, ColourScale, map_colours, to_css
 from rover_planner.viewer.state.survey_layers import ColouredGround
 
 STOPS = 9
@@ -45,7 +45,3 @@ def describe_survey(
     if differences:
         notes.append(f"not as on the page: {'; '.join(differences)}")
     return {"title": name, "gradient": [], "ends": [], "keys": keys, "notes": notes}
-
-
-HATCHED = to_css(BEYOND)
-"""Colour of hatched ground."""

@@ -35,7 +35,7 @@ def describe_verdict(shown: Shown, work: Work) -> dict[str, Any]:
         **describe_answer(verdict.traversable, f"path {shown.index + 1} of {len(shown.paths)}"),
         "headline": "" if failure is None else failure.headline,
         "where": "" if failure is None else write_place(failure),
-        "details": [*filter(None, (verdict.reason, closed)), *shown.path.trajectory.notes],
+        "details": [*filter(None, (verdict.reason, closed))],
         "old": work.old,
         "refusal": work.refusal,
         "judging": work.judging,

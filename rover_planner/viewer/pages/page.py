@@ -331,8 +331,6 @@ class Page(PageBase):
                 self.drawings.ask("the cameras are not moved", self._fit_cameras)
         if before is None or now.paths != before.paths or now.index != before.index:
             self.drawings.ask("the paths are not drawn", self._draw_paths)
-        if before is None or now.around is not before.around:
-            self.drawings.ask("the closed area is not drawn", self._draw_closed_area)
         depends = self._colouring.is_predicted or self._survey is not None
         if was is not None and depends and asked is not was:
             self._paint()
@@ -355,10 +353,6 @@ class Page(PageBase):
     def _draw_failure(self) -> None:
         shown = self.session.shown
         self.scene.failure.show(shown.scenario.rover, shown.path.failure)
-
-    def _draw_closed_area(self) -> None:
-        shown = self.session.shown
-        self.scene.closed.show(shown.scenario.rover, self.ground, shown.around)
 
     def _paint(self) -> None:
         shown, origin = self.session.shown, self.scene.frame.origin
@@ -430,7 +424,6 @@ class Page(PageBase):
         if old != self._greyed:
             self._greyed = old
             self.scene.paths.mark_old(old)
-            self.scene.closed.mark_old(bool(old))
 
     def advance(self, seconds: float) -> None:
         """Play on by a time of the visitor [s], and show what has changed."""

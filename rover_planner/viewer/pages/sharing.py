@@ -13,6 +13,7 @@ from typing import Any
 import rover_physics
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover, preset_names
+from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.soil_file import soil_named
 from rover_planner.errors import PlanningError
@@ -21,7 +22,6 @@ from rover_planner.viewer.front.channel import read_file
 from rover_planner.viewer.state.link import (
     PageLink,
     change_values,
-    fingerprint,
     list_changed_values,
     write_link,
 )

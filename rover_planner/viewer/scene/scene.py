@@ -10,7 +10,6 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.viewer.scene.cameras import FIT, Cameras
-from rover_planner.viewer.scene.closed_area import ClosedAreaOverlay
 from rover_planner.viewer.scene.failure_mark import FailureMark
 from rover_planner.viewer.scene.force_arrows import ForceArrows
 from rover_planner.viewer.scene.labels import Labels
@@ -35,7 +34,6 @@ class Scene:
         """The visitors' cameras."""
         labels = Labels(self._scene)
         self.paths = PathOverlay(self._scene, labels, self.frame)
-        self.closed = ClosedAreaOverlay(self._scene, self.frame)
         self.failure = FailureMark(self._scene, labels, self.frame)
         self._rover: Rover
         self._visual: RoverVisual | None = None

@@ -12,7 +12,6 @@ from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_rpy
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.traversability.verdict import Verdict
-from rover_planner.viewer.state.exemptions import describe_exemptions
 
 MAX_SLIP = 0.95
 """Slip ratio at which the shown rate of a wheel is limited."""
@@ -83,8 +82,6 @@ class Trajectory:
             end = min(end, verdict.first_failure + 1)
         self.length = end
         """Number of waypoints; 0 where the rover does not settle at the start."""
-        self.notes = describe_exemptions(prediction, end)
-        """Sentences on what lies between the waypoints, and on what the verdict did not ask."""
         self._series = dict.fromkeys(("time", "distance", "energy"), np.zeros(1))
         if end:
             self._series = _read_drive(rover, prediction.select(slice(end)))

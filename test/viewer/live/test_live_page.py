@@ -15,6 +15,7 @@ from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.viewer.live.listener import LiveLink
 from rover_planner.viewer.pages.live_page import LivePage
 from rover_planner.viewer.state.colours import UNKNOWN
+from rover_planner.viewer.state.link import PageLink, write_link
 from support import waiting
 from support.grounds import make_terrain, waves
 from support.viewer.sessions import PATIENCE, ask
@@ -22,7 +23,9 @@ from support.viewer.sessions import PATIENCE, ask
 pytestmark = pytest.mark.slow
 
 LSR1 = load_rover("lsr1")
-QUERY = "rover=lsr1&map=1&start=0,0,0&goal=1,0,0&torques=equal&layer=height"
+QUERY = write_link(
+    PageLink("lsr1", "0", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), "equal", "", 1, 0.0, "height", 0.0)
+)
 LEVEL = Terrain(np.zeros((160, 160)), 0.05, (-4.0, -4.0))
 
 
