@@ -165,9 +165,13 @@ def test_a_dragged_number_is_judged_and_the_reason_of_a_refused_one_stays_on_the
     wait_until(
         lambda: session.shown.scenario.rover.friction == pytest.approx(0.62, abs=0.05), "a quarter"
     )
+
+    def is_in_the_box() -> bool:
+        return float(visitor.box(FRICTION).input_value()) == session.wanted.rover.friction
+
+    wait_until(is_in_the_box, "the box")
     wait_for_rest(page)
-    friction = session.shown.scenario.rover.friction
-    wait_until(lambda: float(visitor.box(FRICTION).input_value()) == friction, "the box")
+    friction = session.wanted.rover.friction
     visitor.tab.locator("#sliders summary", has_text="Masses").click()
     visitor.box(last).scroll_into_view_if_needed()
     visitor.type_number("middle wheel x [m]", "0.6")

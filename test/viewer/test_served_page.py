@@ -102,6 +102,27 @@ def test_another_site_gets_no_channel(page):
 # What is told and drawn.
 
 
+def test_no_press_of_a_key_is_lost_and_of_a_slider_only_the_last_value_counts(page):
+    times, asked = page.session.shown.path.trajectory.times, []
+    ask(page, lambda: page.playback.go_to(0.0))
+    for _ in range(3):
+        page.hear({"ask": "step", "by": 1}, None)
+    wait_until(lambda: abs(page.playback.time - times[3]) < 1e-6, "three steps")
+    busy, go_on = threading.Event(), threading.Event()
+    page.requests.add(lambda: (busy.set(), go_on.wait(PATIENCE)))
+    assert busy.wait(PATIENCE)
+    page._answers["seek"], seek = (
+        lambda words, _box: asked.append(words["time"]),
+        page._answers["seek"],
+    )
+    for time_asked in (1.0, 2.0, 3.0):
+        page.hear({"ask": "seek", "time": time_asked}, None)
+    go_on.set()
+    wait_until(lambda: asked, "the last value")
+    page._answers["seek"] = seek
+    assert asked == [3.0]
+
+
 def test_a_changed_number_is_told_with_what_it_changes_and_can_be_undone_and_reset(page):
     for friction in (0.75, 0.7):
         change_friction(page, friction)
@@ -267,6 +288,7 @@ def test_a_failed_request_is_told_until_a_request_succeeds(page):
 
 def test_a_failed_picture_is_not_drawn_again_before_the_next_request(page, monkeypatch):
     tried = []
+    ask(page, lambda: None)  # nothing else is asked any more
 
     def fail_and_count(_frame):
         tried.append(True)

@@ -42,6 +42,8 @@ HOTKEYS: dict[Any, tuple[str, Words]] = {
     "home": ("To the start", {"ask": "seek", "time": 0.0}),
 }
 """What keys ask while the scene has the focus; page.js does the same elsewhere."""
+CONTINUOUS = ("value", "seek", "place")
+"""Words that come dozens of times a second while a slider is dragged."""
 MAX_PORT = 65535
 
 
@@ -132,10 +134,11 @@ class PageBase(ABC):
             pass
 
     def hear(self, words: Words, mailbox: Mailbox | None) -> None:
-        """Take what a visitor asks; a later value of the same kind replaces an earlier one."""
+        """Take what a visitor asks; a later value of a slider replaces an earlier one."""
         answer = self._answers.get(str(words.get("ask")))
         if answer is not None:
-            kind = f"{words['ask']} {words.get('label', '')}"
+            word = words["ask"]
+            kind = f"{word} {words.get('label', '')}" if word in CONTINUOUS else ""
             self.requests.add(lambda: answer(words, mailbox), kind)
 
     @abstractmethod

@@ -397,10 +397,14 @@ class Page(PageBase):
         made("subject", (shown.scenario,), lambda: describe_subject(shown.scenario, name))
         tell("verdict", describe_verdict(shown, work))
         is_judging = session.progress is not None
-        tell("paths", {
-            "rows": list_paths(shown, is_outdated=waits, is_judging=is_judging),
-            "shown": shown.index,
-        })  # fmt: skip
+        made(
+            "paths",
+            (shown, waits, is_judging),
+            lambda: {
+                "rows": list_paths(shown, is_outdated=waits, is_judging=is_judging),
+                "shown": shown.index,
+            },
+        )
         made("current", (shown, self._colouring), self._write_current)
         made("sliders", (wanted.loaded,), lambda: describe_sliders(wanted.loaded))
         made("values", (wanted, session.refusal), lambda: describe_values(wanted))
