@@ -64,9 +64,8 @@ def choose_answer(
         words = f"{newest.question}: {word}, {write_age(now - newest.heard)}"
         offers = [{"words": words, "ask": {"ask": "newest"}}]
     old = ""
-    if verdict is not None and (server.age is None or server.is_stale):
-        silent = "was not heard" if server.age is None else f"is silent for {server.age:.0f} s"
-        old = f"the server {silent}"
+    if verdict is not None and server.age is not None and server.is_stale:
+        old = f"the server is silent for {server.age:.0f} s"
     shown = plan if click is None else click.plan
     document = {**answer, "headline": headline, "old": old, "refusal": refusal, "offers": offers}
     return LiveAnswer(document, shown)

@@ -280,6 +280,7 @@ class LiveListener(Node):
         if not message.status:
             return
         status, now = message.status[0], time.monotonic()
+        self._ages[SIGN_OF_LIFE] = TopicAge(SIGN_OF_LIFE, now, True)
         about = {one.key: one.value for one in status.values}
         passes = status.level != DiagnosticStatus.ERROR
         question = f"question {about.get('request', '?')}, {about.get('service', '?')}"
