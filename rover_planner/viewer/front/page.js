@@ -7,6 +7,7 @@ const chosen = { tab: "Drive", lane: "", link: "", program: "", dragged: null };
 const at = (id) => document.getElementById(id);
 const SVG = "http://www.w3.org/2000/svg";
 const COLOURS = { rear: "#0072b2", middle: "#d55e00", front: "#00795a" };
+const SETTLE = 500; // [ms] after which a box shows the program's value, also if its own was refused
 const CLASSES = [["little", "to 50 %"], ["half", "to 80 %"], ["near", "to 100 %"],
   ["broken", "broken"], ["unasked", "not asked"]];
 
@@ -163,12 +164,13 @@ function drawSliders({ parts }) {
         if (event.target.value === "") return;
         ask({ ask: "value", label, value: Number(event.target.value) });
       };
-      const release = () => { chosen.dragged = null; drawValues(state.values); };
+      const settle = () => setTimeout(() => drawValues(state.values), SETTLE);
+      const release = () => { chosen.dragged = null; settle(); };
       const ends = { min: low, max: high, step: "any", "aria-label": label };
       return make("div", { class: "slider", "data-label": label },
         make("label", {}, label),
         make("input", { type: "range", ...ends, step, oninput: (event) => { chosen.dragged = label; send(event); }, onchange: release }),
-        make("input", { type: "number", ...ends, onchange: send }));
+        make("input", { type: "number", ...ends, onchange: (event) => { send(event); settle(); } }));
     }))));
   if (state.values) drawValues(state.values);
 }
