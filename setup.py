@@ -33,7 +33,7 @@ EXTRAS = {
         "ros-jazzy-rmw-fastrtps-cpp>=8.4,<9",
     ],
     "plots": ["matplotlib>=3.6,<4"],
-    "view": ["viser>=1.1.1,<1.2", "trimesh>=4.0,<6", "matplotlib>=3.6,<4"],
+    "view": ["viser>=1.1.1,<1.2", "websockets>=14", "trimesh>=4.0,<6", "matplotlib>=3.6,<4"],
     "bags": ["rosbags>=0.11,<1"],
     "survey": [
         "dask>=2024.8,<2027",
@@ -89,7 +89,7 @@ setup(
     name=NAME,
     version=read_version(),
     packages=find_packages(HERE, include=[f"{name}*" for name in IMPORT_PACKAGES]),
-    package_data={"rover_planner.viewer.browser": ["page.js"]},
+    package_data={"rover_planner.viewer.front": ["page.html", "page.css", "page.js"]},
     data_files=list_data_files(),
     python_requires=">=3.11",
     install_requires=REQUIRES,

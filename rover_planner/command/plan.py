@@ -83,7 +83,7 @@ def plan(
     )
     if dump is not None:
         write_query(dump, question, settings)
-    _ask(question, settings, out, picture)
+    _ask(question, settings, out, picture, Path(terrain).name)
 
 
 def replay_plan(
@@ -96,11 +96,15 @@ def replay_plan(
     from rover_planner.planning.search.query_file import read_query
 
     asked, settings = read_query(question, max_cells)
-    _ask(asked, settings, out, picture)
+    _ask(asked, settings, out, picture, f"the map of {question.name}")
 
 
 def _ask(
-    question: "SearchQuery", settings: "LatticeSettings", out: Path, picture: Path | None
+    question: "SearchQuery",
+    settings: "LatticeSettings",
+    out: Path,
+    picture: Path | None,
+    map_name: str,
 ) -> None:
     """Search the path, write it and print the report."""
     from rover_planner.command.prediction_files import write_prediction
@@ -121,7 +125,7 @@ def _ask(
     if picture is not None:
         from rover_planner.figures.path_picture import draw_path
 
-        draw_path(picture, question, answer)
+        draw_path(picture, question, answer, map_name)
     if answer.warning:
         typer.echo(f"warning: {answer.warning}", err=True)
     typer.echo(json.dumps(answer.report(), allow_nan=False))

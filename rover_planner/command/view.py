@@ -98,13 +98,14 @@ def view(
         _check_on_map(ground, start=start, goal=goal)
     _compile()
     low, high = choose_ends(model, ground)
-    session = ViewSession(model, ground, start or low, goal or high)
-    session.ground_name = name_ground(terrain, survey) or session.ground_name
+    name = name_ground(terrain, survey)
     with contextlib.ExitStack() as closing:
         if follow:
-            page = _follow(closing, session, host, port, terrain is not None)
+            given = name if terrain is not None else ""
+            page: PageBase = _follow(closing, model, ground, (host, port), given)
         else:
-            page = _show(session, (host, port), prediction, surveyed)
+            session = ViewSession(model, ground, start or low, goal or high)
+            page = _show(session, (host, port), prediction, surveyed, name)
         closing.callback(page.close)
         # What is there now stays. Looking through all of it for garbage takes 0.1 s each time.
         gc.freeze()
@@ -155,6 +156,7 @@ def _show(
     address: tuple[str, int],
     prediction: Path | None,
     survey: "ShownSurvey | None",
+    name: str,
 ) -> "PageBase":
     """Serve a page that plans, or replays a recorded prediction."""
     from rover_planner.command.prediction_files import read_prediction, read_recorded_assumptions
@@ -162,17 +164,21 @@ def _show(
 
     if prediction is not None:
         assumptions = read_recorded_assumptions(prediction)
-        if assumptions is not None and assumptions.rover != session.rover.name:
+        if assumptions is not None and assumptions.rover != session.wanted.rover.name:
             raise PlanningError(
                 f"{prediction} is about rover {assumptions.rover}; the page shows "
-                f"{session.rover.name}"
+                f"{session.wanted.rover.name}"
             )
         session.replay(*read_prediction(prediction), assumptions)
-    return Page(session, *address, survey=survey)
+    return Page(session, *address, survey=survey, ground_name=name)
 
 
 def _follow(
-    closing: contextlib.ExitStack, session: "ViewSession", host: str, port: int, has_ground: bool
+    closing: contextlib.ExitStack,
+    rover: "Rover",
+    ground: "Terrain",
+    address: tuple[str, int],
+    ground_name: str,
 ) -> "PageBase":
     """Serve a page that follows a live graph."""
     from rover_planner.viewer.live.listener import LiveLink
@@ -180,7 +186,7 @@ def _follow(
 
     link = LiveLink()
     closing.callback(link.close)
-    return LivePage(session, link.listener, host, port, has_ground=has_ground)
+    return LivePage(rover, ground, link.listener, *address, ground_name=ground_name)
 
 
 def _load_or_make(name: str | None, follow: bool, max_cells: int) -> "Terrain":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Draws the answer to a question for a path: the path, or the closed area, on the shaded map."""
+"""Draws the answer to a question for a path: on the shaded map, and the use of limits along it."""
 
 from pathlib import Path
 
@@ -8,6 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.patheffects import withStroke
 
+from rover_physics.results.uses import find_uses, limits_of
+from rover_physics.rover.model import Rover
 from rover_planner.figures.pictures import (
     INK,
     PASSABLE,
@@ -16,25 +18,36 @@ from rover_planner.figures.pictures import (
     drawing,
     find_extent,
 )
+from rover_planner.planning.path_query import Candidate
 from rover_planner.planning.search.path_search import SearchResult
 from rover_planner.planning.search.query import SearchQuery
 
+COLOURS, FAINT = ("#0072B2", "#009E73", "#CC79A7", "#E69F00"), "#BBBBBB"
+"""Colours of the most used limits, and of the others."""
 
-def draw_path(path: Path, question: SearchQuery, answer: SearchResult) -> None:
+
+def draw_path(path: Path, question: SearchQuery, answer: SearchResult, map_name: str) -> None:
     """Draw the map with start and goal, and the path or the area that is closed in.
+
+    Below a path is the use of each limit along it.
 
     Args:
         path: Picture to write; its suffix sets the format, such as .png.
         question: The question.
         answer: The answer to it.
+        map_name: Name of the map.
 
     Raises:
         PlanningError: The file cannot be written.
     """
     terrain = question.terrain
     elevation = np.asarray(terrain.elevation)
-    with drawing(path, (8.5, 7.0)) as figure:
-        axes = figure.subplots()
+    with drawing(path, (8.5, 7.0 if answer.path is None else 9.5)) as figure:
+        if answer.path is None:
+            axes = figure.subplots()
+        else:
+            axes, below = figure.subplots(2, height_ratios=(2.4, 1.0))
+            _draw_uses(below, question.rover, answer.path)
         extent = find_extent(terrain.origin, elevation.shape, terrain.resolution)
         draw_ground(axes, elevation, terrain.resolution, extent)
         if answer.closed is not None:
@@ -45,8 +58,32 @@ def draw_path(path: Path, question: SearchQuery, answer: SearchResult) -> None:
             axes.plot(x, y, color=PASSABLE, linewidth=2.2, path_effects=halo, label="way")
         _draw_end(axes, "start", np.asarray(question.start), INK)
         _draw_end(axes, "goal", np.asarray(question.goal), REFUSED)
-        axes.set_title(_title(answer), loc="left", wrap=True)
+        title = f"{question.rover.name} on {map_name}: {_title(answer)}"
+        axes.set_title(title, loc="left", wrap=True)
         axes.legend(loc="upper left", frameon=True, framealpha=0.85)
+
+
+def _draw_uses(axes: Axes, rover: Rover, path: Candidate) -> None:
+    """Draw the use of each limit over the distance, the most used ones first in the legend."""
+    prediction = path.prediction
+    limits = limits_of(rover, prediction.policy)
+    uses = find_uses(limits, prediction.results).use
+    titles = list(dict.fromkeys(row.title for row in limits.rows))
+    of_title = {
+        title: np.fmax.reduce(
+            uses[:, [k for k, row in enumerate(limits.rows) if row.title == title]], axis=1
+        )
+        for title in titles
+    }
+    ranked = sorted(titles, key=lambda title: -np.nanmax(of_title[title], initial=0.0))
+    for k, title in enumerate(ranked):
+        shown = k < len(COLOURS)
+        colour, width = (COLOURS[k], 1.4) if shown else (FAINT, 0.8)
+        label = title if shown else None
+        axes.plot(prediction.distance, of_title[title], color=colour, lw=width, label=label)
+    axes.axhline(1.0, color=REFUSED, linestyle=":", linewidth=1.2)
+    axes.set(xlabel="distance along the path [m]", ylabel="use of the limit, 1 at it", ylim=0.0)
+    axes.legend(loc="upper right", ncols=len(COLOURS))
 
 
 def _draw_area(axes: Axes, answer: SearchResult) -> None:

@@ -39,6 +39,10 @@ STYLE: dict[str, Any] = {
 PASSABLE, REFUSED = "#0072B2", "#D55E00"
 INK, UNKNOWN = "#222222", "#CCD6E6"
 """Colours of lines and texts, and of unknown ground."""
+BRIGHTEST = 1.1
+"""Brightness that would be white."""
+LEVEL = 2 / 3 / BRIGHTEST
+"""Grey of level ground in a picture, 0 to 1."""
 
 Extent = tuple[float, float, float, float]
 """Left, right, lower and upper edge [m]."""
@@ -131,4 +135,4 @@ def draw_ground(
     axes.set(xlabel="x [m]", ylabel="y [m]", aspect="equal")
     if min(elevation.shape) >= 2:
         shade = hill_shade(elevation, resolution)
-        axes.imshow(shade, origin="lower", extent=extent, cmap="gray", vmin=0.0, vmax=1.1)
+        axes.imshow(shade, origin="lower", extent=extent, cmap="gray", vmin=0.0, vmax=BRIGHTEST)

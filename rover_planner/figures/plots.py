@@ -35,7 +35,7 @@ SIDE_STYLES = {"right": "-", "left": (0, (3, 1.5))}
 
 # Ground is drawn in warm greys, so that the coloured paths stand out.
 _GROUND = LinearSegmentedColormap.from_list("ground", ["#6E6259", "#B5A99C", "#F1EAE0"])
-_COLUMNS = 3
+_COLUMNS = 6
 _EDGE = "#E4E1DC"
 
 
@@ -58,7 +58,7 @@ def draw_answers(
 
     The upper part shows the terrain with the candidate paths, coloured by verdict. The lower part
     shows wheel loads, friction utilisation, torque saturation and tip-over margin over distance,
-    for up to three chosen paths, or for refused paths if none was chosen.
+    up to the failure of a refused path, for up to _COLUMNS goals.
 
     Args:
         path: Picture to write; its suffix sets the format, such as .png.
@@ -72,9 +72,8 @@ def draw_answers(
     """
     if not answers:
         raise PlanningError("no answers to draw; there must be at least one")
-    passable = [a for a in answers if a.answer.traversable]
-    shown = (passable or list(answers))[:_COLUMNS]
-    with drawing(path, (12.5, 15.5)) as figure:
+    shown = list(answers)[:_COLUMNS]
+    with drawing(path, (max(12.5, 2.6 * len(shown)), 15.5)) as figure:
         grid = figure.add_gridspec(2, 1, height_ratios=(1.0, 1.05))
         above, below = (figure.add_subfigure(grid[row]) for row in (0, 1))
         if title:
@@ -262,8 +261,9 @@ def _panel_title(labelled: LabelledAnswer) -> str:
     """Return the heading of a column."""
     chosen = labelled.answer.chosen
     if labelled.answer.traversable:
-        return f"{labelled.name} ({labelled.intent}): chosen path, {chosen.length:.1f} m"
-    return f"{labelled.name} ({labelled.intent}): refused, {chosen.verdict.code}"
+        return f"{labelled.name} ({labelled.intent}):\nchosen path, {chosen.length:.1f} m"
+    reason = chosen.verdict.code.replace("_", " ")
+    return f"{labelled.name} ({labelled.intent}):\nrefused, {reason}"
 
 
 def _draw_quantity(axes: Axes, candidate: Candidate, name: str) -> None:

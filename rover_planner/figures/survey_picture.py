@@ -7,12 +7,13 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap
+from matplotlib.colors import ListedColormap, to_rgb
 from matplotlib.patches import Patch, Rectangle
 
 from rover_physics.traversability.classification import IMPASSABLE
 from rover_planner.figures.pictures import (
     INK,
+    LEVEL,
     UNKNOWN,
     Extent,
     draw_ground,
@@ -118,9 +119,20 @@ def _draw(path, store, shown, scale, labels, title, start=None) -> None:
             axes.plot(*start, "o", color=INK, markersize=7, markeredgecolor="white")
         axes.set(xlim=extent[:2], ylim=extent[2:])
         axes.set_title(title, loc="left")
-        handles = [Patch(color=colour, label=text) for text, colour in labels]
+        handles = [Patch(color=on_level_ground(colour), label=text) for text, colour in labels]
         figure.legend(handles=handles, loc="outside lower center", ncols=3)  # hides no ground
         _draw_scale_bar(axes, extent)
+
+
+def on_level_ground(colour) -> tuple[float, float, float]:
+    """Return a colour of a layer as it is on level ground; unknown ground has its own.
+
+    The layer lies over the shaded ground, so that a legend of pure colours would not match it.
+    """
+    if colour == UNKNOWN:
+        return to_rgb(UNKNOWN)
+    red, green, blue = (_STRENGTH * c + (1.0 - _STRENGTH) * LEVEL for c in to_rgb(colour))
+    return red, green, blue
 
 
 def _draw_scale_bar(axes: Axes, extent: Extent) -> None:

@@ -44,6 +44,18 @@ ABOUT_DRIVES = ("worst_utilisation", "tip_over_margin", "drive_energy")
 """Objectives that need drives."""
 
 
+def name_thing(name: str) -> str:
+    """Return the dotted name of a number of a rover file in words, such as "rear wheel x"."""
+    *path, last = name.replace("_", " ").split(".")
+    if path[:2] == ["suspension", "wheels"]:
+        return " ".join((*path[2:], "wheel", last))
+    parts = path[1:] if path[:1] in (["suspension"], ["masses"]) else path
+    if path[:1] == ["limits"]:
+        return f"{last} limit"
+    words = ["centre" if part == "com" else part for part in parts]
+    return " ".join((*words, last))
+
+
 def label_of(name: str, unit: str) -> str:
     """Return a name with its unit, as in heads of tables and at axes."""
     return f"{name} [{unit}]" if unit else name

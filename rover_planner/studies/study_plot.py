@@ -15,7 +15,7 @@ from rover_physics.numerics.arrays import Floats
 from rover_planner.figures.pictures import STYLE, drawing, new_figure
 from rover_planner.figures.wheel_colours import WHEEL_COLOURS
 from rover_planner.studies.runner import StudyResult
-from rover_planner.studies.study_file import OBJECTIVES, label_of
+from rover_planner.studies.study_file import OBJECTIVES, label_of, name_thing
 from rover_planner.studies.summary import describe_ties
 
 POINT, BEST, NOW = "#0072B2", "#D55E00", "#009E73"
@@ -61,7 +61,7 @@ def _draw(figure: Figure, result: StudyResult) -> None:
     _, what, unit = OBJECTIVES[result.study.objective]
     best = result.best
     at = ", ".join(
-        f"{parameter.name} {value:.4g} {parameter.unit}".rstrip()
+        f"{name_thing(parameter.name)} {value:.4g} {parameter.unit}".rstrip()
         for parameter, value in zip(result.study.parameters, best.values, strict=True)
     )
     lines = [f"{what}: best {best.objective:.4g} {unit}", f"at {at}", describe_ties(result)]
@@ -106,7 +106,7 @@ def _draw_curve(axes: Axes, result: StudyResult) -> None:
                   markersize=10, label="as good" if k == 0 else None)  # fmt: skip
     axes.legend(fontsize=8)
     _, what, unit = OBJECTIVES[study.objective]
-    axes.set_xlabel(label_of(parameter.name, parameter.unit))
+    axes.set_xlabel(label_of(name_thing(parameter.name), parameter.unit))
     axes.set_ylabel(label_of(what, unit))
 
 
@@ -143,8 +143,8 @@ def _draw_map(figure: Figure, axes: Axes, result: StudyResult) -> None:
     axes.legend()
     _, what, unit = OBJECTIVES[result.study.objective]
     figure.colorbar(points, ax=axes, label=label_of(what, unit))
-    axes.set_xlabel(label_of(first.name, first.unit))
-    axes.set_ylabel(label_of(second.name, second.unit))
+    axes.set_xlabel(label_of(name_thing(first.name), first.unit))
+    axes.set_ylabel(label_of(name_thing(second.name), second.unit))
 
 
 def _draw_progress(axes: Axes, result: StudyResult) -> None:

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A real browser for tests: finds and starts it, and operates the page as a user does."""
 
-import re
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -9,7 +8,6 @@ from typing import Any
 
 import pytest
 
-from rover_planner.viewer.panel.rover_tab import CHANGED
 from support import waiting
 
 viser = pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
@@ -68,7 +66,7 @@ class Visitor:
         self.tab.on("pageerror", lambda error: self.page_errors.append(str(error)))
         self.tab.set_default_timeout(1000.0 * WAIT)
         self.tab.goto(url)
-        self.tab.wait_for_selector("#dashboard")
+        self.tab.wait_for_selector("#board .wheel")
 
     def open_tab(self, name: str) -> None:
         """Open a tab of the panel."""
@@ -76,69 +74,49 @@ class Visitor:
 
     def press(self, name: str) -> None:
         """Press a button."""
-        self.tab.get_by_role("button", name=name, exact=True).or_(
-            self.tab.get_by_text(name, exact=True)
-        ).first.click()
+        self.tab.get_by_role("button", name=name, exact=True).click()
 
-    def row(self, label: str) -> Any:
-        """Return the row of the panel with a label, whether it is marked as changed or not."""
-        named = self.tab.get_by_text(label, exact=True).or_(
-            self.tab.get_by_text(f"{CHANGED}{label}", exact=True)
-        )
-        return named.locator("xpath=ancestor::*[.//input][1]")
+    def box(self, label: str) -> Any:
+        """Return the box of a number beside its slider."""
+        return self.tab.get_by_role("spinbutton", name=label, exact=True)
 
     def type_number(self, label: str, value: str) -> None:
-        """Type a value into the box beside a slider, key by key, and leave the box."""
-        box = self.row(label).locator("input").last
-        box.click()
-        keyboard = self.tab.keyboard
-        keyboard.press("Control+a")
-        keyboard.type(value)
-        keyboard.press("Tab")
-
-    def slider_value(self, label: str) -> float:
-        """Return the value in the box beside a slider."""
-        return float(self.row(label).locator("input").last.input_value())
+        """Type a value into the box beside a slider, and leave the box."""
+        self.box(label).fill(value)
+        self.tab.keyboard.press("Tab")
 
     def drag_slider(self, label: str, share: float, moves: int = 10) -> None:
         """Drag the thumb of a slider to a share of its range, in a number of moves."""
-        thumb = self.row(label).get_by_role("slider")
-        thumb.scroll_into_view_if_needed()
-        at, track = thumb.bounding_box(), thumb.locator("xpath=..").bounding_box()
-        x, y = at["x"] + 0.5 * at["width"], at["y"] + 0.5 * at["height"]
-        self.tab.mouse.move(x, y)
+        slider = self.tab.get_by_role("slider", name=label, exact=True)
+        slider.scroll_into_view_if_needed()
+        track = slider.bounding_box()
+        y = track["y"] + 0.5 * track["height"]
+        self.tab.mouse.move(track["x"] + 0.5 * track["width"], y)
         self.tab.mouse.down()
         self.tab.mouse.move(track["x"] + share * track["width"], y, steps=moves)
         self.tab.mouse.up()
 
     def choose(self, label: str, option: str) -> None:
-        """Choose an option of a drop-down, which a page that redraws its panel may close again."""
-
-        def is_chosen() -> bool:
-            self.row(label).locator("input:visible").first.click()
-            wanted = self.tab.get_by_role("option", name=option, exact=True)
-            try:
-                wanted.click(timeout=5000)
-            except Exception:  # playwright's TimeoutError; playwright is imported late
-                self.tab.keyboard.press("Escape")
-                return False
-            return True
-
-        wait_until(is_chosen, f"the option {option}")
+        """Choose an option of a drop-down."""
+        self.tab.get_by_label(label, exact=True).select_option(option)
 
     def text(self, selector: str) -> str:
         """Return the text of an element of the page."""
         return str(self.tab.inner_text(selector))
 
+    def texts(self, selector: str) -> list[str]:
+        """Return the texts of all elements of a kind."""
+        return [str(text) for text in self.tab.locator(selector).all_inner_texts()]
+
+    def is_on_screen(self, selector: str) -> bool:
+        """Return whether all of an element is within the window."""
+        box = self.tab.locator(selector).first.bounding_box()
+        below, beside = box["y"] + box["height"], box["x"] + box["width"]
+        return box["y"] >= 0.0 and below <= LAPTOP["height"] and beside <= LAPTOP["width"]
+
     def wait_for(self, text: str) -> None:
         """Wait until the page shows a text."""
         self.tab.wait_for_function("text => document.body.innerText.includes(text)", arg=text)
-
-    def number(self, name: str) -> float:
-        """Return a number of the dashboard, such as "Time"."""
-        found = re.search(rf"{name}\s+(-?[\d.]+)", self.text("#dashboard"))
-        assert found, f"no {name} on the dashboard: {self.text('#dashboard')}"
-        return float(found.group(1))
 
     def click_share(self, selector: str, share: float) -> None:
         """Click at a share of the width of an element, in the middle of its height."""

@@ -76,17 +76,13 @@ def _write(browser: Any, case: PictureCase, file: Path) -> str:
     """Write one picture; return what it shows."""
     rover, ground = load_rover("lsr1"), case.make()
     session = ViewSession(rover, ground, *(case.ends or choose_ends(rover, ground)))
-    session.ground_name = case.ground
-    page = Page(session, port=0)
+    page = Page(session, port=0, ground_name=case.ground)
     try:
         wait_until(lambda: not page.is_busy, "the verdicts")
         visitor = Visitor(browser, page.url, scale=1.0)
         _close_notice(visitor)
-        visitor.press("Got it")
         shows = _show_failure(page, visitor) if case.refused else _show_drive(page)
         time.sleep(SETTLE)  # what changes while a page opens may be drawn once more
-        page.requests.add(lambda: setattr(page._panels.controls, "outdated", True))
-        time.sleep(SETTLE)
         file.write_bytes(visitor.tab.screenshot())
         visitor.tab.close()
     finally:
@@ -96,7 +92,8 @@ def _write(browser: Any, case: PictureCase, file: Path) -> str:
 
 def _close_notice(visitor: Visitor) -> None:
     """Close the browser's notice that it draws without a graphics card."""
-    notice = visitor.tab.get_by_text("Software WebGL rendering detected")
+    scene = visitor.tab.frame_locator("#scene")
+    notice = scene.get_by_text("Software WebGL rendering detected")
     notice.wait_for()
     notice.locator("xpath=ancestor::*[.//button][1]").get_by_role("button").first.click()
     notice.wait_for(state="detached")
@@ -105,13 +102,13 @@ def _close_notice(visitor: Visitor) -> None:
 def _show_failure(page: Page, visitor: Visitor) -> str:
     """Show the first candidate that a wheel refuses, at its failure; return what fails."""
     session = page.session
-    for index, candidate in enumerate(session.shown.candidates):
-        if candidate.verdict.traversable:
+    for index, path in enumerate(session.shown.paths):
+        if path.verdict.traversable:
             continue
-        page.requests.add(lambda index=index: page.session.show_candidate(index))
+        page.hear({"ask": "show", "index": index}, None)
         wait_until(lambda index=index: session.shown.index == index, "the path")
         wait_until(lambda: not page.is_busy, "its verdicts")
-        failure = page.judged.failure
+        failure = session.shown.path.failure
         if failure is not None and failure.link in WHEELS:
             visitor.press("Go to the failure")
             at = min(failure.time, page.playback.duration)
@@ -122,9 +119,8 @@ def _show_failure(page: Page, visitor: Visitor) -> str:
 
 def _show_drive(page: Page) -> str:
     """Show the rover after a third of its drive."""
-    page.requests.add(lambda: page.playback.seek(page.playback.duration / 3.0))
-    page.requests.add(lambda: setattr(page._panels.controls, "outdated", True))
-    return page.session.shown.summary
+    page.hear({"ask": "seek", "time": page.playback.duration / 3.0}, None)
+    return page.session.shown.verdict.reason or "traversable"
 
 
 if __name__ == "__main__":

@@ -55,11 +55,9 @@ def blocked(x, y):
 def blocked_session() -> ViewSession:
     """Return a session of which some paths are refused and some pass; it searches briefly."""
     search = LatticeSettings(budget=0.5)
-    session = ViewSession(
+    return ViewSession(
         LSR1, make_terrain(blocked), (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0), search=search
     )
-    session.ground_name = "blocked.npz"
-    return session
 
 
 def shift(terrain: Terrain, by: tuple[float, float]) -> Terrain:
@@ -86,12 +84,11 @@ def ask(page: Any, action: Callable[[], Any]) -> None:
 def wait_for_rest(page: Any) -> None:
     """Wait until everything that is wanted is judged and shown."""
     session = page.session
-
-    def at_rest() -> bool:
-        done = session.shown.answered is session.shown.scenario is session.wanted
-        return done and not page.is_busy and page._changed_at is None
-
-    wait_until(lambda: at_rest() or session.refusal, "all judgements", PATIENCE)
+    wait_until(
+        lambda: (session.is_complete or session.refusal) and not page.is_busy,
+        "all judgements",
+        PATIENCE,
+    )
 
 
 def lowered_reef() -> Terrain:

@@ -11,8 +11,11 @@ from matplotlib.figure import Figure
 
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
+from rover_planner.figures.path_picture import draw_path
 from rover_planner.figures.plots import LabelledAnswer, draw_answers, hill_shade
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
+from rover_planner.planning.search.path_search import find_path
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 
 COARSE = PathQueryOptions(count=3, spacing=0.4, waypoint_spacing=0.1)
 
@@ -35,17 +38,30 @@ def ask(rover, terrain, name, goal):
     )
 
 
-def test_a_picture_shows_accepted_and_refused_answers(tmp_path, rover, holed):
+def test_a_picture_shows_accepted_and_refused_answers_each_with_its_curves(tmp_path, rover, holed):
     answers = [
         ask(rover, holed, "A", (0, 0, 0)),
         ask(rover, holed, "B", (4, 3, 0.5)),
         ask(rover, holed, "C", (9, 0, 0)),
     ]
     assert [one.answer.traversable for one in answers] == [True, False, False]
-    path = tmp_path / "picture.png"
+    path = tmp_path / "picture.svg"
     draw_answers(path, rover, holed, answers, "title")
-    assert path.read_bytes().startswith(b"\x89PNG")
-    assert path.stat().st_size > 50_000
+    text = path.read_text()
+    titles = ("A (plain):", "chosen path, 4.0 m", "B (plain):", "C (plain):", "refused, off map")
+    assert [title for title in titles if title not in text] == []
+
+
+def test_the_picture_of_a_plan_names_rover_and_map_and_shows_the_use_of_each_limit(
+    tmp_path, rover
+):
+    ground = Terrain(np.zeros((41, 41)), 0.1, (-2.0, -2.0))
+    question = SearchQuery(rover, ground, (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), PathQueryOptions())
+    answer = find_path(question, LatticeSettings(budget=5.0, ends_at_first=True))
+    draw_path(tmp_path / "plan.svg", question, answer, "hill.npz")
+    text = (tmp_path / "plan.svg").read_text()
+    words = ("lsr1 on hill.npz: way of 2.0 m", "use of the limit, 1 at it", "margin")
+    assert [one for one in words if one not in text] == []
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from rover_planner.errors import PlanningError
 from rover_planner.studies.objectives import climbs, tallest_step
 from rover_planner.studies.rover_values import find_key, vary
 from rover_planner.studies.runner import find_rover, run_study
-from rover_planner.studies.study_file import study_from_dict
+from rover_planner.studies.study_file import name_thing, study_from_dict
 from rover_planner.studies.summary import describe_ties
 
 LSR1 = load_rover("lsr1")
@@ -200,3 +200,18 @@ def test_rovers_as_good_within_the_resolution_are_named():
     assert max(values) - min(values) < 0.002  # the heights are found to 2 mm
     assert len(result.ties) == 2 and result.best not in result.ties
     assert describe_ties(result).startswith("as good within 0.002 m: suspension.bogie_pivot.z = ")
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("friction", "friction"),
+        ("wheel.radius", "wheel radius"),
+        ("suspension.bogie_pivot.x", "bogie pivot x"),
+        ("suspension.wheels.rear.x", "rear wheel x"),
+        ("masses.body.com.z", "body centre z"),
+        ("limits.tilt", "tilt limit"),
+    ],
+)
+def test_pictures_of_studies_name_things_in_words(name, words):
+    assert name_thing(name) == words

@@ -15,7 +15,7 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.survey.layers import CLASS_COLOURS, CLASS_NUMBERS
-from rover_planner.viewer.panel.legend import draw_survey_legend
+from rover_planner.viewer.documents.legend import describe_survey
 from rover_planner.viewer.scene.ground_mesh import build_survey_mesh
 from rover_planner.viewer.state.colours import UNKNOWN, from_css
 from rover_planner.viewer.state.survey_layers import CLASS, LIMIT, load_map, open_survey
@@ -54,9 +54,9 @@ def test_classes_have_the_colours_of_the_picture_and_a_legend_of_those_that_are_
     assert colour_at(shown, CLASS, HOLE) == UNKNOWN
     assert colour_at(shown, CLASS, (-3.0, 1.0)) == UNKNOWN
     found = shown.colour(CLASS, np.array([1.0]), np.array([1.0]))
-    legend = draw_survey_legend(CLASS, shown.describe(CLASS), found, ())
+    legend = str(describe_survey(CLASS, shown.describe(CLASS), found, ()))
     assert "impassable" in legend and "traction control" not in legend
-    assert "8 headings" in legend and "differs" not in legend
+    assert "8 headings" in legend and "not as on the page" not in legend
 
 
 def test_the_first_limit_has_a_colour_and_a_meaning_for_each_that_fails_somewhere(shown):

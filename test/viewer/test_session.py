@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rover_physics.errors import RoverFileError
 from rover_physics.names import WHEELS
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover, preset_names, rover_to_dict
@@ -27,11 +28,15 @@ from rover_planner.studies.rover_values import (
     with_value,
     write_rover,
 )
-from rover_planner.viewer.state.context import describe_scenario
+from rover_planner.viewer.documents.header import name_ground as name_by_size
+from rover_planner.viewer.documents.paths import list_paths
+from rover_planner.viewer.documents.rover import describe_changes
+from rover_planner.viewer.documents.verdict import Work, describe_verdict
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.trajectory import Trajectory
 from support.grounds import make_terrain, wall_at, waves
-from support.viewer.sessions import LSR1, session_on, straight
+from support.viewer.sessions import LSR1, blocked_session, ramp, session_on, straight
+from support.waiting import wait_until
 
 # The values of a rover.
 
@@ -54,48 +59,154 @@ def test_every_value_is_within_its_range_and_can_be_set(name):
             assert with_value(rover, value.keys, now) == rover
 
 
-def test_every_value_at_both_ends_is_judged_as_the_library_says_or_refused():
-    session, refused = session_on(waves, (-0.4, 0.0, 0.0), (0.4, 0.0, 0.0)), 0
-    for value in (one for values in list_values(LSR1).values() for one in values):
-        for number in (value.low, value.high):
-            before = session.rover
-            if not session.change_rover(value.keys, number):
-                assert session.refusal and session.rover == before
-                refused += 1
-                continue
-            poses, options = session.shown.candidate.poses, session.scenario.asked_options.model
-            _, verdict = judge_path(session.rover, session.terrain, poses, options)
-            assert session.shown.verdict.traversable == verdict.traversable
-            assert session.shown.verdict.reason == verdict.reason
-        assert session.restore_rover(LSR1, {})
-    assert refused > 0
+# What a person looks at, and what it is compared with.
+
+FRICTION = [("friction",)]
+Z = [("suspension", "wheels", name, 2) for name in ("rear", "middle", "front")]
 
 
-# The session.
+def refused_session() -> ViewSession:
+    """Return a session of which some paths pass, and a person looks at one that is refused."""
+    session = blocked_session()
+    verdicts = [path.verdict.traversable for path in session.shown.paths]
+    assert True in verdicts
+    session.show_path(verdicts.index(False))
+    return session
+
+
+def test_a_slider_never_swaps_the_path_that_is_looked_at_and_another_that_passes_is_offered():
+    session = refused_session()
+    poses, index = session.shown.path.poses, session.shown.index
+    for friction in (0.85, 0.3, 0.85):
+        session.change_rover(FRICTION, friction)
+        assert session.shown.index == index and session.shown.path.poses is poses
+        assert session.is_complete and session.shown.scenario.rover.friction == friction
+    assert not session.shown.verdict.traversable
+    session.change_options(policy="servo")
+    assert session.shown.path.poses is poses and session.shown.verdict.policy == "servo"
+    session.change_options(policy="equal")
+    [offer] = describe_verdict(session.shown, Work())["offers"]
+    assert offer["words"].startswith(f"path {session.shown.offer + 1} passes")
+    session.show_path(offer["ask"]["index"])
+    assert session.shown.verdict.traversable and session.shown.offer is None
+
+
+def test_before_and_after_stay_while_something_differs_from_the_loaded_rover():
+    session = session_on(ramp)
+    loaded = session.shown.path
+    for friction, passes in ((0.7, True), (0.3, False), (0.75, True)):
+        session.change_rover(FRICTION, friction)
+        shown = session.shown
+        assert (
+            shown.verdict.traversable == passes and shown.reference.candidate is loaded.candidate
+        )
+        changes = describe_changes(shown.path, shown.reference, is_kept=False)
+        assert changes["rover"] == [["friction [-]", "0.8", f"{friction:g}"]]
+        word = "passes" if passes else "refused"
+        assert changes["drive"][0] == ["verdict", "passes", word]
+    session.change_arm("arm_yaw", 0.5)
+    changes = describe_changes(session.shown.path, session.shown.reference, is_kept=False)
+    assert ["arm_yaw [rad]", "3.14159", "0.5"] in changes["rover"]
+    session.reset()
+    assert session.shown.reference is None
+
+
+def test_a_kept_reference_takes_the_place_of_the_loaded_rover_also_for_another_policy():
+    session = session_on(ramp)
+    session.change_rover(FRICTION, 0.7)
+    session.keep_reference()
+    assert session.shown.reference is None
+    session.change_options(policy="servo")
+    session.show_path(2)
+    reference = session.shown.reference
+    assert reference.verdict.policy == "equal" and reference.scenario.rover.friction == 0.7
+    np.testing.assert_array_equal(reference.poses, session.shown.path.poses)
+    session.drop_reference()
+    assert session.shown.reference.scenario.rover == LSR1
+
+
+def test_all_paths_are_judged_again_after_a_value_that_is_refused_and_old_ones_say_why():
+    session = session_on(waves)
+    session.judge_in_background(lambda: None)
+    try:
+        session.change_rover(Z, -0.19)
+        with pytest.raises(RoverFileError):
+            session.change_rover([("wheel", "radius")], -1.0)
+        wait_until(lambda: session.progress is None, "all paths", 60.0)
+        session.take_finished()
+        assert session.is_complete and session.wanted.rover.suspension.wheels["rear"][2] == -0.19
+        rows = list_paths(session.shown, is_outdated=False, is_judging=False)
+        assert not any(row["waits"] for row in rows)
+        session.change_rover(FRICTION, 0.7)
+        session.change_options(soil="best")  # it is refused when it is judged
+        wait_until(lambda: session.has_news and session.progress is None, "the refusal", 60.0)
+        session.take_finished()
+        assert "best" in session.refusal
+        wait_until(lambda: session.progress is None, "the paths that were left", 60.0)
+        session.take_finished()
+        assert session.is_complete and "best" in session.refusal
+    finally:
+        assert session.close()
+    half = replace(session.shown, scenario=replace(session.wanted))
+    rows = list_paths(half, is_outdated=True, is_judging=False)
+    assert {row["waits"] for row in rows} == {"old, was not judged again"}
 
 
 def test_a_refused_change_alters_nothing_and_says_why():
     session = session_on(waves)
-    shown, answer = session.shown, session.shown.answer
-    assert not session.change_rover([("wheel", "radius")], -1.0)
-    assert "wheel.radius" in session.refusal
-    assert not session.change_rover([("suspension", "wheels", "middle", 0)], 0.4)
-    assert "suspension.wheels.front" in session.refusal
-    assert not session.plan_to(np.array([np.nan, 0.0]))
-    assert not session.change_arm("arm_yaw", float("nan"))
-    assert not session.change_options(policy="best")
-    assert session.shown is shown and session.shown.answer is answer
-    assert session.rover == LSR1 and session.scenario.goal == (1.0, 0.0, 0.0)
-    assert session.plan_to(np.array([0.5, 0.5])) and not session.refusal
+    shown = session.shown
+    for keys, value in (
+        ([("wheel", "radius")], -1.0),
+        ([("suspension", "wheels", "middle", 0)], 0.4),
+    ):
+        with pytest.raises(RoverFileError):
+            session.change_rover(keys, value)
+    for change in (
+        lambda: session.plan_to(np.array([np.nan, 0.0])),
+        lambda: session.change_arm("arm_yaw", float("nan")),
+    ):
+        change()
+        assert session.refusal and session.shown is shown and session.wanted is shown.scenario
+    session.plan_to(np.array([0.5, 0.5]))
+    assert not session.refusal
+
+
+def test_undo_goes_back_change_by_change_and_never_to_another_rover():
+    session = session_on(waves)
+    for friction in (0.7, 0.6):
+        session.change_rover(FRICTION, friction)
+    for friction in (0.7, 0.8):
+        session.undo()
+        assert session.shown.scenario.rover.friction == friction
+    with pytest.raises(PlanningError, match="no change"):
+        session.undo()
+    session.change_rover(FRICTION, 0.6)
+    session.take_rover(load_rover("m2020"))
+    with pytest.raises(PlanningError, match="no change"):
+        session.undo()
+
+
+def test_a_path_is_judged_under_all_policies_and_one_that_cannot_judge_says_so():
+    session = session_on(ramp)
+    session.change_rover(FRICTION, 0.1)
+    by_policy = session.shown.by_policy
+    assert [one.traversable for one in by_policy] == [False] * 3
+    assert all(one.reason and not one.is_old for one in by_policy)
+    ground = make_terrain(ramp)
+    ground = replace(ground, elevation_std=np.full(ground.elevation.shape, 1e-3))
+    session = ViewSession(LSR1, ground, (-2.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    session.judge_again()
+    judged = {one.policy: one for one in session.shown.by_policy}
+    assert judged["servo"].traversable is None and "no bounds" in judged["servo"].reason
 
 
 def test_an_arm_with_a_payload_loads_the_wheels_below_it():
     session = session_on(lambda x, y: 0.0 * x)
     session.change_rover([("manipulator", "payload")], 2.0)
     session.change_arm("arm_yaw", 0.0)
-    ahead = session.shown.candidate.prediction.wheel_loads[0]
+    ahead = session.shown.path.candidate.prediction.wheel_loads[0]
     session.change_arm("arm_yaw", 3.14159)
-    behind = session.shown.candidate.prediction.wheel_loads[0]
+    behind = session.shown.path.candidate.prediction.wheel_loads[0]
     front, rear = [WHEELS.index(f"{end}_left") for end in ("front", "rear")]
     assert ahead[front] > behind[front] and ahead[rear] < behind[rear]
 
@@ -114,7 +225,7 @@ def test_a_recorded_prediction_is_shown_as_it_was_recorded(tmp_path):
     shown = session.shown
     assert shown.verdict.reason == verdict.reason != ""
     assert shown.verdict.first_failure == verdict.first_failure
-    state = shown.trajectory.state_at(10.0)
+    state = shown.path.trajectory.state_at(10.0)
     expected = Trajectory(LSR1, prediction, verdict).state_at(10.0)
     assert state is not None and expected is not None
     np.testing.assert_allclose(state.wheel_loads, expected.wheel_loads)
@@ -159,12 +270,11 @@ def test_a_file_of_other_shapes_or_types_is_refused(tmp_path, changes, names):
 
 def test_a_change_of_the_rover_judges_the_recorded_path_again(tmp_path):
     session, prediction, _ = recorded(tmp_path, straight())
-    assert session.change_rover([("friction",)], 0.4)
-    assert session.plan_again()
-    assert len(session.shown.answer.candidates) == 1
-    np.testing.assert_array_equal(session.shown.candidate.poses, prediction.poses)
+    session.change_rover([("friction",)], 0.4)
+    assert len(session.shown.paths) == 1 and session.shown.scenario.rover.friction == 0.4
+    np.testing.assert_array_equal(session.shown.path.poses, prediction.poses)
     session.plan_to(np.array([2.5, 0.5]))
-    assert len(session.shown.answer.candidates) > 1 and session.scenario.recorded is None
+    assert len(session.shown.paths) > 1 and session.wanted.recorded is None
 
 
 def test_a_replay_keeps_the_soil_the_policy_and_the_arm_it_was_predicted_with(tmp_path):
@@ -182,10 +292,10 @@ def test_a_replay_keeps_the_soil_the_policy_and_the_arm_it_was_predicted_with(tm
 
     session = ViewSession(LSR1, ground, (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
     session.replay(*read_prediction(file), read_recorded_assumptions(file))
-    assert (session.rover.friction, session.rover.manipulator.payload) == (0.7, 0.5)
-    assert session.scenario.arm_angles == angles
-    assert session.change_rover([("wheel", "width")], 0.07)
-    poses, rover = session.shown.candidate.poses, session.rover
+    assert (session.wanted.rover.friction, session.wanted.rover.manipulator.payload) == (0.7, 0.5)
+    assert session.wanted.arm_angles == angles
+    session.change_rover([("wheel", "width")], 0.07)
+    poses, rover = session.shown.path.poses, session.wanted.rover
     again = replace(options, friction=None, payload=None)
     _, expected = judge_path(rover, ground, poses, again, sigmas=2.0)
     assert session.shown.verdict.max_sinkage == expected.max_sinkage > verdict.max_sinkage
@@ -211,18 +321,17 @@ def test_default_ends_are_on_known_ground_where_the_rover_can_stand_at_most_10_m
     start, goal = choose_ends(LSR1, spirit)
     way = np.linspace(start[:2], goal[:2], 100)
     assert np.isfinite(spirit.elevation_at(way[:, 0], way[:, 1])).all()
-    assert ViewSession(LSR1, spirit, start, goal).shown.answer.traversable
+    assert ViewSession(LSR1, spirit, start, goal).shown.verdict.traversable
     start, goal = choose_ends(LSR1, Terrain(np.zeros((1200, 1200)), 0.1, (0.0, 0.0)))
     assert np.hypot(goal[0] - start[0], goal[1] - start[1]) == pytest.approx(10.0)
     steep = choose_ends(LSR1, make_terrain(lambda x, y: 2.0 * x))  # it can stand nowhere
     assert steep == (pytest.approx((-2.0, 0.0, 0.0)), pytest.approx((2.0, 0.0, 0.0)))
 
 
-def test_every_ground_has_a_name_in_the_header(tmp_path, monkeypatch):
+def test_every_ground_has_a_name(tmp_path, monkeypatch):
     (tmp_path / "mars.zarr").mkdir()
     monkeypatch.chdir(tmp_path / "mars.zarr")
     assert name_ground(None, None) == f"made, seed {SEED}"
     assert name_ground("maps/hill.npz", None) == "hill.npz"
     assert name_ground(None, Path(".")) == name_ground(None, Path("../mars.zarr/")) == "mars.zarr"
-    session = session_on(waves)
-    assert describe_scenario(session.shown.scenario, session.ground_name).ground == "8 x 8 m"
+    assert name_by_size(make_terrain(waves)) == "8 x 8 m"

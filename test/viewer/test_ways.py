@@ -1,27 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ways around obstacles on the page, without a browser: searched, shown, cancelled, explained."""
+"""Ways around obstacles, without a browser: searched, offered, looked at, cancelled, explained."""
 
-import dataclasses
 from collections.abc import Iterator
-from contextlib import contextmanager
-from functools import partial
 
 import numpy as np
 import pytest
 
-from rover_physics.names import TORQUE_POLICIES
 from rover_physics.traversability.judge import judge_path
 from rover_planner.planning.search.path_search import FOUND, NO_WAY
+from rover_planner.viewer.documents.verdict import Work, describe_verdict
 from rover_planner.viewer.state.background_work import Progress
-from rover_planner.viewer.state.judging import (
-    BETTER,
-    PATH,
-    POLICY,
-    SEARCH,
-    JudgeRequest,
-    judge_request,
-)
-from rover_planner.viewer.state.scenario import Shown
+from rover_planner.viewer.state.judging import BETTER, SEARCH, JudgeRequest, judge_request
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import wall_with_gap, whole_wall
 from support.viewer.sessions import LSR1, held, walled_session
@@ -34,73 +23,67 @@ BEYOND = np.array(GOAL[:2])
 FRICTION = [("friction",)]
 
 
-BEGIN = [*[PATH] * 5, 5, *[POLICY] * 3, 5, SEARCH]
-"""What is begun before and with a search, and how many candidates each result has."""
+def list_steps(session: ViewSession) -> list[str | int]:
+    """Return what is begun, and how many paths each result has, when all is judged."""
+    steps = judge_request(JudgeRequest(session.wanted))
+    return [one.what if isinstance(one, Progress) else len(one.paths) for one in steps]
 
 
-def judge(session: ViewSession) -> tuple[list, Shown]:
-    """Judge all; return what is begun and how many candidates each result has, and the last."""
-    steps = list(judge_request(JudgeRequest(session.wanted)))
-    names = [
-        one.what if isinstance(one, Progress) else len(one.answer.candidates) for one in steps
-    ]
-    return names, next(one for one in reversed(steps) if isinstance(one, Shown))
-
-
-def test_beyond_a_wall_with_a_gap_a_way_follows_the_refused_candidates_and_is_shown():
+def test_beyond_a_wall_with_a_gap_a_way_is_offered_and_the_path_looked_at_stays():
     session = walled_session(wall_with_gap)
-    assert session.plan_to(BEYOND)
+    session.plan_to(BEYOND)
     shown = session.shown
-    *direct, way = shown.candidates
+    *direct, way = shown.paths
     assert len(direct) == 5 and not any(one.verdict.traversable for one in direct)
-    assert shown.around.outcome == FOUND and shown.candidate is way
-    assert shown.index == shown.answer.best == shown.answer.nearest == 5
+    assert shown.around.outcome == FOUND and shown.path is not way and shown.offer == 5
+    [offer] = describe_verdict(shown, Work())["offers"]
+    assert offer["words"].startswith("way around, path 6 passes")
     poses = way.poses
-    np.testing.assert_allclose(poses[[0, -1], :2], [session.scenario.start[:2], BEYOND], atol=1e-9)
+    np.testing.assert_allclose(poses[[0, -1], :2], [shown.scenario.start[:2], BEYOND], atol=1e-9)
     assert np.all(poses[np.abs(poses[:, 0]) < 0.2, 1] > 1.0)
-    assert judge_path(LSR1, session.terrain, poses)[1].traversable
-    assert [one.policy for one in shown.by_policy] == list(TORQUE_POLICIES)
-    assert not any(one.is_old for one in shown.by_policy)
-    assert f"way of {shown.candidate.length:.1f} m around" in shown.summary
+    assert judge_path(LSR1, shown.scenario.terrain, poses)[1].traversable
 
 
 def test_the_first_way_is_shown_before_a_better_one_is_searched():
-    way = [6, *[POLICY] * 3, 6]
-    steps, _ = judge(walled_session(wall_with_gap, GOAL, ends_at_first=False))
-    assert steps in ([*BEGIN, *way, BETTER], [*BEGIN, *way, BETTER, *way])
+    steps = list_steps(walled_session(wall_with_gap, GOAL, ends_at_first=False))
+    after = steps[steps.index(SEARCH) + 1 :]
+    assert after in ([6, BETTER], [6, BETTER, 6])
 
 
 def test_where_there_is_no_way_the_reason_is_told():
-    steps, shown = judge(walled_session(whole_wall, GOAL))
-    assert steps == [*BEGIN, 5]
-    assert shown.around.outcome == NO_WAY and len(shown.candidates) == 5
-    assert not shown.verdict.traversable
-    assert shown.reason.startswith("no way within the map: ") and "closed in by: " in shown.reason
-    assert shown.reason.endswith(shown.verdict.reason)
+    session = walled_session(whole_wall, GOAL)
+    session.judge_again()
+    shown = session.shown
+    assert shown.around.outcome == NO_WAY and len(shown.paths) == 5
+    details = describe_verdict(shown, Work())["details"]
+    assert details[0] == shown.verdict.reason
+    assert details[1].startswith("no way: no way within the map: ") and "closed in" in details[1]
 
 
 def test_nothing_is_searched_where_a_candidate_passes_off_the_map_or_for_a_recorded_path():
     session = walled_session(wall_with_gap)
     for goal, passes in (((-1.1, 0.1), True), ((9.0, 0.0), False)):
-        assert session.plan_to(np.array(goal))
-        assert session.shown.around is None and session.shown.answer.traversable == passes
-        assert SEARCH not in judge(session)[0]
-    assert session.plan_to(np.array([-1.1, 0.1]))
-    session.replay(session.shown.candidate.prediction, session.shown.verdict.reasons)
-    assert session.change_rover(FRICTION, 0.05) and session.plan_again()
+        session.plan_to(np.array(goal))
+        assert session.shown.around is None and session.shown.verdict.traversable == passes
+        assert SEARCH not in list_steps(session)
+    session.plan_to(np.array([-1.1, 0.1]))
+    session.replay(session.shown.path.candidate.prediction, session.shown.verdict.reasons)
+    session.change_rover(FRICTION, 0.05)
     assert not session.shown.verdict.traversable and session.shown.around is None
 
 
-def test_a_slider_judges_the_shown_way_again_and_then_searches_another():
+def test_a_way_that_is_looked_at_stays_when_a_slider_moves_and_others_go_with_their_values():
     session = walled_session(wall_with_gap)
     session.plan_to(BEYOND)
-    poses, way = session.shown.candidate.poses, session.shown.around
-    assert session.change_rover(FRICTION, 0.7)
-    assert session.shown.index == 5 and session.shown.around is way
-    np.testing.assert_array_equal(session.shown.candidate.poses, poses)
-    assert session.plan_again()
-    assert session.shown.index == 5 and session.shown.around is not way
-    assert session.shown.verdict.traversable
+    session.show_path(5)
+    poses, way = session.shown.path.poses, session.shown.around
+    for friction in (0.7, 0.75):
+        session.change_rover(FRICTION, friction)
+        assert session.shown.index == 5 and len(session.shown.paths) == 6
+        np.testing.assert_array_equal(session.shown.path.poses, poses)
+    session.show_path(0)
+    session.change_rover(FRICTION, 0.72)
+    assert session.shown.index == 0 and session.shown.around is not way
 
 
 # In the background.
@@ -120,72 +103,32 @@ def finish(session: ViewSession) -> None:
     session.take_finished()
 
 
-@contextmanager
-def searching(session: ViewSession) -> Iterator[None]:
-    """Plan beyond the wall, take what is finished before the search, and let that go on later."""
+def test_a_search_can_be_cancelled_and_begun_again_and_a_chosen_path_stays_meanwhile(session):
+    finish(session)
     with held(session._background, SEARCH):
-        assert session.plan_to(BEYOND)
+        session.plan_to(BEYOND)
         wait_until(lambda: session.progress.what == SEARCH, "the search", 60.0)
-        assert session.progress.describe() == "searching a way"
         session.take_finished()
-        yield
-
-
-def test_while_a_way_is_searched_the_verdict_on_the_candidates_is_there(session):
-    with searching(session):
-        assert not session.is_outdated and len(session.shown.candidates) == 5
-        assert not session.shown.verdict.traversable
+        assert not session.is_outdated and not session.shown.verdict.traversable
         other = 1 if session.shown.index != 1 else 2
-        assert session.show_candidate(other)  # it stays, and the way is listed
-    finish(session)
-    assert session.shown.index == other and len(session.shown.candidates) == 6
-    assert session.shown.answer.nearest == 5 and session.shown.candidates[5].verdict.traversable
-    assert session.show_candidate(5)
-    finish(session)
-    assert session.shown.verdict.traversable
-
-
-def test_a_cancelled_search_leaves_the_verdict_on_the_candidates_and_can_be_begun_again(session):
-    with searching(session):
+        session.show_path(other)
+        wait_until(lambda: session.progress.what == SEARCH, "the search again", 60.0)
+        session.take_finished()
         shown = session.shown
         session.cancel()
         session.take_finished()
-        assert session.is_stopped and session.shown is shown and session.shown.around is None
-    assert session.plan_again()
+        assert session.is_stopped and session.shown is shown and shown.around is None
+    session.judge_again()
     finish(session)
-    assert session.shown.around.outcome == FOUND
-
-
-def test_the_way_of_a_rover_that_slips_is_no_candidate_once_it_can_climb_the_wall():
-    slippery = dataclasses.replace(LSR1, friction=0.35)
-    session = walled_session(partial(wall_with_gap, height=0.05), GOAL, slippery)
-    session.judge_in_background(lambda: None)
-    try:
-        finish(session)
-        assert session.shown.index == 5
-        session.change_rover(FRICTION, 1.5)
-        finish(session)
-        session.plan_again()
-        wait_until(lambda: session.progress is None, "all candidates", 60.0)  # and not taken yet
-        session.change_rover(FRICTION, 1.4)
-        session.take_finished()
-        session.change_rover(FRICTION, 1.3)
-        finish(session)
-        assert not session.is_outdated and session.rover.friction == 1.3
-        assert session.shown.candidates[session.shown.index].verdict.traversable
-        session.plan_again()
-        finish(session)
-        assert len(session.shown.candidates) == 5 and session.shown.answer.traversable
-    finally:
-        assert session.close()
+    assert session.shown.around.outcome == FOUND and session.shown.index == other
 
 
 def test_a_session_that_begins_before_a_wall_searches_as_soon_as_it_has_a_thread():
     session = walled_session(wall_with_gap, GOAL)
-    assert session.shown.needs_search and len(session.shown.candidates) == 5
+    assert session.shown.needs_search and len(session.shown.paths) == 5
     session.judge_in_background(lambda: None)
     try:
         finish(session)
-        assert session.shown.index == 5 and session.shown.verdict.traversable
+        assert session.shown.offer == 5
     finally:
         assert session.close()

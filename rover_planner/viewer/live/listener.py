@@ -24,7 +24,9 @@ from std_msgs.msg import Float64MultiArray
 
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.errors import MessageError
+from msg_adapters.identity import plan_request_hash
 from msg_adapters.paths import path_to_poses, stamped_pose, yaw_from_quaternion
+from msg_adapters.results.diagnostics import HEALTH
 from msg_adapters.results.predictions import array_values
 from rover_physics.errors import RoverError
 from rover_physics.names import WHEEL_JOINTS
@@ -37,11 +39,10 @@ from rover_planner.ros.qos import (
     service_qos,
     topic_qos,
 )
-from rover_planner.viewer.live.live_state import LiveValues, TopicAge
+from rover_planner.viewer.live.live_state import Click, LiveValues, LiveVerdict, TopicAge
 
 SERVER, CONTROLLER = "/traverse_server", "/traction_controller"
-ODOMETRY = "odometry"
-NO_ODOMETRY = TopicAge(ODOMETRY, None, True)
+ODOMETRY, SIGN_OF_LIFE = "odometry", "traverse_server"
 PREDICTED_FIELDS = {
     "wheel_loads": "wheel_loads",
     "friction_utilisation": "friction_utilisation",
@@ -57,16 +58,6 @@ ESTIMATED_FIELDS = {
 """Topics of the controller and the fields they fill, in place of predictions."""
 
 
-@dataclass(frozen=True)
-class LiveVerdict:
-    """The last verdict of the server."""
-
-    traversable: bool
-    """True if there is a path that the rover can drive."""
-    reason: str
-    """Reason of a refusal, empty where there is one."""
-
-
 @dataclass(frozen=True, eq=False)
 class LiveData:
     """The latest data; None for what has not come."""
@@ -78,14 +69,37 @@ class LiveData:
     plan: np.ndarray | None = None
     """(n, 3) poses of the plan, x, y [m], yaw [rad]."""
     verdict: LiveVerdict | None = None
-    """The verdict of the server."""
+    """The newest verdict of the server, whoever asked."""
+    click: Click | None = None
+    """The last question of a visitor; None without one."""
     ages: tuple[TopicAge, ...] = ()
     """The ages of all topics."""
 
     @property
     def odometry(self) -> TopicAge:
         """The age of the odometry, without which nothing here is live."""
-        return next((one for one in self.ages if one.topic == ODOMETRY), NO_ODOMETRY)
+        return self._age_of(ODOMETRY)
+
+    @property
+    def server(self) -> TopicAge:
+        """The age of the server's last sign of life."""
+        return self._age_of(SIGN_OF_LIFE)
+
+    @property
+    def freshness(self) -> str:
+        """Whether rover and server are live, in words."""
+        odometry, server = self.odometry, self.server
+        if odometry.age is None:
+            return "waiting for odometry"
+        if odometry.is_stale:
+            return f"not live: odometry is {odometry.age:.0f} s old"
+        if server.age is not None and server.is_stale:
+            return f"the rover is live; the server is silent for {server.age:.0f} s"
+        return "live"
+
+    def _age_of(self, topic: str) -> TopicAge:
+        known = {one.topic: one for one in self.ages}
+        return known.get(topic, TopicAge(topic, None, True))
 
 
 Take = Callable[[Any], None]
@@ -111,6 +125,8 @@ class LiveListener(Node):
         self._estimated: Mapping[str, np.ndarray] = {}
         self._ages: dict[str, TopicAge] = {}
         self._first_time: float | None = None
+        self._click: Click | None = None
+        self._click_lock = threading.Lock()
         self._planner = self.create_client(
             GetPlan, f"{SERVER}/can_traverse", qos_profile=service_qos()
         )
@@ -130,6 +146,9 @@ class LiveListener(Node):
         for topic, field in ESTIMATED_FIELDS.items():
             take = partial(self._on_estimate, field)
             self._listen(numbers, f"{CONTROLLER}/{topic}", take, topic_qos(), is_stream=True)
+
+        self._ages[SIGN_OF_LIFE] = TopicAge(SIGN_OF_LIFE, None, True)
+        self.create_subscription(DiagnosticArray, "diagnostics", self._on_diagnostics, topic_qos())
 
     def _listen(
         self, kind: Any, topic: str, take: Take, qos: QoSProfile, *, is_stream: bool = False
@@ -158,7 +177,7 @@ class LiveListener(Node):
         source = "forces estimated by the traction controller" if is_estimated else source
         forces: dict[str, Any] = {**self._forces, **estimated, "forces_from": source}
         values, ages = replace(data.values, **forces), tuple(self._ages.values())
-        return replace(data, values=values, ages=ages)
+        return replace(data, values=values, ages=ages, click=self._click)
 
     def request_plan(self, goal: np.ndarray) -> str:
         """Ask the server for a plan from the rover's pose to a goal (2,) [m].
@@ -176,8 +195,29 @@ class LiveListener(Node):
         request = GetPlan.Request(
             start=stamped_pose(start, self._frame), goal=stamped_pose((*goal, yaw), self._frame)
         )
-        self._planner.call_async(request)
+        click = Click(plan_request_hash(request.start, request.goal, 0.0), time.monotonic())
+        with self._click_lock:
+            self._click = click
+        self._planner.call_async(request).add_done_callback(partial(self._on_answer, click))
         return ""
+
+    def forget_click(self) -> None:
+        """Follow the server's newest verdict again."""
+        with self._click_lock:
+            self._click = None
+
+    def _on_answer(self, asked: Click, future: Any) -> None:
+        """Take the plan of a click, unless there was another one since."""
+        response = future.result()
+        with self._skipping("plan"), self._click_lock:
+            click = self._click
+            if click is not None and click.asked == asked.asked and response.plan.poses:
+                plan = path_to_poses(response.plan, self._frame)
+                self._click = replace(click, plan=plan)
+
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
+        if any(status.name == HEALTH for status in message.status):
+            self._ages[SIGN_OF_LIFE] = TopicAge(SIGN_OF_LIFE, time.monotonic(), True)
 
     def _on_joint_states(self, state: JointState) -> None:
         known = self._data.values
@@ -235,12 +275,22 @@ class LiveListener(Node):
             poses = path_to_poses(plan, self._frame) if plan.poses else None
             self._data = replace(self._data, plan=poses)
 
-    def _on_verdict(self, verdict: DiagnosticArray) -> None:
-        if verdict.status:
-            status = verdict.status[0]
-            passable = status.level != DiagnosticStatus.ERROR
-            verdict = LiveVerdict(passable, "" if passable else status.message)
-            self._data = replace(self._data, verdict=verdict)
+    def _on_verdict(self, message: DiagnosticArray) -> None:
+        """Take a verdict; it is that of the last click, too, if that asked the same."""
+        if not message.status:
+            return
+        status, now = message.status[0], time.monotonic()
+        self._ages[SIGN_OF_LIFE] = TopicAge(SIGN_OF_LIFE, now, True)
+        about = {one.key: one.value for one in status.values}
+        passes = status.level != DiagnosticStatus.ERROR
+        question = f"question {about.get('request', '?')}, {about.get('service', '?')}"
+        reason, hashed = "" if passes else status.message, about.get("question_hash", "")
+        verdict = LiveVerdict(passes, reason, question, hashed, now)
+        self._data = replace(self._data, verdict=verdict)
+        with self._click_lock:
+            click = self._click
+            if click is not None and click.verdict is None and click.question_hash == hashed:
+                self._click = replace(click, verdict=verdict)
 
     def _on_prediction(self, field: str, message: Float64MultiArray) -> None:
         with self._skipping(field):

@@ -16,7 +16,7 @@ from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
 from rover_planner.viewer.state.trajectory import RoverState
 
-MAX_AGE = 2.0
+MAX_AGE = 3.0
 """Age from which a topic that is published all the time is stale [s]."""
 
 
@@ -50,6 +50,36 @@ class TopicAge:
         if self.age is None:
             return "nothing yet"
         return f"{self.age:.1f} s" if self.age < 10.0 else f"{self.age:.0f} s"
+
+
+@dataclass(frozen=True, eq=False)
+class LiveVerdict:
+    """A verdict of the server."""
+
+    traversable: bool
+    """True if there is a path that the rover can drive."""
+    reason: str
+    """Reason of a refusal, empty where there is one."""
+    question: str
+    """Its question, such as "question 12, can_traverse"."""
+    question_hash: str
+    """`msg_adapters.identity.plan_request_hash` of the question."""
+    heard: float
+    """Time on the monotonic clock [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Click:
+    """A visitor's question to the server."""
+
+    question_hash: str
+    """As in `LiveVerdict`."""
+    asked: float
+    """Time on the monotonic clock [s]."""
+    verdict: LiveVerdict | None = None
+    """Its verdict; None until it comes."""
+    plan: Floats | None = None
+    """(n, 3) poses of its plan; None without one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,9 +156,10 @@ class StateBuilder:
             wheel_loads=values.wheel_loads,
             tangential=torques / radius,
             lateral=np.zeros(6),
-            friction=np.full(6, self._rover.friction),
-            friction_utilisation=values.friction_utilisation,
-            torque_saturation=np.abs(torques) / self._rover.wheel.max_torque,
+            friction_use=values.friction_utilisation / self._rover.limits.friction_utilisation,
+            torque_use=np.abs(torques)
+            / self._rover.wheel.max_torque
+            / self._rover.limits.torque_saturation,
             slip_ratio=values.slip_ratio,
             tip_over_ratio=values.tip_over_ratio,
             belly_clearance=float("nan"),

@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The base of every page: a viser server, its panels, and the one thread that changes them."""
+"""The base of every page: its channel, viser's scene, and the one thread that changes them."""
 
 import math
 import socket
 import threading
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -15,80 +14,41 @@ import numpy as np
 
 from rover_physics.files.validation import describe
 from rover_physics.numerics.arrays import Floats
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
-from rover_planner.viewer.browser.words import add_script
-from rover_planner.viewer.panel.header import Chip, Header
-from rover_planner.viewer.panel.notices import ErrorNotice
-from rover_planner.viewer.panel.plots import Plots
+from rover_planner.viewer.front.channel import Channel, Mailbox
+from rover_planner.viewer.pages.drawings import Action, Drawings, Errors
 from rover_planner.viewer.scene.cameras import VIEWS
 from rover_planner.viewer.scene.ground_mesh import intersect_ground
 from rover_planner.viewer.scene.scene import Scene
-from rover_planner.viewer.state.context import Context
-from rover_planner.viewer.state.session import REFUSALS, ViewSession
-from rover_planner.viewer.state.visitor_requests import Action, VisitorRequests
+from rover_planner.viewer.state.session import REFUSALS
+from rover_planner.viewer.state.visitor_requests import VisitorRequests
 
 PERIOD = 0.04
 """Time between two pictures [s]."""
 RESTART = 1.0
 """Time until a stopped page starts again [s]."""
-PANEL_WIDTH, PLOTS_WIDTH = 394, 300
-"""Widths of the panels on the right and on the left [px]; a laptop's screen shows the scene."""
 FOLLOW, STAY = "Follow", "Stay"
 """The last button of the camera: go along with the rover, or stop that."""
+Words = dict[str, Any]
+"""What a visitor asks: the word `ask` and its values."""
+Answer = Callable[[Words, Mailbox | None], None]
+"""Acts on what a visitor asks, whose mailbox it gets."""
+HOTKEYS: dict[Any, tuple[str, Words]] = {
+    "space": ("Play or pause", {"ask": "toggle"}),
+    "arrowleft": ("Step back", {"ask": "step", "by": -1}),
+    "arrowright": ("Step", {"ask": "step", "by": 1}),
+    "home": ("To the start", {"ask": "seek", "time": 0.0}),
+}
+"""What keys ask while the scene has the focus; page.js does the same elsewhere."""
+CONTINUOUS = ("value", "seek", "place")
+"""Words that come dozens of times a second while a slider is dragged."""
 MAX_PORT = 65535
 
 
-class Drawings:
-    """Drawings that follow the verdict, one at a time, in the order in which they were asked for.
-
-    A drawing shows what there is when it is done. One that is asked for again while it waits is
-    done once, at its old place in the order: it is never put off by newer changes. All methods
-    belong to the page's own thread, except for `waiting`.
-    """
-
-    def __init__(self, errors: ErrorNotice, together: Callable[[], AbstractContextManager[None]]):
-        """Begin with nothing to draw.
-
-        Args:
-            errors: Shows what could not be drawn.
-            together: Returns a context whose messages reach the visitors together.
-        """
-        self._errors, self._together = errors, together
-        self._asked: dict[str, Action] = {}
-
-    @property
-    def waiting(self) -> bool:
-        """True if something is still to be drawn, or is being drawn."""
-        return bool(self._asked)
-
-    def ask(self, failure: str, draw: Action) -> None:
-        """Draw something soon.
-
-        Args:
-            failure: What the page says if it fails, such as "the paths are not drawn"; it also
-                tells drawings apart.
-            draw: Draws it.
-        """
-        self._asked[failure] = draw
-
-    def draw_next(self) -> None:
-        """Draw what has waited longest, if there is anything."""
-        if not self._asked:
-            return
-        failure, draw = next(iter(self._asked.items()))
-        with self._together():
-            self._errors.run(failure, draw)
-        if self._asked[failure] is draw:
-            del self._asked[failure]
-
-    def draw_all(self) -> None:
-        """Draw all that waits."""
-        while self._asked:
-            self.draw_next()
-
-
 class PageBase(ABC):
-    """A served page. Callbacks of the browser only add requests for the page's own thread.
+    """A served page. Callbacks of browsers only add requests for the page's own thread.
 
     No error ends that thread. The page shows an error in a request and takes the next request. An
     error in a picture stops the pictures until the next request, or for `retry_after` [s]. After
@@ -98,37 +58,59 @@ class PageBase(ABC):
     retry_after = math.inf
     """Time from an error in a picture to the next picture without a request [s]."""
 
-    def __init__(self, session: ViewSession, host: str, port: int):
-        """Start the server; `start` starts the thread.
+    def __init__(self, rover: Rover, terrain: Terrain, host: str, port: int):
+        """Start the servers; `start` starts the thread.
 
         Args:
-            session: The state to show.
+            rover: The rover.
+            terrain: The ground.
             host: Address to serve on.
-            port: Port to serve on; 0 takes a free one.
+            port: Port of the page; the scene has the next free one. 0 takes free ones.
         """
         import viser
 
-        self.session = session
+        self._host = host
         self.requests = VisitorRequests()
         self._ended = threading.Event()
         self._fulfils = False
         self._stopped_at: float | None = None
         """When an error stopped the pictures [s]; None while they go on."""
-        self.server = viser.ViserServer(host, port, label="rover_planner", verbose=False)
-        self.server.gui.configure_theme(show_logo=False, show_share_button=False)
+        self._answers = self.list_answers()
+        try:
+            self.channel = Channel(host, port, self.hear)
+        except OSError:  # the port is taken
+            self.channel = Channel(host, 0, self.hear)
+        scene_port = self.channel.port + 1 if port and self.channel.port < MAX_PORT else 0
+        self.server = viser.ViserServer(host, scene_port, label="camera", verbose=False)
+        self.errors = Errors(lambda messages: self.channel.tell("errors", messages))
+        self.drawings = Drawings(self.errors, self.server.atomic)
         self.scene = Scene(self.server)
-        self.scene.frame.move_to(session.terrain)
-        self._add_panels()
+        self.scene.frame.move_to(terrain)
+        self.scene.draw_rover(rover, {})
+        self._add_camera()
+        self.channel.tell("scene", {"port": self.server.get_port()})
+        self._last = self._due = time.monotonic()
+        self._thread = threading.Thread(target=self._run, name="page", daemon=True)
+
+    def _add_camera(self) -> None:
+        """Add what needs to know which visitor looks: the camera and clicks into the scene."""
+        gui = self.server.gui
+        gui.configure_theme(show_logo=False, show_share_button=False)
+        gui.set_panel_label("Camera")
+        self._camera = gui.add_button_group("View", (*VIEWS, FOLLOW))
+        self._camera.on_click(self._request_view)
+        for key, (label, words) in HOTKEYS.items():
+            command = gui.add_command(label, hotkey=key)
+            command.on_trigger(partial(self._press, words))
         self.server.on_client_connect(self._aim_camera)
         self.server.scene.on_click()(partial(self._request_click, shift=False))
         self.server.scene.on_click(modifier="shift")(partial(self._request_click, shift=True))
-        self._last = self._due = time.monotonic()
-        self._thread = threading.Thread(target=self._run, name="page", daemon=True)
 
     @property
     def url(self) -> str:
         """Address of the page."""
-        return f"http://{self.server.get_host()}:{self.server.get_port()}"
+        host = "localhost" if self._host in ("0.0.0.0", "::") else self._host
+        return f"http://{host}:{self.channel.port}"
 
     @property
     def is_drawing(self) -> bool:
@@ -143,6 +125,7 @@ class PageBase(ABC):
         """End the page."""
         self._ended.set()
         self._thread.join(5.0)
+        self.channel.close()
         self.server.stop()
 
     def wait(self) -> None:
@@ -150,68 +133,54 @@ class PageBase(ABC):
         while not self._ended.wait(0.5):
             pass
 
+    def hear(self, words: Words, mailbox: Mailbox | None) -> None:
+        """Take what a visitor asks; a later value of a slider replaces an earlier one."""
+        answer = self._answers.get(str(words.get("ask")))
+        if answer is not None:
+            word = words["ask"]
+            kind = f"{word} {words.get('label', '')}" if word in CONTINUOUS else ""
+            self.requests.add(lambda: answer(words, mailbox), kind)
+
     @abstractmethod
-    def fill_panel(self) -> None:
-        """Add notices and tabs to the main panel."""
+    def list_answers(self) -> Mapping[str, Answer]:
+        """Return what the page does by the word `ask`; refusals are raised as errors."""
+
+    @property
+    @abstractmethod
+    def ground(self) -> Terrain:
+        """The ground that is shown."""
+
+    @property
+    @abstractmethod
+    def ends(self) -> tuple[Any, Any]:
+        """Start and goal, x and y first [m], along which a new camera looks."""
+
+    @property
+    @abstractmethod
+    def points(self) -> Floats:
+        """X and y (n, 2) [m] of what a view of everything shows."""
 
     @abstractmethod
     def click(self, point: Floats | None, shift: bool) -> None:
         """Act on a click at a point of the ground (2,) [m]; None beside known ground."""
 
     @abstractmethod
-    def hear(self, word: str, rest: str) -> None:
-        """Act on words of the page's script.
-
-        Args:
-            word: "open" a link, "show" a path, or "seek" on lanes and plots.
-            rest: The query of the address, the number of the path from 1, or the share, 0 to 1, of
-                the distance.
-
-        Raises:
-            RoverError, PlanningError: This page cannot.
-        """
-
-    @abstractmethod
     def advance(self, seconds: float) -> None:
         """Draw the next picture, after a time of the visitor [s]."""
 
-    def add_due_requests(self) -> None:
-        """Add requests whose time has come; called in each period, with or without pictures."""
-        return
-
     @abstractmethod
-    def describe_context(self) -> tuple[Context, tuple[Chip, ...]]:
-        """Return what the page is about, and the chips of its header; called in each period."""
+    def tell(self) -> None:
+        """Tell what is shown; called in each period, with or without pictures."""
 
     @abstractmethod
     def show_refusal(self, reason: str) -> None:
-        """Show, as text, why a request was refused."""
-
-    @abstractmethod
-    def path_to_look_at(self) -> Floats:
-        """Return x and y (n, 2) [m] of what a view of everything shows."""
-
-    def _add_panels(self) -> None:
-        gui = self.server.gui
-        gui.main_panel.dock_right()
-        gui.main_panel.set_width(PANEL_WIDTH)
-        self.header = Header(gui)
-        self.errors = ErrorNotice(gui)
-        self.drawings = Drawings(self.errors, self.server.atomic)
-        add = self.requests.add
-        add_script(gui, lambda word, rest: add(lambda: self.hear(word, rest), word))
-        self._camera = gui.add_button_group("Camera", (*VIEWS, FOLLOW))
-        self._camera.on_click(self._request_view)
-        left = gui.add_panel()
-        with left.add_tab("Limits and plots"):
-            self.plots = Plots(gui)
-        left.dock_left()
-        left.set_width(PLOTS_WIDTH)
-        self.fill_panel()
+        """Show why a request was refused."""
 
     def _aim_camera(self, client: Any) -> None:
-        now = self.session.scenario
-        self.scene.aim_camera(client, now.rover, now.terrain, now.start, now.goal)
+        self.scene.aim_camera(client, self.ground, *self.ends)
+
+    def _press(self, words: Words, _event: Any) -> None:
+        self.hear(words, None)
 
     def _request_view(self, event: Any) -> None:
         client, name = event.client, event.target.value
@@ -219,7 +188,7 @@ class PageBase(ABC):
         self.requests.add(lambda: act(client, name))
 
     def _look(self, client: Any, view: str) -> None:
-        self.scene.look(client, view, self.session.terrain, self.path_to_look_at())
+        self.scene.look(client, view, self.ground, self.points)
 
     def _follow(self, _client: Any, name: str) -> None:
         """Go along with the rover or not, and name the button by what it does next."""
@@ -232,10 +201,10 @@ class PageBase(ABC):
         def click() -> None:
             index = self.scene.paths.find_number(origin, direction)
             if index is not None:
-                self.hear("show", f"{index + 1}")
+                self.hear({"ask": "show", "index": index}, None)
                 return
             start = self.scene.frame.to_map(origin)
-            self.click(intersect_ground(self.session.terrain, start, direction), shift)
+            self.click(intersect_ground(self.ground, start, direction), shift)
 
         self.requests.add(click, "click")
 
@@ -250,14 +219,11 @@ class PageBase(ABC):
         Without anything to draw, a picture follows the requests at once.
         """
         self.requests.wait(0.0 if self.drawings.waiting else self._due - time.monotonic())
-        self.add_due_requests()
         self._fulfils = True
         for action in self.requests.take_all():
             self._fulfil(action)
         self._fulfils = False
-        self.errors.run(
-            "the header is not shown", lambda: self.header.show(*self.describe_context())
-        )
+        self.errors.run("what is shown is old", self.tell)
         self.drawings.draw_next()
         now = time.monotonic()
         if self.drawings.waiting and now < self._due:
@@ -287,8 +253,6 @@ class PageBase(ABC):
 
 def check_address(host: str, port: int) -> None:
     """Check that this machine can serve on an address; the port itself may be taken.
-
-    viser would search in vain for a free port, or wait for ever.
 
     Args:
         host: Name or address.

@@ -3,22 +3,45 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from rover_physics.numerics.arrays import Floats
-from rover_planner.viewer.panel.ground_tab import GroundTab
-from rover_planner.viewer.panel.legend import draw_survey_legend
+from rover_planner.viewer.documents.legend import describe_scale, describe_survey
 from rover_planner.viewer.scene.ground_mesh import (
     build_ground_mesh,
     build_survey_mesh,
     export_ground,
 )
-from rover_planner.viewer.scene.scene import Scene
 from rover_planner.viewer.state.background_work import BackgroundWork, Progress
-from rover_planner.viewer.state.colours import ColourScale
+from rover_planner.viewer.state.layers import HEIGHT, LAYERS
 from rover_planner.viewer.state.scenario import Scenario
-from rover_planner.viewer.state.survey_layers import ColouredGround, ShownSurvey
+from rover_planner.viewer.state.survey_layers import ShownSurvey
+
+
+@dataclass(frozen=True)
+class Colouring:
+    """What the ground is coloured by."""
+
+    layer: str = HEIGHT
+    """Name of the layer."""
+    heading: float = 0.0
+    """Heading of the rover for predicted layers [deg]."""
+    along: bool = False
+    """True if they are for the heading of the path instead."""
+
+    @property
+    def is_predicted(self) -> bool:
+        """True if the layer is predicted for the rover."""
+        return self.layer in LAYERS and LAYERS[self.layer].is_predicted
+
+    def describe(self) -> str:
+        """Return what the colours are of, in words."""
+        if not self.is_predicted:
+            return self.layer
+        at = "along the path" if self.along else f"at heading {self.heading:g} deg"
+        return f"{self.layer} {at}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,13 +50,12 @@ class PaintRequest:
 
     scenario: Scenario
     """Rover, ground and options."""
-    layer: str
-    """Name of the layer."""
-    heading: float | Floats
-    """Yaw of the rover, where the layer is predicted [rad]; or a path (n, 3) whose yaw at the
-    nearest waypoint it has."""
+    colouring: Colouring
+    """The layer."""
+    path: Floats
+    """(n, 3) poses whose yaw the rover has if predicted layers are for the path."""
     survey: ShownSurvey | None
-    """The survey whose layer it is; None if it is no survey's."""
+    """The survey; None if there is none."""
     origin: Floats
     """(3,) origin of the scene [m], map frame."""
 
@@ -44,69 +66,49 @@ class PaintedGround:
 
     glb: bytes
     """The ground as a file for the scene."""
-    scale: ColourScale | ColouredGround
-    """The values of its colours; the latter for a layer of a survey."""
+    legend: dict[str, Any]
+    """What its colours mean."""
 
 
 class GroundPainter:
-    """Draws the ground in the colours of the layer that the tab names."""
+    """Colours the newest ground that was asked for."""
 
-    def __init__(
-        self,
-        scene: Scene,
-        tab: GroundTab,
-        wake: Callable[[], object],
-        survey: ShownSurvey | None = None,
-    ):
-        """Start the thread; it calls `wake` when there is something for `show_painted`."""
-        self._scene, self._tab, self._survey = scene, tab, survey
+    def __init__(self, wake: Callable[[], object]):
+        """Start the thread; it calls `wake` when there is something to take."""
         self._asked: PaintRequest | None = None
         self.work: BackgroundWork[PaintRequest, PaintedGround] = BackgroundWork(
             _paint, wake, "ground"
         )
 
-    def paint(self, scenario: Scenario, path: Floats) -> None:
-        """Begin to colour the ground for a scenario and its shown path (n, 3)."""
-        fixed = float(np.radians(self._tab.heading))
-        heading = path if self._tab.is_along_path else fixed
-        survey = self._survey if self._tab.is_surveyed else None
-        origin = self._scene.frame.origin
-        self._asked = PaintRequest(scenario, self._tab.layer, heading, survey, origin)
-        self.work.ask(self._asked)
+    def paint(self, request: PaintRequest) -> None:
+        """Begin to colour."""
+        self._asked = request
+        self.work.ask(request)
 
-    def show_painted(self) -> None:
-        """Show the ground if it is finished.
+    def take(self) -> PaintedGround | None:
+        """Return the ground that was asked for last, if it is finished.
 
         Raises:
             Exception: It failed.
         """
-        for one in self.work.take():
-            if one.request is not self._asked:
-                continue
+        done = [one for one in self.work.take() if one.request is self._asked]
+        for one in done:
             if one.error is not None:
                 raise one.error
-            if one.result is not None:
-                self._scene.draw_ground(one.result.glb)
-                self._explain(one.request, one.result.scale)
-
-    def _explain(self, request: PaintRequest, scale: ColourScale | ColouredGround) -> None:
-        """Show what the colours mean."""
-        if isinstance(scale, ColourScale):
-            self._tab.show_scale(scale)
-        elif request.survey is not None:
-            survey, asked, name = request.survey, request.scenario, request.layer
-            differences = survey.find_differences(asked.rover, asked.asked_options.model)
-            description = survey.describe(name)
-            self._tab.show_legend(draw_survey_legend(name, description, scale, differences))
+        return done[-1].result if done else None
 
 
 def _paint(request: PaintRequest) -> Iterator[Progress | PaintedGround]:
-    yield Progress("colouring the ground", 1, 1)
-    asked, name = request.scenario, request.layer
-    if request.survey is not None:
-        mesh, meaning = build_survey_mesh(asked.terrain, request.survey, name)
-        yield PaintedGround(export_ground(mesh, request.origin), meaning)
+    yield Progress("ground")
+    asked, how, survey = request.scenario, request.colouring, request.survey
+    options = asked.asked_options.model
+    if survey is not None and how.layer in survey.names:
+        mesh, meaning = build_survey_mesh(asked.terrain, survey, how.layer)
+        differences = survey.find_differences(asked.rover, options)
+        words = survey.describe(how.layer)
+        legend = describe_survey(how.layer, words, meaning, differences)
     else:
-        options = asked.asked_options.model
-        drawn = build_ground_mesh(asked.rover, asked.terrain, name, request.heading, options)
-        yield PaintedGround(export_ground(drawn.mesh, request.origin), drawn.scale)
+        heading = request.path if how.along else float(np.radians(how.heading))
+        drawn = build_ground_mesh(asked.rover, asked.terrain, how.layer, heading, options)
+        mesh, legend = drawn.mesh, describe_scale(how.describe(), drawn.scale)
+    yield PaintedGround(export_ground(mesh, request.origin), legend)

@@ -2,36 +2,38 @@
 """The page that follows a live rover: the data of its topics, and plans asked of its server."""
 
 import time
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from rover_physics.numerics.arrays import Floats
+from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
-from rover_planner.viewer.browser.link import read_link
-from rover_planner.viewer.live.listener import NO_ODOMETRY, LiveData, LiveListener
-from rover_planner.viewer.live.live_state import StateBuilder, TopicAge
-from rover_planner.viewer.pages.base import PageBase
-from rover_planner.viewer.panel.board import BoardNotes
-from rover_planner.viewer.panel.dashboard import describe_verdict, draw_topics
-from rover_planner.viewer.panel.drive_tab import DriveTab
-from rover_planner.viewer.panel.ground_tab import GroundActions, GroundTab
-from rover_planner.viewer.panel.header import Chip, verdict_chip
-from rover_planner.viewer.panel.history import History
-from rover_planner.viewer.panel.plots import Curves
+from rover_planner.viewer.documents.board import describe_board
+from rover_planner.viewer.documents.legend import describe_scale
+from rover_planner.viewer.documents.live import choose_answer, list_topics
+from rover_planner.viewer.live.listener import LiveData, LiveListener
+from rover_planner.viewer.live.live_state import StateBuilder
+from rover_planner.viewer.pages.base import Answer, PageBase, Words
+from rover_planner.viewer.pages.ground_painter import Colouring
 from rover_planner.viewer.scene.ground_mesh import build_ground_mesh, export_ground
-from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN
-from rover_planner.viewer.state.context import Context
-from rover_planner.viewer.state.session import ViewSession
+from rover_planner.viewer.state.layers import LAYERS
+from rover_planner.viewer.state.link import read_link
+from rover_planner.viewer.state.trajectory import RoverState
 
-DASHBOARD_PERIOD = 0.2
-"""Time between two updates of dashboard and plots [s]."""
+BOARD_PERIOD = 0.2
+"""Time between two updates of the board [s]."""
 GROUND_PERIOD = 2.0
 """Shortest time between two pictures of the ground [s]."""
 RETRY = 2.0
 """Time from an error in a picture to the next one, which shows newer data [s]."""
 ARM_STEP = 0.01
 """Smallest turn of the arm that is drawn [rad]."""
+AHEAD = np.array([4.0, 0.0])
+"""From the rover to where a new camera looks [m]."""
 
 
 class LivePage(PageBase):
@@ -41,183 +43,173 @@ class LivePage(PageBase):
 
     def __init__(
         self,
-        session: ViewSession,
+        rover: Rover,
+        terrain: Terrain,
         listener: LiveListener,
         host: str = "127.0.0.1",
         port: int = 8080,
-        *,
-        has_ground: bool = False,
+        ground_name: str = "",
     ):
         """Start to serve.
 
         Args:
-            session: Holds the rover, and a terrain until a map comes.
+            rover: The rover.
+            terrain: The ground until a map comes.
             listener: Source of the data; the caller spins it.
             host: Address to serve on.
             port: Port to serve on; 0 takes a free one.
-            has_ground: Whether the session's terrain is that of the rover.
+            ground_name: Name of the terrain; empty if it is not that of the rover.
         """
-        self._listener = listener
-        self._history = History()
-        self._refusal = ""
-        self._shown: LiveData | None = None
-        """The data whose plan and verdict are shown; None to show them again.
-
-        It is kept, so that no later plan can have the same identity."""
-        self._shown_refusal = ""
-        self._last_terrain: Terrain | None = None
-        self._updated_at = self._ground_at = 0.0
-        self._camera_aimed = False
-        self._given_ground = session.ground_name if has_ground else "map not known yet"
-        """The page's name of the ground until a map comes."""
-        self._freshness = _describe_freshness(NO_ODOMETRY)
-        super().__init__(session, host, port)
-        self._builder = StateBuilder(session.rover)
-        self.scene.draw_rover(session.rover, {})
-        self._has_ground = has_ground
-        self._draw_ground()
+        self._listener, self._rover, self._terrain = listener, rover, terrain
+        self._ground_name, self._refusal = ground_name, ""
+        self._colouring, self._forces = Colouring(), True
+        self._data: LiveData = listener.latest()
+        self._first: Floats | None = None
+        """Where the rover was first seen (2,) [m]."""
+        self._drawn_plan: tuple[Floats | None, bool] | None = None
+        """The plan that is drawn, and whether it is grey; None to draw it again."""
+        self._told_at = self._ground_at = 0.0
+        super().__init__(rover, terrain, host, port)
+        self._builder = StateBuilder(rover)
+        predicted = [name for name, layer in LAYERS.items() if layer.is_predicted]
+        self.channel.tell("offers", {"layers": list(LAYERS), "predicted": predicted})
+        if ground_name:
+            self._draw_ground()
         self.start()
 
-    def fill_panel(self) -> None:
-        """Add the tabs Drive and Ground."""
-        gui, add = self.server.gui, self.requests.add
-        tabs = gui.add_tab_group()
-        self.drive_tab = DriveTab(gui, tabs.add_tab("Drive"), self.requests, None)
-        actions = GroundActions(
-            recolour=lambda: add(self._draw_ground, "colours"),
-            show_forces=lambda visible: add(lambda: self.scene.show_forces(visible)),
-        )
-        with tabs.add_tab("Ground"):
-            self.ground_tab = GroundTab(gui, actions, has_paths=False)
+    def list_answers(self) -> Mapping[str, Answer]:
+        """Return what the page does by the word `ask`."""
+        return {
+            "newest": lambda _words, _mailbox: self._listener.forget_click(),
+            "colour": lambda words, _mailbox: self._colour(words),
+            "forces": lambda words, _mailbox: self._show_forces(bool(words["shown"])),
+            "open": lambda words, _mailbox: _refuse_link(words["query"]),
+        }
 
-    def describe_context(self) -> tuple[Context, tuple[Chip, ...]]:
-        """Return what is followed, the server's verdict, and whether the data are fresh."""
-        rover, terrain = self.session.rover, self.session.terrain
-        ground = "elevation_cloud" if self._last_terrain is not None else self._given_ground
-        context = Context(rover.name, ground, ", ".join(terrain.soil_names), "", "live")
-        verdict = self._shown.verdict if self._shown is not None else None
-        passable = None if verdict is None else verdict.traversable
-        return context, (verdict_chip(passable, ""), self._freshness)
+    @property
+    def ground(self) -> Terrain:
+        """The ground that is shown."""
+        return self._terrain
+
+    @property
+    def ends(self) -> tuple[Any, Any]:
+        """Where the rover was first seen, and ahead of it."""
+        first = np.zeros(2) if self._first is None else self._first
+        return first, first + AHEAD
+
+    @property
+    def points(self) -> Floats:
+        """X and y (2, 2) [m] of the same places."""
+        return np.array(self.ends)
 
     def click(self, point: Floats | None, shift: bool) -> None:
         """Ask the server for a plan to a point."""
-        if point is None or not self._has_ground:
-            self.show_refusal("the click is beside the known ground")
-        else:
-            self.show_refusal(self._listener.request_plan(point))
-
-    def hear(self, word: str, rest: str) -> None:
-        """Refuse a link; the plan is the only path, and the rover is where it is."""
-        if word == "open" and read_link(rest) is not None:
-            raise PlanningError("this page follows a live rover, so it opens no links")
-
-    def path_to_look_at(self) -> Floats:
-        """Return x and y (2, 2) [m] of the places between which the rover was first seen."""
-        return np.array([self.session.scenario.start[:2], self.session.scenario.goal[:2]])
+        if point is None or not self._ground_name:
+            raise PlanningError("the click is beside the known ground")
+        self._refusal = self._listener.request_plan(point)
 
     def show_refusal(self, reason: str) -> None:
-        """Show, as text, why a request was refused; nothing if the reason is empty."""
+        """Show why a request was refused."""
         self._refusal = reason
 
+    def _colour(self, words: Words) -> None:
+        self._colouring = Colouring(words["layer"], float(words["heading"]))
+        if self._ground_name:
+            self._draw_ground()
+
+    def _show_forces(self, shown: bool) -> None:
+        self._forces = shown
+        self.scene.show_forces(shown)
+
     def _draw_ground(self) -> None:
-        if self._has_ground:
-            self.errors.run("the ground is not drawn", self._build_ground)
+        self.errors.run("the ground is not drawn", self._build_ground)
 
     def _build_ground(self) -> None:
-        tab, session = self.ground_tab, self.session
-        heading = float(np.radians(tab.heading))
-        ground = build_ground_mesh(session.rover, session.terrain, tab.layer, heading)
+        how = self._colouring
+        heading = float(np.radians(how.heading))
+        ground = build_ground_mesh(self._rover, self._terrain, how.layer, heading)
         self.scene.draw_ground(export_ground(ground.mesh, self.scene.frame.origin))
-        tab.show_scale(ground.scale)
+        self.channel.tell("legend", describe_scale(how.describe(), ground.scale))
+
+    def tell(self) -> None:
+        """Tell whose answer is shown and how old it is; the plan has the same age."""
+        data, now, tell = self._data, time.monotonic(), self.channel.tell
+        answer = choose_answer(
+            data.verdict, data.plan, data.click, data.server, now, self._refusal
+        )
+        tell("verdict", answer.document)
+        soil = ", ".join(self._terrain.soil_names)
+        ground = self._ground_name or "not known yet"
+        facts = {"rover": self._rover.name, "map": ground, "soil": soil, "mode": data.freshness}
+        tell("subject", facts)
+        how = self._colouring
+        tell("chosen", {
+            "layer": how.layer, "heading": how.heading, "along": False, "forces": self._forces,
+        })  # fmt: skip
+        shown, drawn = (answer.plan, answer.is_old), self._drawn_plan
+        if drawn is None or shown[0] is not drawn[0] or shown[1] != drawn[1]:
+            self._drawn_plan = shown
+            self.errors.run(
+                "the plan is not drawn",
+                lambda: self.scene.paths.show_plan(self._rover, self._terrain, *shown),
+            )
 
     def advance(self, seconds: float) -> None:
         """Show the latest data."""
-        data = self._listener.latest()
-        self._freshness = _describe_freshness(data.odometry)
+        data = self._data = self._listener.latest()
         now = time.monotonic()
-        self._show_ground(data, now)
-        self._show_plan(data)
+        self._take_terrain(data, now)
         state = self._builder.build(data.values)
+        if state is not None and data.odometry.is_stale:
+            state = _forget_forces(state)
         self.scene.show(state)
-        update = now - self._updated_at > DASHBOARD_PERIOD
-        self._updated_at = now if update else self._updated_at
-        if state is None:
-            if update:
-                self.drive_tab.show(self.session.rover, None, "waiting for odometry")
-                self.drive_tab.show_below(draw_topics(data.ages))
-            return
-        self._turn_arm(data)
-        if not self._camera_aimed:
-            self._camera_aimed = True
-            self._aim_cameras(state.position)
-        moved = self._history.add(state)
-        if update:
-            source = data.values.forces_from or "forces not known"
-            word = self._freshness.word
-            stale = data.odometry.is_stale
-            notes = BoardNotes(has_slip=bool(np.nan_to_num(state.slip_ratio).any()))
-            status = f"{word}; {source}"
-            self.drive_tab.show(self.session.rover, state, status, notes, stale=stale)
-            self.drive_tab.show_below(draw_topics(data.ages))
-        if moved and update:
-            curves = Curves(self._history.distance, self._history.values)
-            self.plots.set_curves(self.session.rover, curves)
-            self.plots.move_cursor(state.distance)
+        if state is not None:
+            self._turn_arm(data)
+            if self._first is None:
+                self._first = state.position[:2]
+                for client in self.server.get_clients().values():
+                    self._aim_camera(client)
+        if now - self._told_at > BOARD_PERIOD:
+            self._told_at = now
+            self._tell_board(state, data)
 
-    def _show_ground(self, data: LiveData, now: float) -> None:
+    def _tell_board(self, state: RoverState | None, data: LiveData) -> None:
+        slips = state is not None and bool(np.nan_to_num(state.slip_ratio).any())
+        self.channel.tell("board", describe_board(state, has_slip=slips))
+        words = f"{data.freshness}; {data.values.forces_from or 'forces not known'}"
+        self.channel.tell("drive", {"duration": None, "words": words})
+        self.channel.tell("topics", list_topics(data.ages))
+
+    def _take_terrain(self, data: LiveData, now: float) -> None:
         """Show a new map, at most every GROUND_PERIOD."""
         terrain = data.terrain
-        if terrain is None or terrain is self._last_terrain:
+        is_new = terrain is not None and terrain is not self._terrain
+        if terrain is None or not is_new or now - self._ground_at < GROUND_PERIOD:
             return
-        if now - self._ground_at < GROUND_PERIOD:
-            return
-        self._last_terrain = terrain
-        self.session.move(terrain=terrain)
+        self._terrain, self._ground_name, self._ground_at = terrain, "elevation_cloud", now
         if self.scene.frame.move_to(terrain):
-            self._camera_aimed = False
-        self._ground_at, self._has_ground, self._shown = now, True, None
+            self._first = None
+        self._drawn_plan = None
         self._draw_ground()
 
-    def _show_plan(self, data: LiveData) -> None:
-        """Show plan, verdict and refusal if one of them has changed."""
-        shown = self._shown
-        if (
-            shown is not None
-            and shown.plan is data.plan
-            and shown.verdict == data.verdict
-            and self._shown_refusal == self._refusal
-        ):
-            return
-        self._shown, self._shown_refusal = data, self._refusal
-        verdict, session = data.verdict, self.session
-        passable = None if verdict is None else verdict.traversable
-        reason = "click the ground to ask for a plan" if verdict is None else verdict.reason
-        self.drive_tab.show_verdict(describe_verdict(passable, reason, self._refusal, ""))
-        self.errors.run(
-            "the plan is not drawn",
-            lambda: self.scene.paths.show_plan(session.rover, session.terrain, data.plan),
-        )
-
     def _turn_arm(self, data: LiveData) -> None:
-        arm = self.session.rover.manipulator
+        arm = self._rover.manipulator
         if arm is not None:
             joints = data.values.joints
             known = {name: joints[name] for name in arm.joints if name in joints}
             steps = {name: ARM_STEP * round(angle / ARM_STEP) for name, angle in known.items()}
             self.scene.turn_arm(steps)
 
-    def _aim_cameras(self, position: Floats) -> None:
-        """Aim the cameras of all visitors, present and future, at the rover."""
-        ahead = (float(position[0]) + 4.0, float(position[1]), 0.0)
-        self.session.move(start=(float(position[0]), float(position[1]), 0.0), goal=ahead)
-        for client in self.server.get_clients().values():
-            self._aim_camera(client)
+
+def _forget_forces(state: RoverState) -> RoverState:
+    """Return a state of which nobody knows the forces any more: grey wheels without arrows."""
+    unknown = np.full(6, np.nan)
+    names = ("wheel_loads", "tangential", "lateral", "friction_use", "torque_use", "slip_ratio")
+    values: dict[str, Any] = dict.fromkeys(names, unknown)
+    return replace(state, **values, tip_over_ratio=float("nan"))
 
 
-def _describe_freshness(odometry: TopicAge) -> Chip:
-    """Return the chip that tells whether the page shows the rover as it is now."""
-    if odometry.age is None:
-        return Chip("waiting for odometry", UNKNOWN, "fresh")
-    if odometry.is_stale:
-        return Chip(f"not live: odometry is {odometry.age:.0f} s old", REFUSED, "fresh")
-    return Chip("live", PASSABLE, "fresh")
+def _refuse_link(query: str) -> None:
+    """Refuse a link; the plan is the only path, and the rover is where it is."""
+    if read_link(query) is not None:
+        raise PlanningError("this page follows a live rover, so it opens no links")

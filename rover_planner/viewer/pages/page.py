@@ -1,36 +1,60 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The page that plans: its tabs, and what visitors can request of the session behind it."""
+"""The page that plans: what visitors ask of the session, and one function that shows its state."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_file import load_rover, preset_names
+from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.soil_file import load_soils
 from rover_planner.errors import PlanningError
-from rover_planner.studies.rover_values import RoverValue
-from rover_planner.viewer.browser.link import PageLink, read_link
-from rover_planner.viewer.pages.base import PageBase
-from rover_planner.viewer.pages.ground_painter import GroundPainter
-from rover_planner.viewer.pages.judged_display import JudgedDisplay, Panels
-from rover_planner.viewer.pages.sharing import Sharing
-from rover_planner.viewer.panel.drive_tab import DriveTab
-from rover_planner.viewer.panel.ground_tab import GroundActions, GroundTab
-from rover_planner.viewer.panel.header import Chip, play_chip, verdict_chip
-from rover_planner.viewer.panel.notices import JudgingNotice
-from rover_planner.viewer.panel.rover_tab import RoverActions, RoverTab
-from rover_planner.viewer.state.context import Context, describe_scenario
-from rover_planner.viewer.state.playback import Playback
+from rover_planner.studies.rover_values import read_rover, write_rover
+from rover_planner.viewer.documents.board import describe_board
+from rover_planner.viewer.documents.header import POLICY_TITLES, describe_subject, name_ground
+from rover_planner.viewer.documents.limits import (
+    describe_curves,
+    describe_limits,
+    describe_uses,
+)
+from rover_planner.viewer.documents.paths import list_paths
+from rover_planner.viewer.documents.rover import (
+    describe_changes,
+    describe_sliders,
+    describe_values,
+    list_numbers,
+)
+from rover_planner.viewer.documents.verdict import Work, describe_verdict
+from rover_planner.viewer.front.channel import Mailbox
+from rover_planner.viewer.pages.base import Answer, PageBase, Words
+from rover_planner.viewer.pages.ground_painter import Colouring, GroundPainter, PaintRequest
+from rover_planner.viewer.pages.sharing import MapPrint, make_link, read_scenario, write_file
+from rover_planner.viewer.scene.cameras import find_radius
+from rover_planner.viewer.state.layers import LAYERS
+from rover_planner.viewer.state.link import PageLink, read_link, write_link
+from rover_planner.viewer.state.playback import SPEEDS, Playback
+from rover_planner.viewer.state.scenario import Scenario, Shown
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.survey_layers import ShownSurvey
+from rover_planner.viewer.state.trajectory import RoverState
 
 DRAWING_TIME, DRAWING_POLL = 0.2, 0.002
 """Longest time for which judging waits for the drawings, and between two looks at them [s]."""
-REPLAN_DELAY = 0.5
-"""Time from the last change of the rover until all candidates are judged again [s]."""
+NOTICE_DELAY = 0.2
+"""Time without a result after which the page tells what it judges, and greys what is old [s]."""
+BOARD_PERIOD = 0.1
+"""Time between two updates of board and lanes while it plays [s]."""
+AT_FAILURE = 0.06
+"""Time from a failure within which the rover is shown as it fails [s]."""
+MUCH_LARGER = 1.5
+"""Ratio of the sizes of two rovers above which the cameras find a new place."""
 
 
 class Page(PageBase):
-    """Shows what the session judges in the background, and plays the path that is shown.
+    """Shows what the session judges in the background, and plays the path that is looked at.
 
     The page's own thread asks for judgements and takes them; it waits for none.
     """
@@ -41,6 +65,7 @@ class Page(PageBase):
         host: str = "127.0.0.1",
         port: int = 8080,
         survey: ShownSurvey | None = None,
+        ground_name: str = "",
     ):
         """Start to serve a session.
 
@@ -49,80 +74,39 @@ class Page(PageBase):
             host: Address to serve on.
             port: Port to serve on; 0 takes a free one.
             survey: A survey of rover and ground, whose layers are offered.
+            ground_name: What the page calls the ground (default: its size).
         """
+        self.session, self.playback = session, Playback()
+        self._ground_name = ground_name or name_ground(session.wanted.terrain)
         self._survey = survey
-        self.playback = Playback()
-        self._changed_at: float | None = None
-        """When the rover was changed last [s]; None if all candidates are judged for it."""
-        super().__init__(session, host, port)
-        self._painter = GroundPainter(
-            self.scene,
-            self.ground_tab,
-            lambda: self.requests.add(self.judged.take_ground, "painted"),
-            survey,
-        )
-        self.judged = JudgedDisplay(session, self.playback, self._panels, self._painter)
-        self.drive_tab.go_to_failure = self.judged.go_to_failure
+        self._layers = (*(survey.names if survey is not None else ()), *LAYERS)
+        self._colouring = Colouring(self._layers[0])
+        self._map_print = MapPrint(session.wanted.terrain)
+        self._click_sets, self._forces = "goal", True
+        self._drawn: Shown | None = None
+        """What the scene shows, or will when its drawings are done."""
+        self._greyed: frozenset[int] = frozenset()
+        self._opening: tuple[PageLink, Scenario] | None = None
+        """The link whose path and time are not shown yet, and what it asks for."""
+        self._moved, self._told_at = True, 0.0
+        super().__init__(session.wanted.rover, session.wanted.terrain, host, port)
+        self._painter = GroundPainter(lambda: self.requests.add(self._take_ground, "painted"))
+        self.channel.tell("offers", self._list_offers())
         session.judge_in_background(self._show_and_wait)
-        self.judged.show_all()
+        self._show(session.shown)
+        self._paint()
         self.start()
 
-    def fill_panel(self) -> None:
-        """Add the notice of what is judged, and the tabs."""
-        gui, add = self.server.gui, self.requests.add
-        notice = JudgingNotice(
-            gui,
-            cancel=lambda: add(self._cancel, "cancel"),
-            judge_again=lambda: add(self._judge_again, "judge again"),
-        )
-        tabs = gui.add_tab_group()
-        self.drive_tab = DriveTab(gui, tabs.add_tab("Drive"), self.requests, self.playback)
-        self.rover_tab = RoverTab(gui, tabs.add_tab("Rover"), self._rover_actions())
-        with tabs.add_tab("Ground and path"):
-            self.candidates = gui.add_html("")
-            names = () if self._survey is None else self._survey.names
-            self.ground_tab = GroundTab(gui, self._ground_actions(), surveyed=names)
-        with tabs.add_tab("Share"):
-            self.sharing = Sharing(
-                self.server, self.requests, self.session, self.playback, self.ground_tab
-            )
-        assert self.drive_tab.controls is not None
-        self._panels = Panels(
-            self.scene,
-            self.errors,
-            self.drawings,
-            notice,
-            self.plots,
-            self.drive_tab,
-            self.drive_tab.controls,
-            self.rover_tab,
-            self.ground_tab,
-            lambda table: setattr(self.candidates, "content", table),
-        )
-
-    def _rover_actions(self) -> RoverActions:
-        add = self.requests.add
-        return RoverActions(
-            load=lambda read: add(lambda: self._load(read)),
-            change=lambda value, number: add(
-                lambda: self._change_value(value, number), f"value {value.keys}"
-            ),
-            turn_arm=lambda joint, angle: add(
-                lambda: self._turn_arm(joint, angle), f"joint {joint}"
-            ),
-            current=lambda: self.session.wanted.rover,
-            undo=lambda: add(self._undo, "undo"),
-            reset=lambda: add(lambda: self._restore(self.session.wanted.loaded, {}), "reset"),
-        )
-
-    def _ground_actions(self) -> GroundActions:
-        add = self.requests.add
-        return GroundActions(
-            set_options=lambda **changes: add(lambda: self._change_options(**changes)),
-            recolour=lambda: add(self.judged.draw_ground, "colours"),
-            show_forces=lambda visible: add(lambda: self.scene.show_forces(visible)),
-            show_between=lambda visible: add(lambda: self.scene.failure.show_between(visible)),
-        )
+    def _list_offers(self) -> dict[str, Any]:
+        """Return what the page's boxes offer."""
+        return {
+            "layers": list(self._layers),
+            "predicted": [name for name, layer in LAYERS.items() if layer.is_predicted],
+            "presets": list(preset_names()),
+            "soils": list(load_soils()),
+            "policies": [[name, title] for name, title in POLICY_TITLES.items()],
+            "speeds": list(SPEEDS),
+        }
 
     @property
     def is_busy(self) -> bool:
@@ -137,117 +121,185 @@ class Page(PageBase):
         self.session.close()
         self._painter.work.close()
 
-    def describe_context(self) -> tuple[Context, tuple[Chip, ...]]:
-        """Return what is judged, the verdict, and what is played."""
+    @property
+    def ground(self) -> Terrain:
+        """The ground that is shown."""
+        return self.session.shown.scenario.terrain
+
+    @property
+    def ends(self) -> tuple[Any, Any]:
+        """Start and goal."""
+        now = self.session.shown.scenario
+        return now.start, now.goal
+
+    @property
+    def points(self) -> Floats:
+        """X and y (n, 2) [m] of the path that is looked at."""
+        return self.session.shown.path.poses[:, :2]
+
+    # What visitors ask.
+
+    def list_answers(self) -> Mapping[str, Answer]:
+        """Return what the page does by the word `ask`."""
         session, playback = self.session, self.playback
-        return describe_scenario(session.shown.scenario, session.ground_name), (
-            verdict_chip(session.shown.verdict.traversable, self.judged.why_old),
-            play_chip(playback.rate != 0.0, playback.describe()),
-        )
+        plain: dict[str, Any] = {
+            "show": lambda words: session.show_path(int(words["index"])),
+            "value": lambda words: self._change_value(words["label"], float(words["value"])),
+            "options": lambda words: session.change_options(**_read_options(words)),
+            "undo": lambda _words: session.undo(),
+            "reset": lambda _words: session.reset(),
+            "keep": lambda _words: session.keep_reference(),
+            "drop": lambda _words: session.drop_reference(),
+            "cancel": lambda _words: self._cancel(),
+            "judge": lambda _words: session.judge_again(),
+            "preset": lambda words: session.take_rover(load_rover(words["name"])),
+            "upload": lambda words: session.take_rover(read_rover(words["text"], words["name"])),
+            "open": lambda words: self._open(read_link(words["query"])),
+            "click": lambda words: setattr(self, "_click_sets", words["sets"]),
+            "colour": lambda words: self._colour(words),
+            "forces": lambda words: self._show_forces(bool(words["shown"])),
+            "toggle": lambda _words: playback.toggle(),
+            "rewind": lambda _words: playback.rewind(),
+            "step": lambda words: playback.step(session.shown.path.trajectory.times, words["by"]),
+            "seek": lambda words: playback.go_to(float(words["time"])),
+            "place": lambda words: self._go_to_place(float(words["distance"])),
+            "speed": lambda words: setattr(playback, "speed", float(words["times"])),
+            "failure": lambda _words: self._go_to_failure(),
+        }
+        answers = {word: self._answer(act) for word, act in plain.items()}
+        files: dict[str, Answer] = {
+            "save rover": lambda _words, mailbox: _send_file(mailbox, *self._save_rover()),
+            "save page": lambda words, mailbox: _send_file(mailbox, *self._save_page(words)),
+            "link": lambda _words, mailbox: _send(mailbox, {"link": write_link(self._link())}),
+        }
+        return {**answers, **files}
 
-    def path_to_look_at(self) -> Floats:
-        """Return x and y (n, 2) [m] of the shown path."""
-        return self.session.shown.candidate.poses[:, :2]
+    def _answer(self, act: Any) -> Answer:
+        def answer(words: Words, _mailbox: Mailbox | None) -> None:
+            act(words)
+            self._moved = True
 
-    # Requests of visitors.
-
-    def hear(self, word: str, rest: str) -> None:
-        """Open a link, show a path, or go to a place of lanes and plots."""
-        if word == "open":
-            link = read_link(rest)
-            if link is not None:
-                self.open_link(link)
-        elif word == "show":
-            self.session.show_candidate(int(rest) - 1)
-        elif word == "seek":
-            self.judged.seek_share(float(rest))
-
-    def open_link(self, link: PageLink) -> None:
-        """Judge what a link holds, and show it."""
-        self.sharing.open(link)
-        self.judged.show_inputs()
-        self.judged.draw_ground()
-        self.judged.show_verdict()
+        return answer
 
     def click(self, point: Floats | None, shift: bool) -> None:
         """Set goal or start, and plan."""
         if point is None:
             raise PlanningError("the click is beside the known ground")
-        self.plan(point, "start" if shift else self.ground_tab.click_sets)
-
-    def plan(self, point: Floats, sets: str = "goal") -> None:
-        """Plan with a point (2,) [m] as the "goal" or the "start"."""
-        if sets == "goal":
-            self.session.plan_to(point)
-        else:
+        if shift or self._click_sets == "start":
             self.session.plan_from(point)
-        self.judged.show_verdict()
+        else:
+            self.session.plan_to(point)
 
     def show_refusal(self, reason: str) -> None:
-        """Show, as text, why a request was refused."""
+        """Show why a request was refused."""
         self.session.refusal = reason
-        self.judged.show_verdict()
 
-    def _change_value(self, value: RoverValue, number: float) -> None:
-        self.session.change_rover(value.keys, number)
-        self._note_change()
-
-    def _turn_arm(self, joint: str, angle: float) -> None:
-        self.session.change_arm(joint, angle)
-        self._note_change()
-
-    def _note_change(self) -> None:
-        """Show the verdict after a change of the rover; soon all candidates are judged."""
-        self._changed_at = time.monotonic()
-        self.judged.show_verdict()
-
-    def _undo(self) -> None:
-        """Take the last rover again.
-
-        Raises:
-            PlanningError: There is none.
-        """
-        before = self.judged.history.undo(self.session.wanted)
-        if before is None:
-            raise PlanningError("there is no change of this rover on these paths to undo")
-        self._restore(before.scenario.rover, before.scenario.arm_angles)
-
-    def _restore(self, rover: Rover, arm_angles: Mapping[str, float]) -> None:
-        self.session.restore_rover(rover, arm_angles)
-        self.judged.show_inputs()
-        self._note_change()
-
-    def _change_options(self, **changes: object) -> None:
-        self.session.change_options(**changes)
-        self.judged.show_verdict()
-
-    def _load(self, read: Callable[[], Rover]) -> None:
-        self.session.take_rover(read())
-        self.judged.show_inputs()
-        self.judged.show_verdict()
-
-    def _plan_again(self) -> None:
-        """After a change of the rover: judge all candidates, or put a refused value back."""
-        if self.session.refusal:
-            self.judged.show_inputs()
-        elif not self.session.is_stopped:
-            self.session.plan_again()
+    def _change_value(self, label: str, number: float) -> None:
+        """Change a number of the rover, or turn a joint, by the label of its slider."""
+        joint = label.removesuffix(" [rad]")
+        if joint in self.session.wanted.arm:
+            self.session.change_arm(joint, number)
+            return
+        known = {one.label: one for one in list_numbers(self.session.wanted.loaded)}
+        if label not in known:
+            raise PlanningError(f"the rover has no number {label!r}")
+        one = known[label]
+        self.session.change_rover(one.keys, min(max(number, one.low), one.high))
 
     def _cancel(self) -> None:
         self.session.cancel()
         self._painter.work.cancel()
 
-    def _judge_again(self) -> None:
-        self.session.plan_again()
-        self.judged.show_verdict()
+    def _colour(self, words: Words) -> None:
+        if words["layer"] not in self._layers:
+            raise PlanningError(f"there is no layer {words['layer']!r}")
+        along = bool(words["along"])
+        self._colouring = Colouring(words["layer"], float(words["heading"]), along)
+        self._paint()
+
+    def _show_forces(self, shown: bool) -> None:
+        self._forces = shown
+        self.scene.show_forces(shown)
+
+    def _go_to_place(self, distance: float) -> None:
+        self.playback.go_to(self.session.shown.path.limits.time_at(distance))
+
+    def _go_to_failure(self) -> None:
+        failure = self.session.shown.path.failure
+        if failure is not None:
+            self.playback.go_to(failure.time)
+            self.scene.cameras.look_at_failure(self.session.shown.scenario.rover, failure)
+
+    # Files and links.
+
+    def _link(self) -> PageLink:
+        how = self._colouring
+        colours = {"layer": how.layer, "heading": how.heading, "along": how.along}
+        time_shown = round(self.playback.time, 3)
+        return make_link(self.session.shown, self._map_print.text, time_shown, colours)
+
+    def _write_current(self) -> str:
+        """Return the link that a browser opens on a program that was started again."""
+        try:
+            return write_link(self._link())
+        except PlanningError:  # it would be too long
+            return ""
+
+    def _save_rover(self) -> tuple[str, str]:
+        rover = self.session.wanted.rover
+        return f"{rover.name.removesuffix('.yaml')}.yaml", write_rover(rover)
+
+    def _save_page(self, words: Words) -> tuple[str, str]:
+        """Return name and text of a file, with the rover where the path is refused if it is."""
+        self.tell()
+        path, parts = self.session.shown.path, dict(self.channel.parts)
+        if path.failure is not None:
+            state, at = path.failure.state, path.failure.time
+            parts |= {
+                "board": describe_board(state, path.failure.link),
+                "uses": describe_uses(path, at),
+                "drive": {**parts["drive"], "time": at, "distance": path.failure.distance},
+            }
+        rover = path.scenario.rover
+        text = write_file(self.server, parts, self._link(), rover, str(words.get("base", "")))
+        return f"{rover.name}.html", text
+
+    def _open(self, link: PageLink | None) -> None:
+        """Judge what a link holds, and show it."""
+        if link is None:
+            return
+        if link.layer not in self._layers:
+            raise PlanningError(f"the link names the layer {link.layer!r}, which there is not")
+        asked = read_scenario(link, self.session.wanted, self._map_print.text)
+        self._colouring = Colouring(link.layer, link.heading, link.along)
+        self.session.take_scenario(asked)
+        self._opening = link, asked
+        self._paint()
+
+    def _go_on_opening(self) -> None:
+        """Show path and time of the link that was opened, as soon as they are judged."""
+        if self._opening is None:
+            return
+        (link, asked), session = self._opening, self.session
+        if session.wanted is not asked:
+            self._opening = None
+        elif session.is_outdated:
+            return
+        elif session.shown.index == link.path - 1:
+            self._opening = None
+            self.playback.go_to(link.time)
+        elif link.path <= len(session.shown.paths):
+            session.show_path(link.path - 1)
+        elif session.progress is None:  # no way around was found this time
+            self._opening = None
 
     # What was judged.
 
     def _show_and_wait(self) -> None:
         """Request that what was judged is shown; in the judging thread.
 
-        What is judged next, the other policies, would slow down the drawings, so it waits for
-        them; a newer change does not.
+        What is judged next would slow down the drawings, so it waits for them; a newer change does
+        not.
         """
         self.requests.add(self._take_judged, "judged")
         wanted, end = self.session.wanted, time.monotonic() + DRAWING_TIME
@@ -258,31 +310,190 @@ class Page(PageBase):
 
     def _take_judged(self) -> None:
         if self.session.has_news:
-            with self.server.atomic():
-                self.errors.run("not judged", self._show_judged)
+            self.errors.run("not judged", self.session.take_finished)
+            self._show(self.session.shown)
+            self._go_on_opening()
 
-    def _show_judged(self) -> None:
-        """Show what was judged; a refused value is put back soon."""
-        try:
-            self.judged.show_judged()
-        finally:
-            if self.session.refusal:
-                self._changed_at = time.monotonic()
-            self.sharing.go_on()
-            self._panels.controls.outdated = True
+    def _show(self, now: Shown) -> None:
+        """Show a state: the drive at once, and what takes longer soon, as far as it differs."""
+        before, self._drawn = self._drawn, now
+        asked = now.scenario
+        was = None if before is None else before.scenario
+        if was is None or (asked.start, asked.goal) != (was.start, was.goal):
+            self.playback.go_to(0.0)
+        if before is None or now.path is not before.path:
+            trajectory = now.path.trajectory
+            self.playback.set_drive(trajectory.times, trajectory.distance)
+            self.drawings.ask("the failure is not shown", self._draw_failure)
+        if was is None or asked is not was:
+            self.drawings.ask("the rover is not drawn", self._draw_rover)
+            if was is not None and _differ_in_size(asked.rover, was.rover):
+                self.drawings.ask("the cameras are not moved", self._fit_cameras)
+        if before is None or now.paths != before.paths or now.index != before.index:
+            self.drawings.ask("the paths are not drawn", self._draw_paths)
+        depends = self._colouring.is_predicted or self._survey is not None
+        if was is not None and depends and asked is not was:
+            self._paint()
+        self._moved = True
 
-    def add_due_requests(self) -> None:
-        """Request that all candidates are judged, REPLAN_DELAY after a change of the rover.
+    def _draw_rover(self) -> None:
+        asked = self.session.shown.scenario
+        self.scene.draw_rover(asked.rover, asked.arm_angles)
 
-        It also tells what is worked on, with or without pictures.
-        """
-        self.errors.run("the progress is not shown", self.judged.show_work)
-        changed = self._changed_at
-        is_due = changed is not None and time.monotonic() - changed > REPLAN_DELAY
-        if is_due and self.session.progress is None:
-            self._changed_at = None
-            self.requests.add(self._plan_again, "plan again")
+    def _fit_cameras(self) -> None:
+        self.scene.fit_all(self.ground, self.points)
+
+    def _draw_paths(self) -> None:
+        shown = self.session.shown
+        candidates = [one.candidate for one in shown.paths]
+        self.scene.paths.show(
+            shown.scenario.rover, self.ground, candidates, shown.index, self._greyed
+        )
+
+    def _draw_failure(self) -> None:
+        shown = self.session.shown
+        self.scene.failure.show(shown.scenario.rover, shown.path.failure)
+
+    def _paint(self) -> None:
+        shown, origin = self.session.shown, self.scene.frame.origin
+        self._painter.paint(
+            PaintRequest(shown.scenario, self._colouring, shown.path.poses, self._survey, origin)
+        )
+
+    def _take_ground(self) -> None:
+        self.errors.run("the ground is not drawn", self._draw_ground)
+
+    def _draw_ground(self) -> None:
+        painted = self._painter.take()
+        if painted is not None:
+            self.scene.draw_ground(painted.glb)
+            self.channel.tell("legend", painted.legend)
+
+    # What is told.
+
+    def _find_work(self) -> Work:
+        """Return what is worked on, and whether the verdict is an old one meanwhile."""
+        session, judging, old = self.session, "", ""
+        progress = session.progress
+        shown = progress or self._painter.work.progress
+        if shown is not None and shown.seconds > NOTICE_DELAY:
+            judging = f"{shown.describe()} ... {int(shown.seconds)} s"
+            old = f"judging {progress.describe()}" if progress is not None else ""
+        elif session.is_stopped:
+            old = "the judgement was stopped"
+        old = old if session.is_outdated else ""
+        return Work(judging, old, session.refusal, session.is_stopped)
+
+    def tell(self) -> None:
+        """Tell all that is shown, as far as it has changed."""
+        session, tell, made = self.session, self.channel.tell, self.channel.tell_made
+        shown, wanted, work = session.shown, session.wanted, self._find_work()
+        path, reference = shown.path, shown.reference
+        every = frozenset(range(len(shown.paths)))
+        waits = session.is_outdated or bool(work.old)
+        is_slow = bool(work.judging) or work.is_stopped
+        self._grey(every if work.old else shown.old if is_slow else frozenset())
+        name = self._ground_name
+        made("subject", (shown.scenario,), lambda: describe_subject(shown.scenario, name))
+        tell("verdict", describe_verdict(shown, work))
+        is_judging = session.progress is not None
+        made(
+            "paths",
+            (shown, waits, is_judging),
+            lambda: {
+                "rows": list_paths(shown, is_outdated=waits, is_judging=is_judging),
+                "shown": shown.index,
+            },
+        )
+        made("current", (shown, self._colouring), self._write_current)
+        made("sliders", (wanted.loaded,), lambda: describe_sliders(wanted.loaded))
+        made("values", (wanted, session.refusal), lambda: describe_values(wanted))
+        kept = session.kept
+        made(
+            "changes",
+            (path, reference, kept),
+            lambda: describe_changes(path, reference, is_kept=kept is not None),
+        )
+        made("limits", (path, reference), lambda: describe_limits(path, reference))
+        made("curves", (path, reference), lambda: describe_curves(path, reference))
+        model, how = wanted.options.model, self._colouring
+        tell("chosen", {
+            "policy": model.policy, "soil": model.soil or "", "sets": self._click_sets,
+            "layer": how.layer, "heading": how.heading, "along": how.along,
+            "forces": self._forces, "speed": self.playback.speed, "preset": wanted.loaded.name,
+        })  # fmt: skip
+
+    def _grey(self, old: frozenset[int]) -> None:
+        """Grey the paths whose verdicts are of old values."""
+        if old != self._greyed:
+            self._greyed = old
+            self.scene.paths.mark_old(old)
 
     def advance(self, seconds: float) -> None:
-        """Play on by a time of the visitor [s]."""
-        self.judged.advance(seconds)
+        """Play on by a time of the visitor [s], and show what has changed."""
+        playback = self.playback
+        self._moved = playback.advance(seconds) or self._moved
+        if not self._moved:
+            return
+        state = self._find_state()
+        self.scene.show(state)
+        self._moved = False
+        now = time.monotonic()
+        if now - self._told_at < BOARD_PERIOD and playback.rate != 0.0:
+            self._moved = True
+            return
+        self._told_at = now
+        self._tell_drive(state)
+
+    def _tell_drive(self, state: RoverState | None) -> None:
+        path, playback = self.session.shown.path, self.playback
+        failure = path.failure
+        self.channel.tell("drive", {
+            "time": round(playback.time, 2), "duration": round(playback.duration, 2),
+            "distance": 0.0 if state is None else round(state.distance, 4),
+            "rate": playback.rate, "words": playback.describe(),
+            "fails": None if failure is None else round(failure.time, 2),
+        })  # fmt: skip
+        link = "" if failure is None else failure.link
+        shown = state if state is not None or failure is None else failure.state
+        board = describe_board(shown, link, has_slip=path.trajectory.has_slip)
+        self.channel.tell("board", board)
+        self.channel.tell("uses", describe_uses(path, playback.time))
+
+    def _find_state(self) -> RoverState | None:
+        """Return the state at the time of the playback; at a failure that at which it fails.
+
+        The model may have been asked there between waypoints.
+        """
+        path, at = self.session.shown.path, self.playback.time
+        state, failure = path.trajectory.state_at(at), path.failure
+        if state is None or failure is None or not failure.is_settled:
+            return state
+        if abs(at - failure.time) > AT_FAILURE:
+            return state
+        return replace(failure.state, spin=state.spin, energy=state.energy)
+
+
+def _differ_in_size(one: Rover, other: Rover) -> bool:
+    """Return whether a camera that shows one rover may stand inside the other."""
+    small, large = sorted((find_radius(one), find_radius(other)))
+    return large > MUCH_LARGER * small
+
+
+def _read_options(words: Words) -> dict[str, Any]:
+    """Return the options of the model that a visitor asks for."""
+    found: dict[str, Any] = {}
+    if "policy" in words:
+        found["policy"] = words["policy"]
+    if "soil" in words:
+        found["soil"] = words["soil"] or None
+    return found
+
+
+def _send(mailbox: Mailbox | None, parts: Mapping[str, Any]) -> None:
+    if mailbox is not None:
+        mailbox.put(parts)
+
+
+def _send_file(mailbox: Mailbox | None, name: str, text: str) -> None:
+    _send(mailbox, {"file": {"name": name, "text": text}})

@@ -6,28 +6,19 @@ from typing import Any
 import numpy as np
 
 from rover_physics.numerics.arrays import Floats
-from rover_physics.numerics.quaternions import wxyz_from_rpy
 from rover_physics.rover.model import Rover
 from rover_planner.viewer.scene.force_arrows import ForceArrows
 from rover_planner.viewer.scene.labels import Label, Labels
 from rover_planner.viewer.scene.link_outline import centre_of, outline_link
 from rover_planner.viewer.scene.local_frame import LocalFrame
-from rover_planner.viewer.scene.rover_visual import (
-    RoverVisual,
-    have_same_parts,
-    look_alike,
-    make_body,
-    make_wheel,
-)
-from rover_planner.viewer.state.colours import BODY, CASING, METAL, REFUSED
+from rover_planner.viewer.scene.rover_visual import RoverVisual, have_same_parts, look_alike
+from rover_planner.viewer.state.colours import CASING, REFUSED
 from rover_planner.viewer.state.failure import Failure
 from rover_planner.viewer.state.trajectory import RoverState
 
 NAME, LABELS = "/failure", "/reasons"
 OPACITY = 0.55
 """Opacity of the ghost."""
-BETWEEN_OPACITY = 0.12
-"""Opacity of the rover at poses between waypoints."""
 NEAR = 0.5
 """Distance of the played rover at which the ghost makes room for it [wheelbases]."""
 LABEL_HEIGHT = 4.5
@@ -53,8 +44,6 @@ class FailureMark:
         self._near = 0.0
         self._is_alone = True
         """True if the played rover is elsewhere."""
-        self._between_shown = True
-        self._between: list[Any] = []
         self._forces_shown = True
 
     def show(self, rover: Rover, failure: Failure | None) -> None:
@@ -80,22 +69,19 @@ class FailureMark:
             )  # fmt: skip
         top = self._frame.to_scene(state.position) + np.array([0.0, 0.0, LABEL_HEIGHT * radius])
         self._draw_label(failure, top, middle)
-        self._draw_between(rover, failure.between)
 
     def clear(self) -> None:
         """Remove all that was drawn but the label."""
         if self._root is not None:
             self._root.remove()  # what is below it goes with it
         self._nodes.clear()
-        self._between.clear()
         self._rover = self._root = self._failure = self._ghost = self._arrows = None
 
     def _clear_failure(self) -> None:
         """Remove what belongs to one failure."""
-        for node in (*self._nodes, *self._between):
+        for node in self._nodes:
             node.remove()
         self._nodes.clear()
-        self._between.clear()
 
     def _show_ghost(self, rover: Rover, failure: Failure) -> None:
         """Bring the ghost to a failure, with the forces."""
@@ -147,12 +133,6 @@ class FailureMark:
         self._forces_shown = visible
         self._show_arrows()
 
-    def show_between(self, visible: bool) -> None:
-        """Show or hide the poses between waypoints."""
-        self._between_shown = visible
-        for node in self._between:
-            node.visible = visible
-
     def _draw_label(self, failure: Failure, top: Floats, foot: Floats) -> None:
         """Draw what is broken, with a line from a place above the rover to the link."""
         where = f"after {failure.distance:.2f} m" + (
@@ -166,35 +146,3 @@ class FailureMark:
         label = Label(f"{words}\n{where}", top)
         self._labels.show(LABELS, {"reason": label})
         self._nodes.append(leader)
-
-    def _draw_between(self, rover: Rover, states: tuple[RoverState, ...]) -> None:
-        """Draw bodies and wheels at poses between waypoints."""
-        if not states:
-            return
-        parts = {"bodies": (make_body(rover), BODY), "wheels": (make_wheel(rover)[0], METAL)}
-        turns = np.array([wxyz_from_rpy(*state.attitude) for state in states])
-        places = {
-            "bodies": (turns, np.array([state.position for state in states])),
-            "wheels": (_turn_wheels(states), np.concatenate([s.wheel_centres for s in states])),
-        }
-        for name, (mesh, colour) in parts.items():
-            wxyz, positions = places[name]
-            self._between.append(
-                self._scene.add_batched_meshes_simple(
-                    f"{NAME}/{name}", mesh.vertices, mesh.faces, wxyz,
-                    self._frame.to_scene(positions), batched_colors=colour,
-                    opacity=BETWEEN_OPACITY, cast_shadow=False, receive_shadow=False,
-                    visible=self._between_shown,
-                )
-            )  # fmt: skip
-
-
-def _turn_wheels(states: tuple[RoverState, ...]) -> Floats:
-    """Return the attitudes (6 n, 4), w first, of wheels that are steered on a body."""
-    return np.array(
-        [
-            wxyz_from_rpy(state.attitude[0], state.attitude[1], state.attitude[2] + float(angle))
-            for state in states
-            for angle in state.steering_angle
-        ]
-    )

@@ -13,8 +13,8 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.path_query import Candidate
 from rover_planner.viewer.scene.labels import Label, Labels
 from rover_planner.viewer.scene.local_frame import LocalFrame
+from rover_planner.viewer.scene.number_places import place_numbers
 from rover_planner.viewer.scene.ribbons import Ribbon, Strand
-from rover_planner.viewer.state.candidate_rows import place_numbers
 from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN, Colour, blend
 
 MAX_POINTS = 250
@@ -81,13 +81,19 @@ class PathOverlay:
         self._draw_numbers(terrain, candidates, radius, shown)
         self._draw_flags(terrain, {"start": poses[0], "goal": poses[-1]}, radius)
 
-    def show_plan(self, rover: Rover, terrain: Terrain, plan: Floats | None) -> None:
-        """Draw a path (n, 3) without a verdict of ours, or none, instead of what was drawn."""
+    def show_plan(
+        self, rover: Rover, terrain: Terrain, plan: Floats | None, is_old: bool = False
+    ) -> None:
+        """Draw a path (n, 3) without a verdict of ours, or none, instead of what was drawn.
+
+        An old one is grey.
+        """
         self.clear()
         if plan is not None:
             height = CLEARANCE * rover.wheel.radius
             width = WIDE * rover.wheel.radius
-            self._plan.show(self._find_strand(terrain, plan[:, :2], PASSABLE, (height, width)))
+            colour = UNKNOWN if is_old else PASSABLE
+            self._plan.show(self._find_strand(terrain, plan[:, :2], colour, (height, width)))
             self._draw_flags(terrain, {"goal": plan[-1]}, rover.wheel.radius)
         else:
             self._labels.show(FLAGS, {})

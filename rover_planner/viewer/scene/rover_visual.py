@@ -15,7 +15,7 @@ from rover_physics.numerics.quaternions import wxyz_about_y, wxyz_from_rpy
 from rover_physics.rover.manipulator import link_points
 from rover_physics.rover.model import Manipulator, Rover
 from rover_planner.viewer.scene.local_frame import LocalFrame
-from rover_planner.viewer.state.colours import BODY, DARK, METAL, colour_utilisation
+from rover_planner.viewer.state.colours import BODY, DARK, METAL, colour_use
 from rover_planner.viewer.state.trajectory import RoverState
 
 GROUSERS = 16
@@ -108,7 +108,7 @@ class RoverVisual:
         for k, wheel in enumerate(WHEELS):
             turn = 0.0, float(state.spin[k]), float(state.steering_angle[k])
             self._joints[wheel].wxyz = wxyz_from_rpy(*turn)
-            self._tyres[wheel].color = colour_utilisation(float(state.friction_utilisation[k]))
+            self._tyres[wheel].color = colour_use(float(state.friction_use[k]))
 
     def remove(self) -> None:
         """Remove all nodes."""

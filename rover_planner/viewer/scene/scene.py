@@ -10,7 +10,6 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.viewer.scene.cameras import FIT, Cameras
-from rover_planner.viewer.scene.closed_area import ClosedAreaOverlay
 from rover_planner.viewer.scene.failure_mark import FailureMark
 from rover_planner.viewer.scene.force_arrows import ForceArrows
 from rover_planner.viewer.scene.labels import Labels
@@ -35,7 +34,6 @@ class Scene:
         """The visitors' cameras."""
         labels = Labels(self._scene)
         self.paths = PathOverlay(self._scene, labels, self.frame)
-        self.closed = ClosedAreaOverlay(self._scene, self.frame)
         self.failure = FailureMark(self._scene, labels, self.frame)
         self._rover: Rover
         self._visual: RoverVisual | None = None
@@ -101,20 +99,17 @@ class Scene:
         if follows and self._last_position is not None:
             self.cameras.centre(self._last_position)
 
-    def aim_camera(
-        self, client: Any, rover: Rover, terrain: Terrain, start: Any, goal: Any
-    ) -> None:
+    def aim_camera(self, client: Any, terrain: Terrain, start: Any, goal: Any) -> None:
         """Aim the camera of a visitor along the line from start to goal, from behind and beside.
 
         Args:
             client: The visitor's client of viser.
-            rover: The rover, for its size.
             terrain: The ground.
             start: x and y [m], further values are not used.
             goal: The same.
         """
         first = _lift(terrain, np.array([start[:2]]))[0]
-        self.cameras.aim(client, first, np.subtract(goal[:2], start[:2]), rover.wheel.radius)
+        self.cameras.aim(client, first, np.subtract(goal[:2], start[:2]), self._rover.wheel.radius)
 
     def look(self, client: Any, view: str, terrain: Terrain, points: Floats) -> None:
         """Let the camera of a visitor look at a path (n, 2) [m], or at the rover on it.

@@ -17,8 +17,6 @@ LOAD = (86, 180, 233)
 """Sky blue: normal forces, torque saturation."""
 TRACTION = (230, 159, 0)
 """Orange: tangential forces, slip."""
-NOTICE = (204, 121, 167)
-"""Reddish purple: a change that was refused."""
 FAILED = (176, 0, 32)
 """Red, with white letters: a part of the page has failed."""
 MIDDLE = (240, 228, 66)
@@ -31,8 +29,6 @@ GOOD = (143, 196, 224)
 UNKNOWN = (110, 110, 110)
 CASING, RING = (16, 16, 16), (255, 255, 255)
 """Dark and light halo around lines on the ground."""
-MIN_CONTRAST = 3.0
-"""Least contrast of a line with what is beside it (WCAG 2.1, graphical objects)."""
 
 
 @dataclass(frozen=True)
@@ -68,14 +64,14 @@ def map_colours(values: NDArray[np.float64], low: float, high: float) -> NDArray
     return colours
 
 
-def colour_utilisation(utilisation: float) -> Colour:
-    """Return the colour of a friction utilisation: blue at 0, yellow at 0.5, vermillion from 1.
+def colour_use(use: float) -> Colour:
+    """Return the colour of the use of a limit: blue at 0, yellow at 0.5, vermillion from 1.
 
     NaN is grey.
     """
-    if np.isnan(utilisation):
+    if np.isnan(use):
         return UNKNOWN
-    t = float(np.clip(utilisation, 0.0, 1.0))
+    t = float(np.clip(use, 0.0, 1.0))
     return blend(PASSABLE, MIDDLE, 2 * t) if t < 0.5 else blend(MIDDLE, REFUSED, 2 * t - 1)
 
 

@@ -12,8 +12,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.viewer.state.limits import ShownLimit
-from rover_planner.viewer.state.path_limits import AskedPoses, PathLimits, find_path_limits
-from rover_planner.viewer.state.scenario import Shown
+from rover_planner.viewer.state.path_limits import AskedPoses, PathLimits
 from rover_planner.viewer.state.trajectory import RoverState, make_state, read_series
 
 BODY = "body"
@@ -32,8 +31,6 @@ TITLES = {
 """Short names of the codes of a verdict that have no number."""
 ON_THE_WAY = "on the way here: "
 """Beginning of the reason of a failure between waypoints."""
-MAX_BETWEEN = 8
-"""Most poses before a failure that are shown beside it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +45,8 @@ class Failure:
     """The broken limit."""
     value: float
     """The value that breaks it, in its unit; NaN if there is none."""
+    use: float
+    """Use of the limit there."""
     link: str
     """The link that fails: a name of WHEELS, BODY, rocker_left, bogie_right and so on; empty if
     it is none."""
@@ -57,12 +56,12 @@ class Failure:
     """Time since the start [s]."""
     is_between: bool
     """True if it is between two waypoints."""
+    row: int
+    """Its row of the limits along the path."""
     is_settled: bool
     """True if the rover stands there; if not, `state` is a level rover above the ground."""
     state: RoverState
     """The rover there."""
-    between: tuple[RoverState, ...] = ()
-    """The rover at poses between the waypoints before it, where the model was asked."""
 
     @property
     def where(self) -> str:
@@ -102,28 +101,28 @@ def find_failure(
         broken = np.flatnonzero(here & ~rows.is_between)
     at = int(broken[np.argmin(rows.is_between[broken])])
     settled, value = bool(rows.prediction.settled[at]), float(lane.values[at])
-    explains = lane.limit.is_broken_by(value)
-    near = rows.is_between & (rows.prediction.waypoint >= verdict.first_failure - 1)
-    before = np.flatnonzero(near[:at] & rows.prediction.settled[:at])
+    limit = lane.limit.keep(float(rows.prediction.results["kept_share"][at]))
+    explains = limit.is_broken_by(value)
     return Failure(
         code=verdict.code,
         reason=verdict.reason,
-        limit=lane.limit,
+        limit=limit,
         value=value if explains else np.nan,
+        use=float(lane.used[at]),
         link=_find_link(rover, terrain, verdict.code, rows, at)
         or (WHEELS[lane.wheel[at]] if explains and lane.wheel[at] >= 0 else ""),
         distance=float(rows.distance[at]),
         time=float(rows.time[at]),
         is_between=bool(rows.is_between[at]),
+        row=at,
         is_settled=settled,
-        state=_state_at(rows, at) if settled else level_state(rover, terrain, rows, at),
-        between=tuple(_state_at(rows, int(k)) for k in before[-MAX_BETWEEN:]),
+        state=_state_at(rover, rows, at) if settled else level_state(rover, terrain, rows, at),
     )
 
 
-def _state_at(rows: AskedPoses, at: int) -> RoverState:
+def _state_at(rover: Rover, rows: AskedPoses, at: int) -> RoverState:
     """Return the state at a row at which the rover settles, with unturned wheels."""
-    series = read_series(rows.prediction.select([at]))
+    series = read_series(rover, rows.prediction.select([at]))
     series |= {"distance": rows.distance[[at]], "time": rows.time[[at]], "spin": np.zeros((1, 6))}
     return make_state({name: values[0] for name, values in series.items()})
 
@@ -189,30 +188,3 @@ def _find_lost_wheel(rover: Rover, terrain: Terrain, state: RoverState) -> str:
     lost = ~np.isfinite(terrain.elevation_at(x + 0.0 * y, y + 0.0 * x)).reshape(6, -1)
     counts = lost.sum(axis=1)
     return WHEELS[int(np.argmax(counts))] if counts.any() else ""
-
-
-@dataclass(frozen=True, eq=False)
-class Explanation:
-    """The reasons of a verdict: the limits along the path and its first failure."""
-
-    limits: PathLimits
-    """Its uses of the limits, up to the first failure."""
-    failure: Failure | None
-    """The first failure; None if the path can be driven."""
-
-    @property
-    def failure_at(self) -> float | None:
-        """Distance of the failure [m]; None without one."""
-        return None if self.failure is None else self.failure.distance
-
-    @property
-    def failing_link(self) -> str:
-        """The link that fails; empty for none."""
-        return "" if self.failure is None else self.failure.link
-
-
-def explain(shown: Shown) -> Explanation:
-    """Return the explanation of the shown path."""
-    asked = shown.scenario
-    limits = find_path_limits(asked.rover, shown.candidate.prediction, shown.verdict)
-    return Explanation(limits, find_failure(asked.rover, asked.terrain, shown.verdict, limits))

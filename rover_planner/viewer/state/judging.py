@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Judges a scenario step by step: the shown path or all candidates, policies, a path around."""
+"""Judges a scenario step by step: the path looked at, its reference, all others, a way around."""
 
-import time
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -10,35 +9,30 @@ from rover_physics.names import TORQUE_POLICIES
 from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.traversability.verdict import hold_against_limits
-from rover_planner.planning.path_query import (
-    Candidate,
-    PathAnswer,
-    check_path,
-    choose,
-    generate_paths,
-)
+from rover_planner.planning.path_query import Candidate, check_path, choose, generate_paths
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.path_search import SearchResult, find_path
 from rover_planner.planning.search.query import SearchQuery
 from rover_planner.viewer.state.background_work import Progress
-from rover_planner.viewer.state.scenario import PolicyVerdict, Scenario, Shown
-from rover_planner.viewer.state.trajectory import Trajectory
+from rover_planner.viewer.state.scenario import Judged, PolicyVerdict, Scenario, Shown
 
-PATH, POLICY, SEARCH = "judging path", "judging policy", "searching a way"
+PATH, COMPARE, POLICY, SEARCH = "path", "reference", "policy", "searching a way"
 BETTER = "way found, searching a better one"
 """Names of steps."""
 
 
 @dataclass(frozen=True, eq=False)
 class JudgeRequest:
-    """A scenario to judge, or one path of it."""
+    """A scenario to judge, and the path that is looked at."""
 
     scenario: Scenario
     """Rover, ground, ends and options."""
     before: Shown | None = None
-    """The last finding, of which a candidate is judged again; None: all candidates are judged."""
-    index: int = 0
-    """Index of that candidate."""
+    """What was shown, whose paths are judged again if they are those of the scenario."""
+    index: int | None = None
+    """Index of the path that is looked at; None: the one that is chosen."""
+    reference: Scenario | None = None
+    """Values to compare with; None: the rover as it was loaded."""
 
 
 Step = Progress | Shown
@@ -46,11 +40,11 @@ Step = Progress | Shown
 
 
 def judge_request(request: JudgeRequest, memory: EdgeMemory | None = None) -> Iterator[Step]:
-    """Yield what is shown with the verdict, then the same with those of all policies.
+    """Yield what is shown with the verdict on the path looked at, then with more and more.
 
-    If all candidates are refused, it follows with the first path around obstacles and with the
-    best of the search's budget, or with why there is none. Before each path, each policy and the
-    search it yields that it begins.
+    Its reference, the other paths and its verdicts under all policies follow. If all candidates
+    are refused, so do the first path around obstacles and the best of the search's budget, or why
+    there is none. The path that is looked at stays the same.
 
     Args:
         request: What to judge.
@@ -59,14 +53,27 @@ def judge_request(request: JudgeRequest, memory: EdgeMemory | None = None) -> It
     Raises:
         RoverError, PlanningError: The rover, the poses or the options are invalid.
     """
-    judge = _judge_all(request.scenario) if request.before is None else _judge_one(request)
-    judged = yield from judge
-    yield judged
-    if judged.scenario.recorded is not None:
+    before, asked = request.before, request.scenario
+    if before is None or request.index is None or not asked.has_paths_of(before.scenario):
+        shown = yield from _judge_new(asked)
+    else:
+        shown = yield from _judge_again(asked, before, request.index)
+    values = _find_reference(asked, request.reference)
+    shown = replace(shown, reference=_recall(shown, before, values))
+    yield shown
+    if shown.reference is None and not shown.path.is_of(shown.path.poses, values):
+        yield Progress(COMPARE)
+        shown = replace(shown, reference=_judge(values, shown.path.poses))
+        yield shown
+    if shown.old:
+        shown = yield from _judge_others(shown)
+        yield shown
+    if asked.recorded is not None:
         return
-    judged = yield from _add_policies(judged)
-    if judged.needs_search:
-        yield from _search_around(judged, memory or EdgeMemory())
+    shown = yield from _add_policies(shown)
+    yield shown
+    if shown.needs_search:
+        yield from _search_around(shown, memory or EdgeMemory())
 
 
 def show_recorded(scenario: Scenario, prediction: PathPrediction, reasons: Sequence[str]) -> Shown:
@@ -80,89 +87,88 @@ def show_recorded(scenario: Scenario, prediction: PathPrediction, reasons: Seque
         first_failure=first,
         reason=reasons[first] if first >= 0 else "",
     )
-    candidate = Candidate(prediction.poses, prediction, verdict, (0.0, 0.0))
-    answer = PathAnswer((candidate,), 0 if first < 0 else -1, 0)
-    return _show(scenario, answer, 0, "recorded")
+    path = Judged(scenario, Candidate(prediction.poses, prediction, verdict, (0.0, 0.0)))
+    return Shown(scenario, (path,), 0, 1)
 
 
-def _judge_all(scenario: Scenario) -> Generator[Step, None, Shown]:
-    """Judge all candidate paths, or the recorded path, and show the one that is chosen."""
-    began = time.perf_counter()
-    if scenario.recorded is None:
-        ends = scenario.start, scenario.goal
-        paths = generate_paths(scenario.rover, *ends, scenario.options)
+def _judge_new(asked: Scenario) -> Generator[Step, None, Shown]:
+    """Judge all candidate paths, or the recorded path, and look at the one that is chosen."""
+    if asked.recorded is None:
+        paths = generate_paths(asked.rover, asked.start, asked.goal, asked.options)
     else:
-        paths = [scenario.recorded]
-    candidates = []
-    for k, path in enumerate(paths):
+        paths = [asked.recorded]
+    judged = []
+    for k, poses in enumerate(paths):
         yield Progress(PATH, k + 1, len(paths))
-        candidates.append(_check(scenario, path))
-    answer = choose(tuple(candidates))
-    passable = sum(candidate.verdict.traversable for candidate in candidates)
-    words = f"{passable} of {len(paths)} candidate paths passable, judged in"
-    if scenario.recorded is not None:
-        words = "recorded path judged again in"
-    return _show(scenario, answer, answer.nearest, f"{words} {_milliseconds(began)}")
+        judged.append(_judge(asked, poses))
+    chosen = choose(tuple(one.candidate for one in judged)).nearest
+    return Shown(asked, tuple(judged), chosen, len(judged), None, _own_policy(judged[chosen]))
 
 
-def _judge_one(request: JudgeRequest) -> Generator[Step, None, Shown]:
-    """Show a candidate of what was shown, judged again unless its verdict still holds."""
-    began, scenario = time.perf_counter(), request.scenario
-    before, index = request.before, request.index
-    assert before is not None
-    candidate, summary = before.answer.candidates[index], before.summary
-    if before.answered is not scenario:
-        yield Progress(PATH, 1, 1)
-        candidate = _check(scenario, candidate.poses)
-        summary = f"path of {candidate.length:.1f} m judged again in {_milliseconds(began)}"
-    old = before.by_policy if index == before.index else ()
-    shown = _show(scenario, before.answer, index, summary, candidate, old)
-    return replace(shown, answered=before.answered, around=before.around)
+def _judge_again(asked: Scenario, before: Shown, index: int) -> Generator[Step, None, Shown]:
+    """Judge the path that is looked at; ways that nobody looks at go with their values."""
+    same, path, paths = before.scenario is asked, before.paths[index], before.paths
+    generated = before.generated
+    if not same:
+        paths = (*paths[:generated], *(paths[index : index + 1] if index >= generated else ()))
+        index = min(index, generated)
+    if path.scenario is not asked:
+        yield Progress(PATH)
+        path = _judge(asked, path.poses)
+    paths = (*paths[:index], path, *paths[index + 1 :])
+    is_same_path = path.poses is before.path.poses
+    old = before.by_policy if is_same_path else ()
+    policies = old if same and is_same_path else _own_policy(path, old)
+    around = before.around if same else None
+    return Shown(asked, paths, index, generated, None, policies, around)
 
 
-def _show(
-    scenario: Scenario,
-    answer: PathAnswer,
-    index: int,
-    summary: str,
-    candidate: Candidate | None = None,
-    old: tuple[PolicyVerdict, ...] = (),
-) -> Shown:
-    """Return a candidate of an answer as what is shown.
-
-    Args:
-        scenario: What it was judged for.
-        answer: All candidates.
-        index: Its index.
-        summary: What was judged.
-        candidate: The candidate as it was judged again (default: as in the answer).
-        old: Its verdicts under other policies, which are of other values.
-    """
-    candidate = candidate or answer.candidates[index]
-    trajectory = Trajectory(scenario.rover, candidate.prediction, candidate.verdict)
-    by_policy: tuple[PolicyVerdict, ...] = ()
-    if scenario.recorded is None:
-        known = {policy: PolicyVerdict(policy, None, "") for policy in TORQUE_POLICIES}
-        known |= {one.policy: one for one in old}
-        known = {policy: replace(one, is_old=True) for policy, one in known.items()}
-        by_policy = tuple((known | {candidate.verdict.policy: _own_verdict(candidate)}).values())
-    return Shown(scenario, answer, scenario, index, candidate, trajectory, summary, by_policy)
+def _find_reference(asked: Scenario, kept: Scenario | None) -> Scenario:
+    """Return the values to compare with: those that were kept, or the rover as it was loaded."""
+    return asked.take_values(kept or replace(asked, rover=asked.loaded, arm_angles={}))
 
 
-def _own_verdict(candidate: Candidate) -> PolicyVerdict:
+def _recall(shown: Shown, before: Shown | None, values: Scenario) -> Judged | None:
+    """Return the path that is looked at as it was judged for other values, if it was."""
+    poses = shown.path.poses
+    if before is None or shown.path.is_of(poses, values):
+        return None
+    known = (before.reference, *before.paths)
+    return next((one for one in known if one is not None and one.is_of(poses, values)), None)
+
+
+def _judge_others(shown: Shown) -> Generator[Step, None, Shown]:
+    paths = list(shown.paths)
+    for k in sorted(shown.old):
+        yield Progress(PATH, k + 1, len(paths))
+        paths[k] = _judge(shown.scenario, paths[k].poses)
+    return replace(shown, paths=tuple(paths))
+
+
+def _own_policy(path: Judged, old: tuple[PolicyVerdict, ...] = ()) -> tuple[PolicyVerdict, ...]:
+    """Return the verdicts under all policies that are known with a path; others are old."""
+    if path.scenario.recorded is not None:
+        return ()
+    known = {policy: PolicyVerdict(policy, None, "") for policy in TORQUE_POLICIES}
+    known |= {one.policy: one for one in old}
+    known = {policy: replace(one, is_old=True) for policy, one in known.items()}
+    return tuple((known | {path.verdict.policy: _policy_verdict(path.candidate)}).values())
+
+
+def _policy_verdict(candidate: Candidate) -> PolicyVerdict:
     verdict = candidate.verdict
     return PolicyVerdict(verdict.policy, verdict.traversable, verdict.reason)
 
 
 def _add_policies(shown: Shown) -> Generator[Step, None, Shown]:
-    """Yield, and return, what is shown with the path's verdicts under all policies."""
+    """Return what is shown with the path's verdicts under all policies."""
+    if shown.by_policy and not any(one.is_old for one in shown.by_policy):
+        return shown
     found = []
     for k, policy in enumerate(TORQUE_POLICIES):
         yield Progress(POLICY, k + 1, len(TORQUE_POLICIES))
-        found.append(_judge_under(policy, shown.scenario, shown.candidate))
-    shown = replace(shown, by_policy=tuple(found))
-    yield shown
-    return shown
+        found.append(_judge_under(policy, shown.path))
+    return replace(shown, by_policy=tuple(found))
 
 
 def _search_around(shown: Shown, memory: EdgeMemory) -> Iterator[Step]:
@@ -170,61 +176,43 @@ def _search_around(shown: Shown, memory: EdgeMemory) -> Iterator[Step]:
 
     Without one, what is shown has the reason.
     """
-    yield Progress(SEARCH, 1, 1)
+    yield Progress(SEARCH)
     asked = shown.scenario
-    ends = asked.start, asked.goal
-    question = SearchQuery(asked.rover, asked.terrain, *ends, asked.asked_options)
+    question = SearchQuery(
+        asked.rover, asked.terrain, asked.start, asked.goal, asked.asked_options
+    )
     first = find_path(question, replace(asked.search, ends_at_first=True), memory)
-    yield from _add_found_path(shown, first)
+    yield _add_way(shown, first)
     left = asked.search.budget - first.seconds
     if first.path is None or left <= 0.0:
         return
-    yield Progress(BETTER, 1, 1)
+    yield Progress(BETTER)
     better = find_path(question, replace(asked.search, budget=left), memory)
     if better.cost < first.cost:
-        seconds = first.seconds + better.seconds
-        yield from _add_found_path(shown, replace(better, seconds=seconds))
+        yield _add_way(shown, better)
 
 
-def _add_found_path(shown: Shown, around: SearchResult) -> Iterator[Step]:
-    """Yield what is shown with a path as one more candidate, or with why there is none.
-
-    The path is shown unless a visitor has chosen another path than the best.
-    """
-    answer, path = shown.answer, around.path
-    if path is None:
-        yield replace(shown, around=around)
-        return
-    candidates = (*answer.candidates, path)
-    last = len(candidates) - 1
-    longer = PathAnswer(candidates, last, last)
-    if shown.index != answer.nearest:
-        yield replace(shown, answer=longer, around=around)
-        return
-    found = f"way of {path.length:.1f} m around, found in {around.seconds:.1f} s"
-    summary = f"none of {last} candidate paths passable; {found}"
-    with_path = replace(_show(shown.scenario, longer, last, summary), around=around)
-    yield with_path
-    yield from _add_policies(with_path)
+def _add_way(shown: Shown, around: SearchResult) -> Shown:
+    """Return what is shown with a way as one more path, which nobody looks at yet."""
+    way = () if around.path is None else (Judged(shown.scenario, around.path),)
+    return replace(shown, paths=(*shown.paths, *way), around=around)
 
 
-def _judge_under(policy: str, scenario: Scenario, candidate: Candidate) -> PolicyVerdict:
+def _judge_under(policy: str, path: Judged) -> PolicyVerdict:
     """Return the verdict on a judged path under a policy, up to the first failure."""
-    if candidate.verdict.policy == policy:
-        return _own_verdict(candidate)
+    if path.verdict.policy == policy:
+        return _policy_verdict(path.candidate)
     try:
-        options = scenario.options.change(policy=policy)
-        return _own_verdict(_check(replace(scenario, options=options), candidate.poses))
+        options = path.scenario.options.change(policy=policy)
+        return _policy_verdict(
+            _judge(replace(path.scenario, options=options), path.poses).candidate
+        )
     except RoverError as error:
         return PolicyVerdict(policy, None, str(error))
 
 
-def _check(scenario: Scenario, poses: Floats) -> Candidate:
+def _judge(scenario: Scenario, poses: Floats) -> Judged:
     """Judge a path up to its first failure, where its playback ends."""
     rover, terrain, options = scenario.rover, scenario.terrain, scenario.asked_options
-    return check_path(rover, terrain, poses, options, stop_at_failure=True)
-
-
-def _milliseconds(began: float) -> str:
-    """Return the time since `began` as text."""
-    return f"{1e3 * (time.perf_counter() - began):.0f} ms"
+    candidate = check_path(rover, terrain, poses, options, stop_at_failure=True)
+    return Judged(scenario, replace(candidate, poses=poses))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The limits of a rover as people read them: one for each code, with title, bound and unit."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,8 +12,10 @@ from rover_physics.rover.model import Rover
 
 GROUND = "ground"
 """Code of what is no limit of a number: unknown ground, no equilibrium, entrapment, steering."""
-MAX_DIGITS = 6
-"""Most digits behind the point that tell a value from its limit."""
+MAX_USE = 99.0
+"""Largest use that is written as a number."""
+MORE_DIGITS = 2
+"""Most digits beyond those of the unit that tell a value from its limit; else words do."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +32,14 @@ class ShownLimit:
     """Unit of bound and values."""
     is_lowest: bool = False
     """True if the bound is the smallest good value, not the largest."""
+    keeps_margin: bool = False
+    """True if a control margin reduces the bound."""
+
+    def keep(self, share: float) -> "ShownLimit":
+        """Return the limit of which a share is kept, if a control margin reduces it."""
+        if self.bound is None or not self.keeps_margin:
+            return self
+        return replace(self, bound=share * self.bound)
 
     def is_broken_by(self, value: float) -> bool:
         """Return whether a value is beyond the limit; False if it is no single number.
@@ -40,28 +50,51 @@ class ShownLimit:
             return False
         return value < self.bound if self.is_lowest else value > self.bound
 
-    def write(self, value: float, digits: int | None = None) -> str:
-        """Return a value as text, without the unit; ? for NaN."""
+    def write(self, value: float, more: int = 0) -> str:
+        """Return a value as text, without the unit and with more digits; ? for NaN."""
         if np.isfinite(value):
-            return f"{value:.{self.unit.digits if digits is None else digits}f}"
+            return f"{value:.{self.unit.digits + more}f}"
         return "?" if np.isnan(value) else "infinite"
 
     def compare(self, value: float) -> str:
-        """Return a value beside the limit, such as "friction 1.32 of 1.00", with enough digits."""
+        """Return a value beside the limit, such as "friction 1.32 of 1.00", with enough digits.
+
+        Where MORE_DIGITS do not tell them apart, words do: "friction just above 1.00".
+        """
         if self.bound is None:
             return self.title
-        digits = self.unit.digits
-        while digits < MAX_DIGITS and self.write(value, digits) == self.write(self.bound, digits):
-            digits += 1
-        word = "of at least" if self.is_lowest else "of"
-        shown, bound = self.write(value, digits), self.write(self.bound, digits)
-        return f"{self.title} {shown} {word} {bound} {self.unit.name}".strip()
+        unit, bound = f" {self.unit.name}".rstrip(), self.bound
+        for more in range(MORE_DIGITS + 1):
+            shown, limit = self.write(value, more), self.write(bound, more)
+            if shown != limit:
+                least = "at least " if self.is_lowest else ""
+                return f"{self.title} {shown} of {least}{limit}{unit}"
+        side = "at" if value == bound else "just above" if value > bound else "just below"
+        return f"{self.title} {side} {self.write(bound)}{unit}"
+
+    @property
+    def good(self) -> str:
+        """Good values with their unit, such as "max 1.00"; empty if it is no single number."""
+        if self.bound is None:
+            return ""
+        word = "min" if self.is_lowest else "max"
+        return f"{word} {self.write(self.bound)} {self.unit.name}".strip()
+
+
+def write_use(use: float) -> str:
+    """Return the use of a limit as text, such as "76 %"."""
+    if np.isnan(use):
+        return "not asked"
+    if use > MAX_USE:
+        return "fails" if np.isinf(use) else f"over {100.0 * MAX_USE:.0f} %"
+    text = f"{100.0 * use:.0f} %"
+    return "just above 100 %" if use > 1.0 and text == "100 %" else text
 
 
 def list_limits(rover: Rover, prediction: PathPrediction) -> dict[str, ShownLimit]:
     """Return the limits by code for a prediction, in the order in which they become reasons.
 
-    Those of friction and torque are less the control margin. Sinkage is left out where nothing
+    Sinkage is left out where nothing
     sinks. Rows of the table with one code are one limit, which is a number if it is one row's.
     """
     asked = limits_of(rover, prediction.policy)
@@ -73,7 +106,8 @@ def list_limits(rover: Rover, prediction: PathPrediction) -> dict[str, ShownLimi
             found[row.code] = ShownLimit(row.code, row.title)
             continue
         unit = row.shown or row.unit
-        bound *= unit.factor * (1.0 - prediction.control_margin if row.keeps_margin else 1.0)
         is_lowest = row.sense in (Sense.LEAST, Sense.SHARE)
-        found[row.code] = ShownLimit(row.code, row.title, bound, unit, is_lowest)
+        found[row.code] = ShownLimit(
+            row.code, row.title, unit.factor * bound, unit, is_lowest, row.keeps_margin
+        )
     return {GROUND: ShownLimit(GROUND, "ground"), **found}

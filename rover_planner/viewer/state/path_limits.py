@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.limits.table import Sense
 from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_prediction import PathPrediction
@@ -20,9 +21,6 @@ from rover_physics.rover.model import Rover
 from rover_physics.traversability.classification import find_wheel
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.viewer.state.limits import GROUND, ShownLimit, list_limits
-
-NOT_ON_THE_BOARD = (GROUND, "suspension", "wheel_lift")
-"""Codes of limits whose worst use the board does not list."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +51,8 @@ class Lane:
     not count or is not known."""
     wheel: NDArray[np.int64]
     """Index of the wheel concerned, -1 for none."""
+    wheels: Floats | None = None
+    """(m, 6) use by each wheel; None if the limit is not one value for each wheel."""
 
     def worst_until(self, rows: int) -> int:
         """Return the row of the first rows that uses most; -1 if nothing is known there."""
@@ -74,31 +74,18 @@ class PathLimits:
         """Distance of the last pose [m]."""
         return float(self.rows.distance[-1])
 
+    def rows_until(self, time: float) -> int:
+        """Return the number of poses up to a time [s], at least 1."""
+        return max(int(np.searchsorted(self.rows.time, time + 1e-6, side="right")), 1)
+
+    def time_at(self, distance: float) -> float:
+        """Return the time at which the rover is at a distance [m]."""
+        return float(np.interp(distance, self.rows.distance, self.rows.time))
+
     def lane(self, code: str) -> Lane:
         """Return the lane of a code of a verdict; that of the ground for other codes."""
         found = {lane.limit.code: lane for lane in self.lanes}
         return found.get(code, found[GROUND])
-
-
-@dataclass(frozen=True)
-class WorstUse:
-    """The worst use of one limit up to a time of the drive."""
-
-    title: str
-    """Short name of the limit."""
-    value: str = "?"
-    """The value nearest to the limit, as text."""
-    bound: str = ""
-    """Good values with their unit, such as "max 1.00"; empty if it is no single number."""
-    used: float = 0.0
-    """Use of the limit, above 1 if it is broken."""
-    wheel: str = ""
-    """The wheel concerned, empty for none."""
-
-    @property
-    def is_broken(self) -> bool:
-        """True if the limit is broken."""
-        return self.used > 1.0
 
 
 def find_path_limits(rover: Rover, prediction: PathPrediction, verdict: Verdict) -> PathLimits:
@@ -186,7 +173,20 @@ def _make_lane(limit: ShownLimit, rows: AskedPoses, uses: Uses) -> Lane:
         element = np.maximum(uses.element[every, decides], 0)
         values = limit.unit.factor * numbers_of(prediction.results)[every, column + element]
     wheel = [find_wheel(prediction, uses, row, int(k)) for row, k in enumerate(decides)]
-    return Lane(limit, values, used, np.array(wheel, np.int64))
+    by_wheel = _find_wheel_uses(prediction, uses, int(of_limit[0])) if len(of_limit) == 1 else None
+    return Lane(limit, values, used, np.array(wheel, np.int64), by_wheel)
+
+
+def _find_wheel_uses(prediction: PathPrediction, uses: Uses, k: int) -> Floats | None:
+    """Return the uses (m, 6) of a row of the table by the wheels; None if it is not theirs."""
+    row, (column, count) = uses.limits.rows[k], find_column(uses.limits.rows[k].reads)
+    if count != len(WHEELS) or row.sense != Sense.MOST:
+        return None
+    kept = prediction.results["kept_share"][:, None] if row.keeps_margin else 1.0
+    values = numbers_of(prediction.results)[:, column : column + count]
+    return np.asarray(
+        np.where(np.isnan(uses.use[:, [k]]), np.nan, values / (uses.limits.bounds[k] * kept))
+    )
 
 
 def _add_refusals(limits: PathLimits, verdict: Verdict) -> None:
@@ -197,28 +197,3 @@ def _add_refusals(limits: PathLimits, verdict: Verdict) -> None:
         lane, here = limits.lane(code), rows.prediction.waypoint == waypoint
         if code and not np.any(lane.used[here] > 1.0):
             lane.used[here & ~rows.is_between] = ABOVE
-
-
-def find_worst(limits: PathLimits, time: float) -> tuple[WorstUse, ...]:
-    """Return the worst use of each limit with a number up to a time [s]."""
-    rows = int(np.searchsorted(limits.rows.time, time + 1e-6, side="right"))
-    return tuple(
-        _worst(lane, lane.worst_until(rows))
-        for lane in limits.lanes
-        if lane.limit.code not in NOT_ON_THE_BOARD
-    )
-
-
-def _worst(lane: Lane, at: int) -> WorstUse:
-    """Return the use at a row of a lane, -1 for none, as text."""
-    limit = lane.limit
-    if at < 0:
-        return WorstUse(limit.title)
-    value, used = float(lane.values[at]), float(lane.used[at])
-    wheel = WHEELS[lane.wheel[at]] if lane.wheel[at] >= 0 and value > 0.0 else ""
-    if limit.bound is None:
-        share = "broken" if used > 1.0 else f"{100.0 * used:.0f} %"
-        return WorstUse(limit.title, share, "", used, wheel)
-    word = "min" if limit.is_lowest else "max"
-    bound = f"{word} {limit.write(limit.bound)} {limit.unit.name}".strip()
-    return WorstUse(limit.title, limit.write(value), bound, used, wheel)

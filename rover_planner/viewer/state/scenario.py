@@ -2,15 +2,20 @@
 """The question that is judged and the answer that is shown: frozen values for all threads."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.verdict import Verdict
-from rover_planner.planning.path_query import Candidate, PathAnswer, PathQueryOptions
+from rover_planner.planning.path_query import Candidate, PathQueryOptions
 from rover_planner.planning.search.path_search import SearchResult
 from rover_planner.planning.search.query import LatticeSettings
+from rover_planner.viewer.state.failure import Failure, find_failure
+from rover_planner.viewer.state.path_limits import PathLimits, find_path_limits
 from rover_planner.viewer.state.trajectory import Trajectory
 
 Pose = tuple[float, float, float]
@@ -44,15 +49,73 @@ class Scenario:
         """The options with the arm as it is."""
         return self.options.change(joint_angles=self.arm_angles)
 
+    @property
+    def arm(self) -> dict[str, float]:
+        """Angles [rad] of all joints of the arm by name."""
+        arm = self.loaded.manipulator
+        stowed = {} if arm is None else dict(zip(arm.joints, arm.stowed, strict=True))
+        return {**stowed, **self.arm_angles}
+
     def has_paths_of(self, other: "Scenario") -> bool:
-        """Return whether the candidate paths are the same but for changed numbers of the rover."""
+        """Return whether the candidate paths are the same, whatever the rover's numbers are."""
         return (
             self.loaded is other.loaded
             and self.terrain is other.terrain
             and (self.start, self.goal) == (other.start, other.goal)
-            and self.options == other.options
+            and replace(self.options, model=other.options.model) == other.options
             and self.recorded is other.recorded
         )
+
+    def has_rover_of(self, other: "Scenario") -> bool:
+        """Return whether the numbers of the rover and the angles of its arm are the same."""
+        return self.rover == other.rover and self.arm == other.arm
+
+    def take_values(self, other: "Scenario") -> "Scenario":
+        """Return this scenario with the rover, its arm and the options of another one."""
+        arm, options = other.arm_angles, other.options
+        return replace(self, rover=other.rover, arm_angles=arm, options=options)
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A path as it was judged for a scenario, and why; what follows is computed once."""
+
+    scenario: Scenario
+    """Values for which it was judged."""
+    candidate: Candidate
+    """The path, its prediction and its verdict."""
+
+    @property
+    def verdict(self) -> Verdict:
+        """The verdict."""
+        return self.candidate.verdict
+
+    @property
+    def poses(self) -> Floats:
+        """(n, 3) x, y [m] and yaw [rad]."""
+        return self.candidate.poses
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """The drive, up to the first failure."""
+        return Trajectory(self.scenario.rover, self.candidate.prediction, self.verdict)
+
+    @cached_property
+    def limits(self) -> PathLimits:
+        """Its uses of the limits, up to the first failure."""
+        return find_path_limits(self.scenario.rover, self.candidate.prediction, self.verdict)
+
+    @cached_property
+    def failure(self) -> Failure | None:
+        """The first failure; None if the path can be driven."""
+        asked = self.scenario
+        return find_failure(asked.rover, asked.terrain, self.verdict, self.limits)
+
+    def is_of(self, poses: Floats, values: Scenario) -> bool:
+        """Return whether it is a path with these poses under these values."""
+        asked = self.scenario
+        same = asked.has_rover_of(values) and asked.options == values.options
+        return same and (self.poses is poses or np.array_equal(self.poses, poses))
 
 
 @dataclass(frozen=True)
@@ -71,56 +134,59 @@ class PolicyVerdict:
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """The shown path with its verdict, and those of all candidates, which may be older."""
+    """All paths, the one that a person looks at, and what it is compared with."""
 
     scenario: Scenario
-    """Values for which the shown path was judged."""
-    answer: PathAnswer
-    """All candidates."""
-    answered: Scenario
-    """Values for which they were judged."""
+    """Values for which the path that is looked at was judged."""
+    paths: tuple[Judged, ...]
+    """Candidates, then ways around obstacles; each as it was judged last."""
     index: int
-    """Index of the shown path among the candidates."""
-    candidate: Candidate
-    """The shown path as it was judged last."""
-    trajectory: Trajectory
-    """The drive along it."""
-    summary: str
-    """Sentence on what was judged and for how long; empty for a recorded path."""
+    """Index of the path that is looked at."""
+    generated: int
+    """Number of candidates; paths beyond were searched."""
+    reference: Judged | None = None
+    """The same path with the values of the reference; None if nothing differs from it."""
     by_policy: tuple[PolicyVerdict, ...] = ()
     """Its verdicts under all torque policies; empty for a replay, whose soil is not known."""
     around: SearchResult | None = None
-    """The finding of a search around obstacles for `answered`; None if none was made."""
+    """The finding of a search around obstacles for the scenario; None if none was made."""
+
+    @property
+    def path(self) -> Judged:
+        """The path that is looked at."""
+        return self.paths[self.index]
 
     @property
     def verdict(self) -> Verdict:
-        """The verdict on the shown path."""
-        return self.candidate.verdict
+        """The verdict on it."""
+        return self.path.verdict
 
     @property
-    def reason(self) -> str:
-        """The reason of a refusal, after why no path was found; empty if the path passes."""
-        reason = self.verdict.reason
-        is_old = self.answered is not self.scenario
-        if not reason or is_old or self.around is None or self.around.path is not None:
-            return reason
-        return f"{self.around.reason}; the shown path: {reason}"
+    def old(self) -> frozenset[int]:
+        """Indices of the paths that were judged for other values."""
+        now = self.scenario
+        return frozenset(k for k, one in enumerate(self.paths) if one.scenario is not now)
+
+    @property
+    def best(self) -> int | None:
+        """Index of the best path that passes, None if none is known."""
+        passing = [
+            (one.candidate.cost, k)
+            for k, one in enumerate(self.paths)
+            if k not in self.old and one.verdict.traversable
+        ]
+        return min(passing)[1] if passing else None
+
+    @property
+    def offer(self) -> int | None:
+        """Index of a path that passes while the one that is looked at does not."""
+        return None if self.verdict.traversable else self.best
 
     @property
     def needs_search(self) -> bool:
         """True if all candidates are refused, and no search around obstacles was made yet."""
         asked = self.scenario
-        return (
-            asked.recorded is None
-            and self.answered is asked
-            and self.around is None
-            and not self.answer.traversable
-            and all(asked.terrain.contains(*end[:2]) for end in (asked.start, asked.goal))
-        )
-
-    @property
-    def candidates(self) -> tuple[Candidate, ...]:
-        """The candidates, with the shown one as it was judged last."""
-        candidates = list(self.answer.candidates)
-        candidates[self.index] = self.candidate
-        return tuple(candidates)
+        is_refused = not self.old and self.best is None and self.around is None
+        ends = (asked.start, asked.goal)
+        on_map = all(asked.terrain.contains(*end[:2]) for end in ends)
+        return asked.recorded is None and is_refused and on_map

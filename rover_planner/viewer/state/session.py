@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The state behind the page: what visitors want judged, and what was judged last."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import islice
@@ -22,19 +22,21 @@ from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.query import LatticeSettings
 from rover_planner.studies.rover_values import with_value
 from rover_planner.viewer.state.background_work import BackgroundWork, Progress
-from rover_planner.viewer.state.context import name_ground
 from rover_planner.viewer.state.judging import JudgeRequest, judge_request, show_recorded
 from rover_planner.viewer.state.scenario import Pose, Scenario, Shown
 
 REFUSALS = (RoverError, PlanningError)
 """Errors that say what is wrong with a request."""
+MAX_STEPS = 50
+"""Most changes that can be undone."""
 
 
 class ViewSession:
     """The scenario that is wanted and what is shown: frozen values that are replaced as a whole.
 
     It judges at once, or in the background after `judge_in_background`. All changes belong to one
-    thread, the owner's. A refused change alters nothing but `refusal`.
+    thread, the owner's. A refused change alters nothing but `refusal`. The path that is looked at
+    stays until `show_path`, another goal or another rover.
     """
 
     def __init__(
@@ -64,12 +66,13 @@ class ViewSession:
             rover, rover, terrain, start, goal, options, {}, search=search or LatticeSettings()
         )
         """The scenario that visitors want judged."""
-        self.ground_name = name_ground(terrain)
-        """Name of the ground on the page; by default its size."""
+        self.kept: Scenario | None = None
+        """The values that were kept as reference; None: the rover as it was loaded."""
         self.refusal = ""
         """Reason why the last change was refused, empty if it was not."""
         self.is_stopped = False
         """True if the judgement of `wanted` was cancelled or failed."""
+        self._undo: list[Scenario] = []
         self._background: BackgroundWork[JudgeRequest, Shown] | None = None
         self._judge = partial(judge_request, memory=EdgeMemory())
         self._asked = JudgeRequest(self.wanted)
@@ -77,24 +80,7 @@ class ViewSession:
         *_, self.shown = islice(_results(self._judge(self._asked)), 2)  # and not what it searches
         """The last finding."""
         self._index = self.shown.index
-        """Index of the candidate that is wanted."""
-
-    # What is shown.
-
-    @property
-    def scenario(self) -> Scenario:
-        """Rover, ground, ends and options of what is shown; `wanted` has the newest values."""
-        return self.shown.scenario
-
-    @property
-    def rover(self) -> Rover:
-        """The rover of what is shown."""
-        return self.shown.scenario.rover
-
-    @property
-    def terrain(self) -> Terrain:
-        """Its ground."""
-        return self.shown.scenario.terrain
+        """Index of the path that visitors want to look at."""
 
     @property
     def is_outdated(self) -> bool:
@@ -102,132 +88,129 @@ class ViewSession:
         return self.shown.scenario is not self.wanted
 
     @property
-    def has_old_candidates(self) -> bool:
-        """True if the other candidates were judged for other values."""
-        return self.shown.answered is not self.wanted
+    def is_complete(self) -> bool:
+        """True if all paths were judged for what is wanted."""
+        return not self.is_outdated and not self.shown.old
 
-    # What is wanted. All return whether the change was accepted; if not, `refusal` says why. In
-    # the background a change may be accepted and still be refused when it is judged.
+    # What is wanted. In the background a change may be accepted and refused when it is judged;
+    # `refusal` then says why.
 
-    def show_candidate(self, index: int) -> bool:
-        """Show another candidate of the last answer.
+    def show_path(self, index: int) -> None:
+        """Look at another path.
 
         Raises:
-            PlanningError: There is no candidate of this index, or other paths are wanted.
+            PlanningError: There is no path of this index, or other paths are wanted.
         """
-        count = len(self.shown.answer.candidates)
+        count = len(self.shown.paths)
         if not 0 <= index < count:
             raise PlanningError(f"no path {index + 1}; there are paths 1 to {count}")
-        if not self.wanted.has_paths_of(self.shown.answered):
-            raise PlanningError("the listed paths are old; judge again first")
-        return self._ask(self.wanted, index)
+        if not self.wanted.has_paths_of(self.shown.scenario):
+            raise PlanningError("the listed paths are old; wait for the new ones")
+        self._ask(self.wanted, index)
 
-    def plan_to(self, goal: Floats) -> bool:
+    def plan_to(self, goal: Floats) -> None:
         """Plan to a goal (2,) [m] with the yaw of the straight line there."""
-        start = self.wanted.start
-        return self._want(start=start, goal=_facing(start, goal), recorded=None)
+        self._ask(replace(self.wanted, goal=_facing(self.wanted.start, goal), recorded=None))
 
-    def plan_from(self, start: Floats) -> bool:
+    def plan_from(self, start: Floats) -> None:
         """Plan from a start (2,) [m] with the yaw of the straight line to the goal."""
         x, y, yaw = _facing(start, self.wanted.goal)
         pose = (float(start[0]), float(start[1]), yaw)
-        return self._want(start=pose, goal=(x, y, yaw), recorded=None)
+        self._ask(replace(self.wanted, start=pose, goal=(x, y, yaw), recorded=None))
 
-    def restore_rover(self, rover: Rover, arm_angles: Mapping[str, float]) -> bool:
-        """Take other numbers of the same rover, such as those before a change.
+    def change_options(self, **changes: object) -> None:
+        """Change options of the model.
 
-        The shown path is judged again.
+        Raises:
+            RoverError: A value is out of range.
         """
-        return self._judge_shown(rover=rover, arm_angles=dict(arm_angles))
+        self._change(options=self.wanted.options.change(**changes))
 
-    def change_options(self, **changes: object) -> bool:
-        """Change options of the paths or of the model and plan again."""
-        try:
-            options = self.wanted.options.change(**changes)
-        except RoverError as error:
-            self.refusal = str(error)
-            return False
-        return self._want(options=options)
+    def change_rover(self, keys: Sequence[Key], value: float) -> None:
+        """Change a number of the rover, the same at all of the keys in the rover file.
 
-    def take_rover(self, rover: Rover) -> bool:
+        Raises:
+            RoverError: The changed rover is invalid.
+        """
+        self._change(rover=with_value(self.wanted.rover, keys, value))
+
+    def change_arm(self, joint: str, angle: float) -> None:
+        """Turn a joint of the arm to an angle [rad]."""
+        self._change(arm_angles={**self.wanted.arm_angles, joint: angle})
+
+    def reset(self) -> None:
+        """Take the numbers of the rover as it was loaded, with its arm stowed."""
+        self._change(rover=self.wanted.loaded, arm_angles={})
+
+    def undo(self) -> None:
+        """Take the numbers of the rover before the last change.
+
+        Raises:
+            PlanningError: There is no change to undo.
+        """
+        if not self._undo:
+            raise PlanningError("there is no change of this rover to undo")
+        self._ask(self.wanted.take_values(self._undo.pop()))
+
+    def keep_reference(self) -> None:
+        """Compare with the values of now from now on."""
+        self.kept = self.wanted
+        self._ask(self.wanted)
+
+    def drop_reference(self) -> None:
+        """Compare with the rover as it was loaded again."""
+        self.kept = None
+        self._ask(self.wanted)
+
+    def take_rover(self, rover: Rover) -> None:
         """Take another rover as it was loaded, and plan again."""
-        return self._want(loaded=rover, rover=rover, arm_angles={})
+        self.take_scenario(replace(self.wanted, loaded=rover, rover=rover, arm_angles={}))
 
-    def plan_again(self) -> bool:
-        """Judge all candidates again, after a change of the rover."""
-        return self._ask(self.wanted)
-
-    def change_rover(self, keys: Sequence[Key], value: float) -> bool:
-        """Change a number of the rover and judge the shown path again.
-
-        The other candidates keep their verdicts until `plan_again`.
-
-        Args:
-            keys: Keys of the number in the rover file; several get the same value.
-            value: The new value.
-        """
-        try:
-            rover = with_value(self.wanted.rover, keys, value)
-        except REFUSALS as error:
-            self.refusal = str(error)
-            return False
-        return self._judge_shown(rover=rover)
-
-    def change_arm(self, joint: str, angle: float) -> bool:
-        """Turn a joint of the arm to an angle [rad]; otherwise like `change_rover`."""
-        return self._judge_shown(arm_angles={**self.wanted.arm_angles, joint: angle})
-
-    def take_scenario(self, scenario: Scenario) -> bool:
+    def take_scenario(self, scenario: Scenario) -> None:
         """Plan for a whole scenario on the same ground."""
-        return self._ask(scenario)
+        if scenario.loaded is not self.wanted.loaded:
+            self.kept, self._undo = None, []
+        self._ask(scenario)
 
-    def _want(self, **changes: Any) -> bool:
-        """Plan with other values."""
-        return self._ask(replace(self.wanted, **changes))
+    def judge_again(self) -> None:
+        """Judge what is wanted, after it was stopped."""
+        self._ask(self.wanted)
 
-    def _judge_shown(self, **changes: Any) -> bool:
-        """Judge the shown path again with other values; all, if others are wanted meanwhile."""
-        wanted = replace(self.wanted, **changes)
-        same = wanted.has_paths_of(self.shown.answered)
-        is_listed = self._index < len(self.shown.answer.candidates)
-        return self._ask(wanted, self._index if same and is_listed else None)
+    def _change(self, **changes: Any) -> None:
+        """Judge the same paths with other values; one step to undo for each that was judged."""
+        if self.is_complete:
+            self._undo = [*self._undo[-MAX_STEPS:], self.wanted]
+        self._ask(replace(self.wanted, **changes))
 
-    def _ask(self, wanted: Scenario, index: int | None = None) -> bool:
-        """Judge a candidate by its index, or all; without background do it at once."""
-        before = None if index is None else self.shown
-        request = JudgeRequest(wanted, before, index or 0)
-        self.wanted, self._asked = wanted, request
-        self._index = self._index if index is None else index
-        self.refusal, self.is_stopped = "", False
+    def _ask(self, wanted: Scenario, index: int | None = None) -> None:
+        """Judge a scenario, and look at a path by its index (default: the same as before)."""
+        same = wanted.has_paths_of(self.shown.scenario)
+        if index is not None:
+            self._index = index
+        self.wanted, self.refusal, self.is_stopped = wanted, "", False
+        before, at = (self.shown, self._index) if same else (None, None)
+        self._asked = JudgeRequest(wanted, before, at, self.kept)
         if self._background is not None:
-            self._background.ask(request)
-            return True
+            self._background.ask(self._asked)
+            return
         try:
-            for shown in _results(self._judge(request)):
-                self._finish(request, shown)
+            for shown in _results(self._judge(self._asked)):
+                self._finish(self._asked, shown)
         except REFUSALS as error:
             self._refuse(error)
-            return False
-        return True
 
     def _finish(self, request: JudgeRequest, shown: Shown) -> None:
-        """Take what was judged; one path leaves the others as they were judged last."""
-        now, before = self.shown, request.before
-        if (
-            before is not None
-            and shown.around is before.around
-            and request.scenario.has_paths_of(now.answered)
-            and shown.index < len(now.answer.candidates)
-        ):
-            shown = replace(shown, answer=now.answer, answered=now.answered, around=now.around)
-        self.shown = shown
-        if request is self._asked:
-            self._index = shown.index
+        """Take what was judged, unless visitors look at another path meanwhile."""
+        same = shown.index == self._index and shown.scenario.has_paths_of(self.wanted)
+        if request is self._asked or same:
+            self.shown, self._index = shown, shown.index
 
     def _refuse(self, error: Exception) -> None:
-        """Want again what was judged last."""
-        self.refusal = str(error)
+        """Want again what was judged last, and judge what was left of it."""
         self.wanted, self._index = self.shown.scenario, self.shown.index
+        if self._background is not None or self.shown.old:
+            self._ask(self.wanted)
+        self.refusal = str(error)
 
     # In the background.
 
@@ -238,8 +221,7 @@ class ViewSession:
             wake: Called in that thread when there is something to take with `take_finished`.
         """
         self._background = BackgroundWork(self._judge, wake, "judge")
-        if self.shown.needs_search:
-            self._ask(self.wanted, self._index)
+        self._ask(self.wanted)
 
     @property
     def progress(self) -> Progress | None:
@@ -251,14 +233,13 @@ class ViewSession:
         """True if there is something for `take_finished`."""
         return self._background is not None and self._background.has_news
 
-    def take_finished(self) -> bool:
-        """Take what was judged in the background; return whether there was anything.
+    def take_finished(self) -> None:
+        """Take what was judged in the background.
 
         Raises:
             Exception: The newest judgement failed by an error that is no refusal.
         """
-        done = self._background.take() if self._background is not None else []
-        for one in done:
+        for one in self._background.take() if self._background is not None else []:
             if one.result is not None:
                 self._finish(one.request, one.result)
             elif one.request is self._asked and isinstance(one.error, REFUSALS):
@@ -266,7 +247,6 @@ class ViewSession:
             elif one.request is self._asked and one.error is not None:
                 self.is_stopped = True
                 raise one.error
-        return bool(done)
 
     def cancel(self) -> None:
         """Stop the judgement in the background; the last one stays, and `wanted` stays."""
@@ -276,13 +256,6 @@ class ViewSession:
     def close(self) -> bool:
         """End the thread; return whether it has ended."""
         return self._background is None or self._background.close()
-
-    # Without a judgement.
-
-    def move(self, **places: Any) -> None:
-        """Replace terrain, start or goal without a judgement, for a page that follows a rover."""
-        self.wanted = replace(self.shown.scenario, **places)
-        self.shown = replace(self.shown, scenario=self.wanted)
 
     def replay(
         self,
@@ -303,7 +276,7 @@ class ViewSession:
                 arm_angles=assumptions.joint_angles or {},
             )
         start, goal = tuple(poses[0].tolist()), tuple(poses[-1].tolist())
-        self.wanted = replace(wanted, start=start, goal=goal, recorded=poses)
+        self.wanted = self.kept = replace(wanted, start=start, goal=goal, recorded=poses)
         self.shown, self._index = show_recorded(self.wanted, prediction, reasons), 0
 
 

@@ -12,7 +12,6 @@ from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_rpy
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.traversability.verdict import Verdict
-from rover_planner.viewer.state.exemptions import describe_exemptions
 
 MAX_SLIP = 0.95
 """Slip ratio at which the shown rate of a wheel is limited."""
@@ -58,12 +57,10 @@ class RoverState:
     """(6,) tractions T [N]."""
     lateral: Floats
     """(6,) lateral forces S [N]."""
-    friction: Floats
-    """(6,) friction coefficients mu at the contacts."""
-    friction_utilisation: Floats
-    """(6,)"""
-    torque_saturation: Floats
-    """(6,)"""
+    friction_use: Floats
+    """(6,) friction utilisation over its limit."""
+    torque_use: Floats
+    """(6,) torque saturation over its limit."""
     slip_ratio: Floats
     """(6,)"""
     tip_over_ratio: float
@@ -85,8 +82,6 @@ class Trajectory:
             end = min(end, verdict.first_failure + 1)
         self.length = end
         """Number of waypoints; 0 where the rover does not settle at the start."""
-        self.notes = describe_exemptions(prediction, end)
-        """Sentences on what lies between the waypoints, and on what the verdict did not ask."""
         self._series = dict.fromkeys(("time", "distance", "energy"), np.zeros(1))
         if end:
             self._series = _read_drive(rover, prediction.select(slice(end)))
@@ -140,15 +135,21 @@ def _read_drive(rover: Rover, driven: PathPrediction) -> dict[str, Floats]:
     rolled = moves / rover.wheel.radius / (1.0 - np.clip(driven.slip_ratio, 0, MAX_SLIP))[1:]
     rolled *= np.where(driven.wheel_speed[1:] < 0.0, -1.0, 1.0)
     spin = np.vstack([np.zeros(6), np.cumsum(np.nan_to_num(rolled), axis=0)])
-    return {**read_series(driven), "spin": spin}
+    return {**read_series(rover, driven), "spin": spin}
 
 
-def read_series(prediction: PathPrediction) -> dict[str, Floats]:
+def read_series(rover: Rover, prediction: PathPrediction) -> dict[str, Floats]:
     """Return the values (n, ...) of the fields of `RoverState` but for the spin of the wheels."""
     names = [field.name for field in fields(RoverState) if hasattr(prediction, field.name)]
     series = {name: getattr(prediction, name) for name in names}
     yaw = np.unwrap(prediction.poses[:, 2])
     series["attitude"] = np.column_stack([prediction.roll, prediction.pitch, yaw])
+    limits, kept = rover.limits, prediction.results["kept_share"][:, None]
+    for name, use, bound in (
+        ("friction_utilisation", "friction_use", limits.friction_utilisation),
+        ("torque_saturation", "torque_use", limits.torque_saturation),
+    ):
+        series[use] = getattr(prediction, name) / np.maximum(bound * kept, 1e-9)
     series["speed"] = np.hypot(prediction.motion[:, 0], prediction.motion[:, 1])
     return {
         name: values if name in PLACES else np.clip(np.nan_to_num(values), -MAX_VALUE, MAX_VALUE)

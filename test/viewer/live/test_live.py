@@ -22,9 +22,15 @@ from rover_physics.warm_up import warm_up
 from rover_planner.nodes.rover_simulator import RoverSimulator
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.ros.qos import result_qos, sensor_qos, topic_qos
+from rover_planner.viewer.documents.live import PATIENCE, choose_answer, list_topics
 from rover_planner.viewer.live.listener import LiveLink, LiveListener
-from rover_planner.viewer.live.live_state import MAX_AGE, StateBuilder, TopicAge
-from rover_planner.viewer.panel.dashboard import draw_topics
+from rover_planner.viewer.live.live_state import (
+    MAX_AGE,
+    Click,
+    LiveVerdict,
+    StateBuilder,
+    TopicAge,
+)
 from support.grounds import make_terrain, wall_at
 from support.waiting import wait_until
 
@@ -151,7 +157,7 @@ def test_invalid_messages_are_skipped_and_values_without_a_topic_are_nan(ros, li
     assert "rocker_right" not in listener.latest().values.joints
     state = StateBuilder(LSR1).build(listener.latest().values)
     assert state is not None and np.isnan(state.tip_over_ratio)
-    for values in (state.wheel_loads, state.friction_utilisation, state.torque_saturation):
+    for values in (state.wheel_loads, state.friction_use, state.torque_use):
         assert np.isnan(values).all()
     assert listener.latest().values.forces_from == ""
 
@@ -206,6 +212,11 @@ def test_a_rover_its_map_and_the_answers_of_its_server_are_followed(ros, listene
     wait_until(lambda: not listener.latest().verdict.traversable, "the refusal")
     assert listener.latest().verdict.reason
     wait_until(lambda: listener.latest().plan is None, "no plan")  # it is another topic
+    click = listener.latest().click
+    assert click.verdict.reason == listener.latest().verdict.reason and click.plan is None
+    wait_until(lambda: listener.latest().freshness == "live", "the server's sign of life")
+    listener.forget_click()
+    assert listener.latest().click is None
 
 
 def test_a_stream_gets_stale_and_a_result_never():
@@ -219,6 +230,51 @@ def test_a_stream_gets_stale_and_a_result_never():
     assert [one.is_stale for one in (odometry, plan, none, fresh)] == [True, False, False, False]
     assert odometry.describe() == plan.describe() == f"{MAX_AGE + 22.0:.0f} s"
     assert none.describe() == "nothing yet"
-    text = draw_topics((odometry, plan))
-    assert 'data-topic="odometry" data-stale="true"' in text
-    assert 'data-topic="plan" data-stale="false"' in text
+    told = {one["topic"]: one["stale"] for one in list_topics((odometry, plan))}
+    assert told == {"odometry": True, "plan": False}
+
+
+# The answer that is shown: whose question it is, and how old.
+
+NOW = 1000.0
+ALIVE = TopicAge("traverse_server", time.monotonic() + 1e6, True)
+
+
+def verdict_on(question_hash: str, passes: bool, age: float) -> LiveVerdict:
+    reason = "" if passes else "a wheel slips"
+    return LiveVerdict(passes, reason, f"question {question_hash}", question_hash, NOW - age)
+
+
+def test_an_answer_to_a_click_belongs_to_the_click_and_the_newest_is_one_click_away():
+    refusal, mission = verdict_on("1", False, 5.0), verdict_on("2", True, 3.0)
+    clicked, planned = np.zeros((2, 3)), np.ones((3, 3))
+    click = Click("1", NOW - 6.0, refusal)
+    shown = choose_answer(mission, planned, click, ALIVE, NOW)
+    told = shown.document
+    assert told["passes"] is False and told["headline"] == "a wheel slips"
+    assert told["about"] == "your click, 5 s ago" and shown.plan is None
+    [offer] = told["offers"]
+    assert offer["words"] == "question 2: traversable, 3 s ago"
+    assert offer["ask"] == {"ask": "newest"}
+    newest = choose_answer(mission, planned, None, ALIVE, NOW)
+    assert newest.document["passes"] and newest.document["about"] == "question 2, 3 s ago"
+    assert newest.plan is planned and not newest.is_old
+    again = Click("2", NOW - 4.0, mission, clicked)
+    assert choose_answer(mission, planned, again, ALIVE, NOW).plan is clicked
+
+
+def test_a_click_without_an_answer_says_so_in_2_s_and_shows_no_older_verdict():
+    for waited, words in (
+        (0.5, "asking the server"),
+        (PATIENCE + 1.0, "no answer from the server"),
+    ):
+        click = Click("1", NOW - waited)
+        told = choose_answer(verdict_on("2", True, 9.0), None, click, ALIVE, NOW).document
+        assert told["passes"] is None and told["headline"].startswith(words)
+
+
+def test_a_verdict_of_a_server_that_fell_silent_is_old_in_words_and_in_the_scene():
+    silent = TopicAge("traverse_server", time.monotonic() - 20.0, True)
+    shown = choose_answer(verdict_on("1", True, 25.0), np.zeros((2, 3)), None, silent, NOW)
+    assert shown.is_old and shown.document["old"] == "the server is silent for 20 s"
+    assert shown.document["about"] == "question 1, 25 s ago"

@@ -1,38 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parts of the page without a browser: trajectories, playback, colours, dashboard, plots."""
+"""Parts behind the page without a server: trajectories, playback, requests, colours, ground."""
 
-import dataclasses
 import math
 
 import numpy as np
 import pytest
 
-from rover_physics.names import WHEELS
 from rover_physics.traversability.judge import judge_path
-from rover_planner.viewer.panel.dashboard import describe_verdict, draw_dashboard
-from rover_planner.viewer.panel.history import History
-from rover_planner.viewer.panel.plots import PLOTS, add_line
+from rover_planner.planning.path_query import check_path
+from rover_planner.viewer.scene.number_places import place_numbers
 from rover_planner.viewer.state.colours import (
     PASSABLE,
     REFUSED,
     UNKNOWN,
-    colour_utilisation,
+    colour_use,
     map_colours,
 )
 from rover_planner.viewer.state.playback import FAST, Playback
-from rover_planner.viewer.state.trajectory import Trajectory
+from rover_planner.viewer.state.trajectory import Trajectory, find_axles
 from rover_planner.viewer.state.visitor_requests import VisitorRequests
 from support.grounds import gap, make_terrain, wall_at, waves
-from support.viewer.sessions import LSR1, straight
+from support.viewer.sessions import LSR1, session_on, straight
 
 pytest.importorskip("trimesh", reason="no trimesh: pip install '.[view]'")
 
-import pytest
-
-from rover_physics.rover.rover_file import load_rover
-from rover_planner.planning.path_query import check_path
 from rover_planner.viewer.scene.ground_mesh import build_ground_mesh, intersect_ground
-from rover_planner.viewer.state.trajectory import find_axles
 
 # Trajectories.
 
@@ -72,32 +64,6 @@ def test_a_trajectory_without_waypoints_has_no_state():
     trajectory = trajectory_on(gap, np.add(straight(), [1.75, 0.0, 0.0]))
     assert trajectory.length == 0
     assert trajectory.state_at(0.0) is None
-
-
-@pytest.mark.parametrize(
-    ("height", "told"),
-    [
-        (lambda x, y: 0.0 * x, ()),
-        (lambda x, y: -0.1 * (x > 0.5), ("between waypoints the utilisation", "not asked while")),
-    ],
-    ids=["level", "edge"],
-)
-def test_what_lies_between_waypoints_and_what_is_exempt_is_said(height, told):
-    trajectory = trajectory_on(height, straight(3.0))
-    assert trajectory.verdict.traversable
-    prediction = trajectory.prediction
-    pairs = zip(trajectory.notes, told, strict=True)
-    assert all(note.startswith(begin) for note, begin in pairs)
-    if told:
-        between = prediction.between
-        largest = np.nanmax(between.friction_utilisation)
-        assert largest > 1.0  # more than the limit, though traversable
-        first, second = trajectory.notes
-        assert f"reaches {largest:.2f}" in first and "not asked" in first
-        assert "wheel lift, sinkage, friction and torque" in second
-        assert "front left and front right 1.20 to 1.26 m" in second
-        html = describe_verdict(True, "", "", "", notes=trajectory.notes)
-        assert html.count('class="note"') == 2
 
 
 # Playback.
@@ -177,9 +143,9 @@ def test_a_later_request_of_a_kind_replaces_the_earlier_one():
 
 
 def test_the_colour_of_a_wheel_goes_from_blue_to_vermillion_and_is_grey_for_nan():
-    assert colour_utilisation(0.0) == PASSABLE
-    assert colour_utilisation(1.0) == colour_utilisation(7.0) == REFUSED
-    assert colour_utilisation(math.nan) == UNKNOWN
+    assert colour_use(0.0) == PASSABLE
+    assert colour_use(1.0) == colour_use(7.0) == REFUSED
+    assert colour_use(math.nan) == UNKNOWN
 
 
 def test_colours_get_lighter_with_the_value_and_are_grey_for_nan():
@@ -218,53 +184,16 @@ def test_unknown_ground_is_left_out_of_the_mesh():
     assert not ((centres[:, 0] > 0.55) & (centres[:, 0] < 0.95)).any()
 
 
-# Dashboard and plots.
-
-
-def test_the_dashboard_shows_all_loads_with_their_unit():
-    state = trajectory_on(waves).state_at(20.0)
-    assert state is not None
-    dashboard = draw_dashboard(LSR1, state, "paused")
-    for load in state.wheel_loads:
-        assert f"{load:.1f} N<" in dashboard
-    assert all(wheel in dashboard for wheel in WHEELS)
-    assert f"{state.tip_over_ratio:.2f}" in dashboard
-    for text in ("20.0 s", " cm", " J", "cm/s", ">stability<", ">margin<", "paused"):
-        assert text in dashboard
-
-
-def test_the_dashboard_shows_unknown_values_as_question_marks():
-    state = trajectory_on(waves).state_at(20.0)
-    assert state is not None
-    unknown = dataclasses.replace(
-        state, wheel_loads=np.full(6, np.nan), slip_ratio=np.full(6, np.nan)
-    )
-    dashboard = draw_dashboard(LSR1, unknown, "live")
-    assert dashboard.count("? N<") == 6
-    assert "nan" not in dashboard
-
-
-def test_lines_of_a_plot_are_at_their_distances_and_do_not_change_the_curves():
-    x, values = np.linspace(0.0, 4.0, 9), np.arange(9.0)
-    at, curve, mark, cursor = columns = add_line(add_line((x, values), 3.1, 0.0), 1.25, 0.0)
-    assert np.isfinite(columns).all() and (np.diff(at) >= 0.0).all()
-    assert at[np.argmax(mark)] == 3.1 and at[np.argmax(cursor)] == 1.25
-    np.testing.assert_allclose(curve, 2.0 * at)
-    assert add_line((x, values), None, 0.0)[-1].max() == 0.0
-
-
-def test_the_history_of_a_live_rover_keeps_known_values_every_centimetre():
-    history = History()
-    state = trajectory_on(waves).state_at(20.0)
-    assert state is not None
-    assert history.add(dataclasses.replace(state, distance=0.5))
-    assert not history.add(dataclasses.replace(state, distance=0.501))
-    assert not history.add(
-        dataclasses.replace(state, distance=0.6, wheel_loads=np.full(6, np.nan))
-    )
-    assert history.add(dataclasses.replace(state, distance=0.7))
-    np.testing.assert_array_equal(history.distance, [0.5, 0.7])
-    assert set(history.values) == set(PLOTS)
+def test_the_numbers_of_paths_stand_on_them_and_apart_from_each_other():
+    session = session_on(waves)
+    paths = [path.poses[:, :2] for path in session.shown.paths]
+    taken = np.array([session.wanted.start[:2], session.wanted.goal[:2]])
+    places = place_numbers(paths, taken)
+    for path, place in zip(paths, places, strict=True):
+        assert np.linalg.norm(path - place, axis=1).min() < 0.03
+    both = np.concatenate([places, taken])
+    away = np.linalg.norm(both[:, None] - both[None], axis=2)
+    assert away[~np.eye(len(both), dtype=bool)].min() > 0.4
 
 
 def arc(radius, length=1.0, count=41):
@@ -274,7 +203,7 @@ def arc(radius, length=1.0, count=41):
 
 
 def drive(poses, ground=lambda x, y: 0.0 * x):
-    rover = load_rover("lsr1")
+    rover = LSR1
     candidate = check_path(rover, make_terrain(ground, half=4.0), poses)
     trajectory = Trajectory(rover, candidate.prediction, candidate.verdict)
     return rover, trajectory.state_at(0.5 * trajectory.duration)
@@ -287,11 +216,3 @@ def test_the_axles_are_those_of_the_model_on_rough_ground():
     assert (away <= 0.5 * rover.wheel.width + 1e-6).all()
     radial = np.sqrt((outwards**2).sum(axis=1) - away**2)
     assert radial == pytest.approx(np.full(6, rover.wheel.radius), abs=2e-3)
-
-
-def test_the_dashboard_shows_turned_wheels_to_the_left_for_positive_angles():
-    rover, state = drive(arc(0.8))
-    text = draw_dashboard(rover, state, "paused")
-    front_left = np.degrees(state.steering_angle[5])
-    assert front_left > 20.0
-    assert f"rotate({-front_left:.1f} " in text and f"turned {front_left:.0f} deg" in text

@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The limits along a path, as lanes and curves of their uses, beside those of the reference."""
+
+import itertools
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.names import WHEELS
+from rover_physics.numerics.arrays import Floats
+from rover_planner.viewer.documents.numbers import plain
+from rover_planner.viewer.state.limits import write_use
+from rover_planner.viewer.state.path_limits import Lane, PathLimits
+from rover_planner.viewer.state.scenario import Judged
+
+MAX_POINTS = 240
+"""Most points of a curve."""
+HALF, MUCH = 0.5, 0.8
+"""Uses at which the colour changes."""
+CLASSES = ("little", "half", "near", "broken", "unasked")
+"""Classes of colours: up to HALF, up to MUCH, up to the limit, beyond it, not asked."""
+BROKEN, NOT_ASKED = 3, 4
+
+
+def describe_limits(path: Judged, reference: Judged | None) -> dict[str, Any]:
+    """Return the lanes and curves of a path, and those of the same path for the reference."""
+    failure, before = path.failure, None if reference is None else reference.limits
+    end = max(path.limits.end, 0.0 if before is None else before.end)
+    lanes = [
+        {
+            "code": lane.limit.code,
+            "title": lane.limit.title,
+            "pieces": list(_list_pieces(lane, path.limits)),
+            "before": [] if before is None else _list_before(lane, before),
+        }
+        for lane in path.limits.lanes
+    ]
+    return {
+        "end": round(end, 4),
+        "fails": None if failure is None else round(failure.distance, 4),
+        "code": "" if failure is None else path.limits.lane(failure.code).limit.code,
+        "compared": reference is not None,
+        "lanes": lanes,
+        "loads": _describe_loads(path),
+    }
+
+
+def describe_curves(path: Judged, reference: Judged | None) -> dict[str, Any]:
+    """Return the uses of each limit along a path, by code; six curves where wheels have it."""
+    curves = {}
+    for lane in path.limits.lanes:
+        values = lane.used[:, None] if lane.wheels is None else lane.wheels
+        curve = _pick_points(path.limits.rows.distance, values)
+        old = None
+        if reference is not None:
+            limits = reference.limits
+            old = _pick_points(limits.rows.distance, limits.lane(lane.limit.code).used[:, None])
+        curves[lane.limit.code] = {**curve, "old": old}
+    return curves
+
+
+def describe_uses(path: Judged, time: float) -> list[dict[str, Any]]:
+    """Return for each lane its use at a time [s] and the worst so far, with value and wheel."""
+    limits, failure = path.limits, path.failure
+    rows = limits.rows_until(time)
+    here = rows - 1
+    if failure is not None and time >= failure.time - 1e-6:
+        rows, here = max(rows, failure.row + 1), failure.row
+    return [_describe_use(lane, limits, lane.worst_until(rows), here) for lane in limits.lanes]
+
+
+def _describe_use(lane: Lane, limits: PathLimits, worst: int, here: int) -> dict[str, Any]:
+    kept = float(limits.rows.prediction.results["kept_share"][max(worst, 0)])
+    limit = lane.limit.keep(kept) if np.isfinite(kept) else lane.limit
+    used = float(lane.used[worst]) if worst >= 0 else np.nan
+    value = float(lane.values[worst]) if worst >= 0 else np.nan
+    wheel = int(lane.wheel[worst]) if worst >= 0 and used > 0.0 else -1
+    return {
+        "now": write_use(float(lane.used[here])),
+        "worst": write_use(used),
+        "share": plain(min(used, 1.0), 2),
+        "broken": bool(used > 1.0),
+        "value": "" if np.isnan(value) else f"{limit.write(value)}, {limit.good}",
+        "wheel": WHEELS[wheel].replace("_", " ") if wheel >= 0 else "",
+    }
+
+
+def _describe_loads(path: Judged) -> dict[str, Any]:
+    """Return the wheel loads [N] along a path while the rover stands."""
+    rows = path.limits.rows
+    stands = rows.prediction.settled
+    return _pick_points(rows.distance[stands], rows.prediction.wheel_loads[stands], 1)
+
+
+def classify(used: Floats) -> NDArray[np.intp]:
+    """Return the index (m,) in CLASSES of each use (m,)."""
+    shares = np.select([used <= HALF, used <= MUCH], [0, 1], 2)
+    return np.select([used > 1.0, np.isnan(used)], [BROKEN, NOT_ASKED], shares)
+
+
+def _list_runs(lane: Lane, limits: PathLimits) -> Iterator[tuple[int, int, float, float, int]]:
+    """Yield first row, end, begin and end [m], and class of each stretch of one class."""
+    distance = limits.rows.distance
+    edges = np.concatenate([[0.0], 0.5 * (distance[1:] + distance[:-1]), distance[-1:]])
+    first = 0
+    for kind, run in itertools.groupby(classify(lane.used).tolist()):
+        end = first + len(list(run))
+        yield first, end, float(edges[first]), float(edges[end]), kind
+        first = end
+
+
+def _list_pieces(lane: Lane, limits: PathLimits) -> Iterator[list[Any]]:
+    """Yield begin and end [m], class and words of each stretch, broken ones last, on top."""
+    for first, end, left, right, kind in sorted(
+        _list_runs(lane, limits), key=lambda run: run[4] == BROKEN
+    ):
+        words = f"{lane.limit.title}: does not count or is not known"
+        if kind != NOT_ASKED:
+            at = first + int(np.argmax(np.nan_to_num(lane.used[first:end], nan=-1.0, posinf=1e9)))
+            wheel = int(lane.wheel[at])
+            named = f", {WHEELS[wheel].replace('_', ' ')}" if wheel >= 0 else ""
+            words = f"{lane.limit.title} {write_use(float(lane.used[at]))}{named}"
+        yield [round(left, 4), round(right, 4), CLASSES[kind], f"{words}; at {left:.2f} m"]
+
+
+def _list_before(lane: Lane, before: PathLimits) -> list[list[Any]]:
+    """Return begin, end [m] and class of each stretch of a lane of the reference."""
+    runs = _list_runs(before.lane(lane.limit.code), before)
+    return [[round(left, 4), round(right, 4), CLASSES[kind]] for _, _, left, right, kind in runs]
+
+
+def _pick_points(distance: Floats, values: Floats, digits: int = 3) -> dict[str, Any]:
+    """Return x (j,) and curves y (k, j) of values (m, k) with all peaks and dips."""
+    rows = choose_rows(values)
+    return {"x": plain(distance[rows], 4), "y": plain(values[rows].T, digits)}
+
+
+def choose_rows(values: Floats) -> NDArray[np.intp]:
+    """Return at most MAX_POINTS rows of curves (m, k): first, last, and all peaks and dips.
+
+    A peak between two waypoints is what refuses a path; it must not be left out.
+    """
+    m = len(values)
+    if m <= MAX_POINTS:
+        return np.arange(m)
+    edges = np.linspace(0, m, MAX_POINTS // 2).astype(int)
+    high = np.nan_to_num(values, nan=-1e9).max(axis=1)
+    low = np.nan_to_num(values, nan=1e9).min(axis=1)
+    chosen = [
+        first + int(pick)
+        for first, end in itertools.pairwise(edges)
+        for pick in (np.argmax(high[first:end]), np.argmin(low[first:end]))
+    ]
+    return np.unique([0, *chosen, m - 1])

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The answer that a live page shows: whose question it is, how old it is, and whether it holds."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rover_physics.numerics.arrays import Floats
+from rover_planner.viewer.documents.verdict import describe_answer
+from rover_planner.viewer.live.live_state import Click, LiveVerdict, TopicAge
+
+PATIENCE = 2.0
+"""Time after which a click without an answer says so [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class LiveAnswer:
+    """The one answer that is shown, in words and in the scene."""
+
+    document: dict[str, Any]
+    """As `describe_verdict` returns it."""
+    plan: Floats | None
+    """(n, 3) poses of its plan; None without one."""
+
+    @property
+    def is_old(self) -> bool:
+        """True if nobody stands for it any more."""
+        return bool(self.document["old"])
+
+
+def choose_answer(
+    newest: LiveVerdict | None,
+    plan: Floats | None,
+    click: Click | None,
+    server: TopicAge,
+    now: float,
+    refusal: str = "",
+) -> LiveAnswer:
+    """Return the answer to the last click, or without one the server's newest.
+
+    Args:
+        newest: The server's newest verdict, whoever asked.
+        plan: Its plan.
+        click: The last click of a visitor; None before, and once the newest was asked for.
+        server: The age of the server's last sign of life.
+        now: The monotonic clock [s].
+        refusal: Why a visitor's last request was refused; empty if it was not.
+    """
+    verdict, offers = (newest if click is None else click.verdict), []
+    if verdict is not None:
+        whose = "your click" if click is not None else verdict.question
+        answer = describe_answer(verdict.traversable, f"{whose}, {write_age(now - verdict.heard)}")
+        headline = verdict.reason
+    elif click is not None:
+        waited = now - click.asked
+        late = waited > PATIENCE
+        answer = describe_answer(None, f"your click, {write_age(waited)}")
+        headline = f"no answer from the server for {waited:.0f} s" if late else "asking the server"
+    else:
+        answer = describe_answer(None, "")
+        headline = "click the ground to ask for a plan"
+    if click is not None and newest is not None and newest is not click.verdict:
+        word = "traversable" if newest.traversable else "not traversable"
+        words = f"{newest.question}: {word}, {write_age(now - newest.heard)}"
+        offers = [{"words": words, "ask": {"ask": "newest"}}]
+    old = ""
+    if verdict is not None and server.age is not None and server.is_stale:
+        old = f"the server is silent for {server.age:.0f} s"
+    shown = plan if click is None else click.plan
+    document = {**answer, "headline": headline, "old": old, "refusal": refusal, "offers": offers}
+    return LiveAnswer(document, shown)
+
+
+def write_age(seconds: float) -> str:
+    """Return an age in words, in steps that do not change all the time."""
+    return "just now" if seconds < PATIENCE else f"{seconds:.0f} s ago"
+
+
+def list_topics(ages: Sequence[TopicAge]) -> list[dict[str, Any]]:
+    """Return the topics of a live rover with their ages."""
+    return [{"topic": one.topic, "age": one.describe(), "stale": one.is_stale} for one in ages]

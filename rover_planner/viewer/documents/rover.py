@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The rover's numbers as sliders, and what of it and of its drive differs from the reference."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_file import rover_to_dict
+from rover_planner.studies.rover_values import RoverValue, get_value, list_values
+from rover_planner.viewer.documents.header import POLICY_TITLES
+from rover_planner.viewer.documents.numbers import write
+from rover_planner.viewer.state.limits import write_use
+from rover_planner.viewer.state.scenario import Judged, Scenario
+
+FULL_TURN = 3.15
+"""Largest angle, both ways, of the slider of an arm's joint without limits [rad]."""
+SAME = 1e-9
+"""Difference up to which two numbers are the same."""
+
+
+def list_numbers(rover: Rover) -> list[RoverValue]:
+    """Return the changeable numbers of a rover."""
+    return [value for values in list_values(rover).values() for value in values]
+
+
+def describe_sliders(loaded: Rover) -> dict[str, Any]:
+    """Return the sliders of a rover that was loaded: label, ends and step, by part."""
+    parts = [
+        {
+            "title": title,
+            "sliders": [[one.label, one.low, one.high, one.step] for one in values],
+        }
+        for title, values in list_values(loaded).items()
+    ]
+    if (arm := loaded.manipulator) is not None:
+        ends = arm.joint_limits or ((-FULL_TURN, FULL_TURN),) * 3
+        joints = [
+            [f"{joint} [rad]", low, high, 0.01]
+            for joint, (low, high) in zip(arm.joints, ends, strict=True)
+        ]
+        parts.append({"title": "Arm", "sliders": joints})
+    return {"rover": loaded.name, "parts": parts}
+
+
+def read_values(scenario: Scenario) -> dict[str, float]:
+    """Return the numbers of a scenario by the label of their slider."""
+    data = rover_to_dict(scenario.rover)
+    numbers = {one.label: get_value(data, one.keys[0]) for one in list_numbers(scenario.loaded)}
+    return numbers | {f"{joint} [rad]": angle for joint, angle in scenario.arm.items()}
+
+
+def describe_values(scenario: Scenario) -> dict[str, list[float]]:
+    """Return the numbers now and as loaded, by the label of their slider."""
+    now = read_values(scenario)
+    loaded = read_values(
+        Scenario(**{**vars(scenario), "rover": scenario.loaded, "arm_angles": {}})
+    )
+    return {label: [value, loaded[label]] for label, value in now.items()}
+
+
+def describe_changes(path: Judged, reference: Judged | None, *, is_kept: bool) -> dict[str, Any]:
+    """Return what differs from the reference: numbers of the rover and the arm, and the drive."""
+    title = "reference" if is_kept else "loaded"
+    if reference is None:
+        return {"title": title, "kept": is_kept, "rover": [], "drive": []}
+    before, now = read_values(reference.scenario), read_values(path.scenario)
+    rows = [
+        [label, f"{before[label]:g}", f"{value:g}"]
+        for label, value in now.items()
+        if abs(value - before[label]) > SAME
+    ]
+    was, here = (one.scenario.options.model for one in (reference, path))
+    if was.policy != here.policy:
+        rows.append(["torques", POLICY_TITLES[was.policy], POLICY_TITLES[here.policy]])
+    if was.soil != here.soil:
+        rows.append(["soil", was.soil or "none", here.soil or "none"])
+    return {
+        "title": title,
+        "kept": is_kept,
+        "rover": rows,
+        "drive": compare_drives(reference, path),
+    }
+
+
+def compare_drives(before: Judged, now: Judged) -> list[list[str]]:
+    """Return name, value before and now of the drives along one path, up to their failures."""
+    reads: Mapping[str, Callable[[Judged], str]] = {
+        "verdict": lambda one: "passes" if one.verdict.traversable else "refused",
+        "driven": lambda one: write(float(one.trajectory.distance[-1]), 2, "m"),
+        "time": lambda one: write(float(one.trajectory.times[-1]), 1, "s"),
+        "energy": lambda one: write(float(one.trajectory.series("energy")[-1]), 1, "J"),
+    }
+    rows = [[name, read(before), read(now)] for name, read in reads.items()]
+    for lane in now.limits.lanes:
+        uses = [
+            write_use(float(np.fmax.reduce(one.limits.lane(lane.limit.code).used)))
+            for one in (before, now)
+        ]
+        rows.append([lane.limit.title, *uses])
+    return [row for row in rows if row[0] == "verdict" or row[1] != row[2]]

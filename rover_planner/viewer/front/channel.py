@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Serves the page's files, and one JSON channel to each visitor."""
+
+import json
+import threading
+from collections.abc import Callable, Mapping
+from http import HTTPStatus
+from importlib.resources import files
+from typing import Any
+from uuid import uuid4
+
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+from websockets.sync.server import ServerConnection, serve
+
+CHANNEL = "/channel"
+"""Path of the channel; all others are files."""
+FILES = {
+    "/": ("page.html", "text/html"),
+    "/page.js": ("page.js", "text/javascript"),
+    "/page.css": ("page.css", "text/css"),
+}
+"""Files of the page and their kinds, by path."""
+MAX_MESSAGE = 1 << 20
+"""Most bytes that a visitor may send at once; a rover file has a few thousand."""
+
+Part = Any
+"""A part of what is shown: dicts, lists, texts, numbers, True, False and None."""
+Hear = Callable[[dict[str, Any], "Mailbox"], None]
+"""Takes a visitor's words and where to answer."""
+
+
+class Mailbox:
+    """Parts on their way to one visitor: a newer one replaces an older one of the same name."""
+
+    def __init__(self, parts: Mapping[str, Part]):
+        self._parts = dict(parts)
+        self._changed = threading.Condition()
+        self._is_open = True
+
+    def put(self, parts: Mapping[str, Part]) -> None:
+        """Send parts soon."""
+        with self._changed:
+            self._parts.update(parts)
+            self._changed.notify()
+
+    def take(self) -> dict[str, Part]:
+        """Wait for parts and return them; nothing once it is closed."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._parts or not self._is_open)
+            parts, self._parts = self._parts, {}
+        return parts
+
+    def close(self) -> None:
+        """Wake whoever waits."""
+        with self._changed:
+            self._is_open, self._parts = False, {}
+            self._changed.notify()
+
+
+class Channel:
+    """Tells all visitors what is shown, part by part, and hears what they ask.
+
+    To a browser: an object with the parts that have changed, by name; the first has all of them.
+    From a browser: an object with the word `ask` and its values.
+    """
+
+    def __init__(self, host: str, port: int, hear: Hear):
+        """Start to serve; `hear` is called in a thread of the visitor and must be quick."""
+        self._hear = hear
+        self._lock = threading.Lock()
+        self._parts: dict[str, Part] = {"program": uuid4().hex}
+        self._made_of: dict[str, tuple[Any, ...]] = {}
+        self._mailboxes: set[Mailbox] = set()
+        self._server = serve(
+            self._serve, host, port, process_request=_answer, max_size=MAX_MESSAGE
+        )
+        self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
+        self._thread.start()
+
+    @property
+    def port(self) -> int:
+        """The port."""
+        return int(self._server.socket.getsockname()[1])
+
+    @property
+    def parts(self) -> Mapping[str, Part]:
+        """What is shown, by name."""
+        return self._parts
+
+    def tell(self, name: str, part: Part) -> None:
+        """Show a part, if it differs from what is shown."""
+        if name in self._parts and self._parts[name] == part:
+            return
+        with self._lock:
+            self._parts = {**self._parts, name: part}
+            for mailbox in self._mailboxes:
+                mailbox.put({name: part})
+
+    def tell_made(self, name: str, made_of: tuple[Any, ...], make: Callable[[], Part]) -> None:
+        """Show a part that is made anew only if one of the objects has changed of which it is."""
+        before = self._made_of.get(name)
+        if before is None or any(a is not b for a, b in zip(before, made_of, strict=True)):
+            self._made_of[name] = made_of
+            self.tell(name, make())
+
+    def close(self) -> None:
+        """End it."""
+        self._server.shutdown()
+        for mailbox in tuple(self._mailboxes):
+            mailbox.close()
+        self._thread.join(5.0)
+
+    def _serve(self, connection: ServerConnection) -> None:
+        with self._lock:
+            mailbox = Mailbox(self._parts)
+            self._mailboxes.add(mailbox)
+        sender = threading.Thread(target=_send, args=(connection, mailbox), daemon=True)
+        sender.start()
+        try:
+            for message in connection:
+                self._hear(json.loads(message), mailbox)
+        except (ConnectionClosed, ValueError):
+            pass
+        finally:
+            with self._lock:
+                self._mailboxes.discard(mailbox)
+            mailbox.close()
+
+
+def _send(connection: ServerConnection, mailbox: Mailbox) -> None:
+    """Send what a mailbox gets until it is closed."""
+    try:
+        while parts := mailbox.take():
+            connection.send(json.dumps(parts, allow_nan=False))
+    except ConnectionClosed:
+        return
+    connection.close()
+
+
+def _answer(connection: ServerConnection, request: Request) -> Response | None:
+    """Answer with a file of the page; None goes on to the channel."""
+    path = request.path.partition("?")[0]
+    if path == CHANNEL:
+        origin, host = request.headers.get("Origin", ""), request.headers.get("Host", "")
+        if origin.partition("://")[2] == host:  # no other site may change what is shown
+            return None
+        return connection.respond(HTTPStatus.FORBIDDEN, "the page of this program only\n")
+    if path not in FILES:
+        return connection.respond(HTTPStatus.NOT_FOUND, f"no {path}\n")
+    name, kind = FILES[path]
+    response = connection.respond(HTTPStatus.OK, read_file(name))
+    del response.headers["Content-Type"]
+    response.headers["Content-Type"] = f"{kind}; charset=utf-8"
+    response.headers["Cache-Control"] = "no-store"
+    return response
+
+
+def read_file(name: str) -> str:
+    """Return the text of a file of the page."""
+    return files(__package__).joinpath(name).read_text(encoding="utf-8")

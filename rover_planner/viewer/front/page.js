@@ -1,0 +1,447 @@
+// SPDX-License-Identifier: Apache-2.0
+// Draws what the program tells, part by part, and asks what a person wants.
+// A part is drawn anew when it comes; nothing here knows more than `state` has.
+
+const state = {};
+const chosen = { tab: "Drive", lane: "", link: "", program: "", dragged: null };
+const at = (id) => document.getElementById(id);
+const SVG = "http://www.w3.org/2000/svg";
+const COLOURS = { rear: "#0072b2", middle: "#d55e00", front: "#00795a" };
+const SETTLE = 500; // [ms] after which a box shows the program's value, also if its own was refused
+const CLASSES = [["little", "to 50 %"], ["half", "to 80 %"], ["near", "to 100 %"],
+  ["broken", "broken"], ["unasked", "not asked"]];
+
+// An element with its attributes and children; what begins with "on" listens.
+function make(tag, attributes = {}, ...children) {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+    else if (value !== null && value !== undefined && value !== false) element.setAttribute(name, value === true ? "" : value);
+  }
+  element.append(...children.flat().filter((child) => child !== null && child !== ""));
+  return element;
+}
+
+function draw(tag, attributes) {
+  const element = document.createElementNS(SVG, tag);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  return element;
+}
+
+const button = (words, question, attributes = {}) =>
+  make("button", { onclick: () => ask(question), ...attributes }, words);
+
+// ---- The channel.
+
+let socket = null;
+let heard = 0;
+
+function ask(question) {
+  if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(question));
+}
+
+function connect() {
+  socket = new WebSocket(`ws://${location.host}/channel`);
+  socket.onmessage = (event) => take(JSON.parse(event.data));
+  socket.onopen = () => showLost(false);
+  socket.onclose = () => { showLost(true); setTimeout(connect, 1000); };
+}
+
+function showLost(is) {
+  state.lost = is;
+  drawErrors();
+}
+
+function take(parts) {
+  Object.assign(state, parts);
+  if ("program" in parts) greet(parts.program);
+  for (const name of Object.keys(parts)) if (DRAW[name]) DRAW[name](parts[name]);
+  heard += 1;
+  document.body.dataset.heard = heard;
+}
+
+// A program that was started again knows nothing of what was changed: take that up.
+function greet(program) {
+  const before = chosen.program;
+  chosen.program = program;
+  if (before && before !== program) {
+    state.restarted = chosen.link ? "The program was started again; what you had changed is taken up."
+      : "The program was started again; it shows what it was started with.";
+    if (chosen.link) ask({ ask: "open", query: chosen.link });
+    drawErrors();
+  } else if (!before && location.search) {
+    ask({ ask: "open", query: location.search });
+    history.replaceState(null, "", location.pathname);
+  }
+}
+
+// ---- What is drawn for each part.
+
+const DRAW = {
+  subject: drawSubject, errors: drawErrors, scene: drawScene, verdict: drawVerdict,
+  paths: drawPaths, sliders: drawSliders, values: drawValues, changes: drawChanges,
+  limits: drawLimits, curves: drawCurves, uses: drawUses, board: drawBoard, drive: drawDrive,
+  legend: drawLegend, chosen: drawChosen, offers: drawChosen, topics: drawTopics,
+  file: saveFile, link: drawShare, current: (link) => { chosen.link = link; }, written: drawShare,
+};
+
+function drawSubject(facts) {
+  document.title = `${facts.rover} on ${facts.map}`;
+  at("subject").replaceChildren(...Object.entries(facts).filter(([, value]) => value)
+    .map(([name, value]) => make("div", {}, make("span", {}, `${name} `), make("b", {}, value))));
+}
+
+function drawErrors() {
+  const lines = (state.errors || []).map(([what, why]) => `${what}: ${why}`);
+  if (state.lost) lines.unshift("No connection to the program: what is shown is old. The page goes on by itself when the program runs again.");
+  if (state.restarted) lines.push(state.restarted);
+  at("errors").replaceChildren(...lines.map((line) => make("div", {}, line)));
+}
+
+function drawScene(scene) {
+  const address = `http://${location.hostname}:${scene.port}`;
+  if (!at("scene").srcdoc && at("scene").src !== `${address}/`) at("scene").src = address;
+}
+
+function drawVerdict(one) {
+  const box = at("verdict");
+  box.dataset.passes = one.passes;
+  box.toggleAttribute("data-old", Boolean(one.old));
+  const open = box.querySelector("details")?.open;
+  const policies = (one.policies || []).map((policy) =>
+    make("div", { "data-passes": policy.passes, "data-old": policy.old, title: policy.reason },
+      policy.title, make("br"), make("b", {}, policy.word)));
+  const offers = (one.offers || []).map((offer) => button(offer.words, offer.ask, { class: "main" }));
+  box.replaceChildren(
+    make("div", {}, make("span", { class: "word" }, one.word), " ", make("small", {}, one.about)),
+    ...(one.headline ? [make("div", { id: "headline" }, make("b", {}, one.headline), one.where ? `, ${one.where}` : "")] : []),
+    ...(one.old ? [make("div", { class: "notice", id: "old" }, `old: ${one.old}`)] : []),
+    ...(one.refusal ? [make("div", { class: "notice", id: "refusal" }, `refused: ${one.refusal}`)] : []),
+    make("div", { class: "row" }, ...offers,
+      one.fails ? button("Go to the failure", { ask: "failure" }) : "",
+      one.judging ? make("small", { id: "judging" }, one.judging) : "",
+      one.judging && !one.stopped ? button("Cancel", { ask: "cancel" }) : "",
+      one.stopped ? button("Judge again", { ask: "judge" }) : ""),
+    make("div", { class: "policies" }, ...policies),
+    ...(one.details && one.details.length ? [make("details", { open: open || document.body.className === "sent" },
+      make("summary", {}, "the whole reason"), ...one.details.map((line) => make("div", {}, line)))] : []),
+  );
+}
+
+function drawPaths({ rows, shown }) {
+  const focus = document.activeElement?.dataset?.row;
+  const bodies = rows.map((row, index) => make("tbody", {
+    "data-passes": row.passes, "data-old": Boolean(row.waits), "data-shown": index === shown,
+    onclick: () => ask({ ask: "show", index }),
+  },
+  make("tr", { tabindex: 0, "data-row": index, "aria-selected": index === shown, onkeydown: pressRow },
+    make("td", {}, make("b", {}, row.number)),
+    make("td", {}, make("b", { class: "mark" }, row.word), row.waits ? ` (${row.waits})` : ""),
+    make("td", {}, row.length), make("td", {}, row.energy), make("td", {}, row.use, make("br"), row.limit)),
+  make("tr", {}, make("td"), make("td", { colspan: 4, class: "quiet" }, row.reason))));
+  at("paths").replaceChildren(make("table", { role: "grid" },
+    make("tr", {}, ...["", "verdict", "length [m]", "energy [J]", "most used"].map((head) => make("th", {}, head))),
+    ...bodies));
+  if (focus !== undefined) at("paths").querySelector(`[data-row="${focus}"]`)?.focus();
+}
+
+function pressRow(event) {
+  const step = { ArrowDown: 1, ArrowUp: -1 }[event.key];
+  if (["Enter", " "].includes(event.key)) event.currentTarget.click();
+  else if (step) at("paths").querySelector(`[data-row="${Number(event.currentTarget.dataset.row) + step}"]`)?.focus();
+  else return;
+  event.preventDefault();
+  event.stopPropagation();
+}
+
+// ---- The rover.
+
+function drawSliders({ parts }) {
+  at("sliders").replaceChildren(...parts.map((part, k) => make("details", { open: k < 2 },
+    make("summary", {}, make("b", {}, part.title)),
+    ...part.sliders.map(([label, low, high, step]) => {
+      const send = (event) => {
+        if (event.target.value === "") return;
+        ask({ ask: "value", label, value: Number(event.target.value) });
+      };
+      const settle = () => setTimeout(() => drawValues(state.values), SETTLE);
+      const release = () => { chosen.dragged = null; settle(); };
+      const ends = { min: low, max: high, step: "any", "aria-label": label };
+      return make("div", { class: "slider", "data-label": label },
+        make("label", {}, label),
+        make("input", { type: "range", ...ends, step, oninput: (event) => { chosen.dragged = label; send(event); }, onchange: release }),
+        make("input", { type: "number", ...ends, onchange: (event) => { send(event); settle(); } }));
+    }))));
+  if (state.values) drawValues(state.values);
+}
+
+function drawValues(values) {
+  for (const row of at("sliders").querySelectorAll(".slider")) {
+    const [now, loaded] = values[row.dataset.label] || [0, 0];
+    row.toggleAttribute("data-changed", Math.abs(now - loaded) > 1e-9);
+    if (chosen.dragged === row.dataset.label) continue;
+    for (const input of row.querySelectorAll("input")) {
+      if (document.activeElement !== input || input.type === "range") input.value = String(Number(now.toPrecision(6)));
+    }
+  }
+}
+
+function drawChanges({ title, kept, rover, drive }) {
+  const rows = (lines) => lines.map(([name, was, now]) =>
+    make("tr", {}, make("td", {}, name), make("td", {}, was), make("td", {}, make("b", {}, now))));
+  const table = rover.length || drive.length
+    ? make("table", {}, make("tr", {}, ...["", title, "now"].map((head) => make("th", {}, head))), ...rows(rover), ...rows(drive))
+    : make("div", { class: "quiet" }, `nothing differs from the rover as ${kept ? "kept" : "loaded"}`);
+  const offers = state.offers || { presets: [] };
+  at("changes").replaceChildren(
+    make("div", { class: "row" },
+      button("Undo", { ask: "undo" }), button("Reset", { ask: "reset" }),
+      button("Keep as reference", { ask: "keep" }), kept ? button("Compare with loaded", { ask: "drop" }) : "",
+      select("preset", offers.presets.map((name) => [name, name]), state.chosen?.preset, (name) => ({ ask: "preset", name })),
+      make("label", {}, "Load a file ", make("input", { type: "file", accept: ".yaml,.yml", style: "width:9em", onchange: upload })),
+      button("Save as rover file", { ask: "save rover" })),
+    table);
+}
+
+async function upload(event) {
+  const file = event.target.files[0];
+  if (file) ask({ ask: "upload", name: file.name, text: await file.text() });
+}
+
+function select(label, options, now, question) {
+  const known = options.some(([value]) => value === now) ? options : [...options, [now, now]];
+  const box = make("select", { "aria-label": label, onchange: (event) => ask(question(event.target.value)) },
+    ...known.map(([value, words]) => make("option", { value }, words)));
+  box.value = now;
+  return box;
+}
+
+function drawChosen() {
+  const { offers, chosen: now } = state;
+  if (!offers || !now) return;
+  const colour = (changes) => ({ ask: "colour", layer: now.layer, heading: now.heading, along: now.along, ...changes });
+  const row = (label, box) => make("div", { class: "row" }, make("label", {}, label), box);
+  const check = (label, on, question) => row(label, make("input", { type: "checkbox", "aria-label": label, ...(on ? { checked: true } : {}), onchange: (event) => ask(question(event.target.checked)) }));
+  const rows = [];
+  if (offers.policies) rows.push(
+    row("A click sets", select("A click sets", [["goal", "goal"], ["start", "start"]], now.sets, (sets) => ({ ask: "click", sets }))),
+    row("Torques", select("Torques", offers.policies, now.policy, (policy) => ({ ask: "options", policy }))),
+    row("Soil", select("Soil", [["", "none (Coulomb)"], ...offers.soils.map((name) => [name, name])], now.soil, (soil) => ({ ask: "options", soil }))));
+  rows.push(row("Colour by", select("Colour by", offers.layers.map((name) => [name, name]), now.layer, (layer) => colour({ layer }))));
+  if (offers.predicted.includes(now.layer)) rows.push(
+    row("Heading [deg]", make("input", { type: "number", min: -180, max: 180, step: 5, value: now.heading, "aria-label": "Heading [deg]", onchange: (event) => ask(colour({ heading: Number(event.target.value) })) })),
+    check("Heading along the path", now.along, (along) => colour({ along })));
+  rows.push(check("Forces", now.forces, (shown) => ({ ask: "forces", shown })));
+  at("chosen").replaceChildren(...rows);
+  drawShare();
+  if (state.changes) drawChanges(state.changes);
+}
+
+// ---- Limits: lanes, curves, and their uses at the time that is shown.
+
+const share = (distance) => `${100 * Math.min(distance / (state.limits.end || 1), 1)}%`;
+
+function goTo(event) {
+  const { left, width } = event.currentTarget.getBoundingClientRect();
+  ask({ ask: "place", distance: state.limits.end * (event.clientX - left) / width });
+}
+
+function drawLimits({ end, lanes, code, compared }) {
+  if (!lanes.some((lane) => lane.code === chosen.lane) || code) chosen.lane = code || "friction";
+  const piece = ([left, right, kind, words], extra = "") => make("i", {
+    class: `${kind} ${extra}`, title: words || "reference",
+    style: end ? `left:${share(left)};width:calc(${share(right)} - ${share(left)})` : "left:0;width:100%",
+  });
+  const rows = lanes.map((lane) => make("div", { class: "lane", "data-code": lane.code, onclick: () => { chosen.lane = lane.code; drawCurves(); drawUses(); } },
+    make("div", {}, lane.title),
+    make("div", { class: `strip ${compared ? "compared" : ""}`, onclick: goTo },
+      ...lane.pieces.map((one) => piece(one)), ...lane.before.map((one) => piece(one, "before")), make("div", { class: "cursor" })),
+    make("div", {}), make("div", { class: "worst" })));
+  at("limits").replaceChildren(
+    make("h2", {}, "Use of the limits ", make("small", {}, end ? `over ${end.toFixed(2)} m${compared ? "; below: the reference" : ""}` : "at the first pose")),
+    ...rows, make("div", {}, ...CLASSES.map(([kind, words]) => make("span", { class: "key" }, make("i", { class: kind }), words))));
+  drawUses();
+  moveCursor();
+}
+
+function drawUses() {
+  if (!state.uses) return;
+  at("limits").querySelectorAll(".lane").forEach((row, k) => {
+    const use = state.uses[k];
+    if (!use) return;
+    row.toggleAttribute("data-broken", use.broken);
+    row.toggleAttribute("data-chosen", row.dataset.code === chosen.lane);
+    row.children[2].textContent = use.now;
+    row.children[3].textContent = [`worst ${use.worst}`, use.value, use.wheel].filter(Boolean).join(", ");
+  });
+}
+
+function drawCurves() {
+  const curve = (state.curves || {})[chosen.lane];
+  if (!curve || !state.limits) return;
+  const title = state.limits.lanes.find((lane) => lane.code === chosen.lane)?.title;
+  at("curves").replaceChildren(
+    make("h2", {}, `${title}, use of the limit`), plot(curve, (value) => `${Math.round(100 * value)} %`, 1.0, curve.old),
+    make("h2", {}, "wheel loads"), plot(state.limits.loads, (value) => `${value.toFixed(0)} N`, null, null),
+    make("div", {}, ...Object.entries(COLOURS).map(([name, colour]) => make("span", { class: "key" }, make("i", { style: `background:${colour}` }), name)),
+      make("small", {}, "right: line, left: dashes")));
+  moveCursor();
+}
+
+function plot(curve, write, limit, old) {
+  const known = [...curve.y.flat(), ...(old ? old.y.flat() : [])].filter((value) => value !== null);
+  const top = Math.min(Math.max(limit ? 1.2 : 0, ...known, 1e-9), limit ? 3 : Infinity);
+  const box = draw("svg", { viewBox: "0 0 1000 100", preserveAspectRatio: "none" });
+  const end = state.limits.end || 1;
+  const line = (x, y, attributes) => {
+    let path = "", pen = "M";
+    x.forEach((distance, k) => {
+      if (y[k] === null) { pen = "M"; return; }
+      path += `${pen}${(1000 * distance / end).toFixed(1)} ${(100 * (1 - Math.min(y[k], top) / top)).toFixed(2)}`;
+      pen = "L";
+    });
+    if (x.length === 1) path += "h1000";
+    box.append(draw("path", { d: path || "M0 0", fill: "none", "vector-effect": "non-scaling-stroke", "stroke-width": 1.6, ...attributes }));
+  };
+  if (old) line(old.x, old.y[0], { stroke: "#888", "stroke-width": 4, opacity: 0.6 });
+  curve.y.forEach((y, k) => {
+    const wheel = ["rear", "middle", "front"][k % 3];
+    line(curve.x, y, curve.y.length === 6 ? { stroke: COLOURS[wheel], ...(k > 2 ? { "stroke-dasharray": "5 3" } : {}) } : { stroke: "#222" });
+  });
+  const ticks = [[0, write(0)], [top, write(top)]];
+  if (limit) {
+    line([0, end], [limit, limit], { stroke: "#c24f00", "stroke-dasharray": "2 3" });
+    ticks.push([limit, write(limit)]);
+  }
+  return make("div", { class: "plot", onclick: goTo }, box,
+    ...ticks.map(([value, words]) => make("span", { class: "tick", style: `top:${100 * (1 - value / top)}%` }, words)),
+    make("span", { class: "end" }, `${(state.limits.end || 0).toFixed(2)} m`), make("div", { class: "cursor" }));
+}
+
+function moveCursor() {
+  if (!state.drive || !state.limits) return;
+  for (const cursor of document.querySelectorAll(".cursor")) cursor.style.left = share(state.drive.distance);
+}
+
+// ---- The drive.
+
+function drawBoard(board) {
+  if (!board) {
+    at("board").replaceChildren(make("div", { class: "quiet" }, "the rover is not known yet"));
+    return;
+  }
+  const bar = ([title, use, words]) => make("div", {}, make("small", {}, `${title} `), make("b", {}, words),
+    make("span", { class: "use" },
+      make("i", { class: use === null ? "unasked" : use > 1 ? "broken" : use > 0.8 ? "near" : "half", style: `width:${100 * Math.min((use ?? 1.5) / 1.5, 1)}%` }),
+      make("i", { class: "limit" })));
+  const wheels = [5, 2, 4, 1, 3, 0].map((k) => board.wheels[k]).map((wheel) =>
+    make("div", { class: "wheel", "data-wheel": wheel.name, "data-fails": wheel.fails },
+      make("div", {}, make("div", { class: "tyre", style: `background:${wheel.colour};transform:rotate(${-(wheel.turn || 0)}deg)` }), make("small", {}, wheel.load)),
+      make("div", {}, make("div", {}, wheel.name, wheel.slip ? make("small", {}, `, ${wheel.slip}`) : ""), ...wheel.bars.map(bar))));
+  at("board").replaceChildren(
+    make("div", { class: "quiet" }, "from above, the front at the top; bars: use of the limit, which is the line"),
+    make("div", { class: "wheels" }, ...wheels),
+    make("div", { class: "numbers" }, ...Object.entries(board.numbers).map(([name, value]) => make("div", {}, make("span", {}, name), make("b", {}, value)))),
+    make("details", { open: document.body.className === "sent" || at("board").querySelector("details")?.open },
+      make("summary", {}, "all numbers of the wheels"),
+      make("table", { id: "wheels" },
+        make("tr", {}, make("th"), ...board.wheels.map((wheel) => make("th", {}, wheel.name))),
+        ...board.table.map(([title, cells]) => make("tr", {}, make("th", {}, title), ...cells.map((cell) => make("td", {}, cell)))))));
+}
+
+function drawDrive(drive) {
+  const box = at("drive");
+  if (drive.duration === null) { box.replaceChildren(make("span", {}, drive.words)); return; }
+  if (!box.querySelector("input")) {
+    const time = (event) => ask({ ask: "seek", time: Number(event.target.value) });
+    const hold = (is) => () => { chosen.scrubs = is; };
+    box.replaceChildren(
+      make("div", { class: "track" }, make("input", { type: "range", min: 0, step: 0.1, "aria-label": "Time [s]", oninput: time, onpointerdown: hold(true), onpointerup: hold(false) }), make("i", { class: "mark", title: "fails" })),
+      button("To the start", { ask: "seek", time: 0 }), button("Rewind", { ask: "rewind" }),
+      button("Play", { ask: "toggle" }, { id: "play", class: "main" }),
+      button("Step back", { ask: "step", by: -1 }), button("Step", { ask: "step", by: 1 }),
+      make("span", { id: "speed" }), make("span", { id: "plays" }));
+  }
+  const scrubber = box.querySelector("input");
+  scrubber.max = drive.duration;
+  if (!chosen.scrubs) scrubber.value = drive.time;
+  const mark = box.querySelector(".mark");
+  mark.hidden = drive.fails === null;
+  mark.style.left = `${100 * (drive.fails || 0) / (drive.duration || 1)}%`;
+  at("play").textContent = drive.rate === 0 ? "Play" : "Pause";
+  at("plays").textContent = `${drive.time.toFixed(1)} s, ${drive.words}`;
+  const speed = String(state.chosen?.speed ?? 10);
+  if (at("speed").dataset.now !== speed && state.offers?.speeds) {
+    at("speed").dataset.now = speed;
+    at("speed").replaceChildren(select("Speed", state.offers.speeds.map((one) => [String(one), `${one} x`]), speed, (times) => ({ ask: "speed", times: Number(times) })));
+  }
+  moveCursor();
+}
+
+function drawLegend({ title, gradient, ends, keys, notes }) {
+  at("legend").replaceChildren(make("b", {}, title),
+    ...(gradient.length ? [make("div", { class: "bar", style: `background:linear-gradient(90deg,${gradient})` }),
+      make("div", { class: "ends" }, ...ends.map((end) => make("span", {}, end)))] : []),
+    ...keys.map(([colour, words]) => make("div", { class: "key" }, make("i", colour === "hatched" ? { class: "hatched" } : { style: `background:${colour}` }), words)),
+    ...notes.map((note) => make("div", {}, note)));
+}
+
+function drawTopics(topics) {
+  at("topics").replaceChildren(make("h2", {}, "age of the last message"), make("table", {},
+    ...topics.map(({ topic, age, stale }) => make("tr", { "data-topic": topic, "data-stale": String(stale), ...(stale ? { "data-old": true } : {}) },
+      make("td", {}, topic), make("td", {}, `${stale ? "stale, " : ""}${age}`)))));
+}
+
+// ---- Share.
+
+function drawShare() {
+  const { written, link } = state;
+  const address = link ? `${location.origin}${location.pathname}?${link}` : "";
+  at("share").replaceChildren(...(written ? [
+    make("h2", {}, "How it was made"), make("div", {}, `${written.versions}; written ${written.written}`),
+    ...(written.link ? [make("div", {}, "the same on a page of the same map: ", make("a", { href: written.link }, written.link))] : []),
+    make("details", {}, make("summary", {}, "rover file"), make("pre", {}, written.rover)),
+  ] : [
+    make("p", {}, "One HTML file with the scene, the failing pose, all numbers and versions. It opens in any browser, without this program."),
+    button("Save as HTML file", { ask: "save page", base: location.origin }),
+    make("p", {}, "A link to this page that holds rover, changed values, ends, path, time and colours."),
+    button("Link to what is shown", { ask: "link" }),
+    ...(link ? [make("div", { class: "row" }, make("button", { onclick: () => navigator.clipboard.writeText(address) }, "Copy"), make("a", { id: "link", href: address }, address))] : []),
+  ]));
+}
+
+function saveFile({ name, text }) {
+  const address = URL.createObjectURL(new Blob([text]));
+  make("a", { href: address, download: name }).click();
+  URL.revokeObjectURL(address);
+}
+
+// ---- Tabs and keys.
+
+function openTab(name) {
+  chosen.tab = name;
+  for (const panel of at("panels").children) panel.toggleAttribute("data-open", panel.dataset.tab === name);
+  at("tabs").replaceChildren(...[...at("panels").children].map((panel) => make("button", {
+    role: "tab", "aria-selected": String(panel.dataset.tab === name), onclick: () => openTab(panel.dataset.tab) }, panel.dataset.tab)));
+}
+
+// Space and arrows belong to the drive, unless a control was reached by the keyboard.
+const KEYS = { " ": { ask: "toggle" }, ArrowLeft: { ask: "step", by: -1 }, ArrowRight: { ask: "step", by: 1 }, Home: { ask: "seek", time: 0 } };
+document.addEventListener("keydown", (event) => {
+  const target = event.target, question = KEYS[event.key];
+  const typed = target.matches("input, select, summary") || target.matches("button:focus-visible");
+  if (!question || typed || event.ctrlKey || event.altKey) return;
+  event.preventDefault();
+  target.blur();
+  ask(question);
+});
+document.addEventListener("click", (event) => {
+  if (event.detail > 0) event.target.closest("button")?.blur(); // pressed with the pointer
+});
+
+openTab(chosen.tab);
+const told = at("told");
+if (told) {
+  document.body.className = "sent";
+  take(JSON.parse(told.textContent));
+} else connect();

@@ -1,2 +1,0 @@
-# SPDX-License-Identifier: Apache-2.0
-"""The panels beside the scene: tabs, buttons, dashboard and plots."""

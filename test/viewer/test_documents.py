@@ -1,0 +1,294 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the page tells: limits along a path, the failure, the board, paths, and their words."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rover_physics.names import EQUAL, OPTIMAL, SERVO, WHEELS
+from rover_physics.traversability.judge import judge_path
+from rover_physics.traversability.verdict import hold_against_limits
+from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.viewer.documents.board import describe_board
+from rover_planner.viewer.documents.limits import (
+    MAX_POINTS,
+    choose_rows,
+    describe_curves,
+    describe_limits,
+    describe_uses,
+)
+from rover_planner.viewer.documents.numbers import plain
+from rover_planner.viewer.documents.paths import list_paths
+from rover_planner.viewer.documents.rover import compare_drives, describe_sliders, read_values
+from rover_planner.viewer.documents.verdict import Work, describe_verdict
+from rover_planner.viewer.state.limits import ShownLimit, write_use
+from rover_planner.viewer.state.scenario import Judged
+from rover_planner.viewer.state.session import ViewSession
+from support.grounds import gap, make_terrain, wall_at, waves
+from support.viewer.sessions import LSR1, ramp, session_on
+
+
+def stepped(x, y):
+    """Return waves with an edge on which the model is asked between waypoints."""
+    return waves(x, y) + 0.05 * (x > 0.3)
+
+
+def judged_on(height, start=-1.0, **options) -> Judged:
+    """Return a straight path to x = 1 m over a ground, judged."""
+    options = PathQueryOptions(count=1).change(**options)
+    ends = (start, 0.0, 0.0), (start + 2.0, 0.0, 0.0)
+    return ViewSession(LSR1, make_terrain(height), *ends, options).shown.path
+
+
+# Limits along a path.
+
+
+def test_the_values_of_a_lane_are_those_of_the_prediction_at_its_waypoints():
+    path = judged_on(waves)
+    limits, prediction = path.limits, path.candidate.prediction
+    at = ~limits.rows.is_between
+    np.testing.assert_array_equal(
+        limits.lane("friction").values[at], prediction.friction_utilisation.max(axis=1)
+    )
+    np.testing.assert_allclose(limits.lane("belly").values[at], 100.0 * prediction.belly_clearance)
+    wheels = limits.lane("torque").wheel[at]
+    np.testing.assert_array_equal(wheels, prediction.torque_saturation.argmax(axis=1))
+    uses = limits.lane("torque").wheels
+    np.testing.assert_allclose(uses.max(axis=1), limits.lane("torque").used)
+
+
+def test_rows_are_in_the_order_of_the_path_with_the_poses_between_in_their_places():
+    rows = judged_on(stepped).limits.rows
+    assert rows.is_between.any()
+    assert (np.diff(rows.distance) >= 0.0).all() and (np.diff(rows.time) >= 0.0).all()
+
+
+@pytest.mark.parametrize(
+    ("height", "policy"),
+    [(waves, EQUAL), (ramp, EQUAL), (ramp, SERVO), (stepped, OPTIMAL), (stepped, SERVO),
+     (wall_at(0.5), EQUAL), (gap, EQUAL)],
+)  # fmt: skip
+def test_a_limit_is_broken_on_a_lane_exactly_where_the_verdict_refuses_the_path(height, policy):
+    path = judged_on(height, policy=policy, friction=0.5)
+    limits, failure, verdict = path.limits, path.failure, path.verdict
+    broken = np.any([lane.used > 1.0 for lane in limits.lanes], axis=0)
+    refused = set(np.unique(limits.rows.prediction.waypoint[broken]).tolist())
+    first = verdict.first_failure
+    assert refused == ({first} if first >= 0 else set())
+    assert (failure is None) == verdict.traversable
+    if failure is not None:
+        assert failure.code == verdict.code and failure.headline
+        assert np.isfinite(failure.state.position).all()
+        assert failure.is_settled == (failure.code != "unknown_ground")
+
+
+@pytest.mark.parametrize("policy", [EQUAL, OPTIMAL])
+def test_board_lanes_curves_and_verdict_show_one_number_for_the_wheel_that_fails(policy):
+    path = judged_on(ramp, friction=0.3, policy=policy)
+    failure, end = path.failure, path.trajectory.duration
+    assert failure.code == "friction" and failure.link in WHEELS
+    wheel, codes = WHEELS.index(failure.link), [lane.limit.code for lane in path.limits.lanes]
+    board = describe_board(failure.state, failure.link)["wheels"][wheel]
+    assert board["fails"] and board["bars"][0][2] == write_use(failure.use)
+    used = describe_uses(path, end)[codes.index("friction")]
+    assert used["now"] == used["worst"] == write_use(failure.use) and used["broken"]
+    assert used["wheel"] == failure.link.replace("_", " ") and used["wheel"] in failure.headline
+    curve = describe_curves(path, None)["friction"]
+    assert max(curve["y"][wheel]) == pytest.approx(failure.use, abs=1e-3)
+    assert list_paths_of(path)["use"] == write_use(failure.use)
+
+
+def list_paths_of(path: Judged) -> dict:
+    session = ViewSession(
+        LSR1, path.scenario.terrain, path.scenario.start, path.scenario.goal,
+        path.scenario.options,
+    )  # fmt: skip
+    return list_paths(session.shown, is_outdated=False, is_judging=False)[0]
+
+
+def test_the_worst_so_far_grows_and_has_all_limits_in_one_unit():
+    path = judged_on(waves)
+    uses = [describe_uses(path, time) for time in np.linspace(0.0, path.trajectory.duration, 5)]
+    shares = np.array([[one["share"] for one in row] for row in uses])
+    assert (np.diff(shares, axis=0) >= 0.0).all()
+    assert len(uses[0]) == len(path.limits.lanes)
+    assert all(one["worst"].endswith("%") for one in uses[-1])
+
+
+def test_a_path_that_fails_at_its_first_pose_has_a_lane_and_a_use_for_each_limit():
+    session = session_on(waves)
+    session.change_rover([("wheel", "max_torque")], 0.01)
+    path = session.shown.path
+    assert path.verdict.first_failure == 0
+    told = describe_limits(path, None)
+    assert told["fails"] == told["end"] == 0.0
+    assert all(len(lane["pieces"]) == 1 for lane in told["lanes"])
+    uses = {
+        lane["code"]: one
+        for lane, one in zip(told["lanes"], describe_uses(path, 0.0), strict=True)
+    }
+    assert uses["torque"]["broken"] and uses["tilt"]["now"].endswith("%")
+    assert len(told["loads"]["x"]) == 1
+    json.dumps([told, describe_curves(path, None)], allow_nan=False)
+
+
+def test_the_lanes_of_the_reference_stand_below_those_of_now():
+    session = session_on(ramp)
+    session.change_rover([("friction",)], 0.3)
+    shown = session.shown
+    told = describe_limits(shown.path, shown.reference)
+    assert told["compared"] and told["end"] == pytest.approx(shown.reference.limits.end, abs=1e-4)
+    now, before = (
+        {piece[2] for lane in told["lanes"] for piece in lane[name]}
+        for name in ("pieces", "before")
+    )
+    assert "broken" in now and "broken" not in before
+    assert describe_curves(shown.path, shown.reference)["friction"]["old"]["y"]
+
+
+def test_a_peak_between_points_of_a_curve_is_kept():
+    values = np.zeros((10 * MAX_POINTS, 2))
+    values[1237, 1] = 5.0
+    rows = choose_rows(values)
+    assert len(rows) <= MAX_POINTS + 2 and values[rows].max() == 5.0
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (1.234, "friction 1.23 of 1.00"),
+        (1.0004, "friction 1.0004 of 1.0000"),
+        (1.00004, "friction just above 1.00"),
+        (0.99999, "friction just below 1.00"),
+    ],
+)
+def test_as_many_digits_as_tell_a_value_from_its_limit_and_words_where_none_do(value, words):
+    assert ShownLimit("friction", "friction", 1.0).compare(value) == words
+
+
+def test_a_use_that_is_above_the_limit_never_reads_as_one_at_it():
+    assert [write_use(use) for use in (0.996, 1.0, 1.0001, 1.23)] == [
+        "100 %", "100 %", "just above 100 %", "123 %",
+    ]  # fmt: skip
+    assert (write_use(np.nan), write_use(np.inf)) == ("not asked", "fails")
+
+
+def test_with_speed_servos_friction_is_no_number_that_a_passing_path_may_cross():
+    for policy, bound in ((EQUAL, LSR1.limits.friction_utilisation), (SERVO, None)):
+        assert judged_on(ramp, policy=policy).limits.lane("friction").limit.bound == bound
+
+
+# The failure.
+
+
+def test_the_failure_names_value_limit_and_wheel_as_the_verdict_does():
+    path = judged_on(ramp, friction=0.3)
+    failure, verdict = path.failure, path.verdict
+    assert failure is not None and failure.code == verdict.code == "friction"
+    assert failure.link in WHEELS and failure.link in verdict.reason
+    assert f"{failure.value:.2f}, limit 1.00" in verdict.reason
+    assert failure.headline == f"friction {failure.value:.2f} of 1.00, {failure.where}"
+    row = verdict.first_failure
+    assert failure.distance == pytest.approx(path.candidate.prediction.distance[row], abs=0.021)
+
+
+def test_a_failure_between_waypoints_has_the_pose_at_which_the_model_was_asked():
+    path = judged_on(stepped, friction=0.4)
+    failure, prediction = path.failure, path.candidate.prediction
+    assert failure is not None and failure.is_between
+    first = path.verdict.first_failure
+    before, after = prediction.distance[first - 1 : first + 1]
+    assert before < failure.distance < after
+    places = prediction.between.position[prediction.between.waypoint == first]
+    assert np.isclose(places, failure.state.position).all(axis=1).any()
+
+
+def test_where_the_rover_does_not_settle_a_level_one_stands_and_the_wheel_beyond_is_named():
+    failure = judged_on(gap).failure
+    assert failure is not None and failure.code == "unknown_ground"
+    assert not failure.is_settled and failure.link.startswith("front")
+    assert failure.headline.startswith("unknown ground, front")
+    np.testing.assert_allclose(failure.state.attitude[:2], 0.0)
+    wheels = failure.state.wheel_centres - failure.state.position
+    prediction = judged_on(lambda x, y: 0.0 * x).candidate.prediction
+    right = prediction.wheel_centres[0] - prediction.position[0]
+    np.testing.assert_allclose(np.abs(wheels), np.abs(right), atol=0.01)
+
+
+@pytest.mark.parametrize("start", [-1.0, 0.4])
+def test_a_refusal_on_unknown_ground_is_at_the_time_to_which_the_drive_is_played(start):
+    session = session_on(gap, start=(start, 0.0, 0.0), goal=(1.9, 0.0, 0.0))
+    path = session.shown.path
+    assert path.failure is not None and path.failure.code == "unknown_ground"
+    assert path.failure.time == path.trajectory.duration
+    assert (path.trajectory.length == 0) == (start > 0.0) == (path.failure.time == 0.0)
+    told = [
+        describe_verdict(session.shown, Work()),
+        describe_limits(path, None),
+        describe_uses(path, 0.0),
+        list_paths(session.shown, is_outdated=False, is_judging=False),
+    ]
+    json.dumps(told, allow_nan=False)
+
+
+def test_the_numbers_of_the_only_path_are_those_up_to_its_failure():
+    def slope_beyond(x, y):
+        return gap(x, y) + 0.5 * np.maximum(x - 1.0, 0.0)
+
+    ground, ends = make_terrain(slope_beyond), ((-1.5, 0.0, 0.0), (2.5, 0.0, 0.0))
+    session = ViewSession(LSR1, ground, *ends, PathQueryOptions(count=1))
+    poses = session.shown.path.poses
+    prediction, verdict = judge_path(LSR1, ground, poses)
+    assert verdict.max_tilt > 0.4
+    before = hold_against_limits(LSR1, prediction.cut(verdict.first_failure + 1))
+    for _ in range(2):
+        assert session.shown.verdict.code == "unknown_ground"
+        assert session.shown.verdict.max_tilt == before.max_tilt < 0.2
+        session.replay(prediction, verdict.reasons)
+
+
+# The board, paths, sliders.
+
+
+def test_the_board_has_all_loads_and_unknown_values_are_none_or_a_question_mark():
+    path = judged_on(waves)
+    state = path.trajectory.state_at(20.0)
+    board = describe_board(state)
+    assert [one["load"] for one in board["wheels"]] == [
+        f"{load:.1f} N" for load in state.wheel_loads
+    ]
+    assert [len(cells) for _, cells in board["table"]] == [6] * 6
+    unknown = replace(state, wheel_loads=np.full(6, np.nan), friction_use=np.full(6, np.nan))
+    board = describe_board(unknown)
+    assert {one["load"] for one in board["wheels"]} == {"?"}
+    assert {one["bars"][0][1] for one in board["wheels"]} == {None}
+    json.dumps(board, allow_nan=False)
+    assert plain([1.0, np.nan, np.inf]) == [1.0, None, None]
+
+
+def test_a_row_of_a_path_has_the_numbers_of_its_verdict():
+    session = session_on(wall_at(0.5), goal=(1.5, 0.0, 0.0))
+    shown = session.shown
+    rows = list_paths(shown, is_outdated=False, is_judging=False)
+    assert [row["passes"] for row in rows] == [one.verdict.traversable for one in shown.paths]
+    assert [row["number"] for row in rows if row["word"].endswith("best")] == (
+        [] if shown.best is None else [shown.best + 1]
+    )
+    for row, path in zip(rows, shown.paths, strict=True):
+        assert row["reason"] == path.verdict.reason
+
+
+def test_each_number_of_the_rover_has_a_slider_and_what_it_changes_of_the_drive_is_listed():
+    session = session_on(ramp)
+    labels = [one[0] for part in describe_sliders(LSR1)["parts"] for one in part["sliders"]]
+    assert labels == list(read_values(session.wanted))
+    before = session.shown.path
+    session.change_rover([("friction",)], 0.4)
+    rows = {name: (was, now) for name, was, now in compare_drives(before, session.shown.path)}
+    assert rows["verdict"] == ("passes", "refused") and "driven" in rows
+    used = [
+        float(np.nanmax(one.limits.lane("friction").used)) for one in (before, session.shown.path)
+    ]
+    assert rows["friction"] == tuple(map(write_use, used))

@@ -1,0 +1,423 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A served page without a browser: what it tells and draws, errors, links, cameras."""
+
+import json
+import threading
+import time
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+
+from rover_planner.errors import PlanningError
+from rover_planner.studies.rover_values import write_rover
+from rover_planner.viewer.state.link import read_link, write_link
+from rover_planner.viewer.state.session import ViewSession
+from support.grounds import make_terrain, waves
+from support.viewer.sessions import (
+    FAR,
+    LSR1,
+    PATIENCE,
+    ask,
+    held,
+    ramp,
+    session_on,
+    shift,
+    wait_for_rest,
+)
+from support.waiting import wait_until as wait
+
+pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
+
+from rover_planner.viewer.pages import page as page_module
+from rover_planner.viewer.pages.drawings import Drawings
+from rover_planner.viewer.pages.page import Page
+from rover_planner.viewer.scene.ribbons import Ribbon, Strand
+from rover_planner.viewer.scene.rover_visual import RoverVisual
+from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN
+from rover_planner.viewer.state.judging import POLICY
+
+pytestmark = pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
+FRICTION = "friction [-]"
+
+
+def wait_until(condition, what: str) -> None:
+    """Wait for what a busy machine's page does late."""
+    wait(condition, what, PATIENCE)
+
+
+@pytest.fixture(scope="module")
+def served():
+    page = Page(session_on(ramp), port=0)
+    yield page
+    page.close()
+
+
+@pytest.fixture
+def page(served) -> Page:
+    """A page without visitors, at rest with the rover as it was loaded."""
+    ask(served, lambda: served.session.take_rover(LSR1))
+    wait_for_rest(served)
+    return served
+
+
+def told(page: Page, name: str):
+    """Return a part that the page tells."""
+    return page.channel.parts.get(name)
+
+
+def change_friction(page: Page, friction: float) -> None:
+    """Change the friction as a slider does."""
+    page.hear({"ask": "value", "label": FRICTION, "value": friction}, None)
+
+
+def fail(*_arguments) -> None:
+    raise ValueError("a line of <no> points")
+
+
+# The channel.
+
+
+def test_a_browser_gets_the_files_and_all_parts_at_once_and_then_those_that_change(page):
+    with connect(f"ws{page.url[4:]}/channel", origin=page.url) as browser:
+        parts = json.loads(browser.recv(timeout=PATIENCE))
+        assert {"program", "scene", "subject", "verdict", "paths", "limits", "board"} <= set(parts)
+        browser.send(json.dumps({"ask": "value", "label": FRICTION, "value": 0.3}))
+        while "verdict" not in (news := json.loads(browser.recv(timeout=PATIENCE))):
+            assert "sliders" not in news
+        while parts["verdict"]["passes"]:
+            parts |= json.loads(browser.recv(timeout=PATIENCE))
+        assert parts["verdict"]["headline"].startswith("friction ")
+        browser.send("no JSON")
+
+
+def test_another_site_gets_no_channel(page):
+    with pytest.raises(InvalidStatus, match="403"):
+        connect(f"ws{page.url[4:]}/channel", origin="http://elsewhere.example")
+
+
+# What is told and drawn.
+
+
+def test_no_press_of_a_key_is_lost_and_of_a_slider_only_the_last_value_counts(page):
+    times, asked = page.session.shown.path.trajectory.times, []
+    ask(page, lambda: page.playback.go_to(0.0))
+    for _ in range(3):
+        page.hear({"ask": "step", "by": 1}, None)
+    wait_until(lambda: abs(page.playback.time - times[3]) < 1e-6, "three steps")
+    busy, go_on = threading.Event(), threading.Event()
+    page.requests.add(lambda: (busy.set(), go_on.wait(PATIENCE)))
+    assert busy.wait(PATIENCE)
+    page._answers["seek"], seek = (
+        lambda words, _box: asked.append(words["time"]),
+        page._answers["seek"],
+    )
+    for time_asked in (1.0, 2.0, 3.0):
+        page.hear({"ask": "seek", "time": time_asked}, None)
+    go_on.set()
+    wait_until(lambda: asked, "the last value")
+    page._answers["seek"] = seek
+    assert asked == [3.0]
+
+
+def test_a_changed_number_is_told_with_what_it_changes_and_can_be_undone_and_reset(page):
+    for friction in (0.75, 0.7):
+        change_friction(page, friction)
+        wait_until(lambda f=friction: page.session.wanted.rover.friction == f, "the value")
+        wait_for_rest(page)
+    assert told(page, "subject")["rover"] == "lsr1 (changed)"
+    assert told(page, "changes")["rover"] == [["friction [-]", "0.8", "0.7"]]
+    assert told(page, "limits")["compared"]
+    for word, friction in (("undo", 0.75), ("reset", 0.8)):
+        page.hear({"ask": word}, None)
+        wait_until(lambda f=friction: told(page, "values")[FRICTION] == [f, 0.8], word)
+        wait_for_rest(page)
+
+
+def test_a_rover_file_and_a_preset_are_loaded_and_the_arm_follows(page):
+    text = write_rover(replace(LSR1, name="bare", manipulator=None))
+    page.hear({"ask": "upload", "name": "bare.yaml", "text": text}, None)
+
+    def meshes() -> dict:
+        return {} if page.scene._visual is None else page.scene._visual._meshes
+
+    wait_until(lambda: told(page, "sliders")["rover"] == "bare", "the loaded rover")
+    wait_until(lambda: "arm" not in meshes() and "body" in meshes(), "no arm")
+    page.hear({"ask": "preset", "name": "lsr1"}, None)
+    wait_until(lambda: "arm" in meshes(), "the arm")
+    titles = [part["title"] for part in told(page, "sliders")["parts"]]
+    assert titles[-1] == "Arm"
+
+
+def test_while_a_change_is_judged_the_verdict_and_the_paths_are_grey_and_it_can_be_cancelled(page):
+    session, shown = page.session, page.session.shown
+    with held(session._background):
+        change_friction(page, 0.75)
+        wait_until(lambda: told(page, "verdict")["judging"], "the notice")
+        assert told(page, "verdict")["old"].startswith("judging path")
+        assert session.shown is shown
+        every = frozenset(range(len(session.shown.paths)))
+        wait_until(lambda: page.scene.paths._old == every, "grey paths")
+        page.hear({"ask": "cancel"}, None)
+        wait_until(lambda: session.is_stopped, "the end of the work")
+    wait_until(lambda: told(page, "verdict")["stopped"], "the button to judge again")
+    assert {row["waits"] for row in told(page, "paths")["rows"]} == {"old, was not judged again"}
+    page.hear({"ask": "judge"}, None)
+    wait_for_rest(page)
+    wait_until(lambda: not told(page, "verdict")["old"], "the new verdict")
+    assert session.shown.scenario.rover.friction == 0.75 and not page.scene.paths._old
+
+
+def test_the_verdict_is_told_before_its_drawings_and_policies_are_judged_after_them(
+    page, monkeypatch
+):
+    begun, go_on, judged, show = threading.Event(), threading.Event(), [], page.scene.paths.show
+
+    def draw_slowly(*arguments) -> None:
+        progress = page.session.progress
+        judged.append(progress.what if progress else "")
+        begun.set()
+        assert go_on.wait(PATIENCE)
+        show(*arguments)
+
+    monkeypatch.setattr(page_module, "DRAWING_TIME", PATIENCE)  # or it would give up the wait
+    monkeypatch.setattr(page.scene.paths, "show", draw_slowly)
+    change_friction(page, 0.4)
+    assert begun.wait(PATIENCE)
+    passes = told(page, "verdict")["passes"]
+    assert page.is_busy
+    go_on.set()
+    assert passes is False and judged[0] != POLICY
+    wait_until(lambda: not page.is_busy, "the drawings")
+    assert not any(one.is_old for one in page.session.shown.by_policy)
+
+
+def test_the_ghost_of_a_failure_stays_for_the_next_one_and_hides_without(page):
+    session, mark = session_on(ramp), page.scene.failure
+    ghosts = []
+    for friction in (0.4, 0.35):
+        session.change_rover([("friction",)], friction)
+        failure = session.shown.path.failure
+        mark.show(LSR1, failure)
+        ghosts.append(mark._ghost)
+        np.testing.assert_allclose(
+            mark._ghost._root.position, page.scene.frame.to_scene(failure.state.position)
+        )
+    assert ghosts[0] is ghosts[1] and mark._root.visible
+    assert [node.name for node in mark._nodes] == ["/failure/outline", "/failure/leader"]
+    mark.show(LSR1, None)
+    assert not mark._root.visible and not mark._nodes
+
+
+def test_a_path_is_drawn_in_the_colour_of_its_verdict_up_to_where_it_is_refused(page):
+    session = session_on(ramp)
+    session.change_rover([("friction",)], 0.4)
+    shown, overlay = session.shown, page.scene.paths
+    candidates = [path.candidate for path in shown.paths]
+    ground = session.wanted.terrain
+    ask(page, lambda: overlay.show(LSR1, ground, candidates, shown.index))
+    driven, beyond, *cross = overlay.ribbons[shown.index].strands
+    assert driven.colour == REFUSED and driven.width > beyond.width
+    np.testing.assert_array_equal(driven.line[-1], beyond.line[0])
+    assert beyond.colour != REFUSED and len(cross) == 2
+
+
+def test_a_ribbon_that_looks_the_same_is_not_sent_again(page):
+    line = np.column_stack([np.linspace(0.0, 1.0, 5), np.zeros(5), np.zeros(5)])
+    strands = [Strand(line, PASSABLE, 0.1), Strand(line + 1.0, REFUSED, 0.05)]
+    ribbon = Ribbon(page.server.scene, "/test/ribbon")
+    ribbon.show(strands)
+    band, sent = ribbon._band, ribbon._band.glb_data
+    ribbon.show([replace(one, line=one.line.copy()) for one in strands])
+    assert ribbon._band is band and band.glb_data is sent
+    ribbon.paint(UNKNOWN)
+    assert ribbon._band is band and band.glb_data != sent
+    assert (ribbon._core.colors == UNKNOWN).all() and ribbon.strands[0].colour == PASSABLE
+    ribbon.paint(None)
+    assert band.glb_data == sent and (ribbon._core.colors[-1] == REFUSED).all()
+    ribbon.show([replace(strands[0], line=line[:3])])
+    assert ribbon._band is band and len(ribbon._core.points) == 2
+    ribbon.remove()
+
+
+def test_a_rover_of_another_shape_is_drawn_as_a_new_one(page):
+    scene = page.server.scene
+    wide = replace(LSR1, wheel=replace(LSR1.wheel, radius=1.3 * LSR1.wheel.radius))
+    pivots = {name: (x, 1.2 * y, z) for name, (x, y, z) in LSR1.suspension.wheels.items()}
+    wide = replace(wide, suspension=replace(LSR1.suspension, wheels=pivots))
+    shaped, new = (
+        RoverVisual(scene, rover, page.scene.frame, name)
+        for rover, name in ((LSR1, "/test/a"), (wide, "/test/b"))
+    )
+    shaped.shape(wide)
+    assert shaped._meshes.keys() == new._meshes.keys()
+    for name, mesh in new._meshes.items():
+        np.testing.assert_array_equal(shaped._meshes[name].vertices, mesh.vertices)
+        np.testing.assert_array_equal(shaped._meshes[name].faces, mesh.faces)
+    for name, joint in new._joints.items():
+        np.testing.assert_array_equal(shaped._joints[name].position, joint.position)
+    shaped.remove()
+    new.remove()
+
+
+# Errors.
+
+
+def test_a_drawing_that_is_asked_for_again_is_done_once_and_one_that_fails_stops_no_other(page):
+    drawings, done = Drawings(page.errors, page.server.atomic), []
+    drawings.ask("the paths", lambda: done.append("old paths"))
+    drawings.ask("the plots", lambda: 1 / 0)
+    drawings.ask("the paths", lambda: done.append("new paths"))
+    drawings.ask("the rover", lambda: done.append("rover"))
+    for _ in range(3):
+        drawings.draw_next()
+    assert done == ["new paths", "rover"] and not drawings.waiting
+    assert "ZeroDivisionError" in page.errors.messages.pop("the plots")
+
+
+def test_a_failed_request_is_told_until_a_request_succeeds(page):
+    ask(page, fail)
+    error = ["the last request failed", "ValueError: a line of <no> points"]
+    wait_until(lambda: told(page, "errors") == [error], "the notice")
+    ask(page, lambda: None)
+    wait_until(lambda: told(page, "errors") == [], "the notice to go")
+
+
+def test_a_failed_picture_is_not_drawn_again_before_the_next_request(page, monkeypatch):
+    tried = []
+    ask(page, lambda: None)  # nothing else is asked any more
+
+    def fail_and_count(_frame):
+        tried.append(True)
+        fail()
+
+    with monkeypatch.context() as patch:
+        patch.setattr(page.scene, "show", fail_and_count)
+        page.hear({"ask": "toggle"}, None)
+        wait_until(lambda: told(page, "errors"), "the notice")
+        stopped_at = page.playback.time
+        time.sleep(0.5)  # a dozen pictures
+        assert len(tried) == 1 and page.playback.time == stopped_at
+    ask(page, page.playback.play)
+    wait_until(lambda: page.playback.time > stopped_at, "the rover to drive on")
+    wait_until(lambda: not told(page, "errors"), "the notice to go")
+    ask(page, page.playback.pause)
+
+
+def test_a_refused_value_is_told_and_put_back(page):
+    before = told(page, "values")
+    page.hear({"ask": "value", "label": "middle wheel x [m]", "value": 0.6}, None)
+    wait_until(lambda: "suspension.wheels.front" in told(page, "verdict")["refusal"], "the reason")
+    assert told(page, "values") == before
+    ask(page, lambda: page.session.judge_again())
+    wait_until(lambda: not told(page, "verdict")["refusal"], "no reason")
+
+
+def test_a_closed_page_leaves_no_thread_behind():
+    before = set(threading.enumerate())
+    page = Page(session_on(ramp), port=0)
+    page.requests.add(page.session.judge_again)
+    page.close()
+    left = {thread.name for thread in set(threading.enumerate()) - before}
+    assert not left & {"page", "judge", "ground"}
+
+
+# Cameras, maps.
+
+
+def make_client() -> SimpleNamespace:
+    """Return what the page needs of a visitor's client of viser."""
+    place = {"position": np.zeros(3), "look_at": np.ones(3)}
+    camera = SimpleNamespace(fov=1.0, image_width=600, image_height=600, **place)
+    return SimpleNamespace(camera=camera)
+
+
+def test_a_camera_sees_all_of_the_path_from_behind_or_above_and_the_rover_from_its_side(page):
+    client, path = make_client(), page.points
+    middle = 0.5 * (path.min(axis=0) + path.max(axis=0))
+    away = {}
+    for view in ("Fit", "Top", "Side"):
+        page._look(client, view)
+        away[view] = client.camera.position - client.camera.look_at
+        if view != "Side":
+            np.testing.assert_allclose(client.camera.look_at[:2], middle, atol=1e-6)
+    assert away["Top"][2] > 10.0 * np.hypot(*away["Top"][:2])
+    assert away["Side"][1] < -2.0 * max(abs(away["Side"][0]), away["Side"][2])
+    assert np.linalg.norm(away["Fit"]) > np.linalg.norm(away["Side"])
+
+
+def test_on_a_far_map_the_rover_is_where_it_is_on_a_near_one_and_a_click_lands_where_it_is_aimed():
+    places = {}
+    for x, y in ((0.0, 0.0), FAR):
+        ground = shift(make_terrain(waves), (x, y))
+        page = Page(ViewSession(LSR1, ground, (x - 2.0, y, 0.0), (x + 1.0, y, 0.0)), port=0)
+        try:
+            wait_for_rest(page)
+            places[x] = np.array(page.scene._visual._root.position)
+            aim = np.array([x + 1.5, y + 0.5])
+            place = page.scene.frame.to_scene([*aim, float(ground.elevation_at(*aim))])
+            away = np.array([-1.0, 0.0, 2.0])
+            ray = SimpleNamespace(ray_origin=place + away, ray_direction=-away / np.sqrt(5.0))
+            page._request_click(ray, shift=False)
+            wait_until(lambda p=page, x=x: p.session.wanted.goal[0] != x + 1.0, "a goal")
+            np.testing.assert_allclose(page.session.wanted.goal[:2], aim, atol=0.05)
+        finally:
+            page.close()
+    np.testing.assert_allclose(places[FAR[0]], places[0.0], atol=1e-6)
+
+
+def test_a_click_beside_the_known_ground_is_refused(page):
+    with pytest.raises(PlanningError, match="beside the known ground"):
+        page.click(None, False)
+
+
+# Links.
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({"ground": "00000000"}, "the link is about another map"),
+        ({"policy": "magic"}, "no torque policy 'magic'; policies are equal, servo, optimal"),
+        ({"soil": "mud"}, "no soil 'mud'; soils are "),
+        ({"joints": {"wing": 1.0}}, "the link turns the joint 'wing', which lsr1 lacks"),
+        ({"layer": "gold"}, "the link names the layer 'gold'"),
+    ],
+)
+def test_a_link_with_unknown_names_is_refused_and_nothing_else_changes(page, change, reason):
+    wanted = page.session.wanted
+    query = write_link(replace(page._link(), **change))
+    page.hear({"ask": "open", "query": f"?{query}"}, None)
+    wait_until(lambda: page.session.refusal.startswith(reason), "the reason")
+    assert page.session.wanted is wanted and page.errors.messages == {}
+
+
+def test_path_and_time_of_a_link_come_with_its_paths_and_not_with_a_later_goal(page):
+    link = replace(page._link(), goal=(1.0, 0.5, 0.1), path=4, time=20.0)
+    ask(page, lambda: page._open(link))
+    wait_until(lambda: page.session.shown.index == 3, "the path")
+    wait_until(lambda: page.playback.time == 20.0, "the time")
+    link = replace(page._link(), goal=(-2.0, 0.0, 0.0), path=5)
+    ask(page, lambda: page._open(link))
+    wait_for_rest(page)
+    assert len(page.session.shown.paths) < 5  # it stays where it is: nothing to choose from
+    ask(page, lambda: page.session.plan_to(np.array([1.0, 0.5])))
+    wait_for_rest(page)
+    assert page.session.shown.index == page.session.shown.best != 4 and page.playback.time == 0.0
+
+
+def test_a_program_that_was_started_again_takes_up_the_link_that_the_last_one_told(page):
+    change_friction(page, 0.7)
+    wait_until(lambda: page.session.wanted.rover.friction == 0.7, "the value")
+    wait_for_rest(page)
+    wait_until(lambda: read_link(told(page, "current")).values == {FRICTION: 0.7}, "the link")
+    again = Page(session_on(ramp), port=0)
+    try:
+        assert told(again, "program") != told(page, "program")
+        again.hear({"ask": "open", "query": f"?{told(page, 'current')}"}, None)
+        wait_until(lambda: again.session.shown.scenario.rover.friction == 0.7, "the rover")
+    finally:
+        again.close()
