@@ -83,8 +83,8 @@ PROGRAMS = {
     ),
     "rover_simulator": Program(
         "Simulate a rover on a terrain, with the topics of a real one.",
-        "subscribes path, cmd_vel, traction_controller/commands; publishes joint_states, "
-        "odometry, imu, elevation_cloud, cmd_vel, diagnostics",
+        "subscribes path, cmd_vel, traction_controller/commands, traction_controller/brake; "
+        "publishes joint_states, odometry, imu, elevation_cloud, cmd_vel, diagnostics",
         read_engine,
         specs_of(RoverSimulatorParameters),
     ),

@@ -15,7 +15,7 @@ from nav_msgs.msg import Odometry, Path
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import Imu, JointState, PointCloud2
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Bool, Float64MultiArray
 
 from msg_adapters.commands import joint_order, twist_to_speeds
 from msg_adapters.elevation import terrain_to_point_cloud
@@ -30,13 +30,13 @@ from rover_planner.nodes.running import run_node
 from rover_planner.parameters.declare import declare_parameters, warn_of_unknown_parameters
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.ros.optional_types import find_type
-from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
+from rover_planner.ros.qos import latched_qos, map_qos, sensor_qos, topic_qos
 from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.simulation import Simulation, load_simulation_settings
 
 NODE_NAME = "rover_simulator"
-COMMANDS = "traction_controller/commands"
-"""Topic of the torque commands; remap it for another controller."""
+COMMANDS, BRAKE = "traction_controller/commands", "traction_controller/brake"
+"""Topics of the torque commands and the brake; remap them for another controller."""
 DEVIATIONS = (0.01, 0.005)
 """Standard deviations in odometry: positions [m] and angles [rad]."""
 DIAGNOSTICS_PERIOD = 1.0
@@ -90,6 +90,7 @@ class RoverSimulator(Node):
         self.create_subscription(TwistStamped, "cmd_vel", self._take_speeds, sensor_qos())
         if self._settings.parameters.follow_commands:
             self.create_subscription(Float64MultiArray, COMMANDS, self._take_torques, qos)
+            self.create_subscription(Bool, BRAKE, self._take_brake, latched_qos())
 
     def _take_path(self, path: Path) -> None:
         try:
@@ -116,6 +117,9 @@ class RoverSimulator(Node):
         torques = np.empty(6)
         torques[self._order] = efforts
         self.simulation.take_torques(torques, time.monotonic())
+
+    def _take_brake(self, message: Bool) -> None:
+        self.simulation.take_brake(message.data)
 
     def _advance(self) -> None:
         self._state = state = self.simulation.advance(time.monotonic(), self._period)

@@ -103,6 +103,7 @@ class Simulation:
         self._follower: SecondTry | None = None
         self._wanted, self._wanted_at = (0.0, 0.0), -np.inf
         self._torques, self._torques_at = np.zeros(6), -np.inf
+        self._brakes = False
         self.steering = (0.0, 0.0)
         """Speed [m/s] and yaw rate [rad/s] set by path or command."""
 
@@ -130,6 +131,10 @@ class Simulation:
         """Take torques (6,) [N m] in wheel order at time `now` [s]."""
         self._torques, self._torques_at = torques, now
 
+    def take_brake(self, applied: bool) -> None:
+        """Lock the wheels, or release them."""
+        self._brakes = applied
+
     def has_speeds(self, now: float) -> bool:
         """Return whether commanded speeds apply: they are recent and no path is followed."""
         return self._follower is None and now - self._wanted_at <= self.settings.parameters.timeout
@@ -144,7 +149,10 @@ class Simulation:
         self.steering = self._steer(now)
         if self.settings.parameters.follow_commands:
             fresh = now - self._torques_at <= self.settings.parameters.timeout
-            self.plant.pull(self._torques if fresh else np.zeros(6), self.steering, duration)
+            if fresh and not self._brakes:
+                self.plant.pull(self._torques, self.steering, duration)
+            else:  # drives without commands are off, and braked
+                self.plant.brake(duration)
         else:
             self.plant.drive(*self.steering, duration)
         return self.plant.state()

@@ -14,6 +14,7 @@ from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.simulator.range_sensor import RangeSensor
 from rover_planner.simulator.second_try import SecondTry
+from rover_planner.simulator.simulation import Simulation, SimulationSettings
 from support.grounds import make_terrain, waves
 from support.rough_grounds import plane
 
@@ -115,6 +116,52 @@ def test_torques_that_hold_the_slope_keep_the_speed_and_more_drive_it_up():
     for _ in range(300):
         plant.pull(0.5 * needed, AHEAD, STEP)
     assert plant.pose()[0] < before
+
+
+@pytest.mark.parametrize("engine", [QuasiStaticPlant, MujocoPlant])
+def test_a_brake_stops_the_rover_and_holds_it_on_a_slope(engine):
+    plant = engine(LSR1, plane(-np.tan(np.radians(3.0)), 0.0, half=3.0), (-1.0, 0.0, 0.0))
+    for _ in range(25):
+        plant.pull(np.zeros(6), AHEAD, STEP)
+    assert plant.state().velocity[0] > 0.05
+    places = []
+    for _ in range(100):
+        plant.brake(STEP)
+        places.append(plant.pose()[0])
+    assert places[-1] - places[50] < 1e-3  # 0.25 m without the brake
+    assert np.abs(list(plant.state().joint_velocities.values())).max() < 0.01
+    plant.pull(np.full(6, 0.5), AHEAD, STEP)
+    assert plant.state().velocity[0] > 0.01
+
+
+def test_locked_wheels_slide_as_far_as_their_friction_lets_them():
+    slope = np.radians(15.0)
+    plant = QuasiStaticPlant(LSR1, plane(-np.tan(slope), 0.0, half=3.0), (-1.0, 0.0, 0.0), 0.35)
+    for _ in range(10):
+        plant.pull(np.zeros(6), AHEAD, STEP)
+    before = plant.state().velocity[0]
+    for _ in range(5):
+        plant.brake(STEP)
+    lost = 9.81 * (0.35 * np.cos(slope) - np.sin(slope)) * 5 * STEP
+    assert plant.state().velocity[0] == pytest.approx(before - lost, abs=0.01)
+    assert not any(plant.state().joint_velocities[name] for name in WHEEL_JOINTS)
+
+
+def test_drives_without_commands_are_braked():
+    given = RoverSimulatorParameters(follow_commands=True, start_x=-1.0)
+    slope = plane(-np.tan(np.radians(3.0)), 0.0, half=3.0)
+    simulation = Simulation(SimulationSettings(LSR1, slope, given))
+
+    def roll(begin):
+        return [simulation.advance(begin + STEP * k, STEP).velocity[0] for k in range(25)][-1]
+
+    assert roll(0.0) == 0.0  # the controller is not ready yet
+    simulation.take_torques(np.zeros(6), 1.0)
+    assert roll(1.0) > 0.0
+    simulation.take_brake(True)
+    assert roll(1.0) == 0.0
+    simulation.take_brake(False)
+    assert roll(2.0) == 0.0  # the controller has died
 
 
 def test_a_wheel_pulls_no_more_than_its_friction():
