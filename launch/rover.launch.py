@@ -18,6 +18,9 @@ PARAMETERS = Path(__file__).absolute().parents[1] / "config" / "parameters"
 """Folder of the parameter files, in a checkout and where the package is installed."""
 RESPAWN_DELAY = 1.0
 """Time after which a node that has ended is started again [s]."""
+STOP_TIMEOUT = 0.4
+"""Time without a heartbeat of the watch after which the controller stops the rover [s]; the watch
+has ten a second."""
 ARGUMENTS = {
     "namespace": ("", "namespace of all nodes; diagnostics stay in /diagnostics"),
     "use_sim_time": ("false", "true takes the time from /clock"),
@@ -25,6 +28,11 @@ ARGUMENTS = {
     "rover": ("", "preset name or rover file; empty takes that of the parameter files"),
     "terrain_file": ("", "map to start with; empty takes that of the parameter file"),
     "traction_controller": ("true", "false starts the traverse server alone"),
+    "watch": (
+        "true",
+        "whether the rover drives watched paths only, and stops without its watch; false leaves "
+        "that to the parameter files",
+    ),
     "traverse_server_parameters": (str(PARAMETERS / "traverse_server.yaml"), "parameter file"),
     "traction_controller_parameters": (
         str(PARAMETERS / "traction_controller.yaml"),
@@ -50,7 +58,10 @@ def start_nodes(context: LaunchContext) -> list[Node]:
     if given["rover"]:
         both["rover"] = given["rover"]
     own = {"terrain_file": given["terrain_file"]} if given["terrain_file"] else {}
-    parameters = {"traverse_server": both | own, "traction_controller": both}
+    parameters = {"traverse_server": both | own, "traction_controller": dict(both)}
+    if is_true(given["watch"]):
+        parameters["traverse_server"]["monitor"] = True
+        parameters["traction_controller"]["stop_timeout"] = STOP_TIMEOUT
     wanted = NODES if is_true(given["traction_controller"]) else NODES[:1]
     return [
         Node(

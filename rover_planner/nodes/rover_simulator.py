@@ -29,6 +29,7 @@ from rover_planner.maps.summary import describe_terrain
 from rover_planner.nodes.running import run_node
 from rover_planner.parameters.declare import declare_parameters, warn_of_unknown_parameters
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
+from rover_planner.parameters.shared import STOP
 from rover_planner.ros.optional_types import find_type
 from rover_planner.ros.qos import latched_qos, map_qos, sensor_qos, topic_qos
 from rover_planner.simulator.plant import PlantState
@@ -86,6 +87,7 @@ class RoverSimulator(Node):
 
     def _create_subscriptions(self) -> None:
         qos = topic_qos()
+        self.create_subscription(Bool, STOP, self._take_stop, qos)
         self.create_subscription(Path, "path", self._take_path, qos)
         self.create_subscription(TwistStamped, "cmd_vel", self._take_speeds, sensor_qos())
         if self._settings.parameters.follow_commands:
@@ -120,6 +122,9 @@ class RoverSimulator(Node):
 
     def _take_brake(self, message: Bool) -> None:
         self.simulation.take_brake(message.data)
+
+    def _take_stop(self, message: Bool) -> None:
+        self.simulation.take_stop(message.data, time.monotonic())
 
     def _advance(self) -> None:
         self._state = state = self.simulation.advance(time.monotonic(), self._period)

@@ -257,7 +257,8 @@ class TraverseServerParameters(ParameterTable):
 
     monitor: bool = parameter(
         False,
-        "Whether the accepted path is judged again with each map, and ~/stop is published.",
+        "Whether the accepted path is judged again with each map; ~/stop is then true unless the "
+        "rover may drive it.",
     )
     monitor_offset: float = parameter(
         0.5,
@@ -267,7 +268,8 @@ class TraverseServerParameters(ParameterTable):
     )
     monitor_timeout: float = parameter(
         1.0,
-        "Time without a pose of the rover after which it is to stop.",
+        "Time without a pose of the rover, or joint states that were there, after which it is to "
+        "stop.",
         unit="s",
         bounds=(0.1, 60.0),
     )

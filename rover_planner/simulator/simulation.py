@@ -104,6 +104,7 @@ class Simulation:
         self._wanted, self._wanted_at = (0.0, 0.0), -np.inf
         self._torques, self._torques_at = np.zeros(6), -np.inf
         self._brakes = False
+        self._stops, self._stop_at, self._held = False, -np.inf, 0.0
         self.steering = (0.0, 0.0)
         """Speed [m/s] and yaw rate [rad/s] set by path or command."""
 
@@ -135,6 +136,15 @@ class Simulation:
         """Lock the wheels, or release them."""
         self._brakes = applied
 
+    def take_stop(self, stops: bool, now: float) -> None:
+        """Take what the watch of the path says at time `now` [s]: whether the rover is to stop."""
+        self._stops, self._stop_at = stops, now
+
+    def _may_drive(self, now: float) -> bool:
+        """Return whether the watch of the path, if there is to be one, lets the rover drive."""
+        timeout = self.settings.parameters.stop_timeout or np.inf
+        return not self._stops and now - self._stop_at <= timeout
+
     def has_speeds(self, now: float) -> bool:
         """Return whether commanded speeds apply: they are recent and no path is followed."""
         return self._follower is None and now - self._wanted_at <= self.settings.parameters.timeout
@@ -146,7 +156,10 @@ class Simulation:
 
     def advance(self, now: float, duration: float) -> PlantState:
         """Advance by a duration [s] from time `now` [s]; return the measurements."""
-        self.steering = self._steer(now)
+        if self._may_drive(now):
+            self.steering = self._steer(now)
+        else:  # no time passes for the follower, which knows no reason to stand but being stuck
+            self.steering, self._held = (0.0, 0.0), self._held + duration
         if self.settings.parameters.follow_commands:
             fresh = now - self._torques_at <= self.settings.parameters.timeout
             if fresh and not self._brakes:
@@ -160,7 +173,7 @@ class Simulation:
     def _steer(self, now: float) -> tuple[float, float]:
         if self._follower is not None:
             pose = self.plant.pose()
-            wanted = self._follower.steer(pose, self.settings.speed, now)
+            wanted = self._follower.steer(pose, self.settings.speed, now - self._held)
             if self._follower.has_arrived(pose):
                 self._follower = None
             return wanted

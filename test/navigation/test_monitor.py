@@ -135,6 +135,17 @@ def test_a_rover_off_its_path_or_lost_is_to_stop(service):
     assert monitor.finding.state == STOPPED
 
 
+def test_joint_states_that_cease_stop_a_rover_that_had_them(service):
+    monitor = watching(service, pose_timeout=1.0)
+    here = sight(service, STRAIGHT[0])
+    assert monitor.look(replace(here, time=9.0)).state == WATCHING  # it never had any
+    measured = replace(here, snapshot=replace(here.snapshot, measured_pose=STRAIGHT[0]))
+    assert monitor.look(replace(measured, time=10.0)).state == WATCHING
+    assert monitor.look(replace(here, time=10.9)).state == WATCHING
+    found = monitor.look(replace(here, time=11.1))
+    assert (found.state, found.judgement.code) == (STOPPED, "no_joints")
+
+
 def test_a_difference_counts_once_it_has_lasted():
     drift = SuspensionDrift(1.0)
     assert drift.latest == {} and drift.lasting() == 0.0

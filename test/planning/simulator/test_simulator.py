@@ -164,6 +164,26 @@ def test_drives_without_commands_are_braked():
     assert roll(2.0) == 0.0  # the controller has died
 
 
+def test_a_path_waits_while_the_watch_stops_the_rover_or_is_silent():
+    given = RoverSimulatorParameters(start_x=-1.0, stop_timeout=0.4)
+    simulation = Simulation(SimulationSettings(LSR1, wavy(), given))
+    simulation.take_path(np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
+
+    def speeds(begin, seconds):
+        times = begin + STEP * np.arange(round(seconds / STEP))
+        return [simulation.advance(now, STEP).velocity[0] for now in times]
+
+    assert not any(speeds(0.0, 1.0))
+    simulation.take_stop(False, 1.0)
+    moving = speeds(1.0, 1.0)
+    assert all(moving[1:20]) and not any(moving[22:])
+    assert not any(speeds(2.0, 20.0))
+    simulation.take_stop(False, 22.0)
+    assert min(speeds(22.0, 0.3)[1:]) > 0.0  # it does not back off: it was not stuck
+    simulation.take_stop(True, 22.3)
+    assert not any(speeds(22.3, 0.2)[1:])
+
+
 def test_a_wheel_pulls_no_more_than_its_friction():
     ground = plane(0.0, 0.0, half=3.0)
     weak = QuasiStaticPlant(LSR1, ground, (-1.0, 0.0, 0.0), friction=0.05)
