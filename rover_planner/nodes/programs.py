@@ -86,7 +86,8 @@ PROGRAMS = {
         "Simulate a rover on a terrain, with the topics of a real one.",
         "subscribes path, cmd_vel, traction_controller/commands, traction_controller/brake, "
         "traverse_server/stop; "
-        "publishes joint_states, odometry, imu, elevation_cloud, cmd_vel, diagnostics",
+        "publishes joint_states, odometry, imu, elevation_cloud, cmd_vel, path_driven, "
+        "diagnostics",
         read_engine,
         specs_of(RoverSimulatorParameters),
     ),
@@ -94,7 +95,7 @@ PROGRAMS = {
         "Query a traverse_server over ROS 2 for a list of goals.",
         "calls traverse_server/can_traverse, traverse_server/check_path; subscribes "
         "traverse_server/verdict, traverse_server/wheel_loads, traverse_server/slip_ratios, "
-        "odometry; publishes "
+        "odometry, path_driven; publishes "
         "elevation_cloud, path, traverse_server/path",
         read_mission,
         exit_codes="Exit code 0: every goal is traversable, and with --drive was reached. 1: a "

@@ -15,11 +15,12 @@ from nav_msgs.msg import Odometry, Path
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import Imu, JointState, PointCloud2
-from std_msgs.msg import Bool, Float64MultiArray
+from std_msgs.msg import Bool, Float64MultiArray, String
 
 from msg_adapters.commands import joint_order, twist_to_speeds
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.errors import MessageError
+from msg_adapters.identity import path_hash
 from msg_adapters.joints import convert_steering
 from msg_adapters.paths import path_to_poses
 from msg_adapters.results.diagnostics import SIMULATOR, diagnostics, make_status
@@ -56,7 +57,7 @@ class RoverSimulator(Node):
         self.simulation = Simulation(self._settings)
         """The rover."""
         self._period = 1.0 / parameters.rate
-        self._stopped = ""
+        self._stopped, self._path_hash = "", ""
         self._own_stamps: deque[tuple[int, int]] = deque(maxlen=64)
         self._create_publishers()
         self._create_subscriptions()
@@ -77,6 +78,7 @@ class RoverSimulator(Node):
         self._joints = self.create_publisher(JointState, "joint_states", qos)
         self._odometry = self.create_publisher(Odometry, "odometry", qos)
         self._imu = self.create_publisher(Imu, "imu", qos)
+        self._driven = self.create_publisher(String, "path_driven", latched_qos())
         self._cloud = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
         self._commands = None
@@ -97,6 +99,7 @@ class RoverSimulator(Node):
     def _take_path(self, path: Path) -> None:
         try:
             self.simulation.take_path(path_to_poses(path, self._frame))
+            self._path_hash = path_hash(path)
         except MessageError as error:
             self.get_logger().error(f"path refused: {error}")
 
@@ -152,6 +155,9 @@ class RoverSimulator(Node):
         if self._transforms is not None:
             self._transforms.sendTransform(_transform(state, self._frame, stamp))
         self._log_stop(state)
+        if self._path_hash and self.simulation.at_end:
+            self._driven.publish(String(data=self._path_hash))
+            self._path_hash = ""
 
     def _arm_angles(self) -> dict[str, float]:
         arm = self._settings.rover.manipulator

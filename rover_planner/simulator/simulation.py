@@ -2,6 +2,7 @@
 """The simulation without ROS: drives a plant along a path, by speeds or by torques."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -21,6 +22,8 @@ from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 MADE_SIZE, MADE_RESOLUTION = 24.0, 0.05
 """Width and cell size of the generated terrain [m], the default terrain."""
+WIDEST_GAP = 1e6
+"""Width up to which unknown regions are ground like that around them [m]: any width."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +33,14 @@ class SimulationSettings:
     rover: Rover
     """The rover that is simulated."""
     terrain: Terrain
-    """The true ground."""
+    """The true ground, as far as a sensor can see it."""
     parameters: RoverSimulatorParameters
     """The parameters; empty texts and 0 stand for "as rover and terrain say"."""
+
+    @cached_property
+    def ground(self) -> Terrain:
+        """The true ground with the gaps that a server may interpolate: there is ground there."""
+        return self.terrain.fill_gaps(WIDEST_GAP)
 
     @property
     def start(self) -> tuple[float, float, float]:
@@ -68,7 +76,7 @@ def make_plant(settings: SimulationSettings) -> Plant:
         SoilError: No soil of that name.
     """
     asked = settings.parameters
-    placed = settings.rover, settings.terrain, settings.start, asked.friction or None
+    placed = settings.rover, settings.ground, settings.start, asked.friction or None
     if asked.engine != MUJOCO:
         return QuasiStaticPlant(*placed, asked.policy, asked.soil or None)
     if asked.soil:
@@ -103,6 +111,8 @@ class Simulation:
         self._follower: SecondTry | None = None
         self._wanted, self._wanted_at = (0.0, 0.0), -np.inf
         self._torques, self._torques_at = np.zeros(6), -np.inf
+        self.at_end = False
+        """True once the end of the last path was reached."""
         self._brakes = False
         self._stops, self._stop_at, self._held = False, -np.inf, 0.0
         self.steering = (0.0, 0.0)
@@ -121,7 +131,7 @@ class Simulation:
         steering = rover.steering
         # From one limit to the other, while the rover stands.
         longest = 0.0 if steering is None else 2.0 * steering.limit / steering.rate
-        self._follower = SecondTry(follower, tries, STUCK_TIME + longest)
+        self._follower, self.at_end = SecondTry(follower, tries, STUCK_TIME + longest), False
 
     def take_speeds(self, speed: float, yaw_rate: float, now: float) -> None:
         """Drive at a speed [m/s] and yaw rate [rad/s] from time `now` [s]; ends path following."""
@@ -175,7 +185,7 @@ class Simulation:
             pose = self.plant.pose()
             wanted = self._follower.steer(pose, self.settings.speed, now - self._held)
             if self._follower.has_arrived(pose):
-                self._follower = None
+                self._follower, self.at_end = None, True
             return wanted
         return self._wanted if self.has_speeds(now) else (0.0, 0.0)
 

@@ -107,6 +107,8 @@ def test_the_rover_stops_within_half_a_second_of_the_loss_of_the_server(
     processes["traverse_server"] = subprocess.Popen(
         words, env=os.environ | {"ROS_DOMAIN_ID": str(domain_id())}
     )
-    planner.wait_for_server()
+    pose = planner.wait_for_pose(lambda pose: True, 1.0)
     time.sleep(2.0)
     assert ear.state == "fault"  # the new server has accepted no path
+    assert planner.ask(pose, (3.0, 0.0, 0.0))["traversable"]  # asked before it has started
+    wait_until(lambda: ear.state == "driving", "the drive to go on")

@@ -231,6 +231,17 @@ def test_a_rover_that_stands_still_backs_off_twice_and_then_gives_up(wall_falls)
     assert wall_falls or (not track[-1, 1] and track[:, 0].max() == pytest.approx(0.5))
 
 
+def test_the_ground_goes_on_where_a_file_does_not_know_it_and_the_sensor_does_not_see_it():
+    hole = lambda x, y: waves(x, y) + np.where(np.hypot(x, y) < 0.3, np.nan, 0.0)  # noqa: E731
+    ground = make_terrain(hole, half=3.0)
+    simulation = Simulation(
+        SimulationSettings(LSR1, ground, RoverSimulatorParameters(start_x=-1.0))
+    )
+    drive(simulation.plant, 30.0)
+    assert simulation.plant.pose()[0] > 0.7  # a server that interpolates has let it pass
+    assert np.isnan(simulation.look().elevation_at(0.0, 0.0))
+
+
 def look(ground, **changes):
     values = {"range": 2.0, "noise": 0.0, "height": 0.8, "occlusion": True} | changes
     asked = RoverSimulatorParameters(**{f"sensor_{key}": value for key, value in values.items()})
