@@ -6,6 +6,8 @@ import sys
 import time
 from collections import deque
 from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -26,11 +28,13 @@ from msg_adapters.paths import path_to_poses
 from msg_adapters.results.diagnostics import SIMULATOR, diagnostics, make_status
 from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_message
 from rover_physics.names import WHEEL_JOINTS
+from rover_physics.numerics.arrays import Floats
 from rover_planner.maps.summary import describe_terrain
 from rover_planner.nodes.running import run_node
 from rover_planner.parameters.declare import declare_parameters, warn_of_unknown_parameters
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.shared import STOP
+from rover_planner.ros.guard import Guard
 from rover_planner.ros.optional_types import find_type
 from rover_planner.ros.qos import latched_qos, map_qos, sensor_qos, topic_qos
 from rover_planner.simulator.plant import PlantState
@@ -41,6 +45,9 @@ COMMANDS, BRAKE = "traction_controller/commands", "traction_controller/brake"
 """Topics of the torque commands and the brake; remap them for another controller."""
 DEVIATIONS = (0.01, 0.005)
 """Standard deviations in odometry: positions [m] and angles [rad]."""
+SWITCH_INTERVAL = 5e-4
+"""Longest time for which the thread that makes maps may delay a step whenever that needs Python's
+lock [s]; Python's thread switch interval."""
 DIAGNOSTICS_PERIOD = 1.0
 """Time between two diagnostic messages [s]."""
 
@@ -63,9 +70,13 @@ class RoverSimulator(Node):
         self._create_subscriptions()
         self._state: PlantState = self.simulation.plant.state()
         self.create_timer(self._period, self._advance)
-        self.create_timer(1.0 / parameters.map_rate, self._publish_map)
+        # A map takes longer than a step: other threads must not make the rover's sensors late.
+        self._maps, self._map_in_work = ThreadPoolExecutor(1, "maps"), Future[None]()
+        self._map_in_work.set_result(None)
+        self._guard = Guard(self.get_logger())
+        self.create_timer(1.0 / parameters.map_rate, self._begin_map)
         self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
-        self._publish_map()
+        self._begin_map()
         warn_of_unknown_parameters(self, RoverSimulatorParameters)
         self.get_logger().info(
             f"ready: rover {self._settings.rover.name} on {parameters.engine}, starts at "
@@ -189,9 +200,22 @@ class RoverSimulator(Node):
         status = make_status(SIMULATOR, level, text, values, self._settings.rover.name)
         self._diagnostics.publish(diagnostics([status], self.get_clock().now().to_msg()))
 
-    def _publish_map(self) -> None:
-        stamp = self.get_clock().now().to_msg()
-        self._cloud.publish(terrain_to_point_cloud(self.simulation.look(), self._frame, stamp))
+    def destroy_node(self) -> None:
+        """Finish the map in work, and destroy the node."""
+        self._maps.shutdown()
+        super().destroy_node()
+
+    def _begin_map(self) -> None:
+        """Have a map of what is seen now made in the thread, unless one is still in work."""
+        if self._map_in_work.done():
+            here = self._state.position, float(self.simulation.plant.pose()[2])
+            stamp = self.get_clock().now().to_msg()
+            make = partial(self._publish_map, *here, stamp)
+            self._map_in_work = self._maps.submit(self._guard.call, make)
+
+    def _publish_map(self, position: Floats, yaw: float, stamp: Any) -> None:
+        seen = self.simulation.look(position, yaw)
+        self._cloud.publish(terrain_to_point_cloud(seen, self._frame, stamp))
 
 
 def _twist(speeds: tuple[float, float], stamp: Any) -> TwistStamped:
@@ -221,7 +245,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         overrides = [Parameter(name, value=value) for name, value in options.items()]
         return RoverSimulator(parameter_overrides=overrides)
 
-    return run_node(NODE_NAME, argv, make)
+    return run_node(NODE_NAME, argv, make, SWITCH_INTERVAL)
 
 
 if __name__ == "__main__":

@@ -189,8 +189,11 @@ class Simulation:
             return wanted
         return self._wanted if self.has_speeds(now) else (0.0, 0.0)
 
-    def look(self) -> Terrain:
-        """Return the sensor's map of the ground around the rover."""
-        position = self.plant.state().position
-        yaw = float(self.plant.pose()[2])
+    def look(self, position: Floats, yaw: float) -> Terrain:
+        """Return the sensor's map of the ground around a rover; another thread may look.
+
+        Args:
+            position: (3,) body origin [m].
+            yaw: Heading [rad].
+        """
         return self._sensor.look(self.settings.terrain, position, self._rng, yaw)

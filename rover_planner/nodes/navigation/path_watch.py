@@ -18,6 +18,7 @@ from std_srvs.srv import SetBool
 
 from msg_adapters.results.diagnostics import MONITOR, make_status
 from rover_physics.numerics.interruption import interruptible
+from rover_physics.numerics.kernel_cache import KernelMissingError, loading_only
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.budget import STOPPING, QuestionStoppedError
 from rover_planner.planning.answering.judgement import PathJudgement, refusal
@@ -32,6 +33,7 @@ from rover_planner.planning.navigation.monitor import (
     Sight,
     WatchSettings,
     describe_watch,
+    rehearse,
 )
 from rover_planner.planning.navigation.watched_path import WatchedPath
 from rover_planner.ros.guard import Guard
@@ -180,7 +182,18 @@ class PathWatch:
             self._sight = Sight(snapshot, pose, time.monotonic())
             self._changed.notify_all()
 
+    def _rehearse(self) -> None:
+        """Look at a path of no meaning, unless that compiles kernels."""
+        try:
+            with interruptible(self._check_end), loading_only():
+                rehearse(self._service.settings)
+        except (KernelMissingError, QuestionStoppedError):
+            return
+        except Exception as error:
+            self._guard.report("monitor", error)
+
     def _run(self) -> None:
+        self._rehearse()
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: self._sight is not None or self._ending)

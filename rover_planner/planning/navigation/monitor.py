@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.grid import Terrain
+from rover_planner.maps.known_map import KnownMap
 from rover_planner.planning.answering.judgement import PathJudgement, refusal
 from rover_planner.planning.answering.server_health import ERROR, OK, WARN, Health
 from rover_planner.planning.answering.service_settings import ServiceSettings
@@ -23,7 +25,7 @@ IDLE, WATCHING, STOPPED, ARRIVED = "idle", "watching", "stopped", "arrived"
 """States of a monitor."""
 NO_POSE, NO_JOINTS, OFF_PATH, SUSPENSION = "no_pose", "no_joints", "off_path", "suspension"
 """Codes of a stop besides those of a verdict."""
-NEAR = 10.0
+NEAR = 3.0
 """Length of the part of the path that is judged before the whole rest [m]: the rover is told
 early of what is near."""
 SHARE = 0.25
@@ -267,6 +269,22 @@ class PathMonitor:
     def _has_arrived(self, path: WatchedPath) -> bool:
         place = self._finding.place
         return place is not None and path.is_end(place.index)
+
+
+def rehearse(settings: ServiceSettings) -> None:
+    """Look once, at level ground that is not known exactly, so that no later look takes longer."""
+    flat = np.zeros((120, 120))
+    ground = Terrain(flat, 0.05, (-3.0, -3.0), elevation_std=flat + 0.001)
+    poses = np.column_stack([np.linspace(-1.0, 1.0, 41), np.zeros((41, 2))])
+    snapshot = Snapshot(
+        settings,
+        joints=dict.fromkeys(SUSPENSION_JOINTS, 0.0),
+        known_map=KnownMap(ground, ground, "", None, 0.0, ""),
+        measured_pose=poses[0],
+    )
+    monitor, sight = PathMonitor(WatchSettings()), Sight(snapshot, poses[0], 0.0)
+    monitor.take_path(WatchedPath(poses), sight)
+    monitor.look(sight)
 
 
 def _check(snapshot: Snapshot, poses: NDArray[np.float64]) -> PathJudgement:

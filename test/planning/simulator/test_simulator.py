@@ -239,7 +239,7 @@ def test_the_ground_goes_on_where_a_file_does_not_know_it_and_the_sensor_does_no
     )
     drive(simulation.plant, 30.0)
     assert simulation.plant.pose()[0] > 0.7  # a server that interpolates has let it pass
-    assert np.isnan(simulation.look().elevation_at(0.0, 0.0))
+    assert np.isnan(simulation.look(simulation.plant.state().position, 0.0).elevation_at(0.0, 0.0))
 
 
 def look(ground, **changes):
