@@ -241,6 +241,12 @@ class TraverseServerParameters(ParameterTable):
         "/",
         "Folder below which ~/load_map reads; / is every file.",
     )
+    max_path_poses: int = parameter(
+        2000,
+        "Largest number of poses of ~/path; a longer one is refused before it is read, which "
+        "takes some 20 us a pose.",
+        bounds=(2, 100_000),
+    )
     max_map_bytes: int = parameter(
         1_000_000_000,
         "Largest file that ~/load_map reads.",
