@@ -16,6 +16,7 @@ from geometry_msgs.msg import TransformStamped, TwistStamped
 from nav_msgs.msg import Odometry, Path
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
 from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Bool, Float64MultiArray, String
 
@@ -31,12 +32,14 @@ from rover_physics.names import WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_planner.maps.summary import describe_terrain
 from rover_planner.nodes.running import run_node
+from rover_planner.nodes.warm_up import SIMULATION
 from rover_planner.parameters.declare import declare_parameters, warn_of_unknown_parameters
-from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
+from rover_planner.parameters.rover_simulator import QUASI_STATIC, RoverSimulatorParameters
 from rover_planner.parameters.shared import STOP
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.optional_types import find_type
 from rover_planner.ros.qos import latched_qos, map_qos, sensor_qos, topic_qos
+from rover_planner.shell.kernels import load_kernels
 from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.simulation import Simulation, load_simulation_settings
 
@@ -61,6 +64,8 @@ class RoverSimulator(Node):
         self._frame, self._steering_sign = parameters.map_frame, parameters.steering_sign
         self._order = joint_order(parameters.joints)
         self._settings = load_simulation_settings(parameters)
+        if parameters.engine == QUASI_STATIC:
+            load_kernels(SIMULATION, (), self.get_logger().info)
         self.simulation = Simulation(self._settings)
         """The rover."""
         self._period = 1.0 / parameters.rate
@@ -85,7 +90,7 @@ class RoverSimulator(Node):
         )
 
     def _create_publishers(self) -> None:
-        qos = sensor_qos()
+        qos = QoSProfile(depth=5)  # reliable, so that every subscriber hears it
         self._joints = self.create_publisher(JointState, "joint_states", qos)
         self._odometry = self.create_publisher(Odometry, "odometry", qos)
         self._imu = self.create_publisher(Imu, "imu", qos)

@@ -63,7 +63,7 @@ class Ear(Node):
         super().__init__("ear", context=ros.context)
         self.heard = {}
         for kind, topic, qos in (
-            (JointState, "joint_states", sensor_qos()),
+            (JointState, "joint_states", topic_qos()),  # a reliable subscriber
             (Imu, "imu", sensor_qos()),
             (PointCloud2, "elevation_cloud", map_qos()),
             (DiagnosticArray, "/diagnostics", topic_qos()),
