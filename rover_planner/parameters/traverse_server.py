@@ -238,8 +238,9 @@ class TraverseServerParameters(ParameterTable):
         bounds=(0, 1000),
     )
     map_folder: str = parameter(
-        "/",
-        "Folder below which ~/load_map reads; / is every file.",
+        "~/maps",
+        "Folder below which ~/load_map reads, where relative names start; ~ is the user's home, / "
+        "allows every file.",
     )
     max_path_poses: int = parameter(
         2000,
