@@ -9,6 +9,7 @@ changes. The report has the drives done, the faults by cause, memory and latency
 and the torques that were heard while the controller was to rest.
 """
 
+import contextlib
 import itertools
 import json
 import os
@@ -42,15 +43,13 @@ START_TIME = 300.0
 """Longest wait for the start of all programs [s]."""
 FLIGHT = 0.1
 """Age of a stop from which no torque is on its way any more [s]."""
+PATIENCE = 10.0
+"""Longest wait for an answer [s]."""
 REACH = 3.0
 """Largest distance of a goal [m]."""
-PARAMETERS = """
-/**:
-  ros__parameters:
-    enabled_at_start: true
-    rest_policy: brake
-"""
-"""Of the controller: torques are zero when it rests."""
+PARAMETERS = ROOT / "config" / "parameters" / "simulated_traction_controller.yaml"
+RESTS = "    rest_policy: brake\n"
+"""Line of the controller's parameters besides: torques are zero when it rests."""
 MISSION, PAGE = "mission_planner", "view"
 
 
@@ -59,7 +58,7 @@ class Ear(Node):
 
     def __init__(self, ros: RosRun):
         super().__init__("ear", context=ros.context)
-        self.pose = np.zeros(3)
+        self.pose = np.full(3, np.nan)
         self.faults: Counter[str] = Counter()
         self.torques_at_rest = 0
         self._rests_since, self._fault = np.inf, ""
@@ -93,7 +92,7 @@ class Programs:
     """The programs by name; each can be killed and started again."""
 
     def __init__(self, folder: Path, terrain: Path):
-        (folder / "controller.yaml").write_text(PARAMETERS)
+        (folder / "controller.yaml").write_text(PARAMETERS.read_text() + RESTS)
         self._folder = folder
         self._words = simulation_commands(
             terrain_file=str(terrain),
@@ -152,7 +151,7 @@ def run_soak(minutes: float, load: int, kill_every: float, seed: int) -> dict[st
             save_terrain(terrain, ground)
             programs, ear = Programs(Path(folder), terrain), ros.spin(Ear(ros))
             client = Client(ros, "soak")
-            wait_until(lambda: ear.pose.any(), "the simulator", START_TIME)
+            wait_until(lambda: np.isfinite(ear.pose).all(), "the simulator", START_TIME)
             client.connect()
             return _drive(programs, ear, client, ground, rng, (minutes, kill_every))
         finally:
@@ -238,7 +237,8 @@ def _latency(client: Client, ear: Ear) -> float:
     for _ in range(10):
         begin = time.monotonic()
         x, y, yaw = ear.pose.tolist()
-        client.plan((x, y, yaw), (x + np.cos(yaw), y + np.sin(yaw), yaw))
+        with contextlib.suppress(LostAnswerError):
+            client.plan((x, y, yaw), (x + np.cos(yaw), y + np.sin(yaw), yaw), PATIENCE)
         taken.append(1e3 * (time.monotonic() - begin))
     return median(taken)
 

@@ -3,16 +3,16 @@
 
 import json
 import re
+import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
 import yaml
 
-from msg_adapters.commands import joint_order
-from msg_adapters.joints import read_joint_map
-from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_physics.rover.rover_file import load_rover
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.rover.rover_file import load_rover, preset_names
 from rover_physics.rover.steering_joints import steering_joints
+from rover_physics.rover.urdf.write_urdf import write_urdf
 from rover_planner.nodes.programs import PROGRAMS
 from support.project.checkout import TOP, console_scripts
 from support.project.command_checks import check_parameter_file, check_parameters
@@ -129,34 +129,44 @@ def test_a_layout_shows_topics_that_the_nodes_publish(path):
 CONFIG = TOP / "config"
 
 
-@pytest.mark.parametrize(
-    ("file", "node"),
-    [
-        ("nav2/watch.yaml", "traverse_server"),
-        ("ros2_control/joints.yaml", "traverse_server"),
-        ("ros2_control/joints.yaml", "traction_controller"),
-    ],
-)
-def test_every_parameter_of_a_file_is_one_of_its_node(file, node):
-    check_parameter_file(node, CONFIG / file)
+def test_every_parameter_of_the_file_for_nav2_is_one_of_the_server():
+    check_parameter_file("traverse_server", CONFIG / "nav2" / "watch.yaml")
 
 
-def test_the_groups_of_ros2_control_have_the_joints_and_order_of_the_map():
-    def read(name):
-        return yaml.safe_load((CONFIG / "ros2_control" / name).read_text(encoding="utf-8"))
+@pytest.mark.parametrize("preset", preset_names())
+def test_ros2_control_has_what_the_urdf_tells_and_the_controller_reads_and_commands(
+    preset, tmp_path
+):
+    urdf = tmp_path / "rover.urdf"
+    write_urdf(urdf, load_rover(preset), "mock_components/GenericSystem")
+    system = ElementTree.parse(urdf).getroot().find("ros2_control")
+    commands = {
+        (joint.get("name"), one.get("name"))
+        for joint in system.findall("joint") for one in joint.findall("command_interface")
+    }  # fmt: skip
+    file = yaml.safe_load((CONFIG / "ros2_control" / "controllers.yaml").read_text())
+    values = {name: part["ros__parameters"] for name, part in file.items()}
+    for group in ("wheel_efforts", "wheel_velocities", "steering_positions"):
+        joints, interface = values[group]["joints"], values[group]["interface_name"]
+        assert {(joint, interface) for joint in joints} <= commands
+    assert tuple(values["wheel_efforts"]["joints"]) == WHEEL_JOINTS  # the controller's order
+    assert values["steering_positions"]["joints"] == list(steering_joints(load_rover(preset)))
+    assert values["imu_broadcaster"]["sensor_name"] == system.find("sensor").get("name")
+    controller = {spec.name: spec.default for spec in PROGRAMS["traction_controller"].parameters}
+    assert values["imu_broadcaster"]["frame_id"] == controller["base_frame"]
+    measured = {joint.get("name") for joint in system.findall("joint")}
+    assert {*SUSPENSION_JOINTS, *WHEEL_JOINTS} <= measured
 
-    groups, nodes = read("controllers.yaml"), read("joints.yaml")
-    known = (*SUSPENSION_JOINTS, *WHEEL_JOINTS, *STEERING_JOINTS)
-    names = read_joint_map(nodes["/**"]["ros__parameters"]["joint_map"], known)
-    wheels = nodes["traction_controller"]["ros__parameters"]["joints"]
-    assert sorted(joint_order(wheels, names).tolist()) == list(range(6))
-    for group in ("wheel_efforts", "wheel_velocities"):
-        assert groups[group]["ros__parameters"]["joints"] == wheels
-    for preset in ("lsr1", "m2020"):
-        steered = names.robot_names(steering_joints(load_rover(preset)))
-        assert groups["steering_positions"]["ros__parameters"]["joints"] == list(steered)
-    kinds = groups["controller_manager"]["ros__parameters"]
-    assert {"wheel_efforts", "wheel_velocities", "steering_positions"} <= set(kinds)
+    *_, control, spawner = nodes = start_rover(urdf=str(urdf))
+    assert [node.executable for node in nodes[:3]] == [
+        "traverse_server", "traction_controller", "robot_state_publisher",
+    ]  # fmt: skip
+    assert control.parameters == [str(CONFIG / "ros2_control" / "controllers.yaml")]
+    spawned = set(spawner.arguments) & values.keys() | {"joint_state_broadcaster"}
+    assert spawned <= set(values["controller_manager"])
+    said = PROGRAMS["traction_controller"].topics
+    for ours, theirs in nodes[1].remappings[1:]:
+        assert ours in re.findall(r"[~/a-z_]+", said) and theirs.split("/")[0] in spawned
 
 
 @pytest.mark.parametrize("file", ["hazard_layer.yaml", "hazard_filter.yaml"])
