@@ -46,6 +46,8 @@ from rover_planner.simulator.simulation import Simulation, load_simulation_setti
 NODE_NAME = "rover_simulator"
 COMMANDS, BRAKE = "traction_controller/commands", "traction_controller/brake"
 """Topics of the torque commands and the brake; remap them for another controller."""
+STANDING_PERIOD = 0.1
+"""Time between two commands of a rover that is to stand [s]."""
 DEVIATIONS = (0.01, 0.005)
 """Standard deviations in odometry: positions [m] and angles [rad]."""
 SWITCH_INTERVAL = 5e-4
@@ -69,7 +71,8 @@ class RoverSimulator(Node):
         self.simulation = Simulation(self._settings)
         """The rover."""
         self._period = 1.0 / parameters.rate
-        self._stopped, self._path_hash = "", ""
+        self._standing_steps = max(1, round(STANDING_PERIOD * parameters.rate))
+        self._stopped, self._path_hash, self._steps = "", "", 0
         self._own_stamps: deque[tuple[int, int]] = deque(maxlen=64)
         self._create_publishers()
         self._create_subscriptions()
@@ -164,7 +167,10 @@ class RoverSimulator(Node):
         self._imu.publish(
             imu_message(state.orientation, state.body_rates, gravity, DEVIATIONS[1], stamp)
         )
-        if self._commands is not None and not self.simulation.has_speeds(time.monotonic()):
+        self._steps += 1
+        is_due = any(self.simulation.steering) or self._steps % self._standing_steps == 0
+        own = not self.simulation.has_speeds(time.monotonic())
+        if self._commands is not None and is_due and own:
             twist = _twist(self.simulation.steering, stamp)
             self._own_stamps.append(_stamp_of(twist))
             self._commands.publish(twist)
