@@ -35,6 +35,7 @@ SHARED = {
     "namespace": ("", "namespace of all nodes; diagnostics stay in /diagnostics"),
     "use_sim_time": ("false", "true takes the time from /clock"),
     "respawn": ("true", "whether a node that has ended is started again"),
+    "watch": ("true", "whether the rover drives watched paths only, and stops without its watch"),
     "rover_simulator_parameters": (str(PARAMETERS / "rover_simulator.yaml"), "parameter file"),
     "traverse_server_parameters": (str(PARAMETERS / "traverse_server.yaml"), "parameter file"),
     "traction_controller_parameters": (
@@ -43,7 +44,7 @@ SHARED = {
     ),
 }
 """Default and meaning of the other arguments."""
-PASSED_ON = ("namespace", "use_sim_time", "respawn", "rover",
+PASSED_ON = ("namespace", "use_sim_time", "respawn", "rover", "watch",
              "traverse_server_parameters", "traction_controller_parameters")  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 """Converts PoseStamped and Path messages to arrays of x, y, yaw and back."""
 
 import math
+import struct
 from collections.abc import Sequence
 
 import numpy as np
@@ -32,6 +33,21 @@ MAX_MARKS = 1_000_000
 
 _MIN_LEVEL = 1e-3
 """Smallest horizontal part of the forward axis (a unit vector) for which a heading is defined."""
+
+
+def count_poses(message: bytes) -> int:
+    """Return the number of poses of a serialised Path without reading them.
+
+    Raises:
+        MessageError: The message ends before that number.
+    """
+    order = "<" if message[1:2] == b"\1" else ">"
+    try:
+        (length,) = struct.unpack_from(order + "I", message, 12)  # of frame_id, behind the stamp
+        (count,) = struct.unpack_from(order + "I", message, 16 + 4 * math.ceil(length / 4))
+    except struct.error:
+        raise MessageError(f"{len(message)} bytes were received that are no Path") from None
+    return int(count)
 
 
 def yaw_from_quaternion(quaternion: Quaternion, what: str = "orientation") -> float:

@@ -33,10 +33,10 @@ def spin_server(ros: RosRun, **overrides) -> TraverseServer:
     """Start a traverse server with parameters.
 
     Questions have more time than by default, so that a busy machine makes no difference; kernels
-    that a test needs later are loaded when it does.
+    that a test needs later are loaded when it does. Maps are loaded from any folder.
     """
     warm_up()
-    values = {"time_budget": 60.0} | overrides
+    values = {"time_budget": 60.0, "map_folder": "/"} | overrides
     parameters = [Parameter(name, value=value) for name, value in values.items()]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(kernels, "LOADING_DELAY", 1e6)

@@ -53,6 +53,9 @@ def read_as(kind: Any, data: object, what: str, at: Key = ()) -> Any:
     # A misspelt key is both unknown and missing; the error of the unknown key has a suggestion.
     order = (*UNKNOWN_KEY, MISSING_KEY)
     first = min(faults, key=lambda fault: (fault["type"] not in order, fault["type"] == order[-1]))
+    missing = [show_key((*at, *one["loc"])) for one in faults if one["type"] == MISSING_KEY]
+    if first["type"] == MISSING_KEY and len(missing) > 1:
+        raise RoverFileError(f"missing keys {', '.join(missing)}; {what} needs all of them")
     raise RoverFileError(_describe_fault(kind, first, what, at))
 
 

@@ -93,6 +93,11 @@ def replay(
             "where it starts; give --start",
             err=True,
         )
+    if not results.count and goal is None:
+        asking = bag_reader.PATH, bag_reader.ODOMETRY
+        lacking = [kind for kind in asking if kind not in source.topics]
+        what = " and no ".join(lacking) or "drive of two poses"
+        typer.echo(f"nothing was asked: the bag has no {what}; give --goal", err=True)
     total = {"answers": results.count, "refused_messages": work.refused, "topics": source.topics}
     typer.echo(json.dumps(total))
 

@@ -15,6 +15,9 @@ def urdf(
     joint_map: Annotated[
         Path | None, option("FILE", "Write the joint map that reads it back.", "--map")
     ] = None,
+    hardware: Annotated[
+        str, option("PLUGIN", "Add <ros2_control> for a hardware plugin.", "--ros2-control")
+    ] = "",
 ) -> None:
     """Write a rover as URDF, with inertias, joint limits and collision cylinders."""
     from rover_physics.rover.rover_file import load_rover, save_yaml
@@ -22,7 +25,7 @@ def urdf(
     from rover_physics.rover.urdf.write_urdf import write_urdf
 
     model = load_rover(rover)
-    write_urdf(out, model)
+    write_urdf(out, model, hardware)
     if joint_map is not None:
         comment = f"Joints of {model.name}'s URDF, and what the URDF does not tell."
         save_yaml(joint_map, map_of(model), comment)

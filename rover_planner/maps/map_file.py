@@ -41,8 +41,7 @@ def open_map(url: str, limits: MapLimits) -> Terrain:
     """Load the terrain file that a client names.
 
     Args:
-        url: A path, or a file:// URL with %-escapes. Relative paths start at the working
-            directory.
+        url: A path, or a file:// URL with %-escapes. Relative paths start at the folder.
         limits: What may be loaded.
 
     Raises:
@@ -87,8 +86,9 @@ def _open_below(file: Path, folder: str) -> BinaryIO:
     links, so that no one can exchange a part of it in the meantime.
     """
     try:
+        folder = os.path.expanduser(folder)
         top = os.path.realpath(folder)
-        path = os.path.realpath(file)
+        path = os.path.realpath(os.path.join(folder, file))
         if os.path.commonpath([top, path]) != top:
             raise RoverFileError(f"not below {show_file(folder)}, the folder of maps (map_folder)")
         return wrap_descriptor(_open_part_by_part(top, os.path.relpath(path, top).split(os.sep)))

@@ -23,8 +23,9 @@ from nav_msgs.msg import Odometry, Path
 from nav_msgs.srv import GetPlan
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from sensor_msgs.msg import PointCloud2
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64MultiArray, String
 from std_srvs.srv import Trigger
 
 from msg_adapters.elevation import terrain_to_point_cloud
@@ -37,9 +38,17 @@ from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.nodes.mission.drive import DriveFailedError, DriveSettings, drive_to
 from rover_planner.nodes.mission.options import MissionOptions
 from rover_planner.nodes.programs import read_arguments
+from rover_planner.planning.answering.budget import STOPPING
 from rover_planner.ros.guard import INPUT_ERRORS
 from rover_planner.ros.process import init_ros
-from rover_planner.ros.qos import map_qos, result_qos, sensor_qos, service_qos, topic_qos
+from rover_planner.ros.qos import (
+    latched_qos,
+    map_qos,
+    result_qos,
+    sensor_qos,
+    service_qos,
+    topic_qos,
+)
 from rover_planner.shell.exit_codes import (
     EXIT_BAD_INPUT,
     EXIT_FAILED,
@@ -51,6 +60,8 @@ from rover_planner.shell.exit_codes import (
 from rover_planner.shell.run_program import end_with, run_program
 
 NODE_NAME = "mission_planner"
+REPEAT = 10.0
+"""Time after which a question is asked again: the server may have been started anew [s]."""
 SERVER = "traverse_server"
 """Name of the server's node, relative to this node's namespace; remap services and topics to use
 another one."""
@@ -79,12 +90,17 @@ class MissionPlanner(Node):
         self._verdict_about: tuple[Any, Any] | None = None
         self._arrays: dict[str, np.ndarray] = {}
         self._pose: np.ndarray | None = None
-        self._path_publisher = self.create_publisher(Path, "path", topic_qos())
+        self._sent = self._driven = ""
+        self._path_publisher: Publisher | None = None
+        self._own_paths: set[str] = set()
+        self._other_path = False
         self._check_publisher = self.create_publisher(Path, f"{SERVER}/path", topic_qos())
         self._checker = self.create_client(
             Trigger, f"{SERVER}/check_path", qos_profile=service_qos()
         )
         self.create_subscription(Odometry, "odometry", self._take_odometry, sensor_qos())
+        driven = self.create_subscription(String, "path_driven", self._take_driven, latched_qos())
+        self._driven_topic = driven.topic_name
         self._map_publisher = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
         self._client = self.create_client(
             GetPlan, f"{SERVER}/can_traverse", qos_profile=service_qos()
@@ -136,10 +152,14 @@ class MissionPlanner(Node):
         """
         deadline = time.monotonic() + self._timeout
         while True:
-            answer = self._ask_once(start, goal)
-            # the map may arrive later than the query, because it is sent on a topic
-            if answer.get("code") != "no_map" or time.monotonic() > deadline:
-                return answer
+            try:
+                answer = self._ask_once(start, goal)
+                # the map may arrive later than the query, because it is sent on a topic
+                if answer.get("code") not in ("no_map", STOPPING) or time.monotonic() > deadline:
+                    return answer
+            except NoAnswerError:
+                if time.monotonic() > deadline:
+                    raise
             time.sleep(0.2)
 
     def _ask_once(self, start: Sequence[float], goal: Sequence[float]) -> dict[str, Any]:
@@ -150,11 +170,13 @@ class MissionPlanner(Node):
         request.goal = stamped_pose(goal, self._frame)
         future = self._client.call_async(request)
         future.add_done_callback(self._notify)
-        self._wait(future.done, f"the answer of {self._client.service_name}")
+        self._wait(future.done, f"the answer of {self._client.service_name}", REPEAT)
         plan = future.result().plan
         # The hash tells this question from those of other clients, the stamp from earlier ones.
         about = plan.header.stamp, plan_request_hash(request.start, request.goal, 0.0)
-        self._wait(lambda: self._verdict_about == about, f"the verdict on {self._verdicts}")
+        self._wait(
+            lambda: self._verdict_about == about, f"the verdict on {self._verdicts}", REPEAT
+        )
         answer = dict(self._verdict)
         positions = [pose.pose.position for pose in plan.poses]
         answer["plan"] = [[p.x, p.y, p.z] for p in positions]
@@ -167,12 +189,42 @@ class MissionPlanner(Node):
         """Let the rover follow a path of poses (n, 3), x, y [m] and yaw [rad], map frame.
 
         Raises:
-            NoAnswerError: No node subscribes to paths in time.
+            NoAnswerError: Another node sends paths, or none subscribes to them, for all the time.
         """
+        publisher = self._path_publisher or self._take_rover()
+        # One of those who hear it is this node.
+        self._wait(lambda: publisher.get_subscription_count() > 1, "a rover on the topic path")
+        path = poses_path(poses, self._frame)
+        self._sent, self._driven = path_hash(path), ""
+        self._own_paths.add(self._sent)
+        publisher.publish(path)
+
+    def _take_rover(self) -> Publisher:
+        """Return the publisher of paths, once no other node publishes any.
+
+        Raises:
+            NoAnswerError: Another node goes on to publish them.
+        """
+        topic = self.resolve_topic_name("path")
+        others = [one.node_name for one in self.get_publishers_info_by_topic(topic)]
+        if others:
+            self.get_logger().warning(f"waiting: {', '.join(others)} sends the rover paths")
         self._wait(
-            lambda: self._path_publisher.get_subscription_count() > 0, "a rover on the topic path"
+            lambda: not self.count_publishers(topic),
+            f"the end of {', '.join(others)}, which sends the rover paths",
         )
-        self._path_publisher.publish(poses_path(poses, self._frame))
+        self.create_subscription(Path, "path", self._hear_path, topic_qos())
+        self._path_publisher = self.create_publisher(Path, "path", topic_qos())
+        return self._path_publisher
+
+    def _hear_path(self, path: Path) -> None:
+        self._other_path |= path_hash(path) not in self._own_paths
+
+    def has_ended(self) -> bool | None:
+        """Return whether the follower is at the end of the path; None if it never says so."""
+        if not self.count_publishers(self._driven_topic):
+            return None
+        return self._driven == self._sent
 
     def check(self, poses: np.ndarray) -> str:
         """Return why the server refuses a path (n, 3) on its newest map, empty if it passes.
@@ -186,7 +238,10 @@ class MissionPlanner(Node):
             self._check_publisher.publish(path)
             future = self._checker.call_async(Trigger.Request())
             future.add_done_callback(self._notify)
-            self._wait(future.done, f"the answer of {self._checker.service_name}")
+            with contextlib.suppress(NoAnswerError):
+                self._wait(future.done, "the answer", REPEAT)
+            if not future.done():
+                continue
             answer = json.loads(future.result().message)
             if answer["path_hash"] == about:  # else it was an earlier one, or another client's
                 return "" if answer["traversable"] else str(answer["reason"])
@@ -199,7 +254,10 @@ class MissionPlanner(Node):
 
         Raises:
             NoAnswerError: No pose was measured in time.
+            DriveFailedError: Another node has sent the rover a path.
         """
+        if self._other_path:
+            raise DriveFailedError("another node has sent the rover a path, and drives it now")
         self._wait(lambda: self._pose is not None, "odometry")
         with contextlib.suppress(NoAnswerError):
             self._wait(lambda: is_wanted(np.array(self._pose)), "the rover", seconds)
@@ -213,6 +271,11 @@ class MissionPlanner(Node):
             return
         with self._changed:
             self._pose = pose[[0, 1, 3]]
+            self._changed.notify_all()
+
+    def _take_driven(self, message: String) -> None:
+        with self._changed:
+            self._driven = message.data
             self._changed.notify_all()
 
     def _largest(self, name: str, answer: dict[str, Any]) -> float | None:
@@ -252,7 +315,7 @@ class MissionPlanner(Node):
             NoAnswerError: It does not hold in time.
             ExternalShutdownException: ROS is shut down meanwhile.
         """
-        longest = timeout or self._timeout
+        longest = min(timeout or self._timeout, self._timeout)
         deadline = time.monotonic() + longest
         with self._changed:
             while not condition():
@@ -319,7 +382,8 @@ def _carry_out(node: MissionPlanner, terrain: Terrain | None, options: MissionOp
             report({"event": "driving", "goal": number})
             report_change = partial(_report_change, report, number)
             try:
-                drive_to(node, goal, answer["poses"], DriveSettings(), report_change)
+                settings = DriveSettings(options.position_tolerance, options.heading_tolerance)
+                drive_to(node, goal, answer["poses"], settings, report_change)
             except NoAnswerError as error:
                 raise DriveFailedError(str(error)) from error
             report({"event": "arrived", "goal": number})

@@ -65,7 +65,7 @@ PROGRAMS = {
         "Answer over ROS 2 whether the rover can traverse a path, and why not.",
         "subscribes elevation_cloud, elevation_map, joint_states, odometry, ~/path, "
         "~/tool_target, ~/tool_wrench; serves ~/can_traverse, ~/check_path, ~/check_reach, "
-        "~/load_map, ~/cancel, ~/monitor, ~/get_hazard_map; publishes ~/stop, "
+        "~/load_map, ~/cancel, ~/monitor, ~/get_hazard_map; publishes ~/stop, ~/watch, "
         "~/hazard_map/worst, ~/hazard_map/best, ~/plan, ~/verdict, diagnostics, "
         "~/predicted_joints, ~/wheel_loads, ~/slip_ratios, ~/friction_utilisation, "
         "~/torque_saturation, ~/tip_over_margin, ~/closed_area, ~/search_progress, "
@@ -75,16 +75,19 @@ PROGRAMS = {
     ),
     "traction_controller": Program(
         "Share the wheel torques by a quadratic program at its rate.",
-        "subscribes joint_states, imu, cmd_vel, odometry, elevation_cloud, ~/emergency_stop; "
-        "serves ~/enable; publishes ~/commands, ~/velocity_commands, ~/steering_commands, "
-        "~/brake, ~/state, ~/wheel_loads, ~/friction_utilisation, ~/contact_angles, diagnostics",
+        "subscribes joint_states, imu, cmd_vel, odometry, elevation_cloud, ~/emergency_stop, "
+        "traverse_server/stop; serves ~/enable; publishes ~/commands, ~/velocity_commands, "
+        "~/steering_commands, ~/brake, ~/state, ~/wheel_loads, ~/friction_utilisation, "
+        "~/contact_angles, diagnostics",
         read_nothing,
         specs_of(TractionControllerParameters),
     ),
     "rover_simulator": Program(
         "Simulate a rover on a terrain, with the topics of a real one.",
-        "subscribes path, cmd_vel, traction_controller/commands; publishes joint_states, "
-        "odometry, imu, elevation_cloud, cmd_vel, diagnostics",
+        "subscribes path, cmd_vel, traction_controller/commands, traction_controller/brake, "
+        "traverse_server/stop; "
+        "publishes joint_states, odometry, imu, elevation_cloud, cmd_vel, path_driven, "
+        "diagnostics",
         read_engine,
         specs_of(RoverSimulatorParameters),
     ),
@@ -92,7 +95,7 @@ PROGRAMS = {
         "Query a traverse_server over ROS 2 for a list of goals.",
         "calls traverse_server/can_traverse, traverse_server/check_path; subscribes "
         "traverse_server/verdict, traverse_server/wheel_loads, traverse_server/slip_ratios, "
-        "odometry; publishes "
+        "odometry, path_driven; publishes "
         "elevation_cloud, path, traverse_server/path",
         read_mission,
         exit_codes="Exit code 0: every goal is traversable, and with --drive was reached. 1: a "

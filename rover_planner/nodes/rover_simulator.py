@@ -6,6 +6,8 @@ import sys
 import time
 from collections import deque
 from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,31 +16,43 @@ from geometry_msgs.msg import TransformStamped, TwistStamped
 from nav_msgs.msg import Odometry, Path
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
 from sensor_msgs.msg import Imu, JointState, PointCloud2
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Bool, Float64MultiArray, String
 
 from msg_adapters.commands import joint_order, twist_to_speeds
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.errors import MessageError
+from msg_adapters.identity import path_hash
 from msg_adapters.joints import convert_steering
 from msg_adapters.paths import path_to_poses
 from msg_adapters.results.diagnostics import SIMULATOR, diagnostics, make_status
 from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_message
 from rover_physics.names import WHEEL_JOINTS
+from rover_physics.numerics.arrays import Floats
 from rover_planner.maps.summary import describe_terrain
 from rover_planner.nodes.running import run_node
+from rover_planner.nodes.warm_up import SIMULATION
 from rover_planner.parameters.declare import declare_parameters, warn_of_unknown_parameters
-from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
+from rover_planner.parameters.rover_simulator import QUASI_STATIC, RoverSimulatorParameters
+from rover_planner.parameters.shared import STOP
+from rover_planner.ros.guard import Guard
 from rover_planner.ros.optional_types import find_type
-from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
+from rover_planner.ros.qos import latched_qos, map_qos, sensor_qos, topic_qos
+from rover_planner.shell.kernels import load_kernels
 from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.simulation import Simulation, load_simulation_settings
 
 NODE_NAME = "rover_simulator"
-COMMANDS = "traction_controller/commands"
-"""Topic of the torque commands; remap it for another controller."""
+COMMANDS, BRAKE = "traction_controller/commands", "traction_controller/brake"
+"""Topics of the torque commands and the brake; remap them for another controller."""
+STANDING_PERIOD = 0.1
+"""Time between two commands of a rover that is to stand [s]."""
 DEVIATIONS = (0.01, 0.005)
 """Standard deviations in odometry: positions [m] and angles [rad]."""
+SWITCH_INTERVAL = 5e-4
+"""Longest time for which the thread that makes maps may delay a step whenever that needs Python's
+lock [s]; Python's thread switch interval."""
 DIAGNOSTICS_PERIOD = 1.0
 """Time between two diagnostic messages [s]."""
 
@@ -52,18 +66,25 @@ class RoverSimulator(Node):
         self._frame, self._steering_sign = parameters.map_frame, parameters.steering_sign
         self._order = joint_order(parameters.joints)
         self._settings = load_simulation_settings(parameters)
+        if parameters.engine == QUASI_STATIC:
+            load_kernels(SIMULATION, (), self.get_logger().info)
         self.simulation = Simulation(self._settings)
         """The rover."""
         self._period = 1.0 / parameters.rate
-        self._stopped = ""
+        self._standing_steps = max(1, round(STANDING_PERIOD * parameters.rate))
+        self._stopped, self._path_hash, self._steps = "", "", 0
         self._own_stamps: deque[tuple[int, int]] = deque(maxlen=64)
         self._create_publishers()
         self._create_subscriptions()
         self._state: PlantState = self.simulation.plant.state()
         self.create_timer(self._period, self._advance)
-        self.create_timer(1.0 / parameters.map_rate, self._publish_map)
+        # A map takes longer than a step: other threads must not make the rover's sensors late.
+        self._maps, self._map_in_work = ThreadPoolExecutor(1, "maps"), Future[None]()
+        self._map_in_work.set_result(None)
+        self._guard = Guard(self.get_logger())
+        self.create_timer(1.0 / parameters.map_rate, self._begin_map)
         self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
-        self._publish_map()
+        self._begin_map()
         warn_of_unknown_parameters(self, RoverSimulatorParameters)
         self.get_logger().info(
             f"ready: rover {self._settings.rover.name} on {parameters.engine}, starts at "
@@ -72,10 +93,11 @@ class RoverSimulator(Node):
         )
 
     def _create_publishers(self) -> None:
-        qos = sensor_qos()
+        qos = QoSProfile(depth=5)  # reliable, so that every subscriber hears it
         self._joints = self.create_publisher(JointState, "joint_states", qos)
         self._odometry = self.create_publisher(Odometry, "odometry", qos)
         self._imu = self.create_publisher(Imu, "imu", qos)
+        self._driven = self.create_publisher(String, "path_driven", latched_qos())
         self._cloud = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
         self._commands = None
@@ -86,14 +108,17 @@ class RoverSimulator(Node):
 
     def _create_subscriptions(self) -> None:
         qos = topic_qos()
+        self.create_subscription(Bool, STOP, self._take_stop, qos)
         self.create_subscription(Path, "path", self._take_path, qos)
         self.create_subscription(TwistStamped, "cmd_vel", self._take_speeds, sensor_qos())
         if self._settings.parameters.follow_commands:
             self.create_subscription(Float64MultiArray, COMMANDS, self._take_torques, qos)
+            self.create_subscription(Bool, BRAKE, self._take_brake, latched_qos())
 
     def _take_path(self, path: Path) -> None:
         try:
             self.simulation.take_path(path_to_poses(path, self._frame))
+            self._path_hash = path_hash(path)
         except MessageError as error:
             self.get_logger().error(f"path refused: {error}")
 
@@ -117,6 +142,12 @@ class RoverSimulator(Node):
         torques[self._order] = efforts
         self.simulation.take_torques(torques, time.monotonic())
 
+    def _take_brake(self, message: Bool) -> None:
+        self.simulation.take_brake(message.data)
+
+    def _take_stop(self, message: Bool) -> None:
+        self.simulation.take_stop(message.data, time.monotonic())
+
     def _advance(self) -> None:
         self._state = state = self.simulation.advance(time.monotonic(), self._period)
         stamp = self.get_clock().now().to_msg()
@@ -136,13 +167,19 @@ class RoverSimulator(Node):
         self._imu.publish(
             imu_message(state.orientation, state.body_rates, gravity, DEVIATIONS[1], stamp)
         )
-        if self._commands is not None and not self.simulation.has_speeds(time.monotonic()):
+        self._steps += 1
+        is_due = any(self.simulation.steering) or self._steps % self._standing_steps == 0
+        own = not self.simulation.has_speeds(time.monotonic())
+        if self._commands is not None and is_due and own:
             twist = _twist(self.simulation.steering, stamp)
             self._own_stamps.append(_stamp_of(twist))
             self._commands.publish(twist)
         if self._transforms is not None:
             self._transforms.sendTransform(_transform(state, self._frame, stamp))
         self._log_stop(state)
+        if self._path_hash and self.simulation.at_end:
+            self._driven.publish(String(data=self._path_hash))
+            self._path_hash = ""
 
     def _arm_angles(self) -> dict[str, float]:
         arm = self._settings.rover.manipulator
@@ -174,9 +211,22 @@ class RoverSimulator(Node):
         status = make_status(SIMULATOR, level, text, values, self._settings.rover.name)
         self._diagnostics.publish(diagnostics([status], self.get_clock().now().to_msg()))
 
-    def _publish_map(self) -> None:
-        stamp = self.get_clock().now().to_msg()
-        self._cloud.publish(terrain_to_point_cloud(self.simulation.look(), self._frame, stamp))
+    def destroy_node(self) -> None:
+        """Finish the map in work, and destroy the node."""
+        self._maps.shutdown()
+        super().destroy_node()
+
+    def _begin_map(self) -> None:
+        """Have a map of what is seen now made in the thread, unless one is still in work."""
+        if self._map_in_work.done():
+            here = self._state.position, float(self.simulation.plant.pose()[2])
+            stamp = self.get_clock().now().to_msg()
+            make = partial(self._publish_map, *here, stamp)
+            self._map_in_work = self._maps.submit(self._guard.call, make)
+
+    def _publish_map(self, position: Floats, yaw: float, stamp: Any) -> None:
+        seen = self.simulation.look(position, yaw)
+        self._cloud.publish(terrain_to_point_cloud(seen, self._frame, stamp))
 
 
 def _twist(speeds: tuple[float, float], stamp: Any) -> TwistStamped:
@@ -206,7 +256,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         overrides = [Parameter(name, value=value) for name, value in options.items()]
         return RoverSimulator(parameter_overrides=overrides)
 
-    return run_node(NODE_NAME, argv, make)
+    return run_node(NODE_NAME, argv, make, SWITCH_INTERVAL)
 
 
 if __name__ == "__main__":

@@ -52,7 +52,6 @@ def run_node(
         if options == EXIT_OK:  # help was printed
             return EXIT_OK
         init_ros(argv, signal_handler_options=SignalHandlerOptions.NO)
-        logger.info("compiling kernels; the first start takes longest")
         executor = GuardedExecutor()
         node = make(options)
         stop.defer(executor.wake)

@@ -20,7 +20,7 @@ from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash, plan_request_hash
 from msg_adapters.joints import read_joint_map
 from msg_adapters.odometry import odometry_to_pose, odometry_to_tilt
-from msg_adapters.paths import path_to_poses, stamped_pose_to_array
+from msg_adapters.paths import count_poses, path_to_poses, stamped_pose_to_array
 from msg_adapters.results.diagnostics import (
     HEALTH,
     MONITOR,
@@ -69,6 +69,7 @@ from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.deferred_work import DeferredWork
 from rover_planner.ros.frames import NodeFrames, is_empty
 from rover_planner.ros.guard import INPUT_ERRORS, Guard
+from rover_planner.ros.map_intake import read_message
 from rover_planner.ros.qos import sensor_qos, topic_qos
 from rover_planner.ros.subscriptions import subscribe_to_requests
 from rover_planner.shell.kernels import load_kernels
@@ -162,7 +163,7 @@ class TraverseServer(Node):
             (Odometry, "odometry", self._take_odometry),
         ):
             self.create_subscription(kind, name, take, sensor_qos())
-        subscribe_to_requests(self, Path, "~/path", self._take_path, reliability)
+        subscribe_to_requests(self, Path, "~/path", self._take_path, reliability, raw=True)
 
     def _log_ready(self) -> None:
         name, known = self.service.settings.rover.name, self.service.known_map
@@ -201,9 +202,17 @@ class TraverseServer(Node):
                 f"odometry not used, the suspension is not compared: {error}", once=True
             )
 
-    def _take_path(self, path: Path) -> None:
-        about = path_hash(path), stamp_text(stamp_to_ns(path.header.stamp))
+    def _take_path(self, message: bytes) -> None:
+        about, most = ("", ""), self._values.max_path_poses
         try:
+            count = count_poses(message)
+            if count > most:
+                raise MessageError(
+                    f"path has {count} poses; it may have {most}: leave some out, or set the "
+                    "parameter max_path_poses"
+                )
+            path = read_message(message, Path)
+            about = path_hash(path), stamp_text(stamp_to_ns(path.header.stamp))
             there = self.frames.localise_path(path)
             self.service.take_path(path_to_poses(there, self._values.map_frame), *about)
         except INPUT_ERRORS as error:

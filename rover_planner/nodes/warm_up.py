@@ -15,6 +15,7 @@ from rover_planner.planning.candidates import generate_candidates
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.path_search import find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
 from rover_planner.traction.traction_service import TractionService
 
@@ -28,7 +29,12 @@ TRACTION = (
     CompilationStep("traction controller", "rover_planner.nodes.warm_up:control_traction"),
 )
 """All that updates of the traction controller need."""
-GROUPS = ((*EXACT, *SCORES, *SINGLE, *HAZARDS, *PATH_SEARCH), (*UNCERTAIN, *TRACTION, *CANDIDATES))
+SIMULATION = (CompilationStep("simulator", "rover_planner.nodes.warm_up:simulate"),)
+"""All that the quasi-static simulator needs."""
+GROUPS = (
+    (*EXACT, *SCORES, *SINGLE, *HAZARDS, *PATH_SEARCH, *SIMULATION),
+    (*UNCERTAIN, *TRACTION, *CANDIDATES),
+)
 """All kernels in two groups that take about the same time to compile: the first compiles the model
 of a pose once for all that use it."""
 
@@ -56,6 +62,17 @@ def classify_pose() -> None:
     ground = Terrain(np.zeros((60, 60)), 0.05, (0.0, 0.0))
     on_map = RoverOnMap(load_rover("lsr1"), ground, SweepOptions())
     classify_poses(on_map, np.array([[1.5, 1.5, 0.0]]))
+
+
+def simulate() -> None:
+    """Drive and brake a rover on level ground, on firm ground and on soil."""
+    ground = Terrain(np.zeros((80, 80)), 0.05, (-2.0, -2.0))
+    for soil in (None, "mars_simulant"):
+        plant = QuasiStaticPlant(load_rover("lsr1"), ground, (0.0, 0.0, 0.0), soil=soil)
+        plant.drive(0.03, 0.01, 0.02)
+        plant.pull(np.full(6, 0.1), (0.03, 0.0), 0.02)
+        plant.brake(0.02)
+        plant.state()
 
 
 def control_traction() -> None:

@@ -4,7 +4,11 @@
 from dataclasses import dataclass
 
 from rover_physics.names import CONTROL_POLICIES, EQUAL, WHEEL_JOINTS
-from rover_planner.parameters.shared import STEERING_SIGN, max_map_cells_parameter
+from rover_planner.parameters.shared import (
+    STEERING_SIGN,
+    max_map_cells_parameter,
+    stop_timeout_parameter,
+)
 from rover_planner.parameters.table import ParameterTable, parameter
 
 ALL_AROUND = 6.28
@@ -83,6 +87,7 @@ class RoverSimulatorParameters(ParameterTable):
         bounds=(0.01, 10.0),
         read_only=True,
     )
+    stop_timeout: float = stop_timeout_parameter(read_only=True)
     rate: float = parameter(
         50.0, "Steps per second.", unit="1/s", bounds=(5.0, 500.0), read_only=True
     )

@@ -100,6 +100,22 @@ def max_map_cells_parameter(read_only: bool = False) -> int:
     )
 
 
+STOP = "traverse_server/stop"
+"""Topic on which the watch of the accepted path says whether the rover is to stop."""
+
+
+def stop_timeout_parameter(read_only: bool = False) -> float:
+    """Return the field of the parameter stop_timeout [s]."""
+    return parameter(
+        0.0,
+        "Time without a message of traverse_server/stop after which the rover stops; 0 expects "
+        "none, and only stops while it is true.",
+        unit="s",
+        bounds=(0.0, 10.0),
+        read_only=read_only,
+    )
+
+
 IMU_FRAME: str = parameter(
     "",
     "Frame of the IMU; empty is that of the body. Another frame_id is refused.",

@@ -17,6 +17,7 @@ from rover_planner.parameters.shared import (
     PAYLOAD,
     STEERING_LIMIT,
     STEERING_SIGN,
+    stop_timeout_parameter,
 )
 from rover_planner.parameters.table import ParameterTable, parameter
 
@@ -73,6 +74,7 @@ class TractionControllerParameters(ParameterTable):
     cmd_vel_timeout: float = parameter(
         0.5, "Age above which cmd_vel is stale, a fault.", unit="s", bounds=(0.01, 10.0)
     )
+    stop_timeout: float = stop_timeout_parameter()
     odometry_timeout: float = parameter(
         0.5, "Age above which odometry is not used.", unit="s", bounds=(0.01, 10.0)
     )

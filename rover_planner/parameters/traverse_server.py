@@ -238,8 +238,15 @@ class TraverseServerParameters(ParameterTable):
         bounds=(0, 1000),
     )
     map_folder: str = parameter(
-        "/",
-        "Folder below which ~/load_map reads; / is every file.",
+        "~/maps",
+        "Folder below which ~/load_map reads, where relative names start; ~ is the user's home, / "
+        "allows every file.",
+    )
+    max_path_poses: int = parameter(
+        2000,
+        "Largest number of poses of ~/path; a longer one is refused before it is read, which "
+        "takes some 20 us a pose.",
+        bounds=(2, 100_000),
     )
     max_map_bytes: int = parameter(
         1_000_000_000,
@@ -257,7 +264,8 @@ class TraverseServerParameters(ParameterTable):
 
     monitor: bool = parameter(
         False,
-        "Whether the accepted path is judged again with each map, and ~/stop is published.",
+        "Whether the accepted path is judged again with each map; ~/stop is then true unless the "
+        "rover may drive it.",
     )
     monitor_offset: float = parameter(
         0.5,
@@ -267,7 +275,8 @@ class TraverseServerParameters(ParameterTable):
     )
     monitor_timeout: float = parameter(
         1.0,
-        "Time without a pose of the rover after which it is to stop.",
+        "Time without a pose of the rover, or joint states that were there, after which it is to "
+        "stop.",
         unit="s",
         bounds=(0.1, 60.0),
     )

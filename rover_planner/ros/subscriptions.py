@@ -21,7 +21,13 @@ PERIOD = 1.0
 
 
 def subscribe_to_requests(
-    node: Node, kind: type, name: str, take: Callable[[Any], None], reliability: str
+    node: Node,
+    kind: type,
+    name: str,
+    take: Callable[[Any], None],
+    reliability: str,
+    *,
+    raw: bool = False,
 ) -> None:
     """Subscribe to a topic of requests, such as paths.
 
@@ -31,9 +37,10 @@ def subscribe_to_requests(
         name: Name of the topic.
         take: Called with each message; it must not raise.
         reliability: One of `RELIABILITIES`.
+        raw: Whether `take` gets the bytes of a message.
     """
     qos = replace_reliability(topic_qos(), reliability)
-    _subscribe(node, kind, name, take, qos, HEAR_BEST_EFFORT)
+    _subscribe(node, kind, name, take, qos, HEAR_BEST_EFFORT, raw=raw)
 
 
 def subscribe_to_map(

@@ -74,6 +74,12 @@ class MujocoPlant:
         self._plant.step(self._torques, duration)
         self._measure(duration)
 
+    def brake(self, duration: float) -> None:
+        """Lock the wheels for a duration [s]."""
+        self._torques = np.zeros(6)
+        self._plant.brake(duration)
+        self._measure(duration)
+
     def _measure(self, duration: float) -> None:
         now = self._plant.pose[:3]
         moved = (now - self._last) / duration

@@ -131,6 +131,14 @@ class MujocoRover:
         for _ in range(max(round(duration / self._model.opt.timestep), 1)):
             self._advance(self._limit(torques))
 
+    def brake(self, duration: float) -> None:
+        """Lock the wheels for a duration [s] by dry friction at their axles."""
+        wheels = self._velocities[_WHEELS]
+        self._model.dof_frictionloss[wheels] = self.rover.weight * self.rover.wheel.radius
+        self.step(np.zeros(6), duration)
+        self._model.dof_frictionloss[wheels] = 0.0
+        self._integral[:] = 0.0
+
     def steer(self, angles: Floats) -> None:
         """Turn the steered wheels to angles (6,) [rad] from now on, at their largest rate."""
         self._aims = np.asarray(angles)[self._steered]

@@ -8,8 +8,8 @@ import numpy as np
 
 from rover_physics.numerics.arrays import Floats
 
-ARRIVED = 0.25
-"""Distance from the end at which the path counts as finished, in look-ahead distances."""
+ARRIVED = 0.02
+"""Distance along the path from its end at which it is finished, in look-ahead distances."""
 SAME_PLACE = 1e-4
 """Distance between poses up to which the path turns on the spot [m]."""
 MIN_TURN = 1e-3
@@ -88,8 +88,8 @@ class PathFollower:
         leg = self._leg
         if leg.is_turn:
             return abs(leg.left_to_turn(pose)) <= ALIGNED
-        near = leg.distance_to_end(pose) < ARRIVED * self._look_ahead
-        return (near and self._is_last) or leg.done >= leg.length - 1e-6
+        left = ARRIVED * self._look_ahead if self._is_last else 1e-6
+        return leg.done >= leg.length - left
 
     def _turn(self, pose: Floats, speed: float) -> float:
         """Return the yaw rate [rad/s] of a turn on the spot."""
@@ -110,9 +110,6 @@ class _Leg:
         self.length = 0.0 if self.is_turn else float(self._along[-1])
         self.done = 0.0
         self._seen: float | None = None
-
-    def distance_to_end(self, pose: Floats) -> float:
-        return float(np.hypot(*(self._places[-1] - pose[:2])))
 
     def left_to_turn(self, pose: Floats) -> float:
         """Return the turn [rad] that is left, positive to the left; of large turns, too."""

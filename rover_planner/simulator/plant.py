@@ -45,6 +45,9 @@ class Plant(Protocol):
         `command`, speed [m/s] and yaw rate [rad/s], sets the steering.
         """
 
+    def brake(self, duration: float) -> None:
+        """Lock the wheels for a duration [s]; they hold as far as their friction reaches."""
+
     def state(self) -> PlantState:
         """Return the current measurements."""
 

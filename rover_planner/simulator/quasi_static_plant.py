@@ -5,8 +5,8 @@ With a commanded speed, the rover moves if the model allows it; otherwise it sto
 reason. With commanded torques, the balance of forces decides: the traction beyond the force that
 holds the rover on its slope accelerates its mass, and wheel force beyond friction is lost as slip.
 The mean speed of the wheels is the only state with inertia. Limits of attitude, suspension and
-clearance apply in both cases. Wheels that steer turn at the rate of the rover file; `SteeredDrive`
-says how the drive waits for them.
+clearance apply in both cases. A brake locks the wheels. Wheels that steer turn at the rate of the
+rover file; `SteeredDrive` says how the drive waits for them.
 """
 
 import numpy as np
@@ -90,6 +90,7 @@ class QuasiStaticPlant:
         self._torques = np.zeros(6)
         self._speed, self._moved, self._duration = 0.0, np.zeros(3), 1.0
         self._stopped = ""
+        self._braked_at: PathPrediction | None = None
         self._anchor, self._stalled = self._pose.copy(), 0.0
 
     def pose(self) -> Floats:
@@ -101,7 +102,8 @@ class QuasiStaticPlant:
         self._torques = self._here.torque[0].copy()
         angles, aims = self._steer((speed, yaw_rate), duration)
         if aims.refusal:
-            self._stop(aims.refusal, duration)
+            self._stopped = aims.refusal
+            self._stand(duration)
             return
         share = self._drive.share(angles, aims.angles)
         self._speed = share * speed
@@ -123,16 +125,10 @@ class QuasiStaticPlant:
         self._torques = np.clip(torques, -limit, limit)
         angles, aims = self._steer(command, duration)
         same = self._take_course()
-        forces = find_driving_forces(
-            self._writer, wheel.radius, self._here, self._torques,
-            self._course.sign * float(np.sign(self._speed)),
-        )  # fmt: skip
-        push = self._course.sign * forces.push / self._rolling.inertia
-        speed = self._speed + (push / self._mass - DRAG * self._speed) * duration
+        forces = self._find_forces(self._torques, float(np.sign(self._speed)))
+        speed = self._accelerate(forces, DRAG, duration)
         top = wheel.max_speed * wheel.radius
         speed = float(np.clip(speed, -top, top))
-        if self._speed * speed < 0.0:
-            speed = 0.0  # the rover stops before it reverses
         if not same or self._drive.share(angles, aims.angles) == 0.0:
             speed = 0.0  # wheels that steer far away from the motion hold the rover
         self._speed = speed
@@ -143,6 +139,38 @@ class QuasiStaticPlant:
         racing = np.sign(torques) * wheel.max_speed
         self._wheel_rates = np.where(forces.sliding, racing, self._wheel_rates)
         self._watch_stall(forces, duration)
+
+    def brake(self, duration: float) -> None:
+        """Lock the wheels for a duration [s]; beyond their friction the rover slides."""
+        if self._braked_at is self._here and self._speed == 0.0:
+            self._stand(duration)
+            return
+        self._torques = np.zeros(6)
+        self._take_course()
+        way = float(np.sign(self._speed))
+        way = way or self._course.sign * float(np.sign(self._find_forces(self._torques, way).push))
+        locked = -way * self._course.sign * self._rolling.directions * self._writer.weight
+        forces = self._find_forces(locked * self._rover.wheel.radius, way)
+        speed = self._accelerate(forces, 0.0, duration)
+        self._speed = speed if speed * way > 0.0 else 0.0
+        spin = self._spin.copy()
+        motion = self._speed * self._course.sign * self._rolling.motion
+        self._move(motion, self._angles, duration, forces)
+        self._spin, self._wheel_rates, self._braked_at = spin, np.zeros(6), self._here
+
+    def _find_forces(self, torques: Floats, way: float) -> DrivingForces:
+        """Return the forces under torques (6,) [N m] of a rover that moves along its speed.
+
+        `way` is 1 for a rover that moves, -1 for one that moves back, 0 for one that stands.
+        """
+        radius, way = self._rover.wheel.radius, self._course.sign * way
+        return find_driving_forces(self._writer, radius, self._here, torques, way)
+
+    def _accelerate(self, forces: DrivingForces, drag: float, duration: float) -> float:
+        """Return the speed [m/s] after a duration [s]; the rover stops before it reverses."""
+        push = self._course.sign * forces.push / self._rolling.inertia
+        speed = self._speed + (push / self._mass - drag * self._speed) * duration
+        return speed if self._speed * speed >= 0.0 else 0.0
 
     def _take_course(self) -> bool:
         """Note how the wheels roll; return False if this is another motion than before."""
@@ -178,19 +206,23 @@ class QuasiStaticPlant:
             forces: The forces under given torques.
         """
         self._stopped = ""
+        moves = bool(motion.any())
+        if not moves and np.array_equal(angles, self._angles):
+            self._stand(duration)
+            return
         middle = self._pose[2] + 0.5 * motion[2] * duration
         c, s = np.cos(middle), np.sin(middle)
         step = duration * np.array(
             [c * motion[0] - s * motion[1], s * motion[0] + c * motion[1], motion[2]]
         )
-        there, moves = self._pose + step, bool(motion.any())
+        there = self._pose + step
         self._motion = motion if moves else self._motion
         pulled = forces is not None
         moved = self._predict(np.vstack([self._pose, there]), angles, pulled)
-        changes = moves or bool((angles != self._angles).any())
-        reason = self._why_not(moved, pulled) if changes else ""
+        reason = self._why_not(moved, pulled)
         if reason:
-            self._stop(reason, duration)
+            self._stopped = reason
+            self._stand(duration)
             return
         self._before, self._here = self._here, _last_row(moved)
         self._pose, self._moved, self._angles = there, motion, angles
@@ -208,9 +240,9 @@ class QuasiStaticPlant:
         self._spin += turned
         self._wheel_rates = turned / duration
 
-    def _stop(self, reason: str, duration: float) -> None:
-        """Stand still for a reason."""
-        self._stopped, self._speed, self._moved = reason, 0.0, np.zeros(3)
+    def _stand(self, duration: float) -> None:
+        """Stand still for a duration [s]."""
+        self._speed, self._moved = 0.0, np.zeros(3)
         self._before, self._duration = self._here, duration
         self._wheel_rates = np.zeros(6)
 

@@ -2,6 +2,7 @@
 """The simulation without ROS: drives a plant along a path, by speeds or by torques."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -21,6 +22,8 @@ from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 MADE_SIZE, MADE_RESOLUTION = 24.0, 0.05
 """Width and cell size of the generated terrain [m], the default terrain."""
+WIDEST_GAP = 1e6
+"""Width up to which unknown regions are ground like that around them [m]: any width."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +33,14 @@ class SimulationSettings:
     rover: Rover
     """The rover that is simulated."""
     terrain: Terrain
-    """The true ground."""
+    """The true ground, as far as a sensor can see it."""
     parameters: RoverSimulatorParameters
     """The parameters; empty texts and 0 stand for "as rover and terrain say"."""
+
+    @cached_property
+    def ground(self) -> Terrain:
+        """The true ground with the gaps that a server may interpolate: there is ground there."""
+        return self.terrain.fill_gaps(WIDEST_GAP)
 
     @property
     def start(self) -> tuple[float, float, float]:
@@ -68,7 +76,7 @@ def make_plant(settings: SimulationSettings) -> Plant:
         SoilError: No soil of that name.
     """
     asked = settings.parameters
-    placed = settings.rover, settings.terrain, settings.start, asked.friction or None
+    placed = settings.rover, settings.ground, settings.start, asked.friction or None
     if asked.engine != MUJOCO:
         return QuasiStaticPlant(*placed, asked.policy, asked.soil or None)
     if asked.soil:
@@ -103,6 +111,10 @@ class Simulation:
         self._follower: SecondTry | None = None
         self._wanted, self._wanted_at = (0.0, 0.0), -np.inf
         self._torques, self._torques_at = np.zeros(6), -np.inf
+        self.at_end = False
+        """True once the end of the last path was reached."""
+        self._brakes = False
+        self._stops, self._stop_at, self._held = False, -np.inf, 0.0
         self.steering = (0.0, 0.0)
         """Speed [m/s] and yaw rate [rad/s] set by path or command."""
 
@@ -119,7 +131,7 @@ class Simulation:
         steering = rover.steering
         # From one limit to the other, while the rover stands.
         longest = 0.0 if steering is None else 2.0 * steering.limit / steering.rate
-        self._follower = SecondTry(follower, tries, STUCK_TIME + longest)
+        self._follower, self.at_end = SecondTry(follower, tries, STUCK_TIME + longest), False
 
     def take_speeds(self, speed: float, yaw_rate: float, now: float) -> None:
         """Drive at a speed [m/s] and yaw rate [rad/s] from time `now` [s]; ends path following."""
@@ -129,6 +141,19 @@ class Simulation:
     def take_torques(self, torques: Floats, now: float) -> None:
         """Take torques (6,) [N m] in wheel order at time `now` [s]."""
         self._torques, self._torques_at = torques, now
+
+    def take_brake(self, applied: bool) -> None:
+        """Lock the wheels, or release them."""
+        self._brakes = applied
+
+    def take_stop(self, stops: bool, now: float) -> None:
+        """Take what the watch of the path says at time `now` [s]: whether the rover is to stop."""
+        self._stops, self._stop_at = stops, now
+
+    def _may_drive(self, now: float) -> bool:
+        """Return whether the watch of the path, if there is to be one, lets the rover drive."""
+        timeout = self.settings.parameters.stop_timeout or np.inf
+        return not self._stops and now - self._stop_at <= timeout
 
     def has_speeds(self, now: float) -> bool:
         """Return whether commanded speeds apply: they are recent and no path is followed."""
@@ -141,10 +166,16 @@ class Simulation:
 
     def advance(self, now: float, duration: float) -> PlantState:
         """Advance by a duration [s] from time `now` [s]; return the measurements."""
-        self.steering = self._steer(now)
+        if self._may_drive(now):
+            self.steering = self._steer(now)
+        else:  # no time passes for the follower, which knows no reason to stand but being stuck
+            self.steering, self._held = (0.0, 0.0), self._held + duration
         if self.settings.parameters.follow_commands:
             fresh = now - self._torques_at <= self.settings.parameters.timeout
-            self.plant.pull(self._torques if fresh else np.zeros(6), self.steering, duration)
+            if fresh and not self._brakes:
+                self.plant.pull(self._torques, self.steering, duration)
+            else:  # drives without commands are off, and braked
+                self.plant.brake(duration)
         else:
             self.plant.drive(*self.steering, duration)
         return self.plant.state()
@@ -152,14 +183,17 @@ class Simulation:
     def _steer(self, now: float) -> tuple[float, float]:
         if self._follower is not None:
             pose = self.plant.pose()
-            wanted = self._follower.steer(pose, self.settings.speed, now)
+            wanted = self._follower.steer(pose, self.settings.speed, now - self._held)
             if self._follower.has_arrived(pose):
-                self._follower = None
+                self._follower, self.at_end = None, True
             return wanted
         return self._wanted if self.has_speeds(now) else (0.0, 0.0)
 
-    def look(self) -> Terrain:
-        """Return the sensor's map of the ground around the rover."""
-        position = self.plant.state().position
-        yaw = float(self.plant.pose()[2])
+    def look(self, position: Floats, yaw: float) -> Terrain:
+        """Return the sensor's map of the ground around a rover; another thread may look.
+
+        Args:
+            position: (3,) body origin [m].
+            yaw: Heading [rad].
+        """
         return self._sensor.look(self.settings.terrain, position, self._rng, yaw)

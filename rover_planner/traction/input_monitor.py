@@ -32,7 +32,8 @@ class InputMonitor:
     def __init__(self, timeouts: Mapping[str, float], optional: Collection[str] = ()):
         """Monitor inputs by name; one older than its timeout [s] is stale.
 
-        Inputs that are `optional` are never a fault.
+        Inputs that are `optional` are never a fault; those with an infinite timeout are one only
+        where they are refused.
         """
         self.timeouts = dict(timeouts)
         """Timeouts [s] by name."""
@@ -97,4 +98,5 @@ class InputMonitor:
         )
 
     def _find_needed(self) -> dict[str, InputRecord]:
-        return {n: self._inputs[n] for n in self.timeouts if n not in self._optional}
+        needed = {n: self._inputs[n] for n in self.timeouts if n not in self._optional}
+        return {n: one for n, one in needed.items() if one.error or self.timeouts[n] < math.inf}

@@ -29,6 +29,7 @@ from rover_physics.traction.solver import (
     solve_traction,
 )
 from rover_physics.traction.wheel_course import WheelCourse
+from rover_planner.parameters.shared import STOP
 from rover_planner.traction.input_monitor import InputMonitor
 from rover_planner.traction.joint_memory import JointMemory
 from rover_planner.traction.limits import MeasurementLimits
@@ -130,7 +131,7 @@ class TractionService:
         self.monitor.timeouts = {
             name: getattr(parameters, f"{name}_timeout")
             for name in (JOINT_STATES, IMU, CMD_VEL, ODOMETRY)
-        }
+        } | {STOP: parameters.stop_timeout or math.inf}
         self._writer = BalanceWriter(rover, settings.payload)
         self._limits = MeasurementLimits(rover)
         self._optimal = parameters.policy == OPTIMAL
@@ -218,6 +219,13 @@ class TractionService:
         """
         self.wanted = self._limits.clip_command(speed, yaw_rate)
         self.monitor.take(CMD_VEL, now)
+
+    def take_stop(self, stops: bool, now: float) -> None:
+        """Take what the watch of the path says at time `now` [s]: whether the rover is to stop."""
+        if stops:
+            self.monitor.refuse(STOP, f"{STOP} is true: the watch stops the rover", now)
+        else:
+            self.monitor.take(STOP, now)
 
     def take_odometry(self, pose: Floats, deviation: float, now: float) -> None:
         """Take x, y, z [m], yaw [rad] (4,), map frame, and the standard deviation of x, y [m]."""

@@ -49,8 +49,9 @@ class Drive:
 
     def look(self) -> None:
         """Give the server the map that the camera sees now."""
-        standing = standing_of(self.simulation.plant.state())
-        now = self.keeper.take(self.simulation.look(), "elevation_cloud", self.time, standing)
+        state, yaw = self.simulation.plant.state(), float(self.simulation.plant.pose()[2])
+        standing, seen = standing_of(state), self.simulation.look(state.position, yaw)
+        now = self.keeper.take(seen, "elevation_cloud", self.time, standing)
         self.service.take_terrain(now.terrain, "elevation_cloud", None, now.sources)
 
     def go(self, seconds: float) -> str:

@@ -11,12 +11,14 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Quaternion
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rclpy.serialization import serialize_message
 
 from msg_adapters.errors import MAX_TEXT, MessageError
 from msg_adapters.frames import check_frame
 from msg_adapters.identity import path_hash, plan_request_hash
 from msg_adapters.paths import (
     MAX_POSES,
+    count_poses,
     decimate,
     path_to_poses,
     poses_path,
@@ -167,3 +169,13 @@ def test_stamps_do_not_count_and_poses_order_and_frame_do():
         poses_path([], "map"),
     ]
     assert len({path_hash(other) for other in [path, *others]}) == 1 + len(others)
+
+
+@pytest.mark.parametrize("frame", ["", "map", "odom", "rover_1/map"])
+def test_the_poses_of_a_path_are_counted_without_reading_it(frame):
+    for count in (0, 1, 300):
+        path = poses_path(np.zeros((1, 3)), frame)
+        path.poses = path.poses * count
+        assert count_poses(serialize_message(path)) == count
+    with pytest.raises(MessageError, match="7 bytes were received that are no Path"):
+        count_poses(b"\0\1\0\0map")

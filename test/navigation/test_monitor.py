@@ -135,6 +135,17 @@ def test_a_rover_off_its_path_or_lost_is_to_stop(service):
     assert monitor.finding.state == STOPPED
 
 
+def test_joint_states_that_cease_stop_a_rover_that_had_them(service):
+    monitor = watching(service, pose_timeout=1.0)
+    here = sight(service, STRAIGHT[0])
+    assert monitor.look(replace(here, time=9.0)).state == WATCHING  # it never had any
+    measured = replace(here, snapshot=replace(here.snapshot, measured_pose=STRAIGHT[0]))
+    assert monitor.look(replace(measured, time=10.0)).state == WATCHING
+    assert monitor.look(replace(here, time=10.9)).state == WATCHING
+    found = monitor.look(replace(here, time=11.1))
+    assert (found.state, found.judgement.code) == (STOPPED, "no_joints")
+
+
 def test_a_difference_counts_once_it_has_lasted():
     drift = SuspensionDrift(1.0)
     assert drift.latest == {} and drift.lasting() == 0.0
@@ -159,22 +170,3 @@ def test_health_tells_a_stop_then_drift_with_its_size(service):
     assert describe_watch(found, False, 0.3).level == OK
     stopped = monitor.look(sight(service, None, 9.0))
     assert describe_watch(stopped, True, 0.1).level == ERROR
-
-
-def test_a_path_is_over_near_its_end_but_not_before_it_was_driven_to_the_last_turn():
-    def is_over(path, poses):
-        found, index = [], 0
-        for pose in np.asarray(poses, float):
-            index = path.find_place(pose, index).index
-            found.append(path.is_over(pose, index, 0.2))
-        return found
-
-    there = [(x, 0.0, 0.0) for x in np.arange(0.0, 3.01, 0.1)]
-    back = there[::-1]
-    turn = [(3.0, 0.0, yaw) for yaw in np.arange(0.0, 2.01, 0.2)]
-    beside = [(x, 0.04, 0.05) for x, _, _ in there]
-    over = is_over(WatchedPath(np.array(there)), beside)
-    assert over == [np.hypot(3.0 - x, y) < 0.2 for x, y, _ in beside]
-    for rest in (back, turn):
-        over = is_over(WatchedPath(np.array([*there, *rest[1:]])), [*there, *rest])
-        assert over[-1] and not any(over[: len(there)])

@@ -71,7 +71,7 @@ def test_a_server_says_what_it_does_answers_another_process_and_ends_cleanly(
         "traverse_server", f"terrain_file:={file}", "time_budget:=60.0", "terain_file:=spirit"
     )
     told = read_until(process, "ready for rover lsr1, map ")
-    assert "compiling kernels" in told and "101 x 101 cells of 0.05 m, 100 % known" in told
+    assert "101 x 101 cells of 0.05 m, 100 % known" in told
     assert told.count("terain_file does not exist and is ignored; the nearest is terrain_f") == 1
     plan, results = client.next_results(
         lambda: client.can_traverse((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0))

@@ -176,9 +176,10 @@ def test_a_node_in_a_namespace_has_the_topics_of_the_help_and_tells_of_wrong_par
     told -= {"subscribes", "serves", "publishes", "calls", ""}
     told = {re.sub(r"^~", name, topic) for topic in told}
     told = {"/diagnostics" if topic == "diagnostics" else f"/one/{topic}" for topic in told}
-    # Topics that need follow_commands, grid_map_msgs or hazard_map are in the help, but not here.
+    # Topics that need follow_commands, --drive, grid_map_msgs or hazard_map are in the help only.
     hazards = {f"/one/traverse_server/hazard_map/{which}" for which in ("worst", "best")}
     commands = {"/one/cmd_vel", "/one/traction_controller/commands", "/one/elevation_map"}
+    commands |= {"/one/path"}
     optional = (commands | hazards) & told
     wait_until(lambda: told - optional <= names(), f"{told - optional}")
     assert names() <= told | {"/tf"}

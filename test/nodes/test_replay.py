@@ -366,3 +366,10 @@ def test_a_goal_without_a_start_is_told(tmp_path, capsys):
     assert "no odometry before them tells where it starts" in capsys.readouterr().err
     assert main(["replay", str(bag), str(tmp_path / "no"), "--start", "2,0,0"]) == 2
     assert "--goal, which is not given" in capsys.readouterr().err
+
+
+def test_a_bag_that_asks_nothing_says_what_it_lacks(tmp_path, capsys):
+    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves()))])
+    assert main(["replay", str(bag), str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().err
+    assert "nothing was asked: the bag has no path and no odometry; give --goal" in said

@@ -1,28 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Launch, parameter and Nav2 files and layouts name nodes, parameters and topics that exist.
-
-PyPI has no launch: the files run with stand-ins for its actions, which keep what they are given.
-"""
+"""Launch, parameter and Nav2 files and layouts name nodes, parameters and topics that exist."""
 
 import json
 import re
-import runpy
-import sys
+import xml.etree.ElementTree as ElementTree
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
-from typing import Any
 
 import pytest
 import yaml
 
-from msg_adapters.commands import joint_order
-from msg_adapters.joints import read_joint_map
-from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_physics.rover.rover_file import load_rover
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.rover.rover_file import load_rover, preset_names
 from rover_physics.rover.steering_joints import steering_joints
+from rover_physics.rover.urdf.write_urdf import write_urdf
 from rover_planner.nodes.programs import PROGRAMS
 from support.project.checkout import TOP, console_scripts
 from support.project.command_checks import check_parameter_file, check_parameters
+from support.project.launch_files import describe, start_rover
 
 PARAMETER_FILES = sorted((TOP / "config" / "parameters").glob("*.yaml"))
 LAYOUTS = sorted((TOP / "config" / "views").iterdir())
@@ -30,73 +24,31 @@ OF_OTHERS = {"robot_description", "diagnostics"}
 """Topics in layouts that are not published by a node under its own help's name."""
 
 
-class Kept(SimpleNamespace):
-    """An action or substitution that keeps what it was given."""
-
-    def __init__(self, *given: Any, **named: Any):
-        super().__init__(given=given, **named)
-
-    def perform(self, context: dict[str, str]) -> str:
-        """Return the value of a LaunchConfiguration."""
-        return context[self.given[0]]
-
-
-@pytest.fixture
-def launch_modules(monkeypatch):
-    """Put stand-ins for launch and launch_ros where imports look first."""
-    names = {
-        "launch": ("LaunchContext", "LaunchDescription"),
-        "launch.actions": ("DeclareLaunchArgument", "GroupAction", "IncludeLaunchDescription",
-                           "OpaqueFunction"),
-        "launch.launch_description_sources": ("PythonLaunchDescriptionSource",),
-        "launch.substitutions": ("LaunchConfiguration",),
-        "launch_ros": (),
-        "launch_ros.actions": ("Node",),
-        "launch_ros.parameter_descriptions": ("ParameterValue",),
-    }  # fmt: skip
-    for module, classes in names.items():
-        made = ModuleType(module)
-        for name in classes:
-            setattr(made, name, type(name, (Kept,), {}))
-        monkeypatch.setitem(sys.modules, module, made)
-
-
-def kind(action: Any) -> str:
-    return type(action).__name__
-
-
-def describe(name: str) -> tuple[dict[str, Any], list[Any], dict[str, Any]]:
-    """Run a launch file; return its arguments with defaults, its other actions and its names."""
-    names = runpy.run_path(str(TOP / "launch" / name))
-    actions = names["generate_launch_description"]().given[0]
-    declared = [action for action in actions if kind(action) == "DeclareLaunchArgument"]
-    assert all(action.description for action in declared)
-    defaults = {action.given[0]: action.default_value for action in declared}
-    return defaults, [action for action in actions if action not in declared], names
-
-
-def start_rover(**given: str) -> list[Any]:
-    """Return the nodes that rover.launch.py starts with arguments."""
-    defaults, (opaque,), _ = describe("rover.launch.py")
-    assert given.keys() <= defaults.keys()
-    return opaque.function(defaults | given)
-
-
-def test_the_rover_starts_as_its_parameter_files_say(launch_modules):
+def test_the_rover_starts_as_its_parameter_files_say():
     nodes = start_rover()
     assert [node.executable for node in nodes] == ["traverse_server", "traction_controller"]
     for node in nodes:
         assert node.package == "rover_planner" and node.executable in console_scripts()
         file, given = node.parameters
         assert file == str(TOP / "config" / "parameters" / f"{node.executable}.yaml")
-        assert Path(file).is_file() and given == {"use_sim_time": False}
+        assert Path(file).is_file() and given["use_sim_time"] is False
         assert (node.namespace, node.respawn) == ("", True)
 
 
-def test_arguments_of_the_rover_take_precedence_over_its_files(launch_modules):
+def test_the_controller_expects_the_watch_of_the_server_unless_it_is_told_not_to():
+    server, controller = (node.parameters[1] for node in start_rover())
+    assert server["monitor"] is True and 0.0 < controller["stop_timeout"] < 0.5
+    for name, given in (("traverse_server", server), ("traction_controller", controller)):
+        check_parameters(name, {k: v for k, v in given.items() if k != "use_sim_time"})
+    for node in start_rover(watch="false"):
+        assert node.parameters[1] == {"use_sim_time": False}
+
+
+def test_arguments_of_the_rover_take_precedence_over_its_files():
     server, controller = start_rover(
-        namespace="one", use_sim_time="True", respawn="false", rover="m2020", terrain_file="spirit"
-    )
+        namespace="one", use_sim_time="True", respawn="false", rover="m2020",
+        terrain_file="spirit", watch="false",
+    )  # fmt: skip
     assert server.parameters[1] == {
         "use_sim_time": True, "rover": "m2020", "terrain_file": "spirit",
     }  # fmt: skip
@@ -112,7 +64,7 @@ def test_arguments_of_the_rover_take_precedence_over_its_files(launch_modules):
         start_rover(respawn="maybe")
 
 
-def test_the_simulation_is_the_rover_with_a_simulator(launch_modules):
+def test_the_simulation_is_the_rover_with_a_simulator():
     defaults, (simulator, group), names = describe("simulation.launch.py")
     assert simulator.executable == "rover_simulator"
     file, given = simulator.parameters
@@ -177,34 +129,44 @@ def test_a_layout_shows_topics_that_the_nodes_publish(path):
 CONFIG = TOP / "config"
 
 
-@pytest.mark.parametrize(
-    ("file", "node"),
-    [
-        ("nav2/watch.yaml", "traverse_server"),
-        ("ros2_control/joints.yaml", "traverse_server"),
-        ("ros2_control/joints.yaml", "traction_controller"),
-    ],
-)
-def test_every_parameter_of_a_file_is_one_of_its_node(file, node):
-    check_parameter_file(node, CONFIG / file)
+def test_every_parameter_of_the_file_for_nav2_is_one_of_the_server():
+    check_parameter_file("traverse_server", CONFIG / "nav2" / "watch.yaml")
 
 
-def test_the_groups_of_ros2_control_have_the_joints_and_order_of_the_map():
-    def read(name):
-        return yaml.safe_load((CONFIG / "ros2_control" / name).read_text(encoding="utf-8"))
+@pytest.mark.parametrize("preset", preset_names())
+def test_ros2_control_has_what_the_urdf_tells_and_the_controller_reads_and_commands(
+    preset, tmp_path
+):
+    urdf = tmp_path / "rover.urdf"
+    write_urdf(urdf, load_rover(preset), "mock_components/GenericSystem")
+    system = ElementTree.parse(urdf).getroot().find("ros2_control")
+    commands = {
+        (joint.get("name"), one.get("name"))
+        for joint in system.findall("joint") for one in joint.findall("command_interface")
+    }  # fmt: skip
+    file = yaml.safe_load((CONFIG / "ros2_control" / "controllers.yaml").read_text())
+    values = {name: part["ros__parameters"] for name, part in file.items()}
+    for group in ("wheel_efforts", "wheel_velocities", "steering_positions"):
+        joints, interface = values[group]["joints"], values[group]["interface_name"]
+        assert {(joint, interface) for joint in joints} <= commands
+    assert tuple(values["wheel_efforts"]["joints"]) == WHEEL_JOINTS  # the controller's order
+    assert values["steering_positions"]["joints"] == list(steering_joints(load_rover(preset)))
+    assert values["imu_broadcaster"]["sensor_name"] == system.find("sensor").get("name")
+    controller = {spec.name: spec.default for spec in PROGRAMS["traction_controller"].parameters}
+    assert values["imu_broadcaster"]["frame_id"] == controller["base_frame"]
+    measured = {joint.get("name") for joint in system.findall("joint")}
+    assert {*SUSPENSION_JOINTS, *WHEEL_JOINTS} <= measured
 
-    groups, nodes = read("controllers.yaml"), read("joints.yaml")
-    known = (*SUSPENSION_JOINTS, *WHEEL_JOINTS, *STEERING_JOINTS)
-    names = read_joint_map(nodes["/**"]["ros__parameters"]["joint_map"], known)
-    wheels = nodes["traction_controller"]["ros__parameters"]["joints"]
-    assert sorted(joint_order(wheels, names).tolist()) == list(range(6))
-    for group in ("wheel_efforts", "wheel_velocities"):
-        assert groups[group]["ros__parameters"]["joints"] == wheels
-    for preset in ("lsr1", "m2020"):
-        steered = names.robot_names(steering_joints(load_rover(preset)))
-        assert groups["steering_positions"]["ros__parameters"]["joints"] == list(steered)
-    kinds = groups["controller_manager"]["ros__parameters"]
-    assert {"wheel_efforts", "wheel_velocities", "steering_positions"} <= set(kinds)
+    *_, control, spawner = nodes = start_rover(urdf=str(urdf))
+    assert [node.executable for node in nodes[:3]] == [
+        "traverse_server", "traction_controller", "robot_state_publisher",
+    ]  # fmt: skip
+    assert control.parameters == [str(CONFIG / "ros2_control" / "controllers.yaml")]
+    spawned = set(spawner.arguments) & values.keys() | {"joint_state_broadcaster"}
+    assert spawned <= set(values["controller_manager"])
+    said = PROGRAMS["traction_controller"].topics
+    for ours, theirs in nodes[1].remappings[1:]:
+        assert ours in re.findall(r"[~/a-z_]+", said) and theirs.split("/")[0] in spawned
 
 
 @pytest.mark.parametrize("file", ["hazard_layer.yaml", "hazard_filter.yaml"])

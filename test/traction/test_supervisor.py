@@ -68,6 +68,23 @@ def test_an_emergency_stop_acts_with_the_next_update_and_must_be_followed_by_ena
     assert rig.run(PERIOD).state == "disabled"
 
 
+def test_the_watch_of_the_path_holds_the_rover_and_where_it_is_expected_so_does_its_silence():
+    rig = Rig()
+    service = rig.supervisor.service
+    assert rig.run(1.0).state == "driving"  # nobody told it to expect a watch
+    service.take_stop(True, rig.now)
+    command = rig.run(PERIOD)
+    assert command.state == "fault" and "stop is true" in command.update.fault
+    service.take_stop(False, rig.now)
+    assert rig.run(1.0).state == "driving"  # by itself, with the next accepted path
+    rig = Rig(stop_timeout=0.4)
+    assert "waiting for traverse_server/stop" in rig.run(1.0).update.fault
+    rig.supervisor.service.take_stop(False, rig.now)
+    assert rig.run(0.36).state == "driving" and rig.commands[-1].expiry <= rig.now + 0.06
+    command = rig.run(0.08)
+    assert command.state == "fault" and "stop stale: none for 400 ms" in command.update.fault
+
+
 def test_hold_brakes_wheels_that_turn_and_stays_within_the_limit():
     rig = Rig(max_torque=0.1)
     rig.run(1.0)

@@ -70,6 +70,9 @@ class UrdfJointMap:
         default_factory=dict
     )
     """Joints that steer, keys as in WHEELS; those of both sides."""
+    fixed: tuple[Text, ...] = ()
+    """Joints that turn in the URDF and do not on the rover, at their `angles`: those between the
+    parts of a rocker, for example."""
     axes: Axes = field(default_factory=Axes)
     """Axes of the root link; REP-103's where the map has none."""
     angles: dict[str, Radians] = field(default_factory=dict)

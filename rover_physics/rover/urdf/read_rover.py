@@ -112,6 +112,18 @@ class _Reading:
         self._bogies = {side: tree.joint(joints.bogie[side]) for side in SIDES}
         self._wheels = {wheel: tree.joint(joints.wheels[wheel]) for wheel in WHEELS}
         self._steering = {name: tree.joint(joint) for name, joint in joints.steering.items()}
+        self._fixed = [tree.joint(joint) for joint in joints.fixed]
+        self._on_rocker = {side: self._find_rocker(side) for side in SIDES}
+
+    def _find_rocker(self, side: str) -> set[str]:
+        """Return the links that hang on a rocker, of which some parts may hang on the body."""
+        rocker, found = self._rockers[side], self._tree.links_on(self._rockers[side])
+        wheels = {self._wheels[f"{position}_{side}"].child for position in WHEEL_POSITIONS}
+        for joint in self._fixed:
+            links = self._tree.links_on(joint)
+            if joint.parent == rocker.parent and links & wheels:
+                found |= links
+        return found
 
     def contents(self) -> dict[str, Any]:
         """Return the keys of a rover file that the URDF gives; the others are left out."""
@@ -150,6 +162,9 @@ class _Reading:
         tree = JointTree(self._robot, self._angles, frame)
         pivots = [tree.origin(tree.joint(self._joints.rocker[side])) for side in SIDES]
         frame[:3, 3] = -0.5 * (pivots[0] + pivots[1])
+        # An origin may lie anywhere along its axis: the wheels tell where the middle is.
+        places = [tree.origin(tree.joint(self._joints.wheels[wheel])) for wheel in WHEELS]
+        frame[1, 3] = -float(np.mean([place[1] for place in places]))
         return frame
 
     def check(self) -> None:
@@ -160,6 +175,7 @@ class _Reading:
         arm = self._joints.arm
         if arm is not None and arm.tip not in self._robot.links:
             raise RoverFileError(f"arm.tip: no link {describe(arm.tip)} in the URDF")
+        self._check_names()
         for kind, joints in (("rocker", self._rockers), ("bogie", self._bogies),
                              ("wheels", self._wheels)):  # fmt: skip
             for part, joint in joints.items():
@@ -169,41 +185,96 @@ class _Reading:
                     continue
                 if joint.kind not in ("revolute", "continuous"):
                     raise RoverFileError(f"{key}: joint {name} is {joint.kind}; it must turn")
+                if kind == "bogie" and abs(axis[0]) > np.cos(MAX_TILT):
+                    raise RoverFileError(
+                        f"{key}: joint {name} turns about x: a rover of three bogies has neither "
+                        "rockers nor a differential; only rocker-bogies are read"
+                    )
                 if np.arccos(min(1.0, abs(axis[1]))) > MAX_TILT:
                     raise RoverFileError(
                         f"{key}: joint {name} turns about {np.round(axis, 3).tolist()}; it must "
                         "turn about y of the body frame (axes and angles of the map)"
                     )
         for side in SIDES:
-            self._check_below(f"bogie.{side}", self._bogies[side], self._rockers[side])
+            rocker, on_rocker = self._rockers[side], self._on_rocker[side]
+            self._check_below(f"bogie.{side}", self._bogies[side], rocker, on_rocker)
             for position in WHEEL_POSITIONS:
                 wheel = f"{position}_{side}"
-                self._check_below(f"wheels.{wheel}", self._wheels[wheel], self._rockers[side])
+                self._check_below(f"wheels.{wheel}", self._wheels[wheel], rocker, on_rocker)
                 if wheel in self._steering:
-                    self._check_below(
-                        f"wheels.{wheel}", self._wheels[wheel], self._steering[wheel]
-                    )
-            y = self._tree.origin(self._rockers[side])[1]
+                    steering = self._steering[wheel]
+                    links = self._tree.links_on(steering)
+                    self._check_below(f"wheels.{wheel}", self._wheels[wheel], steering, links)
+                self._check_carriers(wheel, side)
+            y = np.mean([self._wheel_centre(f"{one}_{side}")[1] for one in WHEEL_POSITIONS])
             if (y > 0.0) != (side == "left"):
                 raise RoverFileError(
                     f"rocker.{side}: y is {y:.4g} m in the body frame, on the other side; sides "
                     "are exchanged, or axes.forward or axes.up is wrong"
                 )
 
-    def _check_below(self, key: str, joint: Joint, above: Joint) -> None:
-        if joint.child == above.child or joint.child not in self._tree.links_on(above):
+    def _check_names(self) -> None:
+        """Check that each joint is named once."""
+        joints, found = self._joints, dict[str, str]()
+        kinds = ("rocker", "bogie", "wheels", "steering")
+        named = [(f"{kind}.{part}", name) for kind in kinds
+                 for part, name in getattr(joints, kind).items()]  # fmt: skip
+        named += [("fixed", name) for name in joints.fixed]
+        named += [("arm.joints", name) for name in (joints.arm.joints if joints.arm else ())]
+        for key, name in named:
+            if name in found:
+                raise RoverFileError(
+                    f"{key}: joint {name} is named twice, as {found[name]}, too; a joint has one "
+                    "part in the rover"
+                )
+            found[name] = key
+
+    def _check_below(self, key: str, joint: Joint, above: Joint, links: set[str]) -> None:
+        """Check that a joint hangs on another one, on which `links` do."""
+        if joint.child == above.child or joint.child not in links:
             raise RoverFileError(
-                f"{key}: its link {joint.child} does not hang on {above.child} in the URDF"
+                f"{key}: its link {joint.child} does not hang on {above.child} in the URDF; where "
+                "the parts of a rocker have joints of their own, name those under fixed"
             )
 
-    def _mean(self, points: dict[str, Floats]) -> list[float]:
-        """Return the mean of a point of the left side and the mirrored one of the right side."""
+    def _check_carriers(self, wheel: str, side: str) -> None:
+        """Check that nothing moves between rocker and wheel but bogie, steering and wheel."""
+        moving = {self._joints.rocker[side], self._joints.bogie[side], self._joints.wheels[wheel]}
+        moving |= {self._joints.steering.get(wheel, ""), *self._joints.fixed}
+        chain = self._tree.joints_between(self._wheels[wheel].child, self._rockers[side].parent)
+        for name in chain:
+            kind = self._robot.joints[name].kind
+            if kind != "fixed" and name not in moving:
+                raise RoverFileError(
+                    f"wheels.{wheel}: it hangs on joint {name}, which is {kind} and has no part "
+                    "in the map: name it under steering, or under fixed if it does not move"
+                )
+
+    def _pivots(self, key: str, joints: dict[str, Joint]) -> list[float]:
+        """Return a pivot of the left side; where along its axis an origin lies means nothing."""
+        points = {side: self._tree.origin(joint).copy() for side, joint in joints.items()}
+        if abs(points["left"][1] + points["right"][1]) > MAX_ASYMMETRY:
+            for side in SIDES:
+                wheels = [self._wheel_centre(f"{one}_{side}")[1] for one in WHEEL_POSITIONS]
+                points[side][1] = np.mean(wheels)
+        return self._mean(("suspension", key), points)
+
+    def _mean(self, key: tuple[str, ...], points: dict[str, Floats]) -> list[float]:
+        """Return the mean of a point of the left side and the mirrored one of the right side.
+
+        A point that the map gives under a key of the rover is that, whatever the URDF has.
+        """
+        given: Any = self._joints.rover
+        for name in key:
+            given = given.get(name) if isinstance(given, dict) else None
+        if given is not None:
+            return given
         left, right = points["left"], MIRROR * points["right"]
         apart = float(np.linalg.norm(left - right))
         self.asymmetry = max(self.asymmetry, apart)
         if apart > MAX_ASYMMETRY:
             raise RoverFileError(
-                f"left {np.round(left, 4).tolist()} and mirrored right "
+                f"{'.'.join(key)}: left {np.round(left, 4).tolist()} and mirrored right "
                 f"{np.round(right, 4).tolist()} are {apart:.3g} m apart; both sides of the rover "
                 f"must be alike within {MAX_ASYMMETRY:g} m"
             )
@@ -236,7 +307,6 @@ class _Reading:
 
     def _suspension(self) -> dict[str, Any]:
         """Return pivots, wheel centres and limits."""
-        origin = self._tree.origin
         on_bogie = {
             position
             for position in WHEEL_POSITIONS
@@ -250,12 +320,13 @@ class _Reading:
                 "middle one and the front or the rear one"
             )
         found: dict[str, Any] = {
-            "rocker_pivot": self._mean({side: origin(self._rockers[side]) for side in SIDES}),
-            "bogie_pivot": self._mean({side: origin(self._bogies[side]) for side in SIDES}),
+            "rocker_pivot": self._pivots("rocker_pivot", self._rockers),
+            "bogie_pivot": self._pivots("bogie_pivot", self._bogies),
             "rocker_wheel": alone.pop(),
             "wheels": {
                 position: self._mean(
-                    {side: self._wheel_centre(f"{position}_{side}") for side in SIDES}
+                    ("suspension", "wheels", position),
+                    {side: self._wheel_centre(f"{position}_{side}") for side in SIDES},
                 )
                 for position in WHEEL_POSITIONS
             },
@@ -300,7 +371,7 @@ class _Reading:
     def _masses(self) -> dict[str, Any]:
         """Return body, rocker and bogie; what a wheel weighs beyond the lightest is its link's."""
         wheel_mass, tree = self._wheel_mass(), self._tree
-        on_rockers = [tree.links_on(self._rockers[side]) for side in SIDES]
+        on_rockers = [self._on_rocker[side] for side in SIDES]
         body = tree.lump(set(self._robot.links) - on_rockers[0] - on_rockers[1])
         if self._joints.arm is not None:
             body = body - tree.lump({self._joints.arm.tip})
@@ -323,7 +394,8 @@ class _Reading:
             found[name] = {
                 "mass": mass if mass > 1e-12 else 0.0,
                 "com": self._mean(
-                    {side: lumps[side].com(tree.origin(pivots[name][side])) for side in SIDES}
+                    ("masses", name, "com"),
+                    {side: lumps[side].com(tree.origin(pivots[name][side])) for side in SIDES},
                 ),
             }
         return found
@@ -342,8 +414,7 @@ class _Reading:
     def _belly(self) -> dict[str, Any]:
         """Return the underside of the lowest box of the body; nothing if there is none."""
         links = self._tree.rigid_group(self._rockers["right"].parent)
-        for rocker in self._rockers.values():
-            links -= self._tree.links_on(rocker)
+        links -= self._on_rocker["right"] | self._on_rocker["left"]
         boxes = [_bounds(*box) for box in self._tree.solids(links, "box")]
         if not boxes:
             return {}

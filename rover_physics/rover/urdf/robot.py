@@ -342,6 +342,15 @@ class JointTree:
         """Return the axis (3,) of a joint, a unit vector."""
         return self._places[joint.child][:3, :3] @ joint.axis
 
+    def joints_between(self, link: str, above: str) -> list[str]:
+        """Return the names of the joints between a link and one that it hangs on."""
+        names = {joint.child: name for name, joint in self.robot.joints.items()}
+        found = []
+        while link != above and link in names:
+            found.append(names[link])
+            link = self.robot.joints[names[link]].parent
+        return found
+
     def links_on(self, joint: Joint) -> set[str]:
         """Return the names of all links that hang on a joint."""
         found = [joint.child]

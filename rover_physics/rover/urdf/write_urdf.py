@@ -4,14 +4,14 @@
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from pathlib import Path
-from xml.sax.saxutils import quoteattr
+from xml.sax.saxutils import escape, quoteattr
 
 import numpy as np
 
 from rover_physics.errors import RoverFileError
 from rover_physics.files.user_file import write_file
 from rover_physics.files.validation import errors_of
-from rover_physics.names import SIDES, WHEELS
+from rover_physics.names import SIDES, SUSPENSION_JOINTS, WHEEL_JOINTS, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.manipulator import link_points
 from rover_physics.rover.model import Manipulator, Part, Rover
@@ -37,7 +37,7 @@ ALONG_Y = "1.5707963267948966 0 0"
 """Roll, pitch, yaw that turn a cylinder's axis from z to y [rad]."""
 
 
-def write_urdf(path: Path, rover: Rover) -> None:
+def write_urdf(path: Path, rover: Rover, hardware: str = "") -> None:
     """Write a rover as URDF.
 
     The root link is ``base_link`` in the body frame, the joints have the names of the rover's
@@ -52,6 +52,8 @@ def write_urdf(path: Path, rover: Rover) -> None:
     Args:
         path: The file; an existing one is overwritten.
         rover: The rover.
+        hardware: Plugin of ros2_control, such as mock_components/GenericSystem: the file then says
+            which interfaces it has to have. Empty for none.
 
     Raises:
         RoverFileError: It cannot be written, or a joint of the arm has the name of a link.
@@ -66,14 +68,35 @@ def write_urdf(path: Path, rover: Rover) -> None:
     links = [_body(rover), *(_side(rover, side) for side in SIDES)]
     if arm is not None:
         links.append(_arm(arm))
-    # MuJoCo: keeps links that are fixed to another one, and what is only seen.
-    extension = '<mujoco><compiler fusestatic="false" discardvisual="false"/></mujoco>'
-    name = quoteattr(rover.name)
-    top = ElementTree.fromstring(f"<robot name={name}>{extension}{''.join(links)}</robot>")
+    if hardware:
+        links.append(_interfaces(rover, hardware))
+    top = ElementTree.fromstring(f"<robot name={quoteattr(rover.name)}>{''.join(links)}</robot>")
     ElementTree.indent(top)
     text = ElementTree.tostring(top, encoding="unicode", xml_declaration=False)
     with errors_of(path):
         write_file(path, f'<?xml version="1.0"?>\n{text}\n'.encode())
+
+
+def _interfaces(rover: Rover, hardware: str) -> str:
+    """Return the interfaces of all joints and of an IMU in the body for ros2_control."""
+
+    def joint(name: str, *commands: str) -> str:
+        kinds = [("command", one) for one in commands]
+        kinds += [("state", one) for one in ("position", "velocity")]
+        inside = "".join(f'<{kind}_interface name="{one}"/>' for kind, one in kinds)
+        return f"<joint name={quoteattr(name)}>{inside}</joint>"
+
+    joints = [joint(name) for name in SUSPENSION_JOINTS]
+    joints += [joint(name, "effort", "velocity") for name in WHEEL_JOINTS]
+    joints += [joint(name, "position") for name in steering_joints(rover)]
+    measured = [f"orientation.{axis}" for axis in "xyzw"]
+    measured += [f"{what}.{axis}" for what in ("angular_velocity", "linear_acceleration")
+                 for axis in "xyz"]  # fmt: skip
+    imu = "".join(f'<state_interface name="{name}"/>' for name in measured)
+    return (
+        f'<ros2_control name="rover" type="system"><hardware><plugin>{escape(hardware)}</plugin>'
+        f'</hardware>{"".join(joints)}<sensor name="imu">{imu}</sensor></ros2_control>'
+    )
 
 
 def _body(rover: Rover) -> str:

@@ -46,6 +46,9 @@ class RoverClient(Protocol):
     def check(self, poses: Poses) -> str:
         """Return why the server refuses a path on its newest map, empty if it passes."""
 
+    def has_ended(self) -> bool | None:
+        """Return whether the follower is at the end of its path; None if it never says so."""
+
     def wait_for_pose(self, is_wanted: Callable[[Poses], bool], seconds: float) -> Poses:
         """Return the first measured pose (3,) that is wanted, or the last one in time."""
 
@@ -54,8 +57,10 @@ class RoverClient(Protocol):
 class DriveSettings:
     """Distances and times by which a drive is watched."""
 
-    within: float = 0.2
+    position_tolerance: float = 0.15
     """Distance from the end of a plan that counts as there [m]."""
+    heading_tolerance: float = 0.2
+    """Difference from its heading that counts as there [rad]."""
     period: float = 2.0
     """Time between two looks at the rest of the plan [s]."""
     timeout: float = 3600.0
@@ -122,8 +127,7 @@ class _Drive:
         """Drive a plan (n, 3) and those that follow it."""
         for _ in range(MAX_PLANS):
             stretch = self._follow(plan)
-            ends_at_goal = math.dist(plan[-1, :2], self._goal[:2]) < self._settings.within
-            if not stretch.hindrance and ends_at_goal:
+            if not stretch.hindrance and not self._describe_miss(plan[-1], self._goal):
                 return
             plan = self._find_plan(stretch)
         raise DriveFailedError(f"the goal is not reached after {MAX_PLANS} plans")
@@ -158,19 +162,22 @@ class _Drive:
     def _follow(self, plan: Poses) -> Stretch:
         """Follow a plan (n, 3) to its end, or to where something hinders the rover."""
         path, index, settings = WatchedPath(plan), 0, self._settings
-        standstill = Standstill(settings.patience)
+        standstill, rest = Standstill(settings.patience), Standstill(REST_TIME)
         self._client.send_path(plan)
 
         def is_there(pose: Poses) -> bool:
             nonlocal index
             index = path.find_place(pose, index).index
-            return path.is_over(pose, index, settings.within)
+            rests, ended = rest.is_reached(pose, time.monotonic()), self._client.has_ended()
+            if ended is not None:
+                return ended
+            return rests and path.is_end(index) and not self._describe_miss(pose, plan[-1])
 
         while True:
             pose = self._client.wait_for_pose(is_there, settings.period)
             behind = plan[: index + 1]
             if is_there(pose):
-                return Stretch(pose, "", behind)
+                return Stretch(pose, self._describe_miss(pose, plan[-1]), behind)
             refused = self._client.check(plan[index:])
             if refused:
                 return Stretch(pose, f"the rest of the plan is refused: {refused}", behind)
@@ -183,6 +190,17 @@ class _Drive:
                     f"waited {settings.timeout:.0f} s in vain for the rover to get there; it is "
                     f"at {_describe(pose)}"
                 )
+
+    def _describe_miss(self, pose: Poses, end: Poses | Sequence[float]) -> str:
+        """Return by how much a pose (3,) misses the end of a path; empty within the tolerances."""
+        off, turned = math.dist(pose[:2], end[:2]), abs(float(wrap(pose[2] - end[2])))
+        settings = self._settings
+        if off <= settings.position_tolerance and turned <= settings.heading_tolerance:
+            return ""
+        return (
+            f"the rover has ended {off:.2f} m and {turned:.2f} rad from the end of its path, "
+            f"tolerances {settings.position_tolerance:g} m and {settings.heading_tolerance:g} rad"
+        )
 
     def _go_back(self) -> bool:
         """Let the rover drive back along the waypoints that it has passed, if they pass that way.

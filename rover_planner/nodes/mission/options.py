@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from rover_planner.errors import PlanningError
+from rover_planner.nodes.mission.drive import DriveSettings
 from rover_planner.shell.poses import Pose, pose_option
 
 
@@ -29,6 +30,10 @@ class MissionOptions:
     """Longest wait for each answer [s]."""
     json: bool
     """True prints JSON."""
+    position_tolerance: float
+    """Distance from a goal that counts as there [m]."""
+    heading_tolerance: float
+    """Difference from its heading that counts as there [rad]."""
 
 
 def read_mission(
@@ -53,12 +58,26 @@ def read_mission(
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a JSON object a line; goals count from 1.")
     ] = False,
+    position_tolerance: Annotated[
+        float, typer.Option(metavar="M", help="Distance from the goal that is there, in m.")
+    ] = DriveSettings.position_tolerance,
+    heading_tolerance: Annotated[
+        float, typer.Option(metavar="RAD", help="Difference from its heading that is there.")
+    ] = DriveSettings.heading_tolerance,
 ) -> MissionOptions:
     """Return the options given on the command line.
 
     Raises:
-        PlanningError: The timeout is not above 0.
+        PlanningError: The timeout or a tolerance is not above 0.
     """
-    if not 0.0 < timeout < math.inf:
-        raise PlanningError(f"timeout is {timeout}; it must be a time above 0 in s")
-    return MissionOptions(start, tuple(goal), map_name, drive, map_frame, timeout, as_json)
+    for name, value, what in (
+        ("timeout", timeout, "a time above 0 in s"),
+        ("position_tolerance", position_tolerance, "a distance above 0 in m"),
+        ("heading_tolerance", heading_tolerance, "an angle above 0 in rad"),
+    ):
+        if not 0.0 < value < math.inf:
+            raise PlanningError(f"{name} is {value}; it must be {what}")
+    return MissionOptions(
+        start, tuple(goal), map_name, drive, map_frame, timeout, as_json,
+        position_tolerance, heading_tolerance,
+    )  # fmt: skip

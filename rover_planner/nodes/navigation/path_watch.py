@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Watches the accepted path in a thread: publishes ~/stop at once, serves ~/monitor."""
+"""Watches the accepted path in a thread: ~/stop at once and as a heartbeat, and ~/monitor."""
 
+import math
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
@@ -13,7 +16,9 @@ from rclpy.parameter import Parameter
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
+from msg_adapters.results.diagnostics import MONITOR, make_status
 from rover_physics.numerics.interruption import interruptible
+from rover_physics.numerics.kernel_cache import KernelMissingError, loading_only
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.budget import STOPPING, QuestionStoppedError
 from rover_planner.planning.answering.judgement import PathJudgement, refusal
@@ -21,12 +26,14 @@ from rover_planner.planning.answering.server_health import Health
 from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.monitor import (
+    IDLE,
     STOPPED,
     Finding,
     PathMonitor,
     Sight,
     WatchSettings,
     describe_watch,
+    rehearse,
 )
 from rover_planner.planning.navigation.watched_path import WatchedPath
 from rover_planner.ros.guard import Guard
@@ -34,7 +41,9 @@ from rover_planner.ros.handover import Handover
 from rover_planner.ros.qos import latched_qos
 
 PERIOD = 0.1
-"""Time between two looks while paths are watched [s]."""
+"""Time between two looks while paths are watched, and between two heartbeats [s]."""
+LONGEST_LOOK = 2.0
+"""Age of the last look above which there is no heartbeat: the watch has died [s]."""
 IDLE_PERIOD = 1.0
 """The same while none is: the suspension is compared for the diagnostics."""
 MAX_POSE_AGE = 0.3
@@ -82,6 +91,9 @@ class PathWatch:
         self._reported: PathJudgement | None = None
         self._last_path: WatchedPath | None = None
         self._stop = node.create_publisher(Bool, "~/stop", latched_qos())
+        self._state = node.create_publisher(DiagnosticStatus, "~/watch", latched_qos())
+        self._map_age = math.nan
+        self._looked = time.monotonic()
         self._handover = Handover(node, guard)
         self._changed = threading.Condition()
         self._new_path: WatchedPath | None = None
@@ -92,6 +104,7 @@ class PathWatch:
         node.create_service(SetBool, "~/monitor", self._switch)
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = node.create_timer(IDLE_PERIOD, self._offer_sight, clock=steady)
+        node.create_timer(PERIOD, self._beat, clock=steady)
         self.apply(parameters)
 
     def apply(self, parameters: TraverseServerParameters) -> None:
@@ -100,7 +113,6 @@ class PathWatch:
         if parameters.monitor == self.enabled:
             return
         self.enabled = parameters.monitor
-        self._stop.publish(Bool(data=False))
         if self.enabled:
             self._set_path(self._last_path)
         else:
@@ -123,7 +135,23 @@ class PathWatch:
     def describe(self) -> Health:
         """Return what is watched and what was found, for diagnostics."""
         tolerance = self._service.settings.suspension_tolerance
-        return describe_watch(self.finding, self.enabled, tolerance)
+        health = describe_watch(self.finding, self.enabled, tolerance)
+        return replace(health, values={**health.values, "map_age": f"{self._map_age:.1f} s"})
+
+    @property
+    def _stops(self) -> bool:
+        """Whether the rover is to stop: while paths are watched, it may drive a watched one."""
+        return self.enabled and self.finding.state in (IDLE, STOPPED)
+
+    def _beat(self) -> None:
+        """Publish that the watch is alive, and what it says; a watch that hangs says nothing."""
+        if time.monotonic() - self._looked > LONGEST_LOOK:
+            return
+        self._stop.publish(Bool(data=self._stops))
+        if self._state.get_subscription_count():
+            health, name = self.describe(), self._service.settings.rover.name
+            status = make_status(MONITOR, health.level, health.message, health.values, name)
+            self._state.publish(status)
 
     def close(self) -> None:
         """End the thread."""
@@ -149,11 +177,23 @@ class PathWatch:
         """Hand what is known now to the thread; a look that still waits is replaced."""
         now = self._node.get_clock().now().nanoseconds
         snapshot, pose = self._service.snapshot(now), self._find_pose()
+        self._map_age = snapshot.map_age
         with self._changed:
             self._sight = Sight(snapshot, pose, time.monotonic())
             self._changed.notify_all()
 
+    def _rehearse(self) -> None:
+        """Look at a path of no meaning, unless that compiles kernels."""
+        try:
+            with interruptible(self._check_end), loading_only():
+                rehearse(self._service.settings)
+        except (KernelMissingError, QuestionStoppedError):
+            return
+        except Exception as error:
+            self._guard.report("monitor", error)
+
     def _run(self) -> None:
+        self._rehearse()
         while True:
             with self._changed:
                 self._changed.wait_for(lambda: self._sight is not None or self._ending)
@@ -200,15 +240,15 @@ class PathWatch:
         self._handover.call(lambda: self._report_stop(complete, finding.path_hash, sight.snapshot))
 
     def _take(self, finding: Finding) -> None:
-        """Publish ~/stop where it has changed; called in the executor's thread."""
-        before, self.finding = self.finding, finding
-        stops = finding.state == STOPPED
+        """Publish ~/stop at once where it has changed; called in the executor's thread."""
+        stopped, before = self._stops, self.finding
+        self.finding, self._looked = finding, time.monotonic()
         if not self.enabled or finding.state == before.state:
             return
-        if stops or before.state == STOPPED:
-            self._stop.publish(Bool(data=stops))
+        if self._stops != stopped:
+            self._beat()
         logger = self._node.get_logger()
-        if stops:
+        if finding.state == STOPPED:
             assert finding.judgement is not None
             logger.error(f"monitor: stop: {finding.judgement.reason}")
         else:

@@ -9,6 +9,7 @@ from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from sensor_msgs.msg import Imu, JointState, PointCloud2
+from std_msgs.msg import Bool
 
 from msg_adapters.commands import twist_to_speeds
 from msg_adapters.imu import ImuMounting, imu_to_attitude
@@ -17,12 +18,13 @@ from msg_adapters.odometry import odometry_to_pose
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.steering_joints import STEERING_SIGNS, steering_joints
+from rover_planner.parameters.shared import STOP
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.ros.frames import NodeFrames
 from rover_planner.ros.guard import INPUT_ERRORS, Guard
 from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.map_intake import CLOUD, MapIntake
-from rover_planner.ros.qos import sensor_qos
+from rover_planner.ros.qos import sensor_qos, topic_qos
 from rover_planner.ros.subscriptions import PublisherCheck, subscribe_to_map
 from rover_planner.traction.clocks import NANOSECONDS, StampCheck, StampError
 from rover_planner.traction.traction_service import (
@@ -90,6 +92,8 @@ class TractionInputs:
             (Odometry, ODOMETRY, self._take_odometry),
         ):
             self._node.create_subscription(kind, name, self._guard(name, take), sensor_qos())
+        take_stop = self._guard(STOP, self._take_stop)
+        self._node.create_subscription(Bool, STOP, take_stop, topic_qos())
         durability, reliability = parameters.map_durability, parameters.input_reliability
         subscribe_to_map(self._node, PointCloud2, CLOUD, self._maps.offer, durability, reliability)
 
@@ -154,6 +158,9 @@ class TractionInputs:
         if isinstance(twist, TwistStamped):
             now = self._find_time(CMD_VEL, _stamp_of(twist), now)
         self._service.take_command(*twist_to_speeds(twist), now)
+
+    def _take_stop(self, message: Bool, now: float) -> None:
+        self._service.take_stop(message.data, now)
 
     def _take_odometry(self, odometry: Odometry, now: float) -> None:
         measured = self._find_time(ODOMETRY, _stamp_of(odometry), now)

@@ -97,9 +97,11 @@ class Snapshot:
         judge, ends = self._judge(), (np.asarray(start, float), np.asarray(goal, float))
         if self.settings.planner == LATTICE:
             return self._search_around(judge, ends, None)
+        are_on_map = all(judge.terrain.contains(*end[:2]) for end in ends)
+        if not (are_on_map or tolerance):  # no candidate helps: one tells as much as all
+            judge = replace(judge, options=judge.options.change(count=1))
         search = judge.search(*ends, tolerance)
         judged = self._describe(judge, search.answer.chosen, search)
-        are_on_map = all(judge.terrain.contains(*end[:2]) for end in ends)
         starts_unobserved = (
             judged.code == UNOBSERVED_CODE and search.answer.chosen.verdict.first_failure == 0
         )

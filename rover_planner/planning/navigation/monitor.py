@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.grid import Terrain
+from rover_planner.maps.known_map import KnownMap
 from rover_planner.planning.answering.judgement import PathJudgement, refusal
 from rover_planner.planning.answering.server_health import ERROR, OK, WARN, Health
 from rover_planner.planning.answering.service_settings import ServiceSettings
@@ -21,9 +23,9 @@ from rover_planner.planning.verdict_report import SuspensionReport
 
 IDLE, WATCHING, STOPPED, ARRIVED = "idle", "watching", "stopped", "arrived"
 """States of a monitor."""
-NO_POSE, OFF_PATH, SUSPENSION = "no_pose", "off_path", "suspension"
+NO_POSE, NO_JOINTS, OFF_PATH, SUSPENSION = "no_pose", "no_joints", "off_path", "suspension"
 """Codes of a stop besides those of a verdict."""
-NEAR = 10.0
+NEAR = 3.0
 """Length of the part of the path that is judged before the whole rest [m]: the rover is told
 early of what is near."""
 SHARE = 0.25
@@ -41,7 +43,8 @@ class WatchSettings:
     max_offset: float = 0.5
     """Largest distance of the rover from its path [m]."""
     pose_timeout: float = 1.0
-    """Time without a measured pose after which the rover is to stop [s]."""
+    """Time without a measured pose, or without suspension angles that were measured before, after
+    which the rover is to stop [s]."""
     max_mismatch: float = 0.3
     """Difference of measured and predicted suspension angles from which the rover is to stop if it
     lasts [rad]; 0 never stops for it."""
@@ -127,6 +130,7 @@ class PathMonitor:
         self._finding = Finding(IDLE)
         self._judged_on: tuple[Terrain | None, ServiceSettings] | None = None
         self._pose_time = 0.0
+        self._joints_time: float | None = None
         self._pause_end = 0.0
 
     @property
@@ -145,6 +149,7 @@ class PathMonitor:
             if offset > self.settings.max_offset:
                 return False
         self._path, self._judged_on, self._pose_time = path, None, sight.time
+        self._joints_time = None
         self._drift.forget()
         self._finding = Finding(WATCHING, path.hash)
         return True
@@ -167,7 +172,9 @@ class PathMonitor:
         self._compare_suspension(sight)
         if self._path is None or self._finding.state != WATCHING:
             return self._finding
-        refused = self._find_place(self._path, sight) or self._refuse_drift()
+        refused = (
+            self._find_place(self._path, sight) or self._miss_joints(sight) or self._refuse_drift()
+        )
         if refused is None:
             refused = self._judge_rest(self._path, sight)
         if refused is not None:
@@ -192,6 +199,18 @@ class PathMonitor:
             return None
         reason = f"the rover is {place.offset:.2f} m beside its path, limit {most:.2f} m"
         return refusal(OFF_PATH, reason)
+
+    def _miss_joints(self, sight: Sight) -> PathJudgement | None:
+        """Return a refusal if the suspension is compared, and is no longer measured."""
+        if not self.settings.max_mismatch:
+            return None
+        if sight.snapshot.measured_pose is not None:
+            self._joints_time = sight.time
+        missing = 0.0 if self._joints_time is None else sight.time - self._joints_time
+        if missing <= self.settings.pose_timeout:
+            return None
+        reason = f"suspension angles and odometry are not known together for {missing:.1f} s"
+        return refusal(NO_JOINTS, reason)
 
     def _compare_suspension(self, sight: Sight) -> None:
         """Compare measured and predicted suspension where the rover stands."""
@@ -252,6 +271,22 @@ class PathMonitor:
         return place is not None and path.is_end(place.index)
 
 
+def rehearse(settings: ServiceSettings) -> None:
+    """Look once, at level ground that is not known exactly, so that no later look takes longer."""
+    flat = np.zeros((120, 120))
+    ground = Terrain(flat, 0.05, (-3.0, -3.0), elevation_std=flat + 0.001)
+    poses = np.column_stack([np.linspace(-1.0, 1.0, 41), np.zeros((41, 2))])
+    snapshot = Snapshot(
+        settings,
+        joints=dict.fromkeys(SUSPENSION_JOINTS, 0.0),
+        known_map=KnownMap(ground, ground, "", None, 0.0, ""),
+        measured_pose=poses[0],
+    )
+    monitor, sight = PathMonitor(WatchSettings()), Sight(snapshot, poses[0], 0.0)
+    monitor.take_path(WatchedPath(poses), sight)
+    monitor.look(sight)
+
+
 def _check(snapshot: Snapshot, poses: NDArray[np.float64]) -> PathJudgement:
     return replace(snapshot, path=GivenPath(poses, "")).check_path()
 
@@ -270,6 +305,8 @@ def describe_watch(finding: Finding, enabled: bool, tolerance: float) -> Health:
         f"measured and predicted suspension differ by {finding.drift:.3f} rad, "
         f"tolerance {tolerance:.3f} rad"
     )
+    if enabled and finding.state == IDLE:
+        return Health(WARN, "stop: no path is watched; the rover may drive accepted paths", values)
     if enabled and finding.state == STOPPED and finding.judgement is not None:
         return Health(
             ERROR, f"stop ({finding.judgement.code}): {finding.judgement.reason}", values
@@ -278,7 +315,7 @@ def describe_watch(finding: Finding, enabled: bool, tolerance: float) -> Health:
         return Health(WARN, drift, values)
     if not enabled:
         return Health(OK, "no path is watched: the parameter monitor is false", values)
-    return Health(OK, "no path to watch" if finding.state == IDLE else finding.state, values)
+    return Health(OK, finding.state, values)
 
 
 def _values_of(finding: Finding) -> dict[str, Any]:

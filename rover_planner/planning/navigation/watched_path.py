@@ -76,23 +76,6 @@ class WatchedPath:
         index = first + nearest
         return Place(index, float(away[nearest]), float(along[-1] - along[index]))
 
-    @cached_property
-    def turns(self) -> NDArray[np.float64]:
-        """Turn (n,) from the start to each waypoint, to the left and to the right alike [rad]."""
-        return np.concatenate([[0.0], np.cumsum(np.abs(wrap(np.diff(self.poses[:, 2]))))])
-
-    def is_over(self, pose: NDArray[np.float64], index: int, within: float) -> bool:
-        """Return whether a rover is at the end, and has no turn on the spot left before it.
-
-        Args:
-            pose: (3,) x, y [m] and yaw [rad] of the body.
-            index: Index of the waypoint where it is.
-            within: Distance from the end that counts as there [m].
-        """
-        left = self.distances[-1] - self.distances[index]
-        left += TURN_LENGTH * (self.turns[-1] - self.turns[index])
-        return bool(np.hypot(*(self.poses[-1, :2] - pose[:2])) < within and left < 2.0 * within)
-
     def is_end(self, index: int) -> bool:
         """Return whether a waypoint is the last one."""
         return index >= len(self.poses) - 1

@@ -44,8 +44,13 @@ HARDWARE = {
 """How the robot is built: robot joint, model joint, sign and offset of the model's angle."""
 
 
-def read_config(name, node):
-    return yaml.safe_load((CONFIG / name).read_text())[node]["ros__parameters"]
+NAMES = {model: robot for robot, (model, _, _) in HARDWARE.items()}
+
+
+def joints_of(group):
+    """Return the robot's joints in the order of a group of the shipped file."""
+    contents = yaml.safe_load((CONFIG / "controllers.yaml").read_text())
+    return [NAMES[joint] for joint in contents[group]["ros__parameters"]["joints"]]
 
 
 class KinematicRobot(Node):
@@ -60,7 +65,7 @@ class KinematicRobot(Node):
         self._states = self.create_publisher(JointState, "joint_states", sensor_qos())
         self._imu = self.create_publisher(Imu, "imu", sensor_qos())
         for group in ("wheel_efforts", "wheel_velocities", "steering_positions"):
-            joints = read_config("controllers.yaml", group)["joints"]
+            joints = joints_of(group)
             self.create_subscription(
                 Float64MultiArray, f"/{group}/commands", self._taker(group, joints), topic_qos()
             )
@@ -105,8 +110,10 @@ def start_controller(ros):
     for topic, group in groups.items():
         words += ["-r", f"~/{topic}:=/{group}/commands"]
     values = PATIENT | {
-        "joint_map": read_config("joints.yaml", "/**")["joint_map"],
-        "joints": read_config("joints.yaml", "traction_controller")["joints"],
+        "joint_map": [
+            f"{model}:{robot}:{sign}:{offset}" for robot, (model, sign, offset) in HARDWARE.items()
+        ],
+        "joints": joints_of("wheel_efforts"),
         "enabled_at_start": True,
     }
     parameters = [Parameter(name, value=value) for name, value in values.items()]

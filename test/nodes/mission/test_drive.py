@@ -19,7 +19,7 @@ LSR1 = load_rover("lsr1")
 MAP = plane(0.0, 0.0, half=4.0)
 STEP = 0.1
 COARSE = PathQueryOptions(count=1, waypoint_spacing=0.05)
-SETTINGS = DriveSettings(within=0.1, patience=0.3)
+SETTINGS = DriveSettings(position_tolerance=0.1, patience=0.3)
 
 
 class SimulatedRover:
@@ -28,7 +28,8 @@ class SimulatedRover:
     def __init__(self, ground):
         self.plant = QuasiStaticPlant(LSR1, ground, (-1.0, 0.0, 0.0))
         self.follower = PathFollower(self.plant.pose()[None], 0.3)
-        self.asked, self.now = [], 0.0
+        self.asked, self.now, self.speaks = [], 0.0, True
+        self.make_follower = PathFollower
 
     def ask(self, start, goal):
         self.asked.append(np.array(start))
@@ -37,11 +38,14 @@ class SimulatedRover:
         return {"traversable": answer.traversable, "reason": answer.explain(), "poses": poses}
 
     def send_path(self, poses):
-        self.follower = PathFollower(poses, 0.3)
+        self.follower = self.make_follower(poses, 0.3)
 
     def check(self, poses):
         candidate = check_path(LSR1, MAP, poses, COARSE)
         return "" if candidate.verdict.traversable else candidate.verdict.reason
+
+    def has_ended(self):
+        return self.follower.has_arrived(self.plant.pose()) if self.speaks else None
 
     def wait_for_pose(self, is_wanted, seconds):
         for _ in range(round(seconds / STEP)):
@@ -90,3 +94,26 @@ def test_the_next_plan_begins_where_the_rover_has_come_to_rest(make_rover):
     assert len(resting) == 1
     assert resting[0] == pytest.approx(rover.asked[1])
     assert rover.plant.pose()[0] == pytest.approx(1.5, abs=0.15)
+
+
+@pytest.mark.parametrize("speaks", [True, False])
+def test_a_rover_that_ends_beside_the_goal_or_turned_away_has_not_arrived(make_rover, speaks):
+    """It was told to have arrived 0.18 m and 33 degrees off, after it had been stopped."""
+    rover = make_rover(MAP)
+    rover.speaks = speaks
+    goal, told = (0.5, 0.0, 0.0), []
+    plan = rover.ask(rover.plant.pose(), goal)["poses"]
+
+    class Short(PathFollower):
+        """Ends its first path too early, and turned."""
+
+        def has_arrived(self, pose):
+            return super().has_arrived(pose) or (not told and pose[0] > 0.32)
+
+        def steer(self, pose, speed):
+            return (0.0, 0.0) if self.has_arrived(pose) else super().steer(pose, speed)
+
+    rover.make_follower = Short
+    drive_to(rover, goal, plan, SETTINGS, told.append)
+    assert any("has ended 0.1" in what or "has stood" in what for what in told), told
+    assert rover.plant.pose() == pytest.approx(goal, abs=0.1)

@@ -8,19 +8,25 @@ import pytest
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
+import numpy as np
 import rclpy
+from nav_msgs.msg import Odometry, Path
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from msg_adapters.paths import poses_path
+from rover_planner.nodes.mission.drive import DriveFailedError
 from rover_planner.nodes.mission.options import MissionOptions
-from rover_planner.nodes.mission_planner import main, spin_until
+from rover_planner.nodes.mission_planner import MissionPlanner, NoAnswerError, main, spin_until
 from rover_planner.nodes.programs import read_arguments
 from rover_planner.nodes.traverse_server import TraverseServer
+from rover_planner.planning.answering.budget import STOPPING
 from rover_planner.shell.poses import Pose
 from support.grounds import make_terrain, wall_at, waves
-from support.ros_fixtures import domain_id
+from support.ros_fixtures import domain_id, run_in_executor
+from support.waiting import wait_until
 
 START, NEAR, BEYOND = "--start=-2,0,0", "--goal=-0.5,0,0", "--goal=2,0,0"
 """Words for a start, a goal before the wall at x = 0.5 m, and one behind it."""
@@ -128,3 +134,51 @@ def test_a_server_with_another_name_is_found_by_remapping(ros, run_planner):
     remapped = [word for name in words for word in ("-r", name)]
     code, out, _ = run_planner(NEAR, "--timeout=20", "--ros-args", *remapped)
     assert (code, "goal 1: yes" in out) == (0, True)
+
+
+def test_a_question_that_a_server_does_not_answer_because_it_ends_is_asked_again(
+    ros, mapped, endless
+):
+    planner, answers = ros.spin(MissionPlanner(context=ros.context)), []
+    planner.wait_for_server()
+    with endless():
+        ask = threading.Thread(
+            target=lambda: answers.append(planner.ask((-2.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+        )
+        ask.start()
+        wait_until(lambda: mapped.desk.open_count == 1, "the question")
+        run_in_executor(
+            mapped, lambda: mapped.desk.cancel(STOPPING, "the server is shutting down")
+        )
+    ask.join(20.0)
+    assert answers[0]["traversable"]
+
+
+def test_a_second_planner_waits_for_the_end_of_the_first_and_a_path_from_elsewhere_ends_a_drive(
+    ros, capfd
+):
+    rover = ros.spin(Node("follower", context=ros.context))
+    odometry = rover.create_publisher(Odometry, "odometry", 10)
+    rover.create_subscription(Path, "path", lambda path: None, 10)
+    first, second = (
+        ros.spin(
+            MissionPlanner(timeout=2.0, context=ros.context, cli_args=["--ros-args", "-r", r])
+        )
+        for r in ("__node:=first", "__node:=second")
+    )
+    first.send_path(np.zeros((1, 3)))
+    with pytest.raises(NoAnswerError, match="the end of first, which sends the rover paths"):
+        second.send_path(np.zeros((1, 3)))
+    there = Odometry(child_frame_id="base_link")
+    there.header.frame_id = "map"
+
+    def is_told() -> bool:
+        odometry.publish(there)
+        rover.create_publisher(Path, "path", 10).publish(poses_path(np.ones((2, 3)), "map"))
+        try:
+            first.wait_for_pose(lambda pose: True, 0.1)
+        except DriveFailedError as error:
+            return "another node has sent the rover a path" in str(error)
+        return False
+
+    wait_until(is_told, "the error")

@@ -76,6 +76,7 @@ def watched(start_server, client, ros):
     rover = ros.spin(Rover(ros))
     client.send_terrain(make_terrain(waves))
     wait_until(lambda: server.service.fresh_pose() is not None, "odometry")
+    rover.wait_for_stop()  # no path was accepted yet
     plan, _ = client.next_results(lambda: client.can_traverse(START, GOAL))
     assert plan.poses
     wait_until(lambda: server.watch.finding.state == "watching", "the watch")
@@ -118,6 +119,25 @@ def test_a_rock_put_across_the_path_stops_the_rover_in_half_a_second(watched, cl
         clear_the_path(rover, client)
         delays.append(time_stop(rover, client))
     assert median(delays) < 0.5, delays  # a machine that stops for a moment delays one of them
+
+
+def test_the_stop_is_a_heartbeat_with_the_path_and_the_age_of_the_map(watched, ros):
+    server, rover = watched
+    told = []
+    ros.spin(Node("operator", context=ros.context)).create_subscription(
+        DiagnosticStatus, f"{SERVER}/watch", told.append, 10
+    )
+    wait_until(lambda: len(told) > 3, "the state of the watch")
+    values = {one.key: one.value for one in told[-1].values}
+    assert values["path_hash"] == server.watch.finding.path_hash
+    assert 0.0 < float(values["map_age"].removesuffix(" s")) < 60.0
+    go_on = threading.Event()
+    server.watch._look = lambda *given: go_on.wait(60.0) and server.watch.finding
+    wait_until(
+        lambda: time.monotonic() - rover.stops[-1][1] > 0.5, "silence of a watch that hangs"
+    )
+    go_on.set()
+    wait_until(lambda: time.monotonic() - rover.stops[-1][1] < 0.2, "the heartbeat")
 
 
 @pytest.mark.timed

@@ -242,8 +242,17 @@ def test_a_rocker_may_be_fixed_if_the_map_has_its_limits(tmp_path):
         ({"axes": {"forward": "x", "up": "-x"}}, "axes.up is -x; it must be across forward x"),
         ({"angles": {"PR": 0.05}}, "both sides of the rover must be alike"),
         ({"bogie": None}, "missing key bogie; a joint map needs"),
-        ({"rover": {}}, "missing key .* the URDF does not tell it: write it under rover: in"),
-        ({"steering": {"rear_right": "WBR"}}, "wheels.rear_right: its link .* does not hang on"),
+        ({"rover": {}}, "missing keys .* the URDF does not tell it: write it under rover: in"),
+        ({"steering": {"rear_right": "WBR"}}, "steering.rear_right: joint WBR is named twice"),
+        ({"bogie": {"right": "PR", "left": "QL"}}, "joint PR is named twice, as rocker.right"),
+        (
+            {
+                "steering": {"rear_right": "QR"},
+                "bogie": {"right": "WMR", "left": "QL"},
+                "wheels": foreign_map()["wheels"] | {"middle_right": "WFR", "front_right": "Root"},
+            },
+            "wheels.front_right: joint Root is floating; it must turn",
+        ),
         ({"angles": {"PR": "x"}}, "angles.PR is 'x'; it must be a number in rad"),
         (
             {"arm": {"joints": ["PR", "QR", "PL"], "tip": "t", "stowed": [0.0, 0.0, 0.0]}},
@@ -269,7 +278,12 @@ def test_a_wrong_joint_map_is_refused_with_its_key(keys, said, tmp_path):
         ('<child link="RockerL"/>', '<child link="RockerX"/>', "'RockerX' is no link"),
         ('<child link="RockerL"/>', '<child link="RockerR"/>', "RockerR hangs on two joints"),
         ('<link name="RockerL">', '<link name="RockerR">', "two <link> of the same name"),
-        ('xyz="0.1 -0.3 -0.5"', 'xyz="0.15 -0.3 -0.5"', "m apart; both sides"),
+        ('xyz="0.1 -0.3 -0.5"', 'xyz="0.15 -0.3 -0.5"', "suspension.rocker_pivot: left .* apart"),
+        (
+            '<link name="RockerL"><inertial>',
+            '<link name="RockerL"><inertial><origin xyz="0 9 0"/>',
+            "masses.rocker.com: left .* m apart; both sides",
+        ),
     ],
 )
 def test_a_wrong_urdf_is_refused_with_what_is_wrong(old, new, said, tmp_path):
@@ -277,6 +291,84 @@ def test_a_wrong_urdf_is_refused_with_what_is_wrong(old, new, said, tmp_path):
     assert old in text
     with pytest.raises(RoverFileError, match=said):
         read_foreign(tmp_path, text.replace(old, new, 1))
+
+
+def insert_link(text: str, joint: str, kind: str, axis: str = "0 0 1") -> str:
+    """Return a URDF with a link between a joint's parent and the joint, on a joint of its own."""
+    before, after = text.split(f'<joint name="{joint}" ')
+    own, after = after.split("</joint>", 1)
+    parent = re.search('<parent link="(.*?)"/>', own)[1]
+    own = own.replace(f'<parent link="{parent}"/>', f'<parent link="On{joint}"/>')
+    return (
+        f'{before}<link name="On{joint}"/><joint name="To{joint}" type="{kind}">'
+        f'<parent link="{parent}"/><child link="On{joint}"/><axis xyz="{axis}"/></joint>'
+        f'<joint name="{joint}" {own}</joint>{after}'
+    )
+
+
+def test_what_moves_between_a_rocker_and_its_wheels_is_refused_unless_it_is_named_as_fixed(
+    tmp_path,
+):
+    """A second lambda between bogie and wheels was frozen in silence."""
+    straight = read_foreign(tmp_path)
+    text = foreign_urdf()
+    for side in "RL":
+        text = insert_link(text, f"WM{side}", "revolute", "0 1 0")
+    with pytest.raises(
+        RoverFileError, match="wheels.middle_.*: it hangs on joint ToWM., which is"
+    ):
+        read_foreign(tmp_path, text)
+    assert_alike(read_foreign(tmp_path, text, fixed=["ToWMR", "ToWML"]), straight, 1e-9)
+
+
+@pytest.mark.parametrize("on_body", [False, True])
+def test_a_rocker_in_parts_that_have_joints_of_their_own_is_one_rocker(tmp_path, on_body):
+    """As in models of Curiosity: the arm to the bogie, or that to the lone wheel, has a joint."""
+    straight = read_foreign(tmp_path)
+    text = foreign_urdf()
+    for side, y in (("R", 0.3), ("L", -0.3)):
+        joint = f"WB{side}" if on_body else f"Q{side}"
+        text = insert_link(text, joint, "revolute", "0 1 0")
+        if on_body:  # what carries the lone wheel hangs on the body, where the rocker does
+            at = f'<parent link="Rocker{side}"/><child link="OnWB{side}"/>'
+            assert at in text
+            text = text.replace(
+                at, f'<origin xyz="0.1 {y} -0.5"/>{at.replace("Rocker" + side, "Body")}'
+            )
+    names = [f"To{'WB' if on_body else 'Q'}{side}" for side in "RL"]
+    with pytest.raises(RoverFileError, match="fixed"):
+        read_foreign(tmp_path, text)
+    assert_alike(read_foreign(tmp_path, text, fixed=names), straight, 1e-9)
+
+
+def test_where_an_origin_lies_along_its_axis_means_nothing(tmp_path):
+    straight = read_foreign(tmp_path)
+    moved = foreign_urdf().replace('xyz="0.1 0.3 -0.5"', 'xyz="0.1 0.1 -0.5"')
+    for place in ("0.2 0 0.05", "-0.4 0 0.2"):  # what hangs on the rocker stays where it was
+        x, _, z = place.split()
+        moved = moved.replace(f'xyz="{place}"', f'xyz="{x} 0.2 {z}"', 1)
+    keys = foreign_map()["rover"] | {"masses": {"rocker": {"mass": 2.0, "com": [0.0, 0.3, 0.0]}}}
+    rover = read_foreign(tmp_path, moved, rover=keys)
+    for name in ("rear", "middle", "front"):
+        assert rover.suspension.wheels[name] == pytest.approx(straight.suspension.wheels[name])
+    assert rover.suspension.rocker_pivot[::2] == pytest.approx((0.0, 0.0))
+
+
+def test_masses_of_the_map_count_before_those_of_the_file_are_compared(tmp_path):
+    rocker = '<link name="RockerL"><inertial>'
+    lopsided = foreign_urdf().replace(rocker, f'{rocker}<origin xyz="0 9 0"/>')
+    given = {"mass": 2.0, "com": [0.0, 0.3, 0.0]}
+    keys = foreign_map()["rover"] | {"masses": {"rocker": given}}
+    assert read_foreign(tmp_path, lopsided, rover=keys).masses.rocker.com == (0.0, 0.3, 0.0)
+
+
+def test_a_rover_of_three_bogies_is_refused_by_name(tmp_path):
+    text = foreign_urdf()
+    for side in "RL":
+        before, after = text.split(f'<joint name="Q{side}"')
+        text = f'{before}<joint name="Q{side}"{after.replace("0 -1 0", "1 0 0", 1)}'
+    with pytest.raises(RoverFileError, match="a rover of three bogies has neither"):
+        read_foreign(tmp_path, text)
 
 
 def test_xacro_and_circles_are_refused():

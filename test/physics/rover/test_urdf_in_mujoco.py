@@ -30,6 +30,7 @@ class UrdfRover:
     def __init__(self, urdf: Path, terrain: Terrain, gravity: float, held: dict[str, float]):
         """Load a file of `write_urdf`, with joints of the arm `held` at angles [rad]."""
         spec = mujoco.MjSpec.from_file(str(urdf))
+        spec.compiler.fusestatic = False  # the arm's tip is a link
         spec.option.timestep, spec.option.gravity = TIMESTEP, [0.0, 0.0, -gravity]
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         spec.option.cone, spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10.0

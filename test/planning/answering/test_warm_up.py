@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All kernels of answers are among those that a server's start compiles: no question waits."""
+"""All kernels of answers and of the simulator are among those that are compiled beforehand."""
 
 import subprocess
 import sys
@@ -11,10 +11,13 @@ from dataclasses import replace
 import numpy as np
 
 from rover_physics.numerics.kernels import Kernel
+from rover_physics.rover.rover_file import load_rover
 from rover_planner.nodes.warm_up import GROUPS
+from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.simulator.simulation import Simulation, SimulationSettings
 from support.grounds import make_terrain, wall_at, waves
 
 def compiled():
@@ -47,12 +50,19 @@ for parameters, asked in (
         answering.answer(start, goal, 0.3).complete()
         answering.take_path(np.array([start, goal]))
         answering.check_last_path().complete()
+given = RoverSimulatorParameters(start_x=-1.0)
+simulation = Simulation(SimulationSettings(load_rover("lsr1"), grounds[0], given))
+simulation.take_path(np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))
+for _ in range(3):
+    simulation.advance(0.0, 0.02)
+    simulation.plant.pull(np.full(6, 0.3), (0.03, 0.0), 0.02)
+    simulation.plant.brake(0.02)
 after = compiled()
 print({name: count for name, count in after.items() if count > before.get(name, 0)})
 """
 
 
-def test_no_question_compiles_a_kernel():
+def test_no_question_and_no_step_of_the_simulator_compiles_a_kernel():
     done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "{}"

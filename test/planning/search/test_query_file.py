@@ -49,7 +49,7 @@ def test_a_terrain_file_is_no_question(tmp_path):
     ("key", "value", "said"),
     [
         ("goal", None, "missing key goal"),
-        ("rover", {"name": "x"}, "missing key gravity"),
+        ("rover", {"name": "x"}, "missing keys gravity, .*nominal_speed"),
     ],
 )
 def test_a_question_with_a_wrong_entry_is_refused_by_name(written, key, value, said):

@@ -14,6 +14,7 @@ from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.simulator.range_sensor import RangeSensor
 from rover_planner.simulator.second_try import SecondTry
+from rover_planner.simulator.simulation import Simulation, SimulationSettings
 from support.grounds import make_terrain, waves
 from support.rough_grounds import plane
 
@@ -117,6 +118,72 @@ def test_torques_that_hold_the_slope_keep_the_speed_and_more_drive_it_up():
     assert plant.pose()[0] < before
 
 
+@pytest.mark.parametrize("engine", [QuasiStaticPlant, MujocoPlant])
+def test_a_brake_stops_the_rover_and_holds_it_on_a_slope(engine):
+    plant = engine(LSR1, plane(-np.tan(np.radians(3.0)), 0.0, half=3.0), (-1.0, 0.0, 0.0))
+    for _ in range(25):
+        plant.pull(np.zeros(6), AHEAD, STEP)
+    assert plant.state().velocity[0] > 0.05
+    places = []
+    for _ in range(100):
+        plant.brake(STEP)
+        places.append(plant.pose()[0])
+    assert places[-1] - places[50] < 1e-3  # 0.25 m without the brake
+    assert np.abs(list(plant.state().joint_velocities.values())).max() < 0.01
+    plant.pull(np.full(6, 0.5), AHEAD, STEP)
+    assert plant.state().velocity[0] > 0.01
+
+
+def test_locked_wheels_slide_as_far_as_their_friction_lets_them():
+    slope = np.radians(15.0)
+    plant = QuasiStaticPlant(LSR1, plane(-np.tan(slope), 0.0, half=3.0), (-1.0, 0.0, 0.0), 0.35)
+    for _ in range(10):
+        plant.pull(np.zeros(6), AHEAD, STEP)
+    before = plant.state().velocity[0]
+    for _ in range(5):
+        plant.brake(STEP)
+    lost = 9.81 * (0.35 * np.cos(slope) - np.sin(slope)) * 5 * STEP
+    assert plant.state().velocity[0] == pytest.approx(before - lost, abs=0.01)
+    assert not any(plant.state().joint_velocities[name] for name in WHEEL_JOINTS)
+
+
+def test_drives_without_commands_are_braked():
+    given = RoverSimulatorParameters(follow_commands=True, start_x=-1.0)
+    slope = plane(-np.tan(np.radians(3.0)), 0.0, half=3.0)
+    simulation = Simulation(SimulationSettings(LSR1, slope, given))
+
+    def roll(begin):
+        return [simulation.advance(begin + STEP * k, STEP).velocity[0] for k in range(25)][-1]
+
+    assert roll(0.0) == 0.0  # the controller is not ready yet
+    simulation.take_torques(np.zeros(6), 1.0)
+    assert roll(1.0) > 0.0
+    simulation.take_brake(True)
+    assert roll(1.0) == 0.0
+    simulation.take_brake(False)
+    assert roll(2.0) == 0.0  # the controller has died
+
+
+def test_a_path_waits_while_the_watch_stops_the_rover_or_is_silent():
+    given = RoverSimulatorParameters(start_x=-1.0, stop_timeout=0.4)
+    simulation = Simulation(SimulationSettings(LSR1, wavy(), given))
+    simulation.take_path(np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
+
+    def speeds(begin, seconds):
+        times = begin + STEP * np.arange(round(seconds / STEP))
+        return [simulation.advance(now, STEP).velocity[0] for now in times]
+
+    assert not any(speeds(0.0, 1.0))
+    simulation.take_stop(False, 1.0)
+    moving = speeds(1.0, 1.0)
+    assert all(moving[1:20]) and not any(moving[22:])
+    assert not any(speeds(2.0, 20.0))
+    simulation.take_stop(False, 22.0)
+    assert min(speeds(22.0, 0.3)[1:]) > 0.0  # it does not back off: it was not stuck
+    simulation.take_stop(True, 22.3)
+    assert not any(speeds(22.3, 0.2)[1:])
+
+
 def test_a_wheel_pulls_no_more_than_its_friction():
     ground = plane(0.0, 0.0, half=3.0)
     weak = QuasiStaticPlant(LSR1, ground, (-1.0, 0.0, 0.0), friction=0.05)
@@ -162,6 +229,17 @@ def test_a_rover_that_stands_still_backs_off_twice_and_then_gives_up(wall_falls)
     assert follower.retries == 2 and follower.given_up != wall_falls
     assert follower.has_arrived(np.array([track[-1, 0], 0.0, 0.0])) == wall_falls
     assert wall_falls or (not track[-1, 1] and track[:, 0].max() == pytest.approx(0.5))
+
+
+def test_the_ground_goes_on_where_a_file_does_not_know_it_and_the_sensor_does_not_see_it():
+    hole = lambda x, y: waves(x, y) + np.where(np.hypot(x, y) < 0.3, np.nan, 0.0)  # noqa: E731
+    ground = make_terrain(hole, half=3.0)
+    simulation = Simulation(
+        SimulationSettings(LSR1, ground, RoverSimulatorParameters(start_x=-1.0))
+    )
+    drive(simulation.plant, 30.0)
+    assert simulation.plant.pose()[0] > 0.7  # a server that interpolates has let it pass
+    assert np.isnan(simulation.look(simulation.plant.state().position, 0.0).elevation_at(0.0, 0.0))
 
 
 def look(ground, **changes):

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Launch files without launch, which PyPI has not: what they start, and the commands of that."""
+
+import contextlib
+import runpy
+import sys
+from collections.abc import Iterator
+from types import ModuleType, SimpleNamespace
+from typing import Any
+from unittest import mock
+
+from support.project.checkout import TOP
+
+MODULES = {
+    "launch": ("LaunchContext", "LaunchDescription"),
+    "launch.actions": ("DeclareLaunchArgument", "GroupAction", "IncludeLaunchDescription",
+                       "OpaqueFunction"),
+    "launch.launch_description_sources": ("PythonLaunchDescriptionSource",),
+    "launch.substitutions": ("LaunchConfiguration",),
+    "launch_ros": (),
+    "launch_ros.actions": ("Node",),
+    "launch_ros.parameter_descriptions": ("ParameterValue",),
+}  # fmt: skip
+"""What launch files import."""
+
+
+class Kept(SimpleNamespace):
+    """An action or substitution that keeps what it was given."""
+
+    def __init__(self, *given: Any, **named: Any):
+        super().__init__(given=given, **named)
+
+    def perform(self, context: dict[str, str]) -> str:
+        """Return the value of a LaunchConfiguration."""
+        return context[self.given[0]]
+
+
+@contextlib.contextmanager
+def launch_modules() -> Iterator[None]:
+    """Put stand-ins for launch and launch_ros where imports look first."""
+    made = {}
+    for name, classes in MODULES.items():
+        made[name] = ModuleType(name)
+        for one in classes:
+            setattr(made[name], one, type(one, (Kept,), {}))
+    with mock.patch.dict(sys.modules, made):
+        yield
+
+
+def kind(action: Any) -> str:
+    """Return the name of an action's class."""
+    return type(action).__name__
+
+
+def describe(name: str) -> tuple[dict[str, Any], list[Any], dict[str, Any]]:
+    """Run a launch file; return its arguments with defaults, its other actions and its names."""
+    with launch_modules():
+        names = runpy.run_path(str(TOP / "launch" / name))
+    actions = names["generate_launch_description"]().given[0]
+    declared = [action for action in actions if kind(action) == "DeclareLaunchArgument"]
+    assert all(action.description for action in declared)
+    defaults = {action.given[0]: action.default_value for action in declared}
+    return defaults, [action for action in actions if action not in declared], names
+
+
+def start_rover(**given: str) -> list[Any]:
+    """Return the nodes that rover.launch.py starts with arguments."""
+    defaults, (opaque,), _ = describe("rover.launch.py")
+    assert given.keys() <= defaults.keys()
+    return opaque.function(defaults | given)
+
+
+def simulation_commands(**given: str) -> dict[str, list[str]]:
+    """Return the command of each node that simulation.launch.py starts with arguments."""
+    defaults, (simulator, group), _ = describe("simulation.launch.py")
+    assert given.keys() <= defaults.keys()
+    values = defaults | given
+    passed = dict(group.given[0][0].launch_arguments)
+    nodes = [
+        simulator,
+        *start_rover(**{name: _value(one, values) for name, one in passed.items()}),
+    ]
+    return {node.executable: _command(node, values) for node in nodes}
+
+
+def _value(given: Any, values: dict[str, str]) -> Any:
+    """Return what an argument stands for: a text, or that of a substitution."""
+    while isinstance(given, Kept):
+        given = values[given.given[0]] if kind(given) == "LaunchConfiguration" else given.given[0]
+    return given
+
+
+def _command(node: Any, values: dict[str, str]) -> list[str]:
+    """Return the words that start a node as launch does."""
+    file, named = node.parameters
+    words = [sys.executable, "-m", f"rover_planner.nodes.{node.executable}", "--ros-args"]
+    words += ["-r", f"__node:={node.name}", "--params-file", _value(file, values)]
+    for source, target in node.remappings:
+        words += ["-r", f"{source}:={target}"]
+    for name, one in named.items():
+        value = _value(one, values)
+        is_text = isinstance(value, str) and getattr(one, "value_type", str) is str
+        words += ["-p", f"{name}:={repr(value) if is_text else str(value).lower()}"]
+    return words

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A rover whose watch is lost stops: the processes of the launch file, killed while it drives."""
+
+import os
+import signal
+import subprocess
+import time
+
+import numpy as np
+import pytest
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from std_msgs.msg import Float64MultiArray, String
+
+from rover_physics.terrain.grid import save_terrain
+from rover_planner.nodes.mission_planner import MissionPlanner
+from rover_planner.ros.qos import latched_qos, sensor_qos, topic_qos
+from support.grounds import make_terrain, waves
+from support.project.launch_files import simulation_commands
+from support.ros_fixtures import domain_id
+from support.waiting import wait_until
+
+LONGEST = 0.5
+"""Time from the loss of the watch to a controller that drives no more [s]."""
+
+
+class Ear(Node):
+    """Hears when the controller drives, and how fast the rover is."""
+
+    def __init__(self, ros):
+        super().__init__("ear", context=ros.context)
+        self.states: list[tuple[float, str]] = []
+        self.speed = 0.0
+        self.largest_torque = 0.0
+        for kind, topic, hear, qos in (
+            (String, "traction_controller/state", self._hear_state, latched_qos()),
+            (Odometry, "odometry", self._hear_odometry, sensor_qos()),
+            (Float64MultiArray, "traction_controller/commands", self._hear_torques, topic_qos()),
+        ):
+            self.create_subscription(kind, topic, hear, qos)
+
+    def _hear_state(self, message):
+        self.states.append((time.monotonic(), message.data))
+
+    def _hear_odometry(self, message):
+        self.speed = message.twist.twist.linear.x
+
+    def _hear_torques(self, message):
+        self.largest_torque = max(map(abs, message.data))
+
+    @property
+    def state(self):
+        return self.states[-1][1] if self.states else ""
+
+
+@pytest.fixture
+def start_simulation(tmp_path):
+    """Return a function that starts the processes of simulation.launch.py, and ends them."""
+    file, started = tmp_path / "waves.npz", {}
+    save_terrain(file, make_terrain(waves, half=5.0))
+    environment = os.environ | {"ROS_DOMAIN_ID": str(domain_id())}
+
+    def start(**given):
+        commands = simulation_commands(terrain_file=str(file), **given)
+        started.update({name: subprocess.Popen(words, env=environment)
+                        for name, words in commands.items()})  # fmt: skip
+        return started
+
+    yield start
+    for process in started.values():
+        process.kill()
+        process.wait()
+
+
+def start_drive(ros) -> MissionPlanner:
+    """Ask for a path of 3 m, and let the rover drive it."""
+    planner = ros.spin(MissionPlanner(context=ros.context))
+    planner.wait_for_server()
+    planner.wait_for_pose(lambda pose: True, 30.0)
+    answer = planner.ask((0.0, 0.0, 0.0), (3.0, 0.0, 0.0))
+    assert answer["traversable"], answer["reason"]
+    planner.send_path(np.array(answer["poses"]))
+    return planner
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
+def test_the_rover_stops_within_half_a_second_of_the_loss_of_the_server(
+    ros, start_simulation, how
+):
+    processes, ear = start_simulation(), ros.spin(Ear(ros))
+    wait_until(lambda: ear.state, "the controller", 120.0)
+    assert ear.state == "fault"  # nothing was accepted yet
+    planner = start_drive(ros)
+    wait_until(lambda: ear.state == "driving" and ear.speed > 0.02, "the drive", 60.0)
+    processes["traverse_server"].send_signal(how)
+    lost = time.monotonic()
+    wait_until(lambda: ear.state == "fault", "the stop")
+    assert ear.states[-1][0] - lost < LONGEST
+    time.sleep(0.5)
+    assert abs(ear.speed) < 1e-3  # held
+    if how == signal.SIGSTOP:
+        processes["traverse_server"].send_signal(signal.SIGCONT)
+        wait_until(lambda: ear.state == "driving", "the watch to go on")
+        return
+    words = processes["traverse_server"].args
+    processes["traverse_server"] = subprocess.Popen(
+        words, env=os.environ | {"ROS_DOMAIN_ID": str(domain_id())}
+    )
+    pose = planner.wait_for_pose(lambda pose: True, 1.0)
+    time.sleep(2.0)
+    assert ear.state == "fault"  # the new server has accepted no path
+    assert planner.ask(pose, (3.0, 0.0, 0.0))["traversable"]  # asked before it has started
+    wait_until(lambda: ear.state == "driving", "the drive to go on")
