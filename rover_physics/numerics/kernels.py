@@ -105,6 +105,8 @@ class _PartLibrary(JITCodeLibrary):
 class _WholeLibrary(JITCodeLibrary):
     """Machine code of a kernel that Python calls, with all that it calls."""
 
+    _shared_module: Any
+
     def _get_module_for_linking(self) -> Any:
         """Return the names of its functions alone: no kernel links this one.
 
