@@ -213,9 +213,8 @@ def test_a_layer_colours_the_ground_and_a_soil_lets_wheels_sink(visitor, page):
     wait_for_rest(page)
 
 
-def test_what_is_shown_is_sent_as_a_link_and_as_a_file_that_needs_no_network(
-    visitor, page, browser, tmp_path
-):
+def show_a_refusal(page):
+    """Show a refused path of a changed rover 2 s after its start; return what is shown."""
     session = page.session
     changed = replace(page.home, rover=replace(LSR1, friction=0.6))
     ask(page, lambda: session.take_scenario(changed))
@@ -223,14 +222,15 @@ def test_what_is_shown_is_sent_as_a_link_and_as_a_file_that_needs_no_network(
     ask(page, lambda: session.show_path(find_refused(page)))
     ask(page, lambda: page.playback.go_to(2.0))
     wait_for_rest(page)
-    shown, at = session.shown, page.playback.time
+    return session.shown
+
+
+def test_a_link_brings_back_rover_path_and_time(visitor, page):
+    session, shown, at = page.session, show_a_refusal(page), page.playback.time
     visitor.open_tab("Share")
     visitor.press("Link to what is shown")
     address = visitor.tab.get_attribute("#link", "href")
     assert address.startswith(f"{page.url}/?{KEY}=")
-    with visitor.tab.expect_download() as download:
-        visitor.press("Save as HTML file")
-    download.value.save_as(tmp_path / "refusal.html")
     ask(page, session.reset)
     ask(page, lambda: session.plan_to(np.array([0.5, 0.5])))
     wait_for_rest(page)
@@ -239,8 +239,15 @@ def test_what_is_shown_is_sent_as_a_link_and_as_a_file_that_needs_no_network(
     wait_until(lambda: session.shown.index == shown.index, "the path")
     wait_until(lambda: page.playback.time == pytest.approx(at, abs=1e-3), "the time")
     np.testing.assert_array_equal(session.shown.path.poses, shown.path.poses)
-    wait_for_rest(page)
 
+
+@pytest.mark.long
+def test_a_saved_file_shows_the_same_without_a_network(visitor, page, browser, tmp_path):
+    shown = show_a_refusal(page)
+    visitor.open_tab("Share")
+    with visitor.tab.expect_download() as download:
+        visitor.press("Save as HTML file")
+    download.value.save_as(tmp_path / "refusal.html")
     context = browser.new_context(viewport=LAPTOP, offline=True, device_scale_factor=SCALE)
     tab = context.new_page()
     tab.set_default_timeout(1000.0 * WAIT)
