@@ -33,7 +33,7 @@ EXTRAS = {
         "ros-jazzy-rmw-fastrtps-cpp>=8.4,<9",
     ],
     "plots": ["matplotlib>=3.6,<4"],
-    "view": ["viser>=1.1.1,<1.2", "websockets>=14", "trimesh>=4.0,<6", "matplotlib>=3.6,<4"],
+    "view": ["viser>=1.1.1,<1.2", "websockets>=14,<17", "trimesh>=4.0,<6", "matplotlib>=3.6,<4"],
     "bags": ["rosbags>=0.11,<1"],
     "survey": [
         "dask>=2024.8,<2027",

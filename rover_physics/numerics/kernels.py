@@ -16,10 +16,9 @@ from collections.abc import Callable
 from functools import cached_property, update_wrapper
 from typing import Any
 
-from llvmlite.binding import parse_assembly
 from numba import _dynfunc
 from numba.core import types
-from numba.core.codegen import JITCodeLibrary
+from numba.core.codegen import JITCodeLibrary, ll
 from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
 
@@ -116,7 +115,7 @@ class _WholeLibrary(JITCodeLibrary):
         if self._shared_module is None:
             names = [one.name for one in self._final_module.functions if not one.is_declaration]
             text = "".join(f'define void @"{name}"() {{ ret void }}\n' for name in names)
-            self._shared_module = parse_assembly(text)
+            self._shared_module = ll.parse_assembly(text)
         return self._shared_module
 
     def add_linking_library(self, library: JITCodeLibrary) -> None:
