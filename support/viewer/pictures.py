@@ -19,7 +19,7 @@ from rover_planner.viewer.state.session import ViewSession
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.viewer.browser import ARGUMENTS, PROGRAM, Visitor, sync_api, wait_until
 
-SETTLE = 3.0
+SETTLE = 10.0
 """Time for the browser to draw before a picture is taken [s]."""
 MAX_GAP = 0.2
 """Gaps in maps up to this width are filled, as `rover_planner view` does [m]."""
