@@ -19,6 +19,7 @@ from benchmarks.grounds import real_maps, straight
 from benchmarks.measure import Figure, median_time, median_times
 from rover_physics import (
     Rover,
+    SweepOptions,
     Terrain,
     judge_path,
     load_rover,
@@ -26,7 +27,9 @@ from rover_physics import (
     save_terrain,
     score_poses,
 )
+from rover_physics.names import EQUAL, SERVO
 from rover_planner.command.prediction_files import read_poses, write_prediction
+from rover_planner.parameters.shared import ACCEPTED_CHANCE
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.grounds import make_terrain, waves
@@ -34,8 +37,12 @@ from support.rough_grounds import bouldered
 
 REPEATS = 7
 """Repeats of a measurement."""
+MOST_FOR_CHANCE = 4.0
+"""Time of a verdict with its chance of failure over that without, at most, on mild ground."""
 MANY = 1_000_000
 """Poses of the path whose memory is measured."""
+QUESTIONS = (1, 6.0, 1.0), (9, 40.0, 1.0), (9, 200.0, ACCEPTED_CHANCE)
+"""Candidates, largest time [ms] and accepted chance of questions."""
 START, GOAL = (-5.0, 0.0, 0.0), (5.0, 0.0, 0.0)
 """Ends of the questions of 10 m."""
 
@@ -47,9 +54,10 @@ def measure() -> list[Figure]:
     figures = []
     for name, (ground, paths, most) in cases(mars).items():
         figures += measure_ratios(rover, name, ground, paths, most)
+        figures += measure_chances(rover, name, ground, paths)
     with tempfile.TemporaryDirectory(dir=".") as folder:
         figures += measure_files(rover, mars, Path(folder))
-        figures += [measure_question(rover, mars, *row) for row in ((1, 6.0), (9, 40.0))]
+        figures += [measure_question(rover, mars, *row) for row in QUESTIONS]
         figures.append(measure_memory(mars, Path(folder)))
     return figures
 
@@ -97,6 +105,25 @@ def measure_ratios(
     ]
 
 
+def measure_chances(
+    rover: Rover, name: str, ground: Terrain, paths: Sequence[np.ndarray]
+) -> list[Figure]:
+    """Compare verdicts with chances of failure with those without, in turns."""
+    figures = []
+    for policy in (EQUAL, SERVO):
+        options, sums = SweepOptions(policy=policy), np.zeros(2)
+        for path in paths:
+            calls = [
+                lambda: judge_path(rover, ground, path, options),  # noqa: B023
+                lambda: judge_path(rover, ground, path, options, accepted_chance=1.0),  # noqa: B023
+            ]
+            sums += median_times(calls, REPEATS)
+        words = "paths", f"{name}: chance under {policy}", float(sums[1] / sums[0]), "x"
+        against = "judged without, in turns"
+        figures.append(Figure(*words, MOST_FOR_CHANCE, against=against, repeats=REPEATS))
+    return figures
+
+
 def measure_files(rover: Rover, mars: Terrain, folder: Path) -> list[Figure]:
     """Compare judging and writing with judging alone."""
     np.savez(folder / "poses.npz", poses=np.concatenate([straight(10.0, y=k) for k in (-6, 0, 6)]))
@@ -111,11 +138,14 @@ def measure_files(rover: Rover, mars: Terrain, folder: Path) -> list[Figure]:
     return [Figure("paths", name, whole / alone, "x", 1.3, False, "judged", REPEATS)]
 
 
-def measure_question(rover: Rover, mars: Terrain, count: int, most: float) -> Figure:
-    """Measure a question of 10 m with a number of candidates."""
-    options = PathQueryOptions(count=count)
+def measure_question(
+    rover: Rover, mars: Terrain, count: int, most: float, accepted: float
+) -> Figure:
+    """Measure a question of 10 m with a number of candidates and an accepted chance."""
+    options = PathQueryOptions(count=count, accepted_chance=accepted)
     taken = median_time(lambda: answer_path_query(rover, mars, START, GOAL, options), REPEATS)
     name = f"question of 10 m, {count} candidate{'s' if count > 1 else ''}"
+    name += f", chance up to {accepted:g}" if accepted < 1.0 else ""
     return Figure("paths", name, 1e3 * taken, "ms", most, repeats=REPEATS)
 
 

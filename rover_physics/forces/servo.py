@@ -44,6 +44,7 @@ def balance_servos(model, work):
     for wheel in range(6):
         x, y = work.contacts.point[wheel, 0], work.contacts.point[wheel, 1]
         mu = friction_at(model.ground, x, y, settings.friction)
+        mu *= settings.friction_factor[wheel]
         servo.yields[wheel] = 0
         if settings.on_soil:
             soil = servo.soil[wheel]

@@ -28,6 +28,8 @@ TOLERANCE = 1e-9
 """Excess over a limit, in its SI unit, that counts as rounding."""
 TRAPPED = "trapped"
 """Code of a path that leads to where the rover gets neither on nor back."""
+CHANCE = "chance"
+"""Code of a path that keeps all limits as told, but breaks one with too large a chance."""
 NOT_COMPUTABLE = "not_computable"
 """Code of a value that is not a number; it counts as a broken limit."""
 WHEEL_CONSTRAINTS = ("wheel_lift", "friction", "torque")

@@ -20,6 +20,7 @@ from rover_physics.prediction.path_kernels import (
     Crossings,
     find_jumps,
     join_crossings,
+    none_held,
     sort_pieces,
 )
 from rover_physics.results.record import place_results, select_results
@@ -61,8 +62,10 @@ def find_crossings(
     if not len(jumps) and not len(inside):
         return at_rest
     rows = jumps.ravel()
-    no_climb, at_jumps = np.zeros(len(rows), bool), select_results(results, rows)
-    path = Crossings(rows.astype(float), jumps[:, 1].repeat(2), no_climb, poses[rows], at_jumps)
+    at_jumps = select_results(results, rows)
+    path = Crossings(
+        rows.astype(float), jumps[:, 1].repeat(2), none_held(len(rows)), poses[rows], at_jumps
+    )
     known = join_crossings([path, turns])
     ends = np.vstack([np.arange(len(rows)).reshape(-1, 2), len(rows) + jumps_in_turns])
     while len(ends):
@@ -71,7 +74,7 @@ def find_crossings(
         if len(closed):
             known = join_crossings([known, climb_faces(model, known, closed)])
     kept = (known.results["status"] != PoseStatus.NOT_SETTLED) | known.climbing
-    kept[: len(rows) + len(inside)] = np.append(no_climb, inside)
+    kept[: len(rows) + len(inside)] = np.append(np.zeros(len(rows), bool), inside)
     return join_crossings([known.select(np.flatnonzero(kept)), at_rest]).in_order()
 
 
@@ -101,7 +104,7 @@ def _divide_turns(
     found = select_results(results, np.where(within > 0, first + 1, first))
     turned = model.evaluate(at[inside], motions=found["motion"][inside])
     place_results(turned, found, inside)
-    in_turns = Crossings(first + share, first + 1, np.zeros(len(at), bool), at, found)
+    in_turns = Crossings(first + share, first + 1, none_held(len(at)), at, found)
     return in_turns, inside, _find_jumps(model, at, found, np.diff(within) > 0)
 
 
@@ -115,7 +118,7 @@ def turn_wheels(
         return NO_CROSSINGS
     at, motions = np.ascontiguousarray(poses[rows]), results["motion"][rows + 1]
     turned = model.evaluate(at, motions=np.ascontiguousarray(motions))
-    return Crossings(rows.astype(float), rows + 1, np.zeros(len(rows), bool), at, turned)
+    return Crossings(rows.astype(float), rows + 1, none_held(len(rows)), at, turned)
 
 
 def find_turns(
@@ -170,7 +173,7 @@ def _divide(model: PackedModel, known: Crossings, ends: np.ndarray) -> Crossings
     """Return the poses of `divide_stretches`, evaluated."""
     place, waypoint, poses, motions = divide_stretches(known, ends)
     results = model.evaluate(poses, motions=motions)
-    return Crossings(place, waypoint, np.zeros(len(place), bool), poses, results)
+    return Crossings(place, waypoint, none_held(len(place)), poses, results)
 
 
 def _sort_pieces(
@@ -211,10 +214,8 @@ def climb_faces(model: PackedModel, known: Crossings, ends: np.ndarray) -> Cross
     angles = _angles_on_faces(radius, heights, face[:, None], edge[:, None])
     angles *= np.where(backward, -1.0, 1.0)[:, None]
     touching = (CLIMB_STAGES > 0.0) | (heights > edge[:, None])
-    held = np.full((len(at), stages, 6, 2), np.nan)
-    held[row, :, wheel] = np.where(
-        touching[..., None], np.stack([heights, angles], axis=-1), np.nan
-    )
+    held = none_held(len(at) * stages).reshape(len(at), stages, 6, 2)
+    held[row, :, wheel] = np.stack([np.where(touching, heights, np.nan), angles], axis=-1)
     poses = np.repeat(known.poses[foot], stages, axis=0)
     motions = np.repeat(known.results["motion"][top], stages, axis=0)
     results = model.evaluate(poses, held.reshape(-1, 6, 2), motions)
@@ -223,7 +224,7 @@ def climb_faces(model: PackedModel, known: Crossings, ends: np.ndarray) -> Cross
     climbs = Crossings(
         (start + CLIMB_STAGES * (end - start)).ravel(),
         np.repeat(known.waypoint[foot], stages),
-        np.ones(len(poses), bool),
+        held.reshape(-1, 6, 2),
         poses,
         results,
     )

@@ -40,6 +40,7 @@ of the settings."""
 SETTINGS = record_type(
     ("policy", np.int64),  # a TorquePolicy
     ("friction", float),  # friction coefficient where the terrain has no friction layer
+    ("friction_factor", float, (6,)),  # factor of the friction under each wheel
     ("max_torque", float),  # largest wheel torque [N m]
     ("allowed_torque", float),  # largest torque within safety limit and control margin [N m]
     ("allowed_friction", float),  # largest friction utilisation within the safety limit
@@ -335,7 +336,8 @@ def _write_forces(model, work, result):
     search, point = work.search, work.contacts.point
     weight = linkage.mass * linkage.gravity
     for wheel in range(6):
-        search.mu[wheel] = friction_at(ground, point[wheel, 0], point[wheel, 1], settings.friction)
+        mu = friction_at(ground, point[wheel, 0], point[wheel, 1], settings.friction)
+        search.mu[wheel] = settings.friction_factor[wheel] * mu
     if settings.on_soil:
         share_forces_on_soil(model, work)
     elif settings.policy == TorquePolicy.EQUAL:

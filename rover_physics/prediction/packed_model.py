@@ -187,6 +187,7 @@ def _pack_request(
         SETTINGS,
         policy=POLICIES[options.policy],
         friction=float(mu),
+        friction_factor=1.0,
         max_torque=float(torque),
         allowed_torque=float(
             torque * rover.limits.torque_saturation * (1.0 - options.kept_margin)

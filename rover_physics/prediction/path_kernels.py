@@ -60,12 +60,18 @@ class Crossings(NamedTuple):
     """(m,) place along the path in waypoints: 2.5 is halfway between waypoints 2 and 3."""
     waypoint: np.ndarray
     """(m,) index of the waypoint that follows."""
-    climbing: np.ndarray
-    """(m,) True where a wheel is held at a face."""
+    held: np.ndarray
+    """(m, 6, 2) height [m] and contact angle [rad] of wheels that climb a face, NaN for
+    others; the height is NaN at the foot, where the wheel does not yet touch the face."""
     poses: np.ndarray
     """(m, 3) x, y [m], yaw [rad]."""
     results: Any
     """(m,) RESULT of each pose."""
+
+    @property
+    def climbing(self) -> np.ndarray:
+        """(m,) True where a wheel is held at a face."""
+        return ~np.isnan(self.held[:, :, 1]).all(axis=1)
 
     @property
     def views(self) -> "Crossings":
@@ -94,8 +100,13 @@ class Crossings(NamedTuple):
         return back._replace(place=place, waypoint=waypoint)
 
 
+def none_held(count: int) -> np.ndarray:
+    """Return `held` (count, 6, 2) of poses at which no wheel climbs."""
+    return np.full((count, 6, 2), np.nan)
+
+
 NO_CROSSINGS = Crossings(
-    np.empty(0), np.empty(0, np.int64), np.empty(0, bool), np.empty((0, 3)), new_results(0)
+    np.empty(0), np.empty(0, np.int64), none_held(0), np.empty((0, 3)), new_results(0)
 )
 
 

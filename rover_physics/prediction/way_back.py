@@ -15,6 +15,7 @@ from rover_physics.prediction.path_kernels import (
     Crossings,
     find_remaining_jumps,
     join_crossings,
+    none_held,
 )
 from rover_physics.prediction.sweep import SweptPath, make_prediction
 from rover_physics.results.path_prediction import PathPrediction
@@ -41,7 +42,7 @@ def predict_way_back(model: PackedModel, swept: SweptPath, waypoints: slice) -> 
     crossings = swept.crossings.select(~swept.crossings.climbing).between(first, end - 1)
     crossings = crossings.reversed(n)
     _reverse(crossings.results)
-    path = Crossings(np.arange(float(n)), np.arange(n) + 1, np.zeros(n, bool), poses, results)
+    path = Crossings(np.arange(float(n)), np.arange(n) + 1, none_held(n), poses, results)
     pairs = np.empty((n + len(crossings.place), 2), np.int64)
     count = find_remaining_jumps(path.views, crossings.views, wheels, pairs)
     if count:

@@ -30,6 +30,7 @@ from rover_physics.numerics.plausible import (
     MIN_STEERING,
     MIN_TORQUE,
 )
+from rover_physics.rover.uncertainty import Uncertainty
 
 Metres = Annotated[float, number("m", least=-MAX_LENGTH, most=MAX_LENGTH)]
 Point = Annotated[
@@ -239,6 +240,8 @@ class Rover:
     """The arm; None if there is none."""
     steering: Steering | None = None
     """The wheels that steer; None if all are fixed, and the rover skids in curves."""
+    uncertainty: Uncertainty = field(default_factory=Uncertainty)
+    """How well all this is known, for chances of failure."""
 
     @property
     def total_mass(self) -> float:

@@ -109,6 +109,11 @@ read_int: Any = intrinsic(_reader(types.int32, types.int64))
 @lru_cache(maxsize=4)
 def pack_ground(terrain: Terrain) -> Ground:
     """Return a terrain as a Ground, without soils; the last 4 are cached."""
+    return new_ground(terrain)
+
+
+def new_ground(terrain: Terrain) -> Ground:
+    """Return a terrain as a Ground, without soils."""
     elevation, friction, soil = terrain.elevation, terrain.friction, terrain.soil
     highest = _reduce_blocks(elevation, np.fmax)
     some_unknown = _reduce_blocks(np.isnan(elevation), np.logical_or)

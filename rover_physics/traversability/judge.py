@@ -8,19 +8,26 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rover_physics.bounds.path import SIGMAS, bound_path, check_sigmas
+from rover_physics.chance.failure_chance import find_failure_chance
 from rover_physics.names import EQUAL
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.quiet import quiet
 from rover_physics.prediction.packed_model import PackedModel, pack_model
+from rover_physics.prediction.path_kernels import NO_CROSSINGS
 from rover_physics.prediction.path_motion import motions_of
-from rover_physics.prediction.sweep import check_poses, predict_paths, predict_poses
+from rover_physics.prediction.sweep import SweptPath, check_poses, predict_paths, predict_poses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.bounded_verdict import refuse_worst_case
 from rover_physics.traversability.entrapment import course_of, refuse_if_trapped
-from rover_physics.traversability.verdict import Verdict, hold_against_limits, with_refusals
+from rover_physics.traversability.verdict import (
+    Verdict,
+    hold_against_limits,
+    refuse_chance,
+    with_refusals,
+)
 
 
 def judge_path(
@@ -31,6 +38,7 @@ def judge_path(
     *,
     sigmas: float | None = SIGMAS,
     stop_at_failure: bool = False,
+    accepted_chance: float | None = None,
 ) -> tuple[PathPrediction, Verdict]:
     """Predict a path and judge it, including entrapment.
 
@@ -51,6 +59,9 @@ def judge_path(
         stop_at_failure: Whether to leave out the waypoints beyond the first failure (default: all
             waypoints are predicted and judged). It saves their time and changes neither whether
             the path is traversable nor code, reason and waypoint of the first failure.
+        accepted_chance: Largest chance of failure, 0 to 1, of a path that is traversable; the
+            verdict then has the chance, except of a path that stopped at its first failure
+            (docs/uncertainty.md). None does not ask for it.
 
     Returns:
         The prediction, and the verdict on it. With `stop_at_failure`, both end at the first
@@ -63,7 +74,13 @@ def judge_path(
         SoilError: A soil that is not a preset.
     """
     return judge_paths(
-        rover, terrain, [poses], options, sigmas=sigmas, stop_at_failure=stop_at_failure
+        rover,
+        terrain,
+        [poses],
+        options,
+        sigmas=sigmas,
+        stop_at_failure=stop_at_failure,
+        accepted_chance=accepted_chance,
     )[0]
 
 
@@ -77,6 +94,7 @@ def judge_paths(
     sigmas: float | None = SIGMAS,
     stop_at_failure: bool = False,
     check_entrapment: bool = True,
+    accepted_chance: float | None = None,
 ) -> list[tuple[PathPrediction, Verdict]]:
     """Judge several paths at once, faster than one by one; see `judge_path`.
 
@@ -92,7 +110,11 @@ def judge_paths(
         verdict = hold_against_limits(rover, swept.prediction)
         if check_entrapment and verdict.code != "wheel_drop":
             verdict = refuse_if_trapped(model, course_of(model, swept), verdict)
-        judged.append(add_bounds(model, swept.prediction, verdict, sigmas))
+        prediction, verdict = add_bounds(model, swept.prediction, verdict, sigmas)
+        if accepted_chance is not None and (verdict.traversable or not stop_at_failure):
+            chance = find_failure_chance(model, swept)
+            verdict = refuse_chance(verdict, chance, accepted_chance)
+        judged.append((prediction, verdict))
     return judged
 
 
@@ -105,6 +127,7 @@ def judge_poses(
     options: SweepOptions = DEFAULT_OPTIONS,
     *,
     sigmas: float | None = SIGMAS,
+    accepted_chance: float | None = None,
 ) -> tuple[PathPrediction, Verdict]:
     """Predict and judge single poses that form no path; what lies between them is not looked at.
 
@@ -119,6 +142,7 @@ def judge_poses(
             left, 0 straight ahead, inf or -inf on the spot. None: straight ahead.
         options: As for `judge_path`.
         sigmas: As for `judge_path`.
+        accepted_chance: As for `judge_path`; the chance that any of the poses fails.
 
     Raises:
         PoseError: Poses or curvatures of wrong shape, or not numbers.
@@ -127,7 +151,12 @@ def judge_poses(
     check_sigmas(sigmas)
     model, places = pack_model(rover, terrain, options), check_poses(poses)
     bends = np.zeros(len(places)) if curvature is None else curvature
-    return _judge_in_motion(model, places, motions_of(model, places, bends), sigmas)
+    prediction, verdict = _judge_in_motion(model, places, motions_of(model, places, bends), sigmas)
+    if accepted_chance is not None:
+        swept = SweptPath(places, prediction, NO_CROSSINGS)
+        chance = find_failure_chance(model, swept, on_path=False)
+        verdict = refuse_chance(verdict, chance, accepted_chance)
+    return prediction, verdict
 
 
 def _judge_in_motion(

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from rover_physics.chance.failure_chance import FailureChance
 from rover_physics.limits import table
-from rover_physics.limits.table import DEGREES, NOT_COMPUTABLE, TRAPPED, Sense
+from rover_physics.limits.table import CHANCE, DEGREES, NOT_COMPUTABLE, TRAPPED, Sense
 from rover_physics.names import WHEEL_POSITIONS, WHEELS
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.plain_values import to_plain
@@ -105,6 +106,10 @@ class Verdict:
     """Largest possible tilt of the body [rad], NaN if none is known."""
     belly_clearance_bound: float = float("nan")
     """Smallest possible belly clearance [m], NaN if none is known."""
+    failure_chance: float = float("nan")
+    """Chance that the path fails anywhere, 0 to 1; NaN if it was not asked."""
+    failure_chance_at: tuple[float, ...] = ()
+    """For each waypoint the chance that it fails there; empty if it was not asked."""
 
     def to_dict(self) -> dict[str, Any]:
         """Return the verdict as JSON types: lists for tuples, None for NaN and infinity."""
@@ -114,7 +119,7 @@ class Verdict:
 def codes_of_verdicts() -> tuple[str, ...]:
     """Return the codes of a verdict; the first that applies is the reason of a waypoint."""
     of_limits = dict.fromkeys(limit.code for limit in table.LIMITS)
-    return (*(code for code, _ in UNSETTLED.values()), *of_limits, TRAPPED)
+    return (*(code for code, _ in UNSETTLED.values()), *of_limits, TRAPPED, CHANCE)
 
 
 def hold_against_limits(rover: Rover, prediction: PathPrediction) -> Verdict:
@@ -185,6 +190,25 @@ def find_largest_risk(uses: Uses, settled: np.ndarray) -> float:
     """Return the largest use of the limits that count as risk at the settled rows, 0 for none."""
     counts = uses.limits.records["is_risk"] > 0
     return float(np.fmax.reduce(uses.use[settled][:, counts], axis=None, initial=0.0))
+
+
+def refuse_chance(verdict: Verdict, chance: FailureChance, accepted: float) -> Verdict:
+    """Return the verdict with the chance of failure, refused where that is above `accepted`.
+
+    A path that is trapped fails for sure.
+    """
+    trapped = np.array([code == TRAPPED for code in verdict.codes])
+    at, path = np.where(trapped, 1.0, chance.at), 1.0 if trapped.any() else chance.path
+    known = replace(verdict, failure_chance=path, failure_chance_at=tuple(at.tolist()))
+    if not verdict.traversable or path <= accepted:
+        return known
+    worst, codes, reasons = int(at.argmax()), list(verdict.codes), list(verdict.reasons)
+    codes[worst] = CHANCE
+    reasons[worst] = (
+        f"the path fails with a chance of {path:.2f}, accepted {accepted:g}: most often here, "
+        f"{at[worst]:.2f}, by the limit of {chance.limit}"
+    )
+    return with_refusals(known, codes, reasons)
 
 
 def with_refusals(verdict: Verdict, codes: Sequence[str], reasons: Sequence[str]) -> Verdict:

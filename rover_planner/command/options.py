@@ -49,12 +49,18 @@ Sigmas = Annotated[
     float,
     option("K", "Standard deviations to allow for where the map has elevation_std; 0: none."),
 ]
+AcceptedChance = Annotated[
+    float,
+    option("P", "Largest chance of failure, 0 to 1, of a path that is traversable.", min=0, max=1),
+]
 MaxGap = Annotated[
     float, option("M", "Widest unknown region of the map to interpolate in m; 0: none.")
 ]
 MaxCells = Annotated[
     int, option("N", "Largest terrain file in cells; more are not unpacked.", min=4)
 ]
+ACCEPTED_CHANCE = 0.05
+"""Default of --accepted-chance where chances are asked for: one path of twenty may fail."""
 MAX_CELLS = 25_000_000
 """Default of the option --max-cells; a test compares it with that of `load_terrain`."""
 

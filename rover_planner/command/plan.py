@@ -9,6 +9,7 @@ import typer
 
 from rover_planner.command.options import (
     MAX_CELLS,
+    AcceptedChance,
     Friction,
     MaxCells,
     MaxTorque,
@@ -51,6 +52,7 @@ def plan(
         bool, flag("--frontier", "Plan as near as possible to a goal on unknown ground.")
     ] = False,
     sigmas: Sigmas = 3.0,
+    accepted_chance: AcceptedChance = 1.0,
     picture: Picture = None,
     dump: Annotated[
         Path | None, option("FILE", "Write the question for replay-plan, .npz.")
@@ -79,6 +81,7 @@ def plan(
                 policy=policy, friction=friction, max_torque=max_torque, soil=soil, payload=payload
             ),
             map_sigmas=sigmas,
+            accepted_chance=accepted_chance,
         ),
     )
     if dump is not None:

@@ -1,13 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command `rover_planner predict`: writes loads, slip and margins along a path to a file."""
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from rover_planner.command.options import (
+    ACCEPTED_CHANCE,
     MAX_CELLS,
+    AcceptedChance,
     Friction,
     MaxCells,
     MaxTorque,
@@ -26,7 +29,7 @@ from rover_planner.command.options import (
 
 MAX_IN_MEMORY = 20_000
 """Largest number of poses whose prediction is kept in memory; longer paths are written in parts,
-except with classes."""
+except with classes or chances."""
 
 if TYPE_CHECKING:
     from rover_physics.traversability.torque_ranges import TorqueRanges
@@ -70,6 +73,10 @@ def predict(
     torque_ranges: Annotated[
         bool, flag("--torque-ranges", "Add the range of feasible torques of each wheel.")
     ] = False,
+    chance: Annotated[
+        bool, flag("--chance", "Add the chance that the path fails, and that each waypoint does.")
+    ] = False,
+    accepted_chance: AcceptedChance = ACCEPTED_CHANCE,
     max_cells: MaxCells = MAX_CELLS,
 ) -> None:
     """Predict loads, slip and margins along a path, or at single poses, and write them to a file.
@@ -116,7 +123,7 @@ def predict(
             progress("find the ranges of the torques")
             return find_torque_ranges(model, ground, path, options, curvature)
 
-        if len(path) > MAX_IN_MEMORY and not classes:
+        if len(path) > MAX_IN_MEMORY and not (classes or chance):
             from rover_physics.traversability.partwise import PartwiseJudge
 
             with writing_parts(out, len(path), assumed) as file:
@@ -128,11 +135,14 @@ def predict(
                 verdict = judge.verdict()
                 file.close(verdict, find_ranges())
         else:
+            asked = accepted_chance if chance else None
             if curvature is None:
-                prediction, verdict = judge_path(model, ground, path, options, sigmas=sigmas)
+                prediction, verdict = judge_path(
+                    model, ground, path, options, sigmas=sigmas, accepted_chance=asked
+                )
             else:
                 prediction, verdict = judge_poses(
-                    model, ground, path, curvature, options, sigmas=sigmas
+                    model, ground, path, curvature, options, sigmas=sigmas, accepted_chance=asked
                 )
             found = None
             if classes:
@@ -152,7 +162,9 @@ def _summarise(count: int, verdict: "Verdict") -> str:
     """Return the number of waypoints and the verdict in words."""
     waypoints = f"{count} waypoint{'s' if count > 1 else ''}"
     if verdict.traversable:
-        return f"{waypoints}, traversable"
+        known = not math.isnan(verdict.failure_chance)
+        chance = f" with a chance of failure of {verdict.failure_chance:.2f}" if known else ""
+        return f"{waypoints}, traversable{chance}"
     return (
         f"{waypoints}, not traversable from waypoint {verdict.first_failure} on: {verdict.reason}"
     )

@@ -201,6 +201,7 @@ def write_prediction(
     The file has the ARRAYS, `reason` (n,) text, empty if passable, `traversable` () bool, and
     `first_failure` () int, -1 if there is none. On an uncertain map it also has `map_sigmas` ()
     and for each of BOUNDED_VALUES its `..._bounds`, with minimum and maximum in the last axis.
+    If the verdict has a chance of failure, so do `failure_chance` () and `failure_chance_at` (n,).
 
     Args:
         path: The file; an existing one is overwritten.
@@ -284,7 +285,7 @@ def _summary_of(
     assumptions: Assumptions | None,
     ranges: "TorqueRanges | None",
 ) -> dict[str, Any]:
-    """Return the arrays about the whole path, and torque ranges."""
+    """Return the arrays about the whole path, chances of failure, and torque ranges."""
     arrays: dict[str, Any] = {
         "traversable": np.array(verdict.traversable, dtype=np.bool_),
         "first_failure": np.array(verdict.first_failure, dtype=np.int64),
@@ -293,6 +294,9 @@ def _summary_of(
         arrays[ASSUMPTIONS] = np.array(write_assumptions(assumptions))
     if prediction.bounds is not None:
         arrays["map_sigmas"] = np.array(prediction.bounds.sigmas)
+    if verdict.failure_chance_at:
+        arrays["failure_chance"] = np.array(verdict.failure_chance)
+        arrays["failure_chance_at"] = np.array(verdict.failure_chance_at)
     if ranges is not None:
         arrays["torque_range"] = np.stack([ranges.lowest, ranges.highest], axis=-1)
     return arrays

@@ -215,6 +215,11 @@ class TraverseServerParameters(ParameterTable):
         "Standard deviations to allow for if the map has elevation_std; 0 takes it as exact.",
         bounds=(0.0, 10.0),
     )
+    accepted_chance: float = parameter(
+        1.0,
+        "Largest chance of failure of a path that is traversable; 1 does not ask for it.",
+        bounds=(0.0, 1.0),
+    )
     terrain_file: str = parameter(
         "",
         "Map to start with: a preset's name or a terrain file; empty waits for a map.",

@@ -41,6 +41,8 @@ class PathQueryOptions:
     """Torque policy, friction, torque, soil, payload and arm of the model."""
     map_sigmas: float = SIGMAS
     """Standard deviations to allow for on an uncertain map; 0 treats heights as exact."""
+    accepted_chance: float = 1.0
+    """Largest chance of failure of a path that is traversable; 1 does not ask for it."""
 
     def change(self, **changes: Any) -> "PathQueryOptions":
         """Return the options with other values of their fields, or of those of the model.
@@ -194,12 +196,26 @@ def answer_path_query(
         sigmas=options.map_sigmas,
         stop_at_failure=len(paths) > 1,
     )
-    return choose(
-        tuple(
-            Candidate(poses, prediction, verdict, path_cost(prediction, verdict))
-            for poses, (prediction, verdict) in zip(paths, judged, strict=True)
-        )
-    )
+    candidates = [
+        Candidate(poses, prediction, verdict, path_cost(prediction, verdict))
+        for poses, (prediction, verdict) in zip(paths, judged, strict=True)
+    ]
+    return choose_by_chance(rover, terrain, candidates, options)
+
+
+def choose_by_chance(
+    rover: Rover, terrain: Terrain, candidates: list[Candidate], options: PathQueryOptions
+) -> PathAnswer:
+    """Choose the traversable candidate with the lowest cost whose chance of failure is accepted.
+
+    Chances are found in the order of the costs, up to the first that is accepted.
+    """
+    while (answer := choose(tuple(candidates))).traversable:
+        best = answer.best
+        if options.accepted_chance >= 1.0 or candidates[best].verdict.failure_chance_at:
+            break
+        candidates[best] = check_path(rover, terrain, candidates[best].poses, options)
+    return answer
 
 
 def generate_paths(
@@ -231,21 +247,29 @@ def check_path(
 ) -> Candidate:
     """Evaluate and judge a given path of poses (n, 3); other arguments as `answer_path_query`.
 
-    With `stop_at_failure`, the waypoints beyond the first failure are left out.
+    With `stop_at_failure`, the waypoints beyond the first failure are left out. The chance of
+    failure is asked only of a path that is traversable without it, so refusals are quick.
 
     Raises:
         RoverError: The model refuses an option (ModelError) or the poses (PoseError).
     """
     options = options or PathQueryOptions()
     poses = np.array(poses, np.float64)
-    prediction, verdict = judge_path(
-        rover,
-        terrain,
-        poses,
-        options.model,
-        sigmas=options.map_sigmas,
-        stop_at_failure=stop_at_failure,
-    )
+
+    def judge(accepted: float | None) -> tuple[PathPrediction, Verdict]:
+        return judge_path(
+            rover,
+            terrain,
+            poses,
+            options.model,
+            sigmas=options.map_sigmas,
+            stop_at_failure=stop_at_failure,
+            accepted_chance=accepted,
+        )
+
+    prediction, verdict = judge(None)
+    if verdict.traversable and options.accepted_chance < 1.0:
+        prediction, verdict = judge(options.accepted_chance)
     return Candidate(poses, prediction, verdict, path_cost(prediction, verdict))
 
 

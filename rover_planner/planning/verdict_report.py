@@ -12,7 +12,7 @@ from rover_physics.traversability.verdict import BOUNDS, EXTREMES
 from rover_planner.maps.unobserved_ground import UnobservedShare
 from rover_planner.planning.path_query import Candidate, PathSearch
 
-REPORTED = (*EXTREMES, "risk", "map_sigmas", *BOUNDS)
+REPORTED = (*EXTREMES, "risk", "map_sigmas", *BOUNDS, "failure_chance")
 """Fields of a verdict that a report has."""
 
 
@@ -132,6 +132,7 @@ def report_path(
         {
             "codes": verdict.codes,
             "reasons": verdict.reasons,
+            "failure_chance_at": verdict.failure_chance_at or [math.nan] * len(verdict.codes),
             "traversability_classes": [one.traversability_class for one in classes],
             "class_constraints": [one.constraint for one in classes],
             "class_wheels": [one.wheel for one in classes],

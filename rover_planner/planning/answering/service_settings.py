@@ -100,6 +100,7 @@ def load_service_settings(parameters: TraverseServerParameters) -> ServiceSettin
                 payload=payload,
             ),
             map_sigmas=parameters.map_sigmas,
+            accepted_chance=parameters.accepted_chance,
         ),
         largest_gap=parameters.max_gap if parameters.unknown_cells == INTERPOLATE else 0.0,
         suspension_tolerance=parameters.suspension_tolerance,

@@ -15,12 +15,15 @@ limit) - 1/2) x 2, which is 0 up to half of a limit and 1 at it.
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from statistics import NormalDist
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
@@ -46,6 +49,8 @@ CLIMB = 2.0
 """Metres of level ground that cost as much as the energy that lifts the rover by one metre."""
 RISK = 2.0
 """Further cost of a metre at the limit, in metres of level ground."""
+LEAST_CHANCE, LEAST_SHARE = 0.001, 0.3
+"""Least accepted chance, and share of friction and torque limit, for which pieces are judged."""
 _QUERIES_PER_RING = 4
 """Other goals on a ring around the goal that are tried at most."""
 
@@ -166,12 +171,39 @@ class PathJudge:
         poses, options = pose[None, :], self.options.model
         return judge_poses(self.rover, self.terrain, poses, None, options, sigmas=0)[0]
 
+    @cached_property
+    def _cautious(self) -> tuple[Terrain, SweepOptions]:
+        """Ground and options for pieces of path: as told, or such that their chance is accepted.
+
+        With the friction and the torque limit below which they are with the accepted chance,
+        pieces need no samples; the whole path gets them.
+        """
+        accepted, model, told = self.options.accepted_chance, self.options.model, self.rover
+        if accepted >= 1.0:
+            return self.terrain, model
+        low = min(NormalDist().inv_cdf(max(accepted, LEAST_CHANCE)), 0.0)
+        off = told.uncertainty
+        friction, torque = (
+            max(1.0 + low * math.hypot(std, off.model), LEAST_SHARE)
+            for std in (off.friction, off.max_torque)
+        )
+        layer = self.terrain.friction
+        ground = (
+            self.terrain if layer is None else replace(self.terrain, friction=friction * layer)
+        )
+        return ground, replace(
+            model,
+            friction=friction * (told.friction if model.friction is None else model.friction),
+            max_torque=torque
+            * (told.wheel.max_torque if model.max_torque is None else model.max_torque),
+        )
+
     def judge_pieces(self, pieces: Sequence[Piece]) -> list[JudgedPiece]:
         """Judge pieces of path; whether a path ends in a pit is asked of whole paths only."""
         poses = [piece.poses for piece in pieces]
         self.poses += sum(map(len, poses))
-        model, sigmas = self.options.model, self.options.map_sigmas
-        found = judge_pieces(self.rover, self.terrain, poses, model, sigmas=sigmas)
+        (terrain, model), sigmas = self._cautious, self.options.map_sigmas
+        found = judge_pieces(self.rover, terrain, poses, model, sigmas=sigmas)
         judged = [
             JudgedPiece(verdict.code, find_cost(self.rover, piece.gear, verdict))
             for piece, verdict in zip(pieces, found, strict=True)

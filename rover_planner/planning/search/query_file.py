@@ -35,6 +35,7 @@ class _Options:
     soil: str | None
     payload: float | None
     map_sigmas: float
+    accepted_chance: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Paths of the LSR-1, each driven in MuJoCo with friction and torque limit drawn around the told.
+
+Run from the repository: python -m benchmarks.chance_drives FILE [--seed S] [--paths N] [--draws M]
+It needs the extra `bench`. The file gets a line of JSON for each path; lines that it has are kept.
+"""
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from benchmarks.drives import LOOK_AHEAD, MAX_TILT, Obstacle
+from rover_physics.rover.steered_drive import SteeredDrive
+from rover_planner.simulator.mujoco_rover import MujocoRover
+from rover_planner.simulator.path_follower import PathFollower
+from support.chance_paths import SPEED, ChancePath, draw_path, draw_truths
+from support.reference_drives import KEPT
+
+PERIOD = 0.04
+"""Period of the steering [s]."""
+STUCK_TIME, STUCK_WAY = 8.0, 0.03
+"""A rover that goes less than that way [m] within that time [s] is stuck."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What a path has that the planner is not told."""
+
+    friction: float
+    """Friction coefficient."""
+    max_torque: float
+    """Torque limit [N m]."""
+
+
+def passes(path: ChancePath, truth: Truth) -> bool:
+    """Drive a path with speed servos with droop and a follower; return whether it arrives."""
+    obstacle = Obstacle(path.kind, path.size, truth.friction, path.seed, truth.max_torque)
+    poses = path.poses
+    rover = path.rover(truth.max_torque)
+    plant = MujocoRover(rover, obstacle.ground, tuple(poses[0]), truth.friction)
+    follower = PathFollower(path.extended(LOOK_AHEAD), LOOK_AHEAD)
+    drive, way = SteeredDrive(rover), [0.0]
+    within = round(STUCK_TIME / PERIOD)
+    while follower.driven < path.length:
+        here = plant.pose[[0, 1, 3]]
+        aims = drive.aim(*follower.steer(here, SPEED))
+        plant.steer(aims.angles)
+        share = drive.share(plant.steering_angles, aims.angles)
+        plant.servo_with_droop(
+            share * aims.speeds / rover.wheel.radius, rover.wheel.servo_droop, PERIOD
+        )
+        way.append(follower.driven)
+        if plant.tilt > MAX_TILT or (len(way) > within and way[-1] - way[-1 - within] < STUCK_WAY):
+            return False
+    return bool(np.hypot(*(plant.pose[:2] - poses[-1, :2])) <= KEPT)
+
+
+def main(
+    file: Annotated[Path, typer.Argument(help="File of the drives.")],
+    seed: Annotated[int, typer.Option(help="Seed of the paths.")] = 1,
+    paths: Annotated[int, typer.Option(help="Number of paths.")] = 40,
+    draws: Annotated[int, typer.Option(help="Draws of friction and torque limit per path.")] = 20,
+    first: Annotated[int, typer.Option(help="Number of the first path.")] = 0,
+    step: Annotated[int, typer.Option(help="Every which path.")] = 1,
+) -> None:
+    """Drive the paths that the file does not have."""
+    lines = file.read_text().splitlines() if file.exists() else []
+    known = {(row["stream"], row["number"]) for row in map(json.loads, lines)}
+    for number in range(first, paths, step):
+        if (seed, number) in known:
+            continue
+        path = draw_path(seed, number)
+        truths = [Truth(*truth) for truth in draw_truths(seed, number, path, draws)]
+        passed = "".join("01"[passes(path, truth)] for truth in truths)
+        row = asdict(path) | {"stream": seed, "number": number, "passed": passed}
+        with file.open("a") as target:
+            target.write(json.dumps(row) + "\n")
+        print(json.dumps(row), flush=True)
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The chance that a path fails: the share of a fixed set of samples in which it breaks a limit.
+
+Poses that use less than FAR of every limit keep them in all samples. So do those that use less
+than NEAR with the least friction and torque of all samples, and all else off to either side. The
+others are evaluated anew in each sample, with the contacts that they have there. Drops and poses
+between waypoints are those of the prediction.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.chance.ground import change_heights, cut_around
+from rover_physics.chance.samples import Sample, draw_samples, worst_of
+from rover_physics.numerics.arrays import Floats
+from rover_physics.numerics.interruption import check_interruption
+from rover_physics.numerics.read_only import freeze_fields
+from rover_physics.prediction.packed_model import PackedModel
+from rover_physics.prediction.path_kernels import Crossings, join_crossings, none_held
+from rover_physics.prediction.servo_path import find_drift, find_lift_heights, stop_in_slots
+from rover_physics.prediction.sweep import SweptPath
+from rover_physics.results.record import place_results
+from rover_physics.results.uses import find_uses
+from rover_physics.status import PoseStatus
+from rover_physics.terrain.grid import Terrain
+
+SAMPLES = 32
+"""Number of samples."""
+FIRST = 16
+"""Number of samples after which a path that has failed in all of them fails for sure."""
+FAR = 0.5
+"""Use of a limit below which no sample breaks it: it would have to double. Less where friction or
+torque of a sample may be less than half."""
+NEAR = 0.9
+"""Use with the least friction and torque of all samples below which no sample breaks a limit."""
+SUMS = ("turn_off", "slide_off", "lift_height")
+"""Quantities of limits that are sums along the path."""
+OF_PATH = ("falling", "wheel_drop", "drift", "lift_height")
+"""Quantities that the path around a pose decides."""
+
+
+@dataclass(frozen=True, eq=False)
+class FailureChance:
+    """The chance that a path fails, 0 to 1."""
+
+    path: float
+    """That it fails anywhere."""
+    at: Floats
+    """(n,) that it fails at a waypoint or on the way there from the one before."""
+    limit: str
+    """Title of the limit that breaks most often where it fails most often; empty for none."""
+
+    def __post_init__(self) -> None:
+        freeze_fields(self)
+
+
+def find_failure_chance(
+    model: PackedModel, swept: SweptPath, on_path: bool = True
+) -> FailureChance:
+    """Return the chance that a swept path fails; 1 where the rover does not settle.
+
+    Args:
+        model: The model of the sweep.
+        swept: All of the path.
+        on_path: Whether its poses form a path; if not, there is no drift.
+    """
+    n = len(swept.prediction.poses)
+    rows = _all_rows(swept)
+    settled = rows.results["status"] == PoseStatus.SETTLED
+    samples = draw_samples(model.rover.uncertainty, SAMPLES)
+    worst_two = worst_of(samples)
+    far = min(FAR, NEAR * min(worst_two[0].friction[0], worst_two[0].torque))
+    near = settled & _find_near(model, swept, rows.results, on_path, far)
+    is_exact = model.terrain.elevation_std is None
+    if near.any() and is_exact:
+        closer = _find_near(model, swept, rows.results, on_path, NEAR)
+        for sample in worst_two:
+            worst = _evaluate_near(model, swept, sample, (rows, near), on_path)
+            closer |= _find_near(model, swept, worst, on_path, NEAR)
+        near &= closer
+    failed = np.zeros((SAMPLES if near.any() else 1, n), bool)
+    failed[:, rows.waypoint[~settled]] = True
+    counts = np.zeros((n, len(model.limits)), np.int64)
+    part = model.terrain if is_exact else _cut_around(model, rows.poses)
+    for k, sample in enumerate(samples if near.any() else ()):
+        check_interruption()
+        drawn = model if is_exact else change_heights(model, part, k)
+        results = _evaluate_near(drawn, swept, sample, (rows, near), on_path)
+        broken = find_uses(model.limits, results).use > 1.0
+        failed[k, rows.waypoint[broken.any(axis=1)]] = True
+        np.add.at(counts, rows.waypoint, broken)
+        if k + 1 == FIRST and failed[:FIRST].any(axis=1).all():
+            failed = failed[:FIRST]
+            break
+    at = failed.mean(axis=0)
+    place = int(at.argmax())
+    most = int(counts[place].argmax())
+    limit = model.limits.rows[most].title if counts[place, most] else ""
+    return FailureChance(float(failed.any(axis=1).mean()), at, limit)
+
+
+def _cut_around(model: PackedModel, poses: Floats) -> Terrain:
+    """Return the part of the terrain that a rover at poses (n, 3), and a little off, may touch."""
+    wheels, told = model.wheels, model.rover.uncertainty
+    return cut_around(
+        model.terrain,
+        poses[:, :2],
+        wheels.swing_radius + 2.0 * wheels.radius + 6.0 * told.position,
+    )
+
+
+def _all_rows(swept: SweptPath) -> Crossings:
+    """Return the waypoints, and then the poses between them."""
+    prediction, n = swept.prediction, len(swept.prediction.poses)
+    places = np.arange(float(n)), prediction.waypoint, none_held(n)
+    waypoints = Crossings(*places, prediction.poses, prediction.results)
+    return join_crossings([waypoints, swept.crossings])
+
+
+def _find_near(
+    model: PackedModel, swept: SweptPath, results: np.ndarray, on_path: bool, least: float
+) -> NDArray[np.bool_]:
+    """Return the rows of RESULTs that use more than `least` of a limit, or lead to such a sum.
+
+    Drift and lifts are sums along the path: the rows within a wheelbase before count, too.
+    """
+    uses = find_uses(model.limits, results).use
+    near = np.fmax.reduce(uses, axis=1, initial=0.0) > least
+    if not (on_path and model.wheels.on_servos):
+        return near
+    sums = [row.reads in SUMS for row in model.limits.rows]
+    n, distance = len(swept.prediction.poses), swept.prediction.distance
+    window, leads = float(model.record.linkage.length), np.zeros(n, bool)
+    for i in np.flatnonzero(np.fmax.reduce(uses[:n][:, sums], axis=1, initial=0.0) > least):
+        leads[np.searchsorted(distance, distance[i] - window) : i + 1] = True
+    return np.asarray(near | np.append(leads, leads[swept.crossings.waypoint]))
+
+
+def _evaluate_near(
+    model: PackedModel,
+    swept: SweptPath,
+    sample: Sample,
+    chosen: tuple[Crossings, NDArray[np.bool_]],
+    on_path: bool,
+) -> np.ndarray:
+    """Return the RESULTs of all rows: those where the mask is True evaluated in a sample.
+
+    Wheels at faces stay where they are.
+    """
+    all_rows, near = chosen
+    rows, all_results = all_rows.select(np.flatnonzero(near)), all_rows.results.copy()
+    poses = np.where(rows.climbing[:, None], rows.poses, sample.move(rows.poses))
+    motions = np.ascontiguousarray(rows.results["motion"])
+    results = sample.change(model).evaluate(np.ascontiguousarray(poses), rows.held, motions)
+    for name in OF_PATH:
+        results[name] = rows.results[name]
+    results["torque_saturation"] /= sample.torques
+    if model.wheels.on_servos:
+        results["torque_share"] = results["torque_saturation"].mean(axis=1)
+    place_results(results, all_results, near)
+    if on_path and model.wheels.on_servos:
+        _write_path(model, swept, all_results)
+    return np.asarray(all_results)
+
+
+def _write_path(model: PackedModel, swept: SweptPath, results: np.ndarray) -> None:
+    """Write what the path decides under speed servos into RESULTs of all rows."""
+    poses, wheels, n = swept.prediction.poses, model.wheels, len(swept.prediction.poses)
+    own, between = results[:n], swept.crossings._replace(results=results[n:])
+    stop_in_slots(poses, own, between)
+    own["drift"] = find_drift(wheels, float(model.record.linkage.length), poses, own, between)
+    own["lift_height"], results["lift_height"][n:] = find_lift_heights(wheels, poses, own, between)

@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A fixed set of samples of what is uncertain, and the model of the rover in each of them."""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from statistics import NormalDist
+
+import numpy as np
+
+from rover_physics.numerics.arrays import Floats
+from rover_physics.numerics.read_only import freeze_fields
+from rover_physics.prediction.packed_model import PackedModel
+from rover_physics.rover.uncertainty import Uncertainty
+
+DEVIATES = {
+    "friction": 1,
+    "model": 1,
+    "max_torque": 1,
+    "friction_per_wheel": 6,
+    "max_torque_per_wheel": 6,
+    "wheel_radius": 1,
+    "mass": 1,
+    "com": 3,
+    "position": 2,
+    "heading": 1,
+}
+"""Fields of `Uncertainty`, and how many independent deviates each has."""
+SEED = 5
+"""Seed of the samples: every path gets the same, so that what is common stays common."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """One drawing of all that is uncertain; factors are over what is told."""
+
+    friction: Floats
+    """(6,) factors of the friction under the wheels, less the model's error."""
+    torque: float
+    """Factor of the torque limit of all wheels, less the model's error."""
+    torques: Floats
+    """(6,) factors of the torque limits of the wheels beside that."""
+    mass: float
+    """Mass [kg] that the body has more."""
+    com: Floats
+    """(3,) shift of the body's centre of mass [m], body frame."""
+    shift: Floats
+    """(3,) shift of all poses: along and across their heading [m], and turn [rad]."""
+
+    def __post_init__(self) -> None:
+        freeze_fields(self)
+
+    def change(self, model: PackedModel) -> PackedModel:
+        """Return the model with friction, torque limit and masses of this sample."""
+        records = model.records.copy()
+        settings, linkage = records["settings"], records["linkage"]
+        settings["friction_factor"] *= self.friction
+        settings["max_torque"] *= self.torque
+        settings["allowed_torque"] *= self.torque
+        linkage["body_mass"] += self.mass
+        linkage["mass"] += self.mass
+        linkage["body_com"] += self.com
+        return replace(model, records=records)
+
+    def move(self, poses: Floats) -> Floats:
+        """Return poses (n, 3) with the shift."""
+        c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+        along, across, turn = self.shift
+        steps = c * along - s * across, s * along + c * across, np.full(len(poses), turn)
+        return np.asarray(poses + np.column_stack(steps))
+
+
+@lru_cache(maxsize=8)
+def draw_samples(uncertainty: Uncertainty, count: int) -> tuple[Sample, ...]:
+    """Return the samples: each deviate has one value in each of `count` equally likely ranges."""
+    rng, quantile = np.random.default_rng(SEED), NormalDist().inv_cdf
+    levels = np.array([quantile((k + 0.5) / count) for k in range(count)])
+    drawn = {
+        name: getattr(uncertainty, name)
+        * np.column_stack([levels[rng.permutation(count)] for _ in range(deviates)])
+        for name, deviates in DEVIATES.items()
+    }
+    return tuple(
+        _sample({name: values[k] for name, values in drawn.items()}) for k in range(count)
+    )
+
+
+def worst_of(samples: tuple[Sample, ...]) -> tuple[Sample, Sample]:
+    """Return the least friction and torque limit of samples, with all else off to either side."""
+    friction = np.full(6, min(float(one.friction.min()) for one in samples))
+    torque = min(one.torque * float(one.torques.min()) for one in samples)
+    mass = max(one.mass for one in samples)
+    com, shift = (np.max([getattr(one, name) for one in samples], 0) for name in ("com", "shift"))
+    one, other = (
+        Sample(friction, torque, np.ones(6), side * mass, side * com, side * shift)
+        for side in (1.0, -1.0)
+    )
+    return one, other
+
+
+def _sample(deviations: dict[str, Floats]) -> Sample:
+    """Return a sample from deviations by name."""
+    held = {name: value.item() for name, value in deviations.items() if len(value) == 1}
+    needed = 1.0 + held["model"]
+    return Sample(
+        friction=(1.0 + held["friction"]) * (1.0 + deviations["friction_per_wheel"]) / needed,
+        torque=(1.0 + held["max_torque"]) / (1.0 + held["wheel_radius"]) / needed,
+        torques=1.0 + deviations["max_torque_per_wheel"],
+        mass=held["mass"],
+        com=deviations["com"],
+        shift=np.append(deviations["position"], deviations["heading"]),
+    )

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Chances of failure: what is told, what is common, what decides, and what drives say."""
+
+import re
+from dataclasses import fields, replace
+from pathlib import Path
+from statistics import NormalDist
+
+import numpy as np
+import pytest
+
+from rover_physics import SweepOptions, judge_path, judge_poses, load_rover
+from rover_physics.chance.failure_chance import SAMPLES
+from rover_physics.chance.samples import DEVIATES
+from rover_physics.errors import RoverFileError
+from rover_physics.limits.table import CHANCE
+from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
+from rover_physics.rover.uncertainty import Uncertainty
+from rover_physics.terrain.grid import Terrain
+from support.chance_paths import HELD_OUT, find_chance, read_driven_paths
+from support.reference_drives import unlimited
+from support.rough_grounds import plane
+
+EXACT = Uncertainty(**{one.name: 0.0 for one in fields(Uncertainty)})
+FRICTION = 0.5
+DOCS = Path(__file__).resolve().parents[3] / "docs" / "uncertainty.md"
+ONE = 1.5 / SAMPLES
+"""A sample and a half: what the samples may miss of a chance."""
+
+
+def rover_with(**uncertainty: float):
+    return replace(unlimited(load_rover("lsr1")), uncertainty=replace(EXACT, **uncertainty))
+
+
+def uphill(slope: float) -> Terrain:
+    """Return a plane that rises along x."""
+    return plane(slope, 0.0)
+
+
+def straight(n: int) -> np.ndarray:
+    return np.column_stack([np.linspace(-0.2, 0.2, n), np.zeros((n, 2))])
+
+
+def chance_on(ground: Terrain, rover, policy: str = "equal", n: int = 5):
+    options = SweepOptions(policy=policy, friction=FRICTION)
+    return judge_path(rover, ground, straight(n), options, accepted_chance=1.0)[1]
+
+
+@pytest.mark.parametrize("slope", [0.26, 0.3, 0.33])
+def test_the_chance_is_that_of_a_friction_below_what_the_slope_needs(slope):
+    found = chance_on(uphill(slope), rover_with(friction=0.1))
+    expected = NormalDist(1.0, 0.1).cdf(found.max_friction_utilisation)
+    assert 0.005 < expected < 0.995
+    assert found.failure_chance == pytest.approx(expected, abs=ONE)
+
+
+@pytest.mark.parametrize("name", ["max_torque", "model"])
+def test_the_torque_limit_counts_like_friction(name):
+    rover, ground = rover_with(**{name: 0.1}), uphill(0.2)
+    used = chance_on(ground, rover).max_torque_saturation * rover.wheel.max_torque
+    options = SweepOptions(friction=1.5, max_torque=used / 0.9)
+    found = judge_path(rover, ground, straight(5), options, accepted_chance=1.0)[1]
+    assert found.failure_chance == pytest.approx(NormalDist(1.0, 0.1).cdf(0.9), abs=ONE)
+
+
+def test_what_is_common_stays_common_along_a_path():
+    rover, ground = rover_with(friction=0.1), uphill(0.3)
+    few, many = (chance_on(ground, rover, n=n) for n in (1, 40))
+    assert many.failure_chance == few.failure_chance > 0.0
+    assert set(many.failure_chance_at) == {few.failure_chance}
+
+
+@pytest.mark.parametrize(
+    "name", ["friction", "max_torque", "com", "mass", "position", "heading", "wheel_radius"]
+)
+def test_nothing_fails_that_is_far_from_all_limits(name):
+    told = rover_with(**{name: 0.05})
+    assert chance_on(plane(0.05, 0.02), told, "servo").failure_chance == 0.0
+
+
+@pytest.mark.parametrize(("name", "std"), [("com", 0.1), ("friction_per_wheel", 0.1)])
+def test_deviations_count_near_the_limit_of_friction(name, std):
+    told = rover_with(**{name: std})
+    assert 0.0 < chance_on(plane(0.27, 0.05), told).failure_chance < 1.0
+
+
+@pytest.mark.parametrize(
+    ("name", "std"),
+    [("mass", 1.0), ("heading", 0.3), ("wheel_radius", 0.1), ("max_torque_per_wheel", 0.1)],
+)
+def test_deviations_count_near_the_limit_of_torque(name, std):
+    rover, ground = rover_with(**{name: std}), plane(0.1, 0.2)
+    used = chance_on(ground, rover).max_torque_saturation * rover.wheel.max_torque
+    options = SweepOptions(friction=1.5, max_torque=used / 0.9)
+    found = judge_path(rover, ground, straight(5), options, accepted_chance=1.0)[1]
+    assert 0.0 < found.failure_chance < 1.0
+
+
+def test_uncertain_heights_count():
+    ground = uphill(0.25)
+    std = np.full(ground.elevation.shape, 0.003)
+    rover = rover_with()
+    assert chance_on(ground, rover).failure_chance == 0.0
+    uncertain = replace(ground, elevation_std=std)
+    verdict = judge_path(
+        rover,
+        uncertain,
+        straight(5),
+        SweepOptions(friction=FRICTION),
+        sigmas=0,
+        accepted_chance=1.0,
+    )[1]
+    assert 0.0 < verdict.failure_chance <= 1.0
+
+
+def test_an_accepted_chance_decides():
+    rover, ground = rover_with(friction=0.1), uphill(0.3)
+    options = SweepOptions(friction=FRICTION)
+
+    def judge(accepted: float | None):
+        return judge_path(rover, ground, straight(5), options, accepted_chance=accepted)[1]
+
+    assert judge(0.3).traversable and not judge(0.3).code
+    refused = judge(0.05)
+    assert (refused.traversable, refused.code) == (False, CHANCE)
+    assert "accepted 0.05" in refused.reason and "friction" in refused.reason
+    plain = judge(None)
+    assert plain.traversable and np.isnan(plain.failure_chance) and plain.failure_chance_at == ()
+
+
+def test_a_rover_that_does_not_settle_fails_for_sure():
+    beyond = np.array([[0.0, 0.0, 0.0], [9.0, 0.0, 0.0]])
+    verdict = judge_poses(rover_with(), plane(0.0, 0.0), beyond, accepted_chance=1.0)[1]
+    assert (verdict.failure_chance, verdict.failure_chance_at) == (1.0, (0.0, 1.0))
+
+
+def test_the_docs_tell_what_is_uncertain_and_its_default():
+    rows = re.findall(r"^\| `(\w+)` \| ([\d.]+) \|", DOCS.read_text(), re.MULTILINE)
+    assert {name: float(value) for name, value in rows} == vars(Uncertainty())
+    assert set(DEVIATES) == set(vars(Uncertainty()))
+
+
+def test_a_rover_file_tells_what_is_uncertain():
+    contents = rover_to_dict(load_rover("lsr1"))
+    told = rover_from_dict(contents | {"uncertainty": {"friction": 0.2}}, "here")
+    assert told.uncertainty == replace(Uncertainty(), friction=0.2)
+    with pytest.raises(RoverFileError, match=r"uncertainty.friction"):
+        rover_from_dict(contents | {"uncertainty": {"friction": -0.1}}, "here")
+
+
+@pytest.mark.long
+def test_chances_score_better_than_verdicts_on_drives_and_what_they_accept_passes():
+    paths = [one for one in read_driven_paths() if one.stream == HELD_OUT]
+    told = np.array([find_chance(one.path) for one in paths], float)
+    failed = np.array([one.passed.count("0") / len(one.passed) for one in paths])
+    chance, refused = ((1.0 - failed) * side**2 + failed * (1.0 - side) ** 2 for side in told.T)
+    assert chance.mean() < refused.mean()
+    assert failed[told[:, 0] < 0.05].mean() <= 0.01

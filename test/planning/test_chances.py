@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Planning by chances: what is refused by its chance is gone around, and told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rover_physics.limits.table import CHANCE
+from rover_physics.rover.rover_file import load_rover
+from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.answering.service_settings import load_service_settings
+from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
+from rover_planner.planning.search.path_search import FOUND, find_path
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+from support.rough_grounds import plane
+
+LSR1 = load_rover("lsr1")
+START, GOAL = (-1.2, 0.0, 0.0), (1.2, 0.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def slippery():
+    """A slope with a patch in the middle on which friction is just enough."""
+    ground = plane(0.2, 0.0, half=3.0)
+    axis = ground.origin[0] + ground.resolution * np.arange(ground.elevation.shape[0])
+    x, y = np.meshgrid(axis, axis)
+    patch = (abs(x) < 0.5) & (abs(y) < 0.5)
+    return replace(ground, friction=np.where(patch, 0.32, 0.8))
+
+
+def options(accepted: float, count: int = 1) -> PathQueryOptions:
+    return PathQueryOptions(count=count, waypoint_spacing=0.05, accepted_chance=accepted).change(
+        control_margin=0.0
+    )
+
+
+def test_a_path_is_refused_by_its_chance_alone(slippery):
+    plain = answer_path_query(LSR1, slippery, START, GOAL, options(1.0))
+    assert plain.traversable and np.isnan(plain.chosen.verdict.failure_chance)
+    refused = answer_path_query(LSR1, slippery, START, GOAL, options(0.05)).chosen.verdict
+    assert refused.code == CHANCE and refused.failure_chance > 0.05
+    assert abs(plain.chosen.poses[refused.first_failure, 0]) < 1.0
+
+
+@pytest.mark.long
+def test_a_search_goes_around_what_its_chance_refuses(slippery):
+    query = SearchQuery(LSR1, slippery, START, GOAL, options(0.05))
+    answer = find_path(query, LatticeSettings(budget=60.0, ends_at_first=True))
+    assert answer.outcome == FOUND
+    assert answer.path.verdict.failure_chance <= 0.05
+    assert np.abs(answer.path.poses[:, 1]).max() > 0.5
+
+
+@pytest.mark.parametrize(("parameters", "accepted"), [({}, 1.0), ({"accepted_chance": 0.1}, 0.1)])
+def test_a_server_asks_for_chances_where_it_is_told_to(parameters, accepted):
+    settings = load_service_settings(TraverseServerParameters(**parameters))
+    assert settings.query.accepted_chance == accepted
