@@ -14,6 +14,7 @@ import itertools
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -250,6 +251,7 @@ def main(
     seed: Annotated[int, typer.Option(help="Seed of ground and goals.")] = 1,
 ) -> None:
     """Run a soak and print its report as JSON."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # its programs end with it
     print(json.dumps(run_soak(minutes, load, kill_every, seed), indent=2))
 
 
