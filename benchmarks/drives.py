@@ -21,7 +21,6 @@ from rover_planner.simulator.second_try import SecondTry
 from rover_planner.traction.settings import load_traction_settings
 from rover_planner.traction.traction_service import TractionService
 from support.reference_drives import drive_ground
-from support.rough_grounds import bouldered, fractal
 
 PERIOD = 0.02
 """Period of the controllers [s]."""
@@ -69,11 +68,7 @@ class Obstacle:
     @property
     def ground(self) -> Terrain:
         """The ground."""
-        if self.kind == "rocks":
-            return bouldered(self.seed, highest=self.size)
-        if self.kind == "relief":
-            return fractal(self.seed, roughness=self.size)
-        return drive_ground(self.kind, self.size)
+        return drive_ground(self.kind, self.size, self.seed)
 
     @property
     def rover(self) -> Rover:

@@ -14,7 +14,6 @@ from rover_physics.rover.uncertainty import Uncertainty
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path
 from support.reference_drives import DRIVES, drive_ground, unlimited
-from support.rough_grounds import bouldered, fractal
 
 CHANCES = DRIVES.with_name("chances.jsonl")
 HELD_OUT = 2
@@ -68,11 +67,7 @@ class ChancePath:
     @property
     def ground(self) -> Terrain:
         """The ground."""
-        if self.kind == "rocks":
-            return bouldered(self.seed, highest=self.size)
-        if self.kind == "relief":
-            return fractal(self.seed, roughness=self.size)
-        return drive_ground(self.kind, self.size)
+        return drive_ground(self.kind, self.size, self.seed)
 
     @property
     def length(self) -> float:

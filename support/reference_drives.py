@@ -16,6 +16,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path, judge_poses
 from rover_physics.traversability.verdict import Verdict, hold_against_limits
+from support.rough_grounds import bouldered, fractal
 
 DRIVES = Path(__file__).resolve().parents[1] / "test" / "data" / "drives.json"
 RESOLUTION = 0.02
@@ -64,8 +65,15 @@ def read_drives() -> tuple[ReferenceDrive, ...]:
     )
 
 
-def drive_ground(kind: str, size: float) -> Terrain:
-    """Return the ground of a drive; the formulas are those of test/data/README.md."""
+def drive_ground(kind: str, size: float, seed: int = 0) -> Terrain:
+    """Return the ground of a drive; the formulas are those of test/data/README.md.
+
+    Rocks and relief are drawn from a seed.
+    """
+    if kind == "rocks":
+        return bouldered(seed, highest=size)
+    if kind == "relief":
+        return fractal(seed, roughness=size)
     axis = -3.0 + RESOLUTION * np.arange(301)
     x, y = np.meshgrid(axis, axis)
     if kind == "step":
