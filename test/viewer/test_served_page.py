@@ -91,7 +91,16 @@ def test_a_browser_gets_the_files_and_all_parts_at_once_and_then_those_that_chan
         while parts["verdict"]["passes"]:
             parts |= json.loads(browser.recv(timeout=PATIENCE))
         assert parts["verdict"]["headline"].startswith("friction ")
-        browser.send("no JSON")
+
+
+@pytest.mark.parametrize("words", ["no JSON", "[1]", "[" * 100_000, '{"ask": ["seek"]}', b"\xff"])
+def test_what_is_no_question_ends_no_channel(page, words):
+    with connect(f"ws{page.url[4:]}/channel", origin=page.url) as browser:
+        browser.recv(timeout=PATIENCE)
+        browser.send(words)
+        browser.send(json.dumps({"ask": "value", "label": FRICTION, "value": 0.5}))
+        while "verdict" not in json.loads(browser.recv(timeout=PATIENCE)):
+            pass
 
 
 def test_another_site_gets_no_channel(page):

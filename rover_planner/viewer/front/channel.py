@@ -119,13 +119,22 @@ class Channel:
         sender.start()
         try:
             for message in connection:
-                self._hear(json.loads(message), mailbox)
-        except (ConnectionClosed, ValueError):
+                self._hear(_read(message), mailbox)
+        except ConnectionClosed:
             pass
         finally:
             with self._lock:
                 self._mailboxes.discard(mailbox)
             mailbox.close()
+
+
+def _read(message: str | bytes) -> dict[str, Any]:
+    """Return a visitor's words; none where they are no JSON object."""
+    try:
+        words = json.loads(message)
+    except (ValueError, RecursionError):
+        return {}
+    return words if isinstance(words, dict) else {}
 
 
 def _send(connection: ServerConnection, mailbox: Mailbox) -> None:
