@@ -134,8 +134,8 @@ def test_rates_and_steering_angles_are_those_of_the_commanded_motion(ros):
         return found and np.allclose([found[one] for one in WHEEL_JOINTS], rates, atol=1e-6)
 
     wait_until(is_there, "the rates")
-    efforts = robot.commands["wheel_efforts"]
-    assert sum(efforts.values()) > 0.0  # with the signs of the motors
+    # with the signs of the motors; efforts and rates of an update are two messages
+    wait_until(lambda: sum(robot.commands["wheel_efforts"].values()) > 0.0, "the efforts")
     found = controller.service.joints.suspension_angles
     assert np.abs(found).max() < 1e-9  # the offset of the rocker's encoder is taken off
     for wheel, angle in zip(WHEEL_JOINTS, aims.angles, strict=True):
