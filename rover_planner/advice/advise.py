@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Advice on a refused path: the remedies, best first, and whether all levers were tried."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,7 +14,7 @@ from rover_planner.advice.case import Case, JudgedCase, distance_along
 from rover_planner.advice.refusal import Refusal
 from rover_planner.advice.remedy import Remedy
 from rover_planner.advice.seek import seek_remedies
-from rover_planner.planning.answering.budget import Budget, QuestionStoppedError
+from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.candidates import generate_candidates
 
 MOST_REMEDIES = 5
@@ -88,17 +88,21 @@ def grow_advice(case: Case) -> Iterator[Advice]:
     yield replace(advice, complete=True)
 
 
-def grow_within(case: Case, budget: float) -> Iterator[Advice]:
-    """Yield advice that grows until it is complete, or a time [s] is over.
+def grow_within(case: Case, check: Callable[[], object]) -> Iterator[Advice]:
+    """Yield advice that grows until it is complete, or is stopped.
+
+    Args:
+        case: The refused path.
+        check: Called again and again; it stops the work by a QuestionStoppedError.
 
     Raises:
-        QuestionStoppedError: Not even the path itself was judged in this time.
+        QuestionStoppedError: Not even the path itself was judged.
         RoverError: The model refuses the path or an option.
     """
-    time, growing, has_begun = Budget(budget), grow_advice(case), False
+    growing, has_begun = grow_advice(case), False
     while True:
         try:
-            with interruptible(time.check):
+            with interruptible(check):
                 advice = next(growing, None)
         except QuestionStoppedError:
             if has_begun:

@@ -65,6 +65,7 @@ def advise(
     from rover_planner.advice.case import Case
     from rover_planner.command.prediction_files import read_poses
     from rover_planner.nodes.warm_up import search_paths
+    from rover_planner.planning.answering.budget import Budget
     from rover_planner.shell.progress import show_progress
 
     model = load_rover(rover)
@@ -81,7 +82,7 @@ def advise(
     with show_progress() as progress:
         progress("load the model (the first run compiles it)")
         search_paths()  # so that the budget is not spent on it
-        for advice in grow_within(case, budget):
+        for advice in grow_within(case, Budget(budget).check):
             progress(f"{len(advice.found)} remedies; tried {' and '.join(advice.tried)}")
     out.write_text(
         json.dumps(advice.to_dict(), indent=1, allow_nan=False) + "\n", encoding="utf-8"
