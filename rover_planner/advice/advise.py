@@ -76,7 +76,7 @@ def grow_advice(case: Case) -> Iterator[Advice]:
     Raises:
         RoverError: The model refuses the path or an option.
     """
-    judged = case.judge(is_whole=True)
+    judged = case.judge_all()
     advice = Advice(judged)
     if not judged.passes:
         yield advice

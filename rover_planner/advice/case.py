@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from rover_physics.bounds.path import SIGMAS
+from rover_physics.limits.table import CHANCE
 from rover_physics.names import WHEEL_POSITIONS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
@@ -43,20 +44,33 @@ class Case:
         """Return the case with other options."""
         return replace(self, options=replace(self.options, **options))
 
-    def judge(self, is_whole: bool = False) -> "JudgedCase":
-        """Judge the path up to its first failure, or the whole of it.
+    def judge(self) -> "JudgedCase":
+        """Judge the path up to its first failure; of one that passes, all is predicted.
 
         Raises:
             RoverError: The model refuses the path or an option.
         """
+        return self._judge(stop_at_failure=True, accepted_chance=self.accepted_chance)
+
+    def judge_all(self) -> "JudgedCase":
+        """Judge the whole path; of one that breaks a limit, the chance is not asked.
+
+        Raises:
+            RoverError: The model refuses the path or an option.
+        """
+        judged = self.judge()
+        is_all = judged.passes or judged.verdict.code == CHANCE
+        return judged if is_all else self._judge(stop_at_failure=False, accepted_chance=None)
+
+    def _judge(self, *, stop_at_failure: bool, accepted_chance: float | None) -> "JudgedCase":
         judged = judge_path(
             self.rover,
             self.terrain,
             self.poses,
             self.options,
             sigmas=self.sigmas,
-            stop_at_failure=not is_whole,
-            accepted_chance=self.accepted_chance,
+            stop_at_failure=stop_at_failure,
+            accepted_chance=accepted_chance,
         )
         return JudgedCase(self, *judged)
 

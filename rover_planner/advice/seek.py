@@ -110,7 +110,7 @@ class _Seeker:
                     fails = shares[k]
             shares[k] = passes
         values = _values(ranges, shares)
-        judged = self._judge(levers, values, is_whole=True)
+        judged = self._judge(levers, values)
         if judged is None:
             return None
         told = zip(levers, values, ranges, strict=True)
@@ -120,9 +120,7 @@ class _Seeker:
             judged,
         )
 
-    def _judge(
-        self, levers: Sequence[Lever], values: Values, is_whole: bool = False
-    ) -> JudgedCase | None:
+    def _judge(self, levers: Sequence[Lever], values: Values) -> JudgedCase | None:
         """Return the case with levers set if it passes, else None."""
         case: Case | None = self._refusal.case
         try:
@@ -135,7 +133,7 @@ class _Seeker:
             for place in self._failed if keeps_rows else ():
                 if not case.passes_at(self._refusal.rows_around(place, case.options.policy)):
                     return None
-            judged = case.judge(is_whole)
+            judged = case.judge()
         except RoverError:
             return None  # the rover cannot be asked for it
         if judged.passes:
