@@ -64,7 +64,8 @@ def draw_cases(rng: np.random.Generator) -> Iterator[Case]:
         )
         case = Case(load_rover(str(name)), replace(ground, friction=None), poses, options)
         verdict = case.judge().verdict
-        if verdict.first_failure > 0 and verdict.code not in ("off_map", "unknown_ground"):
+        starts_well = verdict.first_failure > 1.0 / SPACING
+        if starts_well and verdict.code not in ("off_map", "unknown_ground"):
             yield case
 
 

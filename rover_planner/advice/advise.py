@@ -76,7 +76,7 @@ def grow_advice(case: Case) -> Iterator[Advice]:
     Raises:
         RoverError: The model refuses the path or an option.
     """
-    judged = case.judge_all()
+    judged = case.judge()
     advice = Advice(judged)
     if not judged.passes:
         yield advice

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 
 from rover_physics.bounds.path import SIGMAS
-from rover_physics.limits.table import CHANCE
 from rover_physics.names import WHEEL_POSITIONS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.results.uses import Uses, find_uses, limits_of
+from rover_physics.results.uses import find_uses, limits_of
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path, judge_paths
@@ -50,27 +49,14 @@ class Case:
         Raises:
             RoverError: The model refuses the path or an option.
         """
-        return self._judge(stop_at_failure=True, accepted_chance=self.accepted_chance)
-
-    def judge_all(self) -> "JudgedCase":
-        """Judge the whole path; of one that breaks a limit, the chance is not asked.
-
-        Raises:
-            RoverError: The model refuses the path or an option.
-        """
-        judged = self.judge()
-        is_all = judged.passes or judged.verdict.code == CHANCE
-        return judged if is_all else self._judge(stop_at_failure=False, accepted_chance=None)
-
-    def _judge(self, *, stop_at_failure: bool, accepted_chance: float | None) -> "JudgedCase":
         judged = judge_path(
             self.rover,
             self.terrain,
             self.poses,
             self.options,
             sigmas=self.sigmas,
-            stop_at_failure=stop_at_failure,
-            accepted_chance=accepted_chance,
+            stop_at_failure=True,
+            accepted_chance=self.accepted_chance,
         )
         return JudgedCase(self, *judged)
 
@@ -104,27 +90,22 @@ class JudgedCase:
         """True if the path keeps all limits, and fails with no more than the accepted chance."""
         return self.verdict.traversable
 
-    @property
-    def time(self) -> float:
-        """Time of the drive [s], as far as it is predicted."""
-        return float(np.fmax.reduce(self.prediction.time, initial=0.0))
-
-    @property
-    def energy(self) -> float:
-        """Energy of the drive [J], as far as it is predicted."""
-        return float(np.fmax.reduce(self.prediction.energy, initial=0.0))
-
     @cached_property
-    def largest_use(self) -> tuple[float, float]:
-        """Largest use of a limit on the path, and the distance [m] where it is."""
-        found = [(0.0, 0.0)]
+    def use(self) -> Floats:
+        """(n,) largest use of a limit at each waypoint and on the way there."""
+        use = np.zeros(len(self.prediction.poses))
         for part in (self.prediction, self.prediction.between):
             if part is not None and len(part.poses):
-                use = np.fmax.reduce(self._uses(part).use, axis=1)
-                row = int(np.nanargmax(use)) if np.isfinite(use).any() else 0
-                waypoint = int(part.waypoint[row])
-                found.append((float(use[row]), float(self.distance[waypoint])))
-        return max(found)
+                limits = limits_of(self.case.rover, part.policy)
+                of_rows = np.fmax.reduce(find_uses(limits, part.results).use, axis=1)
+                np.fmax.at(use, part.waypoint, of_rows)
+        return use
+
+    @property
+    def largest_use(self) -> tuple[float, float]:
+        """Largest use of a limit on the path, and the distance [m] where it is."""
+        place = int(self.use.argmax())
+        return float(self.use[place]), float(self.distance[place])
 
     @cached_property
     def distance(self) -> Floats:
@@ -135,9 +116,6 @@ class JudgedCase:
         """Return the load [N] of each axle at a waypoint by its name; NaN where unknown."""
         loads = self.prediction.wheel_loads[waypoint]
         return {name: float(loads[k] + loads[k + 3]) for k, name in enumerate(WHEEL_POSITIONS)}
-
-    def _uses(self, part: PathPrediction) -> Uses:
-        return find_uses(limits_of(self.case.rover, part.policy), part.results)
 
 
 def distance_along(poses: Floats) -> Floats:

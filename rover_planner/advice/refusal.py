@@ -17,16 +17,16 @@ from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 
 BEFORE = 1.5
 """Length of path that decides about a failure with servos [wheelbases]: they drift over one."""
-SEARCH = LatticeSettings(budget=1.0)
+SEARCH = LatticeSettings(budget=1.0, ends_at_first=True)
 """How a path around is searched."""
 
 
 @dataclass(frozen=True, eq=False)
 class Refusal:
-    """A case that fails, as a whole."""
+    """A case that fails."""
 
     judged: JudgedCase
-    """The case with the prediction of the whole path."""
+    """The case, predicted up to its first failure or a little beyond."""
 
     @property
     def case(self) -> Case:
@@ -37,6 +37,27 @@ class Refusal:
     def place(self) -> int:
         """Index of the waypoint that fails first."""
         return self.judged.verdict.first_failure
+
+    @property
+    def time(self) -> float:
+        """Time of the path [s], as if the rest of it were as what lies before the failure."""
+        to_failure, share = self._sum_before_failure("time")
+        length = float(self.judged.distance[-1])
+        return to_failure / share if share > 0.0 else length / self.case.rover.nominal_speed
+
+    @property
+    def energy(self) -> float:
+        """Energy of the path [J] in the same way; 0 if nothing lies before the failure."""
+        to_failure, share = self._sum_before_failure("energy")
+        return to_failure / share if share > 0.0 else 0.0
+
+    def _sum_before_failure(self, name: str) -> tuple[float, float]:
+        """Return a sum up to the failure, and the share of the path that this is."""
+        row = max(0, self.place - 1)
+        value = float(getattr(self.judged.prediction, name)[row])
+        distance = self.judged.distance
+        is_known = np.isfinite(value) and distance[row] > 0.0
+        return value, float(distance[row] / distance[-1]) if is_known else 0.0
 
     @property
     def place_on_ground(self) -> tuple[float, float]:

@@ -61,12 +61,12 @@ class Remedy:
     @property
     def extra_time(self) -> float:
         """Time of the drive above that of the refused path [s]."""
-        return self.judged.time - self.refusal.judged.time
+        return float(self.judged.prediction.time[-1]) - self.refusal.time
 
     @property
     def extra_energy(self) -> float:
         """Energy of the drive above that of the refused path [J]."""
-        return self.judged.energy - self.refusal.judged.energy
+        return float(self.judged.prediction.energy[-1]) - self.refusal.energy
 
     def options(self) -> dict[str, Any]:
         """Return the options of `predict` that change."""

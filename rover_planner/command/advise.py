@@ -52,6 +52,9 @@ def advise(
     sigmas: Sigmas = 3.0,
     accepted_chance: AcceptedChance = ACCEPTED_CHANCE,
     budget: Annotated[float, option("S", "Time for the advice in s.", min=0.01)] = 10.0,
+    picture: Annotated[
+        Path | None, option("FILE", "Draw the remedies on the map (.png, .svg).")
+    ] = None,
     max_cells: MaxCells = MAX_CELLS,
 ) -> None:
     """Find the smallest changes that make a refused path pass; write them as JSON.
@@ -87,6 +90,10 @@ def advise(
     out.write_text(
         json.dumps(advice.to_dict(), indent=1, allow_nan=False) + "\n", encoding="utf-8"
     )
+    if picture is not None:
+        from rover_planner.figures.advice_picture import draw_advice
+
+        draw_advice(picture, advice, Path(terrain).name)
     _print_table(advice)
 
 

@@ -10,6 +10,7 @@ import pytest
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traversability.judge import judge_path
+from rover_planner.advice import refusal
 from rover_planner.advice.advise import Advice, grow_advice, grow_within, path_of
 from rover_planner.advice.case import Case
 from rover_planner.advice.levers import Choice
@@ -41,7 +42,7 @@ CASES = {
     "slippery slope": (slope, {"friction": 0.45}, {"policy", "friction"}),
     "weak motors": (slope, {"max_torque": 0.3}, {"max_torque"}),
     "heavy load": (slope, {"payload": 4.0}, {"payload", "arm_shoulder", "policy"}),
-    "rock": (rock, {}, {"shift", "curve", "turn_on_the_spot", "path_around", "ground"}),
+    "rock": (rock, {}, {"shift", "curve", "turn_on_the_spot", "ground"}),
 }
 """Ground, options, and levers that are to be found."""
 
@@ -96,6 +97,14 @@ def test_a_little_less_of_a_remedy_is_refused(advised):
             continue
         less = set_less(remedy, 1.01 * TOLERANCE)
         assert not less.judge().passes, remedy.describe()
+
+
+def test_a_path_around_is_searched(monkeypatch):
+    monkeypatch.setattr(refusal, "SEARCH", replace(refusal.SEARCH, budget=60.0))
+    case = refused_by(rock)
+    around = refusal.Refusal(case.judge()).path_around
+    assert around is not None and replace(case, poses=around).judge().passes
+    np.testing.assert_allclose(around[[0, -1]], STRAIGHT[[0, -1]], atol=1e-9)
 
 
 def test_words_say_what_to_do_and_what_it_does_to_the_rover():
