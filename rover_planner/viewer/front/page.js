@@ -78,7 +78,7 @@ function greet(program) {
 // ---- What is drawn for each part.
 
 const DRAW = {
-  subject: drawSubject, errors: drawErrors, scene: drawScene, verdict: drawVerdict,
+  subject: drawSubject, errors: drawErrors, scene: drawScene, verdict: drawVerdict, advice: drawAdvice,
   paths: drawPaths, sliders: drawSliders, values: drawValues, changes: drawChanges,
   limits: drawLimits, curves: drawCurves, uses: drawUses, board: drawBoard, drive: drawDrive,
   legend: drawLegend, chosen: drawChosen, offers: drawChosen, topics: drawTopics,
@@ -126,6 +126,23 @@ function drawVerdict(one) {
     ...(one.details && one.details.length ? [make("details", { open: open || document.body.className === "sent" },
       make("summary", {}, "the whole reason"), ...one.details.map((line) => make("div", {}, line)))] : []),
   );
+  if (state.advice) drawAdvice(state.advice);
+}
+
+// What would make the path pass: pointed at, a remedy shows its path; clicked, it is judged.
+function drawAdvice({ asked, busy, words, rows }) {
+  const refused = state.verdict && state.verdict.passes === false;
+  const point = (index) => () => ask({ ask: "ghost", index });
+  at("advice").replaceChildren(...(!refused ? [] : !asked
+    ? [button("What would help?", { ask: "advise" })]
+    : [busy ? make("small", {}, busy) : "", words,
+      make("ol", {}, ...rows.map((row) => make("li", {
+        ...(row.index === null ? { class: "quiet" } : {
+          tabindex: 0, onpointerenter: point(row.index), onpointerleave: point(null),
+          onclick: () => ask({ ask: "remedy", index: row.index }),
+          onkeydown: (event) => { if (event.key === "Enter") event.currentTarget.click(); },
+        }),
+      }, row.words, make("small", {}, ` (${row.costs})`))))].filter((child) => child !== "")));
 }
 
 function drawPaths({ rows, shown }) {

@@ -11,8 +11,10 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover, preset_names
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.soil_file import load_soils
+from rover_planner.advice.remedy import Remedy
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import read_rover, write_rover
+from rover_planner.viewer.documents.advice import describe_advice, list_remedies
 from rover_planner.viewer.documents.board import describe_board
 from rover_planner.viewer.documents.header import POLICY_TITLES, describe_subject, name_ground
 from rover_planner.viewer.documents.limits import (
@@ -35,6 +37,7 @@ from rover_planner.viewer.pages.sharing import MapPrint, make_link, read_scenari
 from rover_planner.viewer.scene.cameras import find_radius
 from rover_planner.viewer.state.layers import LAYERS
 from rover_planner.viewer.state.link import PageLink, read_link, write_link
+from rover_planner.viewer.state.path_advice import PathAdvice, apply_remedy
 from rover_planner.viewer.state.playback import SPEEDS, Playback
 from rover_planner.viewer.state.scenario import Scenario, Shown
 from rover_planner.viewer.state.session import ViewSession
@@ -90,6 +93,7 @@ class Page(PageBase):
         """The link whose path and time are not shown yet, and what it asks for."""
         self._moved, self._told_at = True, 0.0
         super().__init__(session.wanted.rover, session.wanted.terrain, host, port)
+        self._advice = PathAdvice(lambda: self.requests.add(self._take_advice, "advice"))
         self._painter = GroundPainter(lambda: self.requests.add(self._take_ground, "painted"))
         self.channel.tell("offers", self._list_offers())
         session.judge_in_background(self._show_and_wait)
@@ -113,12 +117,14 @@ class Page(PageBase):
         """True if something is judged, or judged and not shown yet."""
         works = self.session, self._painter.work
         is_judged = any(work.progress is not None or work.has_news for work in works)
+        is_judged = is_judged or self._advice.is_busy
         return is_judged or self.is_drawing  # in this order: what was taken is drawn
 
     def close(self) -> None:
         """End the page and its threads in the background."""
         super().close()
         self.session.close()
+        self._advice.close()
         self._painter.work.close()
 
     @property
@@ -165,6 +171,9 @@ class Page(PageBase):
             "place": lambda words: self._go_to_place(float(words["distance"])),
             "speed": lambda words: setattr(playback, "speed", float(words["times"])),
             "failure": lambda _words: self._go_to_failure(),
+            "advise": lambda _words: self._advice.ask(session.shown.path),
+            "ghost": lambda words: self._show_ghost(words["index"]),
+            "remedy": lambda words: self._take_remedy(int(words["index"])),
         }
         answers = {word: self._answer(act) for word, act in plain.items()}
         files: dict[str, Answer] = {
@@ -208,6 +217,7 @@ class Page(PageBase):
 
     def _cancel(self) -> None:
         self.session.cancel()
+        self._advice.stop()
         self._painter.work.cancel()
 
     def _colour(self, words: Words) -> None:
@@ -229,6 +239,27 @@ class Page(PageBase):
         if failure is not None:
             self.playback.go_to(failure.time)
             self.scene.cameras.look_at_failure(self.session.shown.scenario.rover, failure)
+
+    # Advice.
+
+    def _find_remedy(self, index: int) -> Remedy:
+        advice = self._advice.about(self.session.shown.path)
+        remedies = [] if advice is None else list_remedies(advice)
+        if not 0 <= index < len(remedies):
+            raise PlanningError(f"there is no remedy {index + 1}; there are {len(remedies)}")
+        return remedies[index]
+
+    def _show_ghost(self, index: int | None) -> None:
+        """Show where the path of a remedy leads while a person points at it."""
+        path = None if index is None else self._find_remedy(int(index)).judged.case.poses
+        self.scene.paths.show_ghost(self.session.shown.scenario.rover, self.ground, path)
+
+    def _take_remedy(self, index: int) -> None:
+        """Judge the path with the levers of a remedy set."""
+        remedy = self._find_remedy(index)
+        self._show_ghost(None)
+        self._advice.stop()
+        self.session.take_change(apply_remedy(self.session.wanted, remedy))
 
     # Files and links.
 
@@ -360,6 +391,11 @@ class Page(PageBase):
             PaintRequest(shown.scenario, self._colouring, shown.path.poses, self._survey, origin)
         )
 
+    def _take_advice(self) -> None:
+        self._advice.take()
+        if self._advice.failure:
+            raise PlanningError(f"no advice: {self._advice.failure}")
+
     def _take_ground(self) -> None:
         self.errors.run("the ground is not drawn", self._draw_ground)
 
@@ -405,6 +441,8 @@ class Page(PageBase):
                 "shown": shown.index,
             },
         )
+        advice, asked = self._advice.about(path), self._advice.is_asked(path)
+        tell("advice", describe_advice(advice, asked, asked and self._advice.is_busy))
         made("current", (shown, self._colouring), self._write_current)
         made("sliders", (wanted.loaded,), lambda: describe_sliders(wanted.loaded))
         made("values", (wanted, session.refusal), lambda: describe_values(wanted))

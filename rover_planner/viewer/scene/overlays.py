@@ -22,6 +22,8 @@ MAX_POINTS = 250
 FADE = 0.6
 """Share of white in the colour of a path behind the waypoint that is refused."""
 WHITE = (255, 255, 255)
+GHOST = (143, 74, 115)
+"""Colour of a path that a person points at."""
 CLEARANCE = 0.15
 """Height of a path above the ground [wheel radii]."""
 CROSS = 0.7
@@ -48,6 +50,7 @@ class PathOverlay:
         self.ribbons: dict[int, Ribbon] = {}
         """The drawn paths by their index."""
         self._plan = Ribbon(scene, "/paths/plan")
+        self._ghost = Ribbon(scene, "/paths/ghost")
         self._old: set[int] = set()
         """Indices of the paths that are greyed."""
         self._numbers: dict[int, Floats] = {}
@@ -99,6 +102,12 @@ class PathOverlay:
             self._labels.show(FLAGS, {})
         self._labels.show(NUMBER_LABELS, {})
 
+    def show_ghost(self, rover: Rover, terrain: Terrain, path: Floats | None) -> None:
+        """Draw a path (n, 3) that a person points at, or none."""
+        size = CLEARANCE * rover.wheel.radius, WIDE * rover.wheel.radius
+        points = None if path is None else path[:, :2]
+        self._ghost.show([] if points is None else self._find_strand(terrain, points, GHOST, size))
+
     def find_number(self, origin: Floats, direction: Floats) -> int | None:
         """Return the index of the path whose number a ray (3,) of the scene hits; None for none.
 
@@ -115,7 +124,7 @@ class PathOverlay:
 
     def clear(self) -> None:
         """Remove all that was drawn but the labels, which are moved to other places."""
-        for node in (*self.ribbons.values(), self._plan, *self._poles.values()):
+        for node in (*self.ribbons.values(), self._plan, self._ghost, *self._poles.values()):
             node.remove()
         self.ribbons.clear()
         self._poles.clear()

@@ -71,9 +71,15 @@ class Scenario:
         return self.rover == other.rover and self.arm == other.arm
 
     def take_values(self, other: "Scenario") -> "Scenario":
-        """Return this scenario with the rover, its arm and the options of another one."""
-        arm, options = other.arm_angles, other.options
-        return replace(self, rover=other.rover, arm_angles=arm, options=options)
+        """Return this scenario with the values of another, and its path between the same ends."""
+        same = (self.start, self.goal) == (other.start, other.goal)
+        return replace(
+            self,
+            rover=other.rover,
+            arm_angles=other.arm_angles,
+            options=other.options,
+            recorded=other.recorded if same else self.recorded,
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -172,15 +172,19 @@ class ViewSession:
             self.kept, self._undo = None, []
         self._ask(scenario)
 
+    def take_change(self, scenario: Scenario) -> None:
+        """Take other values, and perhaps a path of its own; one step to undo."""
+        if self.is_complete:
+            self._undo = [*self._undo[-MAX_STEPS:], self.wanted]
+        self._ask(scenario)
+
     def judge_again(self) -> None:
         """Judge what is wanted, after it was stopped."""
         self._ask(self.wanted)
 
     def _change(self, **changes: Any) -> None:
         """Judge the same paths with other values; one step to undo for each that was judged."""
-        if self.is_complete:
-            self._undo = [*self._undo[-MAX_STEPS:], self.wanted]
-        self._ask(replace(self.wanted, **changes))
+        self.take_change(replace(self.wanted, **changes))
 
     def _ask(self, wanted: Scenario, index: int | None = None) -> None:
         """Judge a scenario, and look at a path by its index (default: the same as before)."""
