@@ -12,7 +12,7 @@ import numpy as np
 
 from rover_physics.limits.table import LIMITS, Limit, Sense
 from rover_physics.names import OPTIMAL, SERVO
-from rover_physics.rover.manipulator import arm_angles
+from rover_physics.rover.manipulator import arm_angles, link_points
 from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius
 from rover_planner.advice.case import Case, distance_along
 from rover_planner.advice.path_changes import (
@@ -37,6 +37,8 @@ MOST_RELAXED = 1.5
 """Largest limit that is asked for, over that of the rover file."""
 ROCK_RADIUS = 4.0
 """Radius of the ground that is lowered [wheel radii]."""
+LEVEL = 1e-9
+"""Height by which an arm may be lower [m] because of rounding."""
 SPACING = 0.02
 """Distance between waypoints of a path of its own where the refused one has no more [m]."""
 TORQUES = {OPTIMAL: "Switch on traction control", SERVO: "Drive the wheels by speed servos"}
@@ -103,11 +105,14 @@ def _arm_joint(k: int, raised: str, lowered: str) -> Lever:
             now, tuple(arm.joint_limits[k]) if arm.joint_limits else (now - np.pi, now + np.pi)
         )
 
-    def apply(case: Case, _refusal: Refusal, angle: float) -> Case:
+    def apply(case: Case, _refusal: Refusal, angle: float) -> Case | None:
         arm = case.rover.manipulator
         assert arm is not None
         angles = arm_angles(arm, case.options.arm_angles)
+        lowest = min(arm.base[2], link_points(arm, angles)[:, 2].min())
         angles[k] = angle
+        if link_points(arm, angles)[:, 2].min() < lowest - LEVEL:
+            return None  # below its foot it may hit the body, which the model does not know
         return case.change(joint_angles=dict(zip(arm.joints, angles.tolist(), strict=True)))
 
     def words(refusal: Refusal, angle: float) -> str:

@@ -23,8 +23,9 @@ def files(tmp_path):
 
 
 def arguments(files, *words):
+    """Return the words of the command, with time enough for a busy machine."""
     names = "terrain.npz", "poses.npz", "out.json"
-    return ["advise", "lsr1", *(str(files / name) for name in names), *words]
+    return ["advise", "lsr1", *(str(files / name) for name in names), "--budget", "300", *words]
 
 
 def options_of(remedy):
