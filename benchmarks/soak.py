@@ -15,7 +15,6 @@ import json
 import os
 import re
 import signal
-import sys
 import time
 from collections import Counter
 from statistics import median
@@ -200,8 +199,7 @@ def _start_mission(programs: Programs, ear: Ear, rng: np.random.Generator) -> No
     far = rng.uniform(0.5, 1.0) * REACH
     start = f"--start={x:.3f},{y:.3f},{yaw:.3f}"
     goal = f"--goal={x + far * np.cos(bearing):.3f},{y + far * np.sin(bearing):.3f},{bearing:.3f}"
-    module = ["-m", "rover_planner.nodes.mission_planner"]
-    programs.start(MISSION, [sys.executable, *module, start, goal, "--drive"])
+    programs.start(MISSION, ["rover_planner.nodes.mission_planner", start, goal, "--drive"])
 
 
 def _change(client: Client, rng: np.random.Generator) -> None:

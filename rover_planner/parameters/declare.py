@@ -27,7 +27,7 @@ from rover_planner.parameters.table import (
     ParameterTable,
     specs_of,
 )
-from rover_planner.shell.one_line import one_line
+from rover_planner.shell.run_program import one_line
 
 ROS_OWN = ("qos_overrides.",)
 """Begins of names of parameters that ROS declares by itself."""
