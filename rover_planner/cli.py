@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command `rover_planner`: its subcommands and its exit code."""
 
-import gc
 import os
 from collections.abc import Sequence
 from typing import Annotated
@@ -28,8 +27,6 @@ from rover_planner.shell.run_app import run_app
 from rover_planner.shell.run_program import run_program
 
 NAME = "rover_planner"
-NEW_OBJECTS = 250_000
-"""Number of new objects after which Python looks for garbage: more than imports make."""
 
 app = typer.Typer(
     help="Can a rocker-bogie rover traverse this path?",
@@ -83,5 +80,4 @@ def main(argv: Sequence[str] | None = None) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Plugins would be looked for among all installed packages; a rover file has none.
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    gc.set_threshold(NEW_OBJECTS)  # by default, looking takes a tenth of the time of `predict`
     return run_program(NAME, lambda: run_app(app, NAME, argv))

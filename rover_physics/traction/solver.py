@@ -23,12 +23,7 @@ from rover_physics.traction.layout import (
     VARIABLES,
 )
 from rover_physics.traction.line_search import find_best_between, measure_peak
-from rover_physics.traction.program import (
-    ProgramInputs,
-    Reference,
-    TractionQP,
-    build_traction_qp,
-)
+from rover_physics.traction.program import ProgramInputs, Reference, TractionQP, build_traction_qp
 
 OSQP_SETTINGS = {
     # Of scaled rows. The default of 1e-3 leaves rows 1e-2 of the weight open.

@@ -19,11 +19,7 @@ from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import elevation_of, find_block_max
 from rover_physics.traversability.classification import IMPASSABLE
 from rover_physics.traversability.judge import judge_poses
-from rover_physics.traversability.pose_classes import (
-    RoverOnMap,
-    classify_poses,
-    hopeless_codes,
-)
+from rover_physics.traversability.pose_classes import RoverOnMap, classify_poses, hopeless_codes
 from rover_planner.survey.layers import (
     CLASS_NUMBERS,
     NO_LIMIT,
