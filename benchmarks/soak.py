@@ -15,12 +15,8 @@ import json
 import os
 import re
 import signal
-import subprocess
-import sys
-import tempfile
 import time
 from collections import Counter
-from pathlib import Path
 from statistics import median
 from typing import Annotated
 
@@ -31,9 +27,17 @@ from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from std_msgs.msg import Float64MultiArray, String
 
-from benchmarks.processes import DOMAIN, ROOT, Client, LostAnswerError
+from benchmarks.processes import (
+    ROOT,
+    Client,
+    LostAnswerError,
+    NodeProcesses,
+    memory_of,
+    open_nodes,
+)
 from msg_adapters.odometry import odometry_to_pose
 from rover_physics import Terrain, save_terrain
+from rover_planner.demo.child_process import ChildProcess
 from rover_planner.ros.qos import latched_qos, sensor_qos, topic_qos
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.project.launch_files import simulation_commands
@@ -92,76 +96,51 @@ class Ear(Node):
 class Programs:
     """The programs by name; each can be killed and started again."""
 
-    def __init__(self, folder: Path, terrain: Path):
-        (folder / "controller.yaml").write_text(PARAMETERS.read_text() + RESTS)
-        self._folder = folder
-        self._words = simulation_commands(
-            terrain_file=str(terrain),
-            speed="0.08",
-            traction_controller_parameters=str(folder / "controller.yaml"),
+    def __init__(self, nodes: NodeProcesses, ground: Terrain):
+        terrain, parameters = nodes.folder / "ground.npz", nodes.folder / "controller.yaml"
+        save_terrain(terrain, ground)
+        parameters.write_text(PARAMETERS.read_text() + RESTS)
+        commands = simulation_commands(
+            terrain_file=str(terrain), speed="0.08", traction_controller_parameters=str(parameters)
         )
-        page = ["-m", "rover_planner", PAGE, "lsr1", str(terrain), "--follow", "--port", "0"]
-        self._words[PAGE] = [sys.executable, *page]
-        self._running: dict[str, subprocess.Popen[bytes]] = {}
-        for name in self._words:
+        self._nodes = nodes
+        self._modules = {name: words[2:] for name, words in commands.items()}  # behind python -m
+        page = [PAGE, "lsr1", str(terrain), "--follow", "--port", "0"]
+        self._modules[PAGE] = ["rover_planner", *page]
+        self._running: dict[str, ChildProcess] = {}
+        for name in self._modules:
             self.start(name)
 
-    def start(self, name: str, words: list[str] | None = None) -> None:
-        """Start a program, with its words or others; its output goes to a file."""
-        environment = os.environ | {"ROS_DOMAIN_ID": str(DOMAIN), "PYTHONPATH": str(ROOT)}
-        with open(self._folder / f"{name}.log", "ab") as log:
-            self._running[name] = subprocess.Popen(
-                words or self._words[name], env=environment, stdout=log, stderr=log
-            )
+    def start(self, name: str, module: list[str] | None = None) -> None:
+        """Start a program, with its module and words or others."""
+        self._running[name] = self._nodes.start_module(*(module or self._modules[name]))
 
     def kill(self, name: str) -> None:
         """Kill a program."""
-        if name in self._running:
-            self._running[name].kill()
-            self._running[name].wait()
+        if self.exit_code(name) is None:
+            os.kill(self._running[name].pid, signal.SIGKILL)
 
     def exit_code(self, name: str) -> int | None:
         """Return the exit code of a program, None while it runs."""
-        return self._running[name].poll()
+        return self._running[name].exit_code
 
     def memory(self) -> dict[str, float]:
         """Return the memory [MB] of each program that runs."""
-        found = {}
-        for name, process in self._running.items():
-            if process.poll() is None:
-                text = Path(f"/proc/{process.pid}/status").read_text()
-                found[name] = int(text.split("VmRSS:")[1].split()[0]) / 1024
-        return found
-
-    def close(self) -> None:
-        """End all programs."""
-        for name in self._running:
-            self.kill(name)
+        return {name: memory_of(child) for name, child in self._running.items() if child.running}
 
 
 def run_soak(minutes: float, load: int, kill_every: float, seed: int) -> dict[str, object]:
     """Run a soak; return its report."""
     rng = np.random.default_rng(seed)
     ground = make_mars_terrain(seed, 24.0, 0.05, rock_cover=0.01, crater_density=0.0)
-    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(load)]
-    ros = RosRun(DOMAIN)
-    with tempfile.TemporaryDirectory() as folder:
-        programs = None
-        try:
-            terrain = Path(folder) / "ground.npz"
-            save_terrain(terrain, ground)
-            programs, ear = Programs(Path(folder), terrain), ros.spin(Ear(ros))
-            client = Client(ros, "soak")
-            wait_until(lambda: np.isfinite(ear.pose).all(), "the simulator", START_TIME)
-            client.connect()
-            return _drive(programs, ear, client, ground, rng, (minutes, kill_every))
-        finally:
-            if programs is not None:
-                programs.close()
-            for process in busy:
-                process.kill()
-                process.wait()
-            ros.close()
+    with open_nodes() as nodes:
+        for _ in range(load):
+            nodes.start_module("timeit", "-n", str(10**12), "pass")
+        programs, ear = Programs(nodes, ground), nodes.ros.spin(Ear(nodes.ros))
+        client = nodes.client("soak")
+        wait_until(lambda: np.isfinite(ear.pose).all(), "the simulator", START_TIME)
+        client.connect()
+        return _drive(programs, ear, client, ground, rng, (minutes, kill_every))
 
 
 def _drive(
@@ -220,8 +199,7 @@ def _start_mission(programs: Programs, ear: Ear, rng: np.random.Generator) -> No
     far = rng.uniform(0.5, 1.0) * REACH
     start = f"--start={x:.3f},{y:.3f},{yaw:.3f}"
     goal = f"--goal={x + far * np.cos(bearing):.3f},{y + far * np.sin(bearing):.3f},{bearing:.3f}"
-    module = ["-m", "rover_planner.nodes.mission_planner"]
-    programs.start(MISSION, [sys.executable, *module, start, goal, "--drive"])
+    programs.start(MISSION, ["rover_planner.nodes.mission_planner", start, goal, "--drive"])
 
 
 def _change(client: Client, rng: np.random.Generator) -> None:
@@ -251,7 +229,6 @@ def main(
     seed: Annotated[int, typer.Option(help="Seed of ground and goals.")] = 1,
 ) -> None:
     """Run a soak and print its report as JSON."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # its programs end with it
     print(json.dumps(run_soak(minutes, load, kill_every, seed), indent=2))
 
 

@@ -11,11 +11,7 @@ from sensor_msgs.msg import Imu
 
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_norm
-from rover_physics.numerics.quaternions import (
-    matrix_from_xyzw,
-    rpy_from_xyzw,
-    xyzw_from_rpy,
-)
+from rover_physics.numerics.quaternions import matrix_from_xyzw, rpy_from_xyzw, xyzw_from_rpy
 
 NOT_MEASURED = -1.0
 """First element of a covariance in sensor_msgs/Imu if the quantity is not measured."""

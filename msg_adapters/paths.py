@@ -92,9 +92,7 @@ def pose_to_array(pose: Pose, what: str = "pose") -> NDArray[np.float64]:
 
 
 def stamped_pose_to_array(
-    stamped: PoseStamped,
-    map_frame: str,
-    what: str = "pose",
+    stamped: PoseStamped, map_frame: str, what: str = "pose"
 ) -> NDArray[np.float64]:
     """Return (3,) x, y [m] and yaw [rad] of a pose in the map frame.
 

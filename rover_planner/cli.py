@@ -78,4 +78,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command and return its exit code; print one line on stderr for bad input."""
     # No command has matrices that are worth a thread, and each takes 20 ms to start.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Plugins would be looked for among all installed packages; a rover file has none.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     return run_program(NAME, lambda: run_app(app, NAME, argv))

@@ -87,9 +87,7 @@ def quarter_turn(terrain: Terrain, poses: np.ndarray) -> tuple[Terrain, np.ndarr
     """Return ground and poses, both rotated by 90 degrees about the map's z: x -> y, y -> -x."""
     xmin, xmax, ymin, ymax = terrain.bounds
     turned = replace(
-        terrain,
-        elevation=np.ascontiguousarray(terrain.elevation.T[:, ::-1]),
-        origin=(-ymax, xmin),
+        terrain, elevation=np.ascontiguousarray(terrain.elevation.T[:, ::-1]), origin=(-ymax, xmin)
     )
     return turned, np.column_stack([-poses[:, 1], poses[:, 0], poses[:, 2] + 0.5 * np.pi])
 

@@ -142,9 +142,7 @@ def suspension_angles(prediction: PathPrediction) -> NDArray[np.float64]:
 
 
 def _rolled_angles(
-    prediction: PathPrediction,
-    wheel_radius: float,
-    count: int,
+    prediction: PathPrediction, wheel_radius: float, count: int
 ) -> NDArray[np.float64]:
     """Return rolling angles (count, 6) [rad] of the wheels, negative backwards."""
     steps = np.diff(prediction.wheel_centres[:count], axis=0)

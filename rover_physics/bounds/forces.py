@@ -19,11 +19,7 @@ from rover_physics.forces.shares import has_turned_wheels
 from rover_physics.forces.soil import SoilWheel, solve_wheel
 from rover_physics.forces.soil_sharing import rolling_direction
 from rover_physics.forces.stability import CORNERS, measure_edge
-from rover_physics.forces.torques import (
-    apply_torques,
-    minimise_friction,
-    take_equal_torques,
-)
+from rover_physics.forces.torques import apply_torques, minimise_friction, take_equal_torques
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import record_type
 from rover_physics.prediction.evaluation import find_tip_over

@@ -101,29 +101,6 @@ def climb_costs(poses: np.ndarray, results: Any, crossings: Crossings) -> Floats
     return np.asarray(np.cumsum(extra, axis=0))
 
 
-def add_up_rate(name: str, time: Floats, results: Any, crossings: Crossings) -> Floats:
-    """Return the sums (n, ...) since the first waypoint of a rate that RESULTs have.
-
-    Such as `slip_speed`, whose sum is the distance that treads slide. Where the rover climbs, the
-    poses between the waypoints count with their durations.
-
-    Args:
-        name: The field of RESULT.
-        time: (n,) time at the waypoints [s].
-        results: (n,) RESULT of each waypoint.
-        crossings: Poses between the waypoints.
-    """
-    rates = results[name]
-    duration = np.diff(time).reshape(-1, *(1,) * (rates.ndim - 1))
-    parts = 0.5 * (rates[1:] + rates[:-1]) * duration
-    for step in _steps_with_crossings(results, crossings):
-        values, i = step.values(name), step.waypoint - 1
-        among = step.durations * (duration[i].item() / step.durations.sum())
-        means = 0.5 * (values[1:] + values[:-1])
-        parts[i] = (means * among.reshape(-1, *(1,) * (rates.ndim - 1))).sum(axis=0)
-    return np.concatenate([np.zeros_like(rates[:1]), np.cumsum(parts, axis=0)])
-
-
 @dataclass(frozen=True, eq=False)
 class _Step:
     """The step to a waypoint over poses between it and the one before."""

@@ -5,15 +5,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from rover_physics.files.rules import (
-    Keys,
-    Radians,
-    Rule,
-    Text,
-    choice,
-    interval,
-    number,
-)
+from rover_physics.files.rules import Keys, Radians, Rule, Text, choice, interval, number
 from rover_physics.names import WHEEL_POSITIONS
 from rover_physics.numerics.plausible import (
     MAX_COORDINATE,

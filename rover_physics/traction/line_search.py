@@ -6,13 +6,7 @@ import numpy as np
 from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.kernels import kernel
 from rover_physics.traction.balance import BalanceRows
-from rover_physics.traction.layout import (
-    FORCES,
-    LATERAL_SHARE,
-    LATERAL_SLOPE,
-    LOAD,
-    TRACTION,
-)
+from rover_physics.traction.layout import FORCES, LATERAL_SHARE, LATERAL_SLOPE, LOAD, TRACTION
 from rover_physics.traction.program import (
     EFFORT_WEIGHT,
     MIN_LOAD,

@@ -9,17 +9,21 @@ import osqp
 from scipy import sparse
 
 from rover_physics.names import WHEEL_COUNT
+from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import array_of, new_record
 from rover_physics.traction.balance import MEASURED_BALANCE, BalanceRows
-from rover_physics.traction.layout import FORCES, ROWS, TRACTION, TRACTIONS, VARIABLES
-from rover_physics.traction.line_search import find_best_between, measure_peak
-from rover_physics.traction.program import (
-    ProgramInputs,
-    Reference,
-    TractionQP,
-    build_traction_qp,
+from rover_physics.traction.layout import (
+    FORCES,
+    LATERAL_SHARE,
+    LATERAL_SLOPE,
+    LOAD,
+    ROWS,
+    TRACTION,
+    TRACTIONS,
+    VARIABLES,
 )
-from rover_physics.traction.wheel_forces import WHEEL_FORCES, write_wheel_forces
+from rover_physics.traction.line_search import find_best_between, measure_peak
+from rover_physics.traction.program import ProgramInputs, Reference, TractionQP, build_traction_qp
 
 OSQP_SETTINGS = {
     # Of scaled rows. The default of 1e-3 leaves rows 1e-2 of the weight open.
@@ -43,6 +47,8 @@ CONVERGED_SHARE = 0.02
 """Change of the scaled tractions, which are of order one, at which a sequence has converged."""
 OSQP_SOLVED = 1
 """OSQP's status_val of a solved problem; the first versions have no name for it."""
+WHEEL_FORCES = ("torques", "loads", "tractions", "lateral", "utilisation")
+"""Rows of a table of wheel forces."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,3 +180,36 @@ def _describe_answer(
         torque_slack=max(inputs.radius * max_traction - inputs.max_torque, 0.0),
         **run,
     )  # fmt: skip
+
+
+@kernel
+def write_wheel_forces(balances, all_inputs, x, table):
+    """Write forces x (14,), in force units, into a table of wheel forces.
+
+    Args:
+        balances: Array (1,) of MEASURED_BALANCE.
+        all_inputs: Array (1,) of PROGRAM_INPUTS; torques are cut off at its largest.
+        x: (14,) tractions, loads and lateral terms in force units.
+        table: (5, 6) rows as in WHEEL_FORCES: torques [N m], loads, tractions and lateral forces
+            [N], utilisations, infinite where there is no load.
+
+    Returns:
+        Largest utilisation, smallest load [N], largest size of a traction [N].
+    """
+    balance, inputs = balances[0], all_inputs[0]
+    unit, limit = balance.force_unit, inputs.max_torque
+    torques, loads, tractions = table[0], table[1], table[2]
+    laterals, utilisation = table[3], table[4]
+    peak, min_load, max_traction = 0.0, np.inf, 0.0
+    for wheel in range(WHEEL_COUNT):
+        traction, load = unit * x[TRACTION + wheel], unit * x[LOAD + wheel]
+        shares = balance.lateral_shares[wheel]
+        lateral = unit * (x[LATERAL_SHARE] * shares[0] + x[LATERAL_SLOPE] * shares[1])
+        across = np.sqrt(traction * traction + lateral * lateral)
+        used = across / (inputs.friction[wheel] * load) if load > 0.0 else np.inf
+        torques[wheel] = min(max(inputs.radius * traction, -limit), limit)
+        loads[wheel], tractions[wheel], laterals[wheel] = load, traction, lateral
+        utilisation[wheel] = used
+        peak, min_load = max(peak, used), min(min_load, load)
+        max_traction = max(max_traction, abs(traction))
+    return peak, min_load, max_traction

@@ -9,14 +9,7 @@ from numpy.typing import ArrayLike
 
 from rover_physics.bounds.path import SIGMAS
 from rover_physics.limits.table import WHEEL_CONSTRAINTS
-from rover_physics.names import (
-    CONTROL_POLICIES,
-    EQUAL,
-    OPTIMAL,
-    SERVO,
-    TORQUE_POLICIES,
-    WHEELS,
-)
+from rover_physics.names import CONTROL_POLICIES, EQUAL, OPTIMAL, SERVO, TORQUE_POLICIES, WHEELS
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.quiet import quiet
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions

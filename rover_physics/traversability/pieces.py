@@ -22,21 +22,12 @@ from rover_physics.numerics.read_only import view_read_only
 from rover_physics.prediction.crossing import find_turns, turn_wheels
 from rover_physics.prediction.drops import MIN_ANGLE
 from rover_physics.prediction.packed_model import PackedModel, pack_model
-from rover_physics.prediction.path_kernels import (
-    FACE,
-    add_up,
-    distance_between,
-    find_jumps,
-)
+from rover_physics.prediction.path_kernels import FACE, add_up, distance_between, find_jumps
 from rover_physics.prediction.path_motion import path_motions
 from rover_physics.prediction.sweep import check_poses, find_suspects, joined_paths
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.results.record import (
-    place_results,
-    select_results,
-    unwritten_results,
-)
+from rover_physics.results.record import place_results, select_results, unwritten_results
 from rover_physics.results.uses import find_codes, find_risk, find_uses, limits_of, readable
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain

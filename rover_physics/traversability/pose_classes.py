@@ -77,9 +77,7 @@ def hopeless_codes(is_uncertain: bool) -> tuple[str, ...]:
 
 @quiet
 def classify_poses(
-    on_map: RoverOnMap,
-    poses: NDArray[np.float64],
-    policies: Sequence[str] = TORQUE_POLICIES,
+    on_map: RoverOnMap, poses: NDArray[np.float64], policies: Sequence[str] = TORQUE_POLICIES
 ) -> NDArray[np.int8]:
     """Return the class (n,) of single poses (n, 3) x, y [m] and yaw [rad], driving straight ahead.
 

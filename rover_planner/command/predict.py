@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command `rover_planner predict`: writes loads, slip and margins along a path to a file."""
 
+import gc
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -86,6 +87,7 @@ def predict(
 
     Exit code 0: it ran, with any verdict. 2: bad input.
     """
+    gc.disable()  # imports make no garbage; to look for it takes a tenth of a short command's time
     from rover_physics.prediction.sweep_options import SweepOptions
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.terrain.grid import load_terrain
@@ -99,6 +101,8 @@ def predict(
     from rover_planner.planning.assumptions import assume
     from rover_planner.shell.progress import show_progress
 
+    gc.freeze()
+    gc.enable()
     model = load_rover(rover)
     ground = load_terrain(terrain, max_cells)
     path = read_poses(poses)

@@ -37,6 +37,8 @@ STYLE: dict[str, Any] = {
 """Settings of matplotlib (rcParams)."""
 # The palette of Okabe and Ito, which is safe for colour-blind readers.
 PASSABLE, REFUSED = "#0072B2", "#D55E00"
+WHEEL_COLOURS = {"rear": "#0072b2", "middle": "#e69f00", "front": "#cc79a7"}
+"""Colours of rear, middle and front wheels."""
 INK, UNKNOWN = "#222222", "#CCD6E6"
 """Colours of lines and texts, and of unknown ground."""
 BRIGHTEST = 1.1

@@ -23,11 +23,11 @@ from rover_planner.figures.pictures import (
     PASSABLE,
     REFUSED,
     UNKNOWN,
+    WHEEL_COLOURS,
     drawing,
     find_extent,
     hill_shade,
 )
-from rover_planner.figures.wheel_colours import WHEEL_COLOURS
 from rover_planner.planning.path_query import Candidate, PathAnswer
 
 CHOSEN = "#F0E442"

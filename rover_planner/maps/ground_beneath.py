@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.prediction.evaluation import new_work
@@ -97,10 +97,6 @@ class GroundBeneath:
         is_contact = inside & self._is_contact(along, across)
         layers = {"elevation": heights, "elevation_std": np.where(inside, std, np.nan)}
         return Patch(box, layers), is_contact
-
-    def height(self, x: ArrayLike, y: ArrayLike) -> Floats:
-        """Return the heights of the surface [m] at points [m], map frame."""
-        return self._height(*_to_body(self.pose, np.asarray(x, float), np.asarray(y, float)))
 
     def _height(self, along: Floats, across: Floats) -> Floats:
         sides = []

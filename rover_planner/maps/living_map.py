@@ -111,11 +111,7 @@ class LivingMap:
         self._whole = terrain
 
     def merge(
-        self,
-        terrain: Terrain,
-        source: str,
-        time: float,
-        centre: tuple[float, float] | None = None,
+        self, terrain: Terrain, source: str, time: float, centre: tuple[float, float] | None = None
     ) -> None:
         """Merge a local map.
 

@@ -21,13 +21,8 @@ from rclpy.parameter import Parameter
 from msg_adapters.errors import MessageError
 from rover_physics.errors import RoverError
 from rover_planner.errors import PlanningError
-from rover_planner.parameters.table import (
-    ParameterError,
-    ParameterSpec,
-    ParameterTable,
-    specs_of,
-)
-from rover_planner.shell.one_line import one_line
+from rover_planner.parameters.table import ParameterError, ParameterSpec, ParameterTable, specs_of
+from rover_planner.shell.run_program import one_line
 
 ROS_OWN = ("qos_overrides.",)
 """Begins of names of parameters that ROS declares by itself."""

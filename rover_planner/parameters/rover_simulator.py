@@ -73,9 +73,7 @@ class RoverSimulatorParameters(ParameterTable):
         read_only=True,
     )
     follow_commands: bool = parameter(
-        False,
-        "Whether torques from traction_controller/commands drive the rover.",
-        read_only=True,
+        False, "Whether torques from traction_controller/commands drive the rover.", read_only=True
     )
     joints: tuple[str, ...] = parameter(
         WHEEL_JOINTS, "Wheel joints in the order of the values of the torques.", read_only=True

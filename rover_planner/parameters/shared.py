@@ -21,10 +21,7 @@ RELIABILITIES = (RELIABLE, BEST_EFFORT)
 
 
 MAX_TORQUE: float = parameter(
-    0.0,
-    "Largest torque of a wheel; 0 uses that of the rover file.",
-    unit="N m",
-    bounds=(0.0, 1e6),
+    0.0, "Largest torque of a wheel; 0 uses that of the rover file.", unit="N m", bounds=(0.0, 1e6)
 )
 STEERING_SIGN: str = parameter(
     LEFT,
@@ -92,11 +89,7 @@ CELL_HEIGHT: str = parameter(
 def max_map_cells_parameter(read_only: bool = False) -> int:
     """Return the field of the parameter max_map_cells [cells]."""
     return parameter(
-        MAX_CELLS,
-        "Largest terrain file.",
-        unit="cells",
-        bounds=(4, 10**9),
-        read_only=read_only,
+        MAX_CELLS, "Largest terrain file.", unit="cells", bounds=(4, 10**9), read_only=read_only
     )
 
 
@@ -117,9 +110,7 @@ def stop_timeout_parameter(read_only: bool = False) -> float:
 
 
 IMU_FRAME: str = parameter(
-    "",
-    "Frame of the IMU; empty is that of the body. Another frame_id is refused.",
-    read_only=True,
+    "", "Frame of the IMU; empty is that of the body. Another frame_id is refused.", read_only=True
 )
 IMU_MOUNTING: tuple[float, ...] = parameter(
     (0.0, 0.0, 0.0),

@@ -49,9 +49,7 @@ class TractionControllerParameters(ParameterTable):
         read_only=True,
     )
     rest_policy: str = parameter(
-        HOLD,
-        "What the wheels do when the node does not drive.",
-        choices=REST_POLICIES,
+        HOLD, "What the wheels do when the node does not drive.", choices=REST_POLICIES
     )
     stall_time: float = parameter(
         10.0,
@@ -66,10 +64,7 @@ class TractionControllerParameters(ParameterTable):
         bounds=(0.01, 1.0),
     )
     imu_timeout: float = parameter(
-        0.06,
-        "Age above which the attitude is stale, a fault.",
-        unit="s",
-        bounds=(0.01, 1.0),
+        0.06, "Age above which the attitude is stale, a fault.", unit="s", bounds=(0.01, 1.0)
     )
     cmd_vel_timeout: float = parameter(
         0.5, "Age above which cmd_vel is stale, a fault.", unit="s", bounds=(0.01, 10.0)

@@ -49,8 +49,7 @@ class TraverseServerParameters(ParameterTable):
     )
     max_torque: float = MAX_TORQUE
     soil: str = parameter(
-        "",
-        "Soil of config/soils.yaml where the map names none; empty is Coulomb friction.",
+        "", "Soil of config/soils.yaml where the map names none; empty is Coulomb friction."
     )
     payload: float = PAYLOAD
     policy: str = parameter(
@@ -69,10 +68,7 @@ class TraverseServerParameters(ParameterTable):
         9, "Largest number of candidate paths between start and goal.", bounds=(1, 99)
     )
     candidate_spacing: float = parameter(
-        0.3,
-        "Distance between neighbouring candidates half-way.",
-        unit="m",
-        bounds=(0.01, 10.0),
+        0.3, "Distance between neighbouring candidates half-way.", unit="m", bounds=(0.01, 10.0)
     )
     waypoint_spacing: float = parameter(
         0.02, "Largest distance between judged waypoints.", unit="m", bounds=(0.001, 1.0)
@@ -93,8 +89,7 @@ class TraverseServerParameters(ParameterTable):
         bounds=(0.0, 10.0),
     )
     search_frontier: bool = parameter(
-        False,
-        "Whether a goal beyond the known ground is answered with a path to near it.",
+        False, "Whether a goal beyond the known ground is answered with a path to near it."
     )
     plan_spacing: float = parameter(
         0.1,
@@ -174,8 +169,7 @@ class TraverseServerParameters(ParameterTable):
         bounds=(0.0, 1e5),
     )
     fill_under_rover: bool = parameter(
-        True,
-        "Whether unknown ground under the standing rover is filled from its six contacts.",
+        True, "Whether unknown ground under the standing rover is filled from its six contacts."
     )
     footprint_margin: float = parameter(
         0.0,
@@ -244,9 +238,7 @@ class TraverseServerParameters(ParameterTable):
         bounds=(0.05, 600.0),
     )
     max_waiting: int = parameter(
-        50,
-        "Questions that may wait; further ones are busy.",
-        bounds=(0, 1000),
+        50, "Questions that may wait; further ones are busy.", bounds=(0, 1000)
     )
     map_folder: str = parameter(
         "~/maps",
@@ -260,10 +252,7 @@ class TraverseServerParameters(ParameterTable):
         bounds=(2, 100_000),
     )
     max_map_bytes: int = parameter(
-        1_000_000_000,
-        "Largest file that ~/load_map reads.",
-        unit="bytes",
-        bounds=(1000, 10**12),
+        1_000_000_000, "Largest file that ~/load_map reads.", unit="bytes", bounds=(1000, 10**12)
     )
     max_map_cells: int = max_map_cells_parameter()
     suspension_tolerance: float = parameter(
@@ -300,8 +289,7 @@ class TraverseServerParameters(ParameterTable):
     )
 
     hazard_map: bool = parameter(
-        False,
-        "Whether the class of each cell and heading is kept up to date on ~/hazard_map.",
+        False, "Whether the class of each cell and heading is kept up to date on ~/hazard_map."
     )
     hazard_headings: int = parameter(
         8, "Number of headings of the hazard map.", bounds=(1, 36), read_only=True

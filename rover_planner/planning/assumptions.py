@@ -1,23 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """Assumptions of a prediction in a file, so that it can be judged again under the same."""
 
-from dataclasses import dataclass, replace
-
-from pydantic import ConfigDict, TypeAdapter, ValidationError
+import json
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING
 
 from rover_physics.bounds.path import SIGMAS
 from rover_physics.errors import RoverError
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_planner.errors import PlanningError
-from rover_planner.planning.path_query import PathQueryOptions
+
+if TYPE_CHECKING:
+    from rover_planner.planning.path_query import PathQueryOptions
 
 
 @dataclass(frozen=True)
 class Assumptions:
     """Rover and options of a prediction, as a file keeps them; None is the rover's own value."""
 
-    __pydantic_config__ = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+    __pydantic_config__ = {"extra": "forbid", "strict": True, "allow_inf_nan": False}  # noqa: RUF012
 
     rover: str
     """Name of the rover."""
@@ -50,7 +52,7 @@ class Assumptions:
         friction = rover.friction if self.friction is None else self.friction
         return replace(rover, friction=friction, wheel=wheel, manipulator=arm)
 
-    def change_options(self, options: PathQueryOptions) -> PathQueryOptions:
+    def change_options(self, options: "PathQueryOptions") -> "PathQueryOptions":
         """Return options with the policy, margin, soil and deviations that were assumed.
 
         Raises:
@@ -62,9 +64,6 @@ class Assumptions:
             soil=self.soil,
             map_sigmas=self.map_sigmas,
         )
-
-
-_ADAPTER = TypeAdapter(Assumptions)
 
 
 def assume(rover: Rover, options: SweepOptions, map_sigmas: float = SIGMAS) -> Assumptions:
@@ -85,7 +84,7 @@ def assume(rover: Rover, options: SweepOptions, map_sigmas: float = SIGMAS) -> A
 
 def write_assumptions(assumptions: Assumptions) -> str:
     """Return assumptions as JSON in one line."""
-    return _ADAPTER.dump_json(assumptions).decode()
+    return json.dumps(asdict(assumptions), separators=(",", ":"), ensure_ascii=False)
 
 
 def read_assumptions(text: str) -> Assumptions:
@@ -94,8 +93,12 @@ def read_assumptions(text: str) -> Assumptions:
     Raises:
         PlanningError: The text is something else.
     """
+    from pydantic import TypeAdapter, ValidationError
+
+    from rover_planner.planning.path_query import PathQueryOptions
+
     try:
-        assumptions = _ADAPTER.validate_json(text)
+        assumptions: Assumptions = TypeAdapter(Assumptions).validate_json(text)
         assumptions.change_options(PathQueryOptions())
     except (ValidationError, RoverError) as error:
         reason = str(error).splitlines()[0]

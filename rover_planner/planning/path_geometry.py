@@ -69,9 +69,7 @@ def _count_pieces(steps: NDArray[np.float64], spacing: float) -> NDArray[np.intp
 
 
 def rings_within(
-    start: NDArray[np.float64],
-    goal: NDArray[np.float64],
-    tolerance: float,
+    start: NDArray[np.float64], goal: NDArray[np.float64], tolerance: float
 ) -> Iterator[list[NDArray[np.float64]]]:
     """Yield rings of goals (3,) around a goal, from near to far within `tolerance` [m].
 

@@ -164,11 +164,7 @@ def add_path(search: PathSearch | None, path: Candidate, goal: Pose) -> PathSear
 
 
 def answer_path_query(
-    rover: Rover,
-    terrain: Terrain,
-    start,
-    goal,
-    options: PathQueryOptions | None = None,
+    rover: Rover, terrain: Terrain, start, goal, options: PathQueryOptions | None = None
 ) -> PathAnswer:
     """Evaluate the candidate paths from start to goal and choose the best traversable one.
 

@@ -13,10 +13,7 @@ Reply = Callable[[Any], None]
 
 
 def serve_later(
-    node: Node,
-    kind: type,
-    name: str,
-    take: Callable[[Any, Any, Reply], None],
+    node: Node, kind: type, name: str, take: Callable[[Any, Any, Reply], None]
 ) -> None:
     """Create a service that takes requests without a response.
 

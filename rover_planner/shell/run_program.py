@@ -18,7 +18,9 @@ from rover_planner.shell.exit_codes import (
     EXIT_OK,
     EXIT_PIPE_CLOSED,
 )
-from rover_planner.shell.one_line import MAX_LINE, one_line
+
+MAX_LINE = 300
+"""Largest number of characters of a line on stderr."""
 
 
 def run_program(name: str, run: Callable[[], Any]) -> int:
@@ -78,3 +80,10 @@ def _drop_output() -> None:
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())
         os.close(nowhere)
+
+
+def one_line(text: str, most: int = MAX_LINE) -> str:
+    """Return a text without line breaks and control characters, cut to `most` characters."""
+    words = " ".join(text[: 10 * most].split())
+    shown = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in words)
+    return shown if len(shown) <= most else f"{shown[: most - 3]}..."

@@ -43,11 +43,6 @@ class PathFollower:
         self._at, self._finished = 0, 0.0
 
     @property
-    def length(self) -> float:
-        """Length of the path [m]."""
-        return sum(leg.length for leg in self._legs)
-
-    @property
     def driven(self) -> float:
         """Distance driven along the path [m]."""
         return self._finished + self._leg.done

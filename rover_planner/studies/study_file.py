@@ -12,15 +12,7 @@ from pydantic import Field
 
 from rover_physics.errors import RoverFileError
 from rover_physics.files.config_files import find_config
-from rover_physics.files.rules import (
-    ListOfMappings,
-    Metres,
-    Radians,
-    Rule,
-    Text,
-    choice,
-    number,
-)
+from rover_physics.files.rules import ListOfMappings, Metres, Radians, Rule, Text, choice, number
 from rover_physics.files.validation import Key, errors_of, read_as, refuse, show_file
 from rover_physics.files.yaml_file import read_yaml
 from rover_physics.rover.model import Rover

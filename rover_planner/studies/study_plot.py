@@ -3,17 +3,13 @@
 
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
-from rover_planner.figures.pictures import STYLE, drawing, new_figure
-from rover_planner.figures.wheel_colours import WHEEL_COLOURS
+from rover_planner.figures.pictures import WHEEL_COLOURS, drawing
 from rover_planner.studies.runner import StudyResult
 from rover_planner.studies.study_file import OBJECTIVES, label_of, name_thing
 from rover_planner.studies.summary import describe_ties
@@ -34,20 +30,6 @@ def draw_study(result: StudyResult, path: Path) -> None:
     """
     with drawing(path, SIZE) as figure:
         _draw(figure, result)
-
-
-def draw_pixels(result: StudyResult) -> NDArray[np.uint8]:
-    """Draw a study and return the pixels (height, width, 4), RGBA.
-
-    Raises:
-        PlanningError: No trial could be judged.
-    """
-    with matplotlib.rc_context({**STYLE, "figure.dpi": 130}):
-        figure = new_figure(SIZE)
-        _draw(figure, result)
-        canvas = FigureCanvasAgg(figure)
-        canvas.draw()
-        return np.array(canvas.buffer_rgba(), dtype=np.uint8)
 
 
 def _draw(figure: Figure, result: StudyResult) -> None:

@@ -41,10 +41,7 @@ class HeadingGrid(NamedTuple):
 
 
 def find_reachable(
-    store: SurveyStore,
-    x: float,
-    y: float,
-    report: Callable[[str], object] = lambda what: None,
+    store: SurveyStore, x: float, y: float, report: Callable[[str], object] = lambda what: None
 ) -> ReachableArea:
     """Find where the rover can go from a place and return to it, and keep that in the store.
 

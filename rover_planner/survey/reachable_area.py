@@ -90,11 +90,7 @@ def new_area(store: SurveyStore) -> Iterator[tuple[Path, Any]]:
 
 
 def note_area(
-    store: SurveyStore,
-    group: Any,
-    start: Index,
-    place: tuple[float, float],
-    numbers: AreaNumbers,
+    store: SurveyStore, group: Any, start: Index, place: tuple[float, float], numbers: AreaNumbers
 ) -> None:
     """Note beside the distances of an area its start, as a cell and as asked, and its numbers."""
     finished = len(store.find_finished())

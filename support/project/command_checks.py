@@ -40,8 +40,6 @@ def check_command(words: tuple[str, ...]) -> None:
         _check_python(arguments)
     elif name == "pip":
         _check_pip(arguments)
-    elif name == "make":
-        _check_make(arguments)
     elif name == "ros2":
         _check_ros2(arguments)
     elif name.startswith("."):
@@ -125,17 +123,6 @@ def _check_pip(words: tuple[str, ...]) -> None:
             assert set((match[1] or "").split(",")) - {""} <= set(extras), word
         elif not word.startswith("-"):
             assert re.search(rf"^{re.escape(word)}==", locked, re.MULTILINE), f"{word} not locked"
-
-
-def _check_make(words: tuple[str, ...]) -> None:
-    """Look for targets and variables in the Makefile."""
-    makefile = (TOP / "Makefile").read_text(encoding="utf-8")
-    for word in words:
-        variable, _, value = word.partition("=")
-        if value:
-            assert re.search(rf"\$\({variable}\)|^{variable} \?=", makefile, re.MULTILINE), word
-        else:
-            assert re.search(rf"^{word}:", makefile, re.MULTILINE), f"no target {word}"
 
 
 def _check_ros2(words: tuple[str, ...]) -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from rover_planner.cli import main
 from rover_planner.shell.exit_codes import EXIT_INTERRUPTED
-from rover_planner.shell.one_line import MAX_LINE
+from rover_planner.shell.run_program import MAX_LINE
 from support.command_line import REPOSITORY, write_ground_and_path
 
 LONG = "n" * 300

@@ -9,11 +9,7 @@ pytest.importorskip("matplotlib", reason="needs matplotlib")
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.traversability.judge import judge_path
 from rover_planner.cli import main
-from rover_planner.figures.figure4 import (
-    HELD,
-    load_changes,
-    loads_under_torque,
-)
+from rover_planner.figures.figure4 import HELD, load_changes, loads_under_torque
 from support.rough_grounds import plane
 from support.rover_geometry import balance_matrix, turned_round
 

@@ -9,12 +9,7 @@ import pytest
 from rover_physics.names import WHEELS
 from rover_physics.terrain.grid import load_terrain, save_terrain
 from rover_planner.cli import main
-from support.command_line import (
-    N,
-    assert_refused,
-    predict_arguments,
-    write_ground_and_path,
-)
+from support.command_line import N, assert_refused, predict_arguments, write_ground_and_path
 
 
 def by_name(table):

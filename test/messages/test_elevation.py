@@ -13,10 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sensor_msgs.msg import PointCloud2, PointField
 
-from msg_adapters.elevation import (
-    terrain_from_point_cloud,
-    terrain_to_point_cloud,
-)
+from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cloud
 from msg_adapters.errors import MAX_TEXT, MessageError
 from msg_adapters.gridding import detect_raster
 from msg_adapters.results.grids import terrain_to_occupancy_grid

@@ -16,12 +16,7 @@ from msg_adapters.errors import MessageError
 from msg_adapters.paths import PoseStock, settled_path
 from msg_adapters.results.diagnostics import to_json, verdict_to_diagnostics
 from msg_adapters.results.markers import IMPASSABLE, PASSABLE, path_markers
-from msg_adapters.results.predictions import (
-    JOINTS,
-    array_values,
-    joint_trajectory,
-    waypoint_array,
-)
+from msg_adapters.results.predictions import JOINTS, array_values, joint_trajectory, waypoint_array
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.rover.rover_file import load_rover
@@ -73,10 +68,7 @@ def test_an_array_whose_length_disagrees_is_refused():
         array_values(Float64MultiArray())
 
 
-def test_the_trajectory_names_its_joints_and_ends_where_the_rover_cannot_settle(
-    prediction,
-    rover,
-):
+def test_the_trajectory_names_its_joints_and_ends_where_the_rover_cannot_settle(prediction, rover):
     message = joint_trajectory(prediction, rover, "map", STAMP)
     assert message.header.frame_id == "map" and message.header.stamp == STAMP
     assert JOINTS == SUSPENSION_JOINTS + WHEEL_JOINTS

@@ -7,11 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from rover_planner.errors import PlanningError
 from rover_planner.planning.navigation.sensor_mounts import SensorPoses, read_mounts
-from rover_planner.planning.navigation.transforms import (
-    Rigid,
-    TransformError,
-    TransformTree,
-)
+from rover_planner.planning.navigation.transforms import Rigid, TransformError, TransformTree
 
 SECOND = 1_000_000_000
 NOW = 1000 * SECOND

@@ -82,8 +82,7 @@ def test_a_server_says_what_it_does_answers_another_process_and_ends_cleanly(
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("name", "how"),
-    [("traverse_server", signal.SIGTERM), ("traction_controller", signal.SIGINT)],
+    ("name", "how"), [("traverse_server", signal.SIGTERM), ("traction_controller", signal.SIGINT)]
 )
 def test_a_signal_ends_a_node_while_kernels_compile(
     start_process, tmp_path, monkeypatch, name, how

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The code blocks of README and docs run as they are written, from top to bottom of each page.
 
-A page gets an empty folder, and the programs of this checkout by their names. What cannot run
-here is listed in NOT_RUN; it is read by the parsers of the product all the same.
+A page gets an empty folder, and the programs of this checkout by their names. A comment before a
+block says why it cannot run here; the parsers of the product read it all the same.
 """
 
 import ast
@@ -23,24 +23,6 @@ from support.project.doc_blocks import PAGES, Block, Command, read_blocks, split
 from support.project.processes import ProcessToken
 from support.ros_fixtures import domain_id
 
-NOT_RUN = {
-    ("make",): "makes an environment and runs the tests; each target has tests of its own",
-    ("pip",): "installs; test_lowest_versions installs in an environment of its own",
-    ("git", "clone"): "needs the network",
-    ("ros2",): "PyPI does not have the ros2 command",
-    ("rosdep",): "is for a robot that has ROS 2 from apt",
-    ("source",): "is for a robot that has ROS 2 from apt",
-    ("python3", "-m", "colcon"): "is for a robot that has ROS 2 from apt",
-    (
-        "python",
-        "-m",
-        "support",
-    ): "needs a browser and the real maps; writes pictures",
-    ("python", "-m", "benchmarks"): "takes minutes; test_benchmarks runs each topic small",
-    ("rover_planner", "replay"): "needs a bag; test_replay records small ones",
-    ("rover_planner", "view"): "serves a page until Ctrl-C; the tests in test/viewer serve it",
-}
-"""How commands begin that are not run here, and why; a block with one of them is not run."""
 SERVERS = ("traverse_server", "traction_controller", "rover_simulator")
 """Programs that run until they are told to stop, so that a block has them in the background."""
 LONGEST, GRACE = 300.0, 20.0
@@ -53,27 +35,8 @@ BLOCKS = [block for page in PAGES for block in read_blocks(page)]
 PAGES_TO_RUN = sorted({block.page for block in BLOCKS})
 
 
-def begins_with(command: Command, start: tuple[str, ...]) -> bool:
-    """Tell whether a command begins with words, the last of which may go on after a dot."""
-    words = [*command.words[: len(start) - 1]]
-    words += [word.split(".")[0] for word in command.words[len(start) - 1 : len(start)]]
-    return tuple(words) == start
-
-
-def find_reason(block: Block) -> str:
-    """Return why a block is not run here, empty if it is."""
-    if block.language == "python":
-        return ""
-    commands = split_commands(block.text)
-    return next(
-        (why for start, why in NOT_RUN.items() if any(begins_with(c, start) for c in commands)),
-        "",
-    )
-
-
 @pytest.mark.parametrize("block", BLOCKS, ids=str)
-def test_a_block_names_only_what_there_is_and_says_only_truly_that_it_is_not_run(block):
-    assert find_reason(block) or not block.not_run, f"{block} says {block.not_run!r}"
+def test_a_block_names_only_what_there_is_and_leaves_no_server_in_the_way(block):
     if block.language == "python":
         ast.parse(block.text)
         return
@@ -81,8 +44,7 @@ def test_a_block_names_only_what_there_is_and_says_only_truly_that_it_is_not_run
     assert (checked.returncode, checked.stderr) == (0, "")
     for command in split_commands(block.text):
         check_command(command.words)
-        is_run = not find_reason(block)
-        assert not is_run or command.words[0] not in SERVERS or command.in_background
+        assert block.not_run or command.words[0] not in SERVERS or command.in_background
 
 
 def test_what_a_robot_does_not_get_from_apt_is_installed_by_pip():
@@ -191,7 +153,7 @@ def reader(tmp_path, programs):
 )
 def test_the_blocks_of_a_page_run_as_written(page, reader):
     for block in BLOCKS:
-        if block.page == page and not find_reason(block):
+        if block.page == page and not block.not_run:
             reader.run(block)
 
 

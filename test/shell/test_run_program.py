@@ -18,8 +18,7 @@ from rover_planner.shell.exit_codes import (
     EXIT_OK,
     EXIT_PIPE_CLOSED,
 )
-from rover_planner.shell.one_line import MAX_LINE, one_line
-from rover_planner.shell.run_program import run_program
+from rover_planner.shell.run_program import MAX_LINE, one_line, run_program
 from support.command_line import REPOSITORY
 
 

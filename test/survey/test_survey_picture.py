@@ -56,9 +56,6 @@ def test_a_start_without_ways_is_drawn(tmp_path):
     assert (tmp_path / "p.png").stat().st_size > 1000
 
 
-@pytest.mark.parametrize(
-    ("width", "length"),
-    [(0.3999999999999999, 0.1), (13.0, 2.0), (1e6, 2e5)],
-)
+@pytest.mark.parametrize(("width", "length"), [(0.3999999999999999, 0.1), (13.0, 2.0), (1e6, 2e5)])
 def test_the_scale_bar_has_a_round_length(width, length):
     assert choose_bar(width) == pytest.approx(length)

@@ -52,9 +52,7 @@ class Rig:
 
 
 @pytest.mark.parametrize("silent", ["joint_states", "imu", "cmd_vel"])
-def test_a_silent_input_stops_the_wheels_after_its_timeout_and_its_return_starts_them(
-    silent,
-):
+def test_a_silent_input_stops_the_wheels_after_its_timeout_and_its_return_starts_them(silent):
     rig = Rig()
     assert rig.run().torques.any()
     others = [name for name in ("joint_states", "imu", "cmd_vel") if name != silent]

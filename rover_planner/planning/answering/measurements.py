@@ -36,10 +36,7 @@ class Measurements:
         self._times.update(dict.fromkeys(positions, now))
 
     def take_pose(
-        self,
-        pose: NDArray[np.float64],
-        now: float,
-        body: tuple[float, float, float] | None = None,
+        self, pose: NDArray[np.float64], now: float, body: tuple[float, float, float] | None = None
     ) -> None:
         """Keep the pose (3,) x, y [m], yaw [rad], measured at time `now` [s].
 

@@ -8,12 +8,7 @@ from queue import SimpleQueue
 from typing import Any
 
 from rover_physics.numerics.interruption import interruptible
-from rover_planner.planning.answering.budget import (
-    BUSY,
-    TOO_LONG,
-    Budget,
-    QuestionStoppedError,
-)
+from rover_planner.planning.answering.budget import BUSY, TOO_LONG, Budget, QuestionStoppedError
 from rover_planner.planning.answering.questions import Question
 
 HOPELESS = 0.02

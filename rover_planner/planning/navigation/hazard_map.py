@@ -19,13 +19,7 @@ from rover_physics.traversability.pose_classes import (
     RoverOnMap,
     classify_poses,
 )
-from rover_planner.maps.changes import (
-    Shift,
-    Window,
-    find_changes,
-    find_overlap,
-    have_same_layers,
-)
+from rover_planner.maps.changes import Shift, Window, find_changes, find_overlap, have_same_layers
 
 TILE = 32
 """Cells along the side of a tile; tiles are judged one after another."""

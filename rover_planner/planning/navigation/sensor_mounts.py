@@ -6,11 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.traverse_server import NO_MOUNTS, TraverseServerParameters
-from rover_planner.planning.navigation.transforms import (
-    Rigid,
-    TransformError,
-    TransformTree,
-)
+from rover_planner.planning.navigation.transforms import Rigid, TransformError, TransformTree
 
 FORM = "frame:x:y:z:roll:pitch:yaw, such as front_camera:0.3:0.0:0.4:0.0:0.5:0.0"
 """Form of an entry, for error texts."""

@@ -74,8 +74,7 @@ def read_pose(pose: Any) -> Rigid:
     """Return the transform of a pose from the frame that it is in."""
     place, turn = pose.position, pose.orientation
     return Rigid(
-        np.array([place.x, place.y, place.z]),
-        Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]),
+        np.array([place.x, place.y, place.z]), Rotation.from_quat([turn.x, turn.y, turn.z, turn.w])
     )
 
 

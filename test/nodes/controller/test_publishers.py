@@ -5,13 +5,11 @@ import time
 
 import pytest
 from geometry_msgs.msg import Twist
-from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import PointCloud2
 
-from rover_planner.nodes.traction_controller import TractionController
 from support.driven_rover import DrivenRover
-from support.ros_fixtures import PATIENT, RosRun
+from support.ros_fixtures import RosRun
 from support.waiting import wait_until
 
 
@@ -71,27 +69,3 @@ def test_a_best_effort_map_is_named_and_the_parameter_mends_it(rover, start_cont
 
     wait_until(is_told, "the warning")
     assert node.get_parameter("input_reliability").value == "reliable"
-
-
-def test_two_rovers_in_two_namespaces_do_not_meet(ros):
-    rovers = {}
-    for name in ("one", "two"):
-        rover = DrivenRover(ros.context, namespace=name)
-        rover.send_twists()
-        rovers[name] = ros.spin(rover)
-    values = {"enabled_at_start": True} | PATIENT
-    parameters = [Parameter(name, value=value) for name, value in values.items()]
-    for name in rovers:
-        node = TractionController(
-            context=ros.context, namespace=name, parameter_overrides=parameters
-        )
-        assert {topic for topic, _ in ros.spin(node).get_topic_names_and_types()}.isdisjoint(
-            {"/diagnostics", "/cmd_vel", "/joint_states", "/imu"}
-        )
-    wait_until(lambda: all(rover.state == "driving" for rover in rovers.values()), "both")
-    rovers["one"].silent.add("imu")
-    wait_until(lambda: rovers["one"].state == "fault", "the fault of one")
-    wait_until(lambda: "imu stale" in rovers["one"].status.message, "its diagnostics")
-    two = rovers["two"]
-    wait_until(lambda: two.state == "driving" and two.status.message.startswith("driving"), "two")
-    assert two.status.level == b"\x00" and two.faults == []

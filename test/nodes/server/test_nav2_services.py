@@ -7,11 +7,7 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped
 
 from msg_adapters.paths import path_to_poses, poses_path, stamped_pose
-from rover_planner.nodes.nav2_services import (
-    NO_VALID_PATH,
-    PathComputation,
-    PathValidity,
-)
+from rover_planner.nodes.nav2_services import NO_VALID_PATH, PathComputation, PathValidity
 from support.grounds import make_terrain, wall_at, waves
 from support.waiting import wait_until
 

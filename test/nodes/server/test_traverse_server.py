@@ -17,11 +17,7 @@ from msg_adapters.paths import path_to_poses, stamped_pose
 from msg_adapters.results.markers import WITH_SPEED_SERVOS as LIME
 from msg_adapters.results.predictions import MEASURES, array_values
 from rover_physics.names import WHEELS
-from rover_physics.traversability.classification import (
-    IMPASSABLE,
-    PASSABLE,
-    WITH_SPEED_SERVOS,
-)
+from rover_physics.traversability.classification import IMPASSABLE, PASSABLE, WITH_SPEED_SERVOS
 from rover_planner.nodes.result_topics import WHEEL_TOPICS
 from rover_planner.ros.qos import map_qos
 from support.grounds import gap, make_terrain, waves

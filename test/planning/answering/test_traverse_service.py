@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from rover_physics.names import SUSPENSION_JOINTS
-from rover_physics.terrain.grid import load_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.search_watch import NewerMapError, SearchWatch
@@ -150,19 +149,6 @@ def test_densify_keeps_the_given_poses_and_the_spacing():
 def test_densify_refuses_an_endless_path():
     with pytest.raises(PlanningError, match="more than 100000 waypoints"):
         densify(np.array([[0.0, 0.0, 0.0], [1e300, 0.0, 0.0]]), 0.02)
-
-
-def test_the_real_martian_ground_is_passed_where_it_is_known():
-    terrain = load_terrain("spirit")
-    north = math.pi / 2
-    start, goal = (-48.5, -20.5, north), (-48.5, -18.0, north)
-    strict = make_service(terrain).answer(start, goal)
-    assert not strict.traversable and strict.code == "unknown_ground"
-    lenient = make_service(terrain, unknown_cells="interpolate", max_gap=0.3)
-    assert lenient.answer(start, goal).traversable
-    shadow = lenient.answer((-48.0, -20.0, 0.0), (-40.0, -20.0, 0.0)).report.to_dict()
-    assert shadow["code"] == "unknown_ground"
-    assert -46.0 < shadow["failure_pose"][0] < -42.0
 
 
 def test_where_the_path_fails_far_from_the_goal_no_other_goal_is_tried():
