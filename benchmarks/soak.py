@@ -2,11 +2,13 @@
 """A soak: all programs drive a rover to random goals, on a busy machine, and are killed in turn.
 
 Run from the repository: python -m benchmarks.soak [--minutes 60] [--load 4] [--kill-every 120]
+[--step-every 0]
 
 Simulator, server and controller are those of simulation.launch.py, with a page and a mission
 planner beside them. Every so often one of them is killed, and the friction that the server assumes
-changes. The report has the drives done, the faults by cause, memory and latency at start and end,
-and the torques that were heard while the controller was to rest.
+changes. With --step-every all have the time of /clock, which is stepped by 5 s, ahead and back in
+turn. The report has the drives done, the faults by cause, memory and latency at start and end, and
+the torques that were heard while the controller was to rest.
 """
 
 import contextlib
@@ -55,7 +57,8 @@ REACH = 3.0
 PARAMETERS = ROOT / "config" / "parameters" / "simulated_traction_controller.yaml"
 RESTS = "    rest_policy: brake\n"
 """Line of the controller's parameters besides: torques are zero when it rests."""
-MISSION, PAGE = "mission_planner", "view"
+MISSION, PAGE, CLOCK = "mission_planner", "view", "clock"
+SIM_TIME = ["--ros-args", "-p", "use_sim_time:=true"]
 
 
 class Ear(Node):
@@ -96,20 +99,30 @@ class Ear(Node):
 class Programs:
     """The programs by name; each can be killed and started again."""
 
-    def __init__(self, nodes: NodeProcesses, ground: Terrain):
+    def __init__(self, nodes: NodeProcesses, ground: Terrain, step_every: float):
         terrain, parameters = nodes.folder / "ground.npz", nodes.folder / "controller.yaml"
         save_terrain(terrain, ground)
         parameters.write_text(PARAMETERS.read_text() + RESTS)
         commands = simulation_commands(
-            terrain_file=str(terrain), speed="0.08", traction_controller_parameters=str(parameters)
+            terrain_file=str(terrain),
+            speed="0.08",
+            use_sim_time=str(step_every > 0.0),
+            traction_controller_parameters=str(parameters),
         )
+        self._options = SIM_TIME if step_every > 0.0 else []
         self._nodes = nodes
         self._modules = {name: words[2:] for name, words in commands.items()}  # behind python -m
         page = [PAGE, "lsr1", str(terrain), "--follow", "--port", "0"]
         self._modules[PAGE] = ["rover_planner", *page]
+        if step_every > 0.0:
+            self._modules[CLOCK] = ["benchmarks.stepped_clock", str(step_every)]
         self._running: dict[str, ChildProcess] = {}
         for name in self._modules:
             self.start(name)
+
+    def start_mission(self, *words: str) -> None:
+        """Start a mission planner."""
+        self.start(MISSION, ["rover_planner.nodes.mission_planner", *words, *self._options])
 
     def start(self, name: str, module: list[str] | None = None) -> None:
         """Start a program, with its module and words or others."""
@@ -129,14 +142,16 @@ class Programs:
         return {name: memory_of(child) for name, child in self._running.items() if child.running}
 
 
-def run_soak(minutes: float, load: int, kill_every: float, seed: int) -> dict[str, object]:
+def run_soak(
+    minutes: float, load: int, kill_every: float, step_every: float, seed: int
+) -> dict[str, object]:
     """Run a soak; return its report."""
     rng = np.random.default_rng(seed)
     ground = make_mars_terrain(seed, 24.0, 0.05, rock_cover=0.01, crater_density=0.0)
     with open_nodes() as nodes:
         for _ in range(load):
             nodes.start_module("timeit", "-n", str(10**12), "pass")
-        programs, ear = Programs(nodes, ground), nodes.ros.spin(Ear(nodes.ros))
+        programs, ear = Programs(nodes, ground, step_every), nodes.ros.spin(Ear(nodes.ros))
         client = nodes.client("soak")
         wait_until(lambda: np.isfinite(ear.pose).all(), "the simulator", START_TIME)
         client.connect()
@@ -199,7 +214,7 @@ def _start_mission(programs: Programs, ear: Ear, rng: np.random.Generator) -> No
     far = rng.uniform(0.5, 1.0) * REACH
     start = f"--start={x:.3f},{y:.3f},{yaw:.3f}"
     goal = f"--goal={x + far * np.cos(bearing):.3f},{y + far * np.sin(bearing):.3f},{bearing:.3f}"
-    programs.start(MISSION, ["rover_planner.nodes.mission_planner", start, goal, "--drive"])
+    programs.start_mission(start, goal, "--drive")
 
 
 def _change(client: Client, rng: np.random.Generator) -> None:
@@ -226,10 +241,14 @@ def main(
     minutes: Annotated[float, typer.Option(help="Length in minutes.")] = 60.0,
     load: Annotated[int, typer.Option(help="Processes that do nothing but compute.")] = 4,
     kill_every: Annotated[float, typer.Option(help="Time between kills in s; 0: none.")] = 120.0,
+    step_every: Annotated[
+        float, typer.Option(help="Time between clock steps in s; 0: none.")
+    ] = 0.0,
     seed: Annotated[int, typer.Option(help="Seed of ground and goals.")] = 1,
 ) -> None:
     """Run a soak and print its report as JSON."""
-    print(json.dumps(run_soak(minutes, load, kill_every, seed), indent=2))
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # its programs end with it
+    print(json.dumps(run_soak(minutes, load, kill_every, step_every, seed), indent=2))
 
 
 if __name__ == "__main__":

@@ -41,7 +41,7 @@ def rover(
 ) -> None:
     """Write a rover file from a URDF and a joint map."""
     from rover_physics.rover.rover_file import save_rover
-    from rover_physics.rover.urdf.read_rover import rover_from_urdf
+    from rover_physics.rover.urdf.read_rover import MAX_TILT, rover_from_urdf
 
     read = rover_from_urdf(from_urdf, joint_map)
     comment = (
@@ -53,6 +53,11 @@ def rover(
         f"wrote {out}: {read.rover.name}, {read.rover.total_mass:.6g} kg, left and right differ "
         f"by {1e3 * read.asymmetry:.3g} mm"
     )
+    if read.tilt > MAX_TILT:
+        typer.echo(
+            f"rockers turn about pivots that are {read.tilt:.4g} rad off y; y is taken, so that "
+            "wheels move up and down without moving sideways"
+        )
     pitch, bogie = read.levelling.pitch, read.levelling.bogie
     if pitch or bogie:
         typer.echo(

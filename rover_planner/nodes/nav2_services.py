@@ -50,7 +50,7 @@ class PathValidity:
             desk: Answers the questions.
             map_frame: Frame of the map.
             publish: Publishes the results of a judgement.
-            localise: Returns a path in the map frame.
+            localise: Returns a path in the map frame; refuses one that is too long.
         """
         self._desk, self._frame, self._publish = desk, map_frame, publish
         self._localise = localise

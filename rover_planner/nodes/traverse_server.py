@@ -128,7 +128,7 @@ class TraverseServer(Node):
         self._create_subscriptions(reliability)
         serve_later(self, GetPlan, "~/can_traverse", self._can_traverse)
         serve_later(self, Trigger, "~/check_path", self._check_path)
-        PathValidity(self.desk, frame, self.publish, self.frames.localise_path).serve(self)
+        PathValidity(self.desk, frame, self.publish, self.localise_path).serve(self)
         PathComputation.serve(self, self.desk, self.read_question, self.publish)
         self._advice = AdviceTopics(self, self.desk, self.guard, self._values.advice_time)
         self.create_service(Trigger, "~/cancel", self._cancel)
@@ -207,14 +207,9 @@ class TraverseServer(Node):
             )
 
     def _take_path(self, message: bytes) -> None:
-        about, most = ("", ""), self._values.max_path_poses
+        about = "", ""
         try:
-            count = count_poses(message)
-            if count > most:
-                raise MessageError(
-                    f"path has {count} poses; it may have {most}: leave some out, or set the "
-                    "parameter max_path_poses"
-                )
+            self._check_length(count_poses(message))
             path = read_message(message, Path)
             about = path_hash(path), stamp_text(stamp_to_ns(path.header.stamp))
             there = self.frames.localise_path(path)
@@ -222,6 +217,20 @@ class TraverseServer(Node):
         except INPUT_ERRORS as error:
             self.service.refuse_path(str(error), *about)
             self.get_logger().error(f"~/path refused: {error}")
+
+    def _check_length(self, poses: int) -> None:
+        """Raise MessageError if a path has too many poses."""
+        most = self._values.max_path_poses
+        if poses > most:
+            raise MessageError(
+                f"path has {poses} poses; it may have {most}: leave some out, or set the "
+                "parameter max_path_poses"
+            )
+
+    def localise_path(self, path: Path) -> Path:
+        """Return a path in the map frame unless it is too long."""
+        self._check_length(len(path.poses))
+        return self.frames.localise_path(path)
 
     def _can_traverse(
         self, request: GetPlan.Request, response: GetPlan.Response, reply: Reply

@@ -246,9 +246,9 @@ class TraverseServerParameters(ParameterTable):
         "allows every file.",
     )
     max_path_poses: int = parameter(
-        2000,
-        "Largest number of poses of ~/path; a longer one is refused before it is read, which "
-        "takes some 20 us a pose.",
+        1500,
+        "Largest number of poses of ~/path, ~/is_path_valid. A longer ~/path is refused before it "
+        "is read, which takes some 30 us a pose; nothing else is heard meanwhile.",
         bounds=(2, 100_000),
     )
     max_map_bytes: int = parameter(

@@ -168,8 +168,8 @@ def answer_path_query(
 ) -> PathAnswer:
     """Evaluate the candidate paths from start to goal and choose the best traversable one.
 
-    Of several candidates, a refused one is judged up to its first failure; `check_path` judges all
-    of it, as is done for a single candidate.
+    Of several candidates, or with a goal off the map, a refused one is judged up to its first
+    failure; `check_path` judges all of it, as is done for a single candidate.
 
     Args:
         rover: The rover; its steering sets the smallest radius of a candidate.
@@ -190,7 +190,7 @@ def answer_path_query(
         paths,
         options.model,
         sigmas=options.map_sigmas,
-        stop_at_failure=len(paths) > 1,
+        stop_at_failure=len(paths) > 1 or not terrain.contains(*paths[0][-1, :2]),
     )
     candidates = [
         Candidate(poses, prediction, verdict, path_cost(prediction, verdict))

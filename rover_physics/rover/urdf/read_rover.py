@@ -20,6 +20,8 @@ from rover_physics.rover.urdf.robot import Joint, JointTree, Lump, Robot, Solid,
 
 MAX_TILT = 0.02
 """Largest angle between a pivot or axle and the body's y axis [rad]."""
+MAX_ROCKER_TILT = 0.25
+"""Largest angle by which a rocker's pivot may rise or fall outwards [rad]."""
 MAX_ASYMMETRY = 0.01
 """Largest distance between a point of the left side and the mirrored one of the right side [m]."""
 DECIMALS = 12
@@ -59,6 +61,8 @@ class ReadRover:
     """Largest distance between points of the left side and mirrored ones of the right [m]."""
     levelling: Levelling
     """Pitch of the axes and angle of the bogies of the URDF on level ground."""
+    tilt: float
+    """Largest angle between a rocker's pivot and y that is left out of account [rad]."""
 
 
 def rover_from_urdf(urdf: Path, joint_map: Path) -> ReadRover:
@@ -87,7 +91,7 @@ def rover_from_urdf(urdf: Path, joint_map: Path) -> ReadRover:
         raise RoverFileError(
             f"{error}; the URDF does not tell it: write it under rover: in {joint_map}"
         ) from None
-    return ReadRover(rover, reading.asymmetry, levelling)
+    return ReadRover(rover, reading.asymmetry, levelling, reading.tilt())
 
 
 class _Reading:
@@ -160,12 +164,29 @@ class _Reading:
         """Return the pose (4, 4) of the root link in the body frame."""
         frame = _pose(self._frame)
         tree = JointTree(self._robot, self._angles, frame)
-        pivots = [tree.origin(tree.joint(self._joints.rocker[side])) for side in SIDES]
-        frame[:3, 3] = -0.5 * (pivots[0] + pivots[1])
-        # An origin may lie anywhere along its axis: the wheels tell where the middle is.
-        places = [tree.origin(tree.joint(self._joints.wheels[wheel])) for wheel in WHEELS]
-        frame[1, 3] = -float(np.mean([place[1] for place in places]))
+        points = [
+            self._point_of(tree, side, tree.joint(self._joints.rocker[side])) for side in SIDES
+        ]
+        frame[:3, 3] = -0.5 * (points[0] + points[1])
         return frame
+
+    def _point_of(self, tree: JointTree, side: str, joint: Joint) -> Floats:
+        """Return the point (3,) of a joint's axis amid the wheels of a side [m].
+
+        An origin may lie anywhere along its axis; the wheels turn about this point.
+        """
+        wheels = [self._joints.wheels[f"{position}_{side}"] for position in WHEEL_POSITIONS]
+        y = np.mean([tree.origin(tree.joint(wheel))[1] for wheel in wheels])
+        point, axis = tree.origin(joint).copy(), tree.axis(joint)
+        if abs(axis[1]) > 0.5 and joint.kind != "fixed":
+            point += (y - point[1]) / axis[1] * axis
+        point[1] = y
+        return point
+
+    def tilt(self) -> float:
+        """Return the largest angle between the pivot of a rocker and y [rad]."""
+        axes = [self._tree.axis(one) for one in self._rockers.values() if one.kind != "fixed"]
+        return max((_angle_to_y(axis) for axis in axes), default=0.0)
 
     def check(self) -> None:
         """Check that joints turn about y and hang on each other as those of a rover do.
@@ -175,7 +196,6 @@ class _Reading:
         arm = self._joints.arm
         if arm is not None and arm.tip not in self._robot.links:
             raise RoverFileError(f"arm.tip: no link {describe(arm.tip)} in the URDF")
-        self._check_names()
         for kind, joints in (("rocker", self._rockers), ("bogie", self._bogies),
                              ("wheels", self._wheels)):  # fmt: skip
             for part, joint in joints.items():
@@ -185,16 +205,18 @@ class _Reading:
                     continue
                 if joint.kind not in ("revolute", "continuous"):
                     raise RoverFileError(f"{key}: joint {name} is {joint.kind}; it must turn")
-                if kind == "bogie" and abs(axis[0]) > np.cos(MAX_TILT):
+                if kind != "wheels" and abs(axis[0]) > np.cos(MAX_TILT) and self._rolls():
                     raise RoverFileError(
                         f"{key}: joint {name} turns about x: a rover of three bogies has neither "
                         "rockers nor a differential; only rocker-bogies are read"
                     )
-                if np.arccos(min(1.0, abs(axis[1]))) > MAX_TILT:
+                rises = kind == "rocker" and abs(axis[0]) < np.sin(MAX_TILT)
+                if _angle_to_y(axis) > (MAX_ROCKER_TILT if rises else MAX_TILT):
                     raise RoverFileError(
                         f"{key}: joint {name} turns about {np.round(axis, 3).tolist()}; it must "
                         "turn about y of the body frame (axes and angles of the map)"
                     )
+        self._check_names()
         for side in SIDES:
             rocker, on_rocker = self._rockers[side], self._on_rocker[side]
             self._check_below(f"bogie.{side}", self._bogies[side], rocker, on_rocker)
@@ -212,6 +234,12 @@ class _Reading:
                     f"rocker.{side}: y is {y:.4g} m in the body frame, on the other side; sides "
                     "are exchanged, or axes.forward or axes.up is wrong"
                 )
+
+    def _rolls(self) -> bool:
+        """Return whether all wheels turn about y."""
+        return all(
+            _angle_to_y(self._tree.axis(wheel)) <= MAX_TILT for wheel in self._wheels.values()
+        )
 
     def _check_names(self) -> None:
         """Check that each joint is named once."""
@@ -252,11 +280,11 @@ class _Reading:
 
     def _pivots(self, key: str, joints: dict[str, Joint]) -> list[float]:
         """Return a pivot of the left side; where along its axis an origin lies means nothing."""
-        points = {side: self._tree.origin(joint).copy() for side, joint in joints.items()}
-        if abs(points["left"][1] + points["right"][1]) > MAX_ASYMMETRY:
+        points = {side: self._point_of(self._tree, side, joints[side]) for side in SIDES}
+        y = {side: self._tree.origin(joint)[1] for side, joint in joints.items()}
+        if abs(y["left"] + y["right"]) <= MAX_ASYMMETRY:
             for side in SIDES:
-                wheels = [self._wheel_centre(f"{one}_{side}")[1] for one in WHEEL_POSITIONS]
-                points[side][1] = np.mean(wheels)
+                points[side][1] = y[side]
         return self._mean(("suspension", key), points)
 
     def _mean(self, key: tuple[str, ...], points: dict[str, Floats]) -> list[float]:
@@ -504,6 +532,11 @@ def _read_arm(tree: JointTree, arm: ArmMap) -> dict[str, Any]:
             "along x at 0 and turn about y; leave arm out, so that the arm is part of the body"
         )
     return found
+
+
+def _angle_to_y(axis: Floats) -> float:
+    """Return the angle between an axis (3,) and y, in either direction [rad]."""
+    return float(np.arctan2(np.hypot(axis[0], axis[2]), abs(axis[1])))
 
 
 def _pose(rotation: Floats) -> Floats:

@@ -41,7 +41,8 @@ class PathJudgement:
     around: SearchResult | None = None
     """The search around obstacles; None if there was none."""
     is_brief: bool = False
-    """True if there was no time for classes and for waypoints beyond the first failure."""
+    """True without classes and waypoints beyond the first failure: there was no time for them, or
+    they lie off the map."""
 
     @property
     def traversable(self) -> bool:

@@ -102,10 +102,12 @@ class Snapshot:
             judge = replace(judge, options=judge.options.change(count=1))
         search = judge.search(*ends, tolerance)
         judged = self._describe(judge, search.answer.chosen, search)
+        if not are_on_map and not judged.traversable:
+            return replace(judged, is_brief=True)  # of what lies off the map nothing is told
         starts_unobserved = (
             judged.code == UNOBSERVED_CODE and search.answer.chosen.verdict.first_failure == 0
         )
-        is_final = judged.traversable or starts_unobserved or not are_on_map
+        is_final = judged.traversable or starts_unobserved
         if is_final or self.settings.planner == FAN:
             return judged
         return self._search_around(judge, ends, judged)

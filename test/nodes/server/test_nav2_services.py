@@ -12,10 +12,10 @@ from support.grounds import make_terrain, wall_at, waves
 from support.waiting import wait_until
 
 
-def ask(server, poses):
+def ask(server, poses, publish=None):
     """Put a request to the handler of the service, as rclpy would; nav2_msgs is not on PyPI."""
     replies = []
-    validity = PathValidity(server.desk, "map", server.publish, server.frames.localise_path)
+    validity = PathValidity(server.desk, "map", publish or server.publish, server.localise_path)
     request, response = SimpleNamespace(path=poses_path(poses, "map")), SimpleNamespace()
     validity.take(request, response, replies.append)
     wait_until(lambda: replies, "the reply")
@@ -33,6 +33,14 @@ def test_the_poses_of_a_path_that_are_not_passable_are_named(server):
     assert not answer.is_valid and answer.invalid_pose_indices
     assert min(answer.invalid_pose_indices) > 4
     assert all(0 <= index < len(poses) for index in answer.invalid_pose_indices)
+
+
+def test_a_path_of_too_many_poses_is_not_valid(server):
+    assert server.service.take_terrain(make_terrain(waves))
+    judged = []
+    answer = ask(server, np.zeros((1501, 3)), lambda judgement, _: judged.append(judgement))
+    assert not answer.is_valid and len(answer.invalid_pose_indices) == 1501
+    assert "path has 1501 poses; it may have 1500" in judged[0].reason
 
 
 class GoalHandle:

@@ -341,17 +341,36 @@ def test_a_rocker_in_parts_that_have_joints_of_their_own_is_one_rocker(tmp_path,
     assert_alike(read_foreign(tmp_path, text, fixed=names), straight, 1e-9)
 
 
-def test_where_an_origin_lies_along_its_axis_means_nothing(tmp_path):
+def tilted(text: str, slope: float) -> str:
+    """Return the foreign rover with pivots of its rockers that rise outwards by a slope."""
+    for side, rise in (("R", -slope), ("L", slope)):  # z points down
+        before, after = text.split(f'<joint name="P{side}"')
+        text = f'{before}<joint name="P{side}"{after.replace("0 1 0", f"0 1 {rise}", 1)}'
+    return text
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.2])
+def test_where_an_origin_lies_along_its_axis_means_nothing(slope, tmp_path):
     straight = read_foreign(tmp_path)
-    moved = foreign_urdf().replace('xyz="0.1 0.3 -0.5"', 'xyz="0.1 0.1 -0.5"')
+    moved = foreign_urdf().replace('xyz="0.1 0.3 -0.5"', f'xyz="0.1 0.1 {-0.5 + 0.2 * slope}"')
     for place in ("0.2 0 0.05", "-0.4 0 0.2"):  # what hangs on the rocker stays where it was
         x, _, z = place.split()
-        moved = moved.replace(f'xyz="{place}"', f'xyz="{x} 0.2 {z}"', 1)
+        moved = moved.replace(f'xyz="{place}"', f'xyz="{x} 0.2 {float(z) - 0.2 * slope}"', 1)
     keys = foreign_map()["rover"] | {"masses": {"rocker": {"mass": 2.0, "com": [0.0, 0.3, 0.0]}}}
-    rover = read_foreign(tmp_path, moved, rover=keys)
+    rover = read_foreign(tmp_path, tilted(moved, slope), rover=keys)
     for name in ("rear", "middle", "front"):
         assert rover.suspension.wheels[name] == pytest.approx(straight.suspension.wheels[name])
     assert rover.suspension.rocker_pivot[::2] == pytest.approx((0.0, 0.0))
+
+
+def test_pivots_of_rockers_that_rise_outwards_are_taken_as_level_and_told(tmp_path):
+    """As in models of Curiosity, by 0.2 rad."""
+    straight = read_foreign(tmp_path)
+    assert_alike(read_foreign(tmp_path, tilted(foreign_urdf(), 0.2)), straight, 1e-9)
+    read = rover_from_urdf(tmp_path / "foreign.urdf", tmp_path / "foreign.yaml")
+    assert read.tilt == pytest.approx(math.atan(0.2))
+    with pytest.raises(RoverFileError, match=r"rocker.right: joint PR turns about \[0.0, -0.9"):
+        read_foreign(tmp_path, tilted(foreign_urdf(), 0.4))
 
 
 def test_masses_of_the_map_count_before_those_of_the_file_are_compared(tmp_path):
@@ -362,13 +381,12 @@ def test_masses_of_the_map_count_before_those_of_the_file_are_compared(tmp_path)
     assert read_foreign(tmp_path, lopsided, rover=keys).masses.rocker.com == (0.0, 0.3, 0.0)
 
 
-def test_a_rover_of_three_bogies_is_refused_by_name(tmp_path):
-    text = foreign_urdf()
-    for side in "RL":
-        before, after = text.split(f'<joint name="Q{side}"')
-        text = f'{before}<joint name="Q{side}"{after.replace("0 -1 0", "1 0 0", 1)}'
+@pytest.mark.parametrize("kind", ["rocker", "bogie"])
+def test_a_rover_of_three_bogies_is_refused_by_name(kind, tmp_path):
+    """The one across the rover is on both sides, whatever it was thought to be."""
+    text = insert_link(foreign_urdf(), "Root", "revolute", "1 0 0")
     with pytest.raises(RoverFileError, match="a rover of three bogies has neither"):
-        read_foreign(tmp_path, text)
+        read_foreign(tmp_path, text, **{kind: {"right": "ToRoot", "left": "ToRoot"}})
 
 
 def test_xacro_and_circles_are_refused():

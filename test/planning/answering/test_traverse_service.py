@@ -45,6 +45,15 @@ def test_an_uncertain_map_is_judged_by_its_bounds_as_the_settings_say():
     assert passed == make_service(certain).answer(start, goal).report.to_dict()
 
 
+def test_a_goal_far_off_the_map_costs_no_more_than_the_way_to_its_edge():
+    """All of the way was judged, and its classes: seconds, up to the time budget."""
+    judged = make_service(make_terrain(waves)).answer((0.0, 0.0, 0.0), (900.0, 0.0, 0.0))
+    whole = judged.complete()
+    assert whole.code == "off_map" and whole.report.to_dict()["reason"]
+    assert len(whole.candidate.prediction.poses) < 0.01 * len(whole.candidate.poses)
+    assert whole.classes == ()
+
+
 def test_soil_and_payload_of_the_settings_count():
     path = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     loads, sinkages = [], []
