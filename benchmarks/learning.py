@@ -69,10 +69,8 @@ NOISE = {
 }
 """Standard deviations: position [m], its drift over the way, attitude and yaw [rad], suspension
 [rad], torque [N m], wheel rates [rad/s]."""
-STILL = 0.15
-"""Speed over the commanded one below which the truth is a stuck rover."""
-STUCK_FOR = 2.0
-"""How long it must last [s]."""
+STAYED, STUCK_FOR = 0.02, 4.0
+"""A rover that goes no farther than this [m] in more than that time [s], to the end, is stuck."""
 
 
 @dataclass(frozen=True)
@@ -230,8 +228,9 @@ class Learned:
     """The estimate at its end."""
     truth: float
     """Friction under most wheels at its end; for a change per side the mean."""
-    early: tuple[float, float] | None
-    """Error of the mean, relative, two seconds of slip after the first; whether it was within."""
+    early: tuple[float, bool] | None
+    """Error of the mean, relative, when slip first bounds it; whether the interval has the truth.
+    For constant friction only."""
     stuck_time: float | None
     """When the rover was stuck in truth [s]."""
     passed: bool
@@ -254,15 +253,16 @@ def learn(drive: LearningDrive, keep: Path | None = None) -> Learned | None:
         if learner.take(row) and early is None:
             estimate = learner.estimate
             if estimate.slip_time is not None and estimate.friction.high is not None:
-                early = estimate.friction.mean, row[X]
+                early = estimate.friction
     cost = (time.process_time() - began) / (rows[-1, TIME] - rows[0, TIME])
     low, high = drive.frictions
     ends = {CONSTANT: low, SIDES: 0.5 * (low + high), LINE: high if rows[-1, X] > 0.4 else low}
     truth = ends[drive.layout]
-    if early is not None:
-        early = early[0] / low - 1.0, early[1]
+    first = None
+    if early is not None and drive.layout == CONSTANT:
+        first = early.mean / low - 1.0, early.low <= low <= (early.high or np.inf)
     return Learned(
-        drive, learner.estimate, truth, early, find_stuck(recorded.rows), recorded.passed, cost
+        drive, learner.estimate, truth, first, find_stuck(recorded), recorded.passed, cost
     )
 
 
@@ -271,13 +271,13 @@ def told_rover() -> Rover:
     return replace(load_rover("lsr1"), nominal_speed=SPEED)
 
 
-def find_stuck(rows: np.ndarray) -> float | None:
-    """Return when a rover that is commanded to drive stood still for STUCK_FOR first [s]."""
-    times, x = rows[:, TIME], rows[:, X]
-    later = times + STUCK_FOR
-    still = np.interp(later, times, x) - x < STILL * SPEED * STUCK_FOR
-    still &= (later <= times[-1]) & (times > 1.0)
-    return float(times[np.argmax(still)]) if still.any() else None
+def find_stuck(recorded: Recorded) -> float | None:
+    """Return the time [s] from which a rover stayed within STAYED to the end, None if it passed."""
+    times, x = recorded.rows[:, TIME], recorded.rows[:, X]
+    if recorded.passed:
+        return None
+    since = float(times[np.argmax(x > x[-1] - STAYED)])
+    return since if times[-1] - since > STUCK_FOR else None
 
 
 def main(
@@ -361,17 +361,22 @@ def print_summary(learned: list[Learned]) -> None:
         ("friction", "drives", "bounded", "median error", "within 10 %", "interval has it"),
         rows,
     )
-    delays, missed, false = [], 0, 0
-    for one in learned:
-        noticed, stuck = one.estimate.immobilised_time, one.stuck_time
-        if noticed is None:
-            missed += stuck is not None
-        elif stuck is None or noticed < stuck:
-            false += 1
-        else:
-            delays.append(noticed - stuck)
-    late = f"{max(delays):.1f} s at most" if delays else "none"
-    print(f"stuck: noticed {len(delays)} after {late}, missed {missed}, false {false}")
+    first = [one.early for one in learned if one.early is not None]
+    print(
+        f"constant, when slip first bounds it: {np.median([abs(e[0]) for e in first]):.0%} off, "
+        f"interval has it in {np.mean([e[1] for e in first]):.0%} of {len(first)}"
+    )
+    stuck = [one for one in learned if one.stuck_time is not None]
+    noticed = [one.estimate.immobilised_time for one in stuck]
+    delays = sorted(
+        t - one.stuck_time
+        for t, one in zip(noticed, stuck, strict=True)
+        if t is not None and one.stuck_time is not None
+    )
+    false = [one for one in learned if one.passed and one.estimate.immobilised_time is not None]
+    late = ", ".join(f"{delay:.1f}" for delay in delays)
+    print(f"stuck: {len(stuck)}, noticed {len(delays)}, after [s]: {late}")
+    print(f"passed: {sum(one.passed for one in learned)}, said to be stuck: {len(false)}")
     print(f"CPU: {100 * np.median([one.cost for one in learned]):.1f} % of a core")
 
 

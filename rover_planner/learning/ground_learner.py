@@ -50,10 +50,15 @@ MAX_UNSTEADY = 0.1
 """Acceleration of the treads, over gravity, from which a window does not count."""
 SAME_PLACE = 0.5
 """Way of a wheel, over its radius, within which its measurements are not independent."""
+EXCESS_NOISE, UNCLEAR_NOISE = 2.0, 0.3
+"""Relative noise of a use of friction per contradiction of the balance over the weight, and if no
+contact is clear."""
 RESISTANCE_TIME = 10.0
 """Time constant of the mean resistance [s]."""
 JUMP = 0.05
 """Step of the position beyond what the wheels can drive that is no motion [m]."""
+CHANGE_CERTAIN = 2.0
+"""Standard deviations that are no change of a suspension angle."""
 SPIKE = 1.3
 """Torque over the largest one of a motor from which it is an error."""
 
@@ -226,7 +231,7 @@ class GroundLearner:
         if slips.any() and self._slip_time is None:
             self._slip_time = window.time
         rows = [recent[2] for recent in self._recent]
-        climb = float(np.ptp([row[[PITCH, *_ANGLES]] for row in rows], axis=0).max())
+        climb = _find_change(np.array([row[[PITCH, *_ANGLES]] for row in rows]))
         torques = np.mean([row[TORQUES] for row in rows], axis=0)
         stuck = self._stuck.update(window, torques, climb, self.commanded)
         if stuck and self._immobilised_time is None:
@@ -262,7 +267,10 @@ class GroundLearner:
         way = abs(float(np.median(window.travel))) * elapsed
         weights = self._weigh(window, tells, elapsed)
         samples = sum(recent[3] for recent in self._recent)
-        noise = np.hypot(fluctuation / np.sqrt(samples), window.excess / self._sense.weight)
+        doubt = np.hypot(
+            EXCESS_NOISE * window.excess / self._sense.weight, self._find_doubt(window)
+        )
+        noise = np.hypot(fluctuation / np.sqrt(samples), doubt)
         every = np.arange(WHEEL_COUNT)
         filters = [
             (self._whole, every >= 0),
@@ -286,9 +294,13 @@ class GroundLearner:
         away = np.hypot(*(window.places - self._place).T) > SAME_PLACE * self._rover.wheel.radius
         self._place = np.where(away[:, None], window.places, self._place)
         self._here = np.where(away, 0.0, self._here)
-        weights = elapsed / (window.duration + BLOCK) / (1.0 + self._here)
+        weights = elapsed / (window.duration + BLOCK) * np.exp(-2.0 * self._here)
         self._here = self._here + np.where(tells, weights, 0.0)
         return np.asarray(weights)
+
+    def _find_doubt(self, window: SlipWindow) -> float:
+        """Return the noise of a wheel's use due to contacts of the others that are not clear."""
+        return UNCLEAR_NOISE * float((window.clear <= 0.0).mean())
 
     def _find_fluctuation(self) -> Floats:
         """Return (6,) standard deviations of the torques over the window, over their means."""
@@ -326,3 +338,13 @@ class GroundLearner:
             resistance_std=float(spread) if self._steady else float("inf"),
             faults=self._health.faults,
         )
+
+
+def _find_change(values: Floats) -> float:
+    """Return the largest change of columns (k, n) along a straight line, less its noise."""
+    steps = np.linspace(-0.5, 0.5, len(values))
+    spread = float(steps @ steps)
+    rest = values - values.mean(axis=0)
+    slopes = steps @ rest / spread
+    noise = np.sqrt(((rest - steps[:, None] * slopes) ** 2).sum(axis=0) / (len(values) - 2))
+    return float((np.abs(slopes) - CHANGE_CERTAIN * noise / np.sqrt(spread)).max())

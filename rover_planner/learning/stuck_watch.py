@@ -7,7 +7,7 @@ from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
 from rover_planner.learning.wheel_slip import SlipWindow
 
-NO_PROGRESS = 0.15
+NO_PROGRESS = 0.10
 """Travel over rolling of the median wheel below which a rover that rolls does not get on."""
 SLOWEST = 0.1
 """Speed of the treads, over the rover's nominal speed, that counts as rolling."""
@@ -15,7 +15,7 @@ PUSHING = 0.9
 """Torque over the largest one of a motor that pushes as hard as it can."""
 CLIMBING = 0.01
 """Change of a suspension angle over a window that shows that a wheel climbs [rad]."""
-PATIENCE = 0.8
+PATIENCE = 1.0
 """Time without progress after which the rover counts as stuck, beyond that of a window [s]."""
 
 
@@ -48,7 +48,7 @@ class StuckWatch:
         Args:
             window: What the wheels did.
             torques: (6,) mean torques [N m].
-            climb: Largest change of a suspension angle over the window [rad].
+            climb: Largest change of a suspension angle over the window, beyond its noise [rad].
             commanded: Commanded speed [m/s], None if it is not known: then wheels that turn, or
                 push as hard as they can, tell that the rover is to move.
         """
@@ -61,8 +61,8 @@ class StuckWatch:
         wanted = bool(pushes.sum() >= WHEEL_COUNT // 3)
         if commanded is not None:
             wanted = abs(commanded) > self._slowest
-        stalls = wanted and max(speed, travel) < self._slowest + noise and climb < CLIMBING
-        stuck = spins or stalls
+        stalls = wanted and max(speed, travel) < self._slowest + noise
+        stuck = (spins or stalls) and climb < CLIMBING
         elapsed = window.time - self._last
         self._last = window.time
         self._time = self._time + min(elapsed, window.duration) if stuck else 0.0
