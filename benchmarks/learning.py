@@ -272,7 +272,7 @@ def told_rover() -> Rover:
 
 
 def find_stuck(recorded: Recorded) -> float | None:
-    """Return the time [s] from which a rover stayed within STAYED to the end, None if it passed."""
+    """Return the time [s] from which a rover stayed to the end, None if it passed."""
     times, x = recorded.rows[:, TIME], recorded.rows[:, X]
     if recorded.passed:
         return None

@@ -138,7 +138,8 @@ class GroundLearner:
         self._turned = np.zeros(WHEEL_COUNT)
         self._forward = np.ones(WHEEL_COUNT)
         self._slipping = np.zeros(WHEEL_COUNT, dtype=int)
-        self._place, self._here = np.full((WHEEL_COUNT, 2), np.inf), np.zeros(WHEEL_COUNT)
+        self._rates, self._place = np.zeros(WHEEL_COUNT), np.full(3, -np.inf)
+        self._spot, self._here = np.full((WHEEL_COUNT, 2), np.inf), np.zeros(WHEEL_COUNT)
         self._last: Floats | None = None
         self._recent: deque[tuple[float, Floats, Floats, float]] = deque(maxlen=WINDOW)
         self._resistance, self._resistance_square, self._steady = 0.0, 0.0, 0.0
@@ -154,21 +155,21 @@ class GroundLearner:
     def take(self, row: Floats) -> bool:
         """Take a row of measurements; return whether the estimate is new."""
         row = self._clean(row)
-        if np.isnan(row[: SUSPENSION.stop]).any():
+        if not np.isfinite(row[TIME]):
             return False
         last, self._last = self._last, row
         elapsed = 0.0 if last is None else row[TIME] - last[TIME]
-        if last is None or elapsed > LONGEST_GAP or self._jumps(last, row, elapsed):
+        block, new = self._block, False
+        if last is None or block is None or elapsed > LONGEST_GAP or self._jumps(row):
             self._begin(row)
             return False
         self._health.take(row)
-        rates = np.where(np.isnan(row[RATES]), last[RATES], row[RATES])
-        self._turned = self._turned + elapsed * np.nan_to_num(0.5 * (rates + last[RATES]))
-        block, new = self._block, False
-        if block is not None and row[TIME] >= block.end - 1e-9 and block.count:
+        known = np.isfinite(row[RATES])
+        before = self._rates
+        self._rates = np.where(known, row[RATES], before)
+        self._turned = self._turned + 0.5 * elapsed * (self._rates + before)
+        if row[TIME] >= block.end - 1e-9 and (block.known[: SUSPENSION.stop] > 0.0).all():
             new = self._think(block)
-            block = None
-        if block is None:
             block = self._block = _Block(row[TIME] + BLOCK)
         block.add(row, self._turned)
         return new
@@ -182,10 +183,15 @@ class GroundLearner:
             row[TORQUES] = np.where(np.abs(torques) > most, np.nan, torques)
         return row
 
-    def _jumps(self, last: Floats, row: Floats, elapsed: float) -> bool:
-        wheel = self._rover.wheel
-        step = float(np.hypot(*(row[[X, Y]] - last[[X, Y]])))
-        return step > 2.0 * wheel.max_speed * wheel.radius * elapsed + JUMP
+    def _jumps(self, row: Floats) -> bool:
+        """Return whether the position, where it was measured, is beyond what the wheels drive."""
+        if not np.isfinite(row[[X, Y]]).all():
+            return False
+        wheel, last = self._rover.wheel, self._place
+        self._place = row[[TIME, X, Y]]
+        step = float(np.hypot(*(self._place - last)[1:]))
+        most = 2.0 * wheel.max_speed * wheel.radius * float(self._place[0] - last[0])
+        return not step <= most + JUMP
 
     def _begin(self, row: Floats) -> None:
         self._block = _Block(row[TIME] + BLOCK)
@@ -291,16 +297,17 @@ class GroundLearner:
 
         What is wrong at a place, such as the slope of the contact, stays wrong.
         """
-        away = np.hypot(*(window.places - self._place).T) > SAME_PLACE * self._rover.wheel.radius
-        self._place = np.where(away[:, None], window.places, self._place)
+        away = np.hypot(*(window.places - self._spot).T) > SAME_PLACE * self._rover.wheel.radius
+        self._spot = np.where(away[:, None], window.places, self._spot)
         self._here = np.where(away, 0.0, self._here)
         weights = elapsed / (window.duration + BLOCK) * np.exp(-2.0 * self._here)
         self._here = self._here + np.where(tells, weights, 0.0)
         return np.asarray(weights)
 
     def _find_doubt(self, window: SlipWindow) -> float:
-        """Return the noise of a wheel's use due to contacts of the others that are not clear."""
-        return UNCLEAR_NOISE * float((window.clear <= 0.0).mean())
+        """Return the relative noise of uses due to what contradicts the model of the contacts."""
+        unclear = UNCLEAR_NOISE * float((window.clear <= 0.0).mean())
+        return float(np.hypot(EXCESS_NOISE * window.excess / self._sense.weight, unclear))
 
     def _find_fluctuation(self) -> Floats:
         """Return (6,) standard deviations of the torques over the window, over their means."""

@@ -64,7 +64,8 @@ PROGRAMS = {
     "traverse_server": Program(
         "Answer over ROS 2 whether the rover can traverse a path, and why not.",
         "subscribes elevation_cloud, elevation_map, joint_states, odometry, ~/path, "
-        "~/tool_target, ~/tool_wrench; serves ~/can_traverse, ~/check_path, ~/check_reach, "
+        "~/ground_estimate, ~/tool_target, ~/tool_wrench; serves ~/can_traverse, ~/check_path, "
+        "~/check_reach, "
         "~/load_map, ~/cancel, ~/monitor, ~/get_hazard_map; publishes ~/stop, ~/watch, "
         "~/hazard_map/worst, ~/hazard_map/best, ~/plan, ~/verdict, diagnostics, "
         "~/predicted_joints, ~/wheel_loads, ~/slip_ratios, ~/friction_utilisation, "

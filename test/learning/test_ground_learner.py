@@ -66,6 +66,22 @@ def test_a_gap_and_a_jump_of_the_odometry_are_no_slip():
     assert learn(rows).estimate.slip_time is None
 
 
+@pytest.mark.parametrize("step", [4, 10])
+def test_a_pose_that_is_measured_less_often_than_the_wheels_serves(step):
+    rows = climb(ROVER, SLOPE, 20.0)
+    sparse = np.arange(len(rows)) % step != 0
+    rows[sparse, X : SUSPENSION.stop] = np.nan
+    estimate = learn(rows).estimate
+    assert 0.6 * SLOPE < estimate.friction.low < 1.1 * SLOPE
+    assert estimate.slip_time is None and not estimate.faults
+
+
+def test_nothing_is_learned_from_rows_without_a_pose():
+    rows = climb(ROVER, SLOPE, 5.0)
+    rows[:, YAW] = np.nan
+    assert learn(rows).window is None
+
+
 def freeze(rows, wheel):
     rows[100:, TORQUES.start + wheel] = rows[100, TORQUES.start + wheel]
 

@@ -104,7 +104,8 @@ def test_a_prediction_takes_what_was_learned(folder, capfd):
     words = ["predict", "lsr1", *(str(folder / n) for n in ("ramp.npz", "poses.npz", "out.npz"))]
     used = {}
     for mean in (0.8, 0.4):
-        learned.write_text(json.dumps({"friction": {"mean": mean, "std": 0.1}}))
+        friction = {"mean": mean, "std": 0.1, "low": 0.3, "high": 1.0}
+        learned.write_text(json.dumps({"friction": friction}))
         assert main([*words, "--learned", str(learned), "--chance"]) == 0
         with np.load(out) as file:
             used[mean] = file["friction_utilisation"], float(file["failure_chance"])
