@@ -152,6 +152,16 @@ class GroundLearner:
         self.commanded: float | None = None
         """Commanded speed [m/s]; None if it is not known."""
 
+    @property
+    def stuck(self) -> str:
+        """Why the rover is stuck now; empty if it is not."""
+        return self._stuck.reason
+
+    def change_map(self, terrain: Terrain) -> None:
+        """Go on with another map of the same ground."""
+        self._sense = ContactSense(self._rover, terrain)
+        self.ground = GroundMap(terrain, self._rover.wheel.width)
+
     def take(self, row: Floats) -> bool:
         """Take a row of measurements; return whether the estimate is new."""
         row = self._clean(row)

@@ -44,6 +44,7 @@ def describe(estimate: GroundEstimate, told: float) -> dict[str, Any]:
         },
         "side_slip": estimate.side_slip,
         "time": _finite(estimate.time),
+        "stuck": estimate.stuck,
         "faults": estimate.faults,
     }
 

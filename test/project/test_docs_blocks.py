@@ -38,6 +38,7 @@ NOT_RUN = {
     ): "needs a browser and the real maps; writes pictures",
     ("python", "-m", "benchmarks"): "takes minutes; test_benchmarks runs each topic small",
     ("rover_planner", "replay"): "needs a bag; test_replay records small ones",
+    ("ground_learner",): "runs until Ctrl-C, and needs a rover; its test sends it a drive",
     ("rover_planner", "view"): "serves a page until Ctrl-C; the tests in test/viewer serve it",
 }
 """How commands begin that are not run here, and why; a block with one of them is not run."""
