@@ -14,10 +14,11 @@ import numpy as np
 import typer
 
 from benchmarks.drives import LOOK_AHEAD, MAX_TILT, Obstacle
+from rover_physics import Rover, Terrain
 from rover_physics.rover.steered_drive import SteeredDrive
 from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.simulator.path_follower import PathFollower
-from support.chance_paths import SPEED, ChancePath, draw_path, draw_truths
+from support.chance_paths import ChancePath, draw_path, draw_truths
 from support.reference_drives import KEPT
 
 PERIOD = 0.04
@@ -39,15 +40,24 @@ class Truth:
 def passes(path: ChancePath, truth: Truth) -> bool:
     """Drive a path with speed servos with droop and a follower; return whether it arrives."""
     obstacle = Obstacle(path.kind, path.size, truth.friction, path.seed, truth.max_torque)
-    poses = path.poses
-    rover = path.rover(truth.max_torque)
-    plant = MujocoRover(rover, obstacle.ground, tuple(poses[0]), truth.friction)
-    follower = PathFollower(path.extended(LOOK_AHEAD), LOOK_AHEAD)
+    return arrives(path.rover(truth.max_torque), obstacle.ground, path.poses, truth.friction)
+
+
+def arrives(rover: Rover, ground: Terrain, poses: np.ndarray, friction: float) -> bool:
+    """Drive poses (n, 3) with speed servos with droop and a follower; return whether it arrives.
+
+    The follower aims at LOOK_AHEAD beyond the last pose.
+    """
+    x, y, yaw = poses[-1]
+    beyond = [x + LOOK_AHEAD * np.cos(yaw), y + LOOK_AHEAD * np.sin(yaw), yaw]
+    plant = MujocoRover(rover, ground, tuple(poses[0]), friction)
+    follower = PathFollower(np.vstack([poses, beyond]), LOOK_AHEAD)
+    length = float(np.hypot(*np.diff(poses[:, :2], axis=0).T).sum())
     drive, way = SteeredDrive(rover), [0.0]
     within = round(STUCK_TIME / PERIOD)
-    while follower.driven < path.length:
+    while follower.driven < length:
         here = plant.pose[[0, 1, 3]]
-        aims = drive.aim(*follower.steer(here, SPEED))
+        aims = drive.aim(*follower.steer(here, rover.nominal_speed))
         plant.steer(aims.angles)
         share = drive.share(plant.steering_angles, aims.angles)
         plant.servo_with_droop(

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from rover_physics import __version__
+from rover_planner.command.advise import advise
 from rover_planner.command.demo import demo
 from rover_planner.command.figure4 import figure4
 from rover_planner.command.learn import learn
@@ -57,6 +58,7 @@ def _take_options(
 
 
 app.command()(predict)
+app.command()(advise)
 app.command(cls=PoseCommand)(plan)
 app.command()(replay_plan)
 app.command(cls=PlacesCommand, context_settings=NEGATIVE_ARGUMENTS)(reach)

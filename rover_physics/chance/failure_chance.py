@@ -57,7 +57,7 @@ class FailureChance:
 
 
 def find_failure_chance(
-    model: PackedModel, swept: SweptPath, on_path: bool = True
+    model: PackedModel, swept: SweptPath, on_path: bool = True, enough: float = 1.0
 ) -> FailureChance:
     """Return the chance that a swept path fails; 1 where the rover does not settle.
 
@@ -65,6 +65,8 @@ def find_failure_chance(
         model: The model of the sweep.
         swept: All of the path.
         on_path: Whether its poses form a path; if not, there is no drift.
+        enough: Chance above which it need not be known: the samples end there, and those that are
+            left count as if they passed.
     """
     n = len(swept.prediction.poses)
     rows = _all_rows(swept)
@@ -91,8 +93,10 @@ def find_failure_chance(
         broken = find_uses(model.limits, results).use > 1.0
         failed[k, rows.waypoint[broken.any(axis=1)]] = True
         np.add.at(counts, rows.waypoint, broken)
-        if k + 1 == FIRST and failed[:FIRST].any(axis=1).all():
+        count = int(failed.any(axis=1).sum())
+        if count == k + 1 == FIRST:
             failed = failed[:FIRST]
+        if count > enough * SAMPLES or len(failed) == FIRST:
             break
     at = failed.mean(axis=0)
     place = int(at.argmax())

@@ -61,7 +61,8 @@ def judge_path(
             the path is traversable nor code, reason and waypoint of the first failure.
         accepted_chance: Largest chance of failure, 0 to 1, of a path that is traversable; the
             verdict then has the chance, except of a path that stopped at its first failure
-            (docs/uncertainty.md). None does not ask for it.
+            (docs/uncertainty.md); with `stop_at_failure`, one above the accepted chance may be
+            larger than told. None does not ask for it.
 
     Returns:
         The prediction, and the verdict on it. With `stop_at_failure`, both end at the first
@@ -112,7 +113,8 @@ def judge_paths(
             verdict = refuse_if_trapped(model, course_of(model, swept), verdict)
         prediction, verdict = add_bounds(model, swept.prediction, verdict, sigmas)
         if accepted_chance is not None and (verdict.traversable or not stop_at_failure):
-            chance = find_failure_chance(model, swept)
+            enough = accepted_chance if stop_at_failure else 1.0
+            chance = find_failure_chance(model, swept, enough=enough)
             verdict = refuse_chance(verdict, chance, accepted_chance)
         judged.append((prediction, verdict))
     return judged

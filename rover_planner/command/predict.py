@@ -66,6 +66,9 @@ def predict(
     tool_moment: Annotated[
         Vector | None, option("MX MY MZ", "Moment on the arm's tip in N m, body frame.")
     ] = None,
+    backward: Annotated[
+        bool, flag("--backward", "The rover drives backwards along the poses.")
+    ] = False,
     sigmas: Sigmas = 3.0,
     classes: Annotated[
         bool, flag("--classes", "Add the class of each waypoint, by all torque policies.")
@@ -117,6 +120,7 @@ def predict(
         payload=payload,
         tool_force=tool_force,
         tool_moment=tool_moment,
+        backward=backward,
     )
     assumed = assume(model, options, sigmas)
     with show_progress() as progress:

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node /mission_planner: queries a traverse_server over ROS 2 for a list of goals.
 
-    mission_planner [--map TERRAIN] --start X,Y,YAW --goal X,Y,YAW [--goal ...] [--drive] [--json]
+    mission_planner [--map TERRAIN] --start X,Y,YAW --goal X,Y,YAW [--goal ...]
+                    [--drive] [--advise] [--json]
 
 It is a short example of a planner client: it publishes a map, calls `~/can_traverse`, and reads
 the verdict, wheel loads and slip ratios that the server publishes with its answer.
@@ -23,6 +24,8 @@ from nav_msgs.msg import Odometry, Path
 from nav_msgs.srv import GetPlan
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.parameter_client import AsyncParameterClient
 from rclpy.publisher import Publisher
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64MultiArray, String
@@ -35,6 +38,7 @@ from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.paths import path_to_poses, poses_path, stamped_pose
 from msg_adapters.results.predictions import array_values
 from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_planner.nodes.mission.advice import choose_remedy
 from rover_planner.nodes.mission.drive import DriveFailedError, DriveSettings, drive_to
 from rover_planner.nodes.mission.options import MissionOptions
 from rover_planner.nodes.programs import read_arguments
@@ -57,6 +61,7 @@ from rover_planner.shell.exit_codes import (
     EXIT_NOT_TRAVERSABLE,
     EXIT_OK,
 )
+from rover_planner.shell.poses import Pose
 from rover_planner.shell.run_program import end_with, run_program
 
 NODE_NAME = "mission_planner"
@@ -98,6 +103,8 @@ class MissionPlanner(Node):
         self._checker = self.create_client(
             Trigger, f"{SERVER}/check_path", qos_profile=service_qos()
         )
+        self._adviser = self.create_client(Trigger, f"{SERVER}/advise", qos_profile=service_qos())
+        self._parameters = AsyncParameterClient(self, SERVER)
         self.create_subscription(Odometry, "odometry", self._take_odometry, sensor_qos())
         driven = self.create_subscription(String, "path_driven", self._take_driven, latched_qos())
         self._driven_topic = driven.topic_name
@@ -249,6 +256,28 @@ class MissionPlanner(Node):
             f"waited {self._timeout:.0f} s in vain for {self._checker.service_name}"
         )
 
+    def ask_advice(self) -> dict[str, Any]:
+        """Return the server's advice on the path that it refused last; see docs/advice.md.
+
+        Raises:
+            NoAnswerError: The server does not answer in time.
+        """
+        future = self._adviser.call_async(Trigger.Request())
+        future.add_done_callback(self._notify)
+        self._wait(future.done, f"the answer of {self._adviser.service_name}")
+        advice: dict[str, Any] = json.loads(future.result().message)
+        return advice
+
+    def set_policy(self, policy: str) -> None:
+        """Let the server judge by another torque policy from now on.
+
+        Raises:
+            NoAnswerError: The server does not answer in time.
+        """
+        future = self._parameters.set_parameters([Parameter("policy", value=policy)])
+        future.add_done_callback(self._notify)
+        self._wait(future.done, f"parameter policy of {SERVER}")
+
     def wait_for_pose(self, is_wanted: Callable[[np.ndarray], bool], seconds: float) -> np.ndarray:
         """Return the first measured pose (3,) that is wanted, or the last one after some seconds.
 
@@ -377,6 +406,13 @@ def _carry_out(node: MissionPlanner, terrain: Terrain | None, options: MissionOp
         answer = node.ask(options.start, goal)
         answer["response_time"] = time.monotonic() - asked
         report({"event": "answer", "goal": number, "answer": answer})
+        if options.advise and _was_judged(answer) and not answer["traversable"]:
+            advised = _take_advice(
+                node, options.start, goal, partial(_report_advice, report, number)
+            )
+            if advised is not None:
+                answer = advised
+                report({"event": "answer", "goal": number, "answer": answer})
         codes.add(_exit_code(answer))
         if options.drive and answer["traversable"]:
             report({"event": "driving", "goal": number})
@@ -388,6 +424,25 @@ def _carry_out(node: MissionPlanner, terrain: Terrain | None, options: MissionOp
                 raise DriveFailedError(str(error)) from error
             report({"event": "arrived", "goal": number})
     return next(code for code in (EXIT_FAILED, EXIT_NOT_TRAVERSABLE, EXIT_OK) if code in codes)
+
+
+def _take_advice(
+    node: MissionPlanner, start: Pose, goal: Pose, tell: Callable[[str], None]
+) -> dict[str, Any] | None:
+    """Take the first remedy that needs nobody else; return the answer with it, None without."""
+    advice = node.ask_advice()
+    remedy = choose_remedy(advice)
+    if remedy is None:
+        tell(f"none that a mission planner can take; {advice.get('words', advice['reason'])}")
+        return None
+    tell(remedy["words"])
+    if "policy" in remedy["options"]:
+        node.set_policy(remedy["options"]["policy"])
+    if "poses" not in remedy:
+        return node.ask(start, goal)
+    poses = remedy["poses"]
+    reason = node.check(np.array(poses))
+    return {"traversable": not reason, "reason": reason, "poses": poses, "waypoints": len(poses)}
 
 
 def _was_judged(answer: dict[str, Any]) -> bool:
@@ -413,6 +468,10 @@ def spin_until(ended: threading.Event, executor: SingleThreadedExecutor) -> None
             if executor.context.ok():
                 raise
             return  # ROS was shut down while the executor began to wait
+
+
+def _report_advice(report: Callable[[dict[str, Any]], None], goal: int, words: str) -> None:
+    report({"event": f"advice: {words}", "goal": goal})
 
 
 def _report_change(report: Callable[[dict[str, Any]], None], goal: int, text: str) -> None:

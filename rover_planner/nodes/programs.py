@@ -66,8 +66,8 @@ PROGRAMS = {
         "Answer over ROS 2 whether the rover can traverse a path, and why not.",
         "subscribes elevation_cloud, elevation_map, joint_states, odometry, ~/path, "
         "~/ground_estimate, ~/tool_target, ~/tool_wrench; serves ~/can_traverse, ~/check_path, "
-        "~/check_reach, "
-        "~/load_map, ~/cancel, ~/monitor, ~/get_hazard_map; publishes ~/stop, ~/watch, "
+        "~/check_reach, ~/advise, ~/load_map, ~/cancel, ~/monitor, ~/get_hazard_map; publishes "
+        "~/stop, ~/watch, ~/advice, "
         "~/hazard_map/worst, ~/hazard_map/best, ~/plan, ~/verdict, diagnostics, "
         "~/predicted_joints, ~/wheel_loads, ~/slip_ratios, ~/friction_utilisation, "
         "~/torque_saturation, ~/tip_over_margin, ~/closed_area, ~/search_progress, "
@@ -102,9 +102,9 @@ PROGRAMS = {
     ),
     "mission_planner": Program(
         "Query a traverse_server over ROS 2 for a list of goals.",
-        "calls traverse_server/can_traverse, traverse_server/check_path; subscribes "
-        "traverse_server/verdict, traverse_server/wheel_loads, traverse_server/slip_ratios, "
-        "odometry, path_driven; publishes "
+        "calls traverse_server/can_traverse, traverse_server/check_path, traverse_server/advise; "
+        "subscribes traverse_server/verdict, traverse_server/wheel_loads, "
+        "traverse_server/slip_ratios, odometry, path_driven; publishes "
         "elevation_cloud, path, traverse_server/path",
         read_mission,
         exit_codes="Exit code 0: every goal is traversable, and with --drive was reached. 1: a "

@@ -35,6 +35,7 @@ from rover_physics.warm_up import EXACT, UNCERTAIN
 from rover_planner.learning.learned_file import parse_learned
 from rover_planner.maps.known_map import stamp_text
 from rover_planner.maps.summary import describe_terrain
+from rover_planner.nodes.advice_topics import AdviceTopics
 from rover_planner.nodes.arm_topics import ArmTopics
 from rover_planner.nodes.maps.map_cloud import MapCloud
 from rover_planner.nodes.maps.map_topics import MapTopics
@@ -131,6 +132,7 @@ class TraverseServer(Node):
         serve_later(self, Trigger, "~/check_path", self._check_path)
         PathValidity(self.desk, frame, self.publish, self.frames.localise_path).serve(self)
         PathComputation.serve(self, self.desk, self.read_question, self.publish)
+        self._advice = AdviceTopics(self, self.desk, self.guard, self._values.advice_time)
         self.create_service(Trigger, "~/cancel", self._cancel)
         self.arm = ArmTopics(self, self.desk, frame, reliability)
         """The topics and the service of the arm."""
@@ -152,6 +154,7 @@ class TraverseServer(Node):
     def destroy_node(self) -> None:
         """Refuse open questions, end the threads and destroy the node."""
         self.desk.close()
+        self._advice.close()
         self.watch.close()
         self._hazards.close()
         self._maps.close()
@@ -184,6 +187,7 @@ class TraverseServer(Node):
         self._values = parameters
         self.service.settings = load_service_settings(parameters)
         self.desk.set_limits(parameters.time_budget, parameters.max_waiting)
+        self._advice.seconds = parameters.advice_time
         self._maps.apply(parameters)
         self.watch.apply(parameters)
         self.frames.apply_timeout(parameters.transform_timeout)
@@ -318,6 +322,7 @@ class TraverseServer(Node):
         """Return plan and report of a judgement; its results are published after the answer."""
         rover, spacing = self.service.settings.rover, self._values.plan_spacing
         plan, report = self._results.take(judgement, identity, rover, spacing)
+        self._advice.take(judgement)
         if judgement.traversable and judgement.candidate is not None:
             poses = judgement.candidate.poses
             self.watch.accept(poses, identity.path_hash or path_hash(plan))
@@ -329,6 +334,7 @@ class TraverseServer(Node):
 
     def _cancel(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         count = self.desk.cancel(CANCELLED, "the question was cancelled by ~/cancel")
+        count += self._advice.cancel()
         response.success = count > 0
         response.message = f"{count} open questions cancelled"
         return response

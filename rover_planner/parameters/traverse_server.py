@@ -245,6 +245,12 @@ class TraverseServerParameters(ParameterTable):
         unit="s",
         bounds=(0.05, 600.0),
     )
+    advice_time: float = parameter(
+        5.0,
+        "Longest time from a call of ~/advise to its answer; questions come first.",
+        unit="s",
+        bounds=(0.05, 600.0),
+    )
     max_waiting: int = parameter(
         50,
         "Questions that may wait; further ones are busy.",

@@ -32,15 +32,22 @@ def turn_and_drive(
     shares = np.linspace(0.0, 1.0, 1 + max(1, int(np.ceil(length / waypoint_spacing - 1e-9))))
     line = np.column_stack([start[:2] + shares[:, None] * away, np.full(len(shares), heading)])
     parts = [
-        _turn(start[:2], start[2], first, step)[:-1],
+        turn_on_the_spot(start[:2], start[2], first, step)[:-1],
         line if length > 0.0 else line[:1],
-        _turn(goal[:2], heading, last, step)[1:],
+        turn_on_the_spot(goal[:2], heading, last, step)[1:],
     ]
     return np.concatenate(parts), length + swing_radius * (abs(first) + abs(last))
 
 
-def _turn(place: np.ndarray, yaw: float, turn: float, step: float) -> np.ndarray:
-    """Return poses (k, 3) of a turn on the spot, both ends included; one if it is left out."""
+def turn_on_the_spot(place: np.ndarray, yaw: float, turn: float, step: float) -> np.ndarray:
+    """Return poses (k, 3) of a turn on the spot, both ends included; one if it is left out.
+
+    Args:
+        place: (2,) x, y [m].
+        yaw: Heading at its begin [rad].
+        turn: Turn to the left [rad].
+        step: Largest turn between two poses [rad].
+    """
     if abs(turn) < LEAST_TURN:
         return np.array([[*place, yaw]])
     count = 1 + max(1, int(np.ceil(abs(turn) / step - 1e-9)))

@@ -24,6 +24,8 @@ class MissionOptions:
     """Preset or file of the map to publish first; None publishes none."""
     drive: bool
     """True sends plans to the rover."""
+    advise: bool
+    """True takes advice where a path is refused."""
     map_frame: str
     """Frame of map and poses."""
     timeout: float
@@ -48,6 +50,12 @@ def read_mission(
     drive: Annotated[
         bool,
         typer.Option("--drive", help="Send each plan to the rover and wait until it is there."),
+    ] = False,
+    advise: Annotated[
+        bool,
+        typer.Option(
+            "--advise", help="Where a path is refused, take the first remedy that needs nobody."
+        ),
     ] = False,
     map_frame: Annotated[
         str, typer.Option(metavar="FRAME", help="Frame of map and poses.")
@@ -78,6 +86,6 @@ def read_mission(
         if not 0.0 < value < math.inf:
             raise PlanningError(f"{name} is {value}; it must be {what}")
     return MissionOptions(
-        start, tuple(goal), map_name, drive, map_frame, timeout, as_json,
+        start, tuple(goal), map_name, drive, advise, map_frame, timeout, as_json,
         position_tolerance, heading_tolerance,
     )  # fmt: skip

@@ -95,7 +95,7 @@ def test_a_stop_is_not_delayed_to_the_next_update(rover, start_controller):
 def test_a_node_that_ends_sends_zeros_last(rover, controller):
     run_in_executor(controller, controller.stop)
     wait_until(lambda: rover.torque == 0.0 and rover.brakes[-1], "zeros and the brake")
-    assert rover.state == "disabled"
+    wait_until(lambda: rover.state == "disabled", "the state")
 
 
 @pytest.mark.long

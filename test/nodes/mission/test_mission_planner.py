@@ -116,6 +116,40 @@ def test_answers_drives_and_refusals_have_exit_codes_of_their_own(start_server, 
     assert "mission_planner: waited 8 s in vain for a rover on the topic path\n" in err
 
 
+def rock(x, y):
+    """Return level ground with a rock below the left wheels of a rover on the x axis."""
+    return 0.3 * np.exp(-((x + 0.3) ** 2 + (y - 0.2) ** 2) / 0.02)
+
+
+def slope(x, y):
+    return 0.3 * x
+
+
+@pytest.mark.parametrize(
+    ("ground", "parameters", "words", "policy"),
+    [(rock, {}, " m ", "equal"), (slope, {"friction": 0.45}, "by speed servos", "servo")],
+)
+def test_advice_that_needs_nobody_else_is_taken(
+    start_server, run_planner, ground, parameters, words, policy
+):
+    patient = {"planner": "fan", "candidate_count": 1, "advice_time": 60.0, "time_budget": 60.0}
+    server = start_server(**patient, **parameters)
+    server.service.take_terrain(make_terrain(ground))
+    code, out, _ = run_planner("--goal=1.2,0,0", "--advise")
+    lines = [line for line in out.splitlines() if line.startswith(("goal", "advice"))]
+    assert code == 0 and lines[0].startswith("goal 1: no, ")
+    assert lines[1].startswith("advice: ") and words in lines[1]
+    assert lines[2] == "goal 1: yes"
+    assert server.get_parameter("policy").value == policy
+
+
+def test_where_advice_needs_others_the_refusal_stays(start_server, run_planner):
+    server = start_server(planner="fan", candidate_count=1, advice_time=1.0)
+    server.service.take_terrain(make_terrain(wall_at(0.5)))
+    code, out, _ = run_planner(BEYOND, "--advise")
+    assert code == 3 and "advice: none that a mission planner can take; " in out
+
+
 def test_without_a_server_it_gives_up_in_time_and_says_what_it_waited_for(run_planner):
     code, _, err = run_planner(NEAR, "--timeout=1")
     assert code == 4 and err.count("\n") == 1

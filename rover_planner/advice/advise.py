@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Advice on a refused path: the remedies, best first, and whether all levers were tried."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from rover_physics.numerics.arrays import Floats
+from rover_physics.numerics.interruption import interruptible
+from rover_physics.rover.model import Rover
+from rover_planner.advice.case import Case, JudgedCase, distance_along
+from rover_planner.advice.refusal import Refusal
+from rover_planner.advice.remedy import Remedy
+from rover_planner.advice.seek import seek_remedies
+from rover_planner.planning.answering.budget import QuestionStoppedError
+from rover_planner.planning.candidates import generate_candidates
+
+MOST_REMEDIES = 5
+"""Largest number of remedies that are told."""
+ENDS_APART = 0.5
+"""Distance of two poses [wheelbases] from which they are start and goal, and no path."""
+
+
+@dataclass(frozen=True, eq=False)
+class Advice:
+    """What would make a path pass."""
+
+    judged: JudgedCase
+    """The path as it was judged."""
+    found: tuple[Remedy, ...] = ()
+    """All remedies, best first."""
+    tried: tuple[str, ...] = ()
+    """Names of the levers that were tried last."""
+    complete: bool = False
+    """True if all levers were tried."""
+
+    @property
+    def remedies(self) -> tuple[Remedy, ...]:
+        """The best remedies that options and path of `predict` hold."""
+        return tuple(one for one in self.found if one.is_option)[:MOST_REMEDIES]
+
+    @property
+    def others(self) -> tuple[Remedy, ...]:
+        """The best remedies that change the ground or the rover's limits."""
+        return tuple(one for one in self.found if not one.is_option)[:MOST_REMEDIES]
+
+    def describe(self) -> str:
+        """Return the result in words."""
+        if self.judged.passes:
+            return "the path is traversable as it is"
+        if any(not one.needs_others for one in self.found):
+            return f"the first of {len(self.found)}: {self.found[0].describe()}"
+        which = "no lever helps" if self.complete else "no lever that was tried in time helps"
+        return f"{which} that the rover has" if self.found else which
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the advice as JSON types; see docs/advice.md."""
+        verdict = self.judged.verdict
+        return {
+            "traversable": self.judged.passes,
+            "code": verdict.code,
+            "reason": verdict.reason,
+            "first_failure": verdict.first_failure,
+            "words": self.describe(),
+            "remedies": [one.to_dict() for one in self.remedies],
+            "others": [one.to_dict() for one in self.others],
+            "complete": self.complete,
+        }
+
+
+def grow_advice(case: Case) -> Iterator[Advice]:
+    """Yield advice that grows with each trial; the last one is complete.
+
+    Raises:
+        RoverError: The model refuses the path or an option.
+    """
+    judged = case.judge()
+    advice = Advice(judged)
+    if not judged.passes:
+        yield advice
+        for trial in seek_remedies(Refusal(judged)):
+            found = advice.found if trial.remedy is None else (*advice.found, trial.remedy)
+            tried = tuple(lever.name for lever in trial.levers)
+            advice = replace(advice, found=tuple(sorted(found, key=_rank)), tried=tried)
+            yield advice
+    yield replace(advice, complete=True)
+
+
+def grow_within(case: Case, check: Callable[[], object]) -> Iterator[Advice]:
+    """Yield advice that grows until it is complete, or is stopped.
+
+    Args:
+        case: The refused path.
+        check: Called again and again; it stops the work by a QuestionStoppedError.
+
+    Raises:
+        QuestionStoppedError: Not even the path itself was judged.
+        RoverError: The model refuses the path or an option.
+    """
+    growing, has_begun = grow_advice(case), False
+    while True:
+        try:
+            with interruptible(check):
+                advice = next(growing, None)
+        except QuestionStoppedError:
+            if has_begun:
+                return
+            raise
+        if advice is None:
+            return
+        has_begun = True
+        yield advice
+
+
+def path_of(rover: Rover, poses: Floats, spacing: float) -> Floats:
+    """Return poses (n, 3) as a path: two that are far apart are its start and goal."""
+    if len(poses) != 2 or distance_along(poses)[-1] < ENDS_APART * rover.wheelbase:
+        return np.asarray(poses)
+    return generate_candidates(*poses, count=1, waypoint_spacing=spacing)[0]
+
+
+def _rank(remedy: Remedy) -> tuple[Any, ...]:
+    """Return what sorts remedies: by whom, how many levers, time, and how close to a limit."""
+    return (
+        remedy.needs_others,
+        len(remedy.levers),
+        round(remedy.extra_time),
+        remedy.judged.largest_use[0],
+    )

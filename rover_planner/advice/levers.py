@@ -1,0 +1,351 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The levers by which a refused path may pass: one row each, from which all advice follows.
+
+A new lever is one row of LEVERS: what it may be set to, how it changes a case, and its words.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from rover_physics.limits.table import LIMITS, Limit, Sense
+from rover_physics.names import OPTIMAL, SERVO
+from rover_physics.rover.manipulator import arm_angles
+from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius
+from rover_planner.advice.case import Case, distance_along
+from rover_planner.advice.path_changes import (
+    bend_path,
+    is_driven_ahead,
+    pass_by,
+    reverse_rover,
+    shift_path,
+    turn_path,
+)
+from rover_planner.advice.refusal import Refusal
+
+ASIDE = 2.0
+"""Largest shift of a path [wheelbases]."""
+ASKEW = 0.6
+"""Largest other angle at which a place is crossed [rad]."""
+MOST_FRICTION = 1.5
+"""Largest friction that is asked for."""
+MOST_TORQUE = 3.0
+"""Largest torque that is asked for, over that of the motors."""
+MOST_RELAXED = 1.5
+"""Largest limit that is asked for, over that of the rover file."""
+ROCK_RADIUS = 4.0
+"""Radius of the ground that is lowered [wheel radii]."""
+SPACING = 0.02
+"""Distance between waypoints of a path of its own where the refused one has no more [m]."""
+TORQUES = {OPTIMAL: "Switch on traction control", SERVO: "Drive the wheels by speed servos"}
+
+
+@dataclass(frozen=True)
+class Span:
+    """What a lever may be set to: any value from now to either end."""
+
+    now: float
+    """The value of the refused case."""
+    ends: tuple[float, ...]
+    """The values farthest from it, on one side or both."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What a lever may be set to: one of a few values."""
+
+    now: Any
+    """The value of the refused case."""
+    values: tuple[Any, ...]
+    """The others, nearest first."""
+
+
+@dataclass(frozen=True)
+class Lever:
+    """One thing that may be changed about a case."""
+
+    name: str
+    """Name of the lever."""
+    unit: str
+    """Unit of its values; empty for a ratio or a word."""
+    settings: Callable[[Refusal], Span | Choice | None]
+    """Returns what it may be set to; None where it cannot be used."""
+    apply: Callable[[Case, Refusal, Any], Case | None]
+    """Returns a case with the lever set; None where there is no room."""
+    words: Callable[[Refusal, Any], str]
+    """Returns what to do, in words."""
+    keeps_rows: bool = True
+    """True if waypoints stay, or are only shifted: row i is near row i of the refused path."""
+    changes_path: bool = False
+    """True if it changes the path. Only one such lever is set at a time."""
+    needs_others: bool = False
+    """True if somebody outside the rover has to do, to know or to decide something."""
+    is_option: bool = True
+    """True if path and options of `predict` hold all that it changes."""
+
+
+def _policies(refusal: Refusal) -> Choice:
+    now = refusal.case.options.policy
+    return Choice(now, tuple(policy for policy in (SERVO, OPTIMAL) if policy != now))
+
+
+def _arm_joint(k: int, raised: str, lowered: str) -> Lever:
+    """Return the lever of a joint of the arm; the words are those of a smaller or larger angle."""
+
+    def settings(refusal: Refusal) -> Span | None:
+        arm = refusal.case.rover.manipulator
+        if arm is None:
+            return None
+        now = float(arm_angles(arm, refusal.case.options.arm_angles)[k])
+        return Span(
+            now, tuple(arm.joint_limits[k]) if arm.joint_limits else (now - np.pi, now + np.pi)
+        )
+
+    def apply(case: Case, _refusal: Refusal, angle: float) -> Case:
+        arm = case.rover.manipulator
+        assert arm is not None
+        angles = arm_angles(arm, case.options.arm_angles)
+        angles[k] = angle
+        return case.change(joint_angles=dict(zip(arm.joints, angles.tolist(), strict=True)))
+
+    def words(refusal: Refusal, angle: float) -> str:
+        span = settings(refusal)
+        assert span is not None
+        turn = angle - span.now
+        verb = lowered if turn > 0.0 else raised
+        return f"{verb.format(f'{abs(turn):.2f} rad')}, to {angle:.2f} rad"
+
+    return Lever(("arm_yaw", "arm_shoulder", "arm_elbow")[k], "rad", settings, apply, words)
+
+
+def _payload(refusal: Refusal) -> Span | None:
+    arm, told = refusal.case.rover.manipulator, refusal.case.options.payload
+    now = told if told is not None else arm.payload if arm is not None else 0.0
+    return Span(now, (0.0,)) if now > 0.0 else None
+
+
+def _describe_payload(refusal: Refusal, payload: float) -> str:
+    if payload == 0.0:
+        return "Put the payload down"
+    span = _payload(refusal)
+    assert span is not None
+    return f"Carry {span.now - payload:.2f} kg less at the arm's tip"
+
+
+def _aside(share: float) -> Callable[[Refusal], Span | None]:
+    """Return the settings of a lever that shifts a path that is driven ahead."""
+
+    def settings(refusal: Refusal) -> Span | None:
+        if not is_driven_ahead(refusal.case.poses):
+            return None
+        most = share * refusal.case.rover.wheelbase
+        return Span(0.0, (-most, most))
+
+    return settings
+
+
+def _askew(refusal: Refusal) -> Span | None:
+    return Span(0.0, (-ASKEW, ASKEW)) if is_driven_ahead(refusal.case.poses) else None
+
+
+def _on_the_spot(refusal: Refusal) -> Span | None:
+    turns = can_turn_on_the_spot(refusal.case.rover)
+    return _aside(ASIDE)(refusal) if turns else None
+
+
+def _around(refusal: Refusal) -> Choice | None:
+    """Return the length of a path around [m], if one is found."""
+    if refusal.judged.distance[-1] < refusal.case.rover.wheelbase or refusal.path_around is None:
+        return None
+    length = float(distance_along(refusal.path_around)[-1])
+    return Choice(float(refusal.judged.distance[-1]), (length,))
+
+
+def _drive_around(case: Case, refusal: Refusal) -> Case:
+    assert refusal.path_around is not None
+    return replace(case, poses=refusal.path_around)
+
+
+def _backward(refusal: Refusal) -> Choice | None:
+    case = refusal.case
+    turns = can_turn_on_the_spot(case.rover) and is_driven_ahead(case.poses)
+    return Choice(False, (True,)) if turns and not case.options.backward else None
+
+
+def _reverse(case: Case, _refusal: Refusal, _value: Any) -> Case:
+    step = _spacing(case) / swing_radius(case.rover)
+    return replace(case.change(backward=True), poses=reverse_rover(case.poses, step))
+
+
+def _spacing(case: Case) -> float:
+    """Return the distance of waypoints [m] of a path of its own."""
+    steps = np.diff(distance_along(case.poses))
+    return float(np.median(steps)) if (steps > 0.0).any() else SPACING
+
+
+def _with_path(change: Callable[[Case, Refusal, float], Any]) -> Callable[..., Case | None]:
+    """Return what sets a lever by a function that returns a path."""
+
+    def apply(case: Case, refusal: Refusal, value: float) -> Case | None:
+        poses = change(case, refusal, value)
+        return None if poses is None else replace(case, poses=poses)
+
+    return apply
+
+
+def _side(value: float) -> str:
+    return "left" if value > 0.0 else "right"
+
+
+def _at(refusal: Refusal) -> str:
+    return f"{refusal.judged.distance[refusal.place]:.1f} m"
+
+
+def _friction(refusal: Refusal) -> Span | None:
+    case = refusal.case
+    if case.terrain.friction is not None or case.terrain.soil is not None or case.options.soil:
+        return None  # the ground has its own
+    told = case.options.friction
+    now = case.rover.friction if told is None else told
+    return Span(now, (MOST_FRICTION,)) if now < MOST_FRICTION else None
+
+
+def _torque(refusal: Refusal) -> Span:
+    told = refusal.case.options.max_torque
+    now = refusal.case.rover.wheel.max_torque if told is None else told
+    return Span(now, (MOST_TORQUE * now,))
+
+
+def _rock(refusal: Refusal) -> Span | None:
+    """Return by how much the ground below the highest wheel may be cut down [m]."""
+    heights = refusal.case.terrain.elevation[_disc(refusal.case, refusal)]
+    heights = heights[np.isfinite(heights)]
+    height = float(heights.max() - np.median(heights)) if heights.size else 0.0
+    return Span(0.0, (height,)) if height > 0.0 else None
+
+
+def _disc(case: Case, refusal: Refusal) -> Any:
+    """Return the mask (ny, nx) of the cells around the place of the failure."""
+    terrain, (x, y) = case.terrain, refusal.place_on_ground
+    ny, nx = terrain.elevation.shape
+    columns = terrain.origin[0] + terrain.resolution * np.arange(nx) - x
+    rows = terrain.origin[1] + terrain.resolution * np.arange(ny) - y
+    return np.hypot(*np.meshgrid(columns, rows)) <= ROCK_RADIUS * case.rover.wheel.radius
+
+
+def _lower_rock(case: Case, refusal: Refusal, depth: float) -> Case:
+    disc, heights = _disc(case, refusal), case.terrain.elevation.copy()
+    heights[disc] = np.minimum(heights[disc], np.nanmax(heights[disc]) - depth)
+    return replace(case, terrain=replace(case.terrain, elevation=heights))
+
+
+def _describe_rock(refusal: Refusal, depth: float) -> str:
+    x, y = refusal.place_on_ground
+    return f"The ground at ({x:.2f}, {y:.2f}) would have to be {100.0 * depth:.0f} cm lower"
+
+
+def _limit(row: Limit) -> Lever:
+    """Return the lever that relaxes a limit of the rover file."""
+
+    def settings(refusal: Refusal) -> Span | None:
+        now = float(getattr(refusal.case.rover.limits, row.reads))
+        if row.code not in refusal.judged.verdict.codes:
+            return None
+        return Span(now, (MOST_RELAXED * now if row.sense == Sense.MOST else 0.0,))
+
+    def apply(case: Case, _refusal: Refusal, bound: float) -> Case:
+        changed: dict[str, Any] = {row.reads: bound}
+        limits = replace(case.rover.limits, **changed)
+        return replace(case, rover=replace(case.rover, limits=limits))
+
+    def words(refusal: Refusal, bound: float) -> str:
+        now = float(getattr(refusal.case.rover.limits, row.reads))
+        name = row.reads.replace("_", " ")
+        return (
+            f"A limit of {row.unit.write(bound)} for {name} would do, in place of "
+            f"{row.unit.write(now)}: a decision, no remedy"
+        )
+
+    return Lever(
+        f"limits.{row.reads}", "rad" if row.reads == "tilt" else row.unit.name, settings, apply,
+        words, needs_others=True, is_option=False,
+    )  # fmt: skip
+
+
+LEVERS: tuple[Lever, ...] = (
+    Lever(
+        "policy", "", _policies, lambda case, _refusal, policy: case.change(policy=policy),
+        lambda _refusal, policy: TORQUES[policy],
+    ),
+    _arm_joint(1, "Lift the arm by {}", "Lower the arm by {}"),
+    _arm_joint(0, "Swing the arm by {} to the right", "Swing the arm by {} to the left"),
+    _arm_joint(2, "Raise the forearm by {}", "Lower the forearm by {}"),
+    Lever(
+        "payload", "kg", _payload, lambda case, _refusal, mass: case.change(payload=mass),
+        _describe_payload,
+    ),
+    Lever(
+        "shift", "m", _aside(ASIDE),
+        _with_path(lambda case, refusal, offset: shift_path(
+            case.poses, refusal.place, offset, case.rover.wheelbase)),
+        lambda refusal, offset:
+            f"Drive {abs(offset):.2f} m further {_side(offset)} around {_at(refusal)}",
+        changes_path=True,
+    ),
+    Lever(
+        "approach_angle", "rad", _askew,
+        _with_path(lambda case, refusal, angle: turn_path(
+            case.poses, refusal.place, angle, case.rover.wheelbase)),
+        lambda refusal, angle: f"Cross the place at {_at(refusal)} at an angle of "
+            f"{np.degrees(abs(angle)):.0f} degrees to the {_side(angle)}",
+        changes_path=True,
+    ),
+    Lever(
+        "curve", "m", _aside(ASIDE),
+        _with_path(lambda case, _refusal, offset: bend_path(case.poses, offset)),
+        lambda _refusal, offset:
+            f"Drive a curve that leads {abs(offset):.2f} m to the {_side(offset)}",
+        changes_path=True,
+    ),
+    Lever(
+        "turn_on_the_spot", "m", _on_the_spot,
+        _with_path(lambda case, refusal, offset: pass_by(
+            case.poses, refusal.place, offset, swing_radius(case.rover), _spacing(case))),
+        lambda refusal, offset: f"Turn on the spot, pass {abs(offset):.2f} m {_side(offset)} of "
+            f"the place at {_at(refusal)}, stop and turn on the spot to the goal",
+        changes_path=True, keeps_rows=False,
+    ),
+    Lever(
+        "path_around", "m", _around, lambda case, refusal, _value: _drive_around(case, refusal),
+        lambda refusal, length: f"Drive around: a path of {length:.1f} m in place of "
+            f"{refusal.judged.distance[-1]:.1f} m",
+        changes_path=True, keeps_rows=False,
+    ),
+    Lever(
+        "backward", "", _backward, _reverse,
+        lambda _refusal, _value: "Turn round and drive it backwards", keeps_rows=False,
+    ),
+    Lever(
+        "friction", "", _friction, lambda case, _refusal, mu: case.change(friction=mu),
+        lambda refusal, mu: f"A friction of {mu:.2f} would do; "
+            f"{mu - _friction(refusal).now:.2f} is missing",  # type: ignore[union-attr]
+        needs_others=True,
+    ),
+    Lever(
+        "max_torque", "N m", _torque, lambda case, _refusal, most: case.change(max_torque=most),
+        lambda refusal, most: f"Motors of {most:.2f} N m would do; "
+            f"{most - _torque(refusal).now:.2f} N m are missing",
+        needs_others=True,
+    ),
+    Lever(
+        "ground", "m", _rock, _lower_rock, _describe_rock, needs_others=True, is_option=False,
+    ),
+    *(
+        _limit(row)
+        for row in LIMITS
+        if row.reads in ("tilt", "tip_over_ratio", "wheel_drop", "belly_clearance")
+    ),
+)  # fmt: skip
+"""All levers: first what the rover does by itself, cheapest first, then what needs others."""

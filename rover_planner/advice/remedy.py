@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A remedy: the levers to set, what they cost, and the words that say so."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from rover_physics.names import WHEEL_POSITIONS
+from rover_physics.numerics.plain_values import to_plain
+from rover_planner.advice.case import JudgedCase
+from rover_planner.advice.levers import Lever
+from rover_planner.advice.refusal import Refusal
+
+TELLING_LOAD = 0.01
+"""Least change of an axle's load that is told [share of the weight]."""
+OPTIONS = ("policy", "friction", "max_torque", "joint_angles", "payload", "backward")
+"""Options of `predict` that levers set."""
+
+
+@dataclass(frozen=True)
+class SetLever:
+    """A lever and the value it is set to."""
+
+    lever: Lever
+    """The lever."""
+    value: Any
+    """Its value."""
+    now: Any
+    """Its value in the refused case."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the lever as JSON types."""
+        return {
+            "name": self.lever.name,
+            "value": self.value,
+            "unit": self.lever.unit,
+            "from": self.now,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Remedy:
+    """Levers whose setting makes a refused path pass, as judged."""
+
+    refusal: Refusal
+    """The refused path."""
+    levers: tuple[SetLever, ...]
+    """The levers, one or a few."""
+    judged: JudgedCase
+    """The whole path with the levers set."""
+
+    @property
+    def needs_others(self) -> bool:
+        """True if somebody outside the rover has to do, know or decide something."""
+        return any(one.lever.needs_others for one in self.levers)
+
+    @property
+    def is_option(self) -> bool:
+        """True if `predict` can be told all of it."""
+        return all(one.lever.is_option for one in self.levers)
+
+    @property
+    def extra_time(self) -> float:
+        """Time of the drive above that of the refused path [s]."""
+        return float(self.judged.prediction.time[-1]) - self.refusal.time
+
+    @property
+    def extra_energy(self) -> float:
+        """Energy of the drive above that of the refused path [J]."""
+        return float(self.judged.prediction.energy[-1]) - self.refusal.energy
+
+    def options(self) -> dict[str, Any]:
+        """Return the options of `predict` that change."""
+        old, new = self.refusal.case.options, self.judged.case.options
+        found = {
+            name: getattr(new, name)
+            for name in OPTIONS
+            if getattr(old, name) != getattr(new, name)
+        }
+        if "joint_angles" in found:
+            found["joint_angles"] = new.arm_angles
+        return found
+
+    def describe(self) -> str:
+        """Return what to do, what it does to the rover and how close it is, in words."""
+        todo = " and ".join(
+            words if k == 0 else words[0].lower() + words[1:]
+            for k, words in enumerate(
+                one.lever.words(self.refusal, one.value) for one in self.levers
+            )
+        )
+        use, distance = self.judged.largest_use
+        return f"{todo}{self._describe_loads()}; largest use {use:.2f} at {distance:.1f} m"
+
+    def _describe_loads(self) -> str:
+        """Return how the load of the axle changes most where the refused path fails."""
+        if self.judged.case.poses is not self.refusal.case.poses:
+            return ""
+        old, new = (
+            one.loads_of_axles(self.refusal.place) for one in (self.refusal.judged, self.judged)
+        )
+        change = {name: new[name] - old[name] for name in WHEEL_POSITIONS}
+        name = max(change, key=lambda one: abs(change[one]))
+        if not abs(change[name]) > TELLING_LOAD * self.refusal.case.rover.weight:
+            return ""  # or unknown
+        more = "more" if change[name] > 0.0 else "less"
+        return f": the {name} wheels then carry {abs(change[name]):.1f} N {more}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the remedy as JSON types."""
+        case, use = self.judged.case, self.judged.largest_use[0]
+        has_path = case.poses is not self.refusal.case.poses
+        found = {
+            "levers": [one.to_dict() for one in self.levers],
+            "words": self.describe(),
+            "options": self.options(),
+            "largest_use": use,
+            "chance": self.judged.verdict.failure_chance,
+            "extra_time": self.extra_time,
+            "extra_energy": self.extra_energy,
+            "needs_others": self.needs_others,
+        }
+        plain: dict[str, Any] = to_plain(found)
+        return plain | ({"poses": case.poses.tolist()} if has_path else {})

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command `rover_planner advise`: the smallest changes that make a refused path pass."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rover_planner.command.options import (
+    ACCEPTED_CHANCE,
+    MAX_CELLS,
+    AcceptedChance,
+    Friction,
+    MaxCells,
+    MaxTorque,
+    Payload,
+    Policy,
+    RoverName,
+    Sigmas,
+    SoilName,
+    TerrainName,
+    argument,
+    option,
+    read_arm_angles,
+)
+
+if TYPE_CHECKING:
+    from rover_planner.advice.advise import Advice
+    from rover_planner.advice.remedy import Remedy
+
+SPACING = 0.02
+"""Distance of the waypoints [m] between a start and a goal."""
+
+
+def advise(
+    rover: RoverName,
+    terrain: TerrainName,
+    poses: Annotated[
+        Path,
+        argument("POSES", "A refused path: poses x, y, yaw, .npz; two far apart: start and goal."),
+    ],
+    out: Annotated[Path, argument("OUT", "The remedies, .json; is overwritten.")],
+    policy: Policy = "equal",
+    friction: Friction = None,
+    max_torque: MaxTorque = None,
+    soil: SoilName = None,
+    arm: Annotated[
+        list[str] | None, option("NAME=RAD", "Angle of a joint of the arm in rad; give all.")
+    ] = None,
+    payload: Payload = None,
+    sigmas: Sigmas = 3.0,
+    accepted_chance: AcceptedChance = ACCEPTED_CHANCE,
+    budget: Annotated[float, option("S", "Time for the advice in s.", min=0.01)] = 10.0,
+    picture: Annotated[
+        Path | None, option("FILE", "Draw the remedies on the map (.png, .svg).")
+    ] = None,
+    max_cells: MaxCells = MAX_CELLS,
+) -> None:
+    """Find the smallest changes that make a refused path pass; write them as JSON.
+
+    Exit code 0: it ran, with any answer. 2: bad input.
+    """
+    from rover_physics.prediction.sweep_options import SweepOptions
+    from rover_physics.rover.rover_file import load_rover
+    from rover_physics.terrain.grid import load_terrain
+    from rover_planner.advice.advise import grow_within, path_of
+    from rover_planner.advice.case import Case
+    from rover_planner.command.prediction_files import read_poses
+    from rover_planner.nodes.warm_up import search_paths
+    from rover_planner.planning.answering.budget import Budget
+    from rover_planner.shell.progress import show_progress
+
+    model = load_rover(rover)
+    options = SweepOptions(
+        policy=policy,
+        friction=friction,
+        max_torque=max_torque,
+        soil=soil,
+        joint_angles=read_arm_angles(model, arm or ()),
+        payload=payload,
+    )
+    path = path_of(model, read_poses(poses), SPACING)
+    case = Case(model, load_terrain(terrain, max_cells), path, options, sigmas, accepted_chance)
+    with show_progress() as progress:
+        progress("load the model (the first run compiles it)")
+        search_paths()  # so that the budget is not spent on it
+        for advice in grow_within(case, Budget(budget).check):
+            progress(f"{len(advice.found)} remedies; tried {' and '.join(advice.tried)}")
+    out.write_text(
+        json.dumps(advice.to_dict(), indent=1, allow_nan=False) + "\n", encoding="utf-8"
+    )
+    if picture is not None:
+        from rover_planner.figures.advice_picture import draw_advice
+
+        draw_advice(picture, advice, Path(terrain).name)
+    _print_table(advice)
+
+
+def _print_table(advice: "Advice") -> None:
+    """Print what is refused and a line for each remedy."""
+    if advice.judged.verdict.reason:
+        typer.echo(f"refused: {advice.judged.verdict.reason}")
+    for number, remedy in enumerate((*advice.remedies, *advice.others), start=1):
+        typer.echo(f"{number}. {remedy.describe()} ({_costs(remedy)})")
+    if not advice.found:
+        typer.echo(advice.describe())
+    if not advice.complete:
+        typer.echo("not all levers were tried in this time; a larger --budget tries more")
+
+
+def _costs(remedy: "Remedy") -> str:
+    chance = remedy.judged.verdict.failure_chance
+    return f"{remedy.extra_time:+.0f} s, {remedy.extra_energy:+.0f} J, chance {chance:.2f}"

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Advice: each remedy passes as told, less of it does not, and few levers come before more."""
+
+from dataclasses import replace
+from itertools import permutations
+
+import numpy as np
+import pytest
+
+from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.rover.rover_file import load_rover
+from rover_physics.traversability.judge import judge_path
+from rover_planner.advice import refusal
+from rover_planner.advice.advise import Advice, grow_advice, grow_within, path_of
+from rover_planner.advice.case import Case
+from rover_planner.advice.levers import Choice
+from rover_planner.advice.remedy import Remedy
+from rover_planner.advice.seek import TOLERANCE
+from rover_planner.planning.answering.budget import QuestionStoppedError
+from support.grounds import make_terrain
+
+LSR1 = load_rover("lsr1")
+S = np.arange(-1.5, 1.6, 0.05)
+STRAIGHT = np.column_stack([S, 0.0 * S, 0.0 * S])
+
+
+def slope(x, y):
+    return 0.3 * x
+
+
+def rock(x, y):
+    """Return level ground with a rock below the left wheels."""
+    return 0.3 * np.exp(-((x - 0.2) ** 2 + (y - 0.2) ** 2) / 0.02)
+
+
+def wall(x, y):
+    """Return level ground with a wall that nothing leads around."""
+    return 1.0 * (x > 0.5)
+
+
+CASES = {
+    "slippery slope": (slope, {"friction": 0.45}, {"policy", "friction"}),
+    "weak motors": (slope, {"max_torque": 0.3}, {"max_torque"}),
+    "heavy load": (slope, {"payload": 4.0}, {"payload", "arm_shoulder", "policy"}),
+    "rock": (rock, {}, {"shift", "curve", "turn_on_the_spot", "ground"}),
+}
+"""Ground, options, and levers that are to be found."""
+
+
+def refused_by(height, **options):
+    return Case(LSR1, make_terrain(height), STRAIGHT, SweepOptions(**options))
+
+
+@pytest.fixture(scope="module", params=CASES)
+def advised(request) -> tuple[Advice, set[str]]:
+    """Return advice on a case after all trials of single levers, and the levers to be found."""
+    height, options, levers = CASES[request.param]
+    advice = None
+    for grown in grow_advice(refused_by(height, **options)):
+        if len(grown.tried) > 1:
+            break
+        advice = grown
+    assert advice is not None
+    return advice, levers
+
+
+def test_the_levers_that_help_are_found_and_the_rover_s_own_come_first(advised):
+    advice, levers = advised
+    assert {one.levers[0].lever.name for one in advice.found} >= levers
+    outside = [one.needs_others for one in advice.found]
+    assert outside == sorted(outside)
+
+
+def test_each_remedy_passes_by_the_options_and_the_path_that_are_told(advised):
+    for remedy in advised[0].remedies:
+        case, told = remedy.refusal.case, remedy.to_dict()
+        options = replace(case.options, **told["options"])
+        poses = np.array(told.get("poses", case.poses))
+        _, verdict = judge_path(LSR1, case.terrain, poses, options, accepted_chance=0.05)
+        assert verdict.traversable, told["words"]
+        assert told["chance"] == verdict.failure_chance <= 0.05
+        assert 0.0 < told["largest_use"] <= 1.0
+
+
+def set_less(remedy: Remedy, share: float) -> Case | None:
+    """Return the case with a lever set to a little less, by a share of its range."""
+    (one,) = remedy.levers
+    span = one.lever.settings(remedy.refusal)
+    end = max(span.ends, key=lambda end: (end - span.now) * (one.value - span.now))
+    value = one.value - share * (end - span.now)
+    return one.lever.apply(remedy.refusal.case, remedy.refusal, value)
+
+
+def test_a_little_less_of_a_remedy_is_refused(advised):
+    for remedy in advised[0].found:
+        if isinstance(remedy.levers[0].lever.settings(remedy.refusal), Choice):
+            continue
+        less = set_less(remedy, 1.01 * TOLERANCE)
+        assert not less.judge().passes, remedy.describe()
+
+
+def test_a_path_around_is_searched(monkeypatch):
+    monkeypatch.setattr(refusal, "SEARCH", replace(refusal.SEARCH, budget=60.0))
+    case = refused_by(rock)
+    around = refusal.Refusal(case.judge()).path_around
+    assert around is not None and replace(case, poses=around).judge().passes
+    np.testing.assert_allclose(around[[0, -1]], STRAIGHT[[0, -1]], atol=1e-9)
+
+
+def test_words_say_what_to_do_and_what_it_does_to_the_rover():
+    case = refused_by(slope, payload=4.0)
+    *_, advice = grow_advice(case)
+    words = {one.levers[0].lever.name: one.describe() for one in advice.found}
+    assert words["payload"].startswith("Carry ")
+    assert "kg less at the arm's tip: the rear wheels then carry " in words["payload"]
+    assert " N less; largest use 0." in words["payload"] and words["payload"].endswith(" m")
+
+
+def test_several_levers_are_set_where_none_helps_alone():
+    steep = make_terrain(lambda x, y: 0.45 * x)
+    case = Case(LSR1, steep, STRAIGHT[24:36], SweepOptions(payload=6.0))
+    for advice in grow_advice(case):
+        own = [one for one in advice.found if not one.needs_others]
+        if len(advice.tried) < 2:
+            assert not own
+        elif own:
+            break
+    assert len(own[0].levers) == 2 and " and lower the arm by " in own[0].describe()
+    for one, other in permutations(own[0].levers):
+        alone = one.lever.apply(case, own[0].refusal, one.value)
+        assert not alone.judge().passes, other.lever.name
+
+
+def test_what_was_not_tried_in_time_is_told():
+    told: list[Advice] = []
+
+    def check() -> None:
+        if len(told) == 3:
+            raise QuestionStoppedError("too_long", "the time is over")
+
+    for advice in grow_within(refused_by(wall), check):
+        told.append(advice)
+    assert len(told) == 3 and told[-1].tried and not told[-1].found and not told[-1].complete
+    assert told[-1].describe() == "no lever that was tried in time helps"
+
+
+def test_a_path_that_is_not_even_judged_in_time_has_no_advice():
+    def check() -> None:
+        raise QuestionStoppedError("too_long", "the time is over")
+
+    with pytest.raises(QuestionStoppedError):
+        list(grow_within(refused_by(wall), check))
+
+
+def test_a_path_that_passes_needs_no_advice():
+    (advice,) = grow_advice(refused_by(lambda x, y: 0.0 * x))
+    assert advice.complete and not advice.found
+    assert advice.describe() == "the path is traversable as it is"
+
+
+def test_two_poses_far_apart_are_start_and_goal():
+    ends = STRAIGHT[[0, -1]]
+    path = path_of(LSR1, ends, 0.02)
+    assert len(path) > 100 and np.allclose(path[[0, -1]], ends)
+    assert path_of(LSR1, ends[:1], 0.02) is not None
+    near = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])
+    assert path_of(LSR1, near, 0.02).shape == (2, 3)

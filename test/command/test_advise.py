@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`advise` keeps its contract: remedies in a file that `predict` passes with."""
+
+import json
+
+import numpy as np
+import pytest
+
+from rover_physics.terrain.grid import save_terrain
+from rover_planner.cli import main
+from support.command_line import assert_refused
+from support.grounds import make_terrain
+
+KEYS = {"levers", "words", "options", "largest_use", "chance", "extra_time", "extra_energy"}
+
+
+@pytest.fixture
+def files(tmp_path):
+    save_terrain(tmp_path / "terrain.npz", make_terrain(lambda x, y: 0.3 * x))
+    s = np.arange(-1.0, 1.0, 0.05)
+    np.savez(tmp_path / "poses.npz", poses=np.column_stack([s, 0.0 * s, 0.0 * s]))
+    return tmp_path
+
+
+def arguments(files, *words):
+    names = "terrain.npz", "poses.npz", "out.json"
+    return ["advise", "lsr1", *(str(files / name) for name in names), *words]
+
+
+def options_of(remedy):
+    """Return the options of `predict` that a remedy names."""
+    told, words = dict(remedy["options"]), []
+    if told.pop("backward", False):
+        words.append("--backward")
+    for joint, angle in told.pop("joint_angles", {}).items():
+        words += ["--arm", f"{joint}={angle}"]
+    for name, value in told.items():
+        words += [f"--{name.replace('_', '-')}", str(value)]
+    return words
+
+
+def test_each_remedy_is_what_predict_passes_with(files, capsys):
+    assert main(arguments(files, "--payload", "4")) == 0
+    printed = capsys.readouterr().out
+    advice = json.loads((files / "out.json").read_text())
+    assert advice["complete"] is True and advice["remedies"]
+    assert printed.startswith("refused: ") and "\n1. " in printed
+    for remedy in advice["remedies"]:
+        assert remedy.keys() >= KEYS and remedy["words"] in printed
+        for lever in remedy["levers"]:
+            assert lever.keys() == {"name", "value", "unit", "from"}
+        poses = files / "poses.npz"
+        if "poses" in remedy:
+            poses = files / "other.npz"
+            np.savez(poses, poses=np.array(remedy["poses"]))
+        out, words = files / "out.npz", options_of(remedy)
+        payload = [] if "--payload" in words else ["--payload", "4"]
+        names = [str(files / "terrain.npz"), str(poses), str(out)]
+        assert main(["predict", "lsr1", *names, *words, *payload]) == 0
+        with np.load(out) as prediction:
+            assert prediction["traversable"], remedy["words"]
+
+
+def test_a_path_that_passes_and_one_without_time_are_answered(files, capsys):
+    assert main(arguments(files, "--friction", "1.0")) == 0
+    assert json.loads((files / "out.json").read_text())["traversable"] is True
+    assert "traversable as it is" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("word", ["budget", "policy", "accepted-chance"])
+def test_bad_input_is_refused_in_one_line(files, capfd, word):
+    assert_refused(capfd, main(arguments(files, f"--{word}", "-1")), word.partition("-")[0])

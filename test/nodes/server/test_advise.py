@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""~/advise answers over DDS about the path that was refused last, and gives way to questions."""
+
+import json
+from concurrent.futures import Future
+
+import numpy as np
+from nav_msgs.srv import GetPlan
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from msg_adapters.paths import stamped_pose
+from rover_physics.traversability.judge import judge_path
+from rover_planner.ros.qos import latched_qos
+from support.grounds import make_terrain
+from support.planner_client import SERVER
+from support.ros_fixtures import call
+from support.waiting import wait_until
+
+START, GOAL = (-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)
+
+
+def rock(x, y):
+    """Return level ground with a rock below the left wheels of a rover on the x axis."""
+    return 0.3 * np.exp(-((x - 0.2) ** 2 + (y - 0.2) ** 2) / 0.02)
+
+
+def send_request(client, kind, name, request) -> Future:
+    service = client.create_client(kind, f"{SERVER}/{name}")
+    assert service.wait_for_service(20.0)
+    return service.call_async(request)
+
+
+def test_advice_is_about_the_path_that_was_refused_last(start_server, client, ros):
+    server = start_server(planner="fan", candidate_count=1, advice_time=60.0)
+    advise = client.create_client(Trigger, f"{SERVER}/advise")
+    grown: list[dict] = []
+    client.create_subscription(
+        String, f"{SERVER}/advice", lambda one: grown.append(json.loads(one.data)), latched_qos()
+    )
+    assert json.loads(call(advise, Trigger.Request()).message)["code"] == "no_path"
+    client.send_terrain(make_terrain(rock))
+    assert not client.can_traverse(START, GOAL).poses
+    response = call(advise, Trigger.Request())
+    advice = json.loads(response.message)
+    assert response.success and advice["complete"] and advice["code"] == "belly"
+    remedy = next(one for one in advice["remedies"] if "poses" in one)
+    settings = server.service.settings
+    _, verdict = judge_path(
+        settings.rover, server.service.terrain, remedy["poses"], settings.query.model
+    )
+    assert verdict.traversable
+    wait_until(lambda: grown and grown[-1] == advice, "the topic with the same advice")
+    counts = [len(one["remedies"]) + len(one["others"]) for one in grown]
+    assert counts == sorted(counts)
+    assert ros.is_alive(server)
+
+
+def test_advice_in_work_gives_way_to_questions_and_ends_when_it_is_cancelled(
+    start_server, client, endless
+):
+    server = start_server(planner="fan", candidate_count=1, advice_time=600.0, time_budget=600.0)
+    client.send_terrain(make_terrain(rock))
+    assert not client.can_traverse(START, GOAL).poses
+    with endless():  # a question that lasts
+        ends = stamped_pose(START, "map"), stamped_pose(GOAL, "map")
+        question = send_request(
+            client, GetPlan, "can_traverse", GetPlan.Request(start=ends[0], goal=ends[1])
+        )
+        wait_until(lambda: server.desk.open_count == 1, "the question")
+        advice = send_request(client, Trigger, "advise", Trigger.Request())
+        busy = send_request(client, Trigger, "advise", Trigger.Request())
+        wait_until(busy.done, "the refusal of the second")
+        assert json.loads(busy.result().message)["code"] == "busy"
+        assert not advice.done()
+        cancel = send_request(client, Trigger, "cancel", Trigger.Request())
+        wait_until(cancel.done, "the answer")
+        assert cancel.result().message.startswith("2 ")
+    wait_until(advice.done, "the end of the advice")
+    assert json.loads(advice.result().message)["code"] == "cancelled"
+    wait_until(question.done, "the end of the question")
