@@ -15,7 +15,7 @@ PUSHING = 0.9
 """Torque over the largest one of a motor that pushes as hard as it can."""
 CLIMBING = 0.01
 """Change of a suspension angle over a window that shows that a wheel climbs [rad]."""
-PATIENCE = 1.0
+PATIENCE = 0.8
 """Time without progress after which the rover counts as stuck, beyond that of a window [s]."""
 
 

@@ -15,23 +15,12 @@ from std_msgs.msg import Bool, String
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.stamps import ns_to_stamp
-from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.rover.rover_file import load_rover
-from rover_planner.learning.drive_log import (
-    PITCH,
-    RATES,
-    ROLL,
-    SUSPENSION,
-    TIME,
-    TORQUES,
-    YAW,
-    X,
-    Y,
-)
+from rover_planner.learning.drive_log import TIME, X
 from rover_planner.nodes.ground_learner import EMERGENCY_STOP, ESTIMATE, GroundLearnerNode
 from rover_planner.ros.qos import latched_qos, map_qos, topic_qos
 from support.learning_drives import climb, ramp
+from support.messages.drives import row_messages
 from support.ros_fixtures import RosRun
 from support.waiting import wait_until
 
@@ -68,17 +57,8 @@ class Rover(Node):
 
     def send(self, row: np.ndarray) -> None:
         """Send what a row holds; the joints first, which the row of the odometry has."""
-        joints = JointState(name=[*SUSPENSION_JOINTS, *WHEEL_JOINTS])
-        joints.position = [*row[SUSPENSION].tolist(), *np.zeros(6).tolist()]
-        joints.velocity = [0.0] * 4 + row[RATES].tolist()
-        joints.effort = [0.0] * 4 + row[TORQUES].tolist()
+        joints, odometry = row_messages(row, BEGIN)
         self._senders["joint_states"].publish(joints)
-        odometry = Odometry()
-        odometry.header.frame_id = "map"
-        odometry.header.stamp = ns_to_stamp(int((BEGIN + row[TIME]) * 1e9))
-        place, turn = odometry.pose.pose.position, odometry.pose.pose.orientation
-        place.x, place.y = float(row[X]), float(row[Y])
-        turn.x, turn.y, turn.z, turn.w = xyzw_from_rpy(*row[[ROLL, PITCH, YAW]]).tolist()
         self._senders["odometry"].publish(odometry)
 
 
