@@ -107,6 +107,7 @@ setup(
             "traction_controller = rover_planner.nodes.start:start_traction_controller",
             "mission_planner = rover_planner.nodes.start:start_mission_planner",
             "rover_simulator = rover_planner.nodes.start:start_rover_simulator",
+            "ground_learner = rover_planner.nodes.start:start_ground_learner",
         ],
     },
 )

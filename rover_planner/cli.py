@@ -11,6 +11,7 @@ from rover_physics import __version__
 from rover_planner.command.advise import advise
 from rover_planner.command.demo import demo
 from rover_planner.command.figure4 import figure4
+from rover_planner.command.learn import learn
 from rover_planner.command.plan import plan, replay_plan
 from rover_planner.command.predict import predict
 from rover_planner.command.reach import reach
@@ -63,6 +64,7 @@ app.command()(replay_plan)
 app.command(cls=PlacesCommand, context_settings=NEGATIVE_ARGUMENTS)(reach)
 app.command()(survey)
 app.command(cls=PoseCommand)(reachable)
+app.command()(learn)
 app.command()(study)
 app.command(cls=PoseCommand)(view)
 app.command()(terrain)

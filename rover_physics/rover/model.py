@@ -74,6 +74,11 @@ class Wheel:
     """Largest speed of the drive in [rad/s]."""
     servo_droop: Annotated[float, number("", least=0.0, below=1.0)] = DEFAULT_SERVO_DROOP
     """Share of the commanded speed that the drive's servo loses at full torque; 0 is stiff."""
+    torque_per_current: (
+        Annotated[float, number("N m/A", least=MIN_TORQUE, most=MAX_TORQUE)] | None
+    ) = None
+    """Torque at the wheel over the motor's current in [N m/A], for logs of currents; None if it is
+    not known."""
 
 
 @dataclass(frozen=True)

@@ -81,6 +81,9 @@ def predict(
         bool, flag("--chance", "Add the chance that the path fails, and that each waypoint does.")
     ] = False,
     accepted_chance: AcceptedChance = ACCEPTED_CHANCE,
+    learned: Annotated[
+        Path | None, option("FILE", "Friction and its uncertainty as learned, .json of learn.")
+    ] = None,
     max_cells: MaxCells = MAX_CELLS,
 ) -> None:
     """Predict loads, slip and margins along a path, or at single poses, and write them to a file.
@@ -104,6 +107,10 @@ def predict(
     gc.freeze()
     gc.enable()
     model = load_rover(rover)
+    if learned is not None:
+        from rover_planner.learning.learned_file import rover_on_learned_ground
+
+        model = rover_on_learned_ground(model, learned)
     ground = load_terrain(terrain, max_cells)
     path = read_poses(poses)
     curvature = read_curvature(poses, len(path))

@@ -13,6 +13,7 @@ import typer
 
 from rover_planner.errors import PlanningError
 from rover_planner.nodes.mission.options import read_mission
+from rover_planner.parameters.ground_learner import GroundLearnerParameters
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.table import ParameterSpec, specs_of
 from rover_planner.parameters.traction_controller import TractionControllerParameters
@@ -64,9 +65,9 @@ PROGRAMS = {
     "traverse_server": Program(
         "Answer over ROS 2 whether the rover can traverse a path, and why not.",
         "subscribes elevation_cloud, elevation_map, joint_states, odometry, ~/path, "
-        "~/tool_target, ~/tool_wrench; serves ~/can_traverse, ~/check_path, ~/check_reach, "
-        "~/advise, ~/load_map, ~/cancel, ~/monitor, ~/get_hazard_map; publishes ~/stop, ~/watch, "
-        "~/advice, "
+        "~/ground_estimate, ~/tool_target, ~/tool_wrench; serves ~/can_traverse, ~/check_path, "
+        "~/check_reach, ~/advise, ~/load_map, ~/cancel, ~/monitor, ~/get_hazard_map; publishes "
+        "~/stop, ~/watch, ~/advice, "
         "~/hazard_map/worst, ~/hazard_map/best, ~/plan, ~/verdict, diagnostics, "
         "~/predicted_joints, ~/wheel_loads, ~/slip_ratios, ~/friction_utilisation, "
         "~/torque_saturation, ~/tip_over_margin, ~/closed_area, ~/search_progress, "
@@ -91,6 +92,13 @@ PROGRAMS = {
         "diagnostics",
         read_engine,
         specs_of(RoverSimulatorParameters),
+    ),
+    "ground_learner": Program(
+        "Learn friction, slip and sticking while a rover drives.",
+        "subscribes joint_states, imu, odometry, cmd_vel, elevation_cloud; publishes "
+        "traverse_server/ground_estimate, traction_controller/emergency_stop",
+        read_nothing,
+        specs_of(GroundLearnerParameters),
     ),
     "mission_planner": Program(
         "Query a traverse_server over ROS 2 for a list of goals.",

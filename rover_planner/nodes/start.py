@@ -27,6 +27,11 @@ def start_rover_simulator() -> int:
     return _start("rover_simulator")
 
 
+def start_ground_learner() -> int:
+    """Run the program ground_learner and return its exit code."""
+    return _start("ground_learner")
+
+
 def start_mission_planner() -> int:
     """Run the program mission_planner and return its exit code."""
     return _start("mission_planner")

@@ -14,6 +14,7 @@ from nav_msgs.srv import GetPlan
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from msg_adapters.errors import MessageError
@@ -31,6 +32,7 @@ from msg_adapters.results.diagnostics import (
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.numerics.kernel_cache import kernel_cache_note
 from rover_physics.warm_up import EXACT, UNCERTAIN
+from rover_planner.learning.learned_file import parse_learned
 from rover_planner.maps.known_map import stamp_text
 from rover_planner.maps.summary import describe_terrain
 from rover_planner.nodes.advice_topics import AdviceTopics
@@ -71,7 +73,7 @@ from rover_planner.ros.deferred_work import DeferredWork
 from rover_planner.ros.frames import NodeFrames, is_empty
 from rover_planner.ros.guard import INPUT_ERRORS, Guard
 from rover_planner.ros.map_intake import read_message
-from rover_planner.ros.qos import sensor_qos, topic_qos
+from rover_planner.ros.qos import replace_reliability, sensor_qos, topic_qos
 from rover_planner.ros.subscriptions import subscribe_to_requests
 from rover_planner.shell.kernels import load_kernels
 
@@ -167,6 +169,12 @@ class TraverseServer(Node):
         ):
             self.create_subscription(kind, name, take, sensor_qos())
         subscribe_to_requests(self, Path, "~/path", self._take_path, reliability, raw=True)
+        self.create_subscription(
+            String,
+            "~/ground_estimate",
+            self._take_ground,
+            replace_reliability(topic_qos(), reliability),
+        )
 
     def _log_ready(self) -> None:
         name, known = self.service.settings.rover.name, self.service.known_map
@@ -205,6 +213,16 @@ class TraverseServer(Node):
             self.get_logger().warning(
                 f"odometry not used, the suspension is not compared: {error}", once=True
             )
+
+    def _take_ground(self, message: String) -> None:
+        """Take what was learned of the ground: JSON as the command learn writes it."""
+        now = self.get_clock().now().nanoseconds
+        try:
+            ground = parse_learned(message.data, "~/ground_estimate", stamp_text(now))
+        except INPUT_ERRORS as error:
+            self.get_logger().warning(f"not used: {error}", throttle_duration_sec=5.0)
+            return
+        self.service.take_ground(ground)
 
     def _take_path(self, message: bytes) -> None:
         about = "", ""

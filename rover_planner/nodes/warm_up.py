@@ -10,6 +10,8 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.pose_classes import RoverOnMap, classify_poses
 from rover_physics.warm_up import EXACT, SCORES, SINGLE, UNCERTAIN
+from rover_planner.learning.contact_sense import ContactSense
+from rover_planner.learning.drive_log import FORCES, WIDTH
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.planning.candidates import generate_candidates
 from rover_planner.planning.path_query import PathQueryOptions
@@ -29,11 +31,13 @@ TRACTION = (
     CompilationStep("traction controller", "rover_planner.nodes.warm_up:control_traction"),
 )
 """All that updates of the traction controller need."""
+LEARNING = (CompilationStep("ground learner", "rover_planner.nodes.warm_up:feel_ground"),)
+"""All that learning the ground needs beside TRACTION."""
 SIMULATION = (CompilationStep("simulator", "rover_planner.nodes.warm_up:simulate"),)
 """All that the quasi-static simulator needs."""
 GROUPS = (
     (*EXACT, *SCORES, *SINGLE, *HAZARDS, *PATH_SEARCH, *SIMULATION),
-    (*UNCERTAIN, *TRACTION, *CANDIDATES),
+    (*UNCERTAIN, *TRACTION, *LEARNING, *CANDIDATES),
 )
 """All kernels in two groups that take about the same time to compile: the first compiles the model
 of a pose once for all that use it."""
@@ -62,6 +66,13 @@ def classify_pose() -> None:
     ground = Terrain(np.zeros((60, 60)), 0.05, (0.0, 0.0))
     on_map = RoverOnMap(load_rover("lsr1"), ground, SweepOptions())
     classify_poses(on_map, np.array([[1.5, 1.5, 0.0]]))
+
+
+def feel_ground() -> None:
+    """Feel level ground."""
+    ground = Terrain(np.zeros((60, 60)), 0.05, (-1.5, -1.5))
+    row = np.where(np.arange(WIDTH) < FORCES.start, 0.0, np.nan)
+    ContactSense(load_rover("lsr1"), ground).feel(row, np.ones(6))
 
 
 def simulate() -> None:

@@ -3,6 +3,7 @@
 
 from collections.abc import Iterator
 
+from rover_planner.parameters.ground_learner import GroundLearnerParameters
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.table import ParameterSpec, ParameterTable, specs_of
 from rover_planner.parameters.traction_controller import TractionControllerParameters
@@ -12,6 +13,7 @@ TABLES: dict[str, type[ParameterTable]] = {
     "/traverse_server": TraverseServerParameters,
     "/traction_controller": TractionControllerParameters,
     "/rover_simulator": RoverSimulatorParameters,
+    "/ground_learner": GroundLearnerParameters,
 }
 """Tables of the nodes, by name and in the order of the document."""
 

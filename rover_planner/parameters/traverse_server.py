@@ -35,6 +35,8 @@ NO_MOUNTS = ("base_link:0:0:0:0:0:0",)
 """Default of the parameter sensor_mounts, which shows its form and adds no sensor."""
 FAN, LATTICE, AUTO = "fan", "lattice", "auto"
 """Values of the parameter planner."""
+OFF, SUGGEST, USE = "off", "suggest", "use"
+"""Values of the parameter learn."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,12 @@ class TraverseServerParameters(ParameterTable):
         0.0,
         "Coulomb friction where the map has none; 0 uses that of the rover file.",
         bounds=(0.0, 10.0),
+    )
+    learn: str = parameter(
+        SUGGEST,
+        "What ~/ground_estimate does: nothing (off), answers name it (suggest), or new questions "
+        "assume its friction and uncertainty where the map has none (use).",
+        choices=(OFF, SUGGEST, USE),
     )
     max_torque: float = MAX_TORQUE
     soil: str = parameter(

@@ -16,6 +16,10 @@ REPORTED = (*EXTREMES, "risk", "map_sigmas", *BOUNDS, "failure_chance")
 """Fields of a verdict that a report has."""
 
 
+TOLD, LEARNED = "told", "learned"
+"""Where the friction of a question comes from."""
+
+
 @dataclass(frozen=True)
 class SuspensionReport:
     """Comparison of the measured suspension angles with those predicted where the rover stands."""
@@ -50,6 +54,14 @@ class IdentityReport:
     """Stamp of the map's header, "seconds.nanoseconds"; empty if it has none."""
     map_age: float
     """Age of the map when the question arrived [s]; NaN without map."""
+    ground: str = TOLD
+    """LEARNED if the question assumed what was learned of the friction, else TOLD."""
+    ground_friction: float = math.nan
+    """Learned friction, assumed or only suggested; NaN if there is none."""
+    ground_friction_std: float = math.nan
+    """Standard deviation of it."""
+    ground_since: str = ""
+    """Time of that estimate, "seconds.nanoseconds"."""
 
 
 @dataclass(frozen=True)

@@ -66,9 +66,10 @@ class MujocoRover:
 
         Args:
             rover: The rover.
-            terrain: The ground without unknown cells. A friction layer is not used.
+            terrain: The ground without unknown cells. Where it has a friction layer, a wheel has
+                the friction of the cell below its centre.
             pose: x, y [m] and yaw [rad] of the body's origin.
-            friction: Friction coefficient; None takes the rover's.
+            friction: Friction coefficient where the terrain has none; None takes the rover's.
             timestep: Time step of the simulation [s].
 
         Raises:
@@ -95,6 +96,10 @@ class MujocoRover:
         self._wheel_of = np.full(self._model.ngeom, -1)
         for geom, wheel in geoms.items():
             self._wheel_of[geom] = wheel
+        self._wheel_geoms = np.array(list(geoms))
+        if terrain.friction is not None:
+            # Of two bodies in contact the larger friction holds: let it be the wheel's.
+            self._model.geom_friction[self._model.geom("ground").id, 0] = 0.0
         self._inertia = float(self._model.dof_M0[self._velocities[_WHEELS][-1]])
         self._aims = np.zeros(len(self._steered))
         self._integral = np.zeros(6)
@@ -151,10 +156,21 @@ class MujocoRover:
         """
         control = self._data.ctrl
         control[:6] = inputs
+        if self.terrain.friction is not None:
+            self._model.geom_friction[self._wheel_geoms, 0] = self._find_friction()
         if self.rover.steering is not None:
             most = self.rover.steering.rate * self._model.opt.timestep
             control[6:] += np.clip(self._aims - control[6:], -most, most)
         mujoco.mj_step(self._model, self._data)
+
+    def _find_friction(self) -> Floats:
+        """Return the friction (6,) of the cells below the wheels."""
+        assert self.terrain.friction is not None
+        origin, cells = np.array(self.terrain.origin), np.array(self.terrain.friction.shape)
+        places = (self._data.xpos[self._bodies, :2] - origin) / self.terrain.resolution
+        rows, columns = np.clip(np.rint(places[:, ::-1]).astype(int), 0, cells - 1).T
+        layer = self.terrain.friction[rows, columns]
+        return np.where(layer > 0.0, layer, self.friction)
 
     def _limit(self, torques: Floats) -> Floats:
         """Limit torques (6,) [N m] to those of the motors, zero above their maximum speed."""

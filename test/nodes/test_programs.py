@@ -13,6 +13,8 @@ import yaml
 from rclpy.parameter import Parameter
 
 from rover_planner.nodes import start
+from rover_planner.nodes.ground_learner import GroundLearnerNode
+from rover_planner.nodes.ground_learner import main as ground_learner
 from rover_planner.nodes.mission_planner import MissionPlanner
 from rover_planner.nodes.mission_planner import main as mission_planner
 from rover_planner.nodes.programs import PROGRAMS
@@ -31,12 +33,14 @@ MAINS = {
     "traverse_server": traverse_server,
     "traction_controller": traction_controller,
     "rover_simulator": rover_simulator,
+    "ground_learner": ground_learner,
     "mission_planner": mission_planner,
 }
 NODES = {
     "traverse_server": TraverseServer,
     "traction_controller": TractionController,
     "rover_simulator": RoverSimulator,
+    "ground_learner": GroundLearnerNode,
     "mission_planner": MissionPlanner,
 }
 PARAMETER_FILES = REPOSITORY / "config" / "parameters"

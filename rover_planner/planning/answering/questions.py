@@ -7,11 +7,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from rover_planner.maps.known_map import stamp_text
+from rover_planner.parameters.traverse_server import USE
 from rover_planner.planning.answering.judgement import refusal
 from rover_planner.planning.answering.reach_query import ReachQuery, refuse_reach
 from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
 from rover_planner.planning.path_query import Pose
-from rover_planner.planning.verdict_report import IdentityReport
+from rover_planner.planning.verdict_report import LEARNED, TOLD, IdentityReport
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,4 +137,14 @@ class Register:
             ("", "") if known is None else (known.fingerprint, stamp_text(known.stamp))
         )
         about = number, service, self.server, question_hash
-        return IdentityReport(*about, "", "", content, stamp, snapshot.map_age)
+        identity = IdentityReport(*about, "", "", content, stamp, snapshot.map_age)
+        ground = snapshot.ground
+        if ground is None:
+            return identity
+        return replace(
+            identity,
+            ground=LEARNED if snapshot.settings.learn == USE else TOLD,
+            ground_friction=ground.mean,
+            ground_friction_std=ground.std,
+            ground_since=ground.since,
+        )

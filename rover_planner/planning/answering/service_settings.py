@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Settings of a traverse server: its parameters and the loaded rover."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.manipulator import body_mass_and_com
@@ -9,12 +9,18 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steering_joints import check_joint_limit
 from rover_physics.terrain.soil_file import soil_named
+from rover_planner.learning.learned_file import LearnedGround
 from rover_planner.maps.living_map import MergeRules
 from rover_planner.maps.map_file import MapLimits
 from rover_planner.maps.map_keeper import KeeperSettings
 from rover_planner.maps.unobserved_ground import ALLOW
 from rover_planner.parameters.shared import payload_or_none
-from rover_planner.parameters.traverse_server import INTERPOLATE, TraverseServerParameters
+from rover_planner.parameters.traverse_server import (
+    INTERPOLATE,
+    SUGGEST,
+    USE,
+    TraverseServerParameters,
+)
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.query import LatticeSettings
 
@@ -37,8 +43,20 @@ class ServiceSettings:
     """Settings of searches around obstacles."""
     max_map_age: float
     """Age from which a map is too old to be used [s]; 0 allows any age."""
+    learn: str = SUGGEST
+    """What a learned friction does: OFF, SUGGEST or USE."""
     unobserved_ground: str = ALLOW
     """Rule for paths over never seen ground under the belly, one of UNOBSERVED_GROUND."""
+
+    def on_ground(self, ground: LearnedGround | None) -> "ServiceSettings":
+        """Return the settings of new questions; with USE they assume the learned ground."""
+        if ground is None or self.learn != USE:
+            return self
+        told = (
+            self.rover.friction if self.query.model.friction is None else self.query.model.friction
+        )
+        rover = ground.change(replace(self.rover, friction=told))
+        return replace(self, rover=rover, query=self.query.change(friction=None))
 
     @property
     def manipulator_joints(self) -> tuple[str, ...]:
@@ -112,4 +130,5 @@ def load_service_settings(parameters: TraverseServerParameters) -> ServiceSettin
         ),
         max_map_age=parameters.max_map_age,
         unobserved_ground=parameters.blind_ground,
+        learn=parameters.learn,
     )

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
+from rover_planner.learning.learned_file import LearnedGround
 from rover_planner.maps.known_map import KnownMap
 from rover_planner.maps.unobserved_ground import UNOBSERVED_CODE
 from rover_planner.parameters.traverse_server import FAN, LATTICE
@@ -63,6 +64,8 @@ class Snapshot:
     suspension; None if it is not known."""
     stale_map: str = ""
     """Why the map is too old to be used; empty if it is not."""
+    ground: LearnedGround | None = None
+    """What was learned of the ground; the settings assume it if they are to."""
 
     edge_memory: EdgeMemory = field(default_factory=EdgeMemory)
     """Edges that earlier searches have judged; grows with each search."""

@@ -14,9 +14,11 @@ from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import pack_ground
+from rover_planner.learning.learned_file import LearnedGround
 from rover_planner.maps.ground_beneath import Standing
 from rover_planner.maps.known_map import KnownMap
 from rover_planner.maps.layers import CellSources
+from rover_planner.parameters.traverse_server import OFF
 from rover_planner.planning.answering.judgement import PathJudgement
 from rover_planner.planning.answering.measurements import MAX_AGE, Measurements
 from rover_planner.planning.answering.service_settings import ServiceSettings
@@ -41,6 +43,7 @@ class TraverseService:
         self._map_lock = threading.Lock()
         self._measurements = Measurements()
         self._edge_memory = EdgeMemory()
+        self._ground: LearnedGround | None = None
         # Compiles or loads the kernels, so that the first query is fast.
         generate_candidates((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
 
@@ -135,6 +138,10 @@ class TraverseService:
         """
         self._measurements.take_pose(pose, time.monotonic(), body)
 
+    def take_ground(self, ground: LearnedGround) -> None:
+        """Keep what was learned of the ground, for new questions."""
+        self._ground = ground
+
     def take_tilt(self, roll: float, pitch: float) -> None:
         """Keep roll and pitch [rad] of the body, measured by an IMU."""
         self._measurements.take_tilt(roll, pitch, time.monotonic())
@@ -155,12 +162,14 @@ class TraverseService:
         """
         now = time.monotonic()
         standing = self._measurements.pose_with_suspension(now)
+        ground = None if self.settings.learn == OFF else self._ground
         known = Snapshot(
-            self.settings,
+            self.settings.on_ground(ground),
             self.given_path,
             self._measurements.joints,
             measured_pose=standing,
             edge_memory=self._edge_memory,
+            ground=ground,
         )
         return self.add_map(known, ros_time)
 

@@ -2,14 +2,16 @@
 """The service knows a map, a path and joint angles, and answers from them without ROS."""
 
 import math
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.errors import PlanningError
+from rover_planner.learning.learned_file import LearnedGround
 from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.answering.questions import Register
 from rover_planner.planning.answering.search_watch import NewerMapError, SearchWatch
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
@@ -52,6 +54,37 @@ def test_a_goal_far_off_the_map_costs_no_more_than_the_way_to_its_edge():
     assert whole.code == "off_map" and whole.report.to_dict()["reason"]
     assert len(whole.candidate.prediction.poses) < 0.01 * len(whole.candidate.poses)
     assert whole.classes == ()
+
+
+def friction_used(service):
+    """Return the largest use of friction on a path."""
+    service.take_path(np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
+    return float(service.check_last_path().candidate.verdict.max_friction_utilisation)
+
+
+@pytest.mark.parametrize(
+    ("learn", "is_bounded", "assumed"),
+    [
+        ("use", True, 0.4),
+        ("use", False, 0.8),  # nothing slipped: what was told holds
+        ("suggest", True, 0.8),
+        ("off", True, 0.8),
+    ],
+)
+def test_a_learned_friction_changes_new_questions_only_if_it_is_to_be_used(
+    learn, is_bounded, assumed
+):
+    service = make_service(make_terrain(waves), learn=learn)
+    before = service.snapshot()
+    told = friction_used(service)
+    service.take_ground(LearnedGround(0.4, 0.04, 0.33, is_bounded, "12.5"))
+    assert friction_used(service) == pytest.approx(0.8 / assumed * told, rel=1e-6)
+    assert before.settings.rover.friction == 0.8
+    report = asdict(Register().identify(1, "check_path", "", service.snapshot()))
+    assert report["ground"] == ("learned" if learn == "use" else "told")
+    known = {"off": math.nan}.get(learn, 0.4)
+    assert report["ground_friction"] == pytest.approx(known, nan_ok=True)
+    assert report["ground_since"] == ("" if learn == "off" else "12.5")
 
 
 def test_soil_and_payload_of_the_settings_count():

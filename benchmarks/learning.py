@@ -1,0 +1,384 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Drives in MuJoCo on ground of unknown friction: what is learned of it, against the truth.
+
+Run from the repository: python -m benchmarks.learning [--drives N] [--seed S] [--keep FOLDER]
+It needs the extra `bench`. Drives are drawn at random: ground, friction, control, noise, rate.
+"""
+
+import hashlib
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from benchmarks.drives import (
+    BY_MOTION,
+    DROOP,
+    END,
+    MAX_OFFSET,
+    MAX_TILT,
+    PERIOD,
+    SERVO,
+    SPEED,
+    START,
+    DriveSteering,
+    Obstacle,
+    make_controller,
+    run_in_processes,
+)
+from benchmarks.measure import print_table
+from rover_physics import Rover, Terrain, load_rover
+from rover_physics.names import SUSPENSION_JOINTS
+from rover_physics.terrain.grid import save_terrain
+from rover_planner.learning.drive_log import (
+    PITCH,
+    RATES,
+    ROLL,
+    STEERING,
+    SUSPENSION,
+    TIME,
+    TORQUES,
+    WIDTH,
+    YAW,
+    X,
+    Y,
+)
+from rover_planner.learning.ground_learner import GroundEstimate, GroundLearner
+from rover_planner.simulator.mujoco_rover import MujocoRover
+from support.learning_drives import write_csv
+
+CONSTANT, SIDES, LINE = "constant", "per side", "at a line"
+LAYOUTS = (CONSTANT, CONSTANT, SIDES, LINE)
+"""Where friction changes: nowhere (half of the drives), at y = 0, at x = 0."""
+SIZES = {
+    "slope": (8.0, 26.0),
+    "cross_slope": (5.0, 20.0),
+    "rocks": (0.04, 0.10),
+    "relief": (0.04, 0.10),
+    "step": (0.04, 0.14),
+    "bump_one_side": (0.04, 0.14),
+}
+"""Smallest and largest size of each kind of ground."""
+NOISE = {
+    "none": (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    "usual": (0.001, 0.01, 0.003, 0.002, 0.03, 0.003),
+    "strong": (0.004, 0.03, 0.01, 0.005, 0.10, 0.01),
+}
+"""Standard deviations: position [m], its drift over the way, attitude and yaw [rad], suspension
+[rad], torque [N m], wheel rates [rad/s]."""
+STAYED, STUCK_FOR = 0.02, 4.0
+"""A rover that goes no farther than this [m] in more than that time [s], to the end, is stuck."""
+
+
+@dataclass(frozen=True)
+class LearningDrive:
+    """A drive along +x and what the learner is told of it."""
+
+    kind: str
+    """Ground, as in `benchmarks.drives`."""
+    size: float
+    """Its size."""
+    seed: int
+    """Its seed, and that of the noise."""
+    layout: str
+    """Where friction changes."""
+    frictions: tuple[float, float]
+    """Friction on both sides of the change: right and left, or before and after."""
+    controller: str
+    """Control of the wheels."""
+    timestep: float
+    """Time step of MuJoCo [s]."""
+    noise: str
+    """Key of NOISE."""
+    step: int
+    """Rows of the log per PERIOD, inverse: every which row is kept."""
+
+    @property
+    def obstacle(self) -> Obstacle:
+        """The ground, with the friction that a controller is told."""
+        return Obstacle(self.kind, self.size, self.frictions[0], self.seed)
+
+    @property
+    def ground(self) -> Terrain:
+        """The ground with its true friction."""
+        ground = self.obstacle.ground
+        if self.layout == CONSTANT:
+            return ground
+        x = np.linspace(ground.bounds[0], ground.bounds[1], ground.elevation.shape[1])
+        y = np.linspace(ground.bounds[2], ground.bounds[3], ground.elevation.shape[0])
+        first = y[:, None] + 0.0 * x < 0.0 if self.layout == SIDES else x + 0.0 * y[:, None] < 0.0
+        return replace(ground, friction=np.where(first, *self.frictions))
+
+    @property
+    def label(self) -> str:
+        """All of it in one line."""
+        low, high = self.frictions
+        mu = f"{low:.2f}" if self.layout == CONSTANT else f"{low:.2f}|{high:.2f} {self.layout}"
+        return (
+            f"{self.kind} {self.size:.3g}, {mu}, {self.controller}, {1e3 * self.timestep:.0f} ms, "
+            f"{self.noise} noise, {1.0 / (self.step * PERIOD):.0f} Hz"
+        )
+
+
+EXAMPLE = LearningDrive("slope", 24.0, 1, CONSTANT, (0.4, 0.4), SERVO, 0.004, "usual", 1)
+"""A drive that ends stuck, for docs/learning.md."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """A drive as it was."""
+
+    rows: np.ndarray
+    """(n, WIDTH) rows without noise."""
+    passed: bool
+    """Whether it reached its end."""
+
+
+def draw_drive(seed: int, number: int) -> LearningDrive:
+    """Draw a drive."""
+    rng = np.random.default_rng((seed, number))
+    kind = str(rng.choice(list(SIZES)))
+    layout = str(rng.choice(LAYOUTS))
+    frictions = rng.uniform(0.25, 0.9, 2)
+    if layout != CONSTANT and abs(np.log(frictions[0] / frictions[1])) < 0.4:
+        frictions[1] = frictions[0] * 0.5 if frictions[0] > 0.55 else frictions[0] * 1.8
+    return LearningDrive(
+        kind=kind,
+        size=float(rng.uniform(*SIZES[kind])),
+        seed=int(rng.integers(1000)),
+        layout=layout,
+        frictions=(float(frictions[0]), float(frictions[1])),
+        controller=str(rng.choice([SERVO, DROOP, BY_MOTION])),
+        timestep=float(rng.choice([0.002, 0.004])),
+        noise=str(rng.choice(list(NOISE))),
+        step=int(rng.choice([1, 1, 2, 5])),
+    )
+
+
+def record(drive: LearningDrive, keep: Path | None = None) -> Recorded:
+    """Drive in MuJoCo; a folder keeps what was driven."""
+    file = None if keep is None else keep / f"{abs(hash_of(drive)):016x}.npz"
+    if file is not None and file.exists():
+        with np.load(file) as kept:
+            return Recorded(kept["rows"], bool(kept["passed"]))
+    obstacle = drive.obstacle
+    plant = MujocoRover(
+        obstacle.rover, drive.ground, (START, 0.0, 0.0), drive.frictions[0], drive.timestep
+    )
+    steering = DriveSteering(plant, 1)
+    control = make_controller(drive.controller, plant, obstacle, steering)
+    rows = []
+    while plant.time < 1.5 * (END - START) / SPEED and plant.pose[0] < END:
+        torques = control()
+        if plant.tilt > MAX_TILT or abs(plant.pose[1]) > MAX_OFFSET:
+            break
+        rows.append(row_of(plant, torques))
+    recorded = Recorded(np.array(rows).reshape(-1, WIDTH), bool(plant.pose[0] >= END))
+    if file is not None:
+        np.savez(file, rows=recorded.rows, passed=recorded.passed)
+    return recorded
+
+
+def hash_of(drive: LearningDrive) -> int:
+    """Return a number for what is driven, without the noise and the rate of the log."""
+    text = repr(replace(drive, noise="", step=1))
+    return int(hashlib.sha256(text.encode()).hexdigest()[:15], 16)
+
+
+def row_of(plant: MujocoRover, torques: np.ndarray) -> np.ndarray:
+    """Return what is measured now."""
+    row = np.full(WIDTH, np.nan)
+    pose, joints = plant.pose, plant.joint_positions
+    row[[TIME, X, Y, YAW]] = plant.time, pose[0], pose[1], pose[3]
+    row[[ROLL, PITCH]] = plant.attitude
+    row[SUSPENSION] = [joints[name] for name in SUSPENSION_JOINTS]
+    row[RATES], row[TORQUES], row[STEERING] = plant.wheel_rates, torques, plant.steering_angles
+    return row
+
+
+def add_noise(rows: np.ndarray, drive: LearningDrive) -> np.ndarray:
+    """Return every `step`-th row with the drive's noise."""
+    rows = rows[:: drive.step].copy()
+    position, drift, attitude, suspension, torque, rate = NOISE[drive.noise]
+    rng = np.random.default_rng(drive.seed)
+    ways = np.append(0.0, np.hypot(*np.diff(rows[:, [X, Y]], axis=0).T))
+    for columns, sigma in (
+        ([X, Y], position),
+        ([YAW, ROLL, PITCH], attitude),
+        (SUSPENSION, suspension),
+        (TORQUES, torque),
+        (RATES, rate),
+    ):
+        rows[:, columns] += sigma * rng.standard_normal(rows[:, columns].shape)
+    course = rng.uniform(-np.pi, np.pi)
+    rows[:, [X, Y]] += drift * np.cumsum(ways)[:, None] * [np.cos(course), np.sin(course)]
+    return rows
+
+
+@dataclass(frozen=True)
+class Learned:
+    """What was learned of a drive, beside the truth."""
+
+    drive: LearningDrive
+    """The drive."""
+    estimate: GroundEstimate
+    """The estimate at its end."""
+    truth: float
+    """Friction under most wheels at its end; for a change per side the mean."""
+    early: tuple[float, bool] | None
+    """Error of the mean, relative, when slip first bounds it; whether the interval has the truth.
+    For constant friction only."""
+    stuck_time: float | None
+    """When the rover was stuck in truth [s]."""
+    passed: bool
+    """Whether it reached its end."""
+    cost: float
+    """CPU time over the time of the drive."""
+
+
+def learn(drive: LearningDrive, keep: Path | None = None) -> Learned | None:
+    """Drive and learn; None where the rover could not stand at the start."""
+    recorded = record(drive, keep)
+    if len(recorded.rows) < 50:
+        return None
+    rover = told_rover()
+    learner = GroundLearner(rover, drive.obstacle.ground)
+    rows = add_noise(recorded.rows, drive)
+    early = None
+    began = time.process_time()
+    for row in rows:
+        if learner.take(row) and early is None:
+            estimate = learner.estimate
+            if estimate.slip_time is not None and estimate.friction.high is not None:
+                early = estimate.friction
+    cost = (time.process_time() - began) / (rows[-1, TIME] - rows[0, TIME])
+    low, high = drive.frictions
+    ends = {CONSTANT: low, SIDES: 0.5 * (low + high), LINE: high if rows[-1, X] > 0.4 else low}
+    truth = ends[drive.layout]
+    first = None
+    if early is not None and drive.layout == CONSTANT:
+        first = early.mean / low - 1.0, early.low <= low <= (early.high or np.inf)
+    return Learned(
+        drive, learner.estimate, truth, first, find_stuck(recorded), recorded.passed, cost
+    )
+
+
+def told_rover() -> Rover:
+    """Return the rover as the learner knows it."""
+    return replace(load_rover("lsr1"), nominal_speed=SPEED)
+
+
+def find_stuck(recorded: Recorded) -> float | None:
+    """Return the time [s] from which a rover stayed to the end, None if it passed."""
+    times, x = recorded.rows[:, TIME], recorded.rows[:, X]
+    if recorded.passed:
+        return None
+    since = float(times[np.argmax(x > x[-1] - STAYED)])
+    return since if times[-1] - since > STUCK_FOR else None
+
+
+def main(
+    drives: Annotated[int, typer.Option(help="Number of drives.")] = 60,
+    seed: Annotated[int, typer.Option(help="Seed of the drives.")] = 1,
+    keep: Annotated[Path | None, typer.Option(help="Folder that keeps the drives.")] = None,
+    example: Annotated[
+        Path | None, typer.Option(help="Only write drive.csv and terrain.npz of a drive there.")
+    ] = None,
+) -> None:
+    """Learn from drives and print errors, coverage and times."""
+    if example is not None:
+        example.mkdir(parents=True, exist_ok=True)
+        write_csv(example / "drive.csv", add_noise(record(EXAMPLE).rows, EXAMPLE))
+        save_terrain(example / "terrain.npz", EXAMPLE.obstacle.ground)
+        return
+    if keep is not None:
+        keep.mkdir(parents=True, exist_ok=True)
+    jobs = [(draw_drive(seed, number), keep) for number in range(drives)]
+    learned = [one for one in run_in_processes(learn, jobs, 2) if one is not None]
+    rows = []
+    for one in learned:
+        friction, sides = one.estimate.friction, one.estimate.sides
+        times = one.estimate.slip_time, one.stuck_time, one.estimate.immobilised_time
+        high = "-" if friction.high is None else f"{friction.high:.2f}"
+        rows.append(
+            (
+                one.drive.label,
+                f"{friction.mean:.2f} [{friction.low:.2f}, {high}]",
+                "" if friction.high is None else f"{friction.mean / one.truth - 1.0:+.0%}",
+                "" if is_within(one) else "outside",
+                "" if one.early is None else f"{one.early[0]:+.0%}",
+                " ".join(f"{s.mean:.2f}" for s in sides.values()),
+                *("" if t is None else f"{t:.1f}" for t in times),
+                " ".join(one.estimate.faults.values()),
+            )
+        )
+    headings = "drive", "friction", "error", "interval", "early", "right left"
+    print_table(
+        "What was learned", (*headings, "slip [s]", "stuck [s]", "noticed [s]", "faults"), rows
+    )
+    print_summary(learned)
+
+
+def is_within(one: Learned) -> bool:
+    """Return whether the interval has the truth; per side, each side's has its own."""
+    if one.drive.layout == SIDES:
+        pairs = zip(one.estimate.sides.values(), one.drive.frictions, strict=True)
+    else:
+        pairs = iter([(one.estimate.friction, one.truth)])
+    return all(e.low <= mu and (e.high is None or mu <= e.high) for e, mu in pairs)
+
+
+def print_summary(learned: list[Learned]) -> None:
+    """Print the summary of all drives by layout."""
+    rows = []
+    for layout in (CONSTANT, SIDES, LINE):
+        own = [one for one in learned if one.drive.layout == layout]
+        bounded = [one for one in own if one.estimate.friction.high is not None]
+        if layout == SIDES:
+            errors = [
+                abs(e.mean / mu - 1.0)
+                for one in own
+                for e, mu in zip(one.estimate.sides.values(), one.drive.frictions, strict=True)
+                if e.high is not None
+            ]
+        else:
+            errors = [abs(one.estimate.friction.mean / one.truth - 1.0) for one in bounded]
+        rows.append(
+            (
+                layout,
+                f"{len(own)}",
+                f"{len(errors)}",
+                f"{np.median(errors):.1%}" if errors else "",
+                f"{np.mean(np.array(errors) < 0.1):.0%}" if errors else "",
+                f"{np.mean([is_within(one) for one in own]):.0%}",
+            )
+        )
+    print_table(
+        "By layout of the friction",
+        ("friction", "drives", "bounded", "median error", "within 10 %", "interval has it"),
+        rows,
+    )
+    first = [one.early for one in learned if one.early is not None]
+    print(
+        f"constant, when slip first bounds it: {np.median([abs(e[0]) for e in first]):.0%} off, "
+        f"interval has it in {np.mean([e[1] for e in first]):.0%} of {len(first)}"
+    )
+    stuck = [one for one in learned if one.stuck_time is not None]
+    noticed = [one.estimate.immobilised_time for one in stuck]
+    delays = sorted(
+        t - one.stuck_time
+        for t, one in zip(noticed, stuck, strict=True)
+        if t is not None and one.stuck_time is not None
+    )
+    false = [one for one in learned if one.passed and one.estimate.immobilised_time is not None]
+    late = ", ".join(f"{delay:.1f}" for delay in delays)
+    print(f"stuck: {len(stuck)}, noticed {len(delays)}, after [s]: {late}")
+    print(f"passed: {sum(one.passed for one in learned)}, said to be stuck: {len(false)}")
+    print(f"CPU: {100 * np.median([one.cost for one in learned]):.1f} % of a core")
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command `rover_planner learn`: learns the ground from a recorded drive."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from rover_planner.command.options import (
+    MAX_CELLS,
+    MaxCells,
+    RoverName,
+    TerrainName,
+    argument,
+    option,
+)
+from rover_planner.shell.extras import need
+
+if TYPE_CHECKING:
+    from rover_physics.numerics.arrays import Floats
+    from rover_physics.rover.model import Rover
+
+CSV = ".csv"
+"""Suffix of a drive that is no bag."""
+
+
+def learn(
+    rover: RoverName,
+    terrain: TerrainName,
+    log: Annotated[Path, argument("LOG", "The drive: a CSV file, or a bag.")],
+    out: Annotated[Path, argument("OUT", "What was learned, .json; is overwritten.")],
+    picture: Annotated[
+        Path | None, option("FILE", "Draw it along the way, .png, .svg or .pdf.")
+    ] = None,
+    ground: Annotated[
+        Path | None, option("FILE", "Write the terrain with layers friction, friction_std, .npz.")
+    ] = None,
+    friction: Annotated[
+        float | None, option("MU", "Friction that is assumed at first; default: the rover's.")
+    ] = None,
+    odometry_topic: Annotated[
+        str, option("TOPIC", "Odometry of a bag that does not come from the wheels.")
+    ] = "",
+    max_cells: MaxCells = MAX_CELLS,
+) -> None:
+    """Learn friction, slip and sticking from a recorded drive, and write them to a file.
+
+    Exit code 0: it ran. 2: bad input.
+    """
+    import numpy as np
+
+    from rover_physics.rover.rover_file import load_rover
+    from rover_physics.terrain.grid import load_terrain
+    from rover_planner.errors import PlanningError
+    from rover_planner.learning.drive_log import X, Y
+    from rover_planner.learning.ground_learner import GroundLearner
+    from rover_planner.learning.learned_file import describe, write_learned
+    from rover_planner.shell.progress import show_bar
+
+    model, map_ = load_rover(rover), load_terrain(terrain, max_cells)
+    told = model.friction if friction is None else friction
+    if not 0.0 < told < np.inf:
+        raise PlanningError(f"--friction is {told:g}; it must be above 0")
+    if picture is not None:
+        from rover_planner.figures.pictures import check_picture
+
+        check_picture(picture)
+    rows = _read_log(log, model, odometry_topic)
+    learner = GroundLearner(model, map_, told)
+    places, estimates = [], []
+    with show_bar("learn", len(rows)) as step:
+        for row in rows:
+            if learner.take(row):
+                places.append(row[[X, Y]])
+                if picture is not None:
+                    estimates.append(learner.estimate)
+            step()
+    if not places:
+        raise PlanningError(
+            f"{log}: nothing can be learned: the drive is not on the known part of the map, "
+            "or too short"
+        )
+    write_learned(out, describe(learner.estimate, told))
+    layers = learner.ground.layers
+    if ground is not None:
+        from rover_physics.terrain.terrain_file import write_entries
+
+        entries = {
+            "elevation": map_.elevation,
+            "resolution": map_.resolution,
+            "origin": np.array(map_.origin),
+            "friction": layers.friction,
+            "friction_std": layers.friction_std,
+        }
+        write_entries(ground, entries)
+    if picture is not None:
+        from rover_planner.figures.learning_picture import draw_learning
+
+        draw_learning(picture, map_, np.array(places), estimates, layers.friction)
+    found = learner.estimate.friction
+    high = "not bounded above" if found.high is None else f"at most {found.high:.2f}"
+    typer.echo(f"wrote {out}: friction {found.mean:.2f}, at least {found.low:.2f}, {high}")
+
+
+def _read_log(path: Path, rover: "Rover", odometry_topic: str) -> "Floats":
+    """Return the rows of a CSV file or a bag."""
+    if path.suffix.lower() == CSV or (path.is_file() and path.suffix not in (".mcap", ".db3")):
+        from rover_planner.learning.drive_log import read_csv
+
+        return read_csv(path, rover.wheel.torque_per_current)
+    need("rclpy", "learn from a bag")
+    need("rosbags", "learn from a bag")
+    from rover_planner.ros.bags.drive_rows import read_rows
+
+    return read_rows(path, odometry_topic)

@@ -1,0 +1,367 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Learns the ground of a drive, measurement by measurement: friction, slip, resistance, sticking.
+
+It takes rows of measurements (`drive_log`) at any rate and thinks once a tenth of a second. The
+motion must be measured without the wheels: by visual odometry, or by a simulator.
+"""
+
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.names import SIDES, WHEEL_COUNT, WHEELS
+from rover_physics.numerics.arrays import Floats
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.learning.contact_sense import ContactSense, WheelState
+from rover_planner.learning.drive_log import (
+    PITCH,
+    RATES,
+    SUSPENSION,
+    TIME,
+    TORQUES,
+    WIDTH,
+    X,
+    Y,
+)
+from rover_planner.learning.friction_filter import FrictionEstimate, FrictionFilter
+from rover_planner.learning.ground_map import GroundMap
+from rover_planner.learning.stuck_watch import StuckWatch
+from rover_planner.learning.wheel_health import WheelHealth
+from rover_planner.learning.wheel_slip import BLOCK, LONGEST_GAP, WINDOW, SlipWindow, SlipWindows
+
+SLIP_SHARE = 0.15
+"""Slip over rolling above which a wheel slips; rigid wheels creep by less."""
+SLIP_SPEED = 0.08
+"""Slip over the nominal speed above which a wheel slips."""
+LASTING = 3
+"""Number of windows in a row in which a wheel that slips does."""
+CERTAIN = 4.0
+"""Standard deviations by which a slip must exceed zero."""
+ALONG = 0.75
+"""Share of a slip along the heading above which the torque shows the shear."""
+MIN_LOAD, MAX_LOAD = 0.3, 4.0
+"""Loads of wheels that count, in sixths of the weight."""
+MAX_FLUCTUATION = 1.0
+"""Fluctuation of a torque over its mean from which the wheel hops rather than slips."""
+MAX_UNSTEADY = 0.1
+"""Acceleration of the treads, over gravity, from which a window does not count."""
+SAME_PLACE = 0.5
+"""Way of a wheel, over its radius, within which its measurements are not independent."""
+EXCESS_NOISE, UNCLEAR_NOISE = 2.0, 0.3
+"""Relative noise of a use of friction per contradiction of the balance over the weight, and if no
+contact is clear."""
+RESISTANCE_TIME = 10.0
+"""Time constant of the mean resistance [s]."""
+JUMP = 0.05
+"""Step of the position beyond what the wheels can drive that is no motion [m]."""
+CHANGE_CERTAIN = 2.0
+"""Standard deviations that are no change of a suspension angle."""
+SPIKE = 1.3
+"""Torque over the largest one of a motor from which it is an error."""
+
+Flags = NDArray[np.bool_]
+_ANGLES = tuple(range(SUSPENSION.start, SUSPENSION.stop))
+_SIDE_WHEELS = tuple(np.array([wheel.endswith(side) for wheel in WHEELS]) for side in SIDES)
+
+
+@dataclass(frozen=True, eq=False)
+class GroundEstimate:
+    """What is known of the ground at one time."""
+
+    time: float
+    """Time of the last measurement [s]."""
+    friction: FrictionEstimate
+    """Friction under all wheels."""
+    sides: dict[str, FrictionEstimate]
+    """Friction under the wheels of each side."""
+    slip_time: float | None
+    """First time a wheel was seen to slip [s]."""
+    immobilised_time: float | None
+    """First time the rover was seen to be stuck [s]."""
+    stuck: str
+    """Why it is stuck now; empty if it is not."""
+    slip_ratios: Floats
+    """(6,) slip ratios of the last window; NaN before."""
+    side_slip: float
+    """Angle between the motion of the wheels and their headings, to the left [rad]."""
+    resistance: float
+    """Resistance to rolling over the load."""
+    resistance_std: float
+    """Standard deviation of it."""
+    faults: dict[str, str]
+    """Sensors that are not believed, by wheel, and why."""
+
+
+@dataclass
+class _Block:
+    """Sums of the rows of a block."""
+
+    end: float
+    count: int = 0
+    sums: Floats = field(default_factory=lambda: np.zeros(WIDTH))
+    known: Floats = field(default_factory=lambda: np.zeros(WIDTH))
+    squares: Floats = field(default_factory=lambda: np.zeros(WHEEL_COUNT))
+    turned: Floats = field(default_factory=lambda: np.zeros(WHEEL_COUNT))
+
+    def add(self, row: Floats, turned: Floats) -> None:
+        known = ~np.isnan(row)
+        values = np.where(known, row, 0.0)
+        self.count += 1
+        self.sums += values
+        self.known += known
+        self.squares += values[TORQUES] ** 2
+        self.turned += turned
+
+    @property
+    def mean(self) -> Floats:
+        """Mean row; NaN where nothing was measured."""
+        return np.where(self.known > 0.0, self.sums, np.nan) / np.maximum(self.known, 1.0)
+
+
+class GroundLearner:
+    """The recursive estimator of one rover on one map."""
+
+    def __init__(self, rover: Rover, terrain: Terrain, told: float | None = None):
+        """Start without measurements; `told` is the friction without any (default: rover's)."""
+        self._rover, wheel = rover, rover.wheel
+        self._sense = ContactSense(rover, terrain)
+        self._windows = SlipWindows(wheel.radius)
+        told = rover.friction if told is None else told
+        self._whole = FrictionFilter(told)
+        self._sides = {side: FrictionFilter(told) for side in SIDES}
+        self._stuck = StuckWatch(rover.nominal_speed, wheel.max_torque)
+        self._health = WheelHealth(self._sense.weight, wheel.max_torque)
+        self._block: _Block | None = None
+        self._turned = np.zeros(WHEEL_COUNT)
+        self._forward = np.ones(WHEEL_COUNT)
+        self._slipping = np.zeros(WHEEL_COUNT, dtype=int)
+        self._rates, self._place = np.zeros(WHEEL_COUNT), np.full(3, -np.inf)
+        self._spot, self._here = np.full((WHEEL_COUNT, 2), np.inf), np.zeros(WHEEL_COUNT)
+        self._last: Floats | None = None
+        self._recent: deque[tuple[float, Floats, Floats, float]] = deque(maxlen=WINDOW)
+        self._resistance, self._resistance_square, self._steady = 0.0, 0.0, 0.0
+        self._slip_time: float | None = None
+        self._immobilised_time: float | None = None
+        self.ground = GroundMap(terrain, wheel.width)
+        """What is known where the wheels have been."""
+        self.window: SlipWindow | None = None
+        """The last window; None before the first."""
+        self.commanded: float | None = None
+        """Commanded speed [m/s]; None if it is not known."""
+
+    @property
+    def stuck(self) -> str:
+        """Why the rover is stuck now; empty if it is not."""
+        return self._stuck.reason
+
+    def change_map(self, terrain: Terrain) -> None:
+        """Go on with another map of the same ground."""
+        self._sense = ContactSense(self._rover, terrain)
+        self.ground = GroundMap(terrain, self._rover.wheel.width)
+
+    def take(self, row: Floats) -> bool:
+        """Take a row of measurements; return whether the estimate is new."""
+        row = self._clean(row)
+        if not np.isfinite(row[TIME]):
+            return False
+        last, self._last = self._last, row
+        elapsed = 0.0 if last is None else row[TIME] - last[TIME]
+        block, new = self._block, False
+        if last is None or block is None or elapsed > LONGEST_GAP or self._jumps(row):
+            self._begin(row)
+            return False
+        self._health.take(row)
+        known = np.isfinite(row[RATES])
+        before = self._rates
+        self._rates = np.where(known, row[RATES], before)
+        self._turned = self._turned + 0.5 * elapsed * (self._rates + before)
+        if row[TIME] >= block.end - 1e-9 and (block.known[: SUSPENSION.stop] > 0.0).all():
+            new = self._think(block)
+            block = self._block = _Block(row[TIME] + BLOCK)
+        block.add(row, self._turned)
+        return new
+
+    def _clean(self, row: Floats) -> Floats:
+        """Return a row without torques that no motor has."""
+        torques = row[TORQUES]
+        if (np.abs(torques) > SPIKE * self._rover.wheel.max_torque).any():
+            row = row.copy()
+            most = SPIKE * self._rover.wheel.max_torque
+            row[TORQUES] = np.where(np.abs(torques) > most, np.nan, torques)
+        return row
+
+    def _jumps(self, row: Floats) -> bool:
+        """Return whether the position, where it was measured, is beyond what the wheels drive."""
+        if not np.isfinite(row[[X, Y]]).all():
+            return False
+        wheel, last = self._rover.wheel, self._place
+        self._place = row[[TIME, X, Y]]
+        step = float(np.hypot(*(self._place - last)[1:]))
+        most = 2.0 * wheel.max_speed * wheel.radius * float(self._place[0] - last[0])
+        return not step <= most + JUMP
+
+    def _begin(self, row: Floats) -> None:
+        self._block = _Block(row[TIME] + BLOCK)
+        self._block.add(row, self._turned)
+        self._windows.begin()
+        self._recent.clear()
+        self._slipping[:] = 0
+
+    def _think(self, block: _Block) -> bool:
+        """Take a block of measurements; return whether it ends a window."""
+        row = block.mean
+        rates = np.nan_to_num(row[RATES])
+        still = 1e-3 * self._rover.wheel.max_speed
+        self._forward = np.where(np.abs(rates) > still, np.sign(rates), self._forward)
+        measured = block.known[TORQUES] > 0.5 * block.count
+        if measured.any():
+            row[TORQUES] = np.where(measured, row[TORQUES], np.nanmean(row[TORQUES]))
+        state = self._sense.feel(row, self._forward)
+        if state is None:
+            return False
+        count = np.maximum(block.known[TORQUES], 1.0)
+        self._recent.append((row[TIME], block.squares / count, row, float(block.count)))
+        window = self._windows.take(row[TIME], block.turned / block.count, state)
+        if window is None:
+            return False
+        elapsed = window.time - self.window.time if self.window else BLOCK
+        self.window = window
+        self._learn(window, state, measured, min(elapsed, window.duration))
+        for one, wheels in zip(self._sides.values(), _SIDE_WHEELS, strict=True):
+            self.ground.visit(window.places[wheels], one.estimate)
+        return True
+
+    def _learn(
+        self, window: SlipWindow, state: WheelState, measured: Flags, elapsed: float
+    ) -> None:
+        faults = self._health.faults
+        good = measured & np.array([name not in faults for name in WHEELS])
+        slipping = self._find_slips(window)
+        self._health.take_window(window, elapsed, not slipping.any())
+        self._slipping = np.where(slipping, self._slipping + 1, 0)
+        good &= ~self._health.doubtful & ~self._health.rolls_backward(window)
+        slips, grips = (self._slipping >= LASTING) & good, ~slipping
+        if slips.any() and self._slip_time is None:
+            self._slip_time = window.time
+        rows = [recent[2] for recent in self._recent]
+        climb = _find_change(np.array([row[[PITCH, *_ANGLES]] for row in rows]))
+        torques = np.mean([row[TORQUES] for row in rows], axis=0)
+        stuck = self._stuck.update(window, torques, climb, self.commanded)
+        if stuck and self._immobilised_time is None:
+            self._immobilised_time = window.time
+        steady = abs(window.unsteadiness) < MAX_UNSTEADY * self._rover.gravity * window.duration
+        if not steady or not measured.any():
+            return
+        if grips.all() and abs(float(window.rolling.mean())) > 3.0 * window.deviation:
+            self._take_resistance(window, elapsed)
+        self._learn_friction(window, slips, grips & good, elapsed)
+
+    def _find_slips(self, window: SlipWindow) -> Flags:
+        """Return (6,) whether wheels slip."""
+        least = np.maximum(
+            np.maximum(SLIP_SHARE * np.abs(window.rolling), CERTAIN * window.deviation),
+            SLIP_SPEED * self._rover.nominal_speed,
+        )
+        return np.asarray(window.slip_speed > least)
+
+    def _learn_friction(
+        self, window: SlipWindow, slips: Flags, grips: Flags, elapsed: float
+    ) -> None:
+        """Take what the wheels of a window tell about the friction."""
+        unit = self._sense.weight / WHEEL_COUNT
+        loads, tractions = window.loads, window.tractions
+        tractions = tractions - self._resistance * loads * np.sign(window.rolling)
+        counts = (window.clear > 0.0) & (loads > MIN_LOAD * unit) & (loads < MAX_LOAD * unit)
+        uses = np.abs(tractions) / np.maximum(loads, 1e-9)
+        along = np.abs(window.slip) / np.maximum(window.slip_speed, 1e-9)
+        fluctuation = self._find_fluctuation()
+        tells = slips & counts & (along > ALONG) & (window.slip * tractions > 0.0)
+        tells &= fluctuation < MAX_FLUCTUATION
+        way = abs(float(np.median(window.travel))) * elapsed
+        weights = self._weigh(window, tells, elapsed)
+        samples = sum(recent[3] for recent in self._recent)
+        doubt = np.hypot(
+            EXCESS_NOISE * window.excess / self._sense.weight, self._find_doubt(window)
+        )
+        noise = np.hypot(fluctuation / np.sqrt(samples), doubt)
+        every = np.arange(WHEEL_COUNT)
+        filters = [
+            (self._whole, every >= 0),
+            *zip(self._sides.values(), _SIDE_WHEELS, strict=True),
+        ]
+        for one, own in filters:
+            one.drive(way)
+            for wheel in np.flatnonzero(tells & own):
+                one.slip(
+                    uses[wheel] / along[wheel], fluctuation[wheel], noise[wheel], weights[wheel]
+                )
+            held = np.sort(uses[counts & grips & own])
+            if len(held) >= 2:  # two wheels: the contact of one may be wrong
+                one.grip(float(held[-2]))
+
+    def _weigh(self, window: SlipWindow, tells: Flags, elapsed: float) -> Floats:
+        """Return (6,) numbers of independent measurements; at one place they tell less and less.
+
+        What is wrong at a place, such as the slope of the contact, stays wrong.
+        """
+        away = np.hypot(*(window.places - self._spot).T) > SAME_PLACE * self._rover.wheel.radius
+        self._spot = np.where(away[:, None], window.places, self._spot)
+        self._here = np.where(away, 0.0, self._here)
+        weights = elapsed / (window.duration + BLOCK) * np.exp(-2.0 * self._here)
+        self._here = self._here + np.where(tells, weights, 0.0)
+        return np.asarray(weights)
+
+    def _find_doubt(self, window: SlipWindow) -> float:
+        """Return the relative noise of uses due to what contradicts the model of the contacts."""
+        unclear = UNCLEAR_NOISE * float((window.clear <= 0.0).mean())
+        return float(np.hypot(EXCESS_NOISE * window.excess / self._sense.weight, unclear))
+
+    def _find_fluctuation(self) -> Floats:
+        """Return (6,) standard deviations of the torques over the window, over their means."""
+        squares = np.mean([recent[1] for recent in self._recent], axis=0)
+        means = np.mean([recent[2][TORQUES] for recent in self._recent], axis=0)
+        spread = np.sqrt(np.maximum(squares - means**2, 0.0))
+        return np.asarray(spread / np.maximum(np.abs(means), 1e-9))
+
+    def _take_resistance(self, window: SlipWindow, elapsed: float) -> None:
+        share = window.excess * float(np.sign(window.rolling.mean())) / self._sense.weight
+        self._steady += elapsed
+        gain = elapsed / min(self._steady, RESISTANCE_TIME)
+        self._resistance += gain * (share - self._resistance)
+        self._resistance_square += gain * (share**2 - self._resistance_square)
+
+    @property
+    def estimate(self) -> GroundEstimate:
+        """What is known now."""
+        window = self.window
+        ratios = np.full(WHEEL_COUNT, np.nan) if window is None else window.ratio
+        side_slip = 0.0
+        if window is not None and np.median(np.abs(window.travel)) > 3.0 * window.deviation:
+            side_slip = float(np.median(np.arctan2(window.aside, np.abs(window.travel))))
+        spread = np.sqrt(max(self._resistance_square - self._resistance**2, 0.0))
+        return GroundEstimate(
+            time=-np.inf if self._last is None else float(self._last[TIME]),
+            friction=self._whole.estimate,
+            sides={side: one.estimate for side, one in self._sides.items()},
+            slip_time=self._slip_time,
+            immobilised_time=self._immobilised_time,
+            stuck=self._stuck.reason,
+            slip_ratios=ratios,
+            side_slip=side_slip,
+            resistance=float(self._resistance),
+            resistance_std=float(spread) if self._steady else float("inf"),
+            faults=self._health.faults,
+        )
+
+
+def _find_change(values: Floats) -> float:
+    """Return the largest change of columns (k, n) along a straight line, less its noise."""
+    steps = np.linspace(-0.5, 0.5, len(values))
+    spread = float(steps @ steps)
+    rest = values - values.mean(axis=0)
+    slopes = steps @ rest / spread
+    noise = np.sqrt(((rest - steps[:, None] * slopes) ** 2).sum(axis=0) / (len(values) - 2))
+    return float((np.abs(slopes) - CHANGE_CERTAIN * noise / np.sqrt(spread)).max())

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tells wheels whose torque or rate cannot be believed: missing, frozen, or of the wrong sign."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.names import WHEEL_COUNT, WHEELS
+from rover_physics.numerics.arrays import Floats
+from rover_planner.learning.drive_log import RATES, TORQUES
+from rover_planner.learning.wheel_slip import SlipWindow
+
+FROZEN_TIME = 1.0
+"""Time without any change, while values of other wheels change, of a frozen value [s]."""
+DOUBTFUL_TIME = 0.25
+"""Time after which it may be frozen [s]."""
+OTHERS = 3
+"""Number of other wheels whose values must change meanwhile."""
+SIGN_TIME = 2.0
+"""Time constant of the search for wrong signs [s]."""
+SIGN_SHARE = 0.25
+"""What is left of a contradiction when one sign is turned, if this sign is wrong."""
+LEAST_EXCESS = 0.03
+"""Contradiction of the tractions from which signs are looked at, over the weight."""
+TURNING_BACK = 0.3
+"""How well a wheel's rolling must be the opposite of its travel if its rate has the wrong sign."""
+
+
+class WheelHealth:
+    """Watches torques and rates of the wheels."""
+
+    def __init__(self, weight: float, max_torque: float):
+        """Start with good sensors of a rover of a weight [N] and a largest wheel torque [N m]."""
+        self._weight, self._most = weight, max_torque
+        self._last = np.full(2 * WHEEL_COUNT, np.nan)
+        self._still = np.zeros(2 * WHEEL_COUNT)
+        self._time = np.nan
+        self._excess = 0.0
+        self._turned = np.zeros(WHEEL_COUNT)
+        self._backward = np.zeros(WHEEL_COUNT)
+        self._missing = np.zeros(2 * WHEEL_COUNT, dtype=bool)
+
+    def take(self, row: Floats) -> None:
+        """Take a row of measurements."""
+        values = np.append(row[TORQUES], row[RATES])
+        elapsed = row[0] - self._time if row[0] > self._time else 0.0
+        self._missing = np.isnan(values)
+        same = values == self._last
+        full = np.append(np.abs(row[TORQUES]) >= 0.99 * self._most, np.zeros(WHEEL_COUNT, bool))
+        changes = np.repeat((~same).reshape(2, -1).sum(axis=1) >= OTHERS, WHEEL_COUNT)
+        grows = self._missing | (same & ~full & changes)
+        stays = self._missing | (same & ~full)
+        self._still = np.where(grows, self._still + elapsed, np.where(stays, self._still, 0.0))
+        self._last, self._time = values, row[0]
+
+    def take_window(self, window: SlipWindow, elapsed: float, grips: bool) -> None:
+        """Take a window to look at signs.
+
+        Args:
+            window: The window.
+            elapsed: Time since the last one [s].
+            grips: Whether all wheels grip, so that the tractions must hold the rover.
+        """
+        share = min(elapsed / SIGN_TIME, 1.0)
+        self._backward += share * (self.rolls_backward(window) - self._backward)
+        if grips:
+            self._excess += share * (abs(window.excess) - self._excess)
+            turned = np.abs(window.excess - 2.0 * window.tractions)
+            self._turned += share * (turned - self._turned)
+
+    def rolls_backward(self, window: SlipWindow) -> NDArray[np.bool_]:
+        """Return (6,) whether wheels roll as fast as they travel, but the other way."""
+        moves = np.abs(window.travel) > 5.0 * window.deviation + 1e-3
+        rest = np.abs(window.rolling + window.travel)
+        return np.asarray(moves & (rest < TURNING_BACK * np.abs(window.travel)))
+
+    @property
+    def doubtful(self) -> NDArray[np.bool_]:
+        """(6,) whether a rate stands still while others change; it may be frozen."""
+        return np.asarray(self._still[WHEEL_COUNT:] > DOUBTFUL_TIME)
+
+    @property
+    def faults(self) -> dict[str, str]:
+        """What is wrong with which wheels."""
+        found: dict[str, str] = {}
+        frozen = self._still > FROZEN_TIME
+        signs = np.zeros(WHEEL_COUNT, dtype=bool)
+        if self._excess > LEAST_EXCESS * self._weight:
+            best = int(np.argmin(self._turned))
+            signs[best] = self._turned[best] < SIGN_SHARE * self._excess
+        torque, rate = slice(WHEEL_COUNT), slice(WHEEL_COUNT, None)
+        for word, mask in (
+            ("no torque", self._missing[torque] & frozen[torque]),
+            ("no rate", self._missing[rate] & frozen[rate]),
+            ("torque is frozen", frozen[torque] & ~self._missing[torque]),
+            ("rate is frozen", frozen[rate] & ~self._missing[rate]),
+            ("torque has the wrong sign", signs),
+            ("rate has the wrong sign", self._backward > 0.6),
+        ):
+            found |= {WHEELS[k]: word for k in np.flatnonzero(mask) if WHEELS[k] not in found}
+        return found

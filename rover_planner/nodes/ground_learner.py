@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The node /ground_learner: learns the ground from a rover's sensors while it drives."""
+
+import json
+import sys
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from geometry_msgs.msg import TwistStamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import Imu, JointState, PointCloud2
+from std_msgs.msg import Bool, String
+
+from msg_adapters.commands import twist_to_speeds
+from msg_adapters.elevation import terrain_from_point_cloud
+from msg_adapters.frames import check_frame
+from msg_adapters.joints import read_joint_map
+from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
+from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.rover.rover_file import load_rover
+from rover_planner.learning.ground_learner import GroundLearner
+from rover_planner.learning.learned_file import describe
+from rover_planner.nodes.running import run_node
+from rover_planner.nodes.warm_up import LEARNING
+from rover_planner.parameters.declare import (
+    declare_parameters,
+    follow_changes,
+    warn_of_unknown_parameters,
+)
+from rover_planner.parameters.ground_learner import GroundLearnerParameters
+from rover_planner.ros.guard import INPUT_ERRORS, Guard
+from rover_planner.ros.map_intake import CLOUD
+from rover_planner.ros.qos import latched_qos, sensor_qos
+from rover_planner.ros.row_collector import RowCollector
+from rover_planner.ros.subscriptions import subscribe_to_map
+from rover_planner.shell.kernels import load_kernels
+
+NODE_NAME = "ground_learner"
+ESTIMATE, EMERGENCY_STOP = "traverse_server/ground_estimate", "traction_controller/emergency_stop"
+"""Topics of the estimate, and of the stop of a rover that is stuck."""
+PERIOD = 1.0
+"""Time between two estimates [s]; that the rover is stuck is told at once."""
+COMMAND_AGE = 0.5
+"""Age from which a command is none [s]."""
+
+
+class GroundLearnerNode(Node):
+    """Connects a GroundLearner to ROS; nothing that arrives ends the node."""
+
+    def __init__(self, **node_arguments: Any):
+        super().__init__(NODE_NAME, **node_arguments)
+        self._values = values = declare_parameters(self, GroundLearnerParameters)
+        load_kernels(LEARNING, (), self.get_logger().info)
+        self._rover = load_rover(values.rover)
+        self._told = values.friction or self._rover.friction
+        known = (*SUSPENSION_JOINTS, *WHEEL_JOINTS, *STEERING_JOINTS)
+        self._rows = RowCollector(read_joint_map(values.joint_map, known))
+        self.learner: GroundLearner | None = None
+        """The estimator; None before the first map."""
+        self.heard_until = 0.0
+        """Time of the last odometry [s]."""
+        self._guard = Guard(self.get_logger())
+        self._commanded, self._command_time, self._sent, self._stuck = 0.0, -1e9, -1e9, ""
+        self._estimates = self.create_publisher(String, ESTIMATE, latched_qos())
+        self._stops = self.create_publisher(Bool, EMERGENCY_STOP, latched_qos())
+        for kind, name, take in (
+            (JointState, "joint_states", self._rows.take_joints),
+            (Imu, "imu", self._rows.take_imu),
+            (Odometry, "odometry", self._take_odometry),
+            (TwistStamped, "cmd_vel", self._take_command),
+        ):
+            self.create_subscription(kind, name, self._guarded(name, take), sensor_qos())
+        subscribe_to_map(
+            self,
+            PointCloud2,
+            CLOUD,
+            self._guarded(CLOUD, self._take_map),
+            values.map_durability,
+            values.input_reliability,
+        )
+        follow_changes(self, lambda: self._values, lambda values: values, self._apply)
+        warn_of_unknown_parameters(self, GroundLearnerParameters)
+        self.get_logger().info(f"ready for rover {self._rover.name}")
+
+    def _apply(self, parameters: GroundLearnerParameters) -> None:
+        self._values = parameters
+
+    def _guarded(self, name: str, take: Callable[[Any], None]) -> Callable[[Any], None]:
+        """Return a callback that refuses what cannot be used."""
+
+        def receive(message: Any) -> None:
+            try:
+                take(message)
+            except INPUT_ERRORS as error:
+                self.get_logger().warning(f"{name} not used: {error}", throttle_duration_sec=5.0)
+            except Exception as error:
+                self._guard.report(name, error)
+
+        return receive
+
+    def _take_map(self, data: bytes) -> None:
+        values, cloud = self._values, deserialize_message(data, PointCloud2)
+        check_frame(cloud.header.frame_id, values.map_frame, CLOUD)
+        terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height)
+        if self.learner is None:
+            self.learner = GroundLearner(self._rover, terrain, self._told)
+        else:
+            self.learner.change_map(terrain)
+
+    def _take_command(self, twist: TwistStamped) -> None:
+        self._commanded, self._command_time = twist_to_speeds(twist)[0], self._now
+
+    @property
+    def _now(self) -> float:
+        return float(self.get_clock().now().nanoseconds / NANOSECONDS)
+
+    def _take_odometry(self, odometry: Odometry) -> None:
+        stamp = stamp_to_ns(odometry.header.stamp)
+        now = self._now if stamp is None else stamp / NANOSECONDS
+        row = self._rows.take_odometry(odometry, now, self._values.map_frame)
+        self.heard_until = now
+        learner = self.learner
+        if learner is None:
+            return
+        is_fresh = self._now - self._command_time < COMMAND_AGE
+        learner.commanded = self._commanded if is_fresh else None
+        if learner.take(row):
+            self._tell(learner, now)
+
+    def _tell(self, learner: GroundLearner, now: float) -> None:
+        """Publish the estimate from time to time, and at once if the rover gets stuck."""
+        stuck, before = learner.stuck, self._stuck
+        self._stuck = stuck
+        if stuck and not before:
+            self.get_logger().warning(f"the rover is stuck: {stuck}")
+            if self._values.stop_when_stuck:
+                self._stops.publish(Bool(data=True))
+        if now - self._sent >= PERIOD or bool(stuck) != bool(before):
+            self._sent = now
+            contents = describe(learner.estimate, self._told)
+            self._estimates.publish(String(data=json.dumps(contents)))
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
+    return run_node(NODE_NAME, argv, lambda _: GroundLearnerNode())
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters of `/ground_learner`."""
+
+from dataclasses import dataclass
+
+from rover_planner.parameters.shared import (
+    CELL_HEIGHT,
+    INPUT_RELIABILITY,
+    JOINT_MAP,
+    MAP_DURABILITY,
+    MAP_RESOLUTION,
+)
+from rover_planner.parameters.table import ParameterTable, parameter
+
+
+@dataclass(frozen=True)
+class GroundLearnerParameters(ParameterTable):
+    """Parameters of `/ground_learner`; the fields document themselves."""
+
+    rover: str = parameter(
+        "lsr1", "Rover that drives: a preset's name or a rover file.", read_only=True
+    )
+    friction: float = parameter(
+        0.0,
+        "Friction that is assumed at first; 0 uses that of the rover file.",
+        bounds=(0.0, 10.0),
+        read_only=True,
+    )
+    stop_when_stuck: bool = parameter(
+        False,
+        "Whether a rover that is stuck gets an emergency stop on "
+        "traction_controller/emergency_stop.",
+    )
+    map_frame: str = parameter(
+        "map", "Frame of map and odometry; others are refused.", read_only=True
+    )
+    joint_map: tuple[str, ...] = JOINT_MAP
+    map_resolution: float = MAP_RESOLUTION
+    cell_height: str = CELL_HEIGHT
+    map_durability: str = MAP_DURABILITY
+    input_reliability: str = INPUT_RELIABILITY

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Drives that the ground is learned from: up a plane by the model, up a slope in MuJoCo; CSV."""
+
+from pathlib import Path
+
+import numpy as np
+
+from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.numerics.arrays import Floats
+from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
+from rover_planner.learning.drive_log import (
+    PITCH,
+    RATES,
+    ROLL,
+    STEERING,
+    SUSPENSION,
+    TIME,
+    TORQUES,
+    WIDTH,
+    YAW,
+    X,
+    Y,
+)
+from support.rough_grounds import plane
+
+RATE = 50.0
+"""Rows per second."""
+NAMES = [
+    *("time", "x", "y", "yaw", "roll", "pitch", *SUSPENSION_JOINTS),
+    *(f"{name}_rate" for name in WHEEL_JOINTS),
+    *(f"{name}_torque" for name in WHEEL_JOINTS),
+    *STEERING_JOINTS,
+]
+"""Columns of a CSV file, in the order of rows."""
+
+
+def climb(rover: Rover, slope: float, seconds: float, speed: float = 0.06) -> Floats:
+    """Return the rows of a rover that climbs the plane z = `slope` x, with grip, and noise.
+
+    The torques hold it up, with different shares of the wheels.
+    """
+    rng = np.random.default_rng(0)
+    time = np.arange(round(RATE * seconds)) / RATE
+    rows = np.zeros((len(time), WIDTH))
+    rows[:, STEERING.stop :] = np.nan
+    angle = np.arctan(slope)
+    rows[:, TIME], rows[:, X] = time, -0.5 * speed * seconds + speed * np.cos(angle) * time
+    rows[:, PITCH] = -angle
+    rows[:, RATES] = speed / rover.wheel.radius
+    shares = np.array([1.3, 1.0, 0.7, 1.2, 1.0, 0.8])
+    rows[:, TORQUES] = rover.weight * np.sin(angle) * rover.wheel.radius / 6.0 * shares
+    for columns, sigma in (([X, Y], 2e-4), ([YAW, ROLL, PITCH], 1e-3), (SUSPENSION, 1e-3)):
+        rows[:, columns] += sigma * rng.standard_normal(rows[:, columns].shape)
+    rows[:, TORQUES] += 0.01 * rng.standard_normal((len(rows), 6))
+    rows[:, RATES] += 1e-3 * rng.standard_normal((len(rows), 6))
+    return rows
+
+
+def ramp(slope: float) -> Terrain:
+    """Return the plane z = `slope` x, large enough for a climb."""
+    return plane(slope, 0.0, half=3.0)
+
+
+def write_csv(path: Path, rows: Floats, names: list[str] | None = None) -> None:
+    """Write rows as a CSV file, in an order of columns; NaN becomes an empty field."""
+    names = NAMES if names is None else names
+    lines = [",".join(names)]
+    places = [NAMES.index(name) for name in names]
+    for row in rows[:, places].tolist():
+        lines.append(",".join("" if np.isnan(value) else f"{value:.6g}" for value in row))
+    path.write_text("\n".join(lines) + "\n")

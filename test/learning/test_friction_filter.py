@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The friction of a ground as the wheels tell it: bounds, measurements, changes."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rover_planner.learning.friction_filter import FrictionFilter
+
+frictions = st.floats(0.15, 1.3)
+TOLD = 0.8
+
+
+def slip_on(ground: FrictionFilter, friction: float, count: int, seed: int = 0) -> None:
+    """Let wheels slip, with noise and now and then in part only."""
+    rng = np.random.default_rng(seed)
+    for use in friction * (1.0 - rng.exponential(0.03, count) + 0.05 * rng.standard_normal(count)):
+        ground.slip(float(use), 0.1, 0.0, 1.0)
+
+
+def test_nothing_is_known_before_anything_is_felt_but_what_is_told():
+    estimate = FrictionFilter(TOLD).estimate
+    assert estimate.mean == pytest.approx(TOLD, rel=0.03)
+    assert estimate.low == 0.0 and estimate.high is None
+
+
+@given(st.lists(st.floats(0.0, 1.2), min_size=1, max_size=200))
+def test_wheels_that_grip_bound_the_friction_from_below_only(uses):
+    ground = FrictionFilter(TOLD)
+    for use in uses:
+        ground.grip(use)
+    estimate = ground.estimate
+    assert estimate.high is None
+    assert estimate.low <= max(uses)
+    assert estimate.mean >= FrictionFilter(TOLD).estimate.mean - 1e-9
+
+
+@given(frictions, st.integers(0, 50))
+def test_wheels_that_slip_measure_the_friction(friction, seed):
+    ground = FrictionFilter(TOLD)
+    slip_on(ground, friction, 12, seed)
+    estimate = ground.estimate
+    assert estimate.mean == pytest.approx(friction, rel=0.15)
+    assert estimate.high is not None
+    assert estimate.low < estimate.mean < estimate.high
+
+
+def test_the_interval_has_the_truth_in_nineteen_of_twenty_grounds():
+    within = 0
+    rng = np.random.default_rng(3)
+    for seed in range(200):
+        friction = float(rng.uniform(0.2, 1.0))
+        ground = FrictionFilter(TOLD)
+        slip_on(ground, friction, 4, seed)
+        estimate = ground.estimate
+        assert estimate.high is not None
+        within += estimate.low <= friction <= estimate.high
+    assert 180 <= within <= 199
+
+
+def test_one_wrong_measurement_moves_little():
+    ground = FrictionFilter(TOLD)
+    slip_on(ground, 0.5, 10)
+    before = ground.estimate.mean
+    ground.slip(1.1, 0.1, 0.0, 1.0)
+    ground.slip(0.1, 0.1, 0.0, 1.0)
+    assert ground.estimate.mean == pytest.approx(before, rel=0.05)
+
+
+@given(st.sampled_from([(0.8, 0.4), (0.35, 0.7)]))
+def test_ground_that_changes_is_learned_anew(frictions):
+    before, after = frictions
+    ground = FrictionFilter(TOLD)
+    slip_on(ground, before, 10)
+    ground.drive(2.0)
+    slip_on(ground, after, 15)
+    assert ground.estimate.mean == pytest.approx(after, rel=0.1)

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A drive tells its ground: bounds while wheels grip, friction as they slip, and sticking."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rover_physics.names import SUSPENSION_JOINTS
+from rover_physics.rover.rover_file import load_rover
+from rover_planner.learning.drive_log import (
+    PITCH,
+    RATES,
+    ROLL,
+    STEERING,
+    SUSPENSION,
+    TIME,
+    TORQUES,
+    WIDTH,
+    YAW,
+    X,
+    Y,
+)
+from rover_planner.learning.ground_learner import GroundLearner
+from support.learning_drives import climb, ramp
+from support.reference_drives import drive_ground
+
+SPEED = 0.06
+ROVER = replace(load_rover("lsr1"), nominal_speed=SPEED)
+SLOPE = 0.3
+
+
+def learn(rows, terrain=None) -> GroundLearner:
+    """Return a learner that has taken rows."""
+    learner = GroundLearner(ROVER, ramp(SLOPE) if terrain is None else terrain)
+    for row in rows:
+        learner.take(row)
+    return learner
+
+
+@pytest.mark.parametrize("step", [1, 5])
+def test_wheels_that_grip_prove_a_friction_and_nothing_above(step):
+    estimate = learn(climb(ROVER, SLOPE, 20.0)[::step]).estimate
+    assert 0.6 * SLOPE < estimate.friction.low < 1.1 * SLOPE
+    assert estimate.friction.high is None
+    assert estimate.slip_time is None and estimate.immobilised_time is None
+    assert not estimate.faults
+    assert abs(estimate.resistance) < 0.02
+    assert np.abs(estimate.slip_ratios).max() < 0.05
+
+
+def test_ground_is_marked_where_wheels_have_been():
+    learner = learn(climb(ROVER, SLOPE, 20.0))
+    known = np.isfinite(learner.ground.layers.friction)
+    x, y = ramp(SLOPE).origin
+    rows, columns = np.nonzero(known)
+    assert known.any() and np.abs(y + 0.04 * rows).min() > 0.2
+    assert np.abs(x + 0.04 * columns).max() < 1.4
+    assert (learner.ground.layers.friction_std[known] > 0.0).all()
+
+
+def test_a_gap_and_a_jump_of_the_odometry_are_no_slip():
+    rows = climb(ROVER, SLOPE, 20.0)
+    rows = np.delete(rows, slice(300, 400), axis=0)
+    rows[500:, X] += 0.3
+    assert learn(rows).estimate.slip_time is None
+
+
+@pytest.mark.parametrize("step", [4, 10])
+def test_a_pose_that_is_measured_less_often_than_the_wheels_serves(step):
+    rows = climb(ROVER, SLOPE, 20.0)
+    sparse = np.arange(len(rows)) % step != 0
+    rows[sparse, X : SUSPENSION.stop] = np.nan
+    estimate = learn(rows).estimate
+    assert 0.6 * SLOPE < estimate.friction.low < 1.1 * SLOPE
+    assert estimate.slip_time is None and not estimate.faults
+
+
+def test_nothing_is_learned_from_rows_without_a_pose():
+    rows = climb(ROVER, SLOPE, 5.0)
+    rows[:, YAW] = np.nan
+    assert learn(rows).window is None
+
+
+def freeze(rows, wheel):
+    rows[100:, TORQUES.start + wheel] = rows[100, TORQUES.start + wheel]
+
+
+def miss(rows, wheel):
+    rows[:, TORQUES.start + wheel] = np.nan
+
+
+def reverse(rows, wheel):
+    rows[:, TORQUES.start + wheel] *= -1.0
+
+
+def freeze_rate(rows, wheel):
+    rows[100:, RATES.start + wheel] = 0.0
+
+
+def reverse_rate(rows, wheel):
+    rows[:, RATES.start + wheel] *= -1.0
+
+
+@pytest.mark.parametrize(
+    ("spoil", "word"),
+    [
+        (freeze, "torque is frozen"),
+        (miss, "no torque"),
+        (reverse, "torque has the wrong sign"),
+        (freeze_rate, "rate is frozen"),
+        (reverse_rate, "rate has the wrong sign"),
+    ],
+)
+def test_a_bad_sensor_is_told_and_not_believed(spoil, word):
+    rows = climb(ROVER, SLOPE, 20.0)
+    spoil(rows, 4)
+    estimate = learn(rows).estimate
+    assert estimate.faults == {"middle_left": word}
+    assert estimate.friction.high is None
+    assert estimate.friction.low < 1.2 * SLOPE
+
+
+def test_spikes_of_a_torque_are_not_believed():
+    rows = climb(ROVER, SLOPE, 20.0)
+    rows[::37, TORQUES.start + 2] = 1e6
+    estimate = learn(rows).estimate
+    assert estimate.friction.high is None and estimate.friction.low < 1.2 * SLOPE
+
+
+def drive_up(friction: float, degrees: float, seconds: float) -> np.ndarray:
+    """Return rows of a drive up a slope in MuJoCo by speed servos, from just before it."""
+    mujoco_rover = pytest.importorskip("rover_planner.simulator.mujoco_rover")
+    plant = mujoco_rover.MujocoRover(
+        ROVER, drive_ground("slope", degrees), (-0.5, 0.0, 0.0), friction
+    )
+    rows = []
+    while plant.time < seconds:
+        row = np.full(WIDTH, np.nan)
+        row[TORQUES] = plant.servo(np.full(6, SPEED / ROVER.wheel.radius), 0.02)
+        joints = plant.joint_positions
+        row[[TIME, X, Y, YAW]] = plant.time, *plant.pose[[0, 1, 3]]
+        row[[ROLL, PITCH]] = plant.attitude
+        row[SUSPENSION] = [joints[name] for name in SUSPENSION_JOINTS]
+        row[RATES], row[STEERING] = plant.wheel_rates, 0.0
+        rows.append(row)
+    return np.array(rows)
+
+
+def test_friction_and_sticking_are_learned_on_a_slope_that_is_too_steep():
+    friction = 0.4
+    rows = drive_up(friction, 24.0, 26.0)
+    estimate = learn(rows, drive_ground("slope", 24.0)).estimate
+    assert estimate.friction.mean == pytest.approx(friction, rel=0.1)
+    assert estimate.friction.high is not None
+    assert estimate.friction.low < friction < estimate.friction.high
+    # It is stuck from where its speed over the next second is below a tenth of the commanded.
+    ahead = np.interp(rows[:, TIME] + 1.0, rows[:, TIME], rows[:, X]) - rows[:, X]
+    stuck = rows[np.argmax((ahead < 0.1 * SPEED) & (rows[:, TIME] > 5.0)), TIME]
+    assert estimate.slip_time is not None and estimate.immobilised_time is not None
+    assert stuck - 1.0 < estimate.immobilised_time < stuck + 2.0

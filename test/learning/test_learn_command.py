@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command learn: drives from CSV files and bags, its file, and predictions with it."""
+
+import json
+
+import numpy as np
+import pytest
+
+from rover_physics.names import WHEEL_JOINTS
+from rover_physics.rover.rover_file import load_rover, save_rover
+from rover_physics.terrain.grid import load_terrain, save_terrain
+from rover_planner.cli import main
+from support.command_line import assert_refused
+from support.learning_drives import NAMES, climb, ramp, write_csv
+
+ROVER = load_rover("lsr1")
+SLOPE = 0.3
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Return a folder with a terrain and a drive on it."""
+    save_terrain(tmp_path / "ramp.npz", ramp(SLOPE))
+    write_csv(tmp_path / "drive.csv", climb(ROVER, SLOPE, 8.0))
+    return tmp_path
+
+
+def arguments(folder, log="drive.csv", rover="lsr1"):
+    return ["learn", str(rover), *(str(folder / n) for n in ("ramp.npz", log, "out.json"))]
+
+
+def friction_of(folder):
+    return json.loads((folder / "out.json").read_text())["friction"]
+
+
+def test_a_drive_without_slip_leaves_the_friction_open_above(folder, capfd):
+    picture, ground = folder / "out.png", folder / "ground.npz"
+    words = ["--picture", str(picture), "--ground", str(ground)]
+    assert main([*arguments(folder), *words]) == 0
+    found = json.loads((folder / "out.json").read_text())
+    assert found["friction"]["high"] is None
+    assert 0.0 < found["friction"]["low"] < SLOPE < found["friction"]["mean"]
+    assert found["slip_time"] is None and found["immobilised_time"] is None
+    assert picture.stat().st_size > 10_000
+    layer = load_terrain(ground).friction
+    assert layer is not None and np.isfinite(layer).any() and np.isnan(layer).any()
+
+
+def test_columns_come_in_any_order_and_some_may_be_missing(folder):
+    assert main(arguments(folder)) == 0
+    usual = friction_of(folder)
+    names = [name for name in NAMES if "steering" not in name]
+    write_csv(folder / "drive.csv", climb(ROVER, SLOPE, 8.0), names[::-1])
+    assert main(arguments(folder)) == 0
+    assert friction_of(folder) == usual
+
+
+def test_motor_currents_serve_with_the_constant_of_the_rover_file(folder, capfd):
+    assert main(arguments(folder)) == 0
+    usual = friction_of(folder)
+    log = folder / "drive.csv"
+    log.write_text(log.read_text().replace("_torque", "_current", 6))
+    assert_refused(capfd, main(arguments(folder)), "torque_per_current")
+    rover = folder / "rover.yaml"
+    save_rover(rover, ROVER)
+    text = rover.read_text().replace("servo_droop: 0.3", "servo_droop: 0.3, torque_per_current: 1")
+    rover.write_text(text)
+    assert main(arguments(folder, rover=rover)) == 0
+    assert friction_of(folder) == usual
+
+
+def test_force_sensors_replace_loads_and_tractions(folder):
+    rows = climb(ROVER, SLOPE, 8.0)
+    write_csv(folder / "drive.csv", rows)
+    lines = (folder / "drive.csv").read_text().splitlines()
+    felt = [f"{name.removesuffix('_wheel')}_f{axis}" for name in WHEEL_JOINTS for axis in "xz"]
+    values = ",".join(["5.0,10.0"] * 6)
+    lines = [f"{lines[0]},{','.join(felt)}", *(f"{line},{values}" for line in lines[1:])]
+    (folder / "drive.csv").write_text("\n".join(lines))
+    assert main(arguments(folder)) == 0
+    assert friction_of(folder)["low"] == pytest.approx(0.5 * 0.84, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "word"),
+    [
+        (lambda text: text.replace("rocker_left", "rocker_port"), "rocker_left"),
+        (lambda text: text.replace("\n", ",\n0.1x", 3), "number"),
+        (lambda text: text.splitlines()[0], "rows"),
+        (lambda text: text + text[text.index("\n") + 1 :], "time goes back"),
+        (lambda text: "", "time"),
+    ],
+)
+def test_a_bad_log_is_refused_in_one_line(folder, capfd, spoil, word):
+    log = folder / "drive.csv"
+    log.write_text(spoil(log.read_text()))
+    assert_refused(capfd, main(arguments(folder)), word)
+
+
+def test_a_prediction_takes_what_was_learned(folder, capfd):
+    learned, out = folder / "learned.json", folder / "out.npz"
+    poses = np.column_stack([np.linspace(-1.0, 1.0, 9), np.zeros(9), np.zeros(9)])
+    np.savez(folder / "poses.npz", poses=poses)
+    words = ["predict", "lsr1", *(str(folder / n) for n in ("ramp.npz", "poses.npz", "out.npz"))]
+    used = {}
+    for mean in (0.8, 0.4):
+        friction = {"mean": mean, "std": 0.1, "low": 0.3, "high": 1.0}
+        learned.write_text(json.dumps({"friction": friction}))
+        assert main([*words, "--learned", str(learned), "--chance"]) == 0
+        with np.load(out) as file:
+            used[mean] = file["friction_utilisation"], float(file["failure_chance"])
+    np.testing.assert_allclose(used[0.4][0], 2.0 * used[0.8][0])
+    assert used[0.8][1] < 0.05 < used[0.4][1]
+    learned.write_text("{}")
+    assert_refused(capfd, main([*words, "--learned", str(learned)]), "learned.json")

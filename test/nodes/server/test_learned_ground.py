@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A traverse server takes what was learned of the ground; its answers say what they assume."""
+
+import json
+
+from rclpy.node import Node
+from std_msgs.msg import String
+
+from rover_planner.ros.qos import topic_qos
+from support.grounds import make_terrain, waves
+from support.planner_client import GOAL, SERVER, START, verdict_of
+from support.ros_fixtures import RosRun
+from support.waiting import wait_until
+
+
+def test_answers_say_which_ground_they_assume_and_since_when(start_server, client, ros: RosRun):
+    server = start_server(planner="fan", learn="use")
+    client.send_terrain(make_terrain(waves))
+    teller = ros.spin(Node("teller", context=ros.context))
+    sender = teller.create_publisher(String, f"{SERVER}/ground_estimate", topic_qos())
+    wait_until(lambda: sender.get_subscription_count() == 1, "the server's subscription")
+    client.can_traverse(START, GOAL)
+    wait_until(lambda: client.heard["verdict"], "the verdict")
+    assert verdict_of({"verdict": client.heard["verdict"][-1]})["ground"] == "told"
+    friction = {"mean": 0.5, "std": 0.05, "low": 0.4, "high": 0.6}
+    for text in ("no JSON", "{}", json.dumps({"friction": friction | {"mean": -1.0}})):
+        sender.publish(String(data=text))
+    sender.publish(String(data=json.dumps({"friction": friction})))
+    wait_until(lambda: server.service.snapshot().ground is not None, "the estimate")
+    client.heard["verdict"].clear()
+    client.can_traverse(START, GOAL)
+    wait_until(lambda: client.heard["verdict"], "the verdict")
+    verdict = verdict_of({"verdict": client.heard["verdict"][-1]})
+    assert verdict["ground"] == "learned"
+    assert float(verdict["ground_friction"]) == 0.5 and verdict["ground_since"]

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The node ground_learner tells what a drive over ROS shows, and stops a rover that is stuck."""
+
+import json
+import time
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import TwistStamped
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from sensor_msgs.msg import JointState, PointCloud2
+from std_msgs.msg import Bool, String
+
+from msg_adapters.elevation import terrain_to_point_cloud
+from msg_adapters.stamps import ns_to_stamp
+from rover_physics.rover.rover_file import load_rover
+from rover_planner.learning.drive_log import TIME, X
+from rover_planner.nodes.ground_learner import EMERGENCY_STOP, ESTIMATE, GroundLearnerNode
+from rover_planner.ros.qos import latched_qos, map_qos, topic_qos
+from support.learning_drives import climb, ramp
+from support.messages.drives import row_messages
+from support.ros_fixtures import RosRun
+from support.waiting import wait_until
+
+SLOPE = 0.3
+BEGIN = 1_700_000_000.0
+"""Time of the first message [s]."""
+
+
+class Rover(Node):
+    """Sends the rows of a drive, and hears what is learned."""
+
+    def __init__(self, ros: RosRun):
+        super().__init__("rover", context=ros.context)
+        self.estimates: list[dict] = []
+        self.stops: list[bool] = []
+        self._map = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
+        kinds = {"joint_states": JointState, "odometry": Odometry, "cmd_vel": TwistStamped}
+        self._senders = {n: self.create_publisher(k, n, topic_qos()) for n, k in kinds.items()}
+        self.create_subscription(
+            String, ESTIMATE, lambda m: self.estimates.append(json.loads(m.data)), latched_qos()
+        )
+        self.create_subscription(
+            Bool, EMERGENCY_STOP, lambda m: self.stops.append(m.data), latched_qos()
+        )
+
+    def is_heard(self) -> bool:
+        """Return whether all topics are connected."""
+        return all(s.get_subscription_count() for s in (*self._senders.values(), self._map))
+
+    def send_map(self) -> None:
+        """Send the map."""
+        stamp = ns_to_stamp(int(BEGIN * 1e9))
+        self._map.publish(terrain_to_point_cloud(ramp(SLOPE), "map", stamp))
+
+    def send(self, row: np.ndarray) -> None:
+        """Send what a row holds; the joints first, which the row of the odometry has."""
+        joints, odometry = row_messages(row, BEGIN)
+        self._senders["joint_states"].publish(joints)
+        self._senders["odometry"].publish(odometry)
+
+
+def drive(node: GroundLearnerNode, rover: Rover, rows: np.ndarray) -> None:
+    """Send rows one after another; one that is lost on the way is sent again."""
+    for row in rows:
+        sent = 0.0
+
+        def arrives(row: np.ndarray = row) -> bool:
+            nonlocal sent
+            if node.heard_until > BEGIN + row[TIME] - 0.05:
+                return True
+            if time.monotonic() > sent + 0.5:
+                rover.send(row)
+                sent = time.monotonic()
+            return False
+
+        wait_until(arrives, "the odometry")
+
+
+@pytest.fixture
+def ros():
+    run = RosRun()
+    yield run
+    run.close()
+
+
+def test_a_drive_is_learned_and_a_rover_that_gets_stuck_is_stopped(ros):
+    stop = Parameter("stop_when_stuck", value=True)
+    node = ros.spin(GroundLearnerNode(context=ros.context, parameter_overrides=[stop]))
+    rover = ros.spin(Rover(ros))
+    wait_until(rover.is_heard, "the node's subscriptions")
+    rover.send_map()
+    wait_until(lambda: node.learner is not None, "the map")
+    rows = climb(load_rover("lsr1"), SLOPE, 12.0)[::5]
+    rows[60:, X] = rows[60, X] + 1e-4 * np.random.default_rng(1).standard_normal(60)
+    drive(node, rover, rows[:60])
+    wait_until(lambda: rover.estimates, "an estimate")
+    assert not rover.stops and not rover.estimates[-1]["stuck"]
+    drive(node, rover, rows[60:])
+    wait_until(lambda: rover.stops == [True], "the stop")
+    wait_until(lambda: rover.estimates[-1]["stuck"], "that it is stuck")
+    last = rover.estimates[-1]
+    assert 6.0 < last["immobilised_time"] - BEGIN < 8.0
+    assert last["friction"]["low"] > 0.5 * SLOPE
