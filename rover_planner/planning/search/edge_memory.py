@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Remembers judged edges from one search to the next while the ground under them is the same."""
+"""Remembers judged edges and the last path, from one search to the next."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +10,7 @@ from rover_planner.maps.changes import find_changes, have_same_layers
 from rover_planner.maps.unobserved_ground import ALLOW
 from rover_planner.planning.search.edges import Edges
 from rover_planner.planning.search.nodes import HEADINGS, Nodes
-from rover_planner.planning.search.primitives import make_primitives
+from rover_planner.planning.search.primitives import Piece, make_primitives
 from rover_planner.planning.search.query import SearchQuery
 
 
@@ -23,6 +23,26 @@ class EdgeMemory:
 
     def __init__(self) -> None:
         self._last: tuple[SearchQuery, Edges] | None = None
+        self._path: tuple[SearchQuery, list[Piece]] | None = None
+
+    def keep_path(self, query: SearchQuery, pieces: list[Piece]) -> None:
+        """Keep the pieces of the path that answers a query."""
+        self._path = query, pieces
+
+    def recall_path(self, query: SearchQuery) -> list[Piece]:
+        """Return the pieces of the last path if it was between the same ends for the same rover.
+
+        They are to be judged again: the map or the options may be others.
+        """
+        if self._path is None:
+            return []
+        asked, pieces = self._path
+        is_same = (
+            asked.rover == query.rover
+            and np.array_equal(asked.start, query.start)
+            and np.array_equal(asked.goal, query.goal)
+        )
+        return pieces if is_same else []
 
     def recall(self, query: SearchQuery, nodes: Nodes) -> Edges:
         """Return the edges between nodes with what is known of them; what is added is kept."""

@@ -39,6 +39,8 @@ class _Map(NamedTuple):
 
     elevation: np.ndarray
     """(ny, nx) heights [m]."""
+    whole: np.ndarray
+    """(ny - 1, nx - 1) whether all corners of a cell are known."""
     away: np.ndarray
     """(ny, nx) distance to the next known cell [m]."""
     resolution: float
@@ -70,8 +72,10 @@ def estimate_ground(rover: Rover, terrain: Terrain, nodes: Nodes) -> GroundEstim
     offsets = np.stack([x, y], axis=-1) - terrain.origin
     wheels = _Wheels(offsets, largest_wheel_shift(rover))
     elevation = np.asarray(terrain.elevation)
+    known = ~np.isnan(elevation)
     ground = _Map(
         elevation,
+        known[:-1, :-1] & known[:-1, 1:] & known[1:, :-1] & known[1:, 1:],
         _distance_to_known(elevation, terrain.resolution),
         terrain.resolution,
     )
@@ -138,7 +142,7 @@ def estimate_nodes(ground, wheels, window, found):
         for wheel in range(6):
             u = (x + wheels.offsets[heading, wheel, 0]) / ground.resolution
             v = (y + wheels.offsets[heading, wheel, 1]) / ground.resolution
-            if not _is_known(ground.elevation, u, v):
+            if not _is_known(ground, u, v):
                 found.doubt[node] = FULL_DOUBT
                 if _distance(ground, u, v) > wheels.shift:
                     found.groundless[node] = True
@@ -155,15 +159,18 @@ def _distance(ground, u, v):
 
 
 @exact_kernel
-def _is_known(elevation, u, v):
+def _is_known(ground, u, v):
     """Return whether a place [cells] is on the map, and known: all corners around it are.
 
     Within rounding of a line between cells, the corners on one side of it suffice.
     """
+    elevation = ground.elevation
     ny, nx = elevation.shape
     if not (-_ROUNDING <= u <= nx - 1 + _ROUNDING and -_ROUNDING <= v <= ny - 1 + _ROUNDING):
         return False
-    i, j = min(int(u), elevation.shape[1] - 2), min(int(v), elevation.shape[0] - 2)
+    i, j = min(int(u), nx - 2), min(int(v), ny - 2)
+    if ground.whole[j, i]:
+        return True
     a, b = u - i, v - j
     known = True
     for row in range(2):

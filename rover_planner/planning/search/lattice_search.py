@@ -61,6 +61,16 @@ class SearchProgress:
     pieces: list[Piece] = field(default_factory=list)
     """The pieces of the best path."""
 
+    def keep(self, pieces: list[Piece], candidate: Candidate) -> bool:
+        """Keep a path, judged as a whole, as the best if it passes; return whether it does."""
+        if not candidate.verdict.traversable:
+            return False
+        self.best, self.pieces = candidate, pieces
+        self.cost = sum(one.cost for one in pieces)
+        if np.isnan(self.first_time):
+            self.first_time = time.perf_counter()
+        return True
+
 
 class _Ends:
     """The connections of the start or of the goal, with what is known of them."""
@@ -113,13 +123,6 @@ class LatticeSearch:
         """Judged connections of the start and of the goal."""
         self.shortest = ShortestPaths(self.edges, self.doubt, self.difficulty, self.ends[0].seeds)
         self._refused: list[tuple[int, int, float]] = []
-
-    def offer(self, piece: Piece) -> None:
-        """Judge a path from start to goal; keep it if it passes and is the best."""
-        cost = self.judge.judge_pieces([piece])[0].cost
-        if cost < self.progress.cost:
-            checked = self.judge.check(piece.poses, stop_at_failure=True)
-            self._keep([replace(piece, cost=cost)], checked)
 
     def run(self, allowed: Callable[["LatticeSearch"], bool]) -> SearchProgress:
         """Search until the best path is found, no path is left, or it is not allowed to go on."""
@@ -252,21 +255,10 @@ class LatticeSearch:
             return True
         poses, owners = join_pieces(pieces)
         candidate = self.judge.check(poses, stop_at_failure=True)
-        if not self._keep(pieces, candidate):
+        if not self.progress.keep(pieces, candidate):
             owner = owners[candidate.verdict.first_failure]
             self._refuse(route, int(owner), candidate.verdict.code)
             return False
-        return True
-
-    def _keep(self, pieces: list[Piece], candidate: Candidate) -> bool:
-        """Keep a path as the best if it passes; return whether it does."""
-        if not candidate.verdict.traversable:
-            return False
-        progress = self.progress
-        progress.best, progress.pieces = candidate, pieces
-        progress.cost = sum(one.cost for one in pieces)
-        if np.isnan(progress.first_time):
-            progress.first_time = time.perf_counter()
         return True
 
     def _pieces(self, route: Route) -> list[Piece]:

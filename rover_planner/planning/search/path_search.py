@@ -170,6 +170,7 @@ class _PathFinder:
         self._memory = memory or EdgeMemory()
         self._radius = tightest_radius(query.rover)
         self._repeatable, self._to_frontier = True, False
+        self._progress = SearchProgress()
 
     def answer(self) -> SearchResult:
         """Search the path."""
@@ -184,12 +185,16 @@ class _PathFinder:
                 return self._make_result(
                     outcome, f"the rover cannot stand at the {name}: {reason}"
                 )
-        search = self._prepare()
+        progress = self._progress
         if not self._to_frontier:
-            self._try_directly(search)
-        progress = search.run(self._allowed)
+            self._try_known_ways()
+        if self._settings.ends_at_first and progress.best is not None:
+            self._memory.keep_path(self._query, progress.pieces)
+            return self._make_result(FOUND, "", path=(progress.best, progress.cost))
+        search = self._prepare()
+        search.run(self._allowed)
         if progress.best is not None:
-            path = self._smooth(search)
+            path = self._smooth(progress)
             return self._make_result(FOUND, self._describe_rest(path[0]), search, path=path)
         where = self._describe_extent()
         if not progress.exhausted:
@@ -225,6 +230,31 @@ class _PathFinder:
         cell = self._nodes.cell
         return f"the {columns * cell:.0f} m x {rows * cell:.0f} m around start and goal"
 
+    def _try_known_ways(self) -> None:
+        """Take the last path between the same ends, or else the direct curve, if it passes.
+
+        It is a first path, long before the lattice is prepared.
+        """
+        for pieces in (self._memory.recall_path(self._query), self._make_direct_way()):
+            judged = self._judge.judge_pieces(pieces)
+            if not pieces or any(one.code for one in judged):
+                continue
+            way = [replace(one, cost=new.cost) for one, new in zip(pieces, judged, strict=True)]
+            poses = join_pieces(way)[0]
+            if self._progress.keep(way, self._judge.check(poses, stop_at_failure=True)):
+                return
+
+    def _make_direct_way(self) -> list[Piece]:
+        """Return the direct curve from start to goal as one piece, none if they are the same."""
+        poses = generate_candidates(
+            self._start,
+            self._goal,
+            count=1,
+            waypoint_spacing=self._query.options.waypoint_spacing,
+            min_radius=self._radius,
+        )[0]
+        return [Piece(poses, Gear.FORWARD)] if len(poses) > 1 else []
+
     def _prepare(self) -> LatticeSearch:
         """Return the search, with the estimates of the ground and the connections of the ends."""
         query, nodes = self._query, self._nodes
@@ -244,19 +274,8 @@ class _PathFinder:
             else connect_goal(rover, nodes, self._goal, spacing),
             ground.doubt,
             estimate_difficulty(rover, terrain, nodes, climb, (edges.samples, edges.difficulty)),
+            self._progress,
         )
-
-    def _try_directly(self, search: LatticeSearch) -> None:
-        """Let the search begin with the direct curve, if the rover may drive it."""
-        poses = generate_candidates(
-            self._start,
-            self._goal,
-            count=1,
-            waypoint_spacing=self._query.options.waypoint_spacing,
-            min_radius=self._radius,
-        )[0]
-        if len(poses) > 1:
-            search.offer(Piece(poses, Gear.FORWARD))
 
     def _allowed(self, search: LatticeSearch) -> bool:
         """Return whether the search may go on; tell of its progress."""
@@ -272,17 +291,18 @@ class _PathFinder:
         self._repeatable &= in_time
         return in_time
 
-    def _smooth(self, search: LatticeSearch) -> tuple[Candidate, float]:
+    def _smooth(self, progress: SearchProgress) -> tuple[Candidate, float]:
         """Return the smoothed path, or the path itself where that does not pass, and its cost."""
-        best, budget = search.progress.best, self._settings.budget
+        best, budget = progress.best, self._settings.budget
         assert best is not None
         spent = time.perf_counter() - self._began
         share = SMOOTHING if self._repeatable else SMOOTHING * min(1.0, budget / spent)
         most = round(share * budget * POSES_PER_SECOND)
-        pieces = smooth(self._judge, search.progress.pieces, self._radius, most)
+        pieces = smooth(self._judge, progress.pieces, self._radius, most)
         smoothed = self._judge.check(join_pieces(pieces)[0], stop_at_failure=True)
         if not smoothed.verdict.traversable:
-            return best, search.progress.cost
+            smoothed, pieces = best, progress.pieces
+        self._memory.keep_path(self._query, pieces)
         return smoothed, sum(one.cost for one in pieces)
 
     def _make_result(
@@ -293,7 +313,7 @@ class _PathFinder:
         path: tuple[Candidate | None, float] = (None, math.inf),
         closed: ClosedArea | None = None,
     ) -> SearchResult:
-        progress = SearchProgress() if search is None else search.progress
+        progress = self._progress
         asked = np.zeros(self._nodes.shape, bool) if search is None else self._asked(search)
         known = progress.best is not None and progress.bound > 0.0
         bound = progress.cost / progress.bound if known else math.inf

@@ -165,6 +165,20 @@ def test_after_a_change_of_the_map_what_is_remembered_gives_the_way_of_a_new_sea
     assert verdict.traversable
 
 
+def test_the_last_way_is_the_first_path_after_a_change_of_the_map_that_it_passes():
+    before, memory = make_terrain(long_wall), EdgeMemory()
+    first = find_path(ask(before), LONG, memory)
+    elevation = np.array(before.elevation)
+    elevation[:3] += 0.02  # far from the way
+    after = Terrain(elevation, before.resolution, before.origin)
+    asked = replace(LONG, ends_at_first=True)
+    again = find_path(ask(after), asked, memory)
+    assert again.outcome == FOUND and again.expanded == 0
+    np.testing.assert_array_equal(again.path.poses, first.path.poses)
+    other = find_path(ask(after, goal=(2.4, 0.1, 0.0)), asked, memory)
+    np.testing.assert_allclose(other.path.poses[-1], (2.4, 0.1, 0.0), atol=1e-12)
+
+
 def test_nodes_without_ground_are_none_on_which_the_rover_can_stand():
     ground = rocky(3)
     elevation = np.array(ground.elevation)
