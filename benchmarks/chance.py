@@ -18,7 +18,7 @@ import typer
 from benchmarks.measure import print_table
 from support.chance_paths import HELD_OUT, TOLD, DrivenPath, find_chance, read_driven_paths
 
-MODEL_STDS = (0.0, 0.05, 0.1, 0.15, 0.2)
+MODEL_STDS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 """Model errors among which the calibration chooses."""
 EDGES = (0.0, 0.05, 0.2, 0.5, 0.8, 0.95, 1.0)
 """Edges of the ranges of chances in the reliability table."""
