@@ -6,6 +6,7 @@ It needs the extra `bench`. The file gets a line of JSON for each path; lines th
 """
 
 import json
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
@@ -43,8 +44,22 @@ def passes(path: ChancePath, truth: Truth) -> bool:
     return arrives(path.rover(truth.max_torque), obstacle.ground, path.poses, truth.friction)
 
 
-def arrives(rover: Rover, ground: Terrain, poses: np.ndarray, friction: float) -> bool:
-    """Drive poses (n, 3) with speed servos with droop and a follower; return whether it arrives.
+@dataclass(frozen=True, eq=False)
+class Moment:
+    """A rover on its way, after each period of the steering."""
+
+    plant: MujocoRover
+    """The rover."""
+    torques: np.ndarray
+    """(6,) torques of the wheels [N m]."""
+    driven: float
+    """Way along the path [m]."""
+    is_lost: bool
+    """Whether it tipped over or is stuck."""
+
+
+def drive(rover: Rover, ground: Terrain, poses: np.ndarray, friction: float) -> Iterator[Moment]:
+    """Drive poses (n, 3) with speed servos with droop and a follower, to their end or until lost.
 
     The follower aims at LOOK_AHEAD beyond the last pose.
     """
@@ -53,20 +68,28 @@ def arrives(rover: Rover, ground: Terrain, poses: np.ndarray, friction: float) -
     plant = MujocoRover(rover, ground, tuple(poses[0]), friction)
     follower = PathFollower(np.vstack([poses, beyond]), LOOK_AHEAD)
     length = float(np.hypot(*np.diff(poses[:, :2], axis=0).T).sum())
-    drive, way = SteeredDrive(rover), [0.0]
-    within = round(STUCK_TIME / PERIOD)
-    while follower.driven < length:
+    steered, way = SteeredDrive(rover), [0.0]
+    within, is_lost = round(STUCK_TIME / PERIOD), False
+    while follower.driven < length and not is_lost:
         here = plant.pose[[0, 1, 3]]
-        aims = drive.aim(*follower.steer(here, rover.nominal_speed))
+        aims = steered.aim(*follower.steer(here, rover.nominal_speed))
         plant.steer(aims.angles)
-        share = drive.share(plant.steering_angles, aims.angles)
-        plant.servo_with_droop(
+        share = steered.share(plant.steering_angles, aims.angles)
+        torques = plant.servo_with_droop(
             share * aims.speeds / rover.wheel.radius, rover.wheel.servo_droop, PERIOD
         )
         way.append(follower.driven)
-        if plant.tilt > MAX_TILT or (len(way) > within and way[-1] - way[-1 - within] < STUCK_WAY):
-            return False
-    return bool(np.hypot(*(plant.pose[:2] - poses[-1, :2])) <= KEPT)
+        stands = len(way) > within and way[-1] - way[-1 - within] < STUCK_WAY
+        is_lost = plant.tilt > MAX_TILT or stands
+        yield Moment(plant, torques, follower.driven, is_lost)
+
+
+def arrives(rover: Rover, ground: Terrain, poses: np.ndarray, friction: float) -> bool:
+    """Drive poses (n, 3) as `drive` does; return whether the rover arrives."""
+    for moment in drive(rover, ground, poses, friction):
+        last = moment
+    off = np.hypot(*(last.plant.pose[:2] - poses[-1, :2]))
+    return not last.is_lost and bool(off <= KEPT)
 
 
 def main(

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.chance.ground import change_heights, cut_around
-from rover_physics.chance.samples import Sample, draw_samples, worst_of
+from rover_physics.chance.samples import Sample, draw_samples, sort_by_strength, worst_of
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.read_only import freeze_fields
@@ -29,7 +29,8 @@ from rover_physics.terrain.grid import Terrain
 SAMPLES = 32
 """Number of samples."""
 FIRST = 16
-"""Number of samples after which a path that has failed in all of them fails for sure."""
+"""Number of samples, those with the most friction and torque, after which a path that has failed
+in all of them fails for sure."""
 FAR = 0.5
 """Use of a limit below which no sample breaks it: it would have to double. Less where friction or
 torque of a sample may be less than half."""
@@ -71,7 +72,7 @@ def find_failure_chance(
     n = len(swept.prediction.poses)
     rows = _all_rows(swept)
     settled = rows.results["status"] == PoseStatus.SETTLED
-    samples = draw_samples(model.rover.uncertainty, SAMPLES)
+    samples = sort_by_strength(draw_samples(model.rover.uncertainty, SAMPLES))
     worst_two = worst_of(samples)
     far = min(FAR, NEAR * min(worst_two[0].friction[0], worst_two[0].torque))
     near = settled & _find_near(model, swept, rows.results, on_path, far)

@@ -84,6 +84,12 @@ def draw_samples(uncertainty: Uncertainty, count: int) -> tuple[Sample, ...]:
     )
 
 
+def sort_by_strength(samples: tuple[Sample, ...]) -> tuple[Sample, ...]:
+    """Return samples sorted by the scarcer of friction and torque, the one with the most first."""
+    scarcer = [min(one.friction.min(), one.torque * one.torques.min()) for one in samples]
+    return tuple(samples[k] for k in np.argsort(scarcer, kind="stable")[::-1])
+
+
 def worst_of(samples: tuple[Sample, ...]) -> tuple[Sample, Sample]:
     """Return the least friction and torque limit of samples, with all else off to either side."""
     friction = np.full(6, min(float(one.friction.min()) for one in samples))

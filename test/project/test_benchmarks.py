@@ -4,6 +4,7 @@
 import importlib
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from benchmarks.measure import print_figures, write_figures
 from benchmarks.run import TOPICS
 from rover_physics import load_rover
 
+FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 SMALL = {
     "faults": {"REPEATS": 1},
     "load": {"QUESTIONS": 10, "BURSTS": {"light": (1.5, 0.05)}, "SECONDS": 2.0, "REPEATS": 1},
@@ -62,6 +64,12 @@ def test_every_topic_measures_in_a_small_size(topic, monkeypatch, tmp_path, caps
     assert [row["name"] for row in rows] == names
     print_figures(figures)
     assert figures[0].topic in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", sorted(file.stem for file in FOLDER.glob("*.py")))
+def test_every_benchmark_can_be_imported(name):
+    pytest.importorskip("mujoco", reason="install the extra bench")
+    importlib.import_module(f"benchmarks.{name}")
 
 
 @pytest.mark.slow

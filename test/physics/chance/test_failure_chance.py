@@ -54,6 +54,13 @@ def test_the_chance_is_that_of_a_friction_below_what_the_slope_needs(slope):
     assert found.failure_chance == pytest.approx(expected, abs=ONE)
 
 
+def test_a_path_that_passes_in_the_best_sample_alone_does_not_fail_for_sure():
+    rover, ground = rover_with(max_torque=0.1), uphill(0.2)
+    used = chance_on(ground, rover).max_torque_saturation * rover.wheel.max_torque
+    weak = replace(rover, wheel=replace(rover.wheel, max_torque=used / 1.19))
+    assert chance_on(ground, weak).failure_chance == 1.0 - 1.0 / SAMPLES
+
+
 @pytest.mark.parametrize("name", ["max_torque", "model"])
 def test_the_torque_limit_counts_like_friction(name):
     rover, ground = rover_with(**{name: 0.1}), uphill(0.2)
