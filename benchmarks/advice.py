@@ -18,7 +18,7 @@ from benchmarks.chance_drives import arrives
 from benchmarks.drives import run_in_processes
 from benchmarks.grounds import all_grounds, made_reef, real_maps
 from benchmarks.measure import console
-from rover_physics import judge_path, load_rover
+from rover_physics import Rover, Terrain, judge_path, load_rover
 from rover_physics.names import EQUAL, SERVO
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_planner.advice.advise import Advice, grow_within
@@ -123,13 +123,13 @@ def is_missed(advice: Advice) -> bool:
     return False
 
 
-def drives(remedy: Remedy) -> bool:
-    """Drive a remedy in MuJoCo with speed servos; return whether the rover arrives."""
+def job_of(remedy: Remedy) -> tuple[Rover, Terrain, np.ndarray, float]:
+    """Return what `arrives` takes to drive a remedy with speed servos."""
     case = remedy.judged.case
     friction = case.options.friction
     assert friction is not None
     rover = replace(case.rover, nominal_speed=SPEED)
-    return arrives(rover, case.terrain, case.poses, friction)
+    return rover, case.terrain, case.poses, friction
 
 
 def can_be_driven(remedy: Remedy) -> bool:
@@ -168,7 +168,7 @@ def main(
         count = sum(any(one.lever is lever for one in remedy.levers) for remedy in remedies)
         say(f"  {lever.name}: {count}")
     driven = list(islice(filter(can_be_driven, remedies), drive_count))
-    arrived = list(run_in_processes(drives, [(one,) for one in driven], 1))
+    arrived = list(run_in_processes(arrives, [job_of(one) for one in driven], None))
     say(f"driven in MuJoCo: {sum(arrived)} of {len(driven)} arrive")
 
 

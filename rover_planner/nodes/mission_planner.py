@@ -309,7 +309,7 @@ class MissionPlanner(Node):
 
     def _largest(self, name: str, answer: dict[str, Any]) -> float | None:
         """Return the largest value of an array published with the verdict, None if it is empty."""
-        rows = answer.get("waypoints")
+        rows = answer.get("predicted_waypoints")
         if not rows:
             return None
         self._wait(lambda: len(self._arrays.get(name, ())) == rows, f"{SERVER}/{name}")

@@ -166,6 +166,7 @@ def _report_drive(candidate: Candidate) -> dict[str, Any]:
         "policy": verdict.policy,
         **{name: getattr(verdict, name) for name in REPORTED},
         "waypoints": len(candidate.poses),
+        "predicted_waypoints": len(prediction.poses),
         "length": candidate.length,
         "time": prediction.time[-1] if candidate.is_complete else math.nan,
         "energy": prediction.energy[-1] if candidate.is_complete else math.nan,

@@ -104,6 +104,8 @@ def test_answers_drives_and_refusals_have_exit_codes_of_their_own(start_server, 
     told = [line for line in out.splitlines() if line.startswith("goal ")]
     assert code == 3 and len(told) == 2
     assert told[0].startswith("goal 1: no, ") and told[1] == "goal 2: yes"
+    code, out, _ = run_planner("--goal=90,0,0", "--timeout=20")  # most of it is not predicted
+    assert code == 3 and "goal 1: no, " in out
     code, out, _ = run_planner(NEAR, NEAR, "--json")
     assert code == 0
     events = [json.loads(line) for line in out.splitlines()]
