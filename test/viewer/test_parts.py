@@ -8,7 +8,6 @@ import pytest
 
 from rover_physics.traversability.judge import judge_path
 from rover_planner.planning.path_query import check_path
-from rover_planner.viewer.scene.number_places import place_numbers
 from rover_planner.viewer.state.colours import (
     PASSABLE,
     REFUSED,
@@ -20,7 +19,7 @@ from rover_planner.viewer.state.playback import FAST, Playback
 from rover_planner.viewer.state.trajectory import Trajectory, find_axles
 from rover_planner.viewer.state.visitor_requests import VisitorRequests
 from support.grounds import gap, make_terrain, wall_at, waves
-from support.viewer.sessions import LSR1, session_on, straight
+from support.viewer.sessions import LSR1, straight
 
 pytest.importorskip("trimesh", reason="no trimesh: pip install '.[view]'")
 
@@ -182,18 +181,6 @@ def test_unknown_ground_is_left_out_of_the_mesh():
     assert len(holed.mesh.faces) < len(whole.mesh.faces)
     centres = holed.mesh.triangles_center
     assert not ((centres[:, 0] > 0.55) & (centres[:, 0] < 0.95)).any()
-
-
-def test_the_numbers_of_paths_stand_on_them_and_apart_from_each_other():
-    session = session_on(waves)
-    paths = [path.poses[:, :2] for path in session.shown.paths]
-    taken = np.array([session.wanted.start[:2], session.wanted.goal[:2]])
-    places = place_numbers(paths, taken)
-    for path, place in zip(paths, places, strict=True):
-        assert np.linalg.norm(path - place, axis=1).min() < 0.03
-    both = np.concatenate([places, taken])
-    away = np.linalg.norm(both[:, None] - both[None], axis=2)
-    assert away[~np.eye(len(both), dtype=bool)].min() > 0.4
 
 
 def arc(radius, length=1.0, count=41):
