@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parts behind the page without a server: trajectories, playback, requests, colours, ground."""
 
+import gc
+import io
 import math
+import weakref
 
 import numpy as np
 import pytest
@@ -23,6 +26,9 @@ from support.viewer.sessions import LSR1, straight
 
 pytest.importorskip("trimesh", reason="no trimesh: pip install '.[view]'")
 
+import trimesh
+
+from rover_planner.viewer.scene.glb import write_glb
 from rover_planner.viewer.scene.ground_mesh import build_ground_mesh, intersect_ground
 
 # Trajectories.
@@ -179,8 +185,31 @@ def test_unknown_ground_is_left_out_of_the_mesh():
         build_ground_mesh(LSR1, make_terrain(ground), "height") for ground in (waves, gap)
     )
     assert len(holed.mesh.faces) < len(whole.mesh.faces)
-    centres = holed.mesh.triangles_center
+    centres = holed.mesh.vertices[holed.mesh.faces].mean(axis=1)
     assert not ((centres[:, 0] > 0.55) & (centres[:, 0] < 0.95)).any()
+
+
+def test_another_reader_finds_the_same_surface_and_picture_in_the_file_of_a_ground():
+    mesh = build_ground_mesh(LSR1, make_terrain(gap), "slope").mesh
+    origin = np.array([0.5, -0.25, 0.0])
+    (read,) = trimesh.load(io.BytesIO(write_glb(mesh, origin)), file_type="glb").geometry.values()
+    np.testing.assert_allclose(read.vertices, mesh.vertices - origin, atol=1e-6)
+    np.testing.assert_array_equal(read.faces, mesh.faces)
+    np.testing.assert_allclose(1.0 - read.visual.uv[:, 1], mesh.uv[:, 1], atol=1e-6)
+    picture = np.asarray(read.visual.material.baseColorTexture)
+    np.testing.assert_array_equal(picture, mesh.picture)
+
+
+def test_grounds_that_are_drawn_one_after_another_leave_no_garbage():
+    terrain = make_terrain(waves)
+    gc.disable()
+    try:
+        held = weakref.ref(mesh := build_ground_mesh(LSR1, terrain, "height").mesh)
+        write_glb(mesh, np.zeros(3))
+        del mesh
+        assert held() is None
+    finally:
+        gc.enable()
 
 
 def arc(radius, length=1.0, count=41):
