@@ -1,14 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parts behind the page without a server: trajectories, playback, requests, colours, ground."""
 
+import gc
+import io
 import math
+import weakref
 
 import numpy as np
 import pytest
 
 from rover_physics.traversability.judge import judge_path
 from rover_planner.planning.path_query import check_path
-from rover_planner.viewer.scene.number_places import place_numbers
 from rover_planner.viewer.state.colours import (
     PASSABLE,
     REFUSED,
@@ -20,10 +22,13 @@ from rover_planner.viewer.state.playback import FAST, Playback
 from rover_planner.viewer.state.trajectory import Trajectory, find_axles
 from rover_planner.viewer.state.visitor_requests import VisitorRequests
 from support.grounds import gap, make_terrain, wall_at, waves
-from support.viewer.sessions import LSR1, session_on, straight
+from support.viewer.sessions import LSR1, straight
 
 pytest.importorskip("trimesh", reason="no trimesh: pip install '.[view]'")
 
+import trimesh
+
+from rover_planner.viewer.scene.glb import write_glb
 from rover_planner.viewer.scene.ground_mesh import build_ground_mesh, intersect_ground
 
 # Trajectories.
@@ -180,20 +185,31 @@ def test_unknown_ground_is_left_out_of_the_mesh():
         build_ground_mesh(LSR1, make_terrain(ground), "height") for ground in (waves, gap)
     )
     assert len(holed.mesh.faces) < len(whole.mesh.faces)
-    centres = holed.mesh.triangles_center
+    centres = holed.mesh.vertices[holed.mesh.faces].mean(axis=1)
     assert not ((centres[:, 0] > 0.55) & (centres[:, 0] < 0.95)).any()
 
 
-def test_the_numbers_of_paths_stand_on_them_and_apart_from_each_other():
-    session = session_on(waves)
-    paths = [path.poses[:, :2] for path in session.shown.paths]
-    taken = np.array([session.wanted.start[:2], session.wanted.goal[:2]])
-    places = place_numbers(paths, taken)
-    for path, place in zip(paths, places, strict=True):
-        assert np.linalg.norm(path - place, axis=1).min() < 0.03
-    both = np.concatenate([places, taken])
-    away = np.linalg.norm(both[:, None] - both[None], axis=2)
-    assert away[~np.eye(len(both), dtype=bool)].min() > 0.4
+def test_another_reader_finds_the_same_surface_and_picture_in_the_file_of_a_ground():
+    mesh = build_ground_mesh(LSR1, make_terrain(gap), "slope").mesh
+    origin = np.array([0.5, -0.25, 0.0])
+    (read,) = trimesh.load(io.BytesIO(write_glb(mesh, origin)), file_type="glb").geometry.values()
+    np.testing.assert_allclose(read.vertices, mesh.vertices - origin, atol=1e-6)
+    np.testing.assert_array_equal(read.faces, mesh.faces)
+    np.testing.assert_allclose(1.0 - read.visual.uv[:, 1], mesh.uv[:, 1], atol=1e-6)
+    picture = np.asarray(read.visual.material.baseColorTexture)
+    np.testing.assert_array_equal(picture, mesh.picture)
+
+
+def test_grounds_that_are_drawn_one_after_another_leave_no_garbage():
+    terrain = make_terrain(waves)
+    gc.disable()
+    try:
+        held = weakref.ref(mesh := build_ground_mesh(LSR1, terrain, "height").mesh)
+        write_glb(mesh, np.zeros(3))
+        del mesh
+        assert held() is None
+    finally:
+        gc.enable()
 
 
 def arc(radius, length=1.0, count=41):

@@ -37,7 +37,7 @@ from rover_planner.viewer.pages.drawings import Drawings
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.scene.ribbons import Ribbon, Strand
 from rover_planner.viewer.scene.rover_visual import RoverVisual
-from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN
+from rover_planner.viewer.state.colours import CASING, PASSABLE, REFUSED, UNKNOWN
 from rover_planner.viewer.state.judging import POLICY
 
 pytestmark = pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
@@ -229,26 +229,27 @@ def test_a_path_is_drawn_in_the_colour_of_its_verdict_up_to_where_it_is_refused(
     ground = session.wanted.terrain
     ask(page, lambda: overlay.show(LSR1, ground, candidates, shown.index))
     driven, beyond, *cross = overlay.ribbons[shown.index].strands
-    assert driven.colour == REFUSED and driven.width > beyond.width
+    assert driven.colour == REFUSED
     np.testing.assert_array_equal(driven.line[-1], beyond.line[0])
     assert beyond.colour != REFUSED and len(cross) == 2
 
 
 def test_a_ribbon_that_looks_the_same_is_not_sent_again(page):
     line = np.column_stack([np.linspace(0.0, 1.0, 5), np.zeros(5), np.zeros(5)])
-    strands = [Strand(line, PASSABLE, 0.1), Strand(line + 1.0, REFUSED, 0.05)]
+    strands = [Strand(line, PASSABLE), Strand(line + 1.0, REFUSED)]
     ribbon = Ribbon(page.server.scene, "/test/ribbon")
-    ribbon.show(strands)
-    band, sent = ribbon._band, ribbon._band.glb_data
-    ribbon.show([replace(one, line=one.line.copy()) for one in strands])
-    assert ribbon._band is band and band.glb_data is sent
+    ribbon.show(strands, 4.0)
+    casing, core = ribbon._nodes
+    sent = core.points
+    ribbon.show([replace(one, line=one.line.copy()) for one in strands], 4.0)
+    assert ribbon._nodes[1] is core and core.points is sent
     ribbon.paint(UNKNOWN)
-    assert ribbon._band is band and band.glb_data != sent
-    assert (ribbon._core.colors == UNKNOWN).all() and ribbon.strands[0].colour == PASSABLE
+    assert (core.colors == UNKNOWN).all() and ribbon.strands[0].colour == PASSABLE
     ribbon.paint(None)
-    assert band.glb_data == sent and (ribbon._core.colors[-1] == REFUSED).all()
-    ribbon.show([replace(strands[0], line=line[:3])])
-    assert ribbon._band is band and len(ribbon._core.points) == 2
+    assert (core.colors[0] == PASSABLE).all() and (core.colors[-1] == REFUSED).all()
+    assert casing.thickness > core.thickness == 4.0 and (casing.colors == CASING).all()
+    ribbon.show([replace(strands[0], line=line[:3])], 4.0)
+    assert ribbon._nodes[1] is core and len(core.points) == 2
     ribbon.remove()
 
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from rover_physics.numerics.arrays import Floats
 from rover_planner.viewer.documents.legend import describe_scale, describe_survey
+from rover_planner.viewer.scene.glb import write_glb
 from rover_planner.viewer.scene.ground_mesh import (
     build_ground_mesh,
     build_survey_mesh,
-    export_ground,
 )
 from rover_planner.viewer.state.background_work import BackgroundWork, Progress
 from rover_planner.viewer.state.layers import HEIGHT, LAYERS
@@ -111,4 +111,4 @@ def _paint(request: PaintRequest) -> Iterator[Progress | PaintedGround]:
         heading = request.path if how.along else float(np.radians(how.heading))
         drawn = build_ground_mesh(asked.rover, asked.terrain, how.layer, heading, options)
         mesh, legend = drawn.mesh, describe_scale(how.describe(), drawn.scale)
-    yield PaintedGround(export_ground(mesh, request.origin), legend)
+    yield PaintedGround(write_glb(mesh, request.origin), legend)

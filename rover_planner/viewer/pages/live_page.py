@@ -19,7 +19,8 @@ from rover_planner.viewer.live.listener import LiveData, LiveListener
 from rover_planner.viewer.live.live_state import StateBuilder
 from rover_planner.viewer.pages.base import Answer, PageBase, Words
 from rover_planner.viewer.pages.ground_painter import Colouring
-from rover_planner.viewer.scene.ground_mesh import build_ground_mesh, export_ground
+from rover_planner.viewer.scene.glb import write_glb
+from rover_planner.viewer.scene.ground_mesh import build_ground_mesh
 from rover_planner.viewer.state.layers import LAYERS
 from rover_planner.viewer.state.link import read_link
 from rover_planner.viewer.state.trajectory import RoverState
@@ -128,7 +129,7 @@ class LivePage(PageBase):
         how = self._colouring
         heading = float(np.radians(how.heading))
         ground = build_ground_mesh(self._rover, self._terrain, how.layer, heading)
-        self.scene.draw_ground(export_ground(ground.mesh, self.scene.frame.origin))
+        self.scene.draw_ground(write_glb(ground.mesh, self.scene.frame.origin))
         self.channel.tell("legend", describe_scale(how.describe(), ground.scale))
 
     def tell(self) -> None:

@@ -1,13 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The terrain as a mesh with a layer as its texture, and where a ray meets the ground."""
+"""The terrain as a mesh with a layer as its picture, and where a ray meets the ground."""
 
-import json
-import struct
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 from scipy import ndimage
 
@@ -15,6 +12,7 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
+from rover_planner.viewer.scene.glb import TexturedMesh
 from rover_planner.viewer.state.colours import BEYOND, GOOD, ColourScale, map_colours
 from rover_planner.viewer.state.layers import (
     LAYERS,
@@ -47,7 +45,7 @@ LINE_SHADE = 0.82
 class GroundMesh:
     """The ground as it is drawn."""
 
-    mesh: trimesh.Trimesh
+    mesh: TexturedMesh
     """The surface with its texture."""
     scale: ColourScale
     """The values of its colours."""
@@ -103,7 +101,7 @@ def build_ground_mesh(
 
 def build_survey_mesh(
     terrain: Terrain, survey: ShownSurvey, name: str
-) -> tuple[trimesh.Trimesh, ColouredGround]:
+) -> tuple[TexturedMesh, ColouredGround]:
     """Return the ground in the colours of a survey's layer, and what they mean.
 
     The texture is finer than the mesh, so that each pixel has the colour of a surveyed cell.
@@ -195,23 +193,14 @@ def _hatch(picture: NDArray[np.uint8], where: NDArray[np.bool_], pixel: float) -
 
 def _build_textured_mesh(
     x: Floats, y: Floats, heights: Floats, texture: NDArray[np.uint8]
-) -> trimesh.Trimesh:
+) -> TexturedMesh:
     """Return the surface of heights (ny, nx) [m] at x and y [m] with a picture on it."""
-    from PIL import Image
-
     gx, gy = np.meshgrid(x, y)
     vertices = np.column_stack([gx.ravel(), gy.ravel(), np.nan_to_num(heights).ravel()])
     ny, nx = heights.shape
     u, v = np.meshgrid((np.arange(nx) + 0.5) / nx, (np.arange(ny) + 0.5) / ny)
-    material = trimesh.visual.material.PBRMaterial(
-        baseColorTexture=Image.fromarray(texture[::-1]), metallicFactor=0.0, roughnessFactor=1.0
-    )
-    visual = trimesh.visual.TextureVisuals(
-        uv=np.column_stack([u.ravel(), v.ravel()]), material=material
-    )
-    return trimesh.Trimesh(
-        vertices, join_cells(np.isfinite(heights)), visual=visual, process=False
-    )
+    uv = np.column_stack([u.ravel(), v.ravel()])
+    return TexturedMesh(vertices, join_cells(np.isfinite(heights)), uv, texture)
 
 
 def join_cells(known: NDArray[np.bool_]) -> NDArray[np.intp]:
@@ -221,35 +210,6 @@ def join_cells(known: NDArray[np.bool_]) -> NDArray[np.intp]:
     whole = known[:-1, :-1] & known[:-1, 1:] & known[1:, 1:] & known[1:, :-1]
     lower = np.column_stack([a[whole], b[whole], c[whole]])
     return np.concatenate([lower, np.column_stack([a[whole], c[whole], d[whole]])])
-
-
-def as_unlit_glb(mesh: trimesh.Trimesh | trimesh.Scene) -> bytes:
-    """Return a mesh, or several, as a binary glTF file whose texture is shown without lights.
-
-    Without a graphics card, a matt surface that fills the screen takes most of the time of a
-    picture. The glTF extension KHR_materials_unlit avoids that; trimesh does not write it.
-    """
-    glb: Any = mesh.export(file_type="glb")
-    length = struct.unpack_from("<I", glb, 12)[0]
-    content = json.loads(glb[20 : 20 + length])
-    for material in content["materials"]:
-        material["extensions"] = {"KHR_materials_unlit": {}}
-    content["extensionsUsed"] = ["KHR_materials_unlit"]
-    text = json.dumps(content).encode()
-    text += b" " * (-len(text) % 4)
-    chunk = struct.pack("<I4s", len(text), b"JSON") + text + glb[20 + length :]
-    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunk)) + chunk
-
-
-def export_ground(mesh: trimesh.Trimesh, origin: Floats) -> bytes:
-    """Return a ground in the map frame as a binary glTF file about an origin (3,) [m].
-
-    It takes a quarter of a second: most of it to compress the texture.
-    """
-    if origin.any():
-        mesh = mesh.copy()
-        mesh.apply_translation(-origin)
-    return as_unlit_glb(mesh)
 
 
 def intersect_ground(terrain: Terrain, origin: Floats, direction: Floats) -> Floats | None:

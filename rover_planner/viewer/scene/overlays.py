@@ -13,7 +13,6 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.path_query import Candidate
 from rover_planner.viewer.scene.labels import Label, Labels
 from rover_planner.viewer.scene.local_frame import LocalFrame
-from rover_planner.viewer.scene.number_places import place_numbers
 from rover_planner.viewer.scene.ribbons import Ribbon, Strand
 from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN, Colour, blend
 
@@ -28,8 +27,10 @@ CLEARANCE = 0.15
 """Height of a path above the ground [wheel radii]."""
 CROSS = 0.7
 """Half the width of the cross where a path is refused [wheel radii]."""
-WIDE, NARROW = 0.5, 0.22
-"""Widths of the shown path and of the others [wheel radii]."""
+WIDE, NARROW = 5.0, 2.5
+"""Widths of the shown path and of the others [px]."""
+NUMBER_SHARES = (0.35, 0.65)
+"""Shares of a path at which the numbers of the first and the last one stand."""
 NUMBER_LABELS, FLAGS = "/numbers", "/flags"
 """Groups of labels."""
 NUMBER_HEIGHT = 1.5
@@ -78,8 +79,8 @@ class PathOverlay:
             self.ribbons.pop(index).remove()
         for index, candidate in enumerate(candidates):
             ribbon = self.ribbons.setdefault(index, Ribbon(self._scene, f"/paths/{index}"))
-            strands = self._find_strands(terrain, candidate, radius, index == shown)
-            ribbon.show(strands, self._paint_of(index))
+            strands = self._find_strands(terrain, candidate, radius)
+            ribbon.show(strands, WIDE if index == shown else NARROW, self._paint_of(index))
         poses = candidates[shown].poses
         self._draw_numbers(terrain, candidates, radius, shown)
         self._draw_flags(terrain, {"start": poses[0], "goal": poses[-1]}, radius)
@@ -94,9 +95,8 @@ class PathOverlay:
         self.clear()
         if plan is not None:
             height = CLEARANCE * rover.wheel.radius
-            width = WIDE * rover.wheel.radius
             colour = UNKNOWN if is_old else PASSABLE
-            self._plan.show(self._find_strand(terrain, plan[:, :2], colour, (height, width)))
+            self._plan.show(self._find_strand(terrain, plan[:, :2], colour, height), WIDE)
             self._draw_flags(terrain, {"goal": plan[-1]}, rover.wheel.radius)
         else:
             self._labels.show(FLAGS, {})
@@ -104,9 +104,10 @@ class PathOverlay:
 
     def show_ghost(self, rover: Rover, terrain: Terrain, path: Floats | None) -> None:
         """Draw a path (n, 3) that a person points at, or none."""
-        size = CLEARANCE * rover.wheel.radius, WIDE * rover.wheel.radius
+        height = CLEARANCE * rover.wheel.radius
         points = None if path is None else path[:, :2]
-        self._ghost.show([] if points is None else self._find_strand(terrain, points, GHOST, size))
+        strands = [] if points is None else self._find_strand(terrain, points, GHOST, height)
+        self._ghost.show(strands, WIDE)
 
     def find_number(self, origin: Floats, direction: Floats) -> int | None:
         """Return the index of the path whose number a ray (3,) of the scene hits; None for none.
@@ -140,61 +141,45 @@ class PathOverlay:
     def _paint_of(self, index: int) -> Colour | None:
         return UNKNOWN if index in self._old else None
 
-    def _find_strands(
-        self, terrain: Terrain, candidate: Candidate, radius: float, shown: bool
-    ) -> list[Strand]:
+    def _find_strands(self, terrain: Terrain, candidate: Candidate, radius: float) -> list[Strand]:
         """Return a path in the colour of its verdict, faded from where it is refused."""
         points, verdict = candidate.poses[:, :2], candidate.verdict
-        size = (CLEARANCE * radius, radius * (WIDE if shown else NARROW))
+        height = CLEARANCE * radius
         if verdict.traversable:
-            return self._find_strand(terrain, points, PASSABLE, size)
+            return self._find_strand(terrain, points, PASSABLE, height)
         end = verdict.first_failure
-        faded = blend(REFUSED, WHITE, FADE)
-        narrow = (CLEARANCE * radius, NARROW * radius)
+        arms = CROSS * radius * np.array([[1.0, 1.0], [1.0, -1.0]])
+        crossing = [np.array([points[end] - arm, points[end] + arm]) for arm in arms]
         return [
-            *self._find_strand(terrain, points[: end + 1], REFUSED, size),
-            *self._find_strand(terrain, points[end:], faded, narrow),
-            *self._find_cross(terrain, points[end], radius),
+            *self._find_strand(terrain, points[: end + 1], REFUSED, height),
+            *self._find_strand(terrain, points[end:], blend(REFUSED, WHITE, FADE), height),
+            *(
+                strand
+                for arm in crossing
+                for strand in self._find_strand(terrain, arm, REFUSED, 2.0 * height)
+            ),
         ]
 
     def _find_strand(
-        self, terrain: Terrain, points: Floats, colour: Colour, size: tuple[float, float]
+        self, terrain: Terrain, points: Floats, colour: Colour, height: float
     ) -> list[Strand]:
-        """Return a strand through points (n, 2) at a height above the ground and of a width [m].
+        """Return a strand through points (n, 2) at a height above the ground [m].
 
         There is none where fewer than two points are on known ground.
         """
-        height, width = size
         points = points[_thin(len(points))]
         ground = terrain.elevation_at(points[:, 0], points[:, 1])
         line = np.column_stack([points, ground + height])[np.isfinite(ground)]
-        if len(line) < 2:
-            return []
-        return [Strand(self._frame.to_scene(line), colour, width)]
-
-    def _find_cross(self, terrain: Terrain, place: Floats, radius: float) -> list[Strand]:
-        """Return a cross on the ground where a path is refused (2,) [m]."""
-        height, width = 2.0 * CLEARANCE * radius, NARROW * radius
-        arms = CROSS * radius * np.array([[1.0, 1.0], [1.0, -1.0]])
-        return [
-            strand
-            for k, arm in enumerate(arms)
-            for strand in self._find_strand(
-                terrain,
-                np.array([place - arm, place + arm]),
-                REFUSED,
-                (height * (1.0 + 0.3 * k), width),
-            )
-        ]
+        return [Strand(self._frame.to_scene(line), colour)] if len(line) > 1 else []
 
     def _draw_numbers(
         self, terrain: Terrain, candidates: Sequence[Candidate], radius: float, shown: int
     ) -> None:
-        """Write the number of each path beside it, away from the ends of the shown path."""
+        """Write the number of each path on it, one after another if there are several."""
         self._numbers.clear()
-        ends = candidates[shown].poses[[0, -1], :2]
-        paths = [candidate.poses[:, :2] for candidate in candidates]
-        for index, (x, y) in enumerate(place_numbers(paths, ends) if len(paths) > 1 else ()):
+        shares = np.linspace(*NUMBER_SHARES, len(candidates))
+        for index, candidate in enumerate(candidates if len(candidates) > 1 else ()):
+            x, y, _ = candidate.poses[round(shares[index] * (len(candidate.poses) - 1))]
             height = _ground_height(terrain, x, y) + NUMBER_HEIGHT * radius
             self._numbers[index] = self._frame.to_scene(np.array([x, y, height]))
         labels = {

@@ -43,7 +43,7 @@ class Scene:
         self._last_position: np.ndarray | None = None
 
     def draw_ground(self, glb: bytes) -> None:
-        """Show another ground, as `export_ground` returns it, or the same in other colours."""
+        """Show another ground, as `write_glb` returns it, or the same in other colours."""
         self._scene.add_glb("/ground", glb, cast_shadow=False, receive_shadow=False)
 
     def draw_rover(self, rover: Rover, arm_angles: Mapping[str, float]) -> None:

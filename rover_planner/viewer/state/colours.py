@@ -27,8 +27,8 @@ BEYOND = REFUSED
 GOOD = (143, 196, 224)
 """Pale blue: ground where the rover keeps its limits."""
 UNKNOWN = (110, 110, 110)
-CASING, RING = (16, 16, 16), (255, 255, 255)
-"""Dark and light halo around lines on the ground."""
+CASING = (16, 16, 16)
+"""Dark border of lines on the ground."""
 
 
 @dataclass(frozen=True)
@@ -80,27 +80,6 @@ def blend(first: Colour, second: Colour, share: float) -> Colour:
     start, end = np.array(first), np.array(second)
     red, green, blue = np.round(start + share * (end - start)).astype(int).tolist()
     return red, green, blue
-
-
-def find_contrast(one: Colour, other: Colour) -> float:
-    """Return the contrast of two colours, 1 to 21 (WCAG 2.1)."""
-    lights = sorted((_luminance(one), _luminance(other)))
-    return (lights[1] + 0.05) / (lights[0] + 0.05)
-
-
-def _luminance(colour: Colour) -> float:
-    """Return the relative luminance of an sRGB colour, 0 to 1."""
-    share = np.array(colour) / 255.0
-    linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
-    return float(linear @ (0.2126, 0.7152, 0.0722))
-
-
-def choose_halo(colour: Colour) -> tuple[Colour, ...]:
-    """Return the halos of a line from the outside in: dark, and light too if the line is dark.
-
-    Whatever the ground is like, dark or light stands out from it, and each from the next.
-    """
-    return (CASING,) if find_contrast(colour, CASING) > 7.0 else (CASING, RING)
 
 
 def to_css(colour: Colour) -> str:
