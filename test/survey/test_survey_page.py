@@ -71,7 +71,7 @@ def test_the_first_limit_has_a_colour_and_a_meaning_for_each_that_fails_somewher
 def test_a_pixel_of_the_ground_is_that_of_its_cell(shown, surveyed):
     terrain = load_map(surveyed, 10_000)
     drawn, _ = build_survey_mesh(terrain, shown, CLASS)
-    picture = np.asarray(drawn.visual.material.baseColorTexture)[::-1]
+    picture = drawn.picture
     factor = picture.shape[0] // 60
     assert factor == 8
     row, column = (int((at / 0.1 + 0.5) * factor) for at in PASSABLE[::-1])
