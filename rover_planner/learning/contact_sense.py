@@ -104,19 +104,19 @@ class ContactSense:
         try:
             ends = [self._finder.find(state, pose, 0.0, way).angles for way in (forward, -forward)]
             tractions = torques / self._radius
-            loads, lateral, excess = zip(
-                *(self._balance_at(state, angles, tractions) for angles in ends), strict=True
+            (loads, lateral, excess), (other_loads, other_lateral, other_excess) = (
+                self._balance_at(state, angles, tractions) for angles in ends
             )
         except ModelError:
             return None
         # Of what is between the two ends, the balance tells how the wheels touch.
-        spread = excess[0] - excess[1]
-        share = float(np.clip(-excess[1] / spread, 0.0, 1.0)) if spread else 0.5
-        doubts = 0.5 * np.abs(loads[0] - loads[1])
-        loads, lateral, excess, middle = (
-            share * first + (1.0 - share) * second
-            for first, second in (loads, lateral, excess, ends)
-        )
+        spread = excess - other_excess
+        share = float(np.clip(-other_excess / spread, 0.0, 1.0)) if spread else 0.5
+        doubts = 0.5 * np.abs(loads - other_loads)
+        loads = share * loads + (1.0 - share) * other_loads
+        lateral = share * lateral + (1.0 - share) * other_lateral
+        excess = share * excess + (1.0 - share) * other_excess
+        middle = share * ends[0] + (1.0 - share) * ends[1]
         s, c = np.sin(middle)[:, None], np.cos(middle)[:, None]
         sides = np.repeat([rocker, -rocker], 3)
         links = row[PITCH] + sides + np.where(self._on_bogie, np.repeat(bogies, 3), 0.0)
