@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from rover_physics.bounds.path import SIGMAS
+from rover_physics.limits.table import CHANCE
 from rover_physics.names import WHEEL_POSITIONS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
@@ -60,8 +61,12 @@ class Case:
         )
         return JudgedCase(self, *judged)
 
-    def passes_at(self, rows: slice) -> bool:
-        """Return whether a piece of the path keeps the limits; if not, the path does not."""
+    def fails_at(self, place: int, rows: slice, by_chance: bool) -> bool:
+        """Return whether a piece of the path shows that a waypoint in it, or one before it, fails.
+
+        Its first row has another motion than in the path, and wheels behind the place may fall in
+        ways that the piece does not show.
+        """
         (_, verdict), *_ = judge_paths(
             self.rover,
             self.terrain,
@@ -70,8 +75,12 @@ class Case:
             sigmas=self.sigmas,
             stop_at_failure=True,
             check_entrapment=False,
+            accepted_chance=self.accepted_chance if by_chance else None,
         )
-        return verdict.traversable
+        row = verdict.first_failure
+        if verdict.code == CHANCE and verdict.failure_chance_at[row] <= self.accepted_chance:
+            return False
+        return (0 if rows.start == 0 else 1) <= row <= place - rows.start
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,8 @@ from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 
 BEFORE = 1.5
 """Length of path that decides about a failure with servos [wheelbases]: they drift over one."""
+EDGE = 2.0
+"""Length of path around a failure that decides whether a wheel falls there [wheel radii]."""
 SEARCH = LatticeSettings(budget=1.0, ends_at_first=True)
 """How a path around is searched."""
 
@@ -87,8 +89,8 @@ class Refusal:
 
     def rows_around(self, place: int, policy: str) -> slice:
         """Return the rows of the path that decide whether a waypoint fails under a policy."""
-        if policy != SERVO:
-            return slice(max(0, place - 1), place + 1)
-        distance = self.judged.distance
-        near = distance[place] - BEFORE * self.case.rover.wheelbase
-        return slice(int(np.searchsorted(distance, near)), place + 1)
+        rover, distance = self.case.rover, self.judged.distance
+        before = BEFORE * rover.wheelbase if policy == SERVO else EDGE * rover.wheel.radius
+        near = distance[place] - before, distance[place] + EDGE * rover.wheel.radius
+        first, last = np.searchsorted(distance, near)
+        return slice(max(0, min(int(first), place - 1)), int(last) + 1)
