@@ -115,6 +115,7 @@ function drawVerdict(one) {
   box.replaceChildren(
     make("div", {}, make("span", { class: "word" }, one.word), " ", make("small", {}, one.about)),
     ...(one.headline ? [make("div", { id: "headline" }, make("b", {}, one.headline), one.where ? `, ${one.where}` : "")] : []),
+    ...(one.chance ? [make("small", { id: "chance" }, one.chance)] : []),
     ...(one.old ? [make("div", { class: "notice", id: "old" }, `old: ${one.old}`)] : []),
     ...(one.refusal ? [make("div", { class: "notice", id: "refusal" }, `refused: ${one.refusal}`)] : []),
     make("div", { class: "row" }, ...offers,
@@ -298,7 +299,7 @@ function drawCurves() {
   if (!curve || !state.limits) return;
   const title = state.limits.lanes.find((lane) => lane.code === chosen.lane)?.title;
   at("curves").replaceChildren(
-    make("h2", {}, `${title}, use of the limit`), plot(curve, (value) => `${Math.round(100 * value)} %`, 1.0, curve.old),
+    make("h2", {}, chosen.lane === "chance" ? "chance of failure" : `${title}, use of the limit`), plot(curve, (value) => `${Math.round(100 * value)} %`, 1.0, curve.old),
     make("h2", {}, "wheel loads"), plot(state.limits.loads, (value) => `${value.toFixed(0)} N`, null, null),
     make("div", {}, ...Object.entries(COLOURS).map(([name, colour]) => make("span", { class: "key" }, make("i", { style: `background:${colour}` }), name)),
       make("small", {}, "right: line, left: dashes")));

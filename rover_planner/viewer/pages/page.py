@@ -288,7 +288,7 @@ class Page(PageBase):
             state, at = path.failure.state, path.failure.time
             parts |= {
                 "board": describe_board(state, path.failure.link),
-                "uses": describe_uses(path, at),
+                "uses": describe_uses(path, at, self.session.shown.chance),
                 "drive": {**parts["drive"], "time": at, "distance": path.failure.distance},
             }
         rover = path.scenario.rover
@@ -452,8 +452,9 @@ class Page(PageBase):
             (path, reference, kept),
             lambda: describe_changes(path, reference, is_kept=kept is not None),
         )
-        made("limits", (path, reference), lambda: describe_limits(path, reference))
-        made("curves", (path, reference), lambda: describe_curves(path, reference))
+        along = path, reference, shown.chance
+        made("limits", along, lambda: describe_limits(*along))
+        made("curves", along, lambda: describe_curves(*along))
         model, how = wanted.options.model, self._colouring
         tell("chosen", {
             "policy": model.policy, "soil": model.soil or "", "sets": self._click_sets,
@@ -496,7 +497,8 @@ class Page(PageBase):
         shown = state if state is not None or failure is None else failure.state
         board = describe_board(shown, link, has_slip=path.trajectory.has_slip)
         self.channel.tell("board", board)
-        self.channel.tell("uses", describe_uses(path, playback.time))
+        uses = describe_uses(path, playback.time, self.session.shown.chance)
+        self.channel.tell("uses", uses)
 
     def _find_state(self) -> RoverState | None:
         """Return the state at the time of the playback; at a failure that at which it fails.

@@ -27,7 +27,7 @@ CLEARANCE = 0.15
 """Height of a path above the ground [wheel radii]."""
 CROSS = 0.7
 """Half the width of the cross where a path is refused [wheel radii]."""
-WIDE, NARROW = 5.0, 2.5
+WIDE, NARROW = 6.0, 3.5
 """Widths of the shown path and of the others [px]."""
 NUMBER_SHARES = (0.35, 0.65)
 """Shares of a path at which the numbers of the first and the last one stand."""

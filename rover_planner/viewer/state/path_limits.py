@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.limits.table import Sense
+from rover_physics.chance.failure_chance import FailureChance
+from rover_physics.limits.table import CHANCE, Sense
 from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_prediction import PathPrediction
@@ -187,6 +188,13 @@ def _find_wheel_uses(prediction: PathPrediction, uses: Uses, k: int) -> Floats |
     return np.asarray(
         np.where(np.isnan(uses.use[:, [k]]), np.nan, values / (uses.limits.bounds[k] * kept))
     )
+
+
+def make_chance_lane(limits: PathLimits, chance: FailureChance) -> Lane:
+    """Return the chance that a path fails at each pose as a lane beside those of its limits."""
+    waypoint = limits.rows.prediction.waypoint
+    unknown, no_wheel = np.full(len(waypoint), np.nan), np.full(len(waypoint), -1)
+    return Lane(ShownLimit(CHANCE, "chance"), unknown, chance.at[waypoint], no_wheel)
 
 
 def _add_refusals(limits: PathLimits, verdict: Verdict) -> None:
