@@ -161,8 +161,10 @@ def test_the_chance_of_failure_is_a_lane_of_its_own_with_its_main_cause():
     curve = describe_curves(shown.path, None, shown.chance)["chance"]["y"][0]
     assert max(curve) == pytest.approx(max(verdict.failure_chance_at), abs=1e-3)
     use = describe_uses(shown.path, np.inf, shown.chance)[-1]
-    assert f"{100.0 * verdict.failure_chance:.0f} %, most often by friction" in use["value"]
-    assert use["value"].removeprefix("whole path") in describe_verdict(shown, Work())["chance"]
+    percent = f"{100.0 * verdict.failure_chance:.0f} %"
+    assert use["value"] == f"whole path {percent}"
+    words = describe_verdict(shown, Work())["chance"]
+    assert words == f"chance of failure {percent}, most often by friction"
 
 
 def test_a_use_without_bound_is_above_the_limit_in_its_curve():

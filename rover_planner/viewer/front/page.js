@@ -81,7 +81,7 @@ const DRAW = {
   subject: drawSubject, errors: drawErrors, scene: drawScene, verdict: drawVerdict, advice: drawAdvice,
   paths: drawPaths, sliders: drawSliders, values: drawValues, changes: drawChanges,
   limits: drawLimits, curves: drawCurves, uses: drawUses, board: drawBoard, drive: drawDrive,
-  legend: drawLegend, chosen: drawChosen, offers: drawChosen, topics: drawTopics,
+  legend: drawLegend, chosen: drawChosen, offers: drawChosen, topics: drawTopics, learned: drawLearned,
   file: saveFile, link: drawShare, current: (link) => { chosen.link = link; }, written: drawShare,
 };
 
@@ -402,6 +402,11 @@ function drawLegend({ title, gradient, ends, keys, notes }) {
       make("div", { class: "ends" }, ...ends.map((end) => make("span", {}, end)))] : []),
     ...keys.map(([colour, words]) => make("div", { class: "key" }, make("i", colour === "hatched" ? { class: "hatched" } : { style: `background:${colour}` }), words)),
     ...notes.map((note) => make("div", {}, note)));
+}
+
+function drawLearned(lines) {
+  at("learned").replaceChildren(...(lines.length ? [make("h2", {}, "learned of the ground")] : []),
+    ...lines.map((line) => make("div", {}, line)));
 }
 
 function drawTopics(topics) {

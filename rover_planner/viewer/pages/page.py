@@ -35,7 +35,7 @@ from rover_planner.viewer.pages.base import Answer, PageBase, Words
 from rover_planner.viewer.pages.ground_painter import Colouring, GroundPainter, PaintRequest
 from rover_planner.viewer.pages.sharing import MapPrint, make_link, read_scenario, write_file
 from rover_planner.viewer.scene.cameras import find_radius
-from rover_planner.viewer.state.layers import LAYERS
+from rover_planner.viewer.state.layers import LAYERS, list_layers
 from rover_planner.viewer.state.link import PageLink, read_link, write_link
 from rover_planner.viewer.state.path_advice import PathAdvice, apply_remedy
 from rover_planner.viewer.state.playback import SPEEDS, Playback
@@ -82,7 +82,10 @@ class Page(PageBase):
         self.session, self.playback = session, Playback()
         self._ground_name = ground_name or name_ground(session.wanted.terrain)
         self._survey = survey
-        self._layers = (*(survey.names if survey is not None else ()), *LAYERS)
+        self._layers = (
+            *(survey.names if survey is not None else ()),
+            *list_layers(session.wanted.terrain),
+        )
         self._colouring = Colouring(self._layers[0])
         self._map_print = MapPrint(session.wanted.terrain)
         self._click_sets, self._forces = "goal", True

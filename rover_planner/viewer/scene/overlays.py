@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from rover_physics.numerics.arrays import Floats
@@ -14,7 +15,14 @@ from rover_planner.planning.path_query import Candidate
 from rover_planner.viewer.scene.labels import Label, Labels
 from rover_planner.viewer.scene.local_frame import LocalFrame
 from rover_planner.viewer.scene.ribbons import Ribbon, Strand
-from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN, Colour, blend
+from rover_planner.viewer.state.colours import (
+    PASSABLE,
+    REFUSED,
+    UNKNOWN,
+    Colour,
+    blend,
+    map_colours,
+)
 
 MAX_POINTS = 250
 """Most points of a path that are drawn."""
@@ -52,6 +60,7 @@ class PathOverlay:
         """The drawn paths by their index."""
         self._plan = Ribbon(scene, "/paths/plan")
         self._ghost = Ribbon(scene, "/paths/ghost")
+        self._trail = Ribbon(scene, "/paths/trail")
         self._old: set[int] = set()
         """Indices of the paths that are greyed."""
         self._numbers: dict[int, Floats] = {}
@@ -108,6 +117,17 @@ class PathOverlay:
         points = None if path is None else path[:, :2]
         strands = [] if points is None else self._find_strand(terrain, points, GHOST, height)
         self._ghost.show(strands, WIDE)
+
+    def show_trail(self, rover: Rover, terrain: Terrain, trail: Floats | None) -> None:
+        """Draw where (n, 3) something was learned: x, y [m] and a number from 0 to 1."""
+        known = np.empty((0, 3)) if trail is None else trail
+        height = CLEARANCE * rover.wheel.radius
+        strands = [
+            strand
+            for pair in sliding_window_view(known, 2, axis=0).swapaxes(1, 2)
+            for strand in self._find_strand(terrain, pair[:, :2], _colour_of(pair[1, 2]), height)
+        ]
+        self._trail.show(strands, WIDE)
 
     def find_number(self, origin: Floats, direction: Floats) -> int | None:
         """Return the index of the path whose number a ray (3,) of the scene hits; None for none.
@@ -215,6 +235,12 @@ class PathOverlay:
 def _thin(count: int) -> NDArray[np.intp]:
     """Return at most MAX_POINTS rows of `count`, with the first and the last."""
     return np.unique(np.linspace(0, count - 1, min(count, MAX_POINTS)).round().astype(np.intp))
+
+
+def _colour_of(value: float) -> Colour:
+    """Return the colour of a number from 0 to 1."""
+    red, green, blue = map_colours(np.array(value), 0.0, 1.0).tolist()
+    return red, green, blue
 
 
 def _ground_height(terrain: Terrain, x: float, y: float) -> float:
