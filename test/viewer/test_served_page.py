@@ -259,6 +259,17 @@ def test_a_ribbon_has_the_colours_of_its_strands_and_is_not_sent_again_if_it_loo
     ribbon.remove()
 
 
+def test_a_trail_has_a_colour_from_blue_to_yellow_at_each_place(page):
+    overlay, ground = page.scene.paths, page.ground
+    trail = np.array([[0.0, 0.0, 0.5], [0.1, 0.0, 0.0], [0.2, 0.0, 1.0]])
+    for known, count in ((None, 0), (trail[:1], 0), (trail, 2)):
+        overlay.show_trail(LSR1, ground, known)
+        assert len(overlay._trail.strands) == count
+    low, high = (one.colour for one in overlay._trail.strands)
+    assert low[2] > low[0] and high[0] > high[2]
+    overlay.show_trail(LSR1, ground, None)
+
+
 def test_a_rover_of_another_shape_is_drawn_as_a_new_one(page):
     scene = page.server.scene
     wide = replace(LSR1, wheel=replace(LSR1.wheel, radius=1.3 * LSR1.wheel.radius))

@@ -56,6 +56,7 @@ function take(parts) {
   Object.assign(state, parts);
   if ("program" in parts) greet(parts.program);
   for (const name of Object.keys(parts)) if (DRAW[name]) DRAW[name](parts[name]);
+  if ("offers" in parts) openTab(chosen.tab);
   heard += 1;
   document.body.dataset.heard = heard;
 }
@@ -137,12 +138,10 @@ function drawAdvice({ asked, busy, words, rows }) {
   at("advice").replaceChildren(...(!refused ? [] : !asked
     ? [button("What would help?", { ask: "advise" })]
     : [busy ? make("small", {}, busy) : "", words,
-      make("ol", {}, ...rows.map((row) => make("li", {
-        ...(row.index === null ? { class: "quiet" } : {
-          tabindex: 0, onpointerenter: point(row.index), onpointerleave: point(null),
-          onclick: () => ask({ ask: "remedy", index: row.index }),
-          onkeydown: (event) => { if (event.key === "Enter") event.currentTarget.click(); },
-        }),
+      make("ol", {}, ...rows.map((row) => make("li", row.index === null ? { class: "quiet" } : {
+        tabindex: 0, onpointerenter: point(row.index), onpointerleave: point(null),
+        onclick: () => ask({ ask: "remedy", index: row.index }),
+        onkeydown: (event) => { if (event.key === "Enter") event.currentTarget.click(); },
       }, row.words, make("small", {}, ` (${row.costs})`))))].filter((child) => child !== "")));
 }
 
@@ -443,8 +442,10 @@ function saveFile({ name, text }) {
 
 function openTab(name) {
   chosen.tab = name;
+  const plans = !state.offers || state.offers.policies; // else it follows a rover, which has its own program
+  const panels = [...at("panels").children].filter((panel) => plans || ["Drive", "Ground"].includes(panel.dataset.tab));
   for (const panel of at("panels").children) panel.toggleAttribute("data-open", panel.dataset.tab === name);
-  at("tabs").replaceChildren(...[...at("panels").children].map((panel) => make("button", {
+  at("tabs").replaceChildren(...panels.map((panel) => make("button", {
     role: "tab", "aria-selected": String(panel.dataset.tab === name), onclick: () => openTab(panel.dataset.tab) }, panel.dataset.tab)));
 }
 

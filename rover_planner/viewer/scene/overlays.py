@@ -5,7 +5,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from rover_physics.numerics.arrays import Floats
@@ -121,11 +120,13 @@ class PathOverlay:
     def show_trail(self, rover: Rover, terrain: Terrain, trail: Floats | None) -> None:
         """Draw where (n, 3) something was learned: x, y [m] and a number from 0 to 1."""
         known = np.empty((0, 3)) if trail is None else trail
-        height = CLEARANCE * rover.wheel.radius
+        height, colours = CLEARANCE * rover.wheel.radius, map_colours(known[:, 2], 0.0, 1.0)
         strands = [
             strand
-            for pair in sliding_window_view(known, 2, axis=0).swapaxes(1, 2)
-            for strand in self._find_strand(terrain, pair[:, :2], _colour_of(pair[1, 2]), height)
+            for k, (red, green, blue) in enumerate(colours[1:].tolist())
+            for strand in self._find_strand(
+                terrain, known[k : k + 2, :2], (red, green, blue), height
+            )
         ]
         self._trail.show(strands, WIDE)
 
@@ -235,12 +236,6 @@ class PathOverlay:
 def _thin(count: int) -> NDArray[np.intp]:
     """Return at most MAX_POINTS rows of `count`, with the first and the last."""
     return np.unique(np.linspace(0, count - 1, min(count, MAX_POINTS)).round().astype(np.intp))
-
-
-def _colour_of(value: float) -> Colour:
-    """Return the colour of a number from 0 to 1."""
-    red, green, blue = map_colours(np.array(value), 0.0, 1.0).tolist()
-    return red, green, blue
 
 
 def _ground_height(terrain: Terrain, x: float, y: float) -> float:
