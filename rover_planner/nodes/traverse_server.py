@@ -65,6 +65,7 @@ from rover_planner.planning.answering.server_health import MEMORY
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.marked_places import NONE_MARKED, parse_place
 from rover_planner.planning.navigation.sensor_mounts import sensor_poses
 from rover_planner.planning.path_query import Pose
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
@@ -137,6 +138,7 @@ class TraverseServer(Node):
         PathComputation.serve(self, self.desk, self.read_question, self.publish)
         self._advice = AdviceTopics(self, self.desk, self.guard, self._values.advice_time)
         self.create_service(Trigger, "~/cancel", self._cancel)
+        self.create_service(Trigger, "~/clear_places", self._clear_marks)
         self.arm = ArmTopics(self, self.desk, frame, reliability)
         """The topics and the service of the arm."""
         self._map_cloud = MapCloud(self, self.service, frame)
@@ -173,12 +175,9 @@ class TraverseServer(Node):
         ):
             self._heard.subscribe(kind, name, take, polled_qos())
         subscribe_to_requests(self, Path, "~/path", self._take_path, reliability, raw=True)
-        self.create_subscription(
-            String,
-            "~/ground_estimate",
-            self._take_ground,
-            replace_reliability(topic_qos(), reliability),
-        )
+        qos = replace_reliability(topic_qos(), reliability)
+        self.create_subscription(String, "~/ground_estimate", self._take_ground, qos)
+        self.create_subscription(String, "~/mark_place", self._take_mark, qos)
 
     def _log_ready(self) -> None:
         name, known = self.service.settings.rover.name, self.service.known_map
@@ -231,6 +230,25 @@ class TraverseServer(Node):
             self.get_logger().warning(f"not used: {error}", throttle_duration_sec=5.0)
             return
         self.service.take_ground(ground)
+
+    def _take_mark(self, message: String) -> None:
+        """Take a place that is impassable from now on: JSON with x, y, radius, reason, date."""
+        try:
+            place = parse_place(message.data, "~/mark_place")
+        except INPUT_ERRORS as error:
+            self.get_logger().warning(f"not used: {error}")
+            return
+        self.service.mark(place)
+        self.get_logger().warning(place.describe())
+
+    def _clear_marks(
+        self, _request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        count = len(self.service.marked.places)
+        self.service.marked = NONE_MARKED
+        response.success = count > 0
+        response.message = f"{count} marked places cleared"
+        return response
 
     def _take_path(self, message: bytes) -> None:
         about = "", ""
@@ -372,6 +390,7 @@ class TraverseServer(Node):
         counts = {
             **({"map": "none"} if known is None else known.describe(snapshot.map_age)),
             "open questions": self.desk.open_count,
+            "marked places": len(self.service.marked.places),
             "internal errors": self.guard.total,
             **self._hazards.describe(),
             **({"kernels not cached": kernel_cache_note()} if kernel_cache_note() else {}),
