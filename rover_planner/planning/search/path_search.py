@@ -275,7 +275,7 @@ class _PathFinder:
             if self._to_frontier
             else connect_goal(rover, nodes, self._goal, spacing),
             ground.doubt,
-            estimate_difficulty(rover, terrain, nodes, climb, (edges.samples, edges.difficulty)),
+            estimate_difficulty(rover, terrain, nodes, climb, edges.samples),
             self._progress,
         )
 
