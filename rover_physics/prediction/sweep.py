@@ -28,6 +28,7 @@ from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import Crossings, add_up, join_crossings
 from rover_physics.prediction.path_motion import path_motions
 from rover_physics.prediction.servo_path import (
+    carry_by_momentum,
     climb_costs,
     find_drift,
     find_lift_heights,
@@ -134,7 +135,8 @@ def predict_in_parts(model: PackedModel, path: np.ndarray) -> Iterator[PathPart]
             done = start + decided
         if drops.restart:
             first = slice(drops.restart + 1)
-            sums = _sum_up(model, here[first], results[first], crossings, sums)
+            settled = swept.prediction.results[first], swept.crossings
+            sums = _sum_up(model, here[first], *settled, sums)
             start, size = start + drops.restart, PART
         else:
             size *= 2  # no waypoint to begin from: the next part is longer
@@ -332,6 +334,7 @@ def make_prediction(
     if wheels.on_servos:
         results = results.copy()
         crossings = crossings._replace(results=crossings.results.copy())
+        carry_by_momentum(wheels, float(model.record.linkage.gravity), poses, results, crossings)
         stop_in_slots(poses, results, crossings)
     between = crossings.results
     results["wheel_drop"] = drops.heights

@@ -183,6 +183,14 @@ def test_with_speed_servos_friction_is_no_number_that_a_passing_path_may_cross()
 # The failure.
 
 
+@pytest.mark.parametrize(("accepted", "told"), [(1.0, []), (0.9, ["fails with a chance of 0.00"])])
+def test_the_verdict_tells_the_chance_of_failure_where_that_is_asked(accepted, told):
+    options = PathQueryOptions(count=1, accepted_chance=accepted)
+    ends = (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)
+    session = ViewSession(LSR1, make_terrain(waves), *ends, options)
+    assert describe_verdict(session.shown, Work())["details"] == told
+
+
 def test_the_failure_names_value_limit_and_wheel_as_the_verdict_does():
     path = judged_on(ramp, friction=0.3)
     failure, verdict = path.failure, path.verdict
