@@ -172,10 +172,10 @@ def record(drive: LearningDrive, keep: Path | None = None) -> Recorded:
     control = make_controller(drive.controller, plant, obstacle, steering)
     rows = []
     while plant.time < 1.5 * (END - START) / SPEED and plant.pose[0] < END:
-        torques = control()
+        control()
         if plant.tilt > MAX_TILT or abs(plant.pose[1]) > MAX_OFFSET:
             break
-        rows.append(row_of(plant, torques))
+        rows.append(row_of(plant))
     recorded = Recorded(np.array(rows).reshape(-1, WIDTH), bool(plant.pose[0] >= END))
     if file is not None:
         np.savez(file, rows=recorded.rows, passed=recorded.passed)
@@ -188,14 +188,15 @@ def hash_of(drive: LearningDrive) -> int:
     return int(hashlib.sha256(text.encode()).hexdigest()[:15], 16)
 
 
-def row_of(plant: MujocoRover, torques: np.ndarray) -> np.ndarray:
+def row_of(plant: MujocoRover) -> np.ndarray:
     """Return what is measured now."""
     row = np.full(WIDTH, np.nan)
     pose, joints = plant.pose, plant.joint_positions
     row[[TIME, X, Y, YAW]] = plant.time, pose[0], pose[1], pose[3]
     row[[ROLL, PITCH]] = plant.attitude
     row[SUSPENSION] = [joints[name] for name in SUSPENSION_JOINTS]
-    row[RATES], row[TORQUES], row[STEERING] = plant.wheel_rates, torques, plant.steering_angles
+    row[RATES], row[TORQUES] = plant.wheel_rates, plant.wheel_torques
+    row[STEERING] = plant.steering_angles
     return row
 
 

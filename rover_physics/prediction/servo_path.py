@@ -79,7 +79,7 @@ def carry_by_momentum(
         for name in ("deficit", "speed_share", "motion", "contact_angle", "wheel_speed")
     )
     nominal = (motion[:, 0] ** 2 + motion[:, 1] ** 2) / (2.0 * gravity)
-    distances = _distances_between(wheels, np.concatenate([poses, crossings.poses])[order])
+    distances = distances_between(wheels, np.concatenate([poses, crossings.poses])[order])
     distances = np.append(0.0, distances)
     stands = (distances == 0.0) | ((angles * np.sign(speeds)).max(axis=1) > FACE)
     head = 0.0
@@ -119,7 +119,7 @@ def find_lift_heights(
         order = _in_order(n, crossings.place)
         share = np.concatenate([results["speed_share"], crossings.results["speed_share"]])[order]
         rate = rates[order] / np.where(share > 0.0, share, 1.0)[:, None]
-        distances = _distances_between(wheels, np.concatenate([poses, crossings.poses])[order])
+        distances = distances_between(wheels, np.concatenate([poses, crossings.poses])[order])
         for k in 1 + np.flatnonzero((rate[1:] > 0.0).any(axis=1)):  # height is 0 at the others
             lifted = rate[k] > 0.0
             rise = 0.5 * (rate[k] + np.fmax(rate[k - 1], 0.0)) * distances[k - 1]
@@ -221,7 +221,7 @@ def find_drift(
     n = len(poses)
     if not wheels.on_servos:
         return np.zeros((n, 2))
-    long_steps = np.append(False, _distances_between(wheels, poses) > wheels.radius)
+    long_steps = np.append(False, distances_between(wheels, poses) > wheels.radius)
     turns = crossings.select(long_steps[crossings.waypoint] & ~crossings.climbing)
     order = _in_order(n, turns.place)
     at = np.concatenate([poses, turns.poses])[order]
@@ -235,7 +235,7 @@ def find_drift(
     c, s = np.cos(at[:, 2]), np.sin(at[:, 2])
     x, y = c * rate[:, 0] - s * rate[:, 1], s * rate[:, 0] + c * rate[:, 1]
     rate = np.column_stack([x, y, rate[:, 2]])
-    distances = _distances_between(wheels, at)
+    distances = distances_between(wheels, at)
     sums = np.zeros(rate.shape)
     sums[1:] = np.cumsum(0.5 * (rate[1:] + rate[:-1]) * distances[:, None], axis=0)
     place = np.append(0.0, np.cumsum(distances))
@@ -253,7 +253,7 @@ def _in_order(n: int, place: np.ndarray) -> np.ndarray:
     return np.lexsort((np.arange(len(places)) >= n, places))
 
 
-def _distances_between(wheels: Wheels, poses: np.ndarray) -> Floats:
+def distances_between(wheels: Wheels, poses: np.ndarray) -> Floats:
     """Return the distances (n - 1,) between poses [m]: of the body or, if it turns, of a wheel."""
     steps = np.diff(poses, axis=0)
     swing = wheels.swing_radius * np.abs((steps[:, 2] + np.pi) % (2.0 * np.pi) - np.pi)

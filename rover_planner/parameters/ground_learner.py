@@ -31,6 +31,11 @@ class GroundLearnerParameters(ParameterTable):
         "Whether a rover that is stuck gets an emergency stop on "
         "traction_controller/emergency_stop.",
     )
+    mark_when_stuck: bool = parameter(
+        False,
+        "Whether the place ahead of a rover that is stuck is marked as impassable, on "
+        "traverse_server/mark_place.",
+    )
     map_frame: str = parameter(
         "map", "Frame of map and odometry; others are refused.", read_only=True
     )

@@ -1,13 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The verdict with its reason, its age, and what a person can do about it."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rover_physics.traversability.verdict import Verdict
 from rover_planner.viewer.documents.header import POLICY_TITLES
+from rover_planner.viewer.documents.limits import write_chance
 from rover_planner.viewer.state.failure import Failure
 from rover_planner.viewer.state.scenario import PolicyVerdict, Shown
 
@@ -37,7 +36,10 @@ def describe_verdict(shown: Shown, work: Work) -> dict[str, Any]:
         **describe_answer(verdict.traversable, f"path {shown.index + 1} of {len(shown.paths)}"),
         "headline": "" if failure is None else failure.headline,
         "where": "" if failure is None else write_place(failure),
-        "details": [*filter(None, (verdict.reason, closed, _write_chance(verdict)))],
+        "chance": ""
+        if shown.chance is None
+        else f"chance of failure {write_chance(shown.chance)}",
+        "details": [*filter(None, (verdict.reason, closed))],
         "old": work.old,
         "refusal": work.refusal,
         "judging": work.judging,
@@ -57,12 +59,6 @@ def write_place(failure: Failure) -> str:
     """Return where and when a path is refused."""
     between = ", between waypoints" if failure.is_between else ""
     return f"after {failure.distance:.2f} m, {failure.time:.0f} s{between}"
-
-
-def _write_chance(verdict: Verdict) -> str:
-    """Return the chance of failure in words, empty if it is not known."""
-    known = not math.isnan(verdict.failure_chance)
-    return f"fails with a chance of {verdict.failure_chance:.2f}" if known else ""
 
 
 def _describe_policy(one: PolicyVerdict) -> dict[str, Any]:

@@ -114,7 +114,7 @@ def test_a_path_in_parts_is_the_whole_path(monkeypatch):
     for part in predict_in_parts(model, drive_path()):
         rows = slice(part.context, None)
         here = part.first + np.arange(len(part.prediction.poses) - part.context)
-        for name in ("wheel_loads", "torque", "speed_share", "time", "energy"):
+        for name in ("wheel_loads", "torque", "speed_share", "time", "energy", "drift"):
             np.testing.assert_allclose(
                 getattr(part.prediction, name)[rows], getattr(whole, name)[here], rtol=1e-9
             )
