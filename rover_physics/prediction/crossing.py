@@ -27,7 +27,7 @@ from rover_physics.results.record import place_results, select_results
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 
-PIECES = 3
+PIECES = 4
 """Number of pieces into which a stretch with a jump is divided in each round."""
 TURNED = 0.1
 """Change of a steering angle [rad] from a waypoint to the next above which the rover is also
