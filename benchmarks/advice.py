@@ -1,24 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """Advice on refused paths of real and made maps: is it valid, least, and in time?
 
-Run from the repository: python -m benchmarks.advice [--paths N] [--drives N]
-The drives in MuJoCo need the extra `bench`.
+Run from the repository: python -m benchmarks.advice FILE [--paths N] [--drives N] [--seconds S]
+The file gets a line of JSON for each path; lines that it has are kept. The drives in MuJoCo need
+the extra `bench`.
 """
 
+import json
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
-from itertools import islice
-from typing import Annotated
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 
 from benchmarks.chance_drives import arrives
-from benchmarks.drives import run_in_processes
 from benchmarks.grounds import all_grounds, made_reef, real_maps
 from benchmarks.measure import console
-from rover_physics import Rover, Terrain, judge_path, load_rover
+from rover_physics import Terrain, judge_path, load_rover
 from rover_physics.names import EQUAL, SERVO
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_planner.advice.advise import Advice, grow_within
@@ -26,6 +27,7 @@ from rover_planner.advice.case import Case
 from rover_planner.advice.levers import LEVERS, Span
 from rover_planner.advice.refusal import Refusal
 from rover_planner.advice.remedy import Remedy
+from rover_planner.nodes.warm_up import search_paths
 from rover_planner.planning.answering.budget import Budget
 
 LENGTHS = {"lsr1": 4.0, "m2020": 10.0}
@@ -37,22 +39,13 @@ GRID = 100
 SPEED = 0.06
 """Speed of the drives [m/s]."""
 
-
-@dataclass(frozen=True, eq=False)
-class Advised:
-    """A refused path and the advice on it."""
-
-    advice: Advice
-    """The advice."""
-    first: float
-    """CPU time until the first remedy [s]; NaN if there is none."""
-    total: float
-    """CPU time of all trials [s]."""
+Row = dict[str, Any]
+"""What came of a path."""
 
 
-def draw_cases(rng: np.random.Generator) -> Iterator[Case]:
-    """Yield straight paths at random places that begin well and are refused further on."""
-    grounds = [*all_grounds().values(), *real_maps().values(), made_reef()][1:]
+def draw_case(grounds: list[Terrain], number: int) -> Case:
+    """Return a straight path at a random place that begins well and is refused further on."""
+    rng = np.random.default_rng(number)
     while True:
         name, ground = rng.choice(list(LENGTHS)), grounds[rng.integers(len(grounds))]
         s = np.arange(0.0, LENGTHS[name], SPACING)
@@ -66,17 +59,36 @@ def draw_cases(rng: np.random.Generator) -> Iterator[Case]:
         verdict = case.judge().verdict
         starts_well = verdict.first_failure > 1.0 / SPACING
         if starts_well and verdict.code not in ("off_map", "unknown_ground"):
-            yield case
+            return case
 
 
-def advise_timed(case: Case, budget: float) -> Advised:
-    """Seek advice within a time [s]."""
-    began, first, advice = time.process_time(), float("nan"), None
+def advise_on(case: Case, budget: float, drives: bool) -> Row:
+    """Return what comes of advice within a CPU time [s]; a remedy is driven if there is one."""
+    began, first, advice = time.process_time(), None, None
     for advice in grow_within(case, Budget(budget, time.process_time).check):
-        if advice.found and np.isnan(first):
+        if advice.found and first is None:
             first = time.process_time() - began
+    total = time.process_time() - began
     assert advice is not None
-    return Advised(advice, first, time.process_time() - began)
+    remedies = advice.remedies
+    driven = next(filter(can_be_driven, remedies), None) if drives else None
+    return {
+        "rover": case.rover.name,
+        "policy": case.options.policy,
+        "code": advice.judged.verdict.code,
+        "complete": advice.complete,
+        "first": first,
+        "total": total,
+        "remedies": [[one.lever.name for one in remedy.levers] for remedy in remedies],
+        "own": any(not one.needs_others for one in advice.found),
+        "found": len(advice.found),
+        "valid": sum(map(is_valid, remedies)),
+        "largest_use": max((one.judged.largest_use[0] for one in remedies), default=None),
+        "gap": next((gap for gap in map(find_gap, remedies) if gap is not None), None),
+        "missed": find_missed(advice) if advice.complete and not advice.found else [],
+        "arrives": None if driven is None else drive(driven),
+        "words": [one.describe() for one in advice.found],
+    }
 
 
 def is_valid(remedy: Remedy) -> bool:
@@ -89,87 +101,102 @@ def is_valid(remedy: Remedy) -> bool:
 
 def find_gap(remedy: Remedy) -> float | None:
     """Return by how much a single lever is set too far [share of its range], by all values."""
-    if len(remedy.levers) > 1:
-        return None
-    (one,) = remedy.levers
+    (one, *others) = remedy.levers
     span = one.lever.settings(remedy.refusal)
-    if not isinstance(span, Span):
+    if others or not isinstance(span, Span):
         return None
     end = max(span.ends, key=lambda end: (end - span.now) * (one.value - span.now))
     for k in range(1, GRID):
         value = span.now + k / GRID * (end - span.now)
         if abs(value - span.now) >= abs(one.value - span.now):
-            return 0.0
+            break
         case = one.lever.apply(remedy.refusal.case, remedy.refusal, value)
         if case is not None and case.judge().passes:
-            return abs(one.value - value) / abs(end - span.now)
+            return float(abs(one.value - value) / abs(end - span.now))
     return 0.0
 
 
-def is_missed(advice: Advice) -> bool:
-    """Return whether a single lever helps by some value though none was found to."""
+def find_missed(advice: Advice) -> list[str]:
+    """Return the rover's own levers that help alone by some value though none was found to."""
     refusal = Refusal(advice.judged)
-    for lever in LEVERS:
-        settings = lever.settings(refusal)
-        if lever.needs_others or settings is None:
-            continue
-        ends = settings.ends if isinstance(settings, Span) else settings.values
-        for end in ends:
-            for k in range(1, GRID + 1) if isinstance(settings, Span) else (GRID,):
-                value = settings.now + k / GRID * (end - settings.now) if k < GRID else end
-                case = lever.apply(refusal.case, refusal, value)
-                if case is not None and case.judge().passes:
-                    return True
-    return False
+    return [lever.name for lever in LEVERS if not lever.needs_others and _helps(lever, refusal)]
 
 
-def job_of(remedy: Remedy) -> tuple[Rover, Terrain, np.ndarray, float]:
-    """Return what `arrives` takes to drive a remedy with speed servos."""
-    case = remedy.judged.case
-    friction = case.options.friction
-    assert friction is not None
-    rover = replace(case.rover, nominal_speed=SPEED)
-    return rover, case.terrain, case.poses, friction
+def _helps(lever: Any, refusal: Refusal) -> bool:
+    settings = lever.settings(refusal)
+    if settings is None:
+        return False
+    values = (
+        [settings.now + k / GRID * (end - settings.now)
+         for end in settings.ends for k in range(1, GRID + 1)]
+        if isinstance(settings, Span) else settings.values
+    )  # fmt: skip
+    cases = (lever.apply(refusal.case, refusal, value) for value in values)
+    return any(case is not None and case.judge().passes for case in cases)
 
 
 def can_be_driven(remedy: Remedy) -> bool:
     """Return whether a remedy is one of the LSR-1 with speed servos, arm and motors as told."""
     case, known = remedy.judged.case, {"policy", "friction"}
     is_known = case.rover.name == "lsr1" and set(remedy.options()) <= known
-    return is_known and case.options.policy == SERVO and remedy.is_option
+    return is_known and case.options.policy == SERVO
+
+
+def drive(remedy: Remedy) -> bool:
+    """Drive a remedy in MuJoCo; return whether the rover arrives."""
+    case = remedy.judged.case
+    assert case.options.friction is not None
+    rover = replace(case.rover, nominal_speed=SPEED)
+    return arrives(rover, case.terrain, case.poses, case.options.friction)
+
+
+def report(rows: list[Row]) -> None:
+    """Print what came of all paths."""
+    say, counts = console().print, Counter(name for row in rows for one in row["remedies"]
+                                           for name in one)  # fmt: skip
+    remedies = sum(len(row["remedies"]) for row in rows)
+    gaps = [row["gap"] for row in rows if row["gap"] is not None]
+    none = [row["missed"] for row in rows if row["complete"] and not row["found"]]
+    driven = [row["arrives"] for row in rows if row["arrives"] is not None]
+    say(f"{len(rows)} refused paths; all levers tried on {sum(row['complete'] for row in rows)}")
+    say(f"with a remedy of the rover's own: {sum(row['own'] for row in rows)}; with any: "
+        f"{sum(row['found'] > 0 for row in rows)}")  # fmt: skip
+    say(f"valid by predict: {sum(row['valid'] for row in rows)} of {remedies}")
+    say(f"gap to the least value, of {len(gaps)}: median {np.median(gaps):.3f}, 95 % "
+        f"{np.percentile(gaps, 95):.3f} of the range")  # fmt: skip
+    say(f"no lever helps: {len(none)}; one of them alone does after all: "
+        f"{sum(bool(one) for one in none)}")  # fmt: skip
+    for name, times in {
+        "the first remedy": [row["first"] for row in rows if row["first"] is not None],
+        "all trials, with a remedy": [row["total"] for row in rows if row["own"]],
+        "all trials, without": [row["total"] for row in rows if not row["own"]],
+    }.items():
+        quantiles = np.percentile(times, (50, 90)) if times else (np.nan, np.nan)
+        say(f"CPU time to {name}: median {quantiles[0]:.2f} s, 90 % {quantiles[1]:.2f} s")
+    say(", ".join(f"{name} {count}" for name, count in counts.most_common()))
+    say(f"driven in MuJoCo: {sum(driven)} of {len(driven)} arrive")
 
 
 def main(
+    file: Annotated[Path, typer.Argument(help="File of the paths.")],
     paths: Annotated[int, typer.Option(help="Number of refused paths.")] = 200,
-    drive_count: Annotated[int, typer.Option("--drives", help="Number of drives.")] = 40,
-    budget: Annotated[float, typer.Option(help="CPU time for each path [s].")] = 20.0,
-    seed: Annotated[int, typer.Option(help="Seed of the paths.")] = 1,
+    drives: Annotated[int, typer.Option(help="Number of the first paths that are driven.")] = 200,
+    budget: Annotated[float, typer.Option(help="CPU time for each path [s].")] = 10.0,
+    seconds: Annotated[float, typer.Option(help="Time after which no path is begun [s].")] = 1e9,
 ) -> None:
     """Print what comes of advice on refused paths."""
-    cases = islice(draw_cases(np.random.default_rng(seed)), paths)
-    advised = [advise_timed(case, budget) for case in cases]
-    remedies = [one for found in advised for one in found.advice.remedies]
-    own = [any(not one.needs_others for one in found.advice.found) for found in advised]
-    complete = [found.advice.complete for found in advised]
-    gaps = [gap for gap in map(find_gap, remedies) if gap is not None]
-    none = [found.advice for found in advised if found.advice.complete and not found.advice.found]
-    missed = sum(map(is_missed, none))
-    say = console().print
-    say(f"{paths} refused paths, {len(remedies)} remedies; all levers tried on {sum(complete)}")
-    say(f"with a remedy of the rover's own: {sum(own)}; with any: "
-        f"{sum(bool(found.advice.found) for found in advised)}")  # fmt: skip
-    say(f"valid by predict: {sum(map(is_valid, remedies))} of {len(remedies)}")
-    say(f"gap to the least value, of {len(gaps)}: median {np.median(gaps):.3f}, 95 % "
-        f"{np.percentile(gaps, 95):.3f} of the range")  # fmt: skip
-    say(f"no lever helps: {len(none)}; one of them alone does after all: {missed}")
-    say(f"CPU time to the first remedy: median {np.nanmedian([f.first for f in advised]):.2f} s; "
-        f"of all trials: median {np.median([f.total for f in advised]):.2f} s")  # fmt: skip
-    for lever in LEVERS:
-        count = sum(any(one.lever is lever for one in remedy.levers) for remedy in remedies)
-        say(f"  {lever.name}: {count}")
-    driven = list(islice(filter(can_be_driven, remedies), drive_count))
-    arrived = list(run_in_processes(arrives, [job_of(one) for one in driven], None))
-    say(f"driven in MuJoCo: {sum(arrived)} of {len(driven)} arrive")
+    rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+    grounds = [*all_grounds().values(), *real_maps().values(), made_reef()][1:]
+    began = time.monotonic()
+    search_paths()
+    for number in range(len(rows), paths):
+        if time.monotonic() - began > seconds:
+            break
+        row = advise_on(draw_case(grounds, number), budget, number < drives)
+        rows.append(row)
+        with file.open("a") as target:
+            target.write(json.dumps(row) + "\n")
+    report(rows)
 
 
 if __name__ == "__main__":

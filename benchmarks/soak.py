@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A soak: all programs drive a rover to random goals, on a busy machine, and are killed in turn.
+"""A soak: all programs drive a rover to random goals, on a busy machine, and are disturbed.
 
-Run from the repository: python -m benchmarks.soak [--minutes 60] [--load 4] [--kill-every 120]
-[--step-every 0]
+Run from the repository: python -m benchmarks.soak [--minutes 60] [--load 4] [--every 40]
+[--faketime LIBRARY]
 
 Simulator, server and controller are those of simulation.launch.py, with a page and a mission
-planner beside them. Every so often one of them is killed, and the friction that the server assumes
-changes. With --step-every all have the time of /clock, which is stepped by 5 s, ahead and back in
-turn. The report has the drives done, the faults by cause, memory and latency at start and end, and
-the torques that were heard while the controller was to rest.
+planner beside them. Every so often, in turn, one of them is killed; the server gets another map
+and friction; and the system clock of all is stepped by 5 s, ahead or back, if libfaketime is given
+(package libfaketime of Debian and Ubuntu). The report has the drives done, the faults by cause,
+memory and latency at start and end, and the torques that were heard while the controller was to
+rest.
 """
 
 import contextlib
@@ -19,13 +20,16 @@ import re
 import signal
 import time
 from collections import Counter
+from pathlib import Path
 from statistics import median
 from typing import Annotated
 
 import numpy as np
 import typer
+import yaml
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
+from nav_msgs.srv import LoadMap
 from rclpy.node import Node
 from std_msgs.msg import Float64MultiArray, String
 
@@ -34,11 +38,12 @@ from benchmarks.processes import (
     Client,
     LostAnswerError,
     NodeProcesses,
+    finish,
     memory_of,
     open_nodes,
 )
 from msg_adapters.odometry import odometry_to_pose
-from rover_physics import Terrain, save_terrain
+from rover_physics import save_terrain
 from rover_planner.demo.child_process import ChildProcess
 from rover_planner.ros.qos import latched_qos, sensor_qos, topic_qos
 from rover_planner.worlds.mars_terrain import make_mars_terrain
@@ -54,11 +59,14 @@ PATIENCE = 10.0
 """Longest wait for an answer [s]."""
 REACH = 3.0
 """Largest distance of a goal [m]."""
-PARAMETERS = ROOT / "config" / "parameters" / "simulated_traction_controller.yaml"
-RESTS = "    rest_policy: brake\n"
-"""Line of the controller's parameters besides: torques are zero when it rests."""
-MISSION, PAGE, CLOCK = "mission_planner", "view", "clock"
-SIM_TIME = ["--ros-args", "-p", "use_sim_time:=true"]
+PARAMETERS = ROOT / "config" / "parameters"
+MISSION, PAGE = "mission_planner", "view"
+VICTIMS = ("traverse_server", "traction_controller", PAGE, MISSION, "rover_simulator")
+"""Programs that are killed in turn."""
+ROCKS = (0.01, 0.005, 0.015)
+"""Cover by rocks of the maps, all of one relief; the first is the ground."""
+CLOCKS = ("+5s", "+0s")
+"""What the system clock is ahead by, in turn."""
 
 
 class Ear(Node):
@@ -91,51 +99,77 @@ class Ear(Node):
     def _hear_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             if status.name.startswith("traction_controller"):
-                fault = re.sub(r"[-\d.]+", "#", status.message) if status.level == b"\2" else ""
+                fault = without_numbers(status.message) if status.level == b"\2" else ""
                 self.faults[fault] += bool(fault) and fault != self._fault
                 self._fault = fault
+
+
+def without_numbers(text: str) -> str:
+    """Return a text with # for each number."""
+    return re.sub(r"[-\d.]+", "#", text)
 
 
 class Programs:
     """The programs by name; each can be killed and started again."""
 
-    def __init__(self, nodes: NodeProcesses, ground: Terrain, step_every: float):
-        terrain, parameters = nodes.folder / "ground.npz", nodes.folder / "controller.yaml"
-        save_terrain(terrain, ground)
-        parameters.write_text(PARAMETERS.read_text() + RESTS)
+    def __init__(self, nodes: NodeProcesses, terrain: Path, faketime: str):
+        self._nodes, self._clock = nodes, nodes.folder / "clock"
+        self._clocks = itertools.cycle(CLOCKS)
+        self._clock.write_text(CLOCKS[-1])
+        self._environment = {
+            "LD_PRELOAD": faketime,
+            "FAKETIME_TIMESTAMP_FILE": str(self._clock),
+            "FAKETIME_CACHE_DURATION": "1",
+            "DONT_FAKE_MONOTONIC": "1",
+        }
+        rests = self._write("simulated_traction_controller", rest_policy="brake")  # no torques
+        reads = self._write("traverse_server", map_folder=str(nodes.folder))
         commands = simulation_commands(
             terrain_file=str(terrain),
             speed="0.08",
-            use_sim_time=str(step_every > 0.0),
-            traction_controller_parameters=str(parameters),
+            traction_controller_parameters=rests,
+            traverse_server_parameters=reads,
         )
-        self._options = SIM_TIME if step_every > 0.0 else []
-        self._nodes = nodes
         self._modules = {name: words[2:] for name, words in commands.items()}  # behind python -m
         page = [PAGE, "lsr1", str(terrain), "--follow", "--port", "0"]
         self._modules[PAGE] = ["rover_planner", *page]
-        if step_every > 0.0:
-            self._modules[CLOCK] = ["benchmarks.stepped_clock", str(step_every)]
         self._running: dict[str, ChildProcess] = {}
         for name in self._modules:
             self.start(name)
 
+    def _write(self, stem: str, **values: str) -> str:
+        """Write a parameter file of the package with other values; return its name."""
+        content = yaml.safe_load((PARAMETERS / f"{stem}.yaml").read_text())
+        content["/**"]["ros__parameters"] |= values
+        file = self._nodes.folder / f"{stem}.yaml"
+        file.write_text(yaml.dump(content))
+        return str(file)
+
     def start_mission(self, *words: str) -> None:
         """Start a mission planner."""
-        self.start(MISSION, ["rover_planner.nodes.mission_planner", *words, *self._options])
+        self.start(MISSION, ["rover_planner.nodes.mission_planner", *words])
 
     def start(self, name: str, module: list[str] | None = None) -> None:
         """Start a program, with its module and words or others."""
-        self._running[name] = self._nodes.start_module(*(module or self._modules[name]))
+        words, environment = module or self._modules[name], self._environment
+        self._running[name] = self._nodes.start_module(*words, environment=environment)
 
     def kill(self, name: str) -> None:
         """Kill a program."""
         if self.exit_code(name) is None:
             os.kill(self._running[name].pid, signal.SIGKILL)
 
+    def step_clock(self) -> None:
+        """Step the system clock of all programs."""
+        self._clock.write_text(next(self._clocks))
+
     def exit_code(self, name: str) -> int | None:
         """Return the exit code of a program, None while it runs."""
         return self._running[name].exit_code
+
+    def last_words(self, name: str) -> str:
+        """Return what a program said last."""
+        return self._running[name].last_line()
 
     def memory(self) -> dict[str, float]:
         """Return the memory [MB] of each program that runs."""
@@ -143,112 +177,135 @@ class Programs:
 
 
 def run_soak(
-    minutes: float, load: int, kill_every: float, step_every: float, seed: int
+    minutes: float, load: int, every: float, seed: int, faketime: str
 ) -> dict[str, object]:
     """Run a soak; return its report."""
-    rng = np.random.default_rng(seed)
-    ground = make_mars_terrain(seed, 24.0, 0.05, rock_cover=0.01, crater_density=0.0)
     with open_nodes() as nodes:
         for _ in range(load):
             nodes.start_module("timeit", "-n", str(10**12), "pass")
-        programs, ear = Programs(nodes, ground, step_every), nodes.ros.spin(Ear(nodes.ros))
+        maps = [nodes.folder / f"{cover}.npz" for cover in ROCKS]
+        for file, cover in zip(maps, ROCKS, strict=True):
+            ground = make_mars_terrain(seed, 24.0, 0.05, rock_cover=cover, crater_density=0.0)
+            save_terrain(file, ground)
+        programs, ear = Programs(nodes, maps[0], faketime), nodes.ros.spin(Ear(nodes.ros))
         client = nodes.client("soak")
         wait_until(lambda: np.isfinite(ear.pose).all(), "the simulator", START_TIME)
         client.connect()
-        return _drive(programs, ear, client, ground, rng, (minutes, kill_every))
+        soak = Soak(programs, ear, client, maps, np.random.default_rng(seed))
+        soak.disturbances = soak.disturbances if faketime else soak.disturbances[:2]
+        return soak.run(60.0 * minutes, every)
 
 
-def _drive(
-    programs: Programs,
-    ear: Ear,
-    client: Client,
-    ground: Terrain,
-    rng: np.random.Generator,
-    times: tuple[float, float],
-) -> dict[str, object]:
-    """Drive, kill and change until the end; return the report."""
-    ear.faults.clear()
-    first = programs.memory(), _latency(client, ear)
-    end, drives, kills = time.monotonic() + 60.0 * times[0], Counter(), Counter()
-    victims = itertools.cycle(("traverse_server", "traction_controller", PAGE, MISSION,
-                               "rover_simulator"))  # fmt: skip
-    next_event = time.monotonic() + (times[1] or np.inf)
-    _start_mission(programs, ear, rng)
-    while time.monotonic() < end:
-        time.sleep(0.5)
-        code = programs.exit_code(MISSION)
-        if code is not None:
-            drives[_WORDS.get(code, f"exit code {code}")] += 1
-            _start_mission(programs, ear, rng)
-        if time.monotonic() > next_event:
-            next_event += times[1]
-            victim = next(victims)
-            kills[victim] += 1
-            programs.kill(victim)
-            time.sleep(1.0)
-            if victim != MISSION:
-                programs.start(victim)
-            _change(client, rng)
-    return {
-        "minutes": times[0],
-        "drives": dict(drives),
-        "kills": dict(kills),
-        "faults": {cause: count for cause, count in ear.faults.items() if count},
-        "torques at rest": ear.torques_at_rest,
-        "memory at start [MB]": first[0],
-        "memory at end [MB]": programs.memory(),
-        "answer at start [ms]": first[1],
-        "answer at end [ms]": _latency(client, ear),
-    }
+class Soak:
+    """Drives and disturbances, and what becomes of them."""
 
+    def __init__(
+        self,
+        programs: Programs,
+        ear: Ear,
+        client: Client,
+        maps: list[Path],
+        rng: np.random.Generator,
+    ):
+        self._programs, self._ear, self._client, self._rng = programs, ear, client, rng
+        self._maps, self._victims = itertools.cycle(maps), itertools.cycle(VICTIMS)
+        self._load = client.node.create_client(LoadMap, "/traverse_server/load_map")
+        self._drives, self._events = Counter[str](), Counter[str]()
+        self.disturbances = [self._kill, self._change_map, self._step_clock]
+        """What happens in turn."""
 
-_WORDS = {0: "arrived", 1: "ended with a reason", 3: "not traversable", -9: "killed"}
-"""Ends of a mission by exit code."""
+    def run(self, seconds: float, every: float) -> dict[str, object]:
+        """Drive and disturb for some time, with a disturbance each so many seconds, or none for 0.
 
-
-def _start_mission(programs: Programs, ear: Ear, rng: np.random.Generator) -> None:
-    """Send the rover to a goal near it, towards the middle of the ground."""
-    x, y, yaw = ear.pose
-    towards = np.arctan2(-y, -x) if np.hypot(x, y) > 2.0 * REACH else rng.uniform(-np.pi, np.pi)
-    bearing = towards + rng.uniform(-0.5, 0.5)
-    far = rng.uniform(0.5, 1.0) * REACH
-    start = f"--start={x:.3f},{y:.3f},{yaw:.3f}"
-    goal = f"--goal={x + far * np.cos(bearing):.3f},{y + far * np.sin(bearing):.3f},{bearing:.3f}"
-    programs.start_mission(start, goal, "--drive")
-
-
-def _change(client: Client, rng: np.random.Generator) -> None:
-    """Change the friction that the server assumes: all that is watched is judged again."""
-    try:
-        client.set_parameter("friction", float(rng.uniform(0.6, 0.8)))
-    except LostAnswerError:
-        return  # it is the server that was killed
-
-
-def _latency(client: Client, ear: Ear) -> float:
-    """Return the median time of a question of 1 m [ms]."""
-    taken = []
-    for _ in range(10):
+        Returns:
+            The report.
+        """
+        programs, disturbances = self._programs, itertools.cycle(self.disturbances)
+        self._ear.faults.clear()
+        memory, latency = programs.memory(), self._find_latency()
         begin = time.monotonic()
-        x, y, yaw = ear.pose.tolist()
+        due = begin + (every or np.inf)
+        self._start_mission()
+        while time.monotonic() < begin + seconds:
+            time.sleep(0.5)
+            code = programs.exit_code(MISSION)
+            if code is not None:
+                end = _ENDS.get(code) or without_numbers(programs.last_words(MISSION))
+                self._drives[end] += 1
+                self._start_mission()
+            if time.monotonic() > due:
+                due += every
+                next(disturbances)()
+        return {
+            "minutes": round((time.monotonic() - begin) / 60.0, 1),
+            "drives": dict(self._drives),
+            "disturbances": dict(self._events),
+            "faults": {cause: count for cause, count in self._ear.faults.items() if count},
+            "torques at rest": self._ear.torques_at_rest,
+            "memory at start [MB]": memory,
+            "memory at end [MB]": programs.memory(),
+            "answer at start [ms]": latency,
+            "answer at end [ms]": self._find_latency(),
+        }
+
+    def _kill(self) -> None:
+        victim = next(self._victims)
+        self._events[f"kills of {victim}"] += 1
+        self._programs.kill(victim)
+        time.sleep(1.0)
+        if victim != MISSION:
+            self._programs.start(victim)
+
+    def _change_map(self) -> None:
+        """Load another map, and assume another friction: all that is watched is judged again."""
+        request = LoadMap.Request(map_url=next(self._maps).name)
         with contextlib.suppress(LostAnswerError):
-            client.plan((x, y, yaw), (x + np.cos(yaw), y + np.sin(yaw), yaw), PATIENCE)
-        taken.append(1e3 * (time.monotonic() - begin))
-    return median(taken)
+            response = finish(self._load.call_async(request), PATIENCE)
+            assert response.result == LoadMap.Response.RESULT_SUCCESS, response.result
+            self._client.set_parameter("friction", float(self._rng.uniform(0.6, 0.8)))
+            self._events["changes of map and friction"] += 1
+
+    def _step_clock(self) -> None:
+        self._programs.step_clock()
+        self._events["steps of the clock"] += 1
+
+    def _start_mission(self) -> None:
+        """Send the rover to a goal near it, towards the middle of the ground."""
+        (x, y, yaw), rng = self._ear.pose, self._rng
+        is_far = np.hypot(x, y) > 2.0 * REACH
+        bearing = np.arctan2(-y, -x) if is_far else rng.uniform(-np.pi, np.pi)
+        bearing += rng.uniform(-0.5, 0.5)
+        far = rng.uniform(0.5, 1.0) * REACH
+        start = f"{x:.3f},{y:.3f},{yaw:.3f}"
+        goal = f"{x + far * np.cos(bearing):.3f},{y + far * np.sin(bearing):.3f},{bearing:.3f}"
+        self._programs.start_mission(f"--start={start}", f"--goal={goal}", "--drive")
+
+    def _find_latency(self) -> float:
+        """Return the median time of a question of 1 m [ms]."""
+        taken = []
+        for _ in range(10):
+            begin = time.monotonic()
+            x, y, yaw = self._ear.pose.tolist()
+            with contextlib.suppress(LostAnswerError):
+                self._client.plan((x, y, yaw), (x + np.cos(yaw), y + np.sin(yaw), yaw), PATIENCE)
+            taken.append(1e3 * (time.monotonic() - begin))
+        return median(taken)
+
+
+_ENDS = {0: "arrived", 3: "not traversable", -9: "killed"}
+"""Ends of a mission by exit code; the others say why."""
 
 
 def main(
     minutes: Annotated[float, typer.Option(help="Length in minutes.")] = 60.0,
     load: Annotated[int, typer.Option(help="Processes that do nothing but compute.")] = 4,
-    kill_every: Annotated[float, typer.Option(help="Time between kills in s; 0: none.")] = 120.0,
-    step_every: Annotated[
-        float, typer.Option(help="Time between clock steps in s; 0: none.")
-    ] = 0.0,
+    every: Annotated[float, typer.Option(help="Time between disturbances in s; 0: none.")] = 40.0,
     seed: Annotated[int, typer.Option(help="Seed of ground and goals.")] = 1,
+    faketime: Annotated[str, typer.Option(help="File libfaketimeMT.so.1: steps the clock.")] = "",
 ) -> None:
     """Run a soak and print its report as JSON."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # its programs end with it
-    print(json.dumps(run_soak(minutes, load, kill_every, step_every, seed), indent=2))
+    print(json.dumps(run_soak(minutes, load, every, seed, faketime), indent=2))
 
 
 if __name__ == "__main__":

@@ -49,9 +49,8 @@ class Drops:
     """(n, 6) largest drop of each wheel at a waypoint or since the one before [m]."""
     decided: int
     """Number of waypoints, from the first, whose drops no later pose of the path can change."""
-    restart: int
-    """Last of these waypoints from which the drops can be found without those before it; 0 if
-    there is none."""
+    starts: np.ndarray
+    """(n,) True for those of them from which the drops can be found without waypoints before."""
 
 
 def find_drops(wheels: Wheels, poses: np.ndarray, results: Any, crossings: Crossings) -> Drops:
@@ -100,7 +99,7 @@ def _find_drops(wheels, poses, results, between):
     descents, drops = np.zeros((n + m, 6)), np.zeros((n, 6))
     _measure_drops(wheels.radius, (height, angle, steps), rolling_off_edge, descents)
     at_waypoints, at_between = np.empty((n, 6), np.bool_), np.empty((m, 6), np.bool_)
-    decided, restart = 0, 0
+    decided, starts = 0, np.zeros(n, np.bool_)
     for k in range(n + m):
         i = order[k]
         if i < n and k < first_open:
@@ -108,8 +107,7 @@ def _find_drops(wheels, poses, results, between):
             some = False
             for wheel in range(6):
                 some = some or rolling_off_edge[k, wheel] or descents[k, wheel] > 0.0
-            if not some:
-                restart = i
+            starts[i] = not some
         owner = i if i < n else between.waypoint[i - n]
         for wheel in range(6):
             drops[owner, wheel] = max(drops[owner, wheel], descents[k, wheel])
@@ -117,7 +115,7 @@ def _find_drops(wheels, poses, results, between):
                 at_waypoints[i, wheel] = rolling_off_edge[k, wheel]
             else:
                 at_between[i - n, wheel] = rolling_off_edge[k, wheel]
-    return at_waypoints, at_between, drops, decided, restart
+    return at_waypoints, at_between, drops, decided, starts
 
 
 @exact_kernel

@@ -4,6 +4,8 @@
 A wheel may lift while the others drive the rover on, and touch down again. How high it gets is the
 sum of its speeds of lifting.
 
+Where forces are missing for a few millimetres, the rover's momentum carries it on.
+
 A wheel that falls into a slot as narrow as itself is wedged between its faces. The forces on it
 are not determined there: friction at both faces may lock it, whatever the motors do.
 
@@ -19,8 +21,9 @@ from typing import Any
 
 import numpy as np
 
+from rover_physics.limits.table import MIN_SPEED_SHARE, RUNAWAY
 from rover_physics.numerics.arrays import Floats
-from rover_physics.prediction.path_kernels import Crossings, Wheels
+from rover_physics.prediction.path_kernels import FACE, Crossings, Wheels
 from rover_physics.status import PoseStatus, Stall
 
 WEDGED = np.radians(140.0)
@@ -50,6 +53,52 @@ def stop_in_slots(poses: np.ndarray, results: Any, crossings: Crossings) -> None
         target["stalls"][row if row < n else row - n] = Stall.WEDGED
 
 
+def carry_by_momentum(
+    wheels: Wheels, gravity: float, poses: np.ndarray, results: Any, crossings: Crossings
+) -> None:
+    """Let the rover roll on where its kinetic energy covers what is missing to drive or to brake.
+
+    Where no speed balances, speed share and shares of friction and torque become those with which
+    it rolls, in both RESULTs. A rover that stands, as while its wheels turn or climb, or runs
+    against a face, has no momentum.
+
+    Args:
+        wheels: Sizes of wheels and rover.
+        gravity: Gravity [m/s^2].
+        poses: (n, 3) x, y [m] and yaw [rad] of the waypoints, map frame.
+        results: (n,) RESULT of each waypoint.
+        crossings: Poses between the waypoints.
+    """
+    n = len(poses)
+    deficits = np.concatenate([results["deficit"], crossings.results["deficit"]])
+    if not (deficits != 0.0).any():
+        return
+    order = _in_order(n, crossings.place)
+    deficits, share, motion, angles, speeds = (
+        np.concatenate([results[name], crossings.results[name]])[order]
+        for name in ("deficit", "speed_share", "motion", "contact_angle", "wheel_speed")
+    )
+    nominal = (motion[:, 0] ** 2 + motion[:, 1] ** 2) / (2.0 * gravity)
+    distances = distances_between(wheels, np.concatenate([poses, crossings.poses])[order])
+    distances = np.append(0.0, distances)
+    stands = (distances == 0.0) | ((angles * np.sign(speeds)).max(axis=1) > FACE)
+    head = 0.0
+    for k, row in enumerate(order):
+        if deficits[k] == 0.0:
+            head = 0.0 if stands[k] else share[k] ** 2 * nominal[k]
+            continue
+        if deficits[k] < 0.0:
+            head = max(head, nominal[k])
+        before = deficits[k - 1] if (deficits[k - 1] < 0.0) == (deficits[k] < 0.0) else 0.0
+        head -= 0.5 * (before + deficits[k]) * distances[k] if distances[k] else 0.0
+        head = 0.0 if stands[k] and deficits[k] > 0.0 else max(head, 0.0)
+        if MIN_SPEED_SHARE**2 * nominal[k] < head <= RUNAWAY:
+            one = results[row : row + 1] if row < n else crossings.results[row - n : row - n + 1]
+            one["speed_share"] = np.sqrt(head / nominal[k])
+            for name in ("friction_share", "torque_share"):
+                one[name] = np.minimum(one[name], 1.0)
+
+
 def find_lift_heights(
     wheels: Wheels, poses: np.ndarray, results: Any, crossings: Crossings
 ) -> tuple[Floats, Floats]:
@@ -70,7 +119,7 @@ def find_lift_heights(
         order = _in_order(n, crossings.place)
         share = np.concatenate([results["speed_share"], crossings.results["speed_share"]])[order]
         rate = rates[order] / np.where(share > 0.0, share, 1.0)[:, None]
-        distances = _distances_between(wheels, np.concatenate([poses, crossings.poses])[order])
+        distances = distances_between(wheels, np.concatenate([poses, crossings.poses])[order])
         for k in 1 + np.flatnonzero((rate[1:] > 0.0).any(axis=1)):  # height is 0 at the others
             lifted = rate[k] > 0.0
             rise = 0.5 * (rate[k] + np.fmax(rate[k - 1], 0.0)) * distances[k - 1]
@@ -172,7 +221,7 @@ def find_drift(
     n = len(poses)
     if not wheels.on_servos:
         return np.zeros((n, 2))
-    long_steps = np.append(False, _distances_between(wheels, poses) > wheels.radius)
+    long_steps = np.append(False, distances_between(wheels, poses) > wheels.radius)
     turns = crossings.select(long_steps[crossings.waypoint] & ~crossings.climbing)
     order = _in_order(n, turns.place)
     at = np.concatenate([poses, turns.poses])[order]
@@ -186,7 +235,7 @@ def find_drift(
     c, s = np.cos(at[:, 2]), np.sin(at[:, 2])
     x, y = c * rate[:, 0] - s * rate[:, 1], s * rate[:, 0] + c * rate[:, 1]
     rate = np.column_stack([x, y, rate[:, 2]])
-    distances = _distances_between(wheels, at)
+    distances = distances_between(wheels, at)
     sums = np.zeros(rate.shape)
     sums[1:] = np.cumsum(0.5 * (rate[1:] + rate[:-1]) * distances[:, None], axis=0)
     place = np.append(0.0, np.cumsum(distances))
@@ -204,7 +253,7 @@ def _in_order(n: int, place: np.ndarray) -> np.ndarray:
     return np.lexsort((np.arange(len(places)) >= n, places))
 
 
-def _distances_between(wheels: Wheels, poses: np.ndarray) -> Floats:
+def distances_between(wheels: Wheels, poses: np.ndarray) -> Floats:
     """Return the distances (n - 1,) between poses [m]: of the body or, if it turns, of a wheel."""
     steps = np.diff(poses, axis=0)
     swing = wheels.swing_radius * np.abs((steps[:, 2] + np.pi) % (2.0 * np.pi) - np.pi)

@@ -28,7 +28,9 @@ from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import Crossings, add_up, join_crossings
 from rover_physics.prediction.path_motion import path_motions
 from rover_physics.prediction.servo_path import (
+    carry_by_momentum,
     climb_costs,
+    distances_between,
     find_drift,
     find_lift_heights,
     stop_in_slots,
@@ -116,7 +118,8 @@ def predict_in_parts(model: PackedModel, path: np.ndarray) -> Iterator[PathPart]
     """Sweep a path (n, 3), as `check_poses` returns it, part by part.
 
     A part ends before wheels whose fall depends on poses that are not yet swept. The next one
-    begins before it, at a waypoint where no wheel rolls off an edge.
+    begins before its end, at a waypoint where no wheel rolls off an edge, on servos by the way
+    within which drift counts.
     """
     motions = path_motions(model, path)
     start, done, size, sums = 0, 0, PART, NO_SUMS
@@ -132,12 +135,29 @@ def predict_in_parts(model: PackedModel, path: np.ndarray) -> Iterator[PathPart]
         if start + decided > done:
             yield PathPart(done, done - start, swept.prediction.cut(decided))
             done = start + decided
-        if drops.restart:
-            first = slice(drops.restart + 1)
-            sums = _sum_up(model, here[first], results[first], crossings, sums)
-            start, size = start + drops.restart, PART
+        restart = _find_restart(model, here, drops)
+        if restart:
+            first = slice(restart + 1)
+            results = swept.prediction.results[first]
+            sums = _sum_up(model, here[first], results, swept.crossings, sums)
+            start, size = start + restart, PART
         else:
             size *= 2  # no waypoint to begin from: the next part is longer
+
+
+def _find_restart(model: PackedModel, poses: np.ndarray, drops: Drops) -> int:
+    """Return the last waypoint of a part from which what is not decided follows; 0 for none."""
+    starts = np.flatnonzero(drops.starts)
+    if model.wheels.on_servos:
+        way = np.append(0.0, np.cumsum(distances_between(model.wheels, poses)))
+        last = way[min(drops.decided, len(way) - 1)]
+        starts = starts[way[starts] <= last - drift_window(model)]
+    return int(starts[-1]) if len(starts) else 0
+
+
+def drift_window(model: PackedModel) -> float:
+    """Return the way before a waypoint within which drift counts [m]: the rover's length."""
+    return float(model.record.linkage.length)
 
 
 @quiet
@@ -332,6 +352,7 @@ def make_prediction(
     if wheels.on_servos:
         results = results.copy()
         crossings = crossings._replace(results=crossings.results.copy())
+        carry_by_momentum(wheels, float(model.record.linkage.gravity), poses, results, crossings)
         stop_in_slots(poses, results, crossings)
     between = crossings.results
     results["wheel_drop"] = drops.heights
@@ -339,8 +360,7 @@ def make_prediction(
     _write_sums(model, crossings.poses, between, NO_SUMS)
     _write_sums(model, poses, results, start)
     if wheels.on_servos:
-        window = float(model.record.linkage.length)
-        results["drift"] = find_drift(wheels, window, poses, results, crossings)
+        results["drift"] = find_drift(wheels, drift_window(model), poses, results, crossings)
         heights = find_lift_heights(wheels, poses, results, crossings)
         results["lift_height"], between["lift_height"] = heights
         time, energy = climb_costs(poses, results, crossings).T

@@ -8,11 +8,15 @@ from typing import Any
 import numpy as np
 
 from rover_physics.bounds.path import SIGMAS
-from rover_physics.names import WHEEL_POSITIONS
+from rover_physics.chance.failure_chance import SUMS
+from rover_physics.limits.table import CHANCE, Sense
+from rover_physics.names import SERVO, WHEEL_POSITIONS
 from rover_physics.numerics.arrays import Floats
+from rover_physics.prediction.packed_model import pack_model
+from rover_physics.prediction.sweep import check_poses, predict_paths
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.results.uses import find_uses, limits_of
+from rover_physics.results.uses import RoverLimits, find_uses, limits_of
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path, judge_paths
@@ -60,8 +64,17 @@ class Case:
         )
         return JudgedCase(self, *judged)
 
-    def passes_at(self, rows: slice) -> bool:
-        """Return whether a piece of the path keeps the limits; if not, the path does not."""
+    def predict(self) -> PathPrediction:
+        """Predict all of the path, also beyond its first failure."""
+        model = pack_model(self.rover, self.terrain, self.options)
+        return predict_paths(model, [check_poses(self.poses)], stop_at_failure=False)[0].prediction
+
+    def fails_at(self, place: int, rows: slice, by_chance: bool) -> bool:
+        """Return whether a piece of the path shows that a waypoint in it, or one before it, fails.
+
+        Its first row has another motion than in the path, and wheels behind the place may fall in
+        ways that the piece does not show.
+        """
         (_, verdict), *_ = judge_paths(
             self.rover,
             self.terrain,
@@ -70,8 +83,12 @@ class Case:
             sigmas=self.sigmas,
             stop_at_failure=True,
             check_entrapment=False,
+            accepted_chance=self.accepted_chance if by_chance else None,
         )
-        return verdict.traversable
+        row = verdict.first_failure
+        if verdict.code == CHANCE and verdict.failure_chance_at[row] <= self.accepted_chance:
+            return False
+        return (0 if rows.start == 0 else 1) <= row <= place - rows.start
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,19 +110,48 @@ class JudgedCase:
     @cached_property
     def use(self) -> Floats:
         """(n,) largest use of a limit at each waypoint and on the way there."""
-        use = np.zeros(len(self.prediction.poses))
-        for part in (self.prediction, self.prediction.between):
-            if part is not None and len(part.poses):
-                limits = limits_of(self.case.rover, part.policy)
-                of_rows = np.fmax.reduce(find_uses(limits, part.results).use, axis=1)
-                np.fmax.at(use, part.waypoint, of_rows)
-        return use
+        return self._uses.max(axis=1)
 
     @property
     def largest_use(self) -> tuple[float, float]:
         """Largest use of a limit on the path, and the distance [m] where it is."""
         place = int(self.use.argmax())
         return float(self.use[place]), float(self.distance[place])
+
+    @property
+    def nearest_limit(self) -> str:
+        """Name of the limit that is used most, such as "tip over"."""
+        place = int(self.use.argmax())
+        return self._limits.rows[int(self._uses[place].argmax())].code.replace("_", " ")
+
+    @property
+    def fails_by_sum(self) -> bool:
+        """True if no limit is broken that a waypoint breaks without the path before it."""
+        broken = self._uses[self.verdict.first_failure] > 1.0
+        rows = zip(self._limits.rows, broken, strict=True)
+        return all(row.reads in SUMS for row, is_broken in rows if is_broken)
+
+    @property
+    def _limits(self) -> RoverLimits:
+        return limits_of(self.case.rover, self.prediction.policy)
+
+    @cached_property
+    def _uses(self) -> Floats:
+        """(n, k) use of each limit at each waypoint and on the way there.
+
+        Speed servos use all friction or lift a wheel for a while without failing: those limits
+        count where they are broken.
+        """
+        uses = np.zeros((len(self.prediction.poses), len(self._limits)))
+        for part in (self.prediction, self.prediction.between):
+            if part is not None and len(part.poses):
+                np.fmax.at(uses, part.waypoint, find_uses(self._limits, part.results).use)
+        if self.prediction.policy == SERVO:
+            saturate = [
+                row.sense == Sense.SHARE or not row.has_number for row in self._limits.rows
+            ]
+            uses[:, saturate] = np.where(uses[:, saturate] > 1.0, uses[:, saturate], 0.0)
+        return uses
 
     @cached_property
     def distance(self) -> Floats:

@@ -23,14 +23,12 @@ from rover_planner.advice.path_changes import (
     shift_path,
     turn_path,
 )
-from rover_planner.advice.refusal import Refusal
+from rover_planner.advice.refusal import MOST_FRICTION, Refusal
 
 ASIDE = 2.0
 """Largest shift of a path [wheelbases]."""
 ASKEW = 0.6
 """Largest other angle at which a place is crossed [rad]."""
-MOST_FRICTION = 1.5
-"""Largest friction that is asked for."""
 MOST_TORQUE = 3.0
 """Largest torque that is asked for, over that of the motors."""
 MOST_RELAXED = 1.5
@@ -39,6 +37,8 @@ ROCK_RADIUS = 4.0
 """Radius of the ground that is lowered [wheel radii]."""
 LEVEL = 1e-9
 """Height by which an arm may be lower [m] because of rounding."""
+TELLING_MOVE = 0.01
+"""Least move of the arm's tip along the body that is told [m]."""
 SPACING = 0.02
 """Distance between waypoints of a path of its own where the refused one has no more [m]."""
 TORQUES = {OPTIMAL: "Switch on traction control", SERVO: "Drive the wheels by speed servos"}
@@ -120,9 +120,22 @@ def _arm_joint(k: int, raised: str, lowered: str) -> Lever:
         assert span is not None
         turn = angle - span.now
         verb = lowered if turn > 0.0 else raised
-        return f"{verb.format(f'{abs(turn):.2f} rad')}, to {angle:.2f} rad"
+        return f"{verb.format(f'{abs(turn):.2f} rad')}{_tip_move(refusal, k, angle)}"
 
     return Lever(("arm_yaw", "arm_shoulder", "arm_elbow")[k], "rad", settings, apply, words)
+
+
+def _tip_move(refusal: Refusal, k: int, angle: float) -> str:
+    """Return where the tip of the arm moves along the body with another angle of joint k."""
+    arm = refusal.case.rover.manipulator
+    assert arm is not None
+    angles = arm_angles(arm, refusal.case.options.arm_angles)
+    before = link_points(arm, angles)[-1, 0]
+    angles[k] = angle
+    ahead = float(link_points(arm, angles)[-1, 0] - before)
+    if abs(ahead) < TELLING_MOVE:
+        return ""
+    return f", its tip {abs(ahead):.2f} m to the {'front' if ahead > 0.0 else 'rear'}"
 
 
 def _payload(refusal: Refusal) -> Span | None:
@@ -171,6 +184,21 @@ def _around(refusal: Refusal) -> Choice | None:
 def _drive_around(case: Case, refusal: Refusal) -> Case:
     assert refusal.path_around is not None
     return replace(case, poses=refusal.path_around)
+
+
+def _describe_way(refusal: Refusal, length: float) -> str:
+    """Return where a path around is farthest from the refused one, and its length."""
+    old, new = refusal.case.poses, refusal.path_around
+    assert new is not None
+    steps = new[:, None, :2] - old[None, :, :2]
+    nearest = np.hypot(steps[..., 0], steps[..., 1]).argmin(axis=1)
+    x, y = (new - old[nearest])[:, :2].T
+    aside = np.cos(old[nearest, 2]) * y - np.sin(old[nearest, 2]) * x
+    farthest = int(np.abs(aside).argmax())
+    return (
+        f"Drive around, up to {abs(aside[farthest]):.2f} m {_side(aside[farthest])} of the path: "
+        f"{length:.1f} m in place of {refusal.judged.distance[-1]:.1f} m"
+    )
 
 
 def _backward(refusal: Refusal) -> Choice | None:
@@ -324,8 +352,7 @@ LEVERS: tuple[Lever, ...] = (
     ),
     Lever(
         "path_around", "m", _around, lambda case, refusal, _value: _drive_around(case, refusal),
-        lambda refusal, length: f"Drive around: a path of {length:.1f} m in place of "
-            f"{refusal.judged.distance[-1]:.1f} m",
+        _describe_way,
         changes_path=True, keeps_rows=False,
     ),
     Lever(

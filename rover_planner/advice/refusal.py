@@ -6,8 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from rover_physics.names import SERVO
 from rover_physics.numerics.arrays import Floats
+from rover_physics.results.path_prediction import PathPrediction
 from rover_planner.advice.case import Case, JudgedCase
 from rover_planner.errors import PlanningError
 from rover_planner.planning.answering.budget import QuestionStoppedError
@@ -15,8 +15,12 @@ from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.path_search import find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 
+MOST_FRICTION = 1.5
+"""Largest friction that is asked for."""
 BEFORE = 1.5
-"""Length of path that decides about a failure with servos [wheelbases]: they drift over one."""
+"""Length of path that decides about drift and lifts of servos [wheelbases]: sums over one."""
+EDGE = 2.0
+"""Length of path around a failure that decides whether a wheel falls there [wheel radii]."""
 SEARCH = LatticeSettings(budget=1.0, ends_at_first=True)
 """How a path around is searched."""
 
@@ -40,24 +44,31 @@ class Refusal:
 
     @property
     def time(self) -> float:
-        """Time of the path [s], as if the rest of it were as what lies before the failure."""
-        to_failure, share = self._sum_before_failure("time")
+        """Time of the path [s], as if the rover could drive on where it fails."""
+        total = self._sum_up("time")
         length = float(self.judged.distance[-1])
-        return to_failure / share if share > 0.0 else length / self.case.rover.nominal_speed
+        return length / self.case.rover.nominal_speed if total is None else total
 
     @property
     def energy(self) -> float:
-        """Energy of the path [J] in the same way; 0 if nothing lies before the failure."""
-        to_failure, share = self._sum_before_failure("energy")
-        return to_failure / share if share > 0.0 else 0.0
+        """Energy of the path [J] in the same way; 0 if none of it is known."""
+        return self._sum_up("energy") or 0.0
 
-    def _sum_before_failure(self, name: str) -> tuple[float, float]:
-        """Return a sum up to the failure, and the share of the path that this is."""
-        row = max(0, self.place - 1)
-        value = float(getattr(self.judged.prediction, name)[row])
-        distance = self.judged.distance
-        is_known = np.isfinite(value) and distance[row] > 0.0
-        return value, float(distance[row] / distance[-1]) if is_known else 0.0
+    def _sum_up(self, name: str) -> float | None:
+        """Return the sum at the end of the path: where it is not known, as before by distance."""
+        values, distance = getattr(self._whole, name), self.judged.distance
+        if np.isfinite(values[-1]):
+            return float(values[-1])
+        known = np.flatnonzero(np.isfinite(values) & (distance > 0.0))
+        if not known.size:
+            return None
+        return float(values[known[-1]] * distance[-1] / distance[known[-1]])
+
+    @cached_property
+    def _whole(self) -> PathPrediction:
+        """The prediction of all of the path, on ground that holds if the wheels slip on this."""
+        slips = self.judged.verdict.code == "friction"
+        return (self.case.change(friction=MOST_FRICTION) if slips else self.case).predict()
 
     @property
     def place_on_ground(self) -> tuple[float, float]:
@@ -85,10 +96,10 @@ class Refusal:
             return None  # an end is not on the map
         return None if found.path is None else found.path.poses
 
-    def rows_around(self, place: int, policy: str) -> slice:
-        """Return the rows of the path that decide whether a waypoint fails under a policy."""
-        if policy != SERVO:
-            return slice(max(0, place - 1), place + 1)
-        distance = self.judged.distance
-        near = distance[place] - BEFORE * self.case.rover.wheelbase
-        return slice(int(np.searchsorted(distance, near)), place + 1)
+    def rows_around(self, place: int, fails_by_sum: bool) -> slice:
+        """Return the rows of the path that show whether a waypoint fails, perhaps by a sum."""
+        rover, distance = self.case.rover, self.judged.distance
+        before = BEFORE * rover.wheelbase if fails_by_sum else EDGE * rover.wheel.radius
+        near = distance[place] - before, distance[place] + EDGE * rover.wheel.radius
+        first, last = np.searchsorted(distance, near)
+        return slice(max(0, min(int(first), place - 1)), int(last) + 1)

@@ -68,6 +68,19 @@ class Remedy:
         """Energy of the drive above that of the refused path [J]."""
         return float(self.judged.prediction.energy[-1]) - self.refusal.energy
 
+    @property
+    def extra_distance(self) -> float:
+        """Length of the path above that of the refused one [m]."""
+        return float(self.judged.distance[-1] - self.refusal.judged.distance[-1])
+
+    def describe_costs(self) -> str:
+        """Return time, way, energy and chance in words."""
+        distance = f"{self.extra_distance:+.1f} m, " if abs(self.extra_distance) > 0.05 else ""
+        return (
+            f"{round(self.extra_time):+d} s, {distance}{round(self.extra_energy):+d} J, "
+            f"chance of failure {self.judged.verdict.failure_chance:.2f}"
+        )
+
     def options(self) -> dict[str, Any]:
         """Return the options of `predict` that change."""
         old, new = self.refusal.case.options, self.judged.case.options
@@ -89,7 +102,10 @@ class Remedy:
             )
         )
         use, distance = self.judged.largest_use
-        return f"{todo}{self._describe_loads()}; largest use {use:.2f} at {distance:.1f} m"
+        return (
+            f"{todo}{self._describe_loads()}; largest use {use:.2f} at {distance:.1f} m "
+            f"({self.judged.nearest_limit})"
+        )
 
     def _describe_loads(self) -> str:
         """Return how the load of the axle changes most where the refused path fails."""
@@ -114,9 +130,11 @@ class Remedy:
             "words": self.describe(),
             "options": self.options(),
             "largest_use": use,
+            "use_before": self.refusal.judged.largest_use[0],
             "chance": self.judged.verdict.failure_chance,
             "extra_time": self.extra_time,
             "extra_energy": self.extra_energy,
+            "extra_distance": self.extra_distance,
             "needs_others": self.needs_others,
         }
         plain: dict[str, Any] = to_plain(found)

@@ -11,23 +11,23 @@ from dataclasses import dataclass
 from itertools import combinations, product
 from typing import Any
 
+import numpy as np
+
 from rover_physics.errors import RoverError
 from rover_physics.limits.table import CHANCE, TRAPPED
+from rover_physics.names import SERVO
 from rover_planner.advice.case import Case, JudgedCase
 from rover_planner.advice.levers import LEVERS, Choice, Lever, Span
 from rover_planner.advice.refusal import Refusal
 from rover_planner.advice.remedy import Remedy, SetLever
 
-STEPS = 10
-"""Steps from the value of a lever to its end."""
 TOLERANCE = 0.02
 """Tolerance of the least value [share of the range]."""
-COARSE = ((), (), (0.3, 0.6, 1.0), (0.5, 1.0))
-"""Steps [share of the range] that are tried of each of two and of three levers."""
-OF_WHOLE_PATH = (TRAPPED, CHANCE)
-"""Codes of failures that a piece of the path does not show."""
-MOST_LEVERS = 3
-"""Largest number of levers that are set at once."""
+COARSE, FINE = (tuple((k + 1) / count for k in range(count)) for count in (10, 50))
+ROUNDS = ((1, COARSE), (1, FINE), (2, (0.3, 0.6, 1.0)), (3, (0.5, 1.0)))
+"""Number of levers, and steps [share of the range] of each of them, as they are tried."""
+MOST_PLACES = 8
+"""Largest number of failures that are remembered."""
 
 Values = tuple[Any, ...]
 """A value for each of a few levers."""
@@ -43,34 +43,47 @@ class Trial:
     """Their least setting that passes."""
 
 
+@dataclass(frozen=True)
+class Failure:
+    """Where a case failed."""
+
+    place: int
+    """Index of the waypoint."""
+    by_chance: bool
+    """True if it kept the limits, but not in enough samples."""
+    by_sum: bool
+    """True if it may be the path before it that decides."""
+
+
 def seek_remedies(refusal: Refusal) -> Iterator[Trial]:
     """Yield all trials: one lever after the other, and several of them if none helps alone.
 
-    Only what the rover does by itself is combined; three only of levers that keep the rows of the
-    path, as the others have to be judged as a whole.
+    Only what the rover does by itself is tried in fine steps and combined.
     """
-    seeker = _Seeker(refusal)
+    seeker, helped = _Seeker(refusal), False
     own = [lever for lever in LEVERS if not lever.needs_others]
-    usable, helped = [], False
-    for lever in LEVERS:
-        if lever.settings(refusal) is None:
-            continue
-        remedy = seeker.seek((lever,))
-        yield Trial((lever,), remedy)
-        if lever in own:
-            usable.append(lever)
-            helped = helped or remedy is not None
-    for count in range(2, MOST_LEVERS + 1):
+    for count, steps in ROUNDS:
+        for levers in combinations(LEVERS if steps is COARSE else own, count):
+            settings = [lever.settings(refusal) for lever in levers]
+            if not _can_combine(levers) or None in settings:
+                continue
+            if steps is FINE and isinstance(settings[0], Choice):
+                continue
+            remedy = seeker.seek(levers, steps)
+            yield Trial(levers, remedy)
+            helped = helped or (remedy is not None and not remedy.needs_others)
         if helped:
             return
-        for levers in combinations(usable, count):
-            if sum(lever.changes_path for lever in levers) > 1:
-                continue
-            if count == MOST_LEVERS and not all(lever.keeps_rows for lever in levers):
-                continue
-            remedy = seeker.seek(levers)
-            yield Trial(levers, remedy)
-            helped = helped or remedy is not None
+
+
+def _can_combine(levers: Sequence[Lever]) -> bool:
+    """Return whether levers may be set at once: three only if all keep the rows of the path.
+
+    The others have to be judged as a whole.
+    """
+    if sum(lever.changes_path for lever in levers) > 1:
+        return False
+    return len(levers) < 3 or all(lever.keeps_rows for lever in levers)
 
 
 class _Seeker:
@@ -78,74 +91,132 @@ class _Seeker:
 
     def __init__(self, refusal: Refusal):
         self._refusal = refusal
-        self._failed: list[int] = []
+        self._failed: list[Failure] = []
+        """Where cases failed, the last first."""
         self._note(refusal.judged)
 
-    def seek(self, levers: Sequence[Lever]) -> Remedy | None:
-        """Return the remedy of a few levers, None if there is none."""
+    def seek(self, levers: Sequence[Lever], steps: Sequence[float]) -> Remedy | None:
+        """Return the remedy of levers in steps [share of the range], None if there is none."""
         ranges = [_range_of(lever, self._refusal) for lever in levers]
-        shares = [_shares(one, len(levers)) for one in ranges]
+        shares = [_shares(one, steps) for one in ranges]
         # The nearest come first.
         for chosen in sorted(product(*shares), key=lambda some: sum(map(abs, some))):
-            if self._judge(levers, _values(ranges, chosen)) is not None:
-                return self._shrink(levers, ranges, list(chosen))
+            values = _values(ranges, chosen)
+            if self._fails_where_known(levers, values):
+                continue
+            judged = self._judge(levers, values)
+            if judged is not None:
+                step = steps[0] if len(levers) == 1 else 1.0
+                least, judged = self._shrink(levers, ranges, list(chosen), judged, step)
+                told = zip(levers, _values(ranges, least), ranges, strict=True)
+                set_levers = tuple(SetLever(lever, value, one.now) for lever, value, one in told)
+                return Remedy(self._refusal, set_levers, judged)
         return None
 
     def _shrink(
-        self, levers: Sequence[Lever], ranges: Sequence[Span | Choice], shares: list[float]
-    ) -> Remedy | None:
-        """Return the remedy with the least shares of the ranges, one lever after the other."""
-        step = 1.0 / STEPS if len(levers) == 1 else 1.0
+        self,
+        levers: Sequence[Lever],
+        ranges: Sequence[Span | Choice],
+        shares: list[float],
+        judged: JudgedCase,
+        step: float,
+    ) -> tuple[list[float], JudgedCase]:
+        """Return the least shares of the ranges that pass, one lever after the other, as judged.
+
+        The given ones pass; less by `step` may fail.
+        """
+        keeps_rows = all(lever.keeps_rows for lever in levers)
         for k, one in enumerate(ranges):
             if isinstance(one, Choice):
                 continue
-            passes = shares[k]
-            sign = 1.0 if passes > 0.0 else -1.0
-            fails = sign * max(0.0, abs(passes) - step)
+            passes, hopes = shares[k], keeps_rows
+            fails = float(np.sign(passes)) * max(0.0, abs(passes) - step)
             while abs(passes - fails) > TOLERANCE:
-                shares[k] = 0.5 * (passes + fails)
-                if self._judge(levers, _values(ranges, shares)) is not None:
-                    passes = shares[k]
+                low, shares[k] = fails, 0.5 * (passes + fails)
+                if hopes:
+                    low, shares[k] = self._narrow(levers, ranges, shares, k, (fails, passes))
+                    if shares[k] == passes:
+                        break
+                found = self._judge(levers, _values(ranges, shares))
+                if found is None:
+                    fails, hopes = shares[k], keeps_rows and not hopes
                 else:
-                    fails = shares[k]
+                    fails, passes, judged = low, shares[k], found
             shares[k] = passes
-        values = _values(ranges, shares)
-        judged = self._judge(levers, values)
-        if judged is None:
-            return None
-        told = zip(levers, values, ranges, strict=True)
-        return Remedy(
-            self._refusal,
-            tuple(SetLever(lever, value, one.now) for lever, value, one in told),
-            judged,
-        )
+        return shares, judged
+
+    def _narrow(
+        self,
+        levers: Sequence[Lever],
+        ranges: Sequence[Span | Choice],
+        shares: Sequence[float],
+        k: int,
+        ends: tuple[float, float],
+    ) -> tuple[float, float]:
+        """Return the ends of share k, narrowed down by the failures that are remembered alone.
+
+        The first end fails. The second may, if it is not the one that was given.
+        """
+        fails, passes = ends
+        while abs(passes - fails) > TOLERANCE:
+            middle = 0.5 * (passes + fails)
+            values = _values(ranges, [*shares[:k], middle, *shares[k + 1 :]])
+            if self._fails_where_known(levers, values):
+                fails = middle
+            else:
+                passes = middle
+        return fails, passes
 
     def _judge(self, levers: Sequence[Lever], values: Values) -> JudgedCase | None:
         """Return the case with levers set if it passes, else None."""
-        case: Case | None = self._refusal.case
+        case = self._set(levers, values)
         try:
-            for lever, value in zip(levers, values, strict=True):
-                if case is not None:
-                    case = lever.apply(case, self._refusal, value)
-            if case is None:
-                return None
-            keeps_rows = all(lever.keeps_rows for lever in levers)
-            for place in self._failed if keeps_rows else ():
-                if not case.passes_at(self._refusal.rows_around(place, case.options.policy)):
-                    return None
-            judged = case.judge()
+            judged = None if case is None else case.judge()
         except RoverError:
-            return None  # the rover cannot be asked for it
-        if judged.passes:
+            return None  # the rover cannot do that
+        if judged is None or judged.passes:
             return judged
-        if keeps_rows:
+        if all(lever.keeps_rows for lever in levers):
             self._note(judged)
         return None
 
+    def _fails_where_known(self, levers: Sequence[Lever], values: Values) -> bool:
+        """Return whether the case with levers set fails where others have failed."""
+        case = self._set(levers, values)
+        if case is None or not all(lever.keeps_rows for lever in levers):
+            return case is None
+        for known in self._failed:
+            by_sum = known.by_sum and case.options.policy == SERVO
+            rows = self._refusal.rows_around(known.place, by_sum)
+            try:
+                fails = case.fails_at(known.place, rows, known.by_chance)
+            except RoverError:
+                fails = True  # the rover cannot do that
+            if fails:
+                self._remember(known)
+                return True
+        return False
+
+    def _set(self, levers: Sequence[Lever], values: Values) -> Case | None:
+        """Return the case with levers set, None where there is no room for it."""
+        case: Case | None = self._refusal.case
+        try:
+            for lever, value in zip(levers, values, strict=True):
+                case = None if case is None else lever.apply(case, self._refusal, value)
+        except RoverError:
+            return None
+        return case
+
     def _note(self, judged: JudgedCase) -> None:
         """Remember where a case failed."""
-        if judged.verdict.code not in OF_WHOLE_PATH:
-            self._failed.insert(0, judged.verdict.first_failure)
+        verdict = judged.verdict
+        if verdict.code != TRAPPED:
+            by_chance = verdict.code == CHANCE
+            self._remember(Failure(verdict.first_failure, by_chance, judged.fails_by_sum))
+
+    def _remember(self, known: Failure) -> None:
+        others = [one for one in self._failed if one != known]
+        self._failed = [known, *others][:MOST_PLACES]
 
 
 def _range_of(lever: Lever, refusal: Refusal) -> Span | Choice:
@@ -154,14 +225,13 @@ def _range_of(lever: Lever, refusal: Refusal) -> Span | Choice:
     return found
 
 
-def _shares(settings: Span | Choice, count: int) -> list[float]:
-    """Return what to try of a lever among `count`: shares to its ends, negative to the first.
+def _shares(settings: Span | Choice, steps: Sequence[float]) -> list[float]:
+    """Return what to try of a lever: steps to its ends, negative to the first one of two.
 
     The values of a choice are 1, 2, ...
     """
     if isinstance(settings, Choice):
         return [float(k + 1) for k in range(len(settings.values))]
-    steps = COARSE[count] or [(k + 1) / STEPS for k in range(STEPS)]
     signs = (-1.0, 1.0) if len(settings.ends) == 2 else (1.0,)
     return [sign * step for step in steps for sign in signs]
 

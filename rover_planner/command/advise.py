@@ -27,7 +27,6 @@ from rover_planner.command.options import (
 
 if TYPE_CHECKING:
     from rover_planner.advice.advise import Advice
-    from rover_planner.advice.remedy import Remedy
 
 SPACING = 0.02
 """Distance of the waypoints [m] between a start and a goal."""
@@ -102,13 +101,8 @@ def _print_table(advice: "Advice") -> None:
     if advice.judged.verdict.reason:
         typer.echo(f"refused: {advice.judged.verdict.reason}")
     for number, remedy in enumerate((*advice.remedies, *advice.others), start=1):
-        typer.echo(f"{number}. {remedy.describe()} ({_costs(remedy)})")
+        typer.echo(f"{number}. {remedy.describe()} [{remedy.describe_costs()}]")
     if not advice.found:
         typer.echo(advice.describe())
     if not advice.complete:
         typer.echo("not all levers were tried in this time; a larger --budget tries more")
-
-
-def _costs(remedy: "Remedy") -> str:
-    chance = remedy.judged.verdict.failure_chance
-    return f"{remedy.extra_time:+.0f} s, {remedy.extra_energy:+.0f} J, chance {chance:.2f}"

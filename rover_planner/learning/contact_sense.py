@@ -53,6 +53,8 @@ class WheelState:
     """(6, 3) directions of the axles, to the left."""
     loads: Floats
     """(6,) normal forces."""
+    doubts: Floats
+    """(6,) errors of them, because it is not clear where the wheels touch."""
     tractions: Floats
     """(6,) measured torques over the radius; or what force sensors feel, as in the others."""
     lateral: Floats
@@ -100,22 +102,26 @@ class ContactSense:
         level = np.zeros(WHEEL_COUNT)
         state = MeasuredState(row[ROLL], row[PITCH], rocker, bogies, level, steering=steering)
         try:
-            angles = self._finder.find(state, pose, 0.0, forward).angles
-            other = self._finder.find(state, pose, 0.0, -forward).angles
-            middle = 0.5 * (angles + other)
-            balance = self._balance.write(replace(state, contact_angles=middle), 0.0)
+            ends = [self._finder.find(state, pose, 0.0, way).angles for way in (forward, -forward)]
+            tractions = torques / self._radius
+            (loads, lateral, excess), (other_loads, other_lateral, other_excess) = (
+                self._balance_at(state, angles, tractions) for angles in ends
+            )
         except ModelError:
             return None
-        unit = balance.force_unit
-        tractions = torques / self._radius
-        forces = balance.complete(tractions / unit)
+        # Of what is between the two ends, the balance tells how the wheels touch.
+        spread = excess - other_excess
+        share = float(np.clip(-other_excess / spread, 0.0, 1.0)) if spread else 0.5
+        doubts = 0.5 * np.abs(loads - other_loads)
+        loads = share * loads + (1.0 - share) * other_loads
+        lateral = share * lateral + (1.0 - share) * other_lateral
+        excess = share * excess + (1.0 - share) * other_excess
+        middle = share * ends[0] + (1.0 - share) * ends[1]
         s, c = np.sin(middle)[:, None], np.cos(middle)[:, None]
         sides = np.repeat([rocker, -rocker], 3)
         links = row[PITCH] + sides + np.where(self._on_bogie, np.repeat(bogies, 3), 0.0)
         along = s * placed["up"] + c * placed["forward"]
-        clear = (np.abs(angles - other) < CLEAR) & (np.abs(along[:, 2]) < np.sin(STEEPEST))
-        loads, lateral = unit * forces[LOAD_ENTRIES], unit * balance.lateral_forces(forces)
-        excess = float((balance.directions * (tractions - unit * forces[TRACTIONS])).sum())
+        clear = (np.abs(ends[0] - ends[1]) < CLEAR) & (np.abs(along[:, 2]) < np.sin(STEEPEST))
         felt = row[FORCES].reshape(WHEEL_COUNT, 3)
         if np.isfinite(felt).any():
             # from the frame of the link to that of the contact, turned about the axle
@@ -133,12 +139,23 @@ class ContactSense:
             along=along,
             axles=placed["axis"].copy(),
             loads=loads,
+            doubts=doubts,
             tractions=tractions,
             lateral=lateral,
             excess=excess,
             clear=clear.astype(float),
             links=links,
         )
+
+    def _balance_at(
+        self, state: MeasuredState, angles: Floats, tractions: Floats
+    ) -> tuple[Floats, Floats, float]:
+        """Return loads and lateral forces (6,), and the tractions' excess, at contact angles."""
+        balance = self._balance.write(replace(state, contact_angles=angles), 0.0)
+        unit = balance.force_unit
+        forces = balance.complete(tractions / unit)
+        excess = float((balance.directions * (tractions - unit * forces[TRACTIONS])).sum())
+        return unit * forces[LOAD_ENTRIES], unit * balance.lateral_forces(forces), excess
 
 
 @kernel

@@ -44,15 +44,23 @@ ALONG = 0.75
 """Share of a slip along the heading above which the torque shows the shear."""
 MIN_LOAD, MAX_LOAD = 0.3, 4.0
 """Loads of wheels that count, in sixths of the weight."""
-MAX_FLUCTUATION = 1.0
-"""Fluctuation of a torque over its mean from which the wheel hops rather than slips."""
+MOST_STICKING = 0.3
+"""Fluctuation of a torque over its mean, times 1 less the slip ratio, from which a wheel sticks
+and slips by turns; its mean shear is then below the friction."""
 MAX_UNSTEADY = 0.1
 """Acceleration of the treads, over gravity, from which a window does not count."""
 SAME_PLACE = 0.5
 """Way of a wheel, over its radius, within which its measurements are not independent."""
-EXCESS_NOISE, UNCLEAR_NOISE = 2.0, 0.3
-"""Relative noise of a use of friction per contradiction of the balance over the weight, and if no
-contact is clear."""
+AT_A_PLACE = 1.5
+"""Number of independent measurements that a wheel makes at one place."""
+SHARE_NOISE = 0.22
+"""Relative noise of one wheel's shear over its load; loads of several wheels are known better."""
+EXCESS_NOISE = 1.5
+"""Relative noise of a use of friction per contradiction of the balance over the weight."""
+MOST_DOUBT = 0.3
+"""Error of a load over the load up to which the wheel counts."""
+FASTEST = 0.8
+"""Speed over the largest one from which a motor gives less torque than it is asked for."""
 RESISTANCE_TIME = 10.0
 """Time constant of the mean resistance [s]."""
 JUMP = 0.05
@@ -271,22 +279,19 @@ class GroundLearner:
         self, window: SlipWindow, slips: Flags, grips: Flags, elapsed: float
     ) -> None:
         """Take what the wheels of a window tell about the friction."""
-        unit = self._sense.weight / WHEEL_COUNT
+        unit, wheel = self._sense.weight / WHEEL_COUNT, self._rover.wheel
         loads, tractions = window.loads, window.tractions
         tractions = tractions - self._resistance * loads * np.sign(window.rolling)
         counts = (window.clear > 0.0) & (loads > MIN_LOAD * unit) & (loads < MAX_LOAD * unit)
-        uses = np.abs(tractions) / np.maximum(loads, 1e-9)
         along = np.abs(window.slip) / np.maximum(window.slip_speed, 1e-9)
-        fluctuation = self._find_fluctuation()
+        sticking = self._find_fluctuation() * (1.0 - np.abs(window.ratio))
         tells = slips & counts & (along > ALONG) & (window.slip * tractions > 0.0)
-        tells &= fluctuation < MAX_FLUCTUATION
+        tells &= sticking < MOST_STICKING
+        tells &= window.doubts < MOST_DOUBT * loads
+        tells &= np.abs(window.rolling) < FASTEST * wheel.max_speed * wheel.radius
         way = abs(float(np.median(window.travel))) * elapsed
         weights = self._weigh(window, tells, elapsed)
-        samples = sum(recent[3] for recent in self._recent)
-        doubt = np.hypot(
-            EXCESS_NOISE * window.excess / self._sense.weight, self._find_doubt(window)
-        )
-        noise = np.hypot(fluctuation / np.sqrt(samples), doubt)
+        doubt = EXCESS_NOISE * window.excess / self._sense.weight
         every = np.arange(WHEEL_COUNT)
         filters = [
             (self._whole, every >= 0),
@@ -294,11 +299,14 @@ class GroundLearner:
         ]
         for one, own in filters:
             one.drive(way)
-            for wheel in np.flatnonzero(tells & own):
-                one.slip(
-                    uses[wheel] / along[wheel], fluctuation[wheel], noise[wheel], weights[wheel]
-                )
-            held = np.sort(uses[counts & grips & own])
+            told = np.flatnonzero(tells & own)
+            if len(told):
+                shear = float((np.abs(tractions) / along)[told].sum())
+                unclear = 2.0 * float(window.doubts[told].sum() / loads[told].sum())
+                noise = float(np.linalg.norm([SHARE_NOISE / np.sqrt(len(told)), doubt, unclear]))
+                use = shear / float(loads[told].sum())
+                one.slip(use, noise, float(weights[told].mean()))
+            held = np.sort((np.abs(tractions) / np.maximum(loads, 1e-9))[counts & grips & own])
             if len(held) >= 2:  # two wheels: the contact of one may be wrong
                 one.grip(float(held[-2]))
 
@@ -310,14 +318,9 @@ class GroundLearner:
         away = np.hypot(*(window.places - self._spot).T) > SAME_PLACE * self._rover.wheel.radius
         self._spot = np.where(away[:, None], window.places, self._spot)
         self._here = np.where(away, 0.0, self._here)
-        weights = elapsed / (window.duration + BLOCK) * np.exp(-2.0 * self._here)
+        weights = elapsed / (window.duration + BLOCK) * np.exp(-self._here / AT_A_PLACE)
         self._here = self._here + np.where(tells, weights, 0.0)
         return np.asarray(weights)
-
-    def _find_doubt(self, window: SlipWindow) -> float:
-        """Return the relative noise of uses due to what contradicts the model of the contacts."""
-        unclear = UNCLEAR_NOISE * float((window.clear <= 0.0).mean())
-        return float(np.hypot(EXCESS_NOISE * window.excess / self._sense.weight, unclear))
 
     def _find_fluctuation(self) -> Floats:
         """Return (6,) standard deviations of the torques over the window, over their means."""

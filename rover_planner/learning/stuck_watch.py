@@ -1,22 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """Notices that a rover is stuck: its wheels push or spin, and it does not move."""
 
+from collections import deque
+
 import numpy as np
 
 from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
-from rover_planner.learning.wheel_slip import SlipWindow
+from rover_planner.learning.wheel_slip import LONGEST_GAP, SlipWindow
 
 NO_PROGRESS = 0.10
-"""Travel over rolling of the median wheel below which a rover that rolls does not get on."""
+"""Way over that of the treads below which a rover that rolls does not get on."""
 SLOWEST = 0.1
 """Speed of the treads, over the rover's nominal speed, that counts as rolling."""
 PUSHING = 0.9
 """Torque over the largest one of a motor that pushes as hard as it can."""
 CLIMBING = 0.01
 """Change of a suspension angle over a window that shows that a wheel climbs [rad]."""
-PATIENCE = 0.8
-"""Time without progress after which the rover counts as stuck, beyond that of a window [s]."""
+PATIENCE = 1.2
+"""Time without progress after which the rover counts as stuck, beyond half a window [s]."""
 
 
 class StuckWatch:
@@ -31,8 +33,7 @@ class StuckWatch:
         """
         self._slowest = SLOWEST * nominal_speed
         self._most = PUSHING * max_torque
-        self._time = 0.0
-        self._last = -np.inf
+        self._past: deque[tuple[float, Floats, float, bool]] = deque()
         self.reason = ""
         """Why the rover is stuck; empty if it is not."""
 
@@ -52,20 +53,23 @@ class StuckWatch:
             commanded: Commanded speed [m/s], None if it is not known: then wheels that turn, or
                 push as hard as they can, tell that the rover is to move.
         """
-        pushed = np.sign(window.rolling)
         speed = float(np.median(np.abs(window.rolling)))
-        travel = abs(float(np.median(window.travel * pushed)))
-        noise = 2.0 * window.deviation
-        spins = speed > max(self._slowest, noise) and travel < NO_PROGRESS * speed + noise
-        pushes = np.abs(torques) >= self._most
-        wanted = bool(pushes.sum() >= WHEEL_COUNT // 3)
+        wanted = bool((np.abs(torques) >= self._most).sum() >= WHEEL_COUNT // 3)
         if commanded is not None:
             wanted = abs(commanded) > self._slowest
-        stalls = wanted and max(speed, travel) < self._slowest + noise
-        stuck = (spins or stalls) and climb < CLIMBING
-        elapsed = window.time - self._last
-        self._last = window.time
-        self._time = self._time + min(elapsed, window.duration) if stuck else 0.0
-        words = "wheels turn and the rover stays" if spins else "wheels push and do not turn"
-        self.reason = words if self._time >= PATIENCE else ""
+        past = self._past
+        if past and window.time - past[-1][0] > LONGEST_GAP:
+            past.clear()
+        past.append((window.time, window.places.mean(axis=0), speed, wanted))
+        while len(past) > 1 and window.time - past[1][0] >= PATIENCE - 1e-6:
+            past.popleft()
+        times, places, speeds, wishes = zip(*past, strict=True)
+        elapsed = times[-1] - times[0]
+        self.reason = ""
+        if elapsed >= PATIENCE - 1e-6 and climb < CLIMBING:
+            moved = float(np.hypot(*(places[-1] - places[0]))) / elapsed
+            if min(speeds) > self._slowest and moved < NO_PROGRESS * np.mean(speeds):
+                self.reason = "wheels turn and the rover stays"
+            elif all(wishes) and max(moved, *speeds) < self._slowest:
+                self.reason = "wheels push and do not turn"
         return bool(self.reason)

@@ -47,6 +47,8 @@ class SlipWindow:
     """(6, 2) mean positions of the wheels [m]."""
     loads: Floats
     """(6,) mean normal forces [N]."""
+    doubts: Floats
+    """(6,) errors of them by unclear contacts [N]."""
     tractions: Floats
     """(6,) mean tractions [N]."""
     lateral: Floats
@@ -135,6 +137,7 @@ class SlipWindows:
             deviation=scatter / np.sqrt(spread),
             places=means[WHEEL_COUNT:].reshape(WHEEL_COUNT, 2),
             loads=np.mean([state.loads for state in states], axis=0),
+            doubts=np.mean([state.doubts for state in states], axis=0),
             tractions=np.mean([state.tractions for state in states], axis=0),
             lateral=np.mean([state.lateral for state in states], axis=0),
             clear=np.min([state.clear for state in states], axis=0) * steady,

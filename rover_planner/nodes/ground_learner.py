@@ -4,6 +4,7 @@
 import json
 import sys
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from typing import Any
 
 from geometry_msgs.msg import TwistStamped
@@ -17,11 +18,16 @@ from msg_adapters.commands import twist_to_speeds
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.frames import check_frame
 from msg_adapters.joints import read_joint_map
+from msg_adapters.odometry import planar_odometry
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.rover_file import load_rover
+from rover_planner.learning.drive_log import YAW, X, Y
 from rover_planner.learning.ground_learner import GroundLearner
 from rover_planner.learning.learned_file import describe
+from rover_planner.learning.stuck_place import find_place_ahead
+from rover_planner.learning.wheel_odometry import WheelOdometry
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.warm_up import LEARNING
 from rover_planner.parameters.declare import (
@@ -40,6 +46,8 @@ from rover_planner.shell.kernels import load_kernels
 NODE_NAME = "ground_learner"
 ESTIMATE, EMERGENCY_STOP = "traverse_server/ground_estimate", "traction_controller/emergency_stop"
 """Topics of the estimate, and of the stop of a rover that is stuck."""
+MARK_PLACE = "traverse_server/mark_place"
+"""Topic of places that are impassable."""
 PERIOD = 1.0
 """Time between two estimates [s]; that the rover is stuck is told at once."""
 COMMAND_AGE = 0.5
@@ -65,9 +73,12 @@ class GroundLearnerNode(Node):
         self._commanded, self._command_time, self._sent, self._stuck = 0.0, -1e9, -1e9, ""
         self._estimates = self.create_publisher(String, ESTIMATE, latched_qos())
         self._stops = self.create_publisher(Bool, EMERGENCY_STOP, latched_qos())
+        self._marks = self.create_publisher(String, MARK_PLACE, latched_qos())
+        self._wheels = WheelOdometry(self._rover)
+        self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", sensor_qos())
         for kind, name, take in (
             (JointState, "joint_states", self._rows.take_joints),
-            (Imu, "imu", self._rows.take_imu),
+            (Imu, "imu", self._take_imu),
             (Odometry, "odometry", self._take_odometry),
             (TwistStamped, "cmd_vel", self._take_command),
         ):
@@ -116,20 +127,41 @@ class GroundLearnerNode(Node):
     def _now(self) -> float:
         return float(self.get_clock().now().nanoseconds / NANOSECONDS)
 
+    def _take_imu(self, imu: Imu) -> None:
+        """Take attitude and yaw rate, and tell where the wheels say that the rover is."""
+        self._rows.take_imu(imu)
+        stamp = stamp_to_ns(imu.header.stamp)
+        motion = self._rows.motion(self._now if stamp is None else stamp / NANOSECONDS)
+        if motion is None:
+            return
+        wheels = self._wheels
+        wheels.take(motion)
+        speed = wheels.speed, wheels.speed_deviation
+        message = planar_odometry(
+            wheels.pose,
+            wheels.covariance,
+            speed,
+            motion.yaw_rate,
+            self._values.odometry_frame,
+            imu.header.stamp,
+        )
+        self._wheel_odometry.publish(message)
+
     def _take_odometry(self, odometry: Odometry) -> None:
         stamp = stamp_to_ns(odometry.header.stamp)
         now = self._now if stamp is None else stamp / NANOSECONDS
         row = self._rows.take_odometry(odometry, now, self._values.map_frame)
         self.heard_until = now
+        self._wheels.learn(row[[X, Y, YAW]])
         learner = self.learner
         if learner is None:
             return
         is_fresh = self._now - self._command_time < COMMAND_AGE
         learner.commanded = self._commanded if is_fresh else None
         if learner.take(row):
-            self._tell(learner, now)
+            self._tell(learner, row, now)
 
-    def _tell(self, learner: GroundLearner, now: float) -> None:
+    def _tell(self, learner: GroundLearner, row: Floats, now: float) -> None:
         """Publish the estimate from time to time, and at once if the rover gets stuck."""
         stuck, before = learner.stuck, self._stuck
         self._stuck = stuck
@@ -137,8 +169,13 @@ class GroundLearnerNode(Node):
             self.get_logger().warning(f"the rover is stuck: {stuck}")
             if self._values.stop_when_stuck:
                 self._stops.publish(Bool(data=True))
+            if self._values.mark_when_stuck:
+                rolling = 0.0 if learner.window is None else learner.window.rolling.mean()
+                place = find_place_ahead(self._rover, row, rolling, stuck)
+                self._marks.publish(String(data=json.dumps(asdict(place))))
         if now - self._sent >= PERIOD or bool(stuck) != bool(before):
             self._sent = now
+            self._wheels.friction = learner.estimate.friction.mean
             contents = describe(learner.estimate, self._told)
             self._estimates.publish(String(data=json.dumps(contents)))
 

@@ -233,8 +233,8 @@ class MissionPlanner(Node):
             return None
         return self._driven == self._sent
 
-    def check(self, poses: np.ndarray) -> str:
-        """Return why the server refuses a path (n, 3) on its newest map, empty if it passes.
+    def check(self, poses: np.ndarray) -> tuple[str, str]:
+        """Return code and reason why the server refuses a path (n, 3) now, empty if it passes.
 
         Raises:
             NoAnswerError: The server does not answer in time.
@@ -251,7 +251,7 @@ class MissionPlanner(Node):
                 continue
             answer = json.loads(future.result().message)
             if answer["path_hash"] == about:  # else it was an earlier one, or another client's
-                return "" if answer["traversable"] else str(answer["reason"])
+                return ("", "") if answer["traversable"] else (answer["code"], answer["reason"])
         raise NoAnswerError(
             f"waited {self._timeout:.0f} s in vain for {self._checker.service_name}"
         )

@@ -65,9 +65,17 @@ class Inquiry(Asked):
 class QuestionDesk:
     """Numbers questions, queues them, and delivers each answer once."""
 
-    def __init__(self, node: Node, service: TraverseService, maps: MapTopics, guard: Guard):
+    def __init__(
+        self,
+        node: Node,
+        service: TraverseService,
+        maps: MapTopics,
+        guard: Guard,
+        listen: Callable[[], None],
+    ):
+        """Begin; `listen` reads what was measured until now."""
         self._node, self._service, self._maps, self._guard = node, service, maps, guard
-        self._sender = PacedSender(node, guard)
+        self._sender, self._listen = PacedSender(node, guard), listen
         self._register = Register()
         self._time_budget = 1.0
         self.health = ServerHealth()
@@ -94,6 +102,7 @@ class QuestionDesk:
 
     def ask(self, question: Question, reply: Reply) -> None:
         """Take a question; its answer follows within its budget and GRACE."""
+        self._listen()
         now = self._node.get_clock().now().nanoseconds
         inquiry = Inquiry(
             question,

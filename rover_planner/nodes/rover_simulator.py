@@ -38,6 +38,7 @@ from rover_planner.parameters.rover_simulator import QUASI_STATIC, RoverSimulato
 from rover_planner.parameters.shared import STOP
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.optional_types import find_type
+from rover_planner.ros.polled_topics import PolledTopics
 from rover_planner.ros.qos import latched_qos, map_qos, sensor_qos, topic_qos
 from rover_planner.shell.kernels import load_kernels
 from rover_planner.simulator.plant import PlantState
@@ -74,6 +75,8 @@ class RoverSimulator(Node):
         self._standing_steps = max(1, round(STANDING_PERIOD * parameters.rate))
         self._stopped, self._path_hash, self._steps = "", "", 0
         self._own_stamps: deque[tuple[int, int]] = deque(maxlen=64)
+        self._guard = Guard(self.get_logger())
+        self._heard = PolledTopics(self, self._guard)
         self._create_publishers()
         self._create_subscriptions()
         self._state: PlantState = self.simulation.plant.state()
@@ -81,7 +84,6 @@ class RoverSimulator(Node):
         # A map takes longer than a step: other threads must not make the rover's sensors late.
         self._maps, self._map_in_work = ThreadPoolExecutor(1, "maps"), Future[None]()
         self._map_in_work.set_result(None)
-        self._guard = Guard(self.get_logger())
         self.create_timer(1.0 / parameters.map_rate, self._begin_map)
         self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
         self._begin_map()
@@ -107,30 +109,30 @@ class RoverSimulator(Node):
         self._transforms = None if broadcaster is None else broadcaster(self)
 
     def _create_subscriptions(self) -> None:
-        qos = topic_qos()
-        self.create_subscription(Bool, STOP, self._take_stop, qos)
-        self.create_subscription(Path, "path", self._take_path, qos)
-        self.create_subscription(TwistStamped, "cmd_vel", self._take_speeds, sensor_qos())
+        qos, hear = topic_qos(), self._heard.subscribe
+        hear(Bool, STOP, self._take_stop, qos)
+        hear(Path, "path", self._take_path, qos)
+        hear(TwistStamped, "cmd_vel", self._take_speeds, sensor_qos())
         if self._settings.parameters.follow_commands:
-            self.create_subscription(Float64MultiArray, COMMANDS, self._take_torques, qos)
-            self.create_subscription(Bool, BRAKE, self._take_brake, latched_qos())
+            hear(Float64MultiArray, COMMANDS, self._take_torques, qos)
+            hear(Bool, BRAKE, self._take_brake, latched_qos())
 
-    def _take_path(self, path: Path) -> None:
+    def _take_path(self, path: Path, _arrival: float) -> None:
         try:
             self.simulation.take_path(path_to_poses(path, self._frame))
             self._path_hash = path_hash(path)
         except MessageError as error:
             self.get_logger().error(f"path refused: {error}")
 
-    def _take_speeds(self, twist: TwistStamped) -> None:
+    def _take_speeds(self, twist: TwistStamped, arrival: float) -> None:
         if _stamp_of(twist) in self._own_stamps:
             return
         try:
-            self.simulation.take_speeds(*twist_to_speeds(twist), time.monotonic())
+            self.simulation.take_speeds(*twist_to_speeds(twist), arrival)
         except MessageError as error:
             self.get_logger().error(f"cmd_vel refused: {error}", throttle_duration_sec=5.0)
 
-    def _take_torques(self, message: Float64MultiArray) -> None:
+    def _take_torques(self, message: Float64MultiArray, arrival: float) -> None:
         efforts = np.array(message.data)
         if efforts.shape != (6,) or not np.isfinite(efforts).all():
             self.get_logger().error(
@@ -140,15 +142,16 @@ class RoverSimulator(Node):
             return
         torques = np.empty(6)
         torques[self._order] = efforts
-        self.simulation.take_torques(torques, time.monotonic())
+        self.simulation.take_torques(torques, arrival)
 
-    def _take_brake(self, message: Bool) -> None:
+    def _take_brake(self, message: Bool, _arrival: float) -> None:
         self.simulation.take_brake(message.data)
 
-    def _take_stop(self, message: Bool) -> None:
-        self.simulation.take_stop(message.data, time.monotonic())
+    def _take_stop(self, message: Bool, arrival: float) -> None:
+        self.simulation.take_stop(message.data, arrival)
 
     def _advance(self) -> None:
+        self._heard.poll()
         self._state = state = self.simulation.advance(time.monotonic(), self._period)
         stamp = self.get_clock().now().to_msg()
         efforts = dict(zip(WHEEL_JOINTS, state.wheel_torques.tolist(), strict=True))

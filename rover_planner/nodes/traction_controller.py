@@ -192,7 +192,9 @@ class TractionController(Node):
 
     def update(self) -> None:
         """Estimate, build, solve and publish; called by the timer."""
-        now, start = time.monotonic(), time.perf_counter()
+        start = time.perf_counter()
+        self._inputs.poll()
+        now = time.monotonic()
         try:
             command = self._find_command(now)
         except Exception as error:

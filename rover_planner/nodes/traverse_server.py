@@ -41,7 +41,7 @@ from rover_planner.nodes.maps.map_cloud import MapCloud
 from rover_planner.nodes.maps.map_topics import MapTopics
 from rover_planner.nodes.nav2_services import PathComputation, PathValidity
 from rover_planner.nodes.navigation.hazard_topics import HazardTopics
-from rover_planner.nodes.navigation.path_watch import MAX_POSE_AGE, PathWatch
+from rover_planner.nodes.navigation.path_watch import MAX_POSE_AGE, PERIOD, PathWatch
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.nodes.result_topics import ResultTopics
 from rover_planner.nodes.running import run_node
@@ -65,6 +65,7 @@ from rover_planner.planning.answering.server_health import MEMORY
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.marked_places import NONE_MARKED, parse_place
 from rover_planner.planning.navigation.sensor_mounts import sensor_poses
 from rover_planner.planning.path_query import Pose
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
@@ -73,7 +74,8 @@ from rover_planner.ros.deferred_work import DeferredWork
 from rover_planner.ros.frames import NodeFrames, is_empty
 from rover_planner.ros.guard import INPUT_ERRORS, Guard
 from rover_planner.ros.map_intake import read_message
-from rover_planner.ros.qos import replace_reliability, sensor_qos, topic_qos
+from rover_planner.ros.polled_topics import PolledTopics
+from rover_planner.ros.qos import polled_qos, replace_reliability, topic_qos
 from rover_planner.ros.subscriptions import subscribe_to_requests
 from rover_planner.shell.kernels import load_kernels
 
@@ -108,6 +110,7 @@ class TraverseServer(Node):
         self.frames = NodeFrames(self, self._values, sensor_poses(self._values))
         """Transforms poses to the map frame."""
         self.frames.listen()
+        self._heard = PolledTopics(self, self.guard)
         self._results = ResultTopics(
             self,
             DeferredWork(self),
@@ -123,8 +126,9 @@ class TraverseServer(Node):
             lambda error: self.desk.health.take_map(error),
             self.frames,
             self.guard,
+            self._heard,
         )
-        self.desk = QuestionDesk(self, self.service, self._maps, self.guard)
+        self.desk = QuestionDesk(self, self.service, self._maps, self.guard, self._heard.poll)
         """Takes the questions of all services."""
         self.desk.set_limits(self._values.time_budget, self._values.max_waiting)
         self._create_subscriptions(reliability)
@@ -134,6 +138,7 @@ class TraverseServer(Node):
         PathComputation.serve(self, self.desk, self.read_question, self.publish)
         self._advice = AdviceTopics(self, self.desk, self.guard, self._values.advice_time)
         self.create_service(Trigger, "~/cancel", self._cancel)
+        self.create_service(Trigger, "~/clear_places", self._clear_marks)
         self.arm = ArmTopics(self, self.desk, frame, reliability)
         """The topics and the service of the arm."""
         self._map_cloud = MapCloud(self, self.service, frame)
@@ -147,6 +152,7 @@ class TraverseServer(Node):
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics, clock=steady)
+        self.create_timer(PERIOD, self._beat, clock=steady)
         follow_changes(self, lambda: self._values, load_service_settings, self._apply_parameters)
         warn_of_unknown_parameters(self, TraverseServerParameters)
         self._log_ready()
@@ -167,14 +173,11 @@ class TraverseServer(Node):
             (JointState, "joint_states", self._take_joints),
             (Odometry, "odometry", self._take_odometry),
         ):
-            self.create_subscription(kind, name, take, sensor_qos())
+            self._heard.subscribe(kind, name, take, polled_qos())
         subscribe_to_requests(self, Path, "~/path", self._take_path, reliability, raw=True)
-        self.create_subscription(
-            String,
-            "~/ground_estimate",
-            self._take_ground,
-            replace_reliability(topic_qos(), reliability),
-        )
+        qos = replace_reliability(topic_qos(), reliability)
+        self.create_subscription(String, "~/ground_estimate", self._take_ground, qos)
+        self.create_subscription(String, "~/mark_place", self._take_mark, qos)
 
     def _log_ready(self) -> None:
         name, known = self.service.settings.rover.name, self.service.known_map
@@ -193,7 +196,11 @@ class TraverseServer(Node):
         self.frames.apply_timeout(parameters.transform_timeout)
         self._hazards.apply(parameters)
 
-    def _take_joints(self, state: JointState) -> None:
+    def _beat(self) -> None:
+        self._heard.poll()
+        self.watch.beat()
+
+    def _take_joints(self, state: JointState, _arrival: float) -> None:
         try:
             self.service.take_joints(self._joint_names.positions(state, self.service.joint_names))
         except MessageError as error:
@@ -201,7 +208,7 @@ class TraverseServer(Node):
                 f"{error}; the angles known before stay", throttle_duration_sec=5.0
             )
 
-    def _take_odometry(self, odometry: Odometry) -> None:
+    def _take_odometry(self, odometry: Odometry, _arrival: float) -> None:
         try:
             here = self.frames.localise_odometry(odometry)
             pose, _ = odometry_to_pose(here, self._values.map_frame)
@@ -223,6 +230,25 @@ class TraverseServer(Node):
             self.get_logger().warning(f"not used: {error}", throttle_duration_sec=5.0)
             return
         self.service.take_ground(ground)
+
+    def _take_mark(self, message: String) -> None:
+        """Take a place that is impassable from now on: JSON with x, y, radius, reason, date."""
+        try:
+            place = parse_place(message.data, "~/mark_place")
+        except INPUT_ERRORS as error:
+            self.get_logger().warning(f"not used: {error}")
+            return
+        self.service.mark(place)
+        self.get_logger().warning(place.describe())
+
+    def _clear_marks(
+        self, _request: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        count = len(self.service.marked.places)
+        self.service.marked = NONE_MARKED
+        response.success = count > 0
+        response.message = f"{count} marked places cleared"
+        return response
 
     def _take_path(self, message: bytes) -> None:
         about = "", ""
@@ -301,6 +327,7 @@ class TraverseServer(Node):
 
     def _find_here(self) -> Pose:
         """Return the pose (3,) of the body by /tf, else by odometry."""
+        self._heard.poll()
         here = self.frames.find_here()
         if here is None:
             here = self.service.fresh_pose()
@@ -363,6 +390,7 @@ class TraverseServer(Node):
         counts = {
             **({"map": "none"} if known is None else known.describe(snapshot.map_age)),
             "open questions": self.desk.open_count,
+            "marked places": len(self.service.marked.places),
             "internal errors": self.guard.total,
             **self._hazards.describe(),
             **({"kernels not cached": kernel_cache_note()} if kernel_cache_note() else {}),

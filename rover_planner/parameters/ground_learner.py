@@ -31,8 +31,16 @@ class GroundLearnerParameters(ParameterTable):
         "Whether a rover that is stuck gets an emergency stop on "
         "traction_controller/emergency_stop.",
     )
+    mark_when_stuck: bool = parameter(
+        False,
+        "Whether the place ahead of a rover that is stuck is marked as impassable, on "
+        "traverse_server/mark_place.",
+    )
     map_frame: str = parameter(
         "map", "Frame of map and odometry; others are refused.", read_only=True
+    )
+    odometry_frame: str = parameter(
+        "odom", "Frame of the wheel odometry on ~/odometry.", read_only=True
     )
     joint_map: tuple[str, ...] = JOINT_MAP
     map_resolution: float = MAP_RESOLUTION

@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from rclpy.event_handler import EventHandler
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
@@ -18,6 +19,10 @@ from rover_planner.errors import PlanningError
 
 INPUT_ERRORS = (MessageError, PlanningError, RoverError)
 """Errors of the input; any other error is an internal error."""
+
+EVENT_PERIOD, EVENT_WINDOW = 1.0, 0.01
+"""Time between two looks at events of publishers and subscriptions, such as profiles that do not
+match, and the length of a look [s]: they are half of the entities of a wait set."""
 
 Refusal = TypeVar("Refusal")
 
@@ -81,6 +86,17 @@ class GuardedExecutor(SingleThreadedExecutor):
     def __init__(self, **executor_arguments: Any):
         super().__init__(**executor_arguments)
         self._guard_of_node: Guard | None = None
+        self._events_due = self._events_until = 0.0
+
+    def can_execute(self, entity: Any) -> bool:
+        """Return whether the next wait is for an entity, too; events wait for their turn."""
+        if isinstance(entity, EventHandler):
+            now = time.monotonic()
+            if now >= self._events_due:
+                self._events_due, self._events_until = now + EVENT_PERIOD, now + EVENT_WINDOW
+            if now >= self._events_until:
+                return False
+        return bool(super().can_execute(entity))
 
     def add_node(self, node: Node) -> bool:
         """Add the node; errors of its callbacks go to its guard, if it has one."""

@@ -44,6 +44,11 @@ def sensor_qos() -> QoSProfile:
     return QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
+def polled_qos() -> QoSProfile:
+    """Return the profile of sensor data at up to 200 Hz that is read ten times a second."""
+    return QoSProfile(depth=20, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
 def service_qos() -> QoSProfile:
     """Return the profile of services that many clients may call at once."""
     return QoSProfile(depth=100)

@@ -281,6 +281,11 @@ class MujocoRover:
         return self._data.qvel[self._velocities[_WHEELS]].copy()
 
     @property
+    def wheel_torques(self) -> Floats:
+        """Torques (6,) that the motors gave in the last step, in wheel order [N m]."""
+        return self._data.actuator_force[: len(WHEEL_JOINTS)].copy()
+
+    @property
     def tilt(self) -> float:
         """Angle between body z and the vertical [rad]."""
         return float(np.arccos(np.clip(self._rotation[2, 2], -1.0, 1.0)))

@@ -14,6 +14,7 @@ from rover_planner.advice import refusal
 from rover_planner.advice.advise import Advice, grow_advice, grow_within, path_of
 from rover_planner.advice.case import Case
 from rover_planner.advice.levers import Choice
+from rover_planner.advice.path_changes import bend_path
 from rover_planner.advice.remedy import Remedy
 from rover_planner.advice.seek import TOLERANCE
 from rover_planner.planning.answering.budget import QuestionStoppedError
@@ -113,7 +114,8 @@ def test_words_say_what_to_do_and_what_it_does_to_the_rover():
     words = {one.levers[0].lever.name: one.describe() for one in advice.found}
     assert words["payload"].startswith("Carry ")
     assert "kg less at the arm's tip: the rear wheels then carry " in words["payload"]
-    assert " N less; largest use 0." in words["payload"] and words["payload"].endswith(" m")
+    assert " N less; largest use 0." in words["payload"]
+    assert words["payload"].endswith(" m (friction)")
 
 
 def test_several_levers_are_set_where_none_helps_alone():
@@ -165,3 +167,44 @@ def test_two_poses_far_apart_are_start_and_goal():
     assert path_of(LSR1, ends[:1], 0.02) is not None
     near = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])
     assert path_of(LSR1, near, 0.02).shape == (2, 3)
+
+
+def test_energy_and_time_are_above_those_of_the_path_as_if_it_went_on():
+    """The path fails at its first waypoint, so that nothing lies before it."""
+    case = refused_by(slope, friction=0.45)
+    refusal_ = refusal.Refusal(case.judge())
+    assert refusal_.place == 0
+    found = next(one for one in grow_advice(case) if one.found).found[0]
+    # The climb is the same; what servos slip costs more.
+    assert 0.0 < found.extra_energy < 0.3 * refusal_.energy
+    assert 0.0 < found.extra_time < 0.3 * refusal_.time
+
+
+def test_a_use_of_servos_tells_how_far_away_a_failure_is():
+    """Servos use all friction on a slope, and may lift a wheel, without failing."""
+    judged = refused_by(slope, policy="servo").judge()
+    assert judged.passes
+    assert judged.nearest_limit == "tilt"
+    assert judged.largest_use[0] == pytest.approx(np.arctan(0.3) / LSR1.limits.tilt, rel=0.02)
+
+
+@pytest.mark.parametrize("policy", ["equal", "servo"])
+def test_a_piece_fails_only_where_the_path_does(policy):
+    """Each waypoint before the first failure passes in its piece, and that one fails in it."""
+    case = replace(refused_by(rock, policy=policy), poses=bend_path(STRAIGHT, 0.1))
+    refused = refusal.Refusal(case.judge())
+    for place in range(refused.place + 1):
+        rows = refused.rows_around(place, fails_by_sum=False)
+        assert case.fails_at(place, rows, by_chance=False) == (place == refused.place), place
+
+
+def test_a_gap_that_coarse_steps_miss_is_found(monkeypatch):
+    """The path has to go 0.40 m aside within 4 cm; coarse steps are 16 cm."""
+    monkeypatch.setattr(refusal, "SEARCH", replace(refusal.SEARCH, budget=1e-6))
+
+    def gate(x, y):
+        return 1.0 * ((np.abs(x) < 0.2) & (np.abs(y - 0.4) > 0.42))
+
+    case = replace(refused_by(gate), terrain=make_terrain(gate, resolution=0.02))
+    found = next(one for one in grow_advice(case) if one.found).found[0]
+    assert len(found.levers) == 1 and found.levers[0].value == pytest.approx(0.4, abs=0.04)

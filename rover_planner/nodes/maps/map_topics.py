@@ -33,7 +33,8 @@ from rover_planner.ros.logs import RepeatLog
 from rover_planner.ros.map_intake import CLOUD, GRID_MAP, MapIntake
 from rover_planner.ros.map_messages import LOOK_PERIOD, MapSettings, read_map
 from rover_planner.ros.optional_types import find_type
-from rover_planner.ros.qos import sensor_qos
+from rover_planner.ros.polled_topics import PolledTopics
+from rover_planner.ros.qos import polled_qos
 from rover_planner.ros.subscriptions import subscribe_to_map
 
 LOG_PERIOD = 10.0
@@ -56,6 +57,7 @@ class MapTopics:
         report: Callable[[str], None],
         frames: Frames,
         guard: Guard,
+        heard: PolledTopics,
     ):
         """Subscribe to the maps, serve ~/load_map and load the first one.
 
@@ -67,12 +69,13 @@ class MapTopics:
                 with an empty text.
             frames: Knows where the frames of messages are on the map; asked in the thread.
             guard: Takes unexpected errors.
+            heard: Topics with odometry, which is read before a map.
 
         Raises:
             TerrainError: The file of the parameter terrain_file cannot be loaded.
         """
         self._node, self._service, self._report = node, service, report
-        self._guard, self._handover = guard, Handover(node, guard)
+        self._guard, self._handover, self._heard = guard, Handover(node, guard), heard
         self._values, self._settings = parameters, MapSettings.of(parameters)
         self._keeper = MapKeeper(service.settings.rover, keeper_settings(parameters))
         self._is_from_topic = False
@@ -95,6 +98,7 @@ class MapTopics:
 
     def _subscribe(self, topic: str, kind: type, parameters: TraverseServerParameters) -> None:
         def offer(message: bytes) -> None:
+            self._heard.poll()
             if not self._intake.offer(message, kind):
                 self._intake.do(self._renew)
 
@@ -104,7 +108,7 @@ class MapTopics:
     def _subscribe_to_imu(self, parameters: TraverseServerParameters) -> None:
         mounting = ImuMounting(parameters.imu_frame or BASE_FRAME, parameters.imu_mounting)
 
-        def take(imu: Imu) -> None:
+        def take(imu: Imu, _arrival: float) -> None:
             try:
                 attitude = imu_to_attitude(imu, mounting)
             except MessageError as error:
@@ -113,7 +117,7 @@ class MapTopics:
                 return
             self._service.take_tilt(attitude.roll, attitude.pitch)
 
-        self._node.create_subscription(Imu, "imu", take, sensor_qos())
+        self._heard.subscribe(Imu, "imu", take, polled_qos())
 
     def ticket(self) -> int:
         """Return a number for `wait`: all maps that have come until now."""

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_planner.planning.angles import wrap
+from rover_planner.planning.marked_places import MARKED_CODE
 from rover_planner.planning.navigation.watched_path import TURN_LENGTH, WatchedPath
 
 Poses = NDArray[np.float64]
@@ -43,8 +44,8 @@ class RoverClient(Protocol):
     def send_path(self, poses: Poses) -> None:
         """Let the rover follow a path."""
 
-    def check(self, poses: Poses) -> str:
-        """Return why the server refuses a path on its newest map, empty if it passes."""
+    def check(self, poses: Poses) -> tuple[str, str]:
+        """Return code and reason why the server refuses a path now, empty if it passes."""
 
     def has_ended(self) -> bool | None:
         """Return whether the follower is at the end of its path; None if it never says so."""
@@ -76,6 +77,8 @@ class Stretch(NamedTuple):
     """(3,) where the rover is."""
     hindrance: str
     """Reason why it does not go on; empty at the end of the plan."""
+    is_marked: bool
+    """Whether it is that a place ahead was marked as impassable: the rover may be stuck."""
     behind: Poses
     """(n, 3) waypoints of the plan up to there."""
 
@@ -91,7 +94,7 @@ def drive_to(
 
     That is where the newest map refuses the rest of it, where the rover stands although it is to
     drive, and where the plan ends before the goal. Where no path begins, and where the rover stops
-    again, it first drives back along its plan.
+    again, it first drives back along its plan; and where a place ahead was marked as impassable.
 
     Args:
         client: Server and rover.
@@ -144,7 +147,7 @@ class _Drive:
             raise DriveFailedError(
                 f"{MAX_STOPS} other ways led nowhere from {_describe(pose)}: {stretch.hindrance}"
             )
-        answer = self._ask(pose) if stops < 2 else None
+        answer = None if stops >= 2 or stretch.is_marked else self._ask(pose)
         if answer is None or not answer["traversable"]:
             went_back = self._go_back()
             if went_back or answer is None:
@@ -177,14 +180,15 @@ class _Drive:
             pose = self._client.wait_for_pose(is_there, settings.period)
             behind = plan[: index + 1]
             if is_there(pose):
-                return Stretch(pose, self._describe_miss(pose, plan[-1]), behind)
-            refused = self._client.check(plan[index:])
+                return Stretch(pose, self._describe_miss(pose, plan[-1]), False, behind)
+            code, refused = self._client.check(plan[index:])
             if refused:
-                return Stretch(pose, f"the rest of the plan is refused: {refused}", behind)
+                text = f"the rest of the plan is refused: {refused}"
+                return Stretch(pose, text, code == MARKED_CODE, behind)
             now = time.monotonic()
             if standstill.is_reached(pose, now):
                 text = f"the rover has stood for {settings.patience:g} s on its way"
-                return Stretch(pose, text, behind)
+                return Stretch(pose, text, False, behind)
             if now > self._deadline:
                 raise DriveFailedError(
                     f"waited {settings.timeout:.0f} s in vain for the rover to get there; it is "
@@ -212,7 +216,7 @@ class _Drive:
         lengths = WatchedPath(self._trail).distances
         is_back = lengths >= lengths[-1] - RETREAT
         back, self._trail = self._trail[is_back][::-1], self._trail[~is_back]
-        if self._client.check(back):
+        if self._client.check(back)[1]:
             return False
         self._report(f"back to {_describe(back[-1])}")
         return not self._follow(back).hindrance

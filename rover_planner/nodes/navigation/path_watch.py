@@ -10,7 +10,6 @@ from dataclasses import replace
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_msgs.msg import Bool
@@ -45,7 +44,7 @@ PERIOD = 0.1
 LONGEST_LOOK = 2.0
 """Age of the last look above which there is no heartbeat: the watch has died [s]."""
 IDLE_PERIOD = 1.0
-"""The same while none is: the suspension is compared for the diagnostics."""
+"""Time between two looks while none is: the suspension is compared for the diagnostics [s]."""
 MAX_POSE_AGE = 0.3
 """Age up to which a pose says where the rover is [s]."""
 NO_PATH = WatchedPath(np.empty((0, 3)))
@@ -93,7 +92,7 @@ class PathWatch:
         self._stop = node.create_publisher(Bool, "~/stop", latched_qos())
         self._state = node.create_publisher(DiagnosticStatus, "~/watch", latched_qos())
         self._map_age = math.nan
-        self._looked = time.monotonic()
+        self._looked, self._idle_until = time.monotonic(), 0.0
         self._handover = Handover(node, guard)
         self._changed = threading.Condition()
         self._new_path: WatchedPath | None = None
@@ -102,9 +101,6 @@ class PathWatch:
         self._thread = threading.Thread(target=self._run, name="monitor", daemon=True)
         self._thread.start()
         node.create_service(SetBool, "~/monitor", self._switch)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(IDLE_PERIOD, self._offer_sight, clock=steady)
-        node.create_timer(PERIOD, self._beat, clock=steady)
         self.apply(parameters)
 
     def apply(self, parameters: TraverseServerParameters) -> None:
@@ -117,9 +113,6 @@ class PathWatch:
             self._set_path(self._last_path)
         else:
             self._set_path(NO_PATH)
-        period = PERIOD if self.enabled else IDLE_PERIOD
-        self._timer.timer_period_ns = round(1e9 * period)
-        self._timer.reset()
 
     def accept(self, poses: NDArray[np.float64], about: str) -> None:
         """Watch a path that was judged traversable, from the next look on.
@@ -143,7 +136,16 @@ class PathWatch:
         """Whether the rover is to stop: while paths are watched, it may drive a watched one."""
         return self.enabled and self.finding.state in (IDLE, STOPPED)
 
-    def _beat(self) -> None:
+    def beat(self) -> None:
+        """Have a look taken if one is due, and publish `~/stop`; to be called each PERIOD."""
+        now = time.monotonic()
+        is_idle = self.finding.state == IDLE and self._new_path is None
+        if (self.enabled and not is_idle) or now >= self._idle_until:
+            self._idle_until = now + IDLE_PERIOD
+            self._offer_sight()
+        self._publish()
+
+    def _publish(self) -> None:
         """Publish that the watch is alive, and what it says; a watch that hangs says nothing."""
         if time.monotonic() - self._looked > LONGEST_LOOK:
             return
@@ -246,7 +248,7 @@ class PathWatch:
         if not self.enabled or finding.state == before.state:
             return
         if self._stops != stopped:
-            self._beat()
+            self._publish()
         logger = self._node.get_logger()
         if finding.state == STOPPED:
             assert finding.judgement is not None

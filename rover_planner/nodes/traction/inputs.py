@@ -24,6 +24,7 @@ from rover_planner.ros.frames import NodeFrames
 from rover_planner.ros.guard import INPUT_ERRORS, Guard
 from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.map_intake import CLOUD, MapIntake
+from rover_planner.ros.polled_topics import PolledTopics
 from rover_planner.ros.qos import sensor_qos, topic_qos
 from rover_planner.ros.subscriptions import PublisherCheck, subscribe_to_map
 from rover_planner.traction.clocks import NANOSECONDS, StampCheck, StampError
@@ -58,7 +59,9 @@ class TractionInputs:
         `frames` brings odometry of other frames to that of the map.
         """
         self._node, self._service, self._maps, self._frames = node, service, maps, frames
-        self._errors = guard
+        self._errors, self._topics = guard, PolledTopics(node, guard)
+        self.poll = self._topics.poll
+        """Reads what has come; to be called before each update."""
         self._steering_sign = parameters.steering_sign
         arm = service.settings.rover.manipulator
         known = (*JOINTS, *STEERING_JOINTS, *(() if arm is None else arm.joints))
@@ -91,9 +94,8 @@ class TractionInputs:
             (twist, CMD_VEL, self._take_command),
             (Odometry, ODOMETRY, self._take_odometry),
         ):
-            self._node.create_subscription(kind, name, self._guard(name, take), sensor_qos())
-        take_stop = self._guard(STOP, self._take_stop)
-        self._node.create_subscription(Bool, STOP, take_stop, topic_qos())
+            self._topics.subscribe(kind, name, self._guard(name, take), sensor_qos())
+        self._topics.subscribe(Bool, STOP, self._guard(STOP, self._take_stop), topic_qos())
         durability, reliability = parameters.map_durability, parameters.input_reliability
         subscribe_to_map(self._node, PointCloud2, CLOUD, self._maps.offer, durability, reliability)
 
@@ -111,14 +113,12 @@ class TractionInputs:
         }
         return PublisherCheck(self._node, types, advice)
 
-    def _guard(self, name: str, take: Callable[[Any, float], None]) -> Callable[[Any], None]:
-        """Return a callback that passes a message and the time of its arrival on.
+    def _guard(
+        self, name: str, take: Callable[[Any, float], None]
+    ) -> Callable[[Any, float], None]:
+        """Return what passes a message and the time of its arrival on, or refuses it."""
 
-        A message with an error is refused.
-        """
-
-        def receive(message: Any) -> None:
-            now = time.monotonic()
+        def receive(message: Any, now: float) -> None:
             try:
                 take(message, now)
             except StampError as error:
@@ -136,7 +136,8 @@ class TractionInputs:
             self._log.update(name, f"odometry not used: {error}", "odometry is used again", now)
 
     def _find_time(self, name: str, stamp: int, now: float, *, merged: bool = False) -> float:
-        clock = self._node.get_clock().now().nanoseconds
+        waited = round(NANOSECONDS * (time.monotonic() - now))
+        clock = self._node.get_clock().now().nanoseconds - waited
         return self.stamps.find_time(name, stamp, clock, now, merged=merged)
 
     def _take_joints(self, state: JointState, now: float) -> None:

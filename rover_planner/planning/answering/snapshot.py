@@ -18,6 +18,7 @@ from rover_planner.parameters.traverse_server import FAN, LATTICE
 from rover_planner.planning.answering.judgement import PathJudgement, refusal
 from rover_planner.planning.answering.search_watch import SearchWatch
 from rover_planner.planning.answering.service_settings import ServiceSettings
+from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlaces
 from rover_planner.planning.path_geometry import densify
 from rover_planner.planning.path_query import Candidate, PathSearch, Pose, add_path
 from rover_planner.planning.search.edge_memory import EdgeMemory
@@ -66,6 +67,8 @@ class Snapshot:
     """Why the map is too old to be used; empty if it is not."""
     ground: LearnedGround | None = None
     """What was learned of the ground; the settings assume it if they are to."""
+    marked: MarkedPlaces = NONE_MARKED
+    """Places that are impassable."""
 
     edge_memory: EdgeMemory = field(default_factory=EdgeMemory)
     """Edges that earlier searches have judged; grows with each search."""
@@ -126,7 +129,12 @@ class Snapshot:
             refused: The judgement on the candidates; None if none were tried.
         """
         query = SearchQuery(
-            judge.rover, judge.terrain, *ends, judge.options, judge.unobserved_check
+            judge.rover,
+            judge.terrain,
+            *ends,
+            judge.options,
+            judge.unobserved_check,
+            self.marked,
         )
         found = find_path(query, self.settings.lattice, self.edge_memory, self._look)
         if found.path is not None:
@@ -192,7 +200,7 @@ class Snapshot:
         settings = self.settings
         options = settings.query.change(joint_angles=self._manipulator_angles())
         check = UnobservedCheck(settings.rover, self.known_map.seen, settings.unobserved_ground)
-        return PathJudge(settings.rover, self.known_map.terrain, options, check)
+        return PathJudge(settings.rover, self.known_map.terrain, options, check, self.marked)
 
     def _describe(
         self, judge: PathJudge, candidate: Candidate, search: PathSearch | None = None

@@ -24,6 +24,7 @@ from rover_planner.planning.answering.measurements import MAX_AGE, Measurements
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
 from rover_planner.planning.candidates import generate_candidates
+from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlace, MarkedPlaces
 from rover_planner.planning.search.edge_memory import EdgeMemory
 
 
@@ -40,6 +41,8 @@ class TraverseService:
         """The last valid map; None if there is none."""
         self.given_path = GivenPath()
         """The last path, or the reason why it was refused."""
+        self.marked = NONE_MARKED
+        """Places that are impassable, for new questions."""
         self._map_lock = threading.Lock()
         self._measurements = Measurements()
         self._edge_memory = EdgeMemory()
@@ -142,6 +145,11 @@ class TraverseService:
         """Keep what was learned of the ground, for new questions."""
         self._ground = ground
 
+    def mark(self, place: MarkedPlace) -> None:
+        """Keep a place as impassable."""
+        if place not in self.marked.places:
+            self.marked = MarkedPlaces((*self.marked.places, place))
+
     def take_tilt(self, roll: float, pitch: float) -> None:
         """Keep roll and pitch [rad] of the body, measured by an IMU."""
         self._measurements.take_tilt(roll, pitch, time.monotonic())
@@ -170,6 +178,7 @@ class TraverseService:
             measured_pose=standing,
             edge_memory=self._edge_memory,
             ground=ground,
+            marked=self.marked,
         )
         return self.add_map(known, ros_time)
 

@@ -35,8 +35,9 @@ STEPS_PER_UNIT = 30
 class Difficulty(NamedTuple):
     """The estimate for all edges of a window, as kernels read it."""
 
-    logit: np.ndarray
-    """(HEADINGS, ny, nx) float32 logit of a refusal with the body origin at a place."""
+    steps: np.ndarray
+    """(HEADINGS, ny, nx) uint8 difficulty with the body origin at a place, in steps; at most 254
+    of them, which is far beyond what any path takes."""
     first: np.ndarray
     """(2,) x and y of the first place, from the first place of the lattice [m]."""
     spacing: float
@@ -46,8 +47,6 @@ class Difficulty(NamedTuple):
     samples: np.ndarray
     """(HEADINGS, P, S, 3) places along the primitives: x, y [m] from the first node, and heading;
     -1 as heading ends a list."""
-    known: np.ndarray
-    """(nodes, P) uint8 difficulties of edges in steps, 0 where not estimated yet; written."""
 
 
 def estimate_difficulty(
@@ -55,7 +54,7 @@ def estimate_difficulty(
     terrain: Terrain,
     nodes: Nodes,
     climb: float,
-    edges: tuple[NDArray[np.float64], NDArray[np.uint8]],
+    samples: NDArray[np.float64],
 ) -> Difficulty:
     """Return the estimate.
 
@@ -64,7 +63,7 @@ def estimate_difficulty(
         terrain: The ground.
         nodes: The nodes.
         climb: Slope at which a climb ends [rise over run].
-        edges: `samples` and `known` of Difficulty.
+        samples: `samples` of Difficulty.
     """
     blocks = round(SHARE * nodes.cell / terrain.resolution)
     stride = max(1, min(blocks, *terrain.elevation.shape))
@@ -73,16 +72,17 @@ def estimate_difficulty(
     steepness = np.hypot(*slopes)
     own = np.array([place[:2] for place in rover.suspension.wheels.values()])
     wheels = np.concatenate([own, own * (1.0, -1.0)])
-    logit = np.empty((HEADINGS, *steepness.shape), np.float32)
+    steps = np.empty((HEADINGS, *steepness.shape), np.uint8)
     for heading, yaw in enumerate(YAWS):
         c, s = np.cos(yaw), np.sin(yaw)
         along = np.abs(np.float32(c) * slopes[0] + np.float32(s) * slopes[1])
         shifts = np.rint(wheels @ np.array([[c, s], [-s, c]]) / spacing).astype(int)
         mean, most = _below_wheels(steepness, along, shifts)
-        logit[heading] = LEVEL + (ALL_WHEELS / climb) * mean + (ONE_WHEEL / climb) * most
+        logit = LEVEL + (ALL_WHEELS / climb) * mean + (ONE_WHEEL / climb) * most
+        steps[heading] = np.minimum(STEPS_PER_UNIT * np.log1p(np.exp(np.minimum(logit, 8.0))), 254)
     first = np.asarray(terrain.origin) - nodes.cell * np.array(nodes.first)
     first += 0.5 * (stride - 1) * terrain.resolution
-    return Difficulty(logit, first, spacing, nodes.cell, *edges)
+    return Difficulty(steps, first, spacing, nodes.cell, samples)
 
 
 def steepest_climb(rover: Rover, friction: float) -> float:
@@ -192,33 +192,23 @@ def _sample(poses: NDArray[np.float64], length: float, spacing: float) -> NDArra
 def difficulty_of(difficulty, columns, node, k):
     """Return the difficulty of edge k of a node: -log of the probability that the model passes it.
 
+    It is the largest at the samples of the edge.
+
     Args:
-        difficulty: Difficulty; `known` is written where it is 0.
+        difficulty: Difficulty.
         columns: Number of columns of places of the lattice.
         node: The node.
         k: Number of the edge.
     """
-    step = difficulty.known[node, k]
-    if step == 0:
-        logit = _largest_logit(difficulty, columns, node, k)
-        value = np.log1p(np.exp(min(logit, 8.0)))
-        step = np.uint8(1 + min(int(STEPS_PER_UNIT * value), 254))
-        difficulty.known[node, k] = step
-    return (step - 0.5) / STEPS_PER_UNIT
-
-
-@exact_kernel
-def _largest_logit(difficulty, columns, node, k):
-    """Return the largest logit at the samples of edge k of a node."""
     heading, place = node % HEADINGS, node // HEADINGS
     x = (place % columns) * difficulty.cell - difficulty.first[0]
     y = (place // columns) * difficulty.cell - difficulty.first[1]
-    _, ny, nx = difficulty.logit.shape
-    largest = np.float32(-100.0)
+    _, ny, nx = difficulty.steps.shape
+    largest = np.uint8(0)
     for sample in difficulty.samples[heading, k]:
         if sample[2] < 0.0:
             break
         i = min(max(int((x + sample[0]) / difficulty.spacing + 0.5), 0), nx - 1)
         j = min(max(int((y + sample[1]) / difficulty.spacing + 0.5), 0), ny - 1)
-        largest = max(largest, difficulty.logit[int(sample[2]), j, i])
-    return largest
+        largest = max(largest, difficulty.steps[int(sample[2]), j, i])
+    return (largest + 0.5) / STEPS_PER_UNIT

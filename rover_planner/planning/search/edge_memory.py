@@ -69,6 +69,7 @@ def _is_alike(asked: SearchQuery, edges: Edges, query: SearchQuery, nodes: Nodes
         and asked.rover == query.rover
         and asked.options == query.options
         and _rule_of(asked) == _rule_of(query)
+        and asked.marked == query.marked
         and old.resolution == new.resolution
         and old.origin == new.origin
         and old.elevation.shape == new.elevation.shape

@@ -56,8 +56,6 @@ class Edges:
         """(nodes, P) cost [m] where the edge passes."""
         self.standing = np.zeros(self.nodes.count, np.int8)
         """(nodes,) as `state`: whether the rover can stand at a node with its wheels ahead."""
-        self.difficulty = np.zeros(shape, np.uint8)
-        """(nodes, P) as `Difficulty.known`."""
         self.codes: list[str] = []
         """Codes of the limits that failed so far."""
 
@@ -120,5 +118,5 @@ class Edges:
 
     def forget(self, places: NDArray[np.int64]) -> None:
         """Forget what is known of the nodes at places (k,) and of the edges that begin there."""
-        for values in (self.state, self.standing, self.difficulty):
+        for values in (self.state, self.standing):
             values.reshape(-1, HEADINGS, *values.shape[1:])[places] = UNJUDGED

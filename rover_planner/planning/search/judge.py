@@ -32,6 +32,7 @@ from rover_physics.traversability.judge import judge_poses
 from rover_physics.traversability.pieces import PieceVerdict, judge_pieces
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.maps.unobserved_ground import UNOBSERVED_CODE
+from rover_planner.planning.marked_places import MARKED_CODE, NONE_MARKED, MarkedPlaces
 from rover_planner.planning.path_geometry import rings_within
 from rover_planner.planning.path_query import (
     Candidate,
@@ -41,6 +42,7 @@ from rover_planner.planning.path_query import (
     Pose,
     answer_path_query,
     check_path,
+    choose,
 )
 from rover_planner.planning.search.primitives import PRICES, Gear, Piece
 from rover_planner.planning.search.unobserved_check import UnobservedCheck, physical
@@ -76,6 +78,8 @@ class PathJudge:
     """Options of candidates and of the judgement of paths."""
     unobserved_check: UnobservedCheck | None = None
     """Refuses ground under the belly that was never seen; None allows it."""
+    marked: MarkedPlaces = NONE_MARKED
+    """Places that are impassable."""
     poses: int = field(default=0, init=False)
     """Number of poses that searches have asked for so far, a measure of the work done."""
 
@@ -108,7 +112,19 @@ class PathJudge:
         return answer_path_query(self.rover, self.terrain, start, goal, self.options)
 
     def _hold(self, answer: PathAnswer) -> PathAnswer:
-        return answer if self.unobserved_check is None else self.unobserved_check.choose(answer)
+        """Return an answer whose choice is among the candidates whose ground is not refused.
+
+        If all that are traversable are refused, the best of them is explained.
+        """
+        if not answer.traversable:
+            return answer
+        held = choose(tuple(self._hold_path(candidate) for candidate in answer.candidates))
+        return held if held.traversable else replace(held, nearest=answer.best)
+
+    def _hold_path(self, candidate: Candidate) -> Candidate:
+        """Return a path, refused where its ground was never seen or is marked."""
+        check = self.unobserved_check
+        return self.marked.hold(candidate if check is None else check.hold(candidate))
 
     def _fails_at(self, answer: PathAnswer, goal: Pose, tolerance: float) -> bool:
         """Return whether another goal within `tolerance` [m] may help.
@@ -142,8 +158,7 @@ class PathJudge:
             RoverError: The model refuses an option or the poses.
         """
         self.poses += len(poses)
-        checked = self._judge_path(poses, stop_at_failure=stop_at_failure)
-        return checked if self.unobserved_check is None else self.unobserved_check.hold(checked)
+        return self._hold_path(self._judge_path(poses, stop_at_failure=stop_at_failure))
 
     def _judge_path(self, poses: Pose, *, stop_at_failure: bool = False) -> Candidate:
         return check_path(
@@ -210,6 +225,8 @@ class PathJudge:
         ]
         for row in self._find_unobserved(poses, [one.code for one in judged]):
             judged[row] = JudgedPiece(UNOBSERVED_CODE, math.inf)
+        for row in np.flatnonzero(self.marked.refuses(poses)).tolist():
+            judged[row] = JudgedPiece(MARKED_CODE, math.inf)
         return judged
 
     def stand(self, poses: NDArray[np.float64]) -> tuple[str, ...]:

@@ -164,7 +164,9 @@ class _PathFinder:
         self._query, self._settings, self._on_progress = query, settings, on_progress
         self._start = _check_end("start", query, may_be_off_map=False)
         self._goal = _check_end("goal", query, may_be_off_map=settings.frontier)
-        self._judge = PathJudge(query.rover, query.terrain, query.options, query.unobserved_check)
+        self._judge = PathJudge(
+            query.rover, query.terrain, query.options, query.unobserved_check, query.marked
+        )
         cell = settings.cell or 0.25 * query.rover.wheelbase
         self._nodes, self._is_limited = choose_window(query, cell)
         self._memory = memory or EdgeMemory()
@@ -273,7 +275,7 @@ class _PathFinder:
             if self._to_frontier
             else connect_goal(rover, nodes, self._goal, spacing),
             ground.doubt,
-            estimate_difficulty(rover, terrain, nodes, climb, (edges.samples, edges.difficulty)),
+            estimate_difficulty(rover, terrain, nodes, climb, edges.samples),
             self._progress,
         )
 

@@ -11,6 +11,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
+from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlaces
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.nodes import HEADINGS, Nodes, nodes_within
 from rover_planner.planning.search.unobserved_check import UnobservedCheck
@@ -35,6 +36,8 @@ class SearchQuery:
     """Options of the judgement of paths."""
     unobserved_check: UnobservedCheck | None = None
     """Refuses ground under the belly that was never seen; None allows it."""
+    marked: MarkedPlaces = NONE_MARKED
+    """Places that are impassable."""
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,8 @@ from rover_planner.maps.unobserved_ground import (
     ObservedGround,
     UnobservedShare,
 )
-from rover_planner.planning.path_query import Candidate, PathAnswer, choose
+from rover_planner.planning.marked_places import MARKED_CODE
+from rover_planner.planning.path_query import Candidate
 
 _REFUSED_COST = (float("inf"), float("inf"))
 
@@ -71,23 +72,13 @@ class UnobservedCheck:
         """Return why the rover may not stand at a pose that `refuses` refuses, in words."""
         return f"ground under the belly that was never seen {self._name_rule()}"
 
-    def choose(self, answer: PathAnswer) -> PathAnswer:
-        """Return an answer whose choice is among the candidates that the rule does not refuse.
-
-        If it refuses all that are traversable, the best of them is explained.
-        """
-        if self.rule == ALLOW or not answer.traversable:
-            return answer
-        held = choose(tuple(self.hold(candidate) for candidate in answer.candidates))
-        return held if held.traversable else replace(held, nearest=answer.best)
-
     def _name_rule(self) -> str:
         return f"(blind_ground is {self.rule})"
 
 
 def physical(candidate: Candidate) -> Candidate:
-    """Return a path as the model judged it, without a refusal by `UnobservedCheck.hold`."""
-    if UNOBSERVED_CODE not in candidate.verdict.codes:
+    """Return a path as the model judged it, without a refusal by a `hold`."""
+    if not {UNOBSERVED_CODE, MARKED_CODE} & set(candidate.verdict.codes):
         return candidate
     none = [""] * len(candidate.poses)
     return replace(candidate, verdict=with_refusals(candidate.verdict, none, none))

@@ -30,7 +30,6 @@ def list_remedies(advice: Advice) -> list[Remedy]:
 
 
 def _describe(index: int, remedy: Remedy) -> dict[str, Any]:
-    chance = remedy.judged.verdict.failure_chance
-    costs = f"{remedy.extra_time:+.0f} s, {remedy.extra_energy:+.0f} J, chance {chance:.2f}"
     can_take = all(one.lever.name != "ground" for one in remedy.levers)
+    costs = remedy.describe_costs()
     return {"index": index if can_take else None, "words": remedy.describe(), "costs": costs}

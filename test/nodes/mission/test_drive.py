@@ -9,6 +9,7 @@ import pytest
 from rover_physics.rover.rover_file import load_rover
 from rover_planner.nodes.mission import drive
 from rover_planner.nodes.mission.drive import DriveFailedError, DriveSettings, drive_to
+from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlace, MarkedPlaces
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query, check_path
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
@@ -29,7 +30,7 @@ class SimulatedRover:
         self.plant = QuasiStaticPlant(LSR1, ground, (-1.0, 0.0, 0.0))
         self.follower = PathFollower(self.plant.pose()[None], 0.3)
         self.asked, self.now, self.speaks = [], 0.0, True
-        self.make_follower = PathFollower
+        self.make_follower, self.marked = PathFollower, NONE_MARKED
 
     def ask(self, start, goal):
         self.asked.append(np.array(start))
@@ -42,7 +43,8 @@ class SimulatedRover:
 
     def check(self, poses):
         candidate = check_path(LSR1, MAP, poses, COARSE)
-        return "" if candidate.verdict.traversable else candidate.verdict.reason
+        held = self.marked.hold(candidate).verdict
+        return held.code, held.reason
 
     def has_ended(self):
         return self.follower.has_arrived(self.plant.pose()) if self.speaks else None
@@ -66,6 +68,22 @@ def make_rover(monkeypatch):
         return rover
 
     return make
+
+
+def test_a_rover_before_a_place_that_is_marked_goes_back_before_it_asks_again(make_rover):
+    rover = make_rover(MAP)
+    goal, told = (1.5, 0.0, 0.0), []
+    plan = rover.ask(rover.plant.pose(), goal)["poses"]
+
+    def ask_freed(start, goal, ask=rover.ask):
+        rover.marked = NONE_MARKED
+        return ask(start, goal)
+
+    rover.ask = ask_freed
+    rover.marked = MarkedPlaces((MarkedPlace(0.4, 0.0, 0.4, "stuck", "today"),))
+    drive_to(rover, goal, plan, SETTINGS, told.append)
+    assert "stuck" in told[0] and "back to" in told[1]
+    assert rover.plant.pose()[0] == pytest.approx(1.5, abs=0.15)
 
 
 def hill(x, y):

@@ -5,6 +5,7 @@ import json
 
 from rclpy.node import Node
 from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
 from rover_planner.ros.qos import topic_qos
 from support.grounds import make_terrain, waves
@@ -33,3 +34,24 @@ def test_answers_say_which_ground_they_assume_and_since_when(start_server, clien
     verdict = verdict_of({"verdict": client.heard["verdict"][-1]})
     assert verdict["ground"] == "learned"
     assert float(verdict["ground_friction"]) == 0.5 and verdict["ground_since"]
+
+
+def test_a_marked_place_stays_impassable_until_places_are_cleared(
+    start_server, client, ros: RosRun
+):
+    server = start_server(planner="fan")
+    client.send_terrain(make_terrain(lambda x, y: 0.0 * x * y))
+    teller = ros.spin(Node("teller", context=ros.context))
+    sender = teller.create_publisher(String, f"{SERVER}/mark_place", topic_qos())
+    wait_until(lambda: sender.get_subscription_count() == 1, "the server's subscription")
+    place = {"x": GOAL[0], "y": GOAL[1], "radius": 0.3, "reason": "dust", "date": "today"}
+    for text in ("no JSON", json.dumps(place)):
+        sender.publish(String(data=text))
+    wait_until(lambda: server.service.marked.places, "the place")
+    assert not client.can_traverse(START, GOAL).poses
+    clearer = teller.create_client(Trigger, f"{SERVER}/clear_places")
+    assert clearer.wait_for_service(10.0)
+    done = clearer.call_async(Trigger.Request())
+    wait_until(done.done, "the answer")
+    assert done.result().message == "1 marked places cleared"
+    assert client.can_traverse(START, GOAL).poses

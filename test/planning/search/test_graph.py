@@ -26,14 +26,13 @@ def random_knowledge(seed):
     least = np.tile(EDGES.table.least_cost, (EDGES.nodes.count // 16, 1))
     known.cost[:] = np.where(np.isfinite(least), least, 0.0) * (1.0 + rng.random(least.shape))
     known.standing[rng.random(EDGES.nodes.count) < 0.3] = FAILS
-    known.difficulty[:] = rng.integers(1, 256, known.state.shape)
-    return known, (2.0 * rng.random(EDGES.nodes.count)).astype(np.float32), hardness(known)
+    return known, (2.0 * rng.random(EDGES.nodes.count)).astype(np.float32), hardness(rng)
 
 
-def hardness(known):
-    """Return level ground with the difficulties that are known."""
-    flat = np.zeros((16, 2, 2), np.float32)
-    return Difficulty(flat, np.zeros(2), 1.0, EDGES.nodes.cell, EDGES.samples, known.difficulty)
+def hardness(rng):
+    """Return ground with random difficulties."""
+    steps = rng.integers(0, 255, (16, 5, 6), np.uint8)
+    return Difficulty(steps, np.zeros(2), 0.5, EDGES.nodes.cell, EDGES.samples)
 
 
 def explicit_costs(known, graph):

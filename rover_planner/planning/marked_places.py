@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Places that were marked as impassable, such as where the rover got stuck, with reason and date.
+
+A place is a disc for the origin of the body. A rover may not come nearer to its centre there; it
+may leave it, so that one that stands at its rim gets away.
+"""
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.traversability.verdict import with_refusals
+from rover_planner.errors import PlanningError
+from rover_planner.planning.path_query import Candidate
+
+MARKED_CODE = "marked_place"
+"""Code of the refusal."""
+NEARER = 1e-6
+"""Step towards a centre that counts [m]."""
+
+
+@dataclass(frozen=True)
+class MarkedPlace:
+    """A disc that the origin of the body may not enter."""
+
+    x: float
+    y: float
+    """Centre [m], map frame."""
+    radius: float
+    """Radius [m]."""
+    reason: str
+    """Why it is impassable."""
+    date: str
+    """When this was found."""
+
+    def describe(self) -> str:
+        """Return it in words."""
+        return (
+            f"{self.radius:.2f} m around {self.x:.2f}, {self.y:.2f} m are marked as impassable "
+            f"since {self.date}: {self.reason}"
+        )
+
+
+@dataclass(frozen=True)
+class MarkedPlaces:
+    """All places that are marked."""
+
+    places: tuple[MarkedPlace, ...]
+    """The places."""
+
+    def refuses(self, pieces: Sequence[NDArray[np.float64]]) -> NDArray[np.bool_]:
+        """Return (k,) whether pieces of path, each of poses (n, 3), are refused."""
+        if not self.places:
+            return np.zeros(len(pieces), bool)
+        return np.array([self._find(poses) is not None for poses in pieces], bool)
+
+    def hold(self, candidate: Candidate) -> Candidate:
+        """Return a path, refused where it enters a place."""
+        found = self._find(candidate.poses) if candidate.verdict.traversable else None
+        if found is None:
+            return candidate
+        codes, reasons = [""] * len(candidate.poses), [""] * len(candidate.poses)
+        codes[found[0]], reasons[found[0]] = MARKED_CODE, found[1].describe()
+        verdict = with_refusals(candidate.verdict, codes, reasons)
+        return replace(candidate, verdict=verdict, cost=(math.inf, math.inf))
+
+    def _find(self, poses: NDArray[np.float64]) -> tuple[int, MarkedPlace] | None:
+        """Return the first pose that comes nearer to a centre within a disc, and its place."""
+        firsts = []
+        for place in self.places:
+            away = np.hypot(poses[:, 0] - place.x, poses[:, 1] - place.y)
+            enters = (away[1:] < place.radius) & (np.diff(away) < -NEARER)
+            if enters.any():
+                firsts.append((1 + int(np.argmax(enters)), place))
+        return min(firsts, key=lambda first: first[0], default=None)
+
+
+NONE_MARKED = MarkedPlaces(())
+"""No places."""
+
+
+def parse_place(text: str, source: str) -> MarkedPlace:
+    """Read a place from JSON with x, y, radius, reason and date.
+
+    Raises:
+        PlanningError: It lacks one of them, or a value cannot be.
+    """
+    try:
+        values = json.loads(text)
+        x, y, radius = (float(values[name]) for name in ("x", "y", "radius"))
+        place = MarkedPlace(x, y, radius, str(values["reason"]), str(values["date"]))
+    except (ValueError, KeyError, TypeError) as error:
+        raise PlanningError(
+            f"{source}: is no place with x, y, radius, reason and date: {error}"
+        ) from None
+    if not (math.isfinite(x) and math.isfinite(y) and 0.0 < radius < math.inf):
+        raise PlanningError(
+            f"{source}: place is {x:g}, {y:g} m with radius {radius:g} m; all must be finite, and "
+            "the radius above 0"
+        )
+    return place

@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Topics that a node reads when it needs what they say, so that no message wakes it.
+
+Each wake-up of rclpy's executor puts all entities of the node into a new wait set, which takes
+longer than most messages do.
+"""
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.callback_groups import CallbackGroup
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.subscription import Subscription
+
+from rover_planner.ros.guard import Guard
+
+NANOSECONDS = 1e9
+
+
+class PolledTopics:
+    """Subscriptions of a node that are read by `poll`, in the executor's thread."""
+
+    def __init__(self, node: Node, guard: Guard):
+        """Begin without topics; `guard` takes unexpected errors."""
+        self._node, self._guard, self._group = node, guard, _Apart()
+        self._topics: list[tuple[Subscription, Callable[[Any, float], None], int]] = []
+        self._polled = time.monotonic()
+
+    def subscribe(
+        self, kind: type, name: str, take: Callable[[Any, float], None], qos: QoSProfile
+    ) -> None:
+        """Subscribe to a topic.
+
+        Args:
+            kind: Type of the messages.
+            name: Name of the topic.
+            take: Called with each message and the time of its arrival [s], monotonic.
+            qos: The profile; of more messages than its depth the last ones are read.
+        """
+        group = self._group
+        topic = self._node.create_subscription(kind, name, take, qos, callback_group=group)
+        self._topics.append((topic, take, qos.depth))
+
+    def poll(self) -> None:
+        """Read all that has come since the last time, topic by topic."""
+        before, self._polled = self._polled, time.monotonic()
+        for topic, take, depth in self._topics:
+            for _ in range(depth):
+                try:
+                    with topic.handle:
+                        found = topic.handle.take_message(topic.msg_type, False)
+                    if found is None:
+                        break
+                    # Since the last poll at most, whatever the system clock was set to meanwhile.
+                    age = (time.time_ns() - found[1]["received_timestamp"]) / NANOSECONDS
+                    now = time.monotonic()
+                    take(found[0], now - min(max(age, 0.0), now - before))
+                except Exception as error:
+                    self._guard.report(f"reading of {topic.topic_name}", error)
+
+
+class _Apart(CallbackGroup):
+    """A group that executors leave alone."""
+
+    def can_execute(self, entity: Any) -> bool:
+        return False
+
+    def beginning_execution(self, entity: Any) -> bool:
+        return False
+
+    def ending_execution(self, entity: Any) -> None:
+        pass

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A rover that creeps is not stuck; one that stands while it pushes is, within 2 s."""
+
+import numpy as np
+import pytest
+
+from rover_planner.learning.stuck_watch import StuckWatch
+from rover_planner.learning.wheel_slip import SlipWindow
+
+SPEED, MAX_TORQUE, PERIOD, DURATION = 0.06, 5.0, 0.1, 0.5
+
+
+def window(time: float, x: float, rolling: float, deviation: float) -> SlipWindow:
+    """Return a window at whose middle the wheels were at x."""
+    none = np.zeros(6)
+    return SlipWindow(
+        time=time,
+        duration=DURATION,
+        rolling=np.full(6, rolling),
+        travel=none,
+        aside=none,
+        deviation=deviation,
+        places=np.tile([x, 0.0], (6, 1)),
+        loads=none,
+        doubts=none,
+        tractions=none,
+        lateral=none,
+        clear=none,
+        excess=0.0,
+        unsteadiness=0.0,
+    )
+
+
+def first_notice(speed: float, rolling: float, torque: float, climb: float = 0.0) -> float | None:
+    """Return when a rover that moves at a speed from 0 s on is first said to be stuck [s]."""
+    watch = StuckWatch(SPEED, MAX_TORQUE)
+    for time in PERIOD * np.arange(1, 100):
+        x = speed * (time - 0.5 * DURATION)
+        one = window(float(time), x, rolling, deviation=0.02)
+        if watch.update(one, np.full(6, torque), climb):
+            return float(time)
+    return None
+
+
+@pytest.mark.parametrize(("rolling", "torque"), [(SPEED, 1.0), (0.0, MAX_TORQUE)])
+def test_a_rover_that_stands_while_its_wheels_turn_or_push_is_stuck_within_two_seconds(
+    rolling, torque
+):
+    noticed = first_notice(0.0, rolling, torque)
+    assert noticed is not None and noticed <= 2.0
+
+
+@pytest.mark.parametrize(("speed", "rolling"), [(0.2 * SPEED, SPEED), (0.2 * SPEED, 0.2 * SPEED)])
+def test_a_rover_that_creeps_is_not_stuck_however_noisy_its_speed_is(speed, rolling):
+    assert first_notice(speed, rolling, MAX_TORQUE) is None
+
+
+def test_a_rover_that_rests_or_climbs_is_not_stuck():
+    assert first_notice(0.0, 0.0, 0.5) is None
+    assert first_notice(0.0, SPEED, 1.0, climb=0.05) is None

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Paths and searches keep out of places that are marked as impassable, until these are cleared."""
+
+import json
+
+import numpy as np
+import pytest
+
+from rover_planner.errors import PlanningError
+from rover_planner.parameters.traverse_server import AUTO, TraverseServerParameters
+from rover_planner.planning.answering.service_settings import load_service_settings
+from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.marked_places import (
+    MARKED_CODE,
+    NONE_MARKED,
+    MarkedPlace,
+    MarkedPlaces,
+    parse_place,
+)
+from support.rough_grounds import plane
+
+PLACE = MarkedPlace(1.5, 0.0, 0.4, "wheels turn and the rover stays", "2026-11-25 04:00:00 UTC")
+START, GOAL = (0.0, 0.0, 0.0), (3.0, 0.0, 0.0)
+
+
+@pytest.fixture
+def service():
+    parameters = TraverseServerParameters(planner=AUTO, search_budget=60.0)
+    service = TraverseService(load_service_settings(parameters))
+    service.take_terrain(plane(0.0, 0.0, half=4.0))
+    return service
+
+
+def straight(first: float, last: float) -> np.ndarray:
+    x = np.linspace(first, last, 40)
+    return np.column_stack([x, 0.0 * x, 0.0 * x])
+
+
+def test_an_answer_leads_around_a_marked_place_until_it_is_cleared(service):
+    service.mark(PLACE)
+    judged = service.answer(START, GOAL)
+    assert judged.traversable, judged.reason
+    away = np.hypot(judged.candidate.poses[:, 0] - PLACE.x, judged.candidate.poses[:, 1])
+    assert away.min() >= PLACE.radius
+    service.marked = NONE_MARKED
+    assert np.abs(service.answer(START, GOAL).candidate.poses[:, 1]).max() < 0.05
+
+
+def test_a_path_into_a_marked_place_is_refused_with_reason_and_date(service):
+    service.mark(PLACE)
+    service.take_path(straight(0.0, 3.0))
+    judged = service.check_last_path()
+    assert judged.code == MARKED_CODE
+    assert PLACE.reason in judged.reason and PLACE.date in judged.reason
+    rim = judged.candidate.poses[judged.candidate.verdict.first_failure]
+    assert rim[0] == pytest.approx(PLACE.x - PLACE.radius, abs=0.1)
+
+
+def test_a_rover_may_leave_a_place_but_not_go_on_into_it():
+    marked = MarkedPlaces((PLACE,))
+    pieces = [straight(1.3, 0.5), straight(1.3, 1.4), straight(1.6, 2.5), straight(1.3, 1.3)]
+    assert marked.refuses(pieces).tolist() == [False, True, False, False]
+
+
+@pytest.mark.parametrize("change", [{"radius": -1.0}, {"x": None}, {"x": float("inf")}])
+def test_what_is_no_place_is_refused(change):
+    text = json.dumps(vars(PLACE) | change)
+    with pytest.raises(PlanningError, match="radius"):
+        parse_place(text, "a test")
