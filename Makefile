@@ -71,9 +71,11 @@ coverage: $(READY) kernels ## share of the lines that tests run, compiled kernel
 	  --cov --cov-report term:skip-covered $(TESTS)
 
 .PHONY: lint
-lint: $(READY) ## ruff and mypy
+lint: $(READY) ## ruff, mypy, and oxlint for the page
 	@echo "== ruff"
 	$(BIN)/python -m ruff check .
+	echo "== oxlint"
+	$(BIN)/oxlint --deny-warnings rover_planner/viewer/front
 	echo "== mypy"
 	$(BIN)/python -m mypy
 

@@ -52,6 +52,7 @@ EXTRAS = {
     "bench": ["mujoco>=3.2,<5"],
     "dev": [
         "ruff>=0.9,<1",
+        "oxlint>=1.0,<2",
         "mypy>=1.14,<3",
         "pytest-cov>=6.0,<8",
         "uv>=0.5,<1",

@@ -6,6 +6,7 @@ It needs the extra `bench`. Drives are drawn at random: ground, friction, contro
 """
 
 import hashlib
+import tempfile
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -47,6 +48,7 @@ from rover_planner.learning.drive_log import (
     Y,
 )
 from rover_planner.learning.ground_learner import GroundEstimate, GroundLearner
+from rover_planner.learning.wheel_odometry import WheelMotion, WheelOdometry
 from rover_planner.simulator.mujoco_rover import MujocoRover
 from support.learning_drives import write_csv
 
@@ -267,6 +269,70 @@ def learn(drive: LearningDrive, keep: Path | None = None) -> Learned | None:
     )
 
 
+GYRO_NOISE, GYRO_BIAS = 2e-3, 1e-4
+"""Noise [rad/sqrt(s)] and standard deviation of the bias [rad/s] of the yaw rate."""
+
+
+def measure_motion(rows: np.ndarray, truth: np.ndarray, seed: int) -> list[WheelMotion]:
+    """Return what wheels and IMU measured in a drive, of rows with noise and without."""
+    rng, times = np.random.default_rng(seed), rows[:, TIME]
+    noise = GYRO_NOISE / np.sqrt(np.median(np.diff(times))) * rng.standard_normal(len(rows))
+    yaw_rates = np.gradient(truth[:, YAW], times) + noise + GYRO_BIAS * rng.standard_normal()
+    return [
+        WheelMotion(row[TIME], row[RATES], np.nan_to_num(row[STEERING]), row[ROLL], row[PITCH], w)
+        for row, w in zip(rows, yaw_rates, strict=True)
+    ]
+
+
+def print_odometry(drives: list[LearningDrive], keep: Path) -> None:
+    """Print misses at the ends of drives without visual odometry, after those before with it."""
+    rover = told_rover()
+    radius, teacher = rover.wheel.radius, WheelOdometry(rover)
+    found: dict[str, list[tuple[float, float, float]]] = {}
+    for drive in drives:
+        recorded = record(drive, keep)
+        if not recorded.passed:
+            continue
+        truth, rows = recorded.rows[:: drive.step], add_noise(recorded.rows, drive)
+        motions = measure_motion(rows, truth, drive.seed)
+        known, pupil, plain = WheelOdometry(rover), WheelOdometry(rover), np.zeros(2)
+        for one in (known, pupil):
+            one.forward, one.side = teacher.forward, teacher.side
+        for motion in motions:
+            before = known.pose[2]
+            known.take(motion)
+            if motion is not motions[0]:
+                yaw = 0.5 * (before + known.pose[2])
+                way = radius * motion.rates.mean() * PERIOD * drive.step
+                plain += way * np.array([np.cos(yaw), np.sin(yaw)])
+        c, s = np.cos(truth[0, YAW]), np.sin(truth[0, YAW])
+        end = np.array([[c, s], [-s, c]]) @ (truth[-1] - truth[0])[[X, Y]]
+        miss = known.pose[:2] - end
+        nees = float(miss @ np.linalg.solve(known.covariance[:2, :2], miss))
+        if drive is not drives[0]:
+            sizes = float(np.hypot(*miss)), float(np.hypot(*(plain - end)))
+            found.setdefault(drive.kind, []).append((*sizes, nees))
+        for motion, row in zip(motions, rows, strict=True):
+            pupil.take(motion)
+            pupil.learn(row[[X, Y, YAW]])
+    table = []
+    for kind, values in found.items():
+        own, plain_miss, nees = np.array(values).T
+        table.append(
+            (
+                kind,
+                f"{len(own)}",
+                f"{own.mean():.3f}",
+                f"{plain_miss.mean():.3f}",
+                f"{plain_miss.mean() / own.mean():.1f}",
+                f"{nees.mean():.1f}",
+                f"{np.mean(nees < 5.99):.0%}",
+            )
+        )
+    headings = "ground", "drives", "miss [m]", "plain [m]", "times better", "NEES", "within 95 %"
+    print_table("Wheel odometry at the ends of drives, without visual odometry", headings, table)
+
+
 def told_rover() -> Rover:
     """Return the rover as the learner knows it."""
     return replace(load_rover("lsr1"), nominal_speed=SPEED)
@@ -295,8 +361,8 @@ def main(
         write_csv(example / "drive.csv", add_noise(record(EXAMPLE).rows, EXAMPLE))
         save_terrain(example / "terrain.npz", EXAMPLE.obstacle.ground)
         return
-    if keep is not None:
-        keep.mkdir(parents=True, exist_ok=True)
+    keep = keep or Path(tempfile.mkdtemp())
+    keep.mkdir(parents=True, exist_ok=True)
     jobs = [(draw_drive(seed, number), keep) for number in range(drives)]
     learned = [one for one in run_in_processes(learn, jobs, 2) if one is not None]
     rows = []
@@ -321,6 +387,7 @@ def main(
         "What was learned", (*headings, "slip [s]", "stuck [s]", "noticed [s]", "faults"), rows
     )
     print_summary(learned)
+    print_odometry([job[0] for job in jobs], keep)
 
 
 def is_within(one: Learned) -> bool:

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads odometry messages: the rover's pose on the map and its standard deviation."""
+"""Reads odometry messages: pose and its standard deviation; writes that of a planar odometry."""
 
 import math
+from typing import Any
 
 import numpy as np
 from nav_msgs.msg import Odometry
@@ -9,11 +10,16 @@ from numpy.typing import NDArray
 
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame, read_orientation
+from msg_adapters.sensing import BASE_FRAME
 
 MAX_COORDINATE = 1e8
 """Largest coordinate of a pose [m]; UTM has 1e7."""
 MAX_DEVIATION = 1e8
 """Largest standard deviation of a pose [m]."""
+UNKNOWN = 1e6
+"""Variance of what is not measured."""
+YAW_RATE_VARIANCE = 1e-4
+"""Variance of a yaw rate of an IMU [rad^2/s^2]."""
 
 
 def odometry_to_pose(
@@ -46,6 +52,39 @@ def odometry_to_pose(
             f"within {MAX_COORDINATE:g} m, variances within {MAX_DEVIATION**2:g} m^2"
         )
     return pose, math.sqrt(max(*variances, 0.0))
+
+
+def planar_odometry(
+    pose: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    speed: tuple[float, float],
+    yaw_rate: float,
+    frame_id: str,
+    stamp: Any,
+) -> Odometry:
+    """Return the odometry of a rover that measures its way in the plane.
+
+    Args:
+        pose: (3,) x, y [m] and yaw [rad].
+        covariance: (3, 3) of the pose.
+        speed: Speed ahead and its standard deviation [m/s].
+        yaw_rate: Rate of the yaw [rad/s].
+        frame_id: Frame of the pose.
+        stamp: builtin_interfaces/Time.
+    """
+    message = Odometry(child_frame_id=BASE_FRAME)
+    message.header.frame_id, message.header.stamp = frame_id, stamp
+    place, turn = message.pose.pose.position, message.pose.pose.orientation
+    place.x, place.y = float(pose[0]), float(pose[1])
+    turn.z, turn.w = float(np.sin(0.5 * pose[2])), float(np.cos(0.5 * pose[2]))
+    message.twist.twist.linear.x, message.twist.twist.angular.z = speed[0], yaw_rate
+    measured, unknown = [0, 1, 5], np.full(6, UNKNOWN)
+    whole = np.diag(unknown)
+    whole[np.ix_(measured, measured)] = covariance
+    message.pose.covariance = whole.ravel()
+    unknown[[0, 1, 5]] = speed[1] ** 2, speed[1] ** 2, YAW_RATE_VARIANCE
+    message.twist.covariance = np.diag(unknown).ravel()
+    return message
 
 
 def odometry_to_tilt(odometry: Odometry) -> tuple[float, float]:

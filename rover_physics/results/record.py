@@ -86,6 +86,11 @@ QUANTITIES = (
     ),
     Quantity("stalls", (), "", "why no forward speed balances, a Stall"),
     Quantity(
+        "deficit", (), "",
+        "force along the motion that is missing where no forward speed balances, over the weight; "
+        "negative where it is missing to brake, infinite where none helps", False,
+    ),
+    Quantity(
         "friction_share", (), "",
         'share of the friction of all wheels that policy "servo" uses; 0 under the others', False,
     ),

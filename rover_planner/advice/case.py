@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from rover_physics.bounds.path import SIGMAS
+from rover_physics.chance.failure_chance import SUMS
 from rover_physics.limits.table import CHANCE, Sense
 from rover_physics.names import SERVO, WHEEL_POSITIONS
 from rover_physics.numerics.arrays import Floats
@@ -122,6 +123,13 @@ class JudgedCase:
         """Name of the limit that is used most, such as "tip over"."""
         place = int(self.use.argmax())
         return self._limits.rows[int(self._uses[place].argmax())].code.replace("_", " ")
+
+    @property
+    def fails_by_sum(self) -> bool:
+        """True if no limit is broken that a waypoint breaks without the path before it."""
+        broken = self._uses[self.verdict.first_failure] > 1.0
+        rows = zip(self._limits.rows, broken, strict=True)
+        return all(row.reads in SUMS for row, is_broken in rows if is_broken)
 
     @property
     def _limits(self) -> RoverLimits:

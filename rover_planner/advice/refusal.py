@@ -6,7 +6,6 @@ from functools import cached_property
 
 import numpy as np
 
-from rover_physics.names import SERVO
 from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_prediction import PathPrediction
 from rover_planner.advice.case import Case, JudgedCase
@@ -19,7 +18,7 @@ from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 MOST_FRICTION = 1.5
 """Largest friction that is asked for."""
 BEFORE = 1.5
-"""Length of path that decides about a failure with servos [wheelbases]: they drift over one."""
+"""Length of path that decides about drift and lifts of servos [wheelbases]: sums over one."""
 EDGE = 2.0
 """Length of path around a failure that decides whether a wheel falls there [wheel radii]."""
 SEARCH = LatticeSettings(budget=1.0, ends_at_first=True)
@@ -97,10 +96,10 @@ class Refusal:
             return None  # an end is not on the map
         return None if found.path is None else found.path.poses
 
-    def rows_around(self, place: int, policy: str) -> slice:
-        """Return the rows of the path that decide whether a waypoint fails under a policy."""
+    def rows_around(self, place: int, fails_by_sum: bool) -> slice:
+        """Return the rows of the path that show whether a waypoint fails, perhaps by a sum."""
         rover, distance = self.case.rover, self.judged.distance
-        before = BEFORE * rover.wheelbase if policy == SERVO else EDGE * rover.wheel.radius
+        before = BEFORE * rover.wheelbase if fails_by_sum else EDGE * rover.wheel.radius
         near = distance[place] - before, distance[place] + EDGE * rover.wheel.radius
         first, last = np.searchsorted(distance, near)
         return slice(max(0, min(int(first), place - 1)), int(last) + 1)

@@ -15,6 +15,7 @@ import numpy as np
 
 from rover_physics.errors import RoverError
 from rover_physics.limits.table import CHANCE, TRAPPED
+from rover_physics.names import SERVO
 from rover_planner.advice.case import Case, JudgedCase
 from rover_planner.advice.levers import LEVERS, Choice, Lever, Span
 from rover_planner.advice.refusal import Refusal
@@ -40,6 +41,18 @@ class Trial:
     """The levers."""
     remedy: Remedy | None
     """Their least setting that passes."""
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Where a case failed."""
+
+    place: int
+    """Index of the waypoint."""
+    by_chance: bool
+    """True if it kept the limits, but not in enough samples."""
+    by_sum: bool
+    """True if it may be the path before it that decides."""
 
 
 def seek_remedies(refusal: Refusal) -> Iterator[Trial]:
@@ -78,8 +91,8 @@ class _Seeker:
 
     def __init__(self, refusal: Refusal):
         self._refusal = refusal
-        self._failed: list[tuple[int, bool]] = []
-        """Waypoints that failed, and whether by chance; the last first."""
+        self._failed: list[Failure] = []
+        """Where cases failed, the last first."""
         self._note(refusal.judged)
 
     def seek(self, levers: Sequence[Lever], steps: Sequence[float]) -> Remedy | None:
@@ -173,9 +186,10 @@ class _Seeker:
         if case is None or not all(lever.keeps_rows for lever in levers):
             return case is None
         for known in self._failed:
-            rows = self._refusal.rows_around(known[0], case.options.policy)
+            by_sum = known.by_sum and case.options.policy == SERVO
+            rows = self._refusal.rows_around(known.place, by_sum)
             try:
-                fails = case.fails_at(known[0], rows, known[1])
+                fails = case.fails_at(known.place, rows, known.by_chance)
             except RoverError:
                 fails = True  # the rover cannot do that
             if fails:
@@ -197,9 +211,10 @@ class _Seeker:
         """Remember where a case failed."""
         verdict = judged.verdict
         if verdict.code != TRAPPED:
-            self._remember((verdict.first_failure, verdict.code == CHANCE))
+            by_chance = verdict.code == CHANCE
+            self._remember(Failure(verdict.first_failure, by_chance, judged.fails_by_sum))
 
-    def _remember(self, known: tuple[int, bool]) -> None:
+    def _remember(self, known: Failure) -> None:
         others = [one for one in self._failed if one != known]
         self._failed = [known, *others][:MOST_PLACES]
 

@@ -106,4 +106,3 @@ def _print_table(advice: "Advice") -> None:
         typer.echo(advice.describe())
     if not advice.complete:
         typer.echo("not all levers were tried in this time; a larger --budget tries more")
-

@@ -18,6 +18,7 @@ from rover_planner.figures.pictures import (
     drawing,
     find_extent,
 )
+from rover_planner.planning.asked_poses import merge_poses
 from rover_planner.planning.path_query import Candidate
 from rover_planner.planning.search.path_search import SearchResult
 from rover_planner.planning.search.query import SearchQuery
@@ -65,9 +66,9 @@ def draw_path(path: Path, question: SearchQuery, answer: SearchResult, map_name:
 
 def _draw_uses(axes: Axes, rover: Rover, path: Candidate) -> None:
     """Draw the use of each limit over the distance, the most used ones first in the legend."""
-    prediction = path.prediction
-    limits = limits_of(rover, prediction.policy)
-    uses = find_uses(limits, prediction.results).use
+    rows = merge_poses(path.prediction)
+    limits = limits_of(rover, path.prediction.policy)
+    uses = find_uses(limits, rows.prediction.results).use
     titles = list(dict.fromkeys(row.title for row in limits.rows))
     of_title = {
         title: np.fmax.reduce(
@@ -80,7 +81,7 @@ def _draw_uses(axes: Axes, rover: Rover, path: Candidate) -> None:
         shown = k < len(COLOURS)
         colour, width = (COLOURS[k], 1.4) if shown else (FAINT, 0.8)
         label = title if shown else None
-        axes.plot(prediction.distance, of_title[title], color=colour, lw=width, label=label)
+        axes.plot(rows.distance, of_title[title], color=colour, lw=width, label=label)
     axes.axhline(1.0, color=REFUSED, linestyle=":", linewidth=1.2)
     axes.set(xlabel="distance along the path [m]", ylabel="use of the limit, 1 at it", ylim=0.0)
     axes.legend(loc="upper right", ncols=len(COLOURS))

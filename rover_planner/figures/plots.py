@@ -35,7 +35,7 @@ SIDE_STYLES = {"right": "-", "left": (0, (3, 1.5))}
 
 # Ground is drawn in warm greys, so that the coloured paths stand out.
 _GROUND = LinearSegmentedColormap.from_list("ground", ["#6E6259", "#B5A99C", "#F1EAE0"])
-_COLUMNS = 6
+_COLUMNS = 8
 _EDGE = "#E4E1DC"
 
 

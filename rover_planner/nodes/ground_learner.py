@@ -18,13 +18,16 @@ from msg_adapters.commands import twist_to_speeds
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.frames import check_frame
 from msg_adapters.joints import read_joint_map
+from msg_adapters.odometry import planar_odometry
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.rover_file import load_rover
+from rover_planner.learning.drive_log import YAW, X, Y
 from rover_planner.learning.ground_learner import GroundLearner
 from rover_planner.learning.learned_file import describe
 from rover_planner.learning.stuck_place import find_place_ahead
+from rover_planner.learning.wheel_odometry import WheelOdometry
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.warm_up import LEARNING
 from rover_planner.parameters.declare import (
@@ -71,9 +74,11 @@ class GroundLearnerNode(Node):
         self._estimates = self.create_publisher(String, ESTIMATE, latched_qos())
         self._stops = self.create_publisher(Bool, EMERGENCY_STOP, latched_qos())
         self._marks = self.create_publisher(String, MARK_PLACE, latched_qos())
+        self._wheels = WheelOdometry(self._rover)
+        self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", sensor_qos())
         for kind, name, take in (
             (JointState, "joint_states", self._rows.take_joints),
-            (Imu, "imu", self._rows.take_imu),
+            (Imu, "imu", self._take_imu),
             (Odometry, "odometry", self._take_odometry),
             (TwistStamped, "cmd_vel", self._take_command),
         ):
@@ -122,11 +127,32 @@ class GroundLearnerNode(Node):
     def _now(self) -> float:
         return float(self.get_clock().now().nanoseconds / NANOSECONDS)
 
+    def _take_imu(self, imu: Imu) -> None:
+        """Take attitude and yaw rate, and tell where the wheels say that the rover is."""
+        self._rows.take_imu(imu)
+        stamp = stamp_to_ns(imu.header.stamp)
+        motion = self._rows.motion(self._now if stamp is None else stamp / NANOSECONDS)
+        if motion is None:
+            return
+        wheels = self._wheels
+        wheels.take(motion)
+        speed = wheels.speed, wheels.speed_deviation
+        message = planar_odometry(
+            wheels.pose,
+            wheels.covariance,
+            speed,
+            motion.yaw_rate,
+            self._values.odometry_frame,
+            imu.header.stamp,
+        )
+        self._wheel_odometry.publish(message)
+
     def _take_odometry(self, odometry: Odometry) -> None:
         stamp = stamp_to_ns(odometry.header.stamp)
         now = self._now if stamp is None else stamp / NANOSECONDS
         row = self._rows.take_odometry(odometry, now, self._values.map_frame)
         self.heard_until = now
+        self._wheels.learn(row[[X, Y, YAW]])
         learner = self.learner
         if learner is None:
             return
@@ -149,6 +175,7 @@ class GroundLearnerNode(Node):
                 self._marks.publish(String(data=json.dumps(asdict(place))))
         if now - self._sent >= PERIOD or bool(stuck) != bool(before):
             self._sent = now
+            self._wheels.friction = learner.estimate.friction.mean
             contents = describe(learner.estimate, self._told)
             self._estimates.publish(String(data=json.dumps(contents)))
 

@@ -39,6 +39,9 @@ class GroundLearnerParameters(ParameterTable):
     map_frame: str = parameter(
         "map", "Frame of map and odometry; others are refused.", read_only=True
     )
+    odometry_frame: str = parameter(
+        "odom", "Frame of the wheel odometry on ~/odometry.", read_only=True
+    )
     joint_map: tuple[str, ...] = JOINT_MAP
     map_resolution: float = MAP_RESOLUTION
     cell_height: str = CELL_HEIGHT

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Merges joint states, attitude and odometry into the rows that the ground is learned from."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from rover_planner.learning.drive_log import (
     X,
     Y,
 )
+from rover_planner.learning.wheel_odometry import WheelMotion
 
 ANGLES = {name: SUSPENSION.start + k for k, name in enumerate(SUSPENSION_JOINTS)} | {
     name: STEERING.start + k for k, name in enumerate(STEERING_JOINTS)
@@ -39,6 +41,7 @@ class RowCollector:
     def __init__(self, names: JointNames = OWN_NAMES) -> None:
         """Start without measurements; `names` are those of the joints in messages."""
         self._row, self._names, self._has_imu = np.full(WIDTH, np.nan), names, False
+        self._yaw_rate = math.nan
 
     def take_joints(self, message: Any) -> None:
         """Take joint states by name; a value that is missing or not finite was not measured."""
@@ -65,6 +68,20 @@ class RowCollector:
         attitude = imu_to_attitude(message)
         self._row[[ROLL, PITCH]] = attitude.roll, attitude.pitch
         self._has_imu = True
+        if attitude.rates is not None:
+            _, q, r = attitude.rates.tolist()
+            turn = q * math.sin(attitude.roll) + r * math.cos(attitude.roll)
+            self._yaw_rate = turn / math.cos(attitude.pitch)
+
+    def motion(self, time: float) -> WheelMotion | None:
+        """Return what wheels and IMU measure at a time [s]; None until both were heard."""
+        row = self._row
+        if math.isnan(self._yaw_rate) or np.isnan(row[RATES]).all():
+            return None
+        steering = np.nan_to_num(row[STEERING])
+        return WheelMotion(
+            time, row[RATES].copy(), steering, row[ROLL], row[PITCH], self._yaw_rate
+        )
 
     def take_odometry(self, message: Any, time: float, frame: str = "") -> Floats:
         """Take a pose; return the row of its time [s].

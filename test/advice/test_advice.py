@@ -194,7 +194,7 @@ def test_a_piece_fails_only_where_the_path_does(policy):
     case = replace(refused_by(rock, policy=policy), poses=bend_path(STRAIGHT, 0.1))
     refused = refusal.Refusal(case.judge())
     for place in range(refused.place + 1):
-        rows = refused.rows_around(place, policy)
+        rows = refused.rows_around(place, fails_by_sum=False)
         assert case.fails_at(place, rows, by_chance=False) == (place == refused.place), place
 
 

@@ -11,7 +11,10 @@ from rover_planner.cli import main
 from support.command_line import assert_refused
 from support.grounds import make_terrain
 
-KEYS = {"levers", "words", "options", "largest_use", "chance", "extra_time", "extra_energy"}
+KEYS = {
+    "levers", "words", "options", "largest_use", "use_before", "chance", "extra_time",
+    "extra_energy", "extra_distance", "needs_others",
+}  # fmt: skip
 
 
 @pytest.fixture

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.figures.path_picture import draw_path
+from rover_planner.figures.path_picture import _draw_uses, draw_path
 from rover_planner.figures.plots import LabelledAnswer, draw_answers, hill_shade
-from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
+from rover_planner.planning.path_query import PathQueryOptions, answer_path_query, check_path
 from rover_planner.planning.search.path_search import find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 
@@ -62,6 +62,19 @@ def test_the_picture_of_a_plan_names_rover_and_map_and_shows_the_use_of_each_lim
     text = (tmp_path / "plan.svg").read_text()
     words = ("lsr1 on hill.npz: way of 2.0 m", "use of the limit, 1 at it", "margin")
     assert [one for one in words if one not in text] == []
+
+
+def test_the_use_along_a_plan_has_the_peaks_between_waypoints(rover):
+    x = 0.05 * np.arange(121) - 3.0
+    bump = Terrain(
+        np.tile(np.where((x > 0.3) & (x < 0.5), 0.06, 0.0), (81, 1)), 0.05, (-3.0, -2.0)
+    )
+    poses = np.column_stack([np.linspace(-1.0, 1.0, 41), np.zeros((41, 2))])
+    path = check_path(rover, bump, poses)
+    axes = Figure().subplots()
+    _draw_uses(axes, rover, path)
+    highest = max(np.nanmax(line.get_ydata()) for line in axes.lines[:-1])
+    assert highest >= path.verdict.risk > path.prediction.friction_utilisation.max()
 
 
 @pytest.fixture

@@ -10,13 +10,15 @@ from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from sensor_msgs.msg import JointState, PointCloud2
+from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Bool, String
 
 from msg_adapters.elevation import terrain_to_point_cloud
+from msg_adapters.sensing import imu_message
 from msg_adapters.stamps import ns_to_stamp
+from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.rover.rover_file import load_rover
-from rover_planner.learning.drive_log import TIME, X
+from rover_planner.learning.drive_log import PITCH, ROLL, TIME, YAW, X
 from rover_planner.nodes.ground_learner import (
     EMERGENCY_STOP,
     ESTIMATE,
@@ -24,7 +26,7 @@ from rover_planner.nodes.ground_learner import (
     GroundLearnerNode,
 )
 from rover_planner.planning.marked_places import parse_place
-from rover_planner.ros.qos import latched_qos, map_qos, topic_qos
+from rover_planner.ros.qos import latched_qos, map_qos, sensor_qos, topic_qos
 from support.learning_drives import climb, ramp
 from support.messages.drives import row_messages
 from support.ros_fixtures import RosRun
@@ -44,10 +46,15 @@ class Rover(Node):
         self.stops: list[bool] = []
         self.marks: list[str] = []
         self._map = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
+        self.wheels: list[Odometry] = []
         kinds = {"joint_states": JointState, "odometry": Odometry, "cmd_vel": TwistStamped}
+        kinds["imu"] = Imu
         self._senders = {n: self.create_publisher(k, n, topic_qos()) for n, k in kinds.items()}
         self.create_subscription(
             String, ESTIMATE, lambda m: self.estimates.append(json.loads(m.data)), latched_qos()
+        )
+        self.create_subscription(
+            Odometry, "ground_learner/odometry", self.wheels.append, sensor_qos()
         )
         self.create_subscription(
             String, MARK_PLACE, lambda m: self.marks.append(m.data), latched_qos()
@@ -69,6 +76,15 @@ class Rover(Node):
         """Send what a row holds; the joints first, which the row of the odometry has."""
         joints, odometry = row_messages(row, BEGIN)
         self._senders["joint_states"].publish(joints)
+        self._senders["imu"].publish(
+            imu_message(
+                xyzw_from_rpy(*row[[ROLL, PITCH, YAW]]),
+                np.zeros(3),
+                3.7,
+                1e-3,
+                odometry.header.stamp,
+            )
+        )
         self._senders["odometry"].publish(odometry)
 
 
@@ -108,6 +124,13 @@ def test_a_drive_is_learned_and_a_rover_that_gets_stuck_is_stopped_and_its_place
     drive(node, rover, rows[:60])
     wait_until(lambda: rover.estimates, "an estimate")
     assert not rover.stops and not rover.estimates[-1]["stuck"]
+    way = rows[59, X] - rows[0, X]
+    wait_until(
+        lambda: rover.wheels and abs(rover.wheels[-1].pose.pose.position.x - way) < 0.05,
+        "the odometry of the wheels",
+    )
+    assert rover.wheels[-1].header.frame_id == "odom"
+    assert 0.0 < rover.wheels[-1].pose.covariance[0] < 0.1**2
     drive(node, rover, rows[60:])
     wait_until(lambda: rover.stops == [True], "the stop")
     wait_until(lambda: rover.estimates[-1]["stuck"], "that it is stuck")

@@ -148,6 +148,32 @@ def test_the_lanes_of_the_reference_stand_below_those_of_now():
     assert describe_curves(shown.path, shown.reference)["friction"]["old"]["y"]
 
 
+def test_the_chance_of_failure_is_a_lane_of_its_own_with_its_main_cause():
+    session = ViewSession(LSR1, make_terrain(ramp), (-2.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    session.change_rover([("friction",)], 0.55)
+    shown = session.shown
+    asked = shown.scenario
+    _, verdict = judge_path(asked.rover, asked.terrain, shown.path.poses, accepted_chance=1.0)
+    assert 0.0 < verdict.failure_chance < 1.0
+    assert shown.chance.path == verdict.failure_chance
+    told = describe_limits(shown.path, None, shown.chance)["lanes"]
+    assert [lane["code"] for lane in told].index("chance") == len(shown.path.limits.lanes)
+    curve = describe_curves(shown.path, None, shown.chance)["chance"]["y"][0]
+    assert max(curve) == pytest.approx(max(verdict.failure_chance_at), abs=1e-3)
+    use = describe_uses(shown.path, np.inf, shown.chance)[-1]
+    percent = f"{100.0 * verdict.failure_chance:.0f} %"
+    assert use["value"] == f"whole path {percent}"
+    words = describe_verdict(shown, Work())["chance"]
+    assert words == f"chance of failure {percent}, most often by friction"
+
+
+def test_a_use_without_bound_is_above_the_limit_in_its_curve():
+    path = judged_on(gap)
+    lane = path.limits.lane(path.failure.code)
+    assert np.isinf(lane.used).any()
+    assert describe_curves(path, None)[lane.limit.code]["y"][0][-1] > 1.0
+
+
 def test_a_peak_between_points_of_a_curve_is_kept():
     values = np.zeros((10 * MAX_POINTS, 2))
     values[1237, 1] = 5.0

@@ -5,6 +5,7 @@ import gc
 import io
 import math
 import weakref
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from rover_planner.viewer.state.colours import (
     colour_use,
     map_colours,
 )
+from rover_planner.viewer.state.layers import FRICTION, list_layers
 from rover_planner.viewer.state.playback import FAST, Playback
 from rover_planner.viewer.state.trajectory import Trajectory, find_axles
 from rover_planner.viewer.state.visitor_requests import VisitorRequests
@@ -187,6 +189,18 @@ def test_unknown_ground_is_left_out_of_the_mesh():
     assert len(holed.mesh.faces) < len(whole.mesh.faces)
     centres = holed.mesh.vertices[holed.mesh.faces].mean(axis=1)
     assert not ((centres[:, 0] > 0.55) & (centres[:, 0] < 0.95)).any()
+
+
+def test_the_friction_of_a_map_is_a_layer_where_it_is_known_and_else_none():
+    plain = make_terrain(waves)
+    friction = np.full(plain.elevation.shape, np.nan)
+    friction[:, : friction.shape[1] // 2] = 0.2
+    learned = replace(plain, friction=friction)
+    assert FRICTION in list_layers(learned) and FRICTION not in list_layers(plain)
+    picture = build_ground_mesh(LSR1, learned, FRICTION).mesh.picture.astype(float)
+    known, unknown = picture[:, 10], picture[:, -10]
+    assert (known[:, 0] < known[:, 2]).all()  # blue
+    assert np.ptp(unknown, axis=1).max() == 0.0  # grey
 
 
 def test_another_reader_finds_the_same_surface_and_picture_in_the_file_of_a_ground():

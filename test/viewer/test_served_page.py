@@ -37,7 +37,7 @@ from rover_planner.viewer.pages.drawings import Drawings
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.scene.ribbons import Ribbon, Strand
 from rover_planner.viewer.scene.rover_visual import RoverVisual
-from rover_planner.viewer.state.colours import CASING, PASSABLE, REFUSED, UNKNOWN
+from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN
 from rover_planner.viewer.state.judging import POLICY
 
 pytestmark = pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
@@ -234,23 +234,40 @@ def test_a_path_is_drawn_in_the_colour_of_its_verdict_up_to_where_it_is_refused(
     assert beyond.colour != REFUSED and len(cross) == 2
 
 
-def test_a_ribbon_that_looks_the_same_is_not_sent_again(page):
+def to_screen(light) -> np.ndarray:
+    """Return the colours that a browser shows for shares of light, by the sRGB standard."""
+    share = np.asarray(light) / 255.0
+    bright = 1.055 * np.maximum(share, 0.0031308) ** (1 / 2.4) - 0.055
+    return 255.0 * np.where(share <= 0.0031308, 12.92 * share, bright)
+
+
+def test_a_ribbon_has_the_colours_of_its_strands_and_is_not_sent_again_if_it_looks_the_same(page):
     line = np.column_stack([np.linspace(0.0, 1.0, 5), np.zeros(5), np.zeros(5)])
     strands = [Strand(line, PASSABLE), Strand(line + 1.0, REFUSED)]
     ribbon = Ribbon(page.server.scene, "/test/ribbon")
     ribbon.show(strands, 4.0)
-    casing, core = ribbon._nodes
-    sent = core.points
+    node = ribbon._node
+    sent = node.points
     ribbon.show([replace(one, line=one.line.copy()) for one in strands], 4.0)
-    assert ribbon._nodes[1] is core and core.points is sent
+    assert ribbon._node is node and node.points is sent
     ribbon.paint(UNKNOWN)
-    assert (core.colors == UNKNOWN).all() and ribbon.strands[0].colour == PASSABLE
+    np.testing.assert_allclose(to_screen(node.colors[[0, -1], 0]), [UNKNOWN] * 2, atol=6.0)
     ribbon.paint(None)
-    assert (core.colors[0] == PASSABLE).all() and (core.colors[-1] == REFUSED).all()
-    assert casing.thickness > core.thickness == 4.0 and (casing.colors == CASING).all()
+    np.testing.assert_allclose(to_screen(node.colors[[0, -1], 0]), [PASSABLE, REFUSED], atol=6.0)
     ribbon.show([replace(strands[0], line=line[:3])], 4.0)
-    assert ribbon._nodes[1] is core and len(core.points) == 2
+    assert ribbon._node is node and len(node.points) == 2
     ribbon.remove()
+
+
+def test_a_trail_has_a_colour_from_blue_to_yellow_at_each_place(page):
+    overlay, ground = page.scene.paths, page.ground
+    trail = np.array([[0.0, 0.0, 0.5], [0.1, 0.0, 0.0], [0.2, 0.0, 1.0]])
+    for known, count in ((None, 0), (trail[:1], 0), (trail, 2)):
+        overlay.show_trail(LSR1, ground, known)
+        assert len(overlay._trail.strands) == count
+    low, high = (one.colour for one in overlay._trail.strands)
+    assert low[2] > low[0] and high[0] > high[2]
+    overlay.show_trail(LSR1, ground, None)
 
 
 def test_a_rover_of_another_shape_is_drawn_as_a_new_one(page):

@@ -8,11 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.chance.failure_chance import FailureChance
+from rover_physics.limits.table import CHANCE
 from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_planner.viewer.documents.numbers import plain
-from rover_planner.viewer.state.limits import write_use
-from rover_planner.viewer.state.path_limits import Lane, PathLimits
+from rover_planner.viewer.state.limits import MAX_USE, write_use
+from rover_planner.viewer.state.path_limits import Lane, PathLimits, make_chance_lane
 from rover_planner.viewer.state.scenario import Judged
 
 MAX_POINTS = 240
@@ -24,8 +26,10 @@ CLASSES = ("little", "half", "near", "broken", "unasked")
 BROKEN, NOT_ASKED = 3, 4
 
 
-def describe_limits(path: Judged, reference: Judged | None) -> dict[str, Any]:
-    """Return the lanes and curves of a path, and those of the same path for the reference."""
+def describe_limits(
+    path: Judged, reference: Judged | None, chance: FailureChance | None = None
+) -> dict[str, Any]:
+    """Return the lanes of a path, those of the same path for the reference, and of its chance."""
     failure, before = path.failure, None if reference is None else reference.limits
     end = max(path.limits.end, 0.0 if before is None else before.end)
     lanes = [
@@ -33,9 +37,9 @@ def describe_limits(path: Judged, reference: Judged | None) -> dict[str, Any]:
             "code": lane.limit.code,
             "title": lane.limit.title,
             "pieces": list(_list_pieces(lane, path.limits)),
-            "before": [] if before is None else _list_before(lane, before),
+            "before": _list_before(lane, before),
         }
-        for lane in path.limits.lanes
+        for lane in list_lanes(path, chance)
     ]
     return {
         "end": round(end, 4),
@@ -47,28 +51,48 @@ def describe_limits(path: Judged, reference: Judged | None) -> dict[str, Any]:
     }
 
 
-def describe_curves(path: Judged, reference: Judged | None) -> dict[str, Any]:
+def list_lanes(path: Judged, chance: FailureChance | None) -> list[Lane]:
+    """Return the lanes of the limits, and the one of the chance of failure if it is known."""
+    lanes = list(path.limits.lanes)
+    return lanes if chance is None else [*lanes, make_chance_lane(path.limits, chance)]
+
+
+def describe_curves(
+    path: Judged, reference: Judged | None, chance: FailureChance | None = None
+) -> dict[str, Any]:
     """Return the uses of each limit along a path, by code; six curves where wheels have it."""
     curves = {}
-    for lane in path.limits.lanes:
+    for lane in list_lanes(path, chance):
         values = lane.used[:, None] if lane.wheels is None else lane.wheels
         curve = _pick_points(path.limits.rows.distance, values)
         old = None
-        if reference is not None:
+        if reference is not None and lane.limit.code != CHANCE:
             limits = reference.limits
             old = _pick_points(limits.rows.distance, limits.lane(lane.limit.code).used[:, None])
         curves[lane.limit.code] = {**curve, "old": old}
     return curves
 
 
-def describe_uses(path: Judged, time: float) -> list[dict[str, Any]]:
+def describe_uses(
+    path: Judged, time: float, chance: FailureChance | None = None
+) -> list[dict[str, Any]]:
     """Return for each lane its use at a time [s] and the worst so far, with value and wheel."""
     limits, failure = path.limits, path.failure
     rows = limits.rows_until(time)
     here = rows - 1
     if failure is not None and time >= failure.time - 1e-6:
         rows, here = max(rows, failure.row + 1), failure.row
-    return [_describe_use(lane, limits, lane.worst_until(rows), here) for lane in limits.lanes]
+    lanes = list_lanes(path, chance)
+    uses = [_describe_use(lane, limits, lane.worst_until(rows), here) for lane in lanes]
+    if chance is not None:
+        uses[-1]["value"] = f"whole path {100.0 * chance.path:.0f} %"
+    return uses
+
+
+def write_chance(chance: FailureChance) -> str:
+    """Return the chance that a path fails, and its main cause, in words."""
+    cause = f", most often by {chance.limit}" if chance.limit else ""
+    return f"{100.0 * chance.path:.0f} %{cause}"
 
 
 def _describe_use(lane: Lane, limits: PathLimits, worst: int, here: int) -> dict[str, Any]:
@@ -125,16 +149,22 @@ def _list_pieces(lane: Lane, limits: PathLimits) -> Iterator[list[Any]]:
         yield [round(left, 4), round(right, 4), CLASSES[kind], f"{words}; at {left:.2f} m"]
 
 
-def _list_before(lane: Lane, before: PathLimits) -> list[list[Any]]:
+def _list_before(lane: Lane, before: PathLimits | None) -> list[list[Any]]:
     """Return begin, end [m] and class of each stretch of a lane of the reference."""
+    if before is None or lane.limit.code == CHANCE:
+        return []
     runs = _list_runs(before.lane(lane.limit.code), before)
     return [[round(left, 4), round(right, 4), CLASSES[kind]] for _, _, left, right, kind in runs]
 
 
 def _pick_points(distance: Floats, values: Floats, digits: int = 3) -> dict[str, Any]:
-    """Return x (j,) and curves y (k, j) of values (m, k) with all peaks and dips."""
+    """Return x (j,) and curves y (k, j) of values (m, k) with all peaks and dips.
+
+    What is infinite is MAX_USE: a use without bound is above the limit, no gap.
+    """
     rows = choose_rows(values)
-    return {"x": plain(distance[rows], 4), "y": plain(values[rows].T, digits)}
+    y = np.where(np.isposinf(values[rows]), MAX_USE, values[rows]).T
+    return {"x": plain(distance[rows], 4), "y": plain(y, digits)}
 
 
 def choose_rows(values: Floats) -> NDArray[np.intp]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from rover_physics.numerics.arrays import Floats
 from rover_planner.viewer.documents.verdict import describe_answer
-from rover_planner.viewer.live.live_state import Click, LiveVerdict, TopicAge
+from rover_planner.viewer.live.live_state import Click, LearnedTrail, LiveVerdict, TopicAge
 
 PATIENCE = 2.0
 """Time after which a click without an answer says so [s]."""
@@ -74,6 +74,17 @@ def choose_answer(
 def write_age(seconds: float) -> str:
     """Return an age in words, in steps that do not change all the time."""
     return "just now" if seconds < PATIENCE else f"{seconds:.0f} s ago"
+
+
+def describe_learned(learned: LearnedTrail | None) -> list[str]:
+    """Return what was learned of the ground in words; none before the first estimate."""
+    if learned is None:
+        return []
+    ground = learned.ground
+    words = f"friction {ground.mean:.2f}, give or take {ground.std:.2f}: wheels have slipped"
+    if not ground.is_bounded:
+        words = f"friction at least {ground.low:.2f}: no wheel has slipped yet"
+    return [words, "where: the trail in the scene, from blue (0) to yellow (1)"]
 
 
 def list_topics(ages: Sequence[TopicAge]) -> list[dict[str, Any]]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rover_planner.viewer.documents.header import POLICY_TITLES
+from rover_planner.viewer.documents.limits import write_chance
 from rover_planner.viewer.state.failure import Failure
 from rover_planner.viewer.state.scenario import PolicyVerdict, Shown
 
@@ -35,6 +36,9 @@ def describe_verdict(shown: Shown, work: Work) -> dict[str, Any]:
         **describe_answer(verdict.traversable, f"path {shown.index + 1} of {len(shown.paths)}"),
         "headline": "" if failure is None else failure.headline,
         "where": "" if failure is None else write_place(failure),
+        "chance": ""
+        if shown.chance is None
+        else f"chance of failure {write_chance(shown.chance)}",
         "details": [*filter(None, (verdict.reason, closed))],
         "old": work.old,
         "refusal": work.refusal,

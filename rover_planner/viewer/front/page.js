@@ -56,6 +56,7 @@ function take(parts) {
   Object.assign(state, parts);
   if ("program" in parts) greet(parts.program);
   for (const name of Object.keys(parts)) if (DRAW[name]) DRAW[name](parts[name]);
+  if ("offers" in parts) openTab(chosen.tab);
   heard += 1;
   document.body.dataset.heard = heard;
 }
@@ -81,7 +82,7 @@ const DRAW = {
   subject: drawSubject, errors: drawErrors, scene: drawScene, verdict: drawVerdict, advice: drawAdvice,
   paths: drawPaths, sliders: drawSliders, values: drawValues, changes: drawChanges,
   limits: drawLimits, curves: drawCurves, uses: drawUses, board: drawBoard, drive: drawDrive,
-  legend: drawLegend, chosen: drawChosen, offers: drawChosen, topics: drawTopics,
+  legend: drawLegend, chosen: drawChosen, offers: drawChosen, topics: drawTopics, learned: drawLearned,
   file: saveFile, link: drawShare, current: (link) => { chosen.link = link; }, written: drawShare,
 };
 
@@ -115,6 +116,7 @@ function drawVerdict(one) {
   box.replaceChildren(
     make("div", {}, make("span", { class: "word" }, one.word), " ", make("small", {}, one.about)),
     ...(one.headline ? [make("div", { id: "headline" }, make("b", {}, one.headline), one.where ? `, ${one.where}` : "")] : []),
+    ...(one.chance ? [make("small", { id: "chance" }, one.chance)] : []),
     ...(one.old ? [make("div", { class: "notice", id: "old" }, `old: ${one.old}`)] : []),
     ...(one.refusal ? [make("div", { class: "notice", id: "refusal" }, `refused: ${one.refusal}`)] : []),
     make("div", { class: "row" }, ...offers,
@@ -136,12 +138,10 @@ function drawAdvice({ asked, busy, words, rows }) {
   at("advice").replaceChildren(...(!refused ? [] : !asked
     ? [button("What would help?", { ask: "advise" })]
     : [busy ? make("small", {}, busy) : "", words,
-      make("ol", {}, ...rows.map((row) => make("li", {
-        ...(row.index === null ? { class: "quiet" } : {
-          tabindex: 0, onpointerenter: point(row.index), onpointerleave: point(null),
-          onclick: () => ask({ ask: "remedy", index: row.index }),
-          onkeydown: (event) => { if (event.key === "Enter") event.currentTarget.click(); },
-        }),
+      make("ol", {}, ...rows.map((row) => make("li", row.index === null ? { class: "quiet" } : {
+        tabindex: 0, onpointerenter: point(row.index), onpointerleave: point(null),
+        onclick: () => ask({ ask: "remedy", index: row.index }),
+        onkeydown: (event) => { if (event.key === "Enter") event.currentTarget.click(); },
       }, row.words, make("small", {}, ` (${row.costs})`))))].filter((child) => child !== "")));
 }
 
@@ -298,7 +298,7 @@ function drawCurves() {
   if (!curve || !state.limits) return;
   const title = state.limits.lanes.find((lane) => lane.code === chosen.lane)?.title;
   at("curves").replaceChildren(
-    make("h2", {}, `${title}, use of the limit`), plot(curve, (value) => `${Math.round(100 * value)} %`, 1.0, curve.old),
+    make("h2", {}, chosen.lane === "chance" ? "chance of failure" : `${title}, use of the limit`), plot(curve, (value) => `${Math.round(100 * value)} %`, 1.0, curve.old),
     make("h2", {}, "wheel loads"), plot(state.limits.loads, (value) => `${value.toFixed(0)} N`, null, null),
     make("div", {}, ...Object.entries(COLOURS).map(([name, colour]) => make("span", { class: "key" }, make("i", { style: `background:${colour}` }), name)),
       make("small", {}, "right: line, left: dashes")));
@@ -403,6 +403,11 @@ function drawLegend({ title, gradient, ends, keys, notes }) {
     ...notes.map((note) => make("div", {}, note)));
 }
 
+function drawLearned(lines) {
+  at("learned").replaceChildren(...(lines.length ? [make("h2", {}, "learned of the ground")] : []),
+    ...lines.map((line) => make("div", {}, line)));
+}
+
 function drawTopics(topics) {
   at("topics").replaceChildren(make("h2", {}, "age of the last message"), make("table", {},
     ...topics.map(({ topic, age, stale }) => make("tr", { "data-topic": topic, "data-stale": String(stale), ...(stale ? { "data-old": true } : {}) },
@@ -437,8 +442,10 @@ function saveFile({ name, text }) {
 
 function openTab(name) {
   chosen.tab = name;
+  const plans = !state.offers || state.offers.policies; // else it follows a rover, which has its own program
+  const panels = [...at("panels").children].filter((panel) => plans || ["Drive", "Ground"].includes(panel.dataset.tab));
   for (const panel of at("panels").children) panel.toggleAttribute("data-open", panel.dataset.tab === name);
-  at("tabs").replaceChildren(...[...at("panels").children].map((panel) => make("button", {
+  at("tabs").replaceChildren(...panels.map((panel) => make("button", {
     role: "tab", "aria-selected": String(panel.dataset.tab === name), onclick: () => openTab(panel.dataset.tab) }, panel.dataset.tab)));
 }
 

@@ -20,7 +20,7 @@ from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState, PointCloud2
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64MultiArray, String
 
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.errors import MessageError
@@ -32,14 +32,23 @@ from rover_physics.errors import RoverError
 from rover_physics.names import WHEEL_JOINTS
 from rover_physics.numerics.quaternions import rpy_from_xyzw
 from rover_physics.terrain.grid import Terrain
+from rover_planner.errors import PlanningError
+from rover_planner.learning.learned_file import parse_learned
 from rover_planner.ros.qos import (
+    latched_qos,
     map_subscriptions_qos,
     result_qos,
     sensor_qos,
     service_qos,
     topic_qos,
 )
-from rover_planner.viewer.live.live_state import Click, LiveValues, LiveVerdict, TopicAge
+from rover_planner.viewer.live.live_state import (
+    Click,
+    LearnedTrail,
+    LiveValues,
+    LiveVerdict,
+    TopicAge,
+)
 
 SERVER, CONTROLLER = "/traverse_server", "/traction_controller"
 ODOMETRY, SIGN_OF_LIFE = "odometry", "traverse_server"
@@ -72,6 +81,8 @@ class LiveData:
     """The newest verdict of the server, whoever asked."""
     click: Click | None = None
     """The last question of a visitor; None without one."""
+    learned: LearnedTrail | None = None
+    """What was learned of the ground."""
     ages: tuple[TopicAge, ...] = ()
     """The ages of all topics."""
 
@@ -140,6 +151,7 @@ class LiveListener(Node):
             self._listen(PointCloud2, "elevation_cloud", self._on_cloud, qos)
         self._listen(Path, f"{SERVER}/plan", self._on_plan, results)
         self._listen(DiagnosticArray, f"{SERVER}/verdict", self._on_verdict, results)
+        self._listen(String, f"{SERVER}/ground_estimate", self._on_ground, latched_qos())
         for topic, field in PREDICTED_FIELDS.items():
             take = partial(self._on_prediction, field)
             self._listen(numbers, f"{SERVER}/{topic}", take, results)
@@ -270,6 +282,13 @@ class LiveListener(Node):
         with self._skipping("elevation_cloud"):
             self._data = replace(self._data, terrain=terrain_from_point_cloud(cloud))
 
+    def _on_ground(self, message: String) -> None:
+        with self._skipping("ground_estimate"):
+            ground, known = parse_learned(message.data, "ground_estimate"), self._data
+            at = None if known.values.position is None else known.values.position[:2]
+            trail = known.learned or LearnedTrail(ground)
+            self._data = replace(known, learned=trail.add(ground, at))
+
     def _on_plan(self, plan: Path) -> None:
         with self._skipping("plan"):
             poses = path_to_poses(plan, self._frame) if plan.poses else None
@@ -305,7 +324,7 @@ class LiveListener(Node):
         """Warn of a bad message instead of taking it."""
         try:
             yield
-        except (MessageError, RoverError) as error:
+        except (MessageError, PlanningError, RoverError) as error:
             self.get_logger().warning(f"{what} not shown: {error}")
 
 

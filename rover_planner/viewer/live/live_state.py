@@ -14,10 +14,13 @@ from rover_physics.numerics.records import new_record
 from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place
 from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
+from rover_planner.learning.learned_file import LearnedGround
 from rover_planner.viewer.state.trajectory import RoverState
 
 MAX_AGE = 3.0
 """Age from which a topic that is published all the time is stale [s]."""
+TRAIL_STEP, MAX_TRAIL = 0.1, 1000
+"""Distance of two places of a trail [m], and their largest number."""
 
 
 def _unknown() -> Floats:
@@ -80,6 +83,26 @@ class Click:
     """Its verdict; None until it comes."""
     plan: Floats | None = None
     """(n, 3) poses of its plan; None without one."""
+
+
+@dataclass(frozen=True, eq=False)
+class LearnedTrail:
+    """What a rover has learned of the ground, and where."""
+
+    ground: LearnedGround
+    """What was learned last."""
+    places: Floats = field(default_factory=lambda: np.empty((0, 3)))
+    """(n, 3) x, y [m] and the friction that was known there: measured, or the least there is."""
+
+    def add(self, ground: LearnedGround, at: Floats | None) -> "LearnedTrail":
+        """Return the trail with what was learned at a place (2,) [m], None if it is not known."""
+        if at is None:
+            return LearnedTrail(ground, self.places)
+        friction = ground.mean if ground.is_bounded else ground.low
+        places = self.places[-MAX_TRAIL:]
+        if len(places) > 1 and np.hypot(*(places[-2, :2] - at)) < TRAIL_STEP:
+            places = places[:-1]
+        return LearnedTrail(ground, np.vstack([places, [*at, friction]]))
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,14 +14,14 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.viewer.documents.board import describe_board
 from rover_planner.viewer.documents.legend import describe_scale
-from rover_planner.viewer.documents.live import choose_answer, list_topics
+from rover_planner.viewer.documents.live import choose_answer, describe_learned, list_topics
 from rover_planner.viewer.live.listener import LiveData, LiveListener
 from rover_planner.viewer.live.live_state import StateBuilder
 from rover_planner.viewer.pages.base import Answer, PageBase, Words
 from rover_planner.viewer.pages.ground_painter import Colouring
 from rover_planner.viewer.scene.glb import write_glb
 from rover_planner.viewer.scene.ground_mesh import build_ground_mesh
-from rover_planner.viewer.state.layers import LAYERS
+from rover_planner.viewer.state.layers import LAYERS, list_layers
 from rover_planner.viewer.state.link import read_link
 from rover_planner.viewer.state.trajectory import RoverState
 
@@ -69,11 +69,12 @@ class LivePage(PageBase):
         """Where the rover was first seen (2,) [m]."""
         self._drawn_plan: tuple[Floats | None, bool] | None = None
         """The plan that is drawn, and whether it is grey; None to draw it again."""
+        self._drawn_trail: Floats | None = None
         self._told_at = self._ground_at = 0.0
         super().__init__(rover, terrain, host, port)
         self._builder = StateBuilder(rover)
         predicted = [name for name, layer in LAYERS.items() if layer.is_predicted]
-        self.channel.tell("offers", {"layers": list(LAYERS), "predicted": predicted})
+        self.channel.tell("offers", {"layers": list_layers(terrain), "predicted": predicted})
         if ground_name:
             self._draw_ground()
         self.start()
@@ -147,6 +148,14 @@ class LivePage(PageBase):
         tell("chosen", {
             "layer": how.layer, "heading": how.heading, "along": False, "forces": self._forces,
         })  # fmt: skip
+        tell("learned", describe_learned(data.learned))
+        trail = None if data.learned is None else data.learned.places
+        if trail is not self._drawn_trail:
+            self._drawn_trail = trail
+            self.errors.run(
+                "the trail is not drawn",
+                lambda: self.scene.paths.show_trail(self._rover, self._terrain, trail),
+            )
         shown, drawn = (answer.plan, answer.is_old), self._drawn_plan
         if drawn is None or shown[0] is not drawn[0] or shown[1] != drawn[1]:
             self._drawn_plan = shown
@@ -190,7 +199,7 @@ class LivePage(PageBase):
         self._terrain, self._ground_name, self._ground_at = terrain, "elevation_cloud", now
         if self.scene.frame.move_to(terrain):
             self._first = None
-        self._drawn_plan = None
+        self._drawn_plan = self._drawn_trail = None
         self._draw_ground()
 
     def _turn_arm(self, data: LiveData) -> None:

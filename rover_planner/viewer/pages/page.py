@@ -35,7 +35,7 @@ from rover_planner.viewer.pages.base import Answer, PageBase, Words
 from rover_planner.viewer.pages.ground_painter import Colouring, GroundPainter, PaintRequest
 from rover_planner.viewer.pages.sharing import MapPrint, make_link, read_scenario, write_file
 from rover_planner.viewer.scene.cameras import find_radius
-from rover_planner.viewer.state.layers import LAYERS
+from rover_planner.viewer.state.layers import LAYERS, list_layers
 from rover_planner.viewer.state.link import PageLink, read_link, write_link
 from rover_planner.viewer.state.path_advice import PathAdvice, apply_remedy
 from rover_planner.viewer.state.playback import SPEEDS, Playback
@@ -82,7 +82,10 @@ class Page(PageBase):
         self.session, self.playback = session, Playback()
         self._ground_name = ground_name or name_ground(session.wanted.terrain)
         self._survey = survey
-        self._layers = (*(survey.names if survey is not None else ()), *LAYERS)
+        self._layers = (
+            *(survey.names if survey is not None else ()),
+            *list_layers(session.wanted.terrain),
+        )
         self._colouring = Colouring(self._layers[0])
         self._map_print = MapPrint(session.wanted.terrain)
         self._click_sets, self._forces = "goal", True
@@ -288,7 +291,7 @@ class Page(PageBase):
             state, at = path.failure.state, path.failure.time
             parts |= {
                 "board": describe_board(state, path.failure.link),
-                "uses": describe_uses(path, at),
+                "uses": describe_uses(path, at, self.session.shown.chance),
                 "drive": {**parts["drive"], "time": at, "distance": path.failure.distance},
             }
         rover = path.scenario.rover
@@ -452,8 +455,9 @@ class Page(PageBase):
             (path, reference, kept),
             lambda: describe_changes(path, reference, is_kept=kept is not None),
         )
-        made("limits", (path, reference), lambda: describe_limits(path, reference))
-        made("curves", (path, reference), lambda: describe_curves(path, reference))
+        along = path, reference, shown.chance
+        made("limits", along, lambda: describe_limits(*along))
+        made("curves", along, lambda: describe_curves(*along))
         model, how = wanted.options.model, self._colouring
         tell("chosen", {
             "policy": model.policy, "soil": model.soil or "", "sets": self._click_sets,
@@ -496,7 +500,8 @@ class Page(PageBase):
         shown = state if state is not None or failure is None else failure.state
         board = describe_board(shown, link, has_slip=path.trajectory.has_slip)
         self.channel.tell("board", board)
-        self.channel.tell("uses", describe_uses(path, playback.time))
+        uses = describe_uses(path, playback.time, self.session.shown.chance)
+        self.channel.tell("uses", uses)
 
     def _find_state(self) -> RoverState | None:
         """Return the state at the time of the playback; at a failure that at which it fails.

@@ -15,6 +15,7 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.viewer.scene.glb import TexturedMesh
 from rover_planner.viewer.state.colours import BEYOND, GOOD, ColourScale, map_colours
 from rover_planner.viewer.state.layers import (
+    FRICTION,
     LAYERS,
     SLOPE,
     colour_span,
@@ -88,6 +89,9 @@ def build_ground_mesh(
         colours[beyond] = BEYOND
     else:
         values = compute_slope(x, y, heights) if layer_name == SLOPE else heights
+        if layer_name == FRICTION and terrain.friction is not None:
+            stride = round((x[1] - x[0]) / terrain.resolution)
+            values = terrain.friction[::stride, ::stride]
         beyond = np.zeros(heights.shape, bool)
         low, high = colour_span(layer, rover, values)
         colours = map_colours(values, low, high)

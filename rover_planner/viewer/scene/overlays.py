@@ -14,7 +14,14 @@ from rover_planner.planning.path_query import Candidate
 from rover_planner.viewer.scene.labels import Label, Labels
 from rover_planner.viewer.scene.local_frame import LocalFrame
 from rover_planner.viewer.scene.ribbons import Ribbon, Strand
-from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN, Colour, blend
+from rover_planner.viewer.state.colours import (
+    PASSABLE,
+    REFUSED,
+    UNKNOWN,
+    Colour,
+    blend,
+    map_colours,
+)
 
 MAX_POINTS = 250
 """Most points of a path that are drawn."""
@@ -27,7 +34,7 @@ CLEARANCE = 0.15
 """Height of a path above the ground [wheel radii]."""
 CROSS = 0.7
 """Half the width of the cross where a path is refused [wheel radii]."""
-WIDE, NARROW = 5.0, 2.5
+WIDE, NARROW = 6.0, 3.5
 """Widths of the shown path and of the others [px]."""
 NUMBER_SHARES = (0.35, 0.65)
 """Shares of a path at which the numbers of the first and the last one stand."""
@@ -52,6 +59,7 @@ class PathOverlay:
         """The drawn paths by their index."""
         self._plan = Ribbon(scene, "/paths/plan")
         self._ghost = Ribbon(scene, "/paths/ghost")
+        self._trail = Ribbon(scene, "/paths/trail")
         self._old: set[int] = set()
         """Indices of the paths that are greyed."""
         self._numbers: dict[int, Floats] = {}
@@ -108,6 +116,19 @@ class PathOverlay:
         points = None if path is None else path[:, :2]
         strands = [] if points is None else self._find_strand(terrain, points, GHOST, height)
         self._ghost.show(strands, WIDE)
+
+    def show_trail(self, rover: Rover, terrain: Terrain, trail: Floats | None) -> None:
+        """Draw where (n, 3) something was learned: x, y [m] and a number from 0 to 1."""
+        known = np.empty((0, 3)) if trail is None else trail
+        height, colours = CLEARANCE * rover.wheel.radius, map_colours(known[:, 2], 0.0, 1.0)
+        strands = [
+            strand
+            for k, (red, green, blue) in enumerate(colours[1:].tolist())
+            for strand in self._find_strand(
+                terrain, known[k : k + 2, :2], (red, green, blue), height
+            )
+        ]
+        self._trail.show(strands, WIDE)
 
     def find_number(self, origin: Floats, direction: Floats) -> int | None:
         """Return the index of the path whose number a ray (3,) of the scene hits; None for none.

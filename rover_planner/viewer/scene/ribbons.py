@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Lines on the ground with a dark casing, which stand out from a ground of any colour."""
+"""Lines over the ground of one width in pixels, each in the colours of its strands."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,12 +8,7 @@ from typing import Any
 import numpy as np
 
 from rover_physics.numerics.arrays import Floats
-from rover_planner.viewer.state.colours import CASING, Colour
-
-BORDER = 3.0
-"""Width of the casing beyond the line, both sides together [px]."""
-LIFT = np.array([0.0, 0.0, 0.01])
-"""From the casing to the line above it [m]."""
+from rover_planner.viewer.state.colours import Colour, to_linear
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,17 +28,17 @@ class Strand:
 class Ribbon:
     """Strands of one width in pixels, so that they are seen from any distance.
 
-    All strands together are two nodes of the scene, which stay when they change: a new node takes
+    All strands together are one node of the scene, which stays when they change: a new node takes
     the page longer than new points.
     """
 
     def __init__(self, scene: Any, name: str):
-        """Draw nothing yet; the nodes will have names that begin with `name`."""
+        """Draw nothing yet; the node will have the name `name`."""
         self._scene, self.name = scene, name
         self.strands: tuple[Strand, ...] = ()
         """The drawn strands, in their own colours."""
         self._drawn: tuple[float, Colour | None] | None = None
-        self._nodes: list[Any] = []
+        self._node: Any = None
 
     def show(self, strands: Sequence[Strand], width: float, paint: Colour | None = None) -> None:
         """Draw strands instead of what was drawn before; what looks the same is not sent again.
@@ -65,12 +60,11 @@ class Ribbon:
         lines = [np.stack([one.line[:-1], one.line[1:]], axis=1) for one in strands]
         points = np.concatenate(lines).astype(np.float32)
         colours = np.repeat(
-            np.array([paint or one.colour for one in strands], np.uint8),
+            to_linear(np.array([paint or one.colour for one in strands])),
             [len(line) for line in lines],
             axis=0,
         )[:, None].repeat(2, axis=1)
-        self._draw(0, points, np.full_like(colours, CASING), width + BORDER)
-        self._draw(1, points + LIFT.astype(np.float32), colours, width)
+        self._draw(points, colours, width)
 
     def paint(self, colour: Colour | None) -> None:
         """Show all strands in a colour, or each in its own again."""
@@ -79,17 +73,14 @@ class Ribbon:
 
     def remove(self) -> None:
         """Remove it."""
-        for node in self._nodes:
-            node.remove()
-        self._nodes.clear()
-        self.strands, self._drawn = (), None
+        if self._node is not None:
+            self._node.remove()
+        self._node, self.strands, self._drawn = None, (), None
 
-    def _draw(self, k: int, points: np.ndarray, colours: np.ndarray, width: float) -> None:
-        if k < len(self._nodes):
-            node = self._nodes[k]
-            node.points, node.colors, node.thickness = points, colours, width
+    def _draw(self, points: np.ndarray, colours: np.ndarray, width: float) -> None:
+        if self._node is not None:
+            self._node.points, self._node.colors, self._node.thickness = points, colours, width
             return
-        node = self._scene.add_line_segments(
-            f"{self.name}/{k}", points, colours, thickness=width, thickness_units="screen"
+        self._node = self._scene.add_line_segments(
+            self.name, points, colours, thickness=width, thickness_units="screen"
         )
-        self._nodes.append(node)

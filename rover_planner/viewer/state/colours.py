@@ -28,7 +28,7 @@ GOOD = (143, 196, 224)
 """Pale blue: ground where the rover keeps its limits."""
 UNKNOWN = (110, 110, 110)
 CASING = (16, 16, 16)
-"""Dark border of lines on the ground."""
+"""The line from a label to what it is about."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +80,13 @@ def blend(first: Colour, second: Colour, share: float) -> Colour:
     start, end = np.array(first), np.array(second)
     red, green, blue = np.round(start + share * (end - start)).astype(int).tolist()
     return red, green, blue
+
+
+def to_linear(colours: NDArray[np.int_]) -> NDArray[np.uint8]:
+    """Return colours (..., 3) as shares of light, which a scene takes for the points of lines."""
+    share = colours / 255.0
+    light = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    return np.asarray(np.round(255.0 * light), np.uint8)
 
 
 def to_css(colour: Colour) -> str:

@@ -11,8 +11,9 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.verdict import Verdict
+from rover_planner.planning.asked_poses import AskedPoses
 from rover_planner.viewer.state.limits import ShownLimit
-from rover_planner.viewer.state.path_limits import AskedPoses, PathLimits
+from rover_planner.viewer.state.path_limits import PathLimits
 from rover_planner.viewer.state.trajectory import RoverState, make_state, read_series
 
 BODY = "body"

@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Judges a scenario step by step: the path looked at, its reference, all others, a way around."""
+"""Judges a scenario step by step: the path, its reference, others, its chance, a way around."""
 
 from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
 
+from rover_physics.chance.failure_chance import find_failure_chance
 from rover_physics.errors import RoverError
 from rover_physics.names import TORQUE_POLICIES
 from rover_physics.numerics.arrays import Floats
+from rover_physics.prediction.packed_model import pack_model
+from rover_physics.prediction.sweep import predict_paths
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.traversability.verdict import hold_against_limits
 from rover_planner.planning.path_query import Candidate, check_path, choose, generate_paths
@@ -16,8 +19,8 @@ from rover_planner.planning.search.query import SearchQuery
 from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.scenario import Judged, PolicyVerdict, Scenario, Shown
 
-PATH, COMPARE, POLICY, SEARCH = "path", "reference", "policy", "searching a way"
-BETTER = "way found, searching a better one"
+PATH, COMPARE, POLICY, CHANCE = "path", "reference", "policy", "chance of failure"
+SEARCH, BETTER = "searching a way", "way found, searching a better one"
 """Names of steps."""
 
 
@@ -42,7 +45,8 @@ Step = Progress | Shown
 def judge_request(request: JudgeRequest, memory: EdgeMemory | None = None) -> Iterator[Step]:
     """Yield what is shown with the verdict on the path looked at, then with more and more.
 
-    Its reference, the other paths and its verdicts under all policies follow. If all candidates
+    Its reference, the other paths, its verdicts under all policies and its chance of failure
+    follow. If all candidates
     are refused, so do the first path around obstacles and the best of the search's budget, or why
     there is none. The path that is looked at stays the same.
 
@@ -72,6 +76,10 @@ def judge_request(request: JudgeRequest, memory: EdgeMemory | None = None) -> It
         return
     shown = yield from _add_policies(shown)
     yield shown
+    if shown.chance is None:
+        yield Progress(CHANCE)
+        shown = _add_chance(shown)
+        yield shown
     if shown.needs_search:
         yield from _search_around(shown, memory or EdgeMemory())
 
@@ -120,7 +128,8 @@ def _judge_again(asked: Scenario, before: Shown, index: int) -> Generator[Step, 
     old = before.by_policy if is_same_path else ()
     policies = old if same and is_same_path else _own_policy(path, old)
     around = before.around if same else None
-    return Shown(asked, paths, index, generated, None, policies, around)
+    chance = before.chance if path is before.path else None
+    return Shown(asked, paths, index, generated, None, policies, chance, around)
 
 
 def _find_reference(asked: Scenario, kept: Scenario | None) -> Scenario:
@@ -169,6 +178,14 @@ def _add_policies(shown: Shown) -> Generator[Step, None, Shown]:
         yield Progress(POLICY, k + 1, len(TORQUE_POLICIES))
         found.append(_judge_under(policy, shown.path))
     return replace(shown, by_policy=tuple(found))
+
+
+def _add_chance(shown: Shown) -> Shown:
+    """Return what is shown with the chance that the path fails anywhere, if it ends or not."""
+    asked = shown.scenario
+    model = pack_model(asked.rover, asked.terrain, asked.asked_options.model)
+    (swept,) = predict_paths(model, [shown.path.poses], False)
+    return replace(shown, chance=find_failure_chance(model, swept))
 
 
 def _search_around(shown: Shown, memory: EdgeMemory) -> Iterator[Step]:

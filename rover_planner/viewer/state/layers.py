@@ -14,6 +14,7 @@ from rover_physics.prediction.map_sweep import score_poses
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
+from rover_physics.terrain.grid import Terrain
 
 STEEP = 35.0
 """Slope of the last colour [deg]."""
@@ -66,10 +67,11 @@ def _standing_clearance(rover: Rover) -> float:
     return max(100.0 * (rover.belly.z - ground), 100.0 * rover.limits.belly_clearance + 1.0)
 
 
-HEIGHT, SLOPE = "height", "slope"
+HEIGHT, SLOPE, FRICTION = "height", "slope", "friction of the ground"
 LAYERS: Mapping[str, Layer] = {
     HEIGHT: Layer("m"),
     SLOPE: Layer("deg", top=lambda _rover: STEEP),
+    FRICTION: Layer(top=lambda _rover: 1.0),
     "passable or not": Layer(scores="passable", top=lambda _rover: 1.0),
     "friction utilisation": _limited("friction", "friction_utilisation"),
     "torque saturation": _limited("torque", "torque_saturation"),
@@ -81,6 +83,11 @@ LAYERS: Mapping[str, Layer] = {
     "belly clearance": _limited("belly", "belly_clearance", _standing_clearance),
 }
 """The layers by name."""
+
+
+def list_layers(terrain: Terrain) -> list[str]:
+    """Return the names of the layers of a ground; the friction only where its map has one."""
+    return [name for name in LAYERS if name != FRICTION or terrain.friction is not None]
 
 
 def compute_slope(x: Floats, y: Floats, heights: Floats) -> Floats:

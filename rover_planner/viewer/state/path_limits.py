@@ -1,41 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """The limits along a path: how much of each is used, by which wheel, and the worst so far."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.limits.table import Sense
+from rover_physics.chance.failure_chance import FailureChance
+from rover_physics.limits.table import CHANCE, Sense
 from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.results.record import (
-    find_column,
-    join_results,
-    numbers_of,
-    select_results,
-)
+from rover_physics.results.record import find_column, numbers_of
 from rover_physics.results.uses import ABOVE, Uses, find_uses, limits_of
 from rover_physics.rover.model import Rover
 from rover_physics.traversability.classification import find_wheel
 from rover_physics.traversability.verdict import Verdict
+from rover_planner.planning.asked_poses import AskedPoses, merge_poses
 from rover_planner.viewer.state.limits import GROUND, ShownLimit, list_limits
-
-
-@dataclass(frozen=True, eq=False)
-class AskedPoses:
-    """The poses of a path at which the model was asked, m of them, in the order of the path."""
-
-    prediction: PathPrediction
-    """Of all of them; its `waypoint` is the next one for a pose in between."""
-    is_between: NDArray[np.bool_]
-    """(m,) True for poses between waypoints."""
-    distance: Floats
-    """(m,) horizontal distance since the start [m]."""
-    time: Floats
-    """(m,) time since the start [s]; where the rover does not settle, and so has no time, that of
-    the last waypoint before at which it does, 0 without one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,49 +92,6 @@ def find_path_limits(rover: Rover, prediction: PathPrediction, verdict: Verdict)
     return found
 
 
-def merge_poses(prediction: PathPrediction) -> AskedPoses:
-    """Return the waypoints of a prediction and the poses between, in the order of the path."""
-    n, between = len(prediction.poses), prediction.between
-    parts, place = [prediction], np.arange(n, dtype=float)
-    if between is not None:
-        parts.append(between)
-        place = np.concatenate([place, _places(prediction.poses, between)])
-    order = np.argsort(place, kind="stable")
-    along = place[order]
-    merged = replace(
-        prediction,
-        poses=np.concatenate([part.poses for part in parts])[order],
-        results=select_results(join_results([part.results for part in parts]), order),
-        waypoint=np.concatenate([part.waypoint for part in parts])[order],
-        between=None,
-        bounds=None,
-    )
-    return AskedPoses(
-        merged,
-        order >= n,
-        np.interp(along, np.arange(n), prediction.distance),
-        np.interp(along, np.arange(n), _hold_known(prediction.time)),
-    )
-
-
-def _hold_known(times: Floats) -> Floats:
-    """Return times (n,) [s], ascending, with the last known one, or 0, in place of each NaN."""
-    return np.maximum.accumulate(np.where(np.isnan(times), 0.0, times))
-
-
-def _places(poses: Floats, between: PathPrediction) -> Floats:
-    """Return the places (k,) of poses between waypoints: 2.5 is half-way from 2 to 3."""
-    after = np.clip(between.waypoint, 1, max(len(poses) - 1, 1))
-    after = np.minimum(after, len(poses) - 1)
-    before = np.maximum(after - 1, 0)
-    step, gone = poses[after] - poses[before], between.poses - poses[before]
-    length = np.hypot(step[:, 0], step[:, 1])
-    turns = length < 1e-9
-    whole = np.where(turns, np.abs(step[:, 2]), length)
-    part = np.where(turns, np.abs(gone[:, 2]), np.hypot(gone[:, 0], gone[:, 1]))
-    return np.asarray(before + np.clip(part / np.maximum(whole, 1e-12), 1e-6, 1.0 - 1e-6))
-
-
 def _make_ground_lane(limit: ShownLimit, rows: AskedPoses) -> Lane:
     """Return the lane of poses at which the rover cannot be judged at all."""
     m = len(rows.distance)
@@ -187,6 +126,13 @@ def _find_wheel_uses(prediction: PathPrediction, uses: Uses, k: int) -> Floats |
     return np.asarray(
         np.where(np.isnan(uses.use[:, [k]]), np.nan, values / (uses.limits.bounds[k] * kept))
     )
+
+
+def make_chance_lane(limits: PathLimits, chance: FailureChance) -> Lane:
+    """Return the chance that a path fails at each pose as a lane beside those of its limits."""
+    waypoint = limits.rows.prediction.waypoint
+    unknown, no_wheel = np.full(len(waypoint), np.nan), np.full(len(waypoint), -1)
+    return Lane(ShownLimit(CHANCE, "chance"), unknown, chance.at[waypoint], no_wheel)
 
 
 def _add_refusals(limits: PathLimits, verdict: Verdict) -> None:

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from rover_physics.chance.failure_chance import FailureChance
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
@@ -154,6 +155,8 @@ class Shown:
     """The same path with the values of the reference; None if nothing differs from it."""
     by_policy: tuple[PolicyVerdict, ...] = ()
     """Its verdicts under all torque policies; empty for a replay, whose soil is not known."""
+    chance: FailureChance | None = None
+    """The chance that the path fails, all of it; None while it is not known, or for a replay."""
     around: SearchResult | None = None
     """The finding of a search around obstacles for the scenario; None if none was made."""
 

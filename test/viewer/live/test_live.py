@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page follows a live graph: it shows what a rover, its server and controller publish."""
 
+import json
 import threading
 import time
 
@@ -11,7 +12,7 @@ from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64MultiArray, String
 
 from msg_adapters.commands import wheel_values
 from msg_adapters.results.predictions import waypoint_array
@@ -19,14 +20,23 @@ from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import save_terrain
 from rover_physics.warm_up import warm_up
+from rover_planner.learning.learned_file import LearnedGround
 from rover_planner.nodes.rover_simulator import RoverSimulator
 from rover_planner.nodes.traverse_server import TraverseServer
-from rover_planner.ros.qos import result_qos, sensor_qos, topic_qos
-from rover_planner.viewer.documents.live import PATIENCE, choose_answer, list_topics
+from rover_planner.ros.qos import latched_qos, result_qos, sensor_qos, topic_qos
+from rover_planner.viewer.documents.live import (
+    PATIENCE,
+    choose_answer,
+    describe_learned,
+    list_topics,
+)
 from rover_planner.viewer.live.listener import LiveLink, LiveListener
 from rover_planner.viewer.live.live_state import (
     MAX_AGE,
+    MAX_TRAIL,
+    TRAIL_STEP,
     Click,
+    LearnedTrail,
     LiveVerdict,
     StateBuilder,
     TopicAge,
@@ -160,6 +170,40 @@ def test_invalid_messages_are_skipped_and_values_without_a_topic_are_nan(ros, li
     for values in (state.wheel_loads, state.friction_use, state.torque_use):
         assert np.isnan(values).all()
     assert listener.latest().values.forces_from == ""
+
+
+def test_what_was_learned_of_the_ground_is_told_with_the_places_where_it_was(listener, talker):
+    estimates = talker.create_publisher(String, "/traverse_server/ground_estimate", latched_qos())
+    learned = lambda: listener.latest().learned  # noqa: E731
+
+    def is_at(x: float) -> bool:
+        position = listener.latest().values.position
+        return position is not None and position[0] == x
+
+    friction = {"mean": 0.8, "std": 0.1, "low": 0.35, "high": None}
+    for x, high, words in (
+        (0.0, None, "friction at least 0.35: no wheel has slipped yet"),
+        (0.5, 0.9, "friction 0.80, give or take 0.10: wheels have slipped"),
+    ):
+        send_until(
+            lambda x=x: talker.odometry.publish(odometry(x, 0.0)),
+            lambda x=x: is_at(x),
+            "the place",
+        )
+        estimates.publish(String(data=json.dumps({"friction": {**friction, "high": high}})))
+        wait_until(lambda words=words: words in describe_learned(learned()), words)
+    np.testing.assert_allclose(learned().places, [[0.0, 0.0, 0.35], [0.5, 0.0, 0.8]])
+    assert describe_learned(None) == []
+
+
+def test_a_trail_keeps_places_a_step_apart_and_the_newest_of_many():
+    ground = LearnedGround(0.5, 0.1, 0.4, True)
+    trail = LearnedTrail(ground)
+    for x in np.arange(0.0, 150.0, 0.04):
+        trail = trail.add(ground, np.array([x, 0.0]))
+    steps = np.diff(trail.places[:-1, 0])
+    assert len(trail.places) <= MAX_TRAIL + 1 and trail.places[-1, 0] == pytest.approx(149.96)
+    assert steps.min() > 0.5 * TRAIL_STEP and trail.add(ground, None).places is trail.places
 
 
 def test_a_plan_needs_odometry_and_a_server(listener, talker):

@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Wheel odometry learns how wheels creep on slopes, and its covariance tells what it misses."""
+
+import numpy as np
+import pytest
+
+from rover_physics.rover.rover_file import load_rover
+from rover_planner.learning.wheel_odometry import WheelMotion, WheelOdometry
+
+ROVER = load_rover("lsr1")
+SPEED, RATE = 0.06, 10.0
+CREEP, DRIFT, SCATTER = 0.12, 0.18, 0.02
+"""Share of the way that is lost per slope, gone aside per side slope, and its scatter."""
+
+
+def drive(odometry, seed, pitch, roll, seconds=60.0, teach=False):
+    """Drive with creep; return the true end (3,)."""
+    rng = np.random.default_rng(seed)
+    true, piece = np.zeros(3), 0.0
+    for k in range(round(seconds * RATE)):
+        if k % 50 == 0:  # what is uneven lasts for a while
+            piece = SCATTER * rng.standard_normal()
+        yaw_rate = 0.02 * np.sin(0.01 * k)
+        rates = np.full(6, SPEED / ROVER.wheel.radius)
+        odometry.take(WheelMotion(k / RATE, rates, np.zeros(6), roll, pitch, yaw_rate))
+        if k:
+            step = SPEED * np.cos(pitch) / RATE
+            true[2] += yaw_rate / RATE
+            c, s = np.cos(true[2]), np.sin(true[2])
+            ahead = 1.0 + CREEP * np.tan(pitch) + piece
+            left = -DRIFT * np.tan(roll)
+            true[:2] += step * np.array([ahead * c - left * s, ahead * s + left * c])
+        if teach:
+            odometry.learn(true)
+    return true
+
+
+@pytest.fixture(scope="module")
+def taught():
+    """Return an odometry that has learned on two slopes and two side slopes."""
+    odometry = WheelOdometry(ROVER)
+    for seed, (pitch, roll) in enumerate([(0.0, 0.0), (-0.3, 0.1), (-0.15, -0.2), (0.2, 0.25)]):
+        first = WheelOdometry(ROVER)
+        first.forward, first.side = odometry.forward, odometry.side
+        drive(first, seed, pitch, roll, teach=True)
+    return odometry
+
+
+def follow(taught, seed, pitch, roll):
+    """Return odometry and truth of a drive without another measurement of the motion."""
+    odometry = WheelOdometry(ROVER)
+    odometry.forward, odometry.side = taught.forward, taught.side
+    return odometry, drive(odometry, seed, pitch, roll)
+
+
+@pytest.mark.parametrize(("pitch", "roll"), [(-0.35, 0.0), (0.0, 0.3), (-0.2, -0.2)])
+def test_what_was_learned_halves_the_drift_on_slopes(taught, pitch, roll):
+    known, true = follow(taught, 10, pitch, roll)
+    plain = WheelOdometry(ROVER)
+    drive(plain, 10, pitch, roll)
+    miss, plain_miss = (np.hypot(*(one.pose - true)[:2]) for one in (known, plain))
+    assert miss < 0.5 * plain_miss
+
+
+def test_the_covariance_is_that_of_the_misses(taught):
+    rng = np.random.default_rng(5)
+    squares = []
+    for seed in range(40):
+        odometry, true = follow(taught, 100 + seed, *rng.uniform(-0.3, 0.3, 2))
+        miss = (odometry.pose - true)[:2]
+        squares.append(miss @ np.linalg.solve(odometry.covariance[:2, :2], miss))
+    assert 0.2 < np.mean(squares) < 4.0
+    assert np.mean(np.array(squares) < 5.99) > 0.9
+
+
+def test_where_all_friction_is_used_the_way_is_not_known(taught):
+    sure, _ = follow(taught, 3, -0.2, 0.0)
+    odometry = WheelOdometry(ROVER)
+    odometry.forward, odometry.side, odometry.friction = taught.forward, taught.side, 0.21
+    drive(odometry, 3, -0.2, 0.0)
+    assert odometry.covariance[0, 0] > 25.0 * sure.covariance[0, 0]
