@@ -99,9 +99,14 @@ class Ear(Node):
     def _hear_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             if status.name.startswith("traction_controller"):
-                fault = re.sub(r"[-\d.]+", "#", status.message) if status.level == b"\2" else ""
+                fault = without_numbers(status.message) if status.level == b"\2" else ""
                 self.faults[fault] += bool(fault) and fault != self._fault
                 self._fault = fault
+
+
+def without_numbers(text: str) -> str:
+    """Return a text with # for each number."""
+    return re.sub(r"[-\d.]+", "#", text)
 
 
 class Programs:
@@ -162,6 +167,10 @@ class Programs:
         """Return the exit code of a program, None while it runs."""
         return self._running[name].exit_code
 
+    def last_words(self, name: str) -> str:
+        """Return what a program said last."""
+        return self._running[name].last_line()
+
     def memory(self) -> dict[str, float]:
         """Return the memory [MB] of each program that runs."""
         return {name: memory_of(child) for name, child in self._running.items() if child.running}
@@ -221,7 +230,8 @@ class Soak:
             time.sleep(0.5)
             code = programs.exit_code(MISSION)
             if code is not None:
-                self._drives[_WORDS.get(code, f"exit code {code}")] += 1
+                end = _ENDS.get(code) or without_numbers(programs.last_words(MISSION))
+                self._drives[end] += 1
                 self._start_mission()
             if time.monotonic() > due:
                 due += every
@@ -282,8 +292,8 @@ class Soak:
         return median(taken)
 
 
-_WORDS = {0: "arrived", 1: "ended with a reason", 3: "not traversable", -9: "killed"}
-"""Ends of a mission by exit code."""
+_ENDS = {0: "arrived", 3: "not traversable", -9: "killed"}
+"""Ends of a mission by exit code; the others say why."""
 
 
 def main(

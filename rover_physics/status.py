@@ -71,3 +71,5 @@ class Stall(IntEnum):
     """The motors stall at their largest torque."""
     WEDGED = 2
     """A wheel is wedged between faces in front and behind."""
+    RUNS_AWAY = 3
+    """The motors cannot hold the rover at their largest torque."""

@@ -23,7 +23,7 @@ from rover_physics.results.path_bounds import PathBounds
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.terrain.ground import Ground, pack_ground
+from rover_physics.terrain.ground import Ground, new_ground
 
 SIGMAS = 3.0
 """Default number of standard deviations by which the map's heights may be wrong."""
@@ -103,7 +103,8 @@ def _pack_uncertain(terrain: Terrain, sigmas: float) -> tuple[Ground, Ground, Gr
     assert terrain.elevation_std is not None
     error = sigmas * terrain.elevation_std
     heights = (terrain.elevation - error, terrain.elevation + error, error)
-    low, high, wrong = (pack_ground(replace(terrain, elevation=one)) for one in heights)
+    bare = replace(terrain, elevation_std=None)  # errors are not checked once more for each
+    low, high, wrong = (new_ground(replace(bare, elevation=one)) for one in heights)
     return low, high, wrong
 
 

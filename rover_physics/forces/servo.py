@@ -87,6 +87,7 @@ def write_servo_forces(model, work, result):
     result.power = power
     result.speed_share = servo.speed_share
     result.stalls = servo.stall
+    result.deficit = servo.deficit
     result.friction_share = shear / max(strength, TOLERANCE)
     result.torque_share = saturation / 6.0
     for k in range(MOTIONS):

@@ -49,6 +49,11 @@ SOFTNESS = 0.02
 load of less than a thousandth of the weight."""
 UNLIMITED = 1e3
 """Traction, over the weight, that no motor limits."""
+TOWED_SLOWLY, TOWED_FAST = 0.1, 1.5
+"""Speed shares at which a rover is towed, to find the force that is missing to drive or to brake:
+with motors at their limits in either direction."""
+STRETCH = 0.05
+"""Speed share by which a force of the weight stretches the tow."""
 LEAST_LOAD = 0.02
 """Least load, over the weight, at the start of a search."""
 
@@ -65,15 +70,21 @@ def solve_servo(linkage, work, servo):
 
     Returns:
         False if the equations are singular. `servo.speed_share` is above 0 if the rover drives.
-        If not, loads and forces are those of equal tractions, the motion is zero, and
-        `servo.stall` says why.
+        If not, loads and forces are those of equal tractions, the motion is zero,
+        `servo.stall` says why, and `servo.deficit` is the force along the motion that is missing,
+        over the weight: negative if it is missing to brake, infinite if none helps.
     """
     if not find_motions(linkage, work.placement, work.contacts, work.balance, servo):
         return False
-    servo.creep, servo.stall = CREEP, Stall.SLIDING
+    servo.creep, servo.stall, servo.towed, servo.deficit = CREEP, Stall.SLIDING, 0.0, 0.0
     share = _find_drive(servo)
     if share >= MIN_SPEED_SHARE:
         _write_drive(servo, share)
+        return True
+    servo.deficit = _find_deficit(servo)
+    if servo.deficit < 0.0:
+        servo.stall = Stall.RUNS_AWAY
+        _write_standstill(servo)
         return True
     servo.max_traction, limit = UNLIMITED, servo.max_traction
     if _find_drive(servo) >= MIN_SPEED_SHARE:
@@ -81,6 +92,23 @@ def solve_servo(linkage, work, servo):
     servo.max_traction = limit
     _write_standstill(servo)
     return True
+
+
+@kernel
+def _find_deficit(servo):
+    """Return the force that a rover without balance misses to drive, or, negative, to brake."""
+    if not _motion_made(servo, servo.z)[1] > 0.0:
+        return np.inf
+    force = np.inf
+    servo.towed = TOWED_SLOWLY
+    share = _find_drive(servo)
+    if share > -np.inf and TOWED_SLOWLY - share < 0.0:
+        servo.towed = TOWED_FAST
+        share = _find_drive(servo)
+    if share > -np.inf and (servo.towed - share > 0.0) == (servo.towed == TOWED_SLOWLY):
+        force = (servo.towed - share) / STRETCH
+    servo.towed = 0.0
+    return force
 
 
 @kernel
@@ -179,13 +207,20 @@ def _share_if_found(servo, found):
 @kernel
 def speed_share(servo):
     """Return the share of the commanded motion in z, weighted by the distances of the wheels."""
+    made, asked = _motion_made(servo, servo.z)
+    return made / asked if asked > 0.0 else 0.0
+
+
+@kernel
+def _motion_made(servo, z):
+    """Return what the level work with the commanded motion is of the motion in z and of itself."""
     made, asked = 0.0, 0.0
     for k in range(MOTIONS):
         for j in range(MOTIONS):
             work = level_work(servo.base, k, j) * servo.nominal[k]
-            made += work * servo.z[6 + j]
+            made += work * z[6 + j]
             asked += work * servo.nominal[j]
-    return made / asked if asked > 0.0 else 0.0
+    return made, asked
 
 
 @kernel
@@ -246,10 +281,25 @@ def write_residual(servo, z):
             roll_wheel(servo, wheel, servo.mu[wheel] * servo.load[wheel], velocity)
         if servo.load[wheel] > 0.0:
             _add_wheel(servo, wheel)
+    if servo.towed > 0.0:
+        _add_tow(servo, z)
     total = 0.0
     for i in range(UNKNOWNS):
         total += residual[i, 0] * residual[i, 0]
     return np.sqrt(total)
+
+
+@kernel
+def _add_tow(servo, z):
+    """Add the tow to the base forces: its power in the whole commanded motion is its force."""
+    made, asked = _motion_made(servo, z)
+    for k in range(MOTIONS):
+        share = servo.nominal[k] / (STRETCH * asked)
+        servo.residual[6 + k, 0] += share * (servo.towed - made / asked)
+        for j in range(MOTIONS):
+            for i in range(MOTIONS):
+                work = level_work(servo.base, i, j) * servo.nominal[i]
+                servo.J[6 + k, 6 + j] -= share * work / asked
 
 
 @kernel

@@ -68,6 +68,8 @@ SERVO = record_type(
     ("rim_speed", float, (6,)),  # r omega over the nominal speed
     ("speed_share", float),  # share of the commanded motion that is made
     ("deviation", float, (MOTIONS,)),  # the motion less its share of the commanded one
+    ("towed", float),  # speed share at which it is towed to find the deficit; 0: it is not
+    ("deficit", float),  # force that is missing if the speed share is 0, negative: to brake
     ("stall", np.int64),  # why the rover does not drive if its speed share is 0: a Stall
 )
 """Inputs, unknowns and results of `solve_servo`. Forces are over the rover's weight, velocities

@@ -18,6 +18,9 @@ MODERATE_SINKAGE = 1.0 / 6.0
 MIN_SPEED_SHARE = 0.05
 """Least share of the commanded motion with which a rover drives. A servo at its torque limit still
 turns; below this share the rover grinds on the spot."""
+RUNAWAY = 0.01
+"""Height [m] of the fall whose speed, 0.44 m/s on Earth, a rover may reach that its motors cannot
+hold."""
 MAX_TURN_OFF = 0.1
 """Largest turn [rad] off its path that a rover with speed servos may make within its wheelbase: a
 curvature error that would double the width of its track within about two lengths."""
@@ -215,6 +218,11 @@ LIMITS: tuple[Limit, ...] = (
         "no forward speed balances: the motors stall at their largest torque", "torque",
         lambda rover: MIN_SPEED_SHARE, Sense.LEAST, has_number=False,
         only_if=("stalls", Stall.STALLED), wheel_of="torque_saturation", **ON_SERVOS,
+    ),
+    Limit(
+        "torque", "speed_share", "the motors cannot hold the rover: it runs away", "torque",
+        lambda rover: MIN_SPEED_SHARE, Sense.LEAST, has_number=False,
+        only_if=("stalls", Stall.RUNS_AWAY), wheel_of="torque_saturation", **ON_SERVOS,
     ),
     Limit(
         "torque", "torque_share", "all torque is used: {compared}", "torque",

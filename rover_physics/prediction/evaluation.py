@@ -329,7 +329,7 @@ def _write_forces(model, work, result):
         write_servo_forces(model, work, result)
         return
     result.speed_share, result.stalls = 1.0, Stall.SLIDING.value
-    result.friction_share = result.torque_share = 0.0
+    result.friction_share = result.torque_share = result.deficit = 0.0
     result.deviation[:] = 0.0
     result.lift_rate[:] = 0.0
     result.slip_speed[:] = 0.0

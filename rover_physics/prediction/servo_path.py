@@ -4,6 +4,8 @@
 A wheel may lift while the others drive the rover on, and touch down again. How high it gets is the
 sum of its speeds of lifting.
 
+Where forces are missing for a few millimetres, the rover's momentum carries it on.
+
 A wheel that falls into a slot as narrow as itself is wedged between its faces. The forces on it
 are not determined there: friction at both faces may lock it, whatever the motors do.
 
@@ -19,8 +21,9 @@ from typing import Any
 
 import numpy as np
 
+from rover_physics.limits.table import MIN_SPEED_SHARE, RUNAWAY
 from rover_physics.numerics.arrays import Floats
-from rover_physics.prediction.path_kernels import Crossings, Wheels
+from rover_physics.prediction.path_kernels import FACE, Crossings, Wheels
 from rover_physics.status import PoseStatus, Stall
 
 WEDGED = np.radians(140.0)
@@ -48,6 +51,52 @@ def stop_in_slots(poses: np.ndarray, results: Any, crossings: Crossings) -> None
         target = results if row < n else crossings.results
         target["speed_share"][row if row < n else row - n] = 0.0
         target["stalls"][row if row < n else row - n] = Stall.WEDGED
+
+
+def carry_by_momentum(
+    wheels: Wheels, gravity: float, poses: np.ndarray, results: Any, crossings: Crossings
+) -> None:
+    """Let the rover roll on where its kinetic energy covers what is missing to drive or to brake.
+
+    Where no speed balances, speed share and shares of friction and torque become those with which
+    it rolls, in both RESULTs. A rover that stands, as while its wheels turn or climb, or runs
+    against a face, has no momentum.
+
+    Args:
+        wheels: Sizes of wheels and rover.
+        gravity: Gravity [m/s^2].
+        poses: (n, 3) x, y [m] and yaw [rad] of the waypoints, map frame.
+        results: (n,) RESULT of each waypoint.
+        crossings: Poses between the waypoints.
+    """
+    n = len(poses)
+    deficits = np.concatenate([results["deficit"], crossings.results["deficit"]])
+    if not (deficits != 0.0).any():
+        return
+    order = _in_order(n, crossings.place)
+    deficits, share, motion, angles, speeds = (
+        np.concatenate([results[name], crossings.results[name]])[order]
+        for name in ("deficit", "speed_share", "motion", "contact_angle", "wheel_speed")
+    )
+    nominal = (motion[:, 0] ** 2 + motion[:, 1] ** 2) / (2.0 * gravity)
+    distances = distances_between(wheels, np.concatenate([poses, crossings.poses])[order])
+    distances = np.append(0.0, distances)
+    stands = (distances == 0.0) | ((angles * np.sign(speeds)).max(axis=1) > FACE)
+    head = 0.0
+    for k, row in enumerate(order):
+        if deficits[k] == 0.0:
+            head = 0.0 if stands[k] else share[k] ** 2 * nominal[k]
+            continue
+        if deficits[k] < 0.0:
+            head = max(head, nominal[k])
+        before = deficits[k - 1] if (deficits[k - 1] < 0.0) == (deficits[k] < 0.0) else 0.0
+        head -= 0.5 * (before + deficits[k]) * distances[k] if distances[k] else 0.0
+        head = 0.0 if stands[k] and deficits[k] > 0.0 else max(head, 0.0)
+        if MIN_SPEED_SHARE**2 * nominal[k] < head <= RUNAWAY:
+            one = results[row : row + 1] if row < n else crossings.results[row - n : row - n + 1]
+            one["speed_share"] = np.sqrt(head / nominal[k])
+            for name in ("friction_share", "torque_share"):
+                one[name] = np.minimum(one[name], 1.0)
 
 
 def find_lift_heights(

@@ -28,6 +28,7 @@ from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import Crossings, add_up, join_crossings
 from rover_physics.prediction.path_motion import path_motions
 from rover_physics.prediction.servo_path import (
+    carry_by_momentum,
     climb_costs,
     distances_between,
     find_drift,
@@ -137,7 +138,8 @@ def predict_in_parts(model: PackedModel, path: np.ndarray) -> Iterator[PathPart]
         restart = _find_restart(model, here, drops)
         if restart:
             first = slice(restart + 1)
-            sums = _sum_up(model, here[first], results[first], crossings, sums)
+            results = swept.prediction.results[first]
+            sums = _sum_up(model, here[first], results, swept.crossings, sums)
             start, size = start + restart, PART
         else:
             size *= 2  # no waypoint to begin from: the next part is longer
@@ -350,6 +352,7 @@ def make_prediction(
     if wheels.on_servos:
         results = results.copy()
         crossings = crossings._replace(results=crossings.results.copy())
+        carry_by_momentum(wheels, float(model.record.linkage.gravity), poses, results, crossings)
         stop_in_slots(poses, results, crossings)
     between = crossings.results
     results["wheel_drop"] = drops.heights

@@ -44,7 +44,7 @@ PERIOD = 0.1
 LONGEST_LOOK = 2.0
 """Age of the last look above which there is no heartbeat: the watch has died [s]."""
 IDLE_PERIOD = 1.0
-"""The same while none is: the suspension is compared for the diagnostics."""
+"""Time between two looks while none is: the suspension is compared for the diagnostics [s]."""
 MAX_POSE_AGE = 0.3
 """Age up to which a pose says where the rover is [s]."""
 NO_PATH = WatchedPath(np.empty((0, 3)))
@@ -139,7 +139,8 @@ class PathWatch:
     def beat(self) -> None:
         """Have a look taken if one is due, and publish `~/stop`; to be called each PERIOD."""
         now = time.monotonic()
-        if self.enabled or now >= self._idle_until:
+        is_idle = self.finding.state == IDLE and self._new_path is None
+        if (self.enabled and not is_idle) or now >= self._idle_until:
             self._idle_until = now + IDLE_PERIOD
             self._offer_sight()
         self._publish()

@@ -32,6 +32,7 @@ from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.record import new_results
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.status import Stall
 from rover_physics.traversability.judge import judge_path, judge_poses
 from support.rough_grounds import fractal, plane, random_poses, rocky, smooth
 from support.rover_geometry import balance_residuals
@@ -146,6 +147,17 @@ def test_a_cross_slope_beyond_friction_slides():
 
 
 # Firm ground and soil
+
+
+@pytest.mark.parametrize("slope", [0.25, -0.25])
+def test_what_is_missing_is_the_weight_along_the_slope_less_what_the_motors_give(slope):
+    """Uphill it is missing to drive, downhill to brake."""
+    options, ground = replace(SERVO, friction=0.8, max_torque=0.25), plane(slope, 0.0)
+    found = judge_poses(LSR1, ground, POSE, [0.0], options)[0]
+    motors = 6.0 * 0.25 / (LSR1.wheel.radius * LSR1.weight)
+    expected = np.sign(slope) * (np.sin(np.arctan(abs(slope))) - motors)
+    assert found.results["deficit"][0] == pytest.approx(expected, rel=1e-3)
+    assert found.stalls[0] == (Stall.STALLED if slope > 0.0 else Stall.RUNS_AWAY)
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.sweep import predict_in_parts
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from support.reference_drives import drive_ground, drive_path, unlimited
@@ -57,6 +58,33 @@ def test_a_wheel_that_falls_into_a_slot_as_wide_as_itself_is_wedged():
     wide, narrow = (drive("ditch", w, friction=0.8, max_torque=2.44)[1] for w in (0.183, 0.10))
     assert wide.code == "friction" and "wedged" in wide.reason
     assert narrow.traversable
+
+
+def over_a_hill(speed: float, max_torque: float):
+    """Return prediction and verdict of the way up a hill of 0.1 m at a speed [m/s]."""
+    x = np.linspace(-2.0, 2.0, 201)
+    ground = Terrain(np.tile(0.05 * np.cos(np.pi * x / 1.5), (201, 1)), 0.02, (-2.0, -2.0))
+    path = drive_path()[:130]
+    options = replace(SERVO, friction=0.8, max_torque=max_torque)
+    return judge_path(replace(ROVER, nominal_speed=speed), ground, path, options)
+
+
+def test_momentum_carries_a_rover_over_a_place_where_little_force_is_missing():
+    low, high = 0.1, 2.0
+    for _ in range(12):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if over_a_hill(0.01, middle)[1].traversable else (middle, high)
+    slow, fast = (over_a_hill(speed, 0.997 * low) for speed in (0.01, 0.1))
+    assert "stall" in slow[1].reason and fast[1].traversable
+    carried = fast[0].results["deficit"] > 0.0
+    assert 0.0 < fast[0].speed_share[carried].min() < fast[0].speed_share[~carried].min()
+
+
+def test_a_rover_that_its_motors_cannot_hold_runs_away_on_a_long_slope_alone():
+    options, ground = replace(SERVO, friction=0.8, max_torque=0.25), plane(-0.25, 0.0, half=2.0)
+    short, long = (judge_path(ROVER, ground, drive_path()[:n], options) for n in (8, 40))
+    assert short[1].traversable and (np.diff(short[0].speed_share) > 0.0).all()
+    assert "runs away" in long[1].reason
 
 
 def test_a_rover_that_cannot_steer_turns_off_an_arc_and_one_that_can_does_not():
