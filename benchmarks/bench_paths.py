@@ -71,10 +71,10 @@ def cases(mars: Terrain) -> dict[str, tuple[Terrain, list[np.ndarray], float]]:
     across = straight(4.0) @ turn + (x, y, 0.5 * np.pi)
     rocks = bouldered(3, half=6.0, count=600)
     found = {
-        "waves": (make_terrain(waves, half=8.0), [straight(10.0, y=k) for k in (-3, 0, 2)], 2.0),
-        "Mars-like": (mars, [straight(10.0, y=k) for k in (-6, -3, 3, 6)], 2.0),
-        "spirit": (spirit, [straight(4.0, x, y), across], 2.0),
-        "rocks": (rocks, [straight(9.0, y=k) for k in (-3, -1, 1, 3)], 3.0),
+        "waves": (make_terrain(waves, half=8.0), [straight(10.0, y=k) for k in (-3, 0, 2)], 1.6),
+        "Mars-like": (mars, [straight(10.0, y=k) for k in (-6, -3, 3, 6)], 1.6),
+        "spirit": (spirit, [straight(4.0, x, y), across], 1.6),
+        "rocks": (rocks, [straight(9.0, y=k) for k in (-3, -1, 1, 3)], 2.5),
     }
     for name, ground in real_maps().items():
         if "otira" in name:

@@ -21,6 +21,9 @@ peaks and ends of falls. With 0.06 for smaller peaks, twice as many waypoints ch
 1,000, not 2, and rough ground costs less than 1 % less."""
 ANGLE_JUMP = np.radians(12.0)
 """Change of a contact angle [rad] above which it is a jump, if one of the two angles is steep."""
+JUMP_SPACING, MILD_USE = 0.07, 0.5
+"""Distance [wheel radii] from which on the place of a jump does not matter where forces stay below
+this share of their limits."""
 STEEP_CONTACT = np.radians(25.0)
 """Size of a contact angle [rad] above which the contact is steep."""
 FACE = np.radians(45.0)
@@ -111,10 +114,11 @@ NO_CROSSINGS = Crossings(
 
 
 def join_crossings(parts: Sequence[Crossings]) -> Crossings:
-    """Return the rows of all parts, one after the other."""
-    if len(parts) <= 1:
-        return parts[0] if parts else NO_CROSSINGS
-    *places, results = zip(*parts, strict=True)
+    """Return the rows of all parts, one after the other; a single part itself."""
+    some = [part for part in parts if len(part.place)]
+    if len(some) <= 1:
+        return some[0] if some else NO_CROSSINGS
+    *places, results = zip(*some, strict=True)
     return Crossings._make([*map(np.concatenate, places), join_results(results)])
 
 
@@ -161,8 +165,9 @@ def sort_pieces(ends, pieces, known, wheels, sorted_ends):
     """Find the pieces of stretches to divide or to close; return how many of each.
 
     A piece in which a contact still jumps is closed if it is shorter than MIN_SPACING, or if the
-    rover does not settle at a pose within it; else it is open. Other pieces are open if `_finest`
-    asks for shorter ones and the rover settles at all poses within them.
+    rover does not settle at a pose within it; else it is open if it is long or `_decides`. Other
+    pieces are open if `_finest` asks for shorter ones and the rover settles at all poses within
+    them.
 
     Args:
         ends: (k, 2) rows of `known` at the start and end of each stretch.
@@ -187,7 +192,9 @@ def sort_pieces(ends, pieces, known, wheels, sorted_ends):
                 if skipped or distance < MIN_SPACING:
                     sorted_ends[1, n_closed, 0], sorted_ends[1, n_closed, 1] = before, after
                     n_closed += 1
-                else:
+                elif distance > JUMP_SPACING * wheels.radius or _decides(
+                    results[before], results[after], wheels
+                ):
                     sorted_ends[0, n_open, 0], sorted_ends[0, n_open, 1] = before, after
                     n_open += 1
             elif not skipped:
@@ -228,6 +235,23 @@ def _jumps(here, there, wheels):
             return True
         rise = there.wheel_centres[wheel, 2] - here.wheel_centres[wheel, 2]
         if abs(rise) > HEIGHT_JUMP * wheels.radius:
+            return True
+    return False
+
+
+@exact_kernel
+def _decides(here, there, wheels):
+    """Return whether a verdict may depend on where between two close poses a contact jumps.
+
+    It does where a wheel climbs or may fall, or forces are not far from their limits.
+    """
+    if wheels.on_servos or max(_largest_use(here, wheels), _largest_use(there, wheels)) > MILD_USE:
+        return True
+    for wheel in range(6):
+        rise = there.wheel_centres[wheel, 2] - here.wheel_centres[wheel, 2]
+        ahead = -1.0 if there.wheel_speed[wheel] < 0.0 else 1.0
+        behind = min(ahead * here.contact_angle[wheel], ahead * there.contact_angle[wheel])
+        if abs(rise) > HEIGHT_JUMP * wheels.radius or behind < -FACE:
             return True
     return False
 

@@ -227,8 +227,9 @@ def join_results(parts: Any) -> Any:
 
 def forget_uncomputable(results: Any) -> None:
     """Overwrite by NaN what is not of motion or path where the forces are not determined."""
-    no_forces = (PoseStatus.NOT_COMPUTABLE, PoseStatus.NO_EQUILIBRIUM)
-    rows = np.flatnonzero(np.isin(results["status"], no_forces))
+    status = results["status"]
+    no_forces = status == PoseStatus.NOT_COMPUTABLE
+    rows = np.flatnonzero(no_forces | (status == PoseStatus.NO_EQUILIBRIUM))
     if len(rows):
         for one in QUANTITIES:
             if not (one.of_motion or one.of_path):

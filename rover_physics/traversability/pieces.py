@@ -2,14 +2,16 @@
 """Judges many short pieces of path at once, as `judge_paths` does but faster.
 
 A search asks about thousands of pieces and needs to know only whether each passes, and what it
-costs. A piece fails if one of its waypoints does in any case. It passes if no waypoint may break a
-limit, no contact jumps between them and no wheel may fall. `judge_paths` decides about the others.
-The verdicts are the same as its own.
+costs. A piece fails if one of its waypoints, or a pose between them, does in any case. It passes
+if none of them breaks a limit while no wheel falls, and with speed servos only if no contact jumps
+and no wheel may fall. `judge_paths` decides about the others. The verdicts are the same as its
+own.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,10 +21,10 @@ from rover_physics.limits.table import MAX_SLIDE, MAX_TURN_OFF
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import view_read_only
-from rover_physics.prediction.crossing import find_turns, turn_wheels
-from rover_physics.prediction.drops import MIN_ANGLE
+from rover_physics.prediction.crossing import find_crossings, find_turns, turn_wheels
+from rover_physics.prediction.drops import MIN_ANGLE, find_drops
 from rover_physics.prediction.packed_model import PackedModel, pack_model
-from rover_physics.prediction.path_kernels import FACE, add_up, distance_between, find_jumps
+from rover_physics.prediction.path_kernels import Crossings, add_up, distance_between, find_jumps
 from rover_physics.prediction.path_motion import path_motions
 from rover_physics.prediction.sweep import check_poses, find_suspects, joined_paths
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
@@ -81,7 +83,7 @@ def judge_pieces(
     sweep = _Sweep(pack_model(rover, terrain, options), list(map(check_poses, pieces)))
     found = {k: PieceVerdict(code) for k, code in sweep.find_failures().items()}
     if terrain.elevation_std is None or not sigmas:
-        found |= sweep.find_passes()
+        found |= sweep.look_between()
     rest = [k for k in range(len(pieces)) if k not in found]
     judged = judge_paths(
         rover,
@@ -136,17 +138,22 @@ class _Sweep:
                 continue
             results = self._model.evaluate(self._poses[rows], motions=self._motions[rows])
             place_results(results, self._results, rows)
-            fails = np.zeros(len(rows), bool)
-            mark_failures(*readable(results), self._model.limits.records, fails)
-            failed, first = np.unique(piece[rows[fails]], return_index=True)
-            at = np.flatnonzero(fails)[first]
-            found = find_codes(self._model.limits, select_results(results, at))
-            codes |= {k: code for k, code in zip(failed.tolist(), found, strict=True) if code}
-            self._is_open[list(codes)] = False
+            codes |= self._close_failures(results, piece[rows])
         return codes
 
-    def find_passes(self) -> dict[int, PieceVerdict]:
-        """Return the verdicts of pieces that pass without a closer look, by index.
+    def _close_failures(self, results: Any, piece: np.ndarray) -> dict[int, str]:
+        """Return the codes of pieces with RESULTs (n,) that fail in any case, by index (n,)."""
+        fails = np.zeros(len(piece), bool)
+        mark_failures(*readable(results), self._model.limits.records, fails)
+        failed, first = np.unique(piece[fails], return_index=True)
+        at = np.flatnonzero(fails)[first]
+        found = find_codes(self._model.limits, select_results(results, at))
+        codes = {k: code for k, code in zip(failed.tolist(), found, strict=True) if code}
+        self._is_open[list(codes)] = False
+        return codes
+
+    def look_between(self) -> dict[int, PieceVerdict]:
+        """Return the verdicts of pieces that fail or pass by what is between waypoints, by index.
 
         `find_failures` must have evaluated the waypoints.
         """
@@ -156,24 +163,50 @@ class _Sweep:
         rows = np.flatnonzero(np.repeat(self._is_open, self._counts))
         ends = np.cumsum(self._counts[indices])
         poses, results = self._poses[rows], select_results(self._results, rows)
-        joined = joined_paths(ends)
-        turned = turn_wheels(self._model, poses, results, joined)
-        jumps, wheels = np.empty((len(poses), 2), np.int64), self._model.wheels
-        jumps = jumps[: find_jumps(results, poses, joined, wheels, jumps)]
-        far = find_turns(self._model, poses, results, joined)
+        between, unsure = self._find_between(poses, results, ends)
+        owner = indices[np.searchsorted(ends, between.waypoint, side="right")]
+        codes = self._close_failures(between.results, owner)
         found, sums = np.full((len(indices), 3), np.nan), np.empty((3, len(poses)))
         path = view_read_only(poses), readable(results), ends
-        turns = readable(turned.results), np.searchsorted(turned.waypoint, ends)
+        inside = readable(between.results), np.searchsorted(between.waypoint, ends)
         linkage = self._model.record.linkage
-        look = self._model.limits.records, wheels, float(linkage.length)
-        sum_up_pieces(path, turns, look, float(linkage.steering_rate), sums, found)
-        closer = np.append(jumps[:, 0], far[:, 0])
-        found[np.searchsorted(ends, closer, side="right"), 0] = np.nan
-        return {
+        look = self._model.limits.records, self._model.wheels, float(linkage.length)
+        sum_up_pieces(path, inside, look, float(linkage.steering_rate), sums, found)
+        found[unsure, 0] = np.nan
+        passes = {
             k: PieceVerdict("", *row)
             for k, row in zip(indices.tolist(), found.tolist(), strict=True)
             if row[0] == row[0]
         }
+        return passes | {k: PieceVerdict(code) for k, code in codes.items()}
+
+    def _find_between(
+        self, poses: np.ndarray, results: Any, ends: np.ndarray
+    ) -> tuple[Crossings, list[int]]:
+        """Return the poses between the waypoints of open pieces, and pieces that need more.
+
+        Drops are written into both RESULTs. With speed servos there are none: what is between
+        waypoints may take time, too, so that only turns of wheels are looked at here.
+        """
+        model, joined = self._model, joined_paths(ends)
+        if model.wheels.on_servos:
+            jumps = np.empty((len(poses), 2), np.int64)
+            jumps = jumps[: find_jumps(results, poses, joined, model.wheels, jumps)]
+            far = find_turns(model, poses, results, joined)
+            unsure = np.searchsorted(ends, np.append(jumps[:, 0], far[:, 0]), side="right")
+            return turn_wheels(model, poses, results, joined), unsure.tolist()
+        between = find_crossings(model, poses, results, joined)
+        angles = np.where(results["wheel_speed"] < 0.0, -1.0, 1.0) * results["contact_angle"]
+        steep = np.flatnonzero((angles < -MIN_ANGLE).any(axis=1))
+        rows = np.append(between.waypoint, steep)
+        for k in np.unique(np.searchsorted(ends, rows, side="right")).tolist():
+            piece = slice(ends[k - 1] if k else 0, ends[k])
+            inside = between.between(piece.start, piece.stop)
+            drops = find_drops(model.wheels, poses[piece], results[piece], inside)
+            results["wheel_drop"][piece] = drops.heights
+            results["falling"][piece] = drops.at_waypoints
+            inside.results["falling"] = drops.between
+        return between, []
 
 
 @exact_kernel
@@ -185,28 +218,27 @@ def mark_failures(results, numbers, limits, fails):
 
 
 @exact_kernel
-def sum_up_pieces(path, turns, look, steering_rate, sums, found):
+def sum_up_pieces(path, between, look, steering_rate, sums, found):
     """Write time, energy and exposure of the pieces that pass without a closer look.
 
     Args:
         path: (n, 3) poses of all pieces, their results as of `readable`, and (k,) the rows where
             pieces end.
-        turns: Results where wheels turn at a waypoint, and (k,) the rows where those of the pieces
-            end.
+        between: Results between the waypoints, and (k,) the rows where those of the pieces end.
         look: (k,) LIMIT, Wheels and wheelbase [m].
         steering_rate: Largest speed of the steering [rad/s].
         sums: (3, n) work space.
         found: (k, 3) time [s], energy [J] and exposure [s], written for pieces that pass.
     """
-    (poses, (results, numbers), ends), ((turned, turned_numbers), turned_ends) = path, turns
+    (poses, (results, numbers), ends), ((others, other_numbers), other_ends) = path, between
     limits, wheels, wheelbase = look
-    first, first_turn = 0, 0
+    first, first_other = 0, 0
     for k in range(ends.size):
-        piece, its_turns = slice(first, ends[k]), slice(first_turn, turned_ends[k])
-        first, first_turn = ends[k], turned_ends[k]
+        piece, inside = slice(first, ends[k]), slice(first_other, other_ends[k])
+        first, first_other = ends[k], other_ends[k]
         if not (
             _is_easy(results[piece], numbers[piece], limits, wheels)
-            and _is_easy(turned[its_turns], turned_numbers[its_turns], limits, wheels)
+            and _is_easy(others[inside], other_numbers[inside], limits, wheels)
             and _keeps_to_path(poses[piece], results[piece], wheels.swing_radius, wheelbase)
         ):
             continue
@@ -231,17 +263,18 @@ def add_exposure(numbers, time, limits):
 
 @exact_kernel
 def _is_easy(results, numbers, limits, wheels):
-    """Return whether no RESULT may break a limit and no wheel may fall or lift."""
+    """Return whether no RESULT breaks a limit and, on servos, no wheel may fall or lift."""
     if find_suspects(results, numbers, limits)[0] >= 0:
         return False
-    steepest = -MIN_ANGLE if wheels.on_servos else -FACE  # no wheel falls from there
+    if not wheels.on_servos:
+        return True
     for row in range(results.size):
         result = results[row]
         for wheel in range(6):
             angle = result.contact_angle[wheel]
             if result.wheel_speed[wheel] < 0.0:
                 angle = -angle
-            if angle < steepest or result.lift_rate[wheel] > 0.0:
+            if angle < -MIN_ANGLE or result.lift_rate[wheel] > 0.0:
                 return False
     return True
 

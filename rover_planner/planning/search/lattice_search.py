@@ -25,7 +25,7 @@ from rover_planner.planning.search.graph import Route, Seeds, ShortestPaths
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.primitives import Piece
 
-CAUTIONS = (8.0, 1.0, 0.0)
+CAUTIONS = (12.0, 1.0, 0.0)
 """Weights of the doubts, one after the other; with 0 the search is exact."""
 DOUBT = 0.3
 """Doubt that a refused edge adds to the nodes around its end: the cost of edges that lead there
