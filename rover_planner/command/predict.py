@@ -108,7 +108,7 @@ def predict(
     gc.enable()
     model = load_rover(rover)
     if learned is not None:
-        from rover_planner.learning.learned_file import rover_on_learned_ground
+        from rover_planner.planning.learned_ground import rover_on_learned_ground
 
         model = rover_on_learned_ground(model, learned)
     ground = load_terrain(terrain, max_cells)

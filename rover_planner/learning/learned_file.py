@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The file of what was learned of the ground: written by `learn`, taken by `predict`."""
+"""The file of what was learned of the ground, as `learn` writes it."""
 
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -10,15 +10,10 @@ import numpy as np
 
 from rover_physics.errors import RoverFileError
 from rover_physics.files.user_file import write_file
-from rover_physics.files.validation import errors_of, show_file
+from rover_physics.files.validation import errors_of
 from rover_physics.names import WHEELS
-from rover_physics.numerics.plausible import MAX_FRICTION, MIN_FRICTION
-from rover_physics.rover.model import Rover
 from rover_planner.errors import PlanningError
 from rover_planner.learning.ground_learner import GroundEstimate
-
-MOST_SPREAD = 0.35
-"""Largest relative standard deviation of friction that a rover file takes."""
 
 
 def describe(estimate: GroundEstimate, told: float) -> dict[str, Any]:
@@ -60,68 +55,6 @@ def write_learned(path: Path, contents: dict[str, Any]) -> None:
             write_file(path, (json.dumps(contents, indent=1) + "\n").encode())
     except RoverFileError as error:
         raise PlanningError(str(error)) from None
-
-
-@dataclass(frozen=True)
-class LearnedGround:
-    """Friction as it was learned, and when."""
-
-    mean: float
-    """Mean."""
-    std: float
-    """Standard deviation."""
-    low: float
-    """Lower end of the 95 % interval."""
-    is_bounded: bool
-    """Whether wheels slipped, so that the mean was measured."""
-    since: str = ""
-    """Time of the estimate, "seconds.nanoseconds"; empty if it has none."""
-
-    def change(self, rover: Rover) -> Rover:
-        """Return a rover with this friction, and its uncertainty for chances.
-
-        While nothing has slipped, the rover keeps its friction, or takes what was proved if that
-        is more.
-        """
-        mean = self.mean if self.is_bounded else max(rover.friction, self.low)
-        spread = min(self.std / self.mean, MOST_SPREAD)
-        uncertainty = replace(rover.uncertainty, friction=spread)
-        return replace(rover, friction=mean, uncertainty=uncertainty)
-
-
-def parse_learned(text: str, source: str, since: str = "") -> LearnedGround:
-    """Read what `describe` has written as JSON.
-
-    Raises:
-        PlanningError: It has no friction with mean, std, low and high, or values that cannot be.
-    """
-    try:
-        friction = json.loads(text)["friction"]
-        mean, std, low = (float(friction[name]) for name in ("mean", "std", "low"))
-        bounded = friction["high"] is not None
-    except (ValueError, KeyError, TypeError) as error:
-        raise PlanningError(
-            f"{source}: has no friction with mean, std, low and high, as learn writes it: {error}"
-        ) from None
-    if not (MIN_FRICTION <= mean <= MAX_FRICTION and 0.0 <= std <= MAX_FRICTION and low <= mean):
-        raise PlanningError(
-            f"{source}: friction has mean {mean:g}, std {std:g}, low {low:g}; mean must be above "
-            "0, std at least 0, low at most the mean"
-        )
-    return LearnedGround(mean, std, low, bounded, since)
-
-
-def rover_on_learned_ground(rover: Rover, path: Path) -> Rover:
-    """Return a rover with the friction of a file; see `LearnedGround.change`.
-
-    Raises:
-        PlanningError: The file cannot be read or is none of `learn`.
-    """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeError) as error:
-        raise PlanningError(f"{show_file(path)}: cannot be read: {error}") from None
-    return parse_learned(text, str(show_file(path))).change(rover)
 
 
 def _finite(value: float) -> float | None:

@@ -32,7 +32,6 @@ from msg_adapters.results.diagnostics import (
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.numerics.kernel_cache import kernel_cache_note
 from rover_physics.warm_up import EXACT, UNCERTAIN
-from rover_planner.learning.learned_file import parse_learned
 from rover_planner.maps.known_map import stamp_text
 from rover_planner.maps.summary import describe_terrain
 from rover_planner.nodes.advice_topics import AdviceTopics
@@ -65,6 +64,7 @@ from rover_planner.planning.answering.server_health import MEMORY
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.planning.marked_places import NONE_MARKED, parse_place
 from rover_planner.planning.navigation.sensor_mounts import sensor_poses
 from rover_planner.planning.path_query import Pose

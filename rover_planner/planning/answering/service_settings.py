@@ -9,7 +9,6 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steering_joints import check_joint_limit
 from rover_physics.terrain.soil_file import soil_named
-from rover_planner.learning.learned_file import LearnedGround
 from rover_planner.maps.living_map import MergeRules
 from rover_planner.maps.map_file import MapLimits
 from rover_planner.maps.map_keeper import KeeperSettings
@@ -21,6 +20,7 @@ from rover_planner.parameters.traverse_server import (
     USE,
     TraverseServerParameters,
 )
+from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.query import LatticeSettings
 

@@ -11,13 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
-from rover_planner.learning.learned_file import LearnedGround
 from rover_planner.maps.known_map import KnownMap
 from rover_planner.maps.unobserved_ground import UNOBSERVED_CODE
 from rover_planner.parameters.traverse_server import FAN, LATTICE
 from rover_planner.planning.answering.judgement import PathJudgement, refusal
 from rover_planner.planning.answering.search_watch import SearchWatch
 from rover_planner.planning.answering.service_settings import ServiceSettings
+from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlaces
 from rover_planner.planning.path_geometry import densify
 from rover_planner.planning.path_query import Candidate, PathSearch, Pose, add_path

@@ -14,7 +14,6 @@ from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import pack_ground
-from rover_planner.learning.learned_file import LearnedGround
 from rover_planner.maps.ground_beneath import Standing
 from rover_planner.maps.known_map import KnownMap
 from rover_planner.maps.layers import CellSources
@@ -24,6 +23,7 @@ from rover_planner.planning.answering.measurements import MAX_AGE, Measurements
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
 from rover_planner.planning.candidates import generate_candidates
+from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlace, MarkedPlaces
 from rover_planner.planning.search.edge_memory import EdgeMemory
 

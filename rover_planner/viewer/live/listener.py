@@ -33,7 +33,7 @@ from rover_physics.names import WHEEL_JOINTS
 from rover_physics.numerics.quaternions import rpy_from_xyzw
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
-from rover_planner.learning.learned_file import parse_learned
+from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.ros.qos import (
     latched_qos,
     map_subscriptions_qos,

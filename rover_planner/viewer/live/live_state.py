@@ -14,7 +14,7 @@ from rover_physics.numerics.records import new_record
 from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place
 from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
-from rover_planner.learning.learned_file import LearnedGround
+from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.viewer.state.trajectory import RoverState
 
 MAX_AGE = 3.0

@@ -9,12 +9,12 @@ import pytest
 
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.errors import PlanningError
-from rover_planner.learning.learned_file import LearnedGround
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.questions import Register
 from rover_planner.planning.answering.search_watch import NewerMapError, SearchWatch
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.path_geometry import densify
 from support.grounds import make_terrain, rocky, wall_at, waves
 

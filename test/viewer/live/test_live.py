@@ -20,9 +20,9 @@ from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import save_terrain
 from rover_physics.warm_up import warm_up
-from rover_planner.learning.learned_file import LearnedGround
 from rover_planner.nodes.rover_simulator import RoverSimulator
 from rover_planner.nodes.traverse_server import TraverseServer
+from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.ros.qos import latched_qos, result_qos, sensor_qos, topic_qos
 from rover_planner.viewer.documents.live import (
     PATIENCE,
