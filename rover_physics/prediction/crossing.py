@@ -57,7 +57,7 @@ def find_crossings(
     """
     joined = np.broadcast_to(joined, len(poses) - 1)
     at_rest = turn_wheels(model, poses, results, joined)
-    jumps = _find_jumps(model, poses, results, joined)
+    jumps = list_jumps(model, poses, results, joined)
     turns, inside, jumps_in_turns = _divide_turns(model, poses, results, joined)
     if not len(jumps) and not len(inside):
         return at_rest
@@ -78,11 +78,12 @@ def find_crossings(
     return join_crossings([known.select(np.flatnonzero(kept)), at_rest]).in_order()
 
 
-def _find_jumps(
+def list_jumps(
     model: PackedModel, poses: np.ndarray, results: Any, joined: np.ndarray
 ) -> np.ndarray:
     """Return the neighbours between which to search, as rows (k, 2)."""
     jumps = np.empty((len(poses), 2), np.int64)
+    joined = np.array(joined)  # a kernel is compiled for each layout, and for read-only arrays
     return jumps[: find_jumps(results, poses, joined, model.wheels, jumps)]
 
 
@@ -105,7 +106,7 @@ def _divide_turns(
     turned = model.evaluate(at[inside], motions=found["motion"][inside])
     place_results(turned, found, inside)
     in_turns = Crossings(first + share, first + 1, none_held(len(at)), at, found)
-    return in_turns, inside, _find_jumps(model, at, found, np.diff(within) > 0)
+    return in_turns, inside, list_jumps(model, at, found, np.diff(within) > 0)
 
 
 def turn_wheels(

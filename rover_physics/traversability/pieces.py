@@ -21,10 +21,10 @@ from rover_physics.limits.table import MAX_SLIDE, MAX_TURN_OFF
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.read_only import view_read_only
-from rover_physics.prediction.crossing import find_crossings, find_turns, turn_wheels
+from rover_physics.prediction.crossing import find_crossings, find_turns, list_jumps, turn_wheels
 from rover_physics.prediction.drops import MIN_ANGLE, find_drops
 from rover_physics.prediction.packed_model import PackedModel, pack_model
-from rover_physics.prediction.path_kernels import Crossings, add_up, distance_between, find_jumps
+from rover_physics.prediction.path_kernels import Crossings, add_up, distance_between
 from rover_physics.prediction.path_motion import path_motions
 from rover_physics.prediction.sweep import check_poses, find_suspects, joined_paths
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
@@ -190,8 +190,7 @@ class _Sweep:
         """
         model, joined = self._model, joined_paths(ends)
         if model.wheels.on_servos:
-            jumps = np.empty((len(poses), 2), np.int64)
-            jumps = jumps[: find_jumps(results, poses, joined, model.wheels, jumps)]
+            jumps = list_jumps(model, poses, results, joined)
             far = find_turns(model, poses, results, joined)
             unsure = np.searchsorted(ends, np.append(jumps[:, 0], far[:, 0]), side="right")
             return turn_wheels(model, poses, results, joined), unsure.tolist()

@@ -441,7 +441,7 @@ def _take_advice(
     if "poses" not in remedy:
         return node.ask(start, goal)
     poses = remedy["poses"]
-    reason = node.check(np.array(poses))
+    _, reason = node.check(np.array(poses))
     return {"traversable": not reason, "reason": reason, "poses": poses, "waypoints": len(poses)}
 
 

@@ -65,8 +65,9 @@ PROGRAMS = {
     "traverse_server": Program(
         "Answer over ROS 2 whether the rover can traverse a path, and why not.",
         "subscribes elevation_cloud, elevation_map, joint_states, odometry, ~/path, "
-        "~/ground_estimate, ~/tool_target, ~/tool_wrench; serves ~/can_traverse, ~/check_path, "
-        "~/check_reach, ~/advise, ~/load_map, ~/cancel, ~/monitor, ~/get_hazard_map; publishes "
+        "~/ground_estimate, ~/mark_place, ~/tool_target, ~/tool_wrench; serves ~/can_traverse, "
+        "~/check_path, ~/check_reach, ~/advise, ~/load_map, ~/cancel, ~/monitor, ~/clear_places, "
+        "~/get_hazard_map; publishes "
         "~/stop, ~/watch, ~/advice, "
         "~/hazard_map/worst, ~/hazard_map/best, ~/plan, ~/verdict, diagnostics, "
         "~/predicted_joints, ~/wheel_loads, ~/slip_ratios, ~/friction_utilisation, "
@@ -95,8 +96,9 @@ PROGRAMS = {
     ),
     "ground_learner": Program(
         "Learn friction, slip and sticking while a rover drives.",
-        "subscribes joint_states, imu, odometry, cmd_vel, elevation_cloud; publishes "
-        "traverse_server/ground_estimate, traction_controller/emergency_stop",
+        "subscribes joint_states, imu, odometry, cmd_vel, elevation_cloud; publishes ~/odometry, "
+        "traverse_server/ground_estimate, traverse_server/mark_place, "
+        "traction_controller/emergency_stop",
         read_nothing,
         specs_of(GroundLearnerParameters),
     ),
