@@ -91,33 +91,29 @@ def _look_at_vertices(ground, search, tops):
     status = ContactStatus.IN_CONTACT
     first = max(int64(np.ceil(search.y + low_y)), 0)
     last = min(int64(np.floor(search.y + high_y)), ground.rows - 1)
-    slant_x = 1.0 / ex if abs(ex) > 1e-9 else 0.0
-    slant_y = 1.0 / ey if abs(ey) > 1e-9 else 0.0
-    flat = 1.0 / (R * R)
+    slant_x, slant_y = 1.0 / _away_from_zero(ex), 1.0 / _away_from_zero(ey)
+    flat, x, y, z = 1.0 / (R * R), search.x, search.y, search.z
     for i in range(first, last + 1):
-        dy = i - search.y
-        low_x, high_x = -np.inf, np.inf
-        if slant_x != 0.0:
-            one, other = (low_s - dy * ey) * slant_x, (high_s - dy * ey) * slant_x
-            low_x, high_x = min(one, other), max(one, other)
-        elif not low_s <= dy * ey <= high_s:
-            continue
-        if slant_y != 0.0:
-            one, other = (dy * ex - low_t) * slant_y, (dy * ex - high_t) * slant_y
-            low_x, high_x = max(low_x, min(one, other)), min(high_x, max(one, other))
-        elif not low_t <= dy * ex <= high_t:
-            continue
-        start = max(int64(np.ceil(search.x + low_x)), 0)
-        end = min(int64(np.floor(search.x + high_x)), ground.columns - 1)
+        dy = i - y
+        one, other = (low_s - dy * ey) * slant_x, (high_s - dy * ey) * slant_x
+        right, left = (dy * ex - low_t) * slant_y, (dy * ex - high_t) * slant_y
+        start = max(int64(np.ceil(x + max(min(one, other), min(right, left)))), 0)
+        end = min(int64(np.floor(x + min(max(one, other), max(right, left)))), ground.columns - 1)
         for j in range(start, end + 1):
-            dx = j - search.x
+            dx = j - x
             s, t = dx * ex + dy * ey, dy * ex - dx * ey
-            base = (elevation_of(ground, i, j) - search.z) * scale - tangent * t
+            base = (elevation_of(ground, i, j) - z) * scale - tangent * t
             if base + _bound_dome(s, R, flat) * inverse > search.best:
                 _look_around(ground, search, (i, j), (s, t, base))
             elif base != base and abs(s) < R and is_below(search, s, t):
                 status = ContactStatus.UNKNOWN_GROUND
     return status
+
+
+@kernel
+def _away_from_zero(part):
+    """Return part of a direction, at least so large that its inverse times a place is finite."""
+    return part if abs(part) > LEVEL else LEVEL
 
 
 @kernel

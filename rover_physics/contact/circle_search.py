@@ -16,6 +16,12 @@ TURN_TOLERANCE = 3e-3
 
 @kernel
 def search_circle(model, work, circle, turn):
+    """Return the smallest gap of a circle near an angle, as `search_circle_below` does."""
+    return search_circle_below(model, work, circle, turn, np.inf)
+
+
+@kernel
+def search_circle_below(model, work, circle, turn, largest):
     """Return the smallest gap of a circle near an angle, and its place.
 
     On a plane, the circle touches in the direction of the plane's normal. The first two trials
@@ -28,6 +34,7 @@ def search_circle(model, work, circle, turn):
         work: A record with `placement`.
         circle: Index of the wheel, and distance of the circle from its middle plane [m].
         turn: (sine, cosine) of the first angle.
+        largest: Gap [m] at that angle from which on nothing more is searched.
 
     Returns:
         Gap [m], infinite over unknown ground; (sine, cosine) of the contact angle; slope of the
@@ -64,7 +71,7 @@ def search_circle(model, work, circle, turn):
                 inverse = 1.0 / length
                 best += radius * (straight - length)
                 best_s, best_c = rise * inverse, fall * inverse
-        if converged:
+        if converged or (trial == 0 and not gap < largest):
             break
         if trial == 0:
             turn_s, turn_c = samples.spacing_sine, samples.spacing_cosine

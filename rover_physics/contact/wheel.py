@@ -11,13 +11,13 @@ wheel has a positive angle.
 import numpy as np
 
 from rover_physics.contact.cell_search import look_everywhere
-from rover_physics.contact.circle_search import search_circle
+from rover_physics.contact.circle_search import search_circle_below
 from rover_physics.contact.contact_record import SearchScope
 from rover_physics.contact.rim_scan import find_tops, scan_carefully, scan_rims
 from rover_physics.contact.tracking import follow_contact, keep_contact, look_at_kept
 from rover_physics.numerics.kernels import kernel
 from rover_physics.status import ContactStatus
-from rover_physics.terrain.ground import height_inside, look_up
+from rover_physics.terrain.ground import height_inside
 
 COMPLIANCE = 2e-3
 """Deformation of real wheels and ground [wheel radii]. Circles whose gaps differ by less share the
@@ -181,9 +181,7 @@ def blend_contact(model, work, wheel):
     largest = 0.0
     for m in range(samples.circles):
         across = samples.laterals[m]
-        if not _gap_at(model, work, (wheel, across), turn) < largest_gap:
-            continue
-        gap, (s, c), _ = search_circle(model, work, (wheel, across), turn)
+        gap, (s, c), _ = search_circle_below(model, work, (wheel, across), turn, largest_gap)
         weight = min(1.0 - (gap - contacts.gap[wheel]) / allowance, 1.0)
         if weight > 0.0:
             largest = max(largest, weight)
@@ -201,20 +199,6 @@ def blend_contact(model, work, wheel):
         length = np.sqrt(sine_sum * sine_sum + cosine_sum * cosine_sum)
         turn = sine_sum / length, cosine_sum / length
         write_point(samples, work, wheel, turn, across_sum / total)
-
-
-@kernel
-def _gap_at(model, work, circle, turn):
-    """Return the gap [m] of a circle (wheel, place across [m]) at an angle (sine, cosine)."""
-    ground, placement, radius = model.ground, work.placement, model.samples.radius
-    wheel, across = circle
-    axis, centres = placement.axis[wheel], placement.centres
-    forward, up = placement.forward[wheel], placement.up[wheel]
-    s, c = turn
-    x = centres[wheel, 0] + across * axis[0] + radius * (s * forward[0] - c * up[0])
-    y = centres[wheel, 1] + across * axis[1] + radius * (s * forward[1] - c * up[1])
-    z = centres[wheel, 2] + across * axis[2] - radius * c * up[2]
-    return z - look_up(ground, x, y)[0]
 
 
 @kernel
