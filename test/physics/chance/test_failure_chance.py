@@ -70,6 +70,18 @@ def test_the_torque_limit_counts_like_friction(name):
     assert found.failure_chance == pytest.approx(NormalDist(1.0, 0.1).cdf(0.9), abs=ONE)
 
 
+def test_a_peak_between_waypoints_counts_though_the_position_is_uncertain():
+    x = np.arange(-1.5, 1.5, 0.02)
+    step = Terrain(np.where(x > 0.3, 0.06, 0.0) * np.ones((150, 1)), 0.02, (-1.5, -1.5))
+    poses = np.column_stack([np.arange(-0.3, 0.5, 0.037), np.zeros((22, 2))])
+    rover = rover_with(friction=0.1, position=0.02)
+    options = SweepOptions(friction=0.6)
+    prediction, found = judge_path(rover, step, poses, options, accepted_chance=1.0)
+    assert prediction.friction_utilisation.max() < 0.6 < 0.9 < found.max_friction_utilisation
+    expected = NormalDist(1.0, 0.1).cdf(found.max_friction_utilisation)
+    assert found.failure_chance == pytest.approx(expected, abs=ONE)
+
+
 def test_what_is_common_stays_common_along_a_path():
     rover, ground = rover_with(friction=0.1), uphill(0.3)
     few, many = (chance_on(ground, rover, n=n) for n in (1, 40))
