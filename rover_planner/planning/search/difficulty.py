@@ -50,7 +50,7 @@ class Difficulty(NamedTuple):
     """(HEADINGS, P, S, 3) places along the primitives: x, y [m] from the first node, and heading;
     -1 as heading ends a list."""
     edges: np.ndarray
-    """(nodes, P) uint8 difficulty of the edges, in steps, written once looked at; else NOT_LOOKED."""
+    """(nodes, P) uint8 difficulty of the edges in steps; NOT_LOOKED until a search asks for it."""
 
 
 def estimate_difficulty(
