@@ -31,6 +31,8 @@ and for the largest one along the drive, both in shares of what the rover can cl
 verdicts on random edges of made and real maps, two rovers."""
 STEPS_PER_UNIT = 30
 """Steps per unit in which difficulties are kept."""
+LEAST_DIFFICULTY = 0.5 / STEPS_PER_UNIT
+"""Difficulty of level ground."""
 NOT_LOOKED = 255
 """Difficulty of an edge that was not looked at."""
 

@@ -16,6 +16,7 @@ from scipy import ndimage
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
+from rover_planner.planning.search.cell_counts import CellCounts
 from rover_planner.planning.search.nodes import HEADINGS, YAWS, Nodes
 
 FULL_DOUBT = 4.0
@@ -41,8 +42,6 @@ class _Map(NamedTuple):
     """(ny, nx) heights [m]."""
     whole: np.ndarray
     """(ny - 1, nx - 1) whether all corners of a cell are known."""
-    unknown: np.ndarray
-    """(ny + 1, nx + 1) number of unknown heights in all rows and columns before."""
     away: np.ndarray
     """(ny, nx) distance to the next known cell [m]."""
     resolution: float
@@ -53,11 +52,8 @@ class _Wheels(NamedTuple):
     """Where the wheels of a rover at a node are."""
 
     offsets: np.ndarray
-    """(HEADINGS, 6, 2) wheel centres at a node at the map frame's origin, from `origin` [m]."""
-    origin: tuple[float, float]
-    """Centre of the map's first cell, map frame [m]."""
-    reach: float
-    """Largest distance of a wheel centre from the body origin on level ground [m]."""
+    """(HEADINGS, 6, 2) wheel centres at a node at the map frame's origin, from the centre of the
+    map's first cell [m]."""
     shift: float
     """Largest distance of a wheel centre from its place on level ground [m], seen from above."""
 
@@ -75,22 +71,22 @@ def estimate_ground(rover: Rover, terrain: Terrain, nodes: Nodes) -> GroundEstim
     c, s = np.cos(YAWS)[:, None], np.sin(YAWS)[:, None]
     x, y = c * places[:, 0] - s * places[:, 1], s * places[:, 0] + c * places[:, 1]
     offsets = np.stack([x, y], axis=-1) - terrain.origin
-    reach = float(np.hypot(*places.T).max())
-    wheels = _Wheels(offsets, terrain.origin, reach, largest_wheel_shift(rover))
+    wheels = _Wheels(offsets, largest_wheel_shift(rover))
     elevation = np.asarray(terrain.elevation)
     known = ~np.isnan(elevation)
     ground = _Map(
         elevation,
         known[:-1, :-1] & known[:-1, 1:] & known[1:, :-1] & known[1:, 1:],
-        np.pad(
-            (~known).cumsum(axis=0, dtype=np.int32).cumsum(axis=1, dtype=np.int32),
-            ((1, 0), (1, 0)),
-        ),
         _distance_to_known(elevation, terrain.resolution),
         terrain.resolution,
     )
     found = GroundEstimate(np.zeros(nodes.count, bool), np.zeros(nodes.count, np.float32))
-    estimate_nodes(ground, wheels, (nodes.cell, nodes.first, nodes.shape), found)
+    at = nodes.poses(np.arange(0, nodes.count, HEADINGS))[:, :2]
+    reach = float(np.hypot(*places.T).max())
+    low, high = np.reshape(terrain.bounds, (2, 2)).T
+    doubtful = ((at - reach < low) | (at + reach > high)).any(axis=1)
+    doubtful |= CellCounts(terrain, ~known).are_near(at, reach)
+    estimate_nodes(ground, wheels, at, np.flatnonzero(doubtful), found)
     return found
 
 
@@ -134,37 +130,20 @@ def _distance_to_known(elevation: NDArray[np.float64], resolution: float) -> NDA
 
 
 @exact_kernel
-def estimate_nodes(ground, wheels, window, found):
-    """Write the estimates of all nodes.
+def estimate_nodes(ground, wheels, at, chosen, found):
+    """Write the estimates of the nodes at some places.
 
     Args:
         ground: _Map.
         wheels: _Wheels.
-        window: Cell [m], first column and row, and numbers of rows and columns of the nodes.
+        at: (n, 2) x and y of all places [m].
+        chosen: (k,) the places to look at.
         found: GroundEstimate of zeros, written where it differs.
     """
-    cell, first, (rows, columns) = window
-    for place in range(rows * columns):
-        x = cell * (place % columns + first[0])
-        y = cell * (place // columns + first[1])
-        if not _is_known_around(ground, wheels, x, y):
-            for heading in range(HEADINGS):
-                _estimate_node(ground, wheels, (x, y, heading), place * HEADINGS + heading, found)
-
-
-@exact_kernel
-def _is_known_around(ground, wheels, x, y):
-    """Return whether all is known that may be below a wheel at a place x, y [m]."""
-    ny, nx = ground.elevation.shape
-    u = (x - wheels.origin[0]) / ground.resolution
-    v = (y - wheels.origin[1]) / ground.resolution
-    reach = wheels.reach / ground.resolution + 1.0
-    left, low = math.floor(u - reach), math.floor(v - reach)
-    right, high = math.ceil(u + reach) + 1, math.ceil(v + reach) + 1
-    if left < 0 or low < 0 or right > nx or high > ny:
-        return False
-    upper, lower = ground.unknown[high], ground.unknown[low]
-    return upper[right] - upper[left] == lower[right] - lower[left]
+    for place in chosen:
+        for heading in range(HEADINGS):
+            pose = at[place, 0], at[place, 1], heading
+            _estimate_node(ground, wheels, pose, place * HEADINGS + heading, found)
 
 
 @exact_kernel
