@@ -105,13 +105,6 @@ def drive(node: GroundLearnerNode, rover: Rover, rows: np.ndarray) -> None:
         wait_until(arrives, "the odometry")
 
 
-@pytest.fixture
-def ros():
-    run = RosRun()
-    yield run
-    run.close()
-
-
 def test_a_drive_is_learned_and_a_rover_that_gets_stuck_is_stopped_and_its_place_marked(ros):
     wishes = [Parameter(f"{what}_when_stuck", value=True) for what in ("stop", "mark")]
     node = ros.spin(GroundLearnerNode(context=ros.context, parameter_overrides=wishes))

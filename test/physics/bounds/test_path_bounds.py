@@ -47,7 +47,7 @@ def draw(rover, terrain, paths, cases):
     for seed, (length, std) in enumerate(cases):
         for policy in ("equal", "optimal"):
             drawn = draw_path(rover, with_std(terrain, std), paths(seed), length, 8, seed, policy)
-            counts += [drawn.waypoints, drawn.outside["any"], drawn.unbounded]
+            counts += [drawn.waypoints, drawn.outside, drawn.unbounded]
     return counts
 
 

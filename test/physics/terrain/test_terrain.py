@@ -276,10 +276,15 @@ def test_blocks_hold_the_highest_ground(shape):
 def test_an_edit_of_the_array_that_was_given_does_not_reach_the_ground():
     """A table of block maxima that is older than the heights would hide obstacles."""
     heights = np.zeros((9, 9))
-    terrain = Terrain(heights, 0.1)
-    packed = pack_ground(terrain)
-    heights[4, 4] = 5.0
-    assert terrain.elevation[4, 4] == packed.arrays["elevation"][4, 4] == 0.0
+    view = heights[:]
+    view.flags.writeable = False  # its owner still writes
+    for given_array in (heights, view):
+        heights[4, 4] = 0.0
+        terrain = Terrain(given_array, 0.1)
+        packed = pack_ground(terrain)
+        heights[4, 4] = 5.0
+        assert terrain.elevation[4, 4] == packed.arrays["elevation"][4, 4] == 0.0
+    assert Terrain(terrain.elevation, 0.1).elevation is terrain.elevation  # nothing to protect
     with pytest.raises(ValueError, match="read-only"):
         terrain.elevation[4, 4] = 5.0
     with pytest.raises(ValueError, match="read-only"):

@@ -232,11 +232,3 @@ def test_the_margin_holds_within_the_bounds_of_an_uncertain_map():
 def test_a_margin_outside_its_range_is_named(margin):
     with pytest.raises(ModelError, match="control_margin"):
         SweepOptions(control_margin=margin)
-
-
-def test_a_bump_that_takes_all_the_torque_of_one_side_is_not_promised():
-    rover, ground = unlimited(LSR1), drive_ground("bump_one_side", 0.16)
-    options = SweepOptions(friction=0.8, max_torque=0.81, policy="optimal")
-    assert judge_path(rover, ground, drive_path(), options)[1].traversable
-    promised = judge_path(rover, ground, drive_path(), replace(options, control_margin=0.1))[1]
-    assert not promised.traversable and "control margin" in promised.reason
