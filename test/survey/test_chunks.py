@@ -36,7 +36,7 @@ def test_any_chunks_give_the_same_bits(tmp_path, step, chunk):
     x, y = (np.arange(0, count, step) * terrain.resolution for count in (140, 70))
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     tile = survey_tile(request, replace(terrain, origin=(0.0, 0.0)), places)["first_limit"]
-    assert (tile != found["first_limit"].ravel()).mean() < 0.01  # coordinates round differently
+    assert (tile != found["first_limit"].ravel()).mean() < 1e-3  # coordinates round differently
 
 
 @pytest.mark.parametrize("policy", ["equal", "servo", "optimal"])
