@@ -7,11 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
+from rover_physics import Rover, SweepOptions, Terrain, judge_path
 from rover_physics.bounds.path import BOUNDED_VALUES, bound_path
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.model import Rover
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_path
 from support.rough_grounds import RESOLUTION, fractal, plane, rocky
 
 ROUNDING = 1e-6

@@ -16,8 +16,8 @@ from std_msgs.msg import Bool, String
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.sensing import imu_message
 from msg_adapters.stamps import ns_to_stamp
+from rover_physics import load_rover
 from rover_physics.numerics.quaternions import xyzw_from_rpy
-from rover_physics.rover.rover_file import load_rover
 from rover_planner.learning.drive_log import PITCH, ROLL, TIME, YAW, X
 from rover_planner.nodes.ground_learner import (
     EMERGENCY_STOP,

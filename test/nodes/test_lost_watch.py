@@ -12,7 +12,7 @@ from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from std_msgs.msg import String
 
-from rover_physics.terrain.grid import save_terrain
+from rover_physics import save_terrain
 from rover_planner.nodes.mission_planner import MissionPlanner
 from rover_planner.ros.qos import latched_qos, sensor_qos
 from support.grounds import make_terrain, waves

@@ -6,7 +6,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rover_physics.rover.rover_file import load_rover
+from rover_physics import load_rover
 from rover_planner.planning.path_query import (
     PathQueryOptions,
     answer_path_query,

@@ -6,8 +6,9 @@ import csv
 import numpy as np
 import pytest
 
+from rover_physics import load_rover
 from rover_physics.errors import RoverFileError
-from rover_physics.rover.rover_file import load_rover, rover_to_dict
+from rover_physics.rover.rover_file import rover_to_dict
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.studies.objectives import climbs, tallest_step

@@ -6,11 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
+from rover_physics import SweepOptions, Terrain, judge_poses, load_rover
 from rover_physics.traversability.classification import classify_judged
-from rover_physics.traversability.judge import judge_poses
 from rover_planner.survey.layers import (
     CLASS_NUMBERS,
     NO_LIMIT,

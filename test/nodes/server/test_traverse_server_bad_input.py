@@ -9,7 +9,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.paths import poses_path
-from rover_physics.terrain.grid import save_terrain
+from rover_physics import save_terrain
 from rover_planner.planning.answering.snapshot import Snapshot
 from support.grounds import make_terrain, waves
 from support.planner_client import GOAL, START, ask, verdict_of

@@ -8,16 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rover_physics import PoseStatus, Rover, SweepOptions, judge_path, judge_poses, load_rover
 from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES, balance_forces
 from rover_physics.forces.stability import tip_over_angles
 from rover_physics.prediction.evaluation import new_work
-from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.linkage import pack_linkage, place, place_masses
 from rover_physics.rover.manipulator import link_points
-from rover_physics.rover.model import Rover, Steering
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.status import PoseStatus
-from rover_physics.traversability.judge import judge_path, judge_poses
+from rover_physics.rover.model import Steering
 from support.reference_cases import reference_grounds, reference_predictions, steered_predictions
 from support.rough_grounds import fractal, plane, random_poses, rocky, scaled_for, smooth
 from support.rover_geometry import (

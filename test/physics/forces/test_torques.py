@@ -10,10 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.judge import judge_path
-from rover_physics.traversability.torque_ranges import find_torque_ranges
+from rover_physics import SweepOptions, find_torque_ranges, judge_path, load_rover
 from rover_physics.traversability.verdict import hold_against_limits
 from support.best_torques import can_stand
 from support.reference_cases import reference_ground

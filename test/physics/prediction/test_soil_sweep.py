@@ -6,13 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rover_physics import SweepOptions, Terrain, judge_path, load_rover
 from rover_physics.errors import SoilError
-from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Part
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.soil_file import load_soils
-from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import plane, random_poses, smooth
 from support.rover_geometry import turned_round

@@ -12,16 +12,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rover_physics.prediction.map_sweep as map_sweep
+from rover_physics import (
+    PoseStatus,
+    SweepOptions,
+    Terrain,
+    judge_path,
+    judge_paths,
+    load_rover,
+    score_poses,
+    sweep_map,
+)
 from rover_physics.errors import ModelError, PoseError
 from rover_physics.numerics import interruption
 from rover_physics.numerics.interruption import check_interruption, interruptible, slices
-from rover_physics.prediction.map_sweep import score_poses, sweep_map
-from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.record import QUANTITIES
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.status import PoseStatus
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_path, judge_paths
 from rover_physics.traversability.verdict import hold_against_limits
 from support.grounds import gap, make_terrain, waves
 from support.grounds import rocky as low_rock

@@ -6,12 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rover_physics import SweepOptions, judge_path, load_rover
 from rover_physics.errors import ModelError
-from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.manipulator import arm_angles, body_mass_and_com, link_points
 from rover_physics.rover.model import Part
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import plane
 

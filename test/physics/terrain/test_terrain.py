@@ -11,10 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rover_physics import Terrain, load_rover, load_terrain, save_terrain
 from rover_physics.errors import TerrainError
 from rover_physics.prediction.packed_model import pack_model
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
 from rover_physics.terrain.ground import (
     BLOCK,
     SOIL_NUMBERS,

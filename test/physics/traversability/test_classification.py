@@ -6,10 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rover_physics import SweepOptions, classify_path, judge_path, load_rover
 from rover_physics.errors import ModelError
 from rover_physics.names import WHEELS
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.rover_file import load_rover
 from rover_physics.traversability.classification import (
     IMPASSABLE,
     PASSABLE,
@@ -17,10 +16,8 @@ from rover_physics.traversability.classification import (
     WITH_SPEED_SERVOS,
     WITH_TRACTION_CONTROL,
     classify_judged,
-    classify_path,
     deciding_waypoint,
 )
-from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import bowl, plane, random_poses, rocky

@@ -9,18 +9,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks.invariants import changes_of
+from rover_physics import (
+    PathPrediction,
+    SweepOptions,
+    Terrain,
+    Verdict,
+    judge_path,
+    judge_paths,
+    judge_pieces,
+    load_rover,
+)
 from rover_physics.bounds.path import BOUNDED_VALUES
 from rover_physics.prediction import sweep
 from rover_physics.prediction.packed_model import PackedModel, pack_model
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.record import QUANTITIES
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_path, judge_paths
 from rover_physics.traversability.partwise import PartwiseJudge
-from rover_physics.traversability.pieces import SAFE, find_exposure, judge_pieces
-from rover_physics.traversability.verdict import Verdict, hold_against_limits
+from rover_physics.traversability.pieces import SAFE, find_exposure
+from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import bouldered, bowl, fractal, rocky
 
 ROVER = load_rover("lsr1")

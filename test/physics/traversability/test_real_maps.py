@@ -4,10 +4,7 @@
 import numpy as np
 import pytest
 
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain, load_terrain
-from rover_physics.traversability.judge import judge_path
+from rover_physics import SweepOptions, Terrain, judge_path, load_rover, load_terrain
 from rover_physics.traversability.verdict import hold_against_limits
 
 LSR1 = load_rover("lsr1")

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rover_physics import load_rover
 from rover_physics.names import STEERING_JOINTS
-from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steering_joints import steering_joints
 from rover_planner.simulator.mujoco_plant import MujocoPlant
 from rover_planner.simulator.path_follower import PathFollower
