@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Drives of all programs on rocks that are slicker than the planner was told, with learning or not.
+"""Drives of all programs on rocks slicker than the planner was told, with learning or without.
 
 Run from the repository: python -m benchmarks.learned_drives FOLDER [--drives 20] [--learn off|use]
 
@@ -111,7 +111,7 @@ def draw_drive(number: int) -> tuple[Terrain, np.ndarray, np.ndarray]:
         x, y = rng.uniform(-most, most, 2)
         yaw, far = rng.uniform(-np.pi, np.pi), rng.uniform(*DISTANCE)
         start = np.array([x, y, yaw])
-        goal = start + [far * np.cos(yaw), far * np.sin(yaw), 0.0]
+        goal = start + far * np.array([np.cos(yaw), np.sin(yaw), 0.0])
         if np.abs(goal[:2]).max() < most and all(
             judge_path(rover, field, pose[None, :])[1].traversable for pose in (start, goal)
         ):

@@ -110,8 +110,9 @@ class RoverSimulator(Node):
         self._driven = self.create_publisher(String, "path_driven", latched_qos())
         self._cloud = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
-        keeps_time = self.get_parameter("use_sim_time").value
-        self._clock = self.create_publisher(ClockMessage, "/clock", qos) if keeps_time else None
+        self._clock_publisher = None
+        if self.get_parameter("use_sim_time").value:
+            self._clock_publisher = self.create_publisher(ClockMessage, "/clock", qos)
         self._commands = None
         if self._settings.parameters.follow_commands:
             self._commands = self.create_publisher(TwistStamped, "cmd_vel", qos)
@@ -165,8 +166,8 @@ class RoverSimulator(Node):
         self._state = state = self.simulation.advance(time.monotonic(), self._period)
         self._steps += 1
         stamp = self._stamp
-        if self._clock is not None:
-            self._clock.publish(ClockMessage(clock=stamp))
+        if self._clock_publisher is not None:
+            self._clock_publisher.publish(ClockMessage(clock=stamp))
         efforts = dict(zip(WHEEL_JOINTS, state.wheel_torques.tolist(), strict=True))
         positions, velocities = (
             convert_steering(values, self._steering_sign)
@@ -199,7 +200,7 @@ class RoverSimulator(Node):
     @property
     def _stamp(self) -> Any:
         """Time now: that of the simulation if it is the source of /clock."""
-        if self._clock is None:
+        if self._clock_publisher is None:
             return self.get_clock().now().to_msg()
         return ns_to_stamp(self._start + round(self._steps * self._period * NANOSECONDS))
 
