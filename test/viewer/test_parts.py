@@ -21,7 +21,7 @@ from rover_planner.viewer.state.colours import (
 )
 from rover_planner.viewer.state.layers import FRICTION, list_layers
 from rover_planner.viewer.state.playback import FAST, Playback
-from rover_planner.viewer.state.trajectory import Trajectory, find_axles
+from rover_planner.viewer.state.trajectory import Trajectory
 from rover_planner.viewer.state.visitor_requests import VisitorRequests
 from support.grounds import gap, make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, straight
@@ -61,9 +61,9 @@ def test_states_are_those_of_the_prediction_and_between_waypoints_their_mean():
 
 
 def test_a_trajectory_ends_where_the_path_is_refused():
-    trajectory = trajectory_on(wall_at(0.5))
-    assert not trajectory.verdict.traversable
-    assert trajectory.length <= trajectory.verdict.first_failure + 1
+    prediction, verdict = judge_path(LSR1, make_terrain(wall_at(0.5)), straight())
+    trajectory = Trajectory(LSR1, prediction, verdict)
+    assert verdict.first_failure >= 0 and trajectory.length <= verdict.first_failure + 1
     assert trajectory.length < len(trajectory.prediction.poses)
 
 
@@ -242,7 +242,7 @@ def drive(poses, ground=lambda x, y: 0.0 * x):
 def test_the_axles_are_those_of_the_model_on_rough_ground():
     rover, state = drive(arc(1.0), waves)
     outwards = state.wheel_centres - state.contact_points
-    away = np.abs((outwards * find_axles(rover, state)).sum(axis=1))
+    away = np.abs((outwards * state.axles).sum(axis=1))
     assert (away <= 0.5 * rover.wheel.width + 1e-6).all()
     radial = np.sqrt((outwards**2).sum(axis=1) - away**2)
     assert radial == pytest.approx(np.full(6, rover.wheel.radius), abs=2e-3)

@@ -3,7 +3,6 @@
 
 import time
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,14 +15,14 @@ from rover_planner.viewer.documents.board import describe_board
 from rover_planner.viewer.documents.legend import describe_scale
 from rover_planner.viewer.documents.live import choose_answer, describe_learned, list_topics
 from rover_planner.viewer.live.listener import LiveData, LiveListener
-from rover_planner.viewer.live.live_state import StateBuilder
+from rover_planner.viewer.live.live_state import read_state
 from rover_planner.viewer.pages.base import Answer, PageBase, Words
 from rover_planner.viewer.pages.ground_painter import Colouring
 from rover_planner.viewer.scene.glb import write_glb
 from rover_planner.viewer.scene.ground_mesh import build_ground_mesh
 from rover_planner.viewer.state.layers import LAYERS, list_layers
 from rover_planner.viewer.state.link import read_link
-from rover_planner.viewer.state.trajectory import RoverState
+from rover_planner.viewer.state.rover_state import RoverState
 
 BOARD_PERIOD = 0.2
 """Time between two updates of the board [s]."""
@@ -33,6 +32,16 @@ RETRY = 2.0
 """Time from an error in a picture to the next one, which shows newer data [s]."""
 ARM_STEP = 0.01
 """Smallest turn of the arm that is drawn [rad]."""
+FORCES = (
+    "wheel_loads",
+    "tangential",
+    "lateral",
+    "friction_utilisation",
+    "torque_saturation",
+    "slip_ratio",
+    "tip_over_ratio",
+)
+"""What nobody knows any more of a rover whose odometry is stale: grey wheels without arrows."""
 AHEAD = np.array([4.0, 0.0])
 """From the rover to where a new camera looks [m]."""
 
@@ -72,7 +81,6 @@ class LivePage(PageBase):
         self._drawn_trail: Floats | None = None
         self._told_at = self._ground_at = 0.0
         super().__init__(rover, terrain, host, port)
-        self._builder = StateBuilder(rover)
         predicted = [name for name, layer in LAYERS.items() if layer.is_predicted]
         self.channel.tell("offers", {"layers": list_layers(terrain), "predicted": predicted})
         if ground_name:
@@ -169,9 +177,9 @@ class LivePage(PageBase):
         data = self._data = self._listener.latest()
         now = time.monotonic()
         self._take_terrain(data, now)
-        state = self._builder.build(data.values)
+        state = read_state(self._rover, data.values)
         if state is not None and data.odometry.is_stale:
-            state = _forget_forces(state)
+            state = state.change(**{name: np.nan * getattr(state, name) for name in FORCES})
         self.scene.show(state)
         if state is not None:
             self._turn_arm(data)
@@ -209,14 +217,6 @@ class LivePage(PageBase):
             known = {name: joints[name] for name in arm.joints if name in joints}
             steps = {name: ARM_STEP * round(angle / ARM_STEP) for name, angle in known.items()}
             self.scene.turn_arm(steps)
-
-
-def _forget_forces(state: RoverState) -> RoverState:
-    """Return a state of which nobody knows the forces any more: grey wheels without arrows."""
-    unknown = np.full(6, np.nan)
-    names = ("wheel_loads", "tangential", "lateral", "friction_use", "torque_use", "slip_ratio")
-    values: dict[str, Any] = dict.fromkeys(names, unknown)
-    return replace(state, **values, tip_over_ratio=float("nan"))
 
 
 def _refuse_link(query: str) -> None:

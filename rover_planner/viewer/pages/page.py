@@ -39,10 +39,10 @@ from rover_planner.viewer.state.layers import LAYERS, list_layers
 from rover_planner.viewer.state.link import PageLink, read_link, write_link
 from rover_planner.viewer.state.path_advice import PathAdvice, apply_remedy
 from rover_planner.viewer.state.playback import SPEEDS, Playback
+from rover_planner.viewer.state.rover_state import RoverState
 from rover_planner.viewer.state.scenario import Scenario, Shown
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.survey_layers import ShownSurvey
-from rover_planner.viewer.state.trajectory import RoverState
 
 DRAWING_TIME, DRAWING_POLL = 0.2, 0.002
 """Longest time for which judging waits for the drawings, and between two looks at them [s]."""
@@ -514,7 +514,7 @@ class Page(PageBase):
             return state
         if abs(at - failure.time) > AT_FAILURE:
             return state
-        return replace(failure.state, spin=state.spin, energy=state.energy)
+        return replace(failure.state.change(energy=state.energy), spin=state.spin)
 
 
 def _differ_in_size(one: Rover, other: Rover) -> bool:
