@@ -119,10 +119,10 @@ def test_no_press_of_a_key_is_lost_and_of_a_slider_only_the_last_value_counts(pa
         page.hear({"ask": "step", "by": 1}, None)
     wait_until(lambda: abs(page.playback.time - times[3]) < 1e-6, "three steps")
     busy, go_on = threading.Event(), threading.Event()
-    page.requests.add(lambda: (busy.set(), go_on.wait(PATIENCE)))
+    page.requests.put(lambda: (busy.set(), go_on.wait(PATIENCE)))
     assert busy.wait(PATIENCE)
     page._answers["seek"], seek = (
-        lambda words, _box: asked.append(words["time"]),
+        lambda words: asked.append(words["time"]),
         page._answers["seek"],
     )
     for time_asked in (1.0, 2.0, 3.0):
@@ -344,7 +344,7 @@ def test_a_refused_value_is_told_and_put_back(page):
 def test_a_closed_page_leaves_no_thread_behind():
     before = set(threading.enumerate())
     page = Page(session_on(ramp), port=0)
-    page.requests.add(page.session.judge_again)
+    page.requests.put(page.session.judge_again)
     page.close()
     left = {thread.name for thread in set(threading.enumerate()) - before}
     assert not left & {"page", "judge", "ground"}

@@ -19,6 +19,7 @@ from rover_physics.terrain.soil_file import soil_named
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import read_rover, write_rover
 from rover_planner.viewer.front.channel import read_file
+from rover_planner.viewer.state.layers import Colouring
 from rover_planner.viewer.state.link import (
     PageLink,
     change_values,
@@ -47,14 +48,14 @@ class MapPrint:
         return self._text
 
 
-def make_link(shown: Shown, ground: str, time: float, colours: Mapping[str, Any]) -> PageLink:
+def make_link(shown: Shown, ground: str, time: float, colouring: Colouring) -> PageLink:
     """Return the link to what is shown.
 
     Args:
         shown: What is shown.
         ground: Fingerprint of the map.
         time: Time of the drive [s].
-        colours: The fields `layer`, `heading` and `along` of the link.
+        colouring: What the ground is coloured by.
     """
     now = shown.scenario
     return PageLink(
@@ -69,7 +70,7 @@ def make_link(shown: Shown, ground: str, time: float, colours: Mapping[str, Any]
         values=list_changed_values(now.loaded, now.rover),
         joints=dict(now.arm_angles),
         rover_file="" if _is_preset(now.loaded) else write_rover(now.loaded),
-        **colours,
+        **dataclasses.asdict(colouring),
     )
 
 
