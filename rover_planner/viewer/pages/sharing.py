@@ -12,20 +12,15 @@ from typing import Any
 
 import rover_physics
 from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_file import load_rover, preset_names
+from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.soil_file import soil_named
 from rover_planner.errors import PlanningError
-from rover_planner.studies.rover_values import read_rover, write_rover
+from rover_planner.studies.rover_values import write_rover
 from rover_planner.viewer.front.channel import read_file
 from rover_planner.viewer.state.layers import Colouring
-from rover_planner.viewer.state.link import (
-    PageLink,
-    change_values,
-    list_changed_values,
-    write_link,
-)
+from rover_planner.viewer.state.link import PageLink, write_link
 from rover_planner.viewer.state.scenario import Scenario, Shown
 
 PACKAGES = ("numpy", "scipy", "numba", "viser")
@@ -59,7 +54,8 @@ def make_link(shown: Shown, ground: str, time: float, colouring: Colouring) -> P
     """
     now = shown.scenario
     return PageLink(
-        rover=now.loaded.name,
+        loaded=rover_to_dict(now.loaded),
+        rover=rover_to_dict(now.rover),
         ground=ground,
         start=now.start,
         goal=now.goal,
@@ -67,9 +63,7 @@ def make_link(shown: Shown, ground: str, time: float, colouring: Colouring) -> P
         soil=now.options.model.soil or "",
         path=shown.index + 1,
         time=time,
-        values=list_changed_values(now.loaded, now.rover),
         joints=dict(now.arm_angles),
-        rover_file="" if _is_preset(now.loaded) else write_rover(now.loaded),
         **dataclasses.asdict(colouring),
     )
 
@@ -82,7 +76,9 @@ def read_scenario(link: PageLink, wanted: Scenario, ground: str) -> Scenario:
     """
     if link.ground != ground:
         raise PlanningError("the link is about another map than this page shows")
-    loaded = _read_loaded(link)
+    loaded, rover = (
+        rover_from_dict(dict(one), "the rover in the link") for one in (link.loaded, link.rover)
+    )
     if loaded == wanted.loaded:
         loaded = wanted.loaded
     known = () if loaded.manipulator is None else loaded.manipulator.joints
@@ -96,28 +92,13 @@ def read_scenario(link: PageLink, wanted: Scenario, ground: str) -> Scenario:
     return dataclasses.replace(
         wanted,
         loaded=loaded,
-        rover=change_values(loaded, link.values),
+        rover=rover,
         start=link.start,
         goal=link.goal,
         options=options,
         arm_angles=dict(link.joints),
         recorded=wanted.recorded if same else None,
     )
-
-
-def _is_preset(rover: Rover) -> bool:
-    return rover.name in preset_names() and load_rover(rover.name) == rover
-
-
-def _read_loaded(link: PageLink) -> Rover:
-    """Return the rover that was loaded when a link was made."""
-    if link.rover_file:
-        return read_rover(link.rover_file, "the rover file in the link")
-    if link.rover not in preset_names():
-        raise PlanningError(
-            f"the link is about the rover {link.rover}, which is no preset; it has no file"
-        )
-    return load_rover(link.rover)
 
 
 def write_file(
