@@ -14,7 +14,7 @@ from rover_physics.rover.model import Rover
 from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.viewer.state.rover_state import RoverState, place_state
 
-MAX_AGE = 3.0
+MAX_AGE = 2.0
 """Age from which a topic that is published all the time is stale [s]."""
 TRAIL_STEP, MAX_TRAIL = 0.1, 1000
 """Distance of two places of a trail [m], and their largest number."""

@@ -21,7 +21,7 @@ from rover_planner.errors import PlanningError
 from rover_planner.viewer.front.channel import Channel, Mailbox, Part
 from rover_planner.viewer.pages.drawings import Action, Drawings, Errors
 from rover_planner.viewer.pages.ground_painter import PaintedGround, PaintRequest, paint
-from rover_planner.viewer.scene.cameras import VIEWS
+from rover_planner.viewer.scene.cameras import START, VIEWS
 from rover_planner.viewer.scene.ground_mesh import intersect_ground
 from rover_planner.viewer.scene.scene import Scene
 from rover_planner.viewer.state.background_work import BackgroundWork
@@ -178,13 +178,8 @@ class PageBase(ABC):
 
     @property
     @abstractmethod
-    def ends(self) -> tuple[Any, Any]:
-        """Start and goal, x and y first [m], along which a new camera looks."""
-
-    @property
-    @abstractmethod
     def points(self) -> Floats:
-        """X and y (n, 2) [m] of what a view of everything shows."""
+        """X and y (n, 2) [m] of what a view of everything shows, the start first."""
 
     @abstractmethod
     def click(self, point: Floats | None, shift: bool) -> None:
@@ -237,7 +232,7 @@ class PageBase(ABC):
         self.scene.show_forces(self.forces)
 
     def _aim_camera(self, client: Any) -> None:
-        self.scene.aim_camera(client, self.ground, *self.ends)
+        self._look(client, START)
 
     def _press(self, words: Words, _event: Any) -> None:
         self.hear(words, None)

@@ -3,7 +3,6 @@
 
 import time
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -105,15 +104,10 @@ class LivePage(PageBase):
         return self._terrain
 
     @property
-    def ends(self) -> tuple[Any, Any]:
-        """Where the rover was first seen, and ahead of it."""
-        first = np.zeros(2) if self._first is None else self._first
-        return first, first + AHEAD
-
-    @property
     def points(self) -> Floats:
-        """X and y (2, 2) [m] of the same places."""
-        return np.array(self.ends)
+        """X and y (2, 2) [m] of where the rover was first seen, and of a place ahead of it."""
+        first = np.zeros(2) if self._first is None else self._first
+        return np.array([first, first + AHEAD])
 
     def click(self, point: Floats | None, shift: bool) -> None:
         """Ask the server for a plan to a point."""

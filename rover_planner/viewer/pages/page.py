@@ -4,11 +4,13 @@
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover, preset_names
+from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.soil_file import load_soils
 from rover_planner.advice.remedy import Remedy
@@ -32,7 +34,7 @@ from rover_planner.viewer.documents.rover import (
 from rover_planner.viewer.documents.verdict import Work, describe_verdict
 from rover_planner.viewer.pages.base import Answer, PageBase, Words
 from rover_planner.viewer.pages.ground_painter import PaintRequest
-from rover_planner.viewer.pages.sharing import MapPrint, make_link, read_scenario, write_file
+from rover_planner.viewer.pages.sharing import make_link, read_scenario, write_file
 from rover_planner.viewer.scene.cameras import find_radius
 from rover_planner.viewer.state.layers import Colouring, list_layers
 from rover_planner.viewer.state.link import PageLink, read_link, write_link
@@ -81,7 +83,6 @@ class Page(PageBase):
         self.session, self.playback = session, Playback()
         self._ground_name = ground_name or name_ground(session.wanted.terrain)
         self._survey = survey
-        self._map_print = MapPrint(session.wanted.terrain)
         self._click_sets = "goal"
         self._drawn: Shown | None = None
         """What the scene shows, or will when its drawings are done."""
@@ -140,12 +141,6 @@ class Page(PageBase):
     def ground(self) -> Terrain:
         """The ground that is shown."""
         return self.session.shown.scenario.terrain
-
-    @property
-    def ends(self) -> tuple[Any, Any]:
-        """Start and goal."""
-        now = self.session.shown.scenario
-        return now.start, now.goal
 
     @property
     def points(self) -> Floats:
@@ -248,9 +243,14 @@ class Page(PageBase):
 
     # Files and links.
 
+    @cached_property
+    def _map_print(self) -> str:
+        """The fingerprint of the map, computed when it is first asked for."""
+        return fingerprint(self.ground)
+
     def _link(self) -> PageLink:
         time_shown = round(self.playback.time, 3)
-        return make_link(self.session.shown, self._map_print.text, time_shown, self.colouring)
+        return make_link(self.session.shown, self._map_print, time_shown, self.colouring)
 
     def _write_current(self) -> str:
         """Return the link that a browser opens on a program that was started again."""
@@ -284,7 +284,7 @@ class Page(PageBase):
             return
         if link.layer not in self.layers:
             raise PlanningError(f"the link names the layer {link.layer!r}, which there is not")
-        asked = read_scenario(link, self.session.wanted, self._map_print.text)
+        asked = read_scenario(link, self.session.wanted, self._map_print)
         self.colouring = Colouring(link.layer, link.heading, link.along)
         self.session.take_scenario(asked)
         self._opening = link, asked

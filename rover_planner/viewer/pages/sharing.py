@@ -13,8 +13,6 @@ from typing import Any
 import rover_physics
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
-from rover_physics.terrain.fingerprint import fingerprint
-from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.soil_file import soil_named
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import write_rover
@@ -28,19 +26,6 @@ SCENE_TAG = '<iframe id="scene" title="scene"></iframe>'
 STYLE_TAG = '<link rel="stylesheet" href="page.css">'
 CODE_TAG = '<script type="module" src="page.js"></script>'
 """Lines of page.html for which a file that is sent has the contents."""
-
-
-class MapPrint:
-    """The fingerprint of a map, computed when it is first asked for."""
-
-    def __init__(self, terrain: Terrain):
-        self._terrain, self._text = terrain, ""
-
-    @property
-    def text(self) -> str:
-        """The fingerprint."""
-        self._text = self._text or fingerprint(self._terrain)
-        return self._text
 
 
 def make_link(shown: Shown, ground: str, time: float, colouring: Colouring) -> PageLink:

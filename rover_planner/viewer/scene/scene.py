@@ -96,24 +96,12 @@ class Scene:
         if follows and self._last_position is not None:
             self.cameras.centre(self._last_position)
 
-    def aim_camera(self, client: Any, terrain: Terrain, start: Any, goal: Any) -> None:
-        """Aim the camera of a visitor along the line from start to goal, from behind and beside.
-
-        Args:
-            client: The visitor's client of viser.
-            terrain: The ground.
-            start: x and y [m], further values are not used.
-            goal: The same.
-        """
-        first = _lift(terrain, np.array([start[:2]]))[0]
-        self.cameras.aim(client, first, np.subtract(goal[:2], start[:2]), self._rover.wheel.radius)
-
     def look(self, client: Any, view: str, terrain: Terrain, points: Floats) -> None:
         """Let the camera of a visitor look at a path (n, 2) [m], or at the rover on it.
 
         Args:
             client: The visitor's client of viser.
-            view: One of VIEWS.
+            view: A view of `Cameras.look`.
             terrain: The ground.
             points: x and y of the path.
         """
