@@ -65,7 +65,7 @@ def seek_remedies(refusal: Refusal) -> Iterator[Trial]:
     for count, steps in ROUNDS:
         for levers in combinations(LEVERS if steps is COARSE else own, count):
             settings = [lever.settings(refusal) for lever in levers]
-            if not _can_combine(levers) or None in settings:
+            if not can_combine(levers) or None in settings:
                 continue
             if steps is FINE and isinstance(settings[0], Choice):
                 continue
@@ -76,7 +76,7 @@ def seek_remedies(refusal: Refusal) -> Iterator[Trial]:
             return
 
 
-def _can_combine(levers: Sequence[Lever]) -> bool:
+def can_combine(levers: Sequence[Lever]) -> bool:
     """Return whether levers may be set at once: three only if all keep the rows of the path.
 
     The others have to be judged as a whole.

@@ -30,6 +30,8 @@ and for the largest one along the drive, both in shares of what the rover can cl
 verdicts on random edges of made and real maps, two rovers."""
 STEPS_PER_UNIT = 30
 """Steps per unit in which difficulties are kept."""
+NOT_LOOKED = 255
+"""Difficulty of an edge that was not looked at."""
 
 
 class Difficulty(NamedTuple):
@@ -47,6 +49,8 @@ class Difficulty(NamedTuple):
     samples: np.ndarray
     """(HEADINGS, P, S, 3) places along the primitives: x, y [m] from the first node, and heading;
     -1 as heading ends a list."""
+    edges: np.ndarray
+    """(nodes, P) uint8 difficulty of the edges in steps; NOT_LOOKED until a search asks for it."""
 
 
 def estimate_difficulty(
@@ -82,7 +86,8 @@ def estimate_difficulty(
         steps[heading] = np.minimum(STEPS_PER_UNIT * np.log1p(np.exp(np.minimum(logit, 8.0))), 254)
     first = np.asarray(terrain.origin) - nodes.cell * np.array(nodes.first)
     first += 0.5 * (stride - 1) * terrain.resolution
-    return Difficulty(steps, first, spacing, nodes.cell, samples)
+    edges = np.full((nodes.count, samples.shape[1]), NOT_LOOKED, np.uint8)
+    return Difficulty(steps, first, spacing, nodes.cell, samples, edges)
 
 
 def steepest_climb(rover: Rover, friction: float) -> float:
@@ -195,11 +200,19 @@ def difficulty_of(difficulty, columns, node, k):
     It is the largest at the samples of the edge.
 
     Args:
-        difficulty: Difficulty.
+        difficulty: Difficulty; its `edges` is written.
         columns: Number of columns of places of the lattice.
         node: The node.
         k: Number of the edge.
     """
+    if difficulty.edges[node, k] == NOT_LOOKED:
+        difficulty.edges[node, k] = _look_along(difficulty, columns, node, k)
+    return (difficulty.edges[node, k] + 0.5) / STEPS_PER_UNIT
+
+
+@exact_kernel
+def _look_along(difficulty, columns, node, k):
+    """Return the difficulty of an edge in steps; arguments as for `difficulty_of`."""
     heading, place = node % HEADINGS, node // HEADINGS
     x = (place % columns) * difficulty.cell - difficulty.first[0]
     y = (place // columns) * difficulty.cell - difficulty.first[1]
@@ -211,4 +224,4 @@ def difficulty_of(difficulty, columns, node, k):
         i = min(max(int((x + sample[0]) / difficulty.spacing + 0.5), 0), nx - 1)
         j = min(max(int((y + sample[1]) / difficulty.spacing + 0.5), 0), ny - 1)
         largest = max(largest, difficulty.steps[int(sample[2]), j, i])
-    return (largest + 0.5) / STEPS_PER_UNIT
+    return largest

@@ -100,6 +100,16 @@ def edge_cost(graph, node, k, end):
 
 
 @exact_kernel
+def _is_too_dear(graph, node, k, here, known):
+    """Return whether edge k of a node, entered at cost `here`, leads nowhere below cost `known`.
+
+    It may say no where it does not know: it does not look at the ground.
+    """
+    least = graph.table.least_cost[node % HEADINGS, k]
+    return graph.state[node, k] != PASSES and here + least >= known
+
+
+@exact_kernel
 def _neighbour(graph, node, i, backwards):
     """Return the other node of an edge, the node where the edge begins, and its number there.
 
@@ -201,7 +211,7 @@ def _enter_before(graph, node, to_goal, heap):
         before, _, k = _neighbour(graph, node, i, True)
         if k < 0:
             break
-        if before < 0:
+        if before < 0 or _is_too_dear(graph, before, k, distance[node], distance[before]):
             continue
         cost = distance[node] + edge_cost(graph, before, k, node)
         if cost < distance[before]:
@@ -264,7 +274,7 @@ def _enter_after(graph, node, to_goal, tree, heap):
         end, _, number = _neighbour(graph, node, k, False)
         if number < 0:
             break
-        if end < 0:
+        if end < 0 or _is_too_dear(graph, node, k, tree.cost[node], tree.cost[end]):
             continue
         bound = _bound_to_goal(measured, limit, graph.columns, end)
         cost = tree.cost[node] + edge_cost(graph, node, k, end)

@@ -5,8 +5,8 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from rover_physics.rover.rover_file import load_rover
-from rover_planner.planning.search.difficulty import Difficulty
+from rover_physics import load_rover
+from rover_planner.planning.search.difficulty import NOT_LOOKED, Difficulty
 from rover_planner.planning.search.edges import FAILS, PASSES, Edges
 from rover_planner.planning.search.graph import Seeds, ShortestPaths, edge_cost
 from rover_planner.planning.search.nodes import nodes_within
@@ -32,7 +32,8 @@ def random_knowledge(seed):
 def hardness(rng):
     """Return ground with random difficulties."""
     steps = rng.integers(0, 255, (16, 5, 6), np.uint8)
-    return Difficulty(steps, np.zeros(2), 0.5, EDGES.nodes.cell, EDGES.samples)
+    unseen = np.full(EDGES.state.shape, NOT_LOOKED, np.uint8)
+    return Difficulty(steps, np.zeros(2), 0.5, EDGES.nodes.cell, EDGES.samples, unseen)
 
 
 def explicit_costs(known, graph):
