@@ -88,7 +88,7 @@ class BadQuestion(Question):
     """A request that cannot be read."""
 
     reason: str
-    """Why not."""
+    """Reason why not."""
 
     def judge(self, _snapshot: Snapshot) -> Any:
         """Return the refusal."""
