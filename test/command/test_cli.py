@@ -8,8 +8,7 @@ import pytest
 import typer
 
 import rover_physics
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import load_terrain, save_terrain
+from rover_physics import load_rover, load_terrain, save_terrain
 from rover_planner.cli import app, main
 from rover_planner.shell.poses import join_poses
 from support.command_line import write_ground_and_path

@@ -9,8 +9,7 @@ import pytest
 pytest.importorskip("matplotlib", reason="needs matplotlib")
 from matplotlib.figure import Figure
 
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
+from rover_physics import Terrain, load_rover
 from rover_planner.figures.path_picture import _draw_uses, draw_path
 from rover_planner.figures.plots import LabelledAnswer, draw_answers, hill_shade
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query, check_path

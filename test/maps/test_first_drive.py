@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from rover_physics import Terrain
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.numerics.quaternions import rpy_from_xyzw
-from rover_physics.terrain.grid import Terrain
 from rover_planner.maps.ground_beneath import Standing
 from rover_planner.maps.map_keeper import MERGE, MapKeeper
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters

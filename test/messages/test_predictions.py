@@ -17,13 +17,10 @@ from msg_adapters.paths import PoseStock, settled_path
 from msg_adapters.results.diagnostics import to_json, verdict_to_diagnostics
 from msg_adapters.results.markers import IMPASSABLE, PASSABLE, path_markers
 from msg_adapters.results.predictions import JOINTS, array_values, joint_trajectory, waypoint_array
+from rover_physics import PoseStatus, Terrain, judge_path, load_rover
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
-from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steering_joints import steered_wheels, steering_joints
-from rover_physics.status import PoseStatus
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_path
 
 STAMP = Time(sec=12, nanosec=34)
 

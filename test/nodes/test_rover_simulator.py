@@ -11,10 +11,10 @@ from sensor_msgs.msg import Imu, JointState, PointCloud2
 
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.imu import imu_to_attitude
+from rover_physics import save_terrain
 from rover_physics.errors import SoilError
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.rover.steering_joints import steering_joints
-from rover_physics.terrain.grid import save_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.nodes.mission.drive import DriveSettings, drive_to
 from rover_planner.nodes.mission_planner import MissionPlanner

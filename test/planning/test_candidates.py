@@ -97,11 +97,6 @@ def test_a_u_turn_swings_out_instead_of_turning_on_the_spot():
     assert path[:, 0].max() > 0.5 and path[:, 0].min() > -1e-9
 
 
-def test_start_equal_to_goal_is_a_single_pose():
-    paths = generate_candidates((1, 2, 7.0), (1, 2, 7.0))
-    assert len(paths) == 1 and paths[0].shape == (1, 3)
-
-
 @pytest.mark.parametrize(
     ("change", "names"),
     [

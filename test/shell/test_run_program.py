@@ -8,7 +8,7 @@ import warnings
 
 import pytest
 
-from rover_physics.errors import RoverError
+from rover_physics import RoverError
 from rover_planner.cli import main
 from rover_planner.errors import DemoError, PlanningError
 from rover_planner.shell.exit_codes import (

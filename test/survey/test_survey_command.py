@@ -18,7 +18,7 @@ pytest.importorskip("distributed", reason="install the extra survey")
 
 from distributed import LocalCluster
 
-from rover_physics.terrain.grid import save_terrain
+from rover_physics import save_terrain
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.shell.end_signals import end_as_by_ctrl_c

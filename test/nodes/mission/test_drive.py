@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rover_physics.rover.rover_file import load_rover
+from rover_physics import load_rover
 from rover_planner.nodes.mission import drive
 from rover_planner.nodes.mission.drive import DriveFailedError, DriveSettings, drive_to
 from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlace, MarkedPlaces

@@ -12,6 +12,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
+from rover_physics import SweepOptions, judge_path, judge_poses, load_rover
 from rover_physics.forces.servo_balance import CREEP, write_residual
 from rover_physics.forces.servo_motion import SERVO as SERVO_RECORD
 from rover_physics.forces.servo_soil import roll_on_soil
@@ -29,11 +30,8 @@ from rover_physics.numerics.records import new_record
 from rover_physics.prediction.evaluation import evaluate_pose, new_works, set_pose
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
-from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.record import new_results
-from rover_physics.rover.rover_file import load_rover
 from rover_physics.status import Stall
-from rover_physics.traversability.judge import judge_path, judge_poses
 from support.rough_grounds import fractal, plane, random_poses, rocky, smooth
 from support.rover_geometry import balance_residuals
 from support.soil_thrust import thrust_at_slip

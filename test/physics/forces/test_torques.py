@@ -10,10 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linprog
 
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.judge import judge_path
-from rover_physics.traversability.torque_ranges import find_torque_ranges
+from rover_physics import SweepOptions, find_torque_ranges, judge_path, load_rover
 from rover_physics.traversability.verdict import hold_against_limits
 from support.best_torques import can_stand
 from support.reference_cases import reference_ground
@@ -52,11 +49,18 @@ def test_no_torques_within_the_limit_need_less_friction(ground, poses, max_torqu
 
 
 @few
-@given(st.integers(0, 19), st.sampled_from([None, (-25.0, 0.0, 8.0)]))
-def test_optimal_torques_never_use_more_friction_than_equal_ones(seed, tool_force):
-    ground, poses = rocky(seed), random_poses(seed, 20, 1.8)
+@given(
+    st.integers(0, 19),
+    st.sampled_from([
+        (rocky, {}), (rocky, {"tool_force": (-25.0, 0.0, 8.0)}), (smooth, {"soil": "dry_sand"}),
+        (smooth, {"soil": "lunar_nominal"}),
+    ]),
+)  # fmt: skip
+def test_optimal_torques_never_use_more_friction_than_equal_ones(seed, asked):
+    make, options = asked
+    ground, poses = make(seed), random_poses(seed, 20, 1.8 if make is rocky else 0.6)
     equal, optimal = (
-        judge_path(LSR1, ground, poses, SweepOptions(policy=policy, tool_force=tool_force))[0]
+        judge_path(LSR1, ground, poses, SweepOptions(policy=policy, **options))[0]
         for policy in ("equal", "optimal")
     )
     within = (equal.torque_saturation.max(axis=1) <= 1.0) & (equal.wheel_loads.min(axis=1) > 0.0)

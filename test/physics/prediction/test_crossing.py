@@ -7,14 +7,17 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from rover_physics import (
+    PathPrediction,
+    Rover,
+    SweepOptions,
+    Terrain,
+    Verdict,
+    judge_path,
+    load_rover,
+)
 from rover_physics.prediction.drops import FACE
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_path
-from rover_physics.traversability.verdict import Verdict, hold_against_limits
+from rover_physics.traversability.verdict import hold_against_limits
 from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import plane, smooth
 from support.rover_geometry import balance_residuals

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics.rover.rover_file import load_rover
+from rover_physics import load_rover
 from rover_physics.rover.steering_joints import tightest_radius
 from rover_planner.planning.angles import wrap
 from rover_planner.planning.search.nodes import HEADINGS, STEPS, YAWS, opposite

@@ -6,9 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from rover_physics.errors import RoverError
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import load_terrain, save_terrain
+from rover_physics import RoverError, load_rover, load_terrain, save_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
