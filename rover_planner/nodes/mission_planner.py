@@ -37,13 +37,13 @@ from msg_adapters.identity import path_hash, plan_request_hash
 from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.paths import path_to_poses, poses_path, stamped_pose
 from msg_adapters.results.predictions import array_values
+from rover_physics.errors import RoverError
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.nodes.mission.advice import choose_remedy
 from rover_planner.nodes.mission.drive import DriveFailedError, DriveSettings, drive_to
 from rover_planner.nodes.mission.options import MissionOptions
 from rover_planner.nodes.programs import read_arguments
 from rover_planner.planning.answering.budget import STOPPING
-from rover_planner.ros.guard import INPUT_ERRORS
 from rover_planner.ros.process import init_ros
 from rover_planner.ros.qos import (
     latched_qos,
@@ -366,7 +366,7 @@ def _run(argv: Sequence[str] | None) -> int:
         if options == EXIT_OK:  # help was printed
             return EXIT_OK
         terrain = load_terrain(options.map_name) if options.map_name else None
-    except INPUT_ERRORS as error:
+    except RoverError as error:
         return end_with(NODE_NAME, EXIT_BAD_INPUT, str(error))
     init_ros(argv)
     node = MissionPlanner(options.map_frame, options.timeout)

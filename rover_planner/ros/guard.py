@@ -13,12 +13,7 @@ from rclpy.event_handler import EventHandler
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from msg_adapters.errors import MessageError
 from rover_physics.errors import RoverError
-from rover_planner.errors import PlanningError
-
-INPUT_ERRORS = (MessageError, PlanningError, RoverError)
-"""Errors of the input; any other error is an internal error."""
 
 EVENT_PERIOD, EVENT_WINDOW = 1.0, 0.01
 """Time between two looks at events of publishers and subscriptions, such as profiles that do not
@@ -70,7 +65,7 @@ def refuse_error(
     guard: Guard, request: str, error: Exception, refuse: Callable[[str, str], Refusal]
 ) -> Refusal:
     """Return `refuse(code, reason)` for an error; the guard counts and logs internal errors."""
-    if isinstance(error, INPUT_ERRORS):
+    if isinstance(error, RoverError):
         return refuse("bad_request", str(error))
     text = guard.report(request, error)
     return refuse("internal_error", f"internal error: {text}")

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rover_physics.errors import RoverError
-from rover_planner.errors import DemoError, PlanningError
+from rover_planner.errors import DemoError
 from rover_planner.shell.exit_codes import (
     EXIT_BAD_INPUT,
     EXIT_FAILED,
@@ -41,7 +41,7 @@ def run_program(name: str, run: Callable[[], Any]) -> int:
             code = run()
         if sys.stdout is not None:
             sys.stdout.flush()
-    except (RoverError, PlanningError) as error:
+    except RoverError as error:
         return end_with(name, EXIT_BAD_INPUT, str(error))
     except DemoError as error:
         return end_with(name, EXIT_FAILED, str(error))
