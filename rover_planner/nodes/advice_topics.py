@@ -17,8 +17,7 @@ from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.planning.answering.budget import BUSY, CANCELLED, Budget, QuestionStoppedError
 from rover_planner.planning.answering.judgement import PathJudgement
 from rover_planner.ros.deferred_service import Reply, serve_later
-from rover_planner.ros.guard import Guard
-from rover_planner.ros.handover import Handover
+from rover_planner.ros.guard import Guard, Handover
 from rover_planner.ros.qos import latched_qos
 
 NOTHING_REFUSED = "no path was refused yet; ask ~/can_traverse or ~/check_path first"

@@ -22,7 +22,7 @@ from rover_physics.errors import RoverError
 from rover_planner.nodes.programs import read_arguments
 from rover_planner.ros.guard import GuardedExecutor
 from rover_planner.ros.process import init_ros, warn_of_disk
-from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
+from rover_planner.shell.run_program import EXIT_BAD_INPUT, EXIT_OK
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 LOOK_FOR_STOP = 0.5

@@ -1,15 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Keeps a node alive: errors are refusals with a reason; an unexpected one is logged once."""
 
+import contextlib
 import functools
 import math
 import time
 import traceback
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 from rclpy.event_handler import EventHandler
+from rclpy.exceptions import InvalidHandle
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
@@ -59,6 +61,25 @@ class Guard:
             function()
         except Exception as error:
             self.report(getattr(function, "__name__", "a callback"), error)
+
+
+class Handover:
+    """Calls functions in the executor's thread, in order."""
+
+    def __init__(self, node: Node, guard: Guard):
+        self._waiting: deque[Callable[[], object]] = deque()
+        self._ready = node.create_guard_condition(self._call_all)
+        self._guard = guard
+
+    def call(self, function: Callable[[], object]) -> None:
+        """Call a function soon in the executor's thread; any thread may ask for it."""
+        self._waiting.append(function)
+        with contextlib.suppress(InvalidHandle):  # the node is gone, and with it who waits
+            self._ready.trigger()
+
+    def _call_all(self) -> None:
+        while self._waiting:
+            self._guard.call(self._waiting.popleft())
 
 
 def refuse_error(

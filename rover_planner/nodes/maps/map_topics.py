@@ -28,8 +28,7 @@ from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.frames import Frames
-from rover_planner.ros.guard import Guard
-from rover_planner.ros.handover import Handover
+from rover_planner.ros.guard import Guard, Handover
 from rover_planner.ros.logs import RepeatLog
 from rover_planner.ros.map_intake import CLOUD, GRID_MAP, MapIntake
 from rover_planner.ros.map_messages import LOOK_PERIOD, MapSettings, read_map

@@ -24,8 +24,7 @@ from rover_planner.planning.answering.budget import STOPPING, QuestionStoppedErr
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.hazard_map import HazardMap, HazardView
-from rover_planner.ros.guard import Guard
-from rover_planner.ros.handover import Handover
+from rover_planner.ros.guard import Guard, Handover
 from rover_planner.ros.lazy_publisher import LazyPublisher
 from rover_planner.ros.logs import TransitionLog
 
