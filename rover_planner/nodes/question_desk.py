@@ -157,7 +157,7 @@ class QuestionDesk:
 
     def _publish_progress(self, report: dict[str, Any]) -> None:
         text = (
-            "a way is found, a better one is searched" if report["found"] else "no way found yet"
+            "a path is found, a better one is searched" if report["found"] else "no path found yet"
         )
         name = self._service.settings.rover.name
         stamp = self._node.get_clock().now().to_msg()

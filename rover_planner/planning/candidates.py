@@ -54,7 +54,7 @@ class BumpedCurve(NamedTuple):
     """A Hermite cubic between two points plus a cosine bump; vectors (2,) in [m]."""
 
     start: np.ndarray
-    """Where it begins."""
+    """Start of the curve."""
     chord: np.ndarray
     """Vector from the start to the end of the curve."""
     m0: np.ndarray

@@ -128,7 +128,7 @@ class PushLoop(PIController):
 
 
 @dataclass(frozen=True, eq=False)
-class WheelMotion:
+class WheelRates:
     """Measured and wanted motion of the wheels, each in the direction in which it rolls."""
 
     rates: Floats
@@ -162,7 +162,7 @@ class StallDetector:
         self.climbs = False
         """True if the suspension has moved by CLIMBING_ANGLE with the last update."""
 
-    def update(self, motion: WheelMotion, duration: float) -> float:
+    def update(self, motion: WheelRates, duration: float) -> float:
         """Return the share of the speed servos, 0 to 1.
 
         Args:
@@ -232,7 +232,7 @@ class SlipControl:
         """Start as for a rover that moves."""
         self.detector = StallDetector()
 
-    def correct(self, torques: Floats, motion: WheelMotion, duration: float) -> Floats:
+    def correct(self, torques: Floats, motion: WheelRates, duration: float) -> Floats:
         """Return torques (6,) [N m] with slip control.
 
         Args:
@@ -250,7 +250,7 @@ class SlipControl:
         return torques + share * (servo - torques)
 
 
-def _find_slip(motion: WheelMotion) -> Floats:
+def _find_slip(motion: WheelRates) -> Floats:
     """Return the differences (6,) between the wheels' rates and those of rolling [rad/s].
 
     While one wheel climbs a steep face, the median rate is about zero and would call that wheel

@@ -59,7 +59,7 @@ def test_the_picture_of_a_plan_names_rover_and_map_and_shows_the_use_of_each_lim
     answer = find_path(question, LatticeSettings(budget=5.0, ends_at_first=True))
     draw_path(tmp_path / "plan.svg", question, answer, "hill.npz")
     text = (tmp_path / "plan.svg").read_text()
-    words = ("lsr1 on hill.npz: way of 2.0 m", "use of the limit, 1 at it", "margin")
+    words = ("lsr1 on hill.npz: path of 2.0 m", "use of the limit, 1 at it", "margin")
     assert [one for one in words if one not in text] == []
 
 

@@ -101,10 +101,6 @@ def test_blind_ground_is_refused_where_the_parameter_says_so():
     assert report["traversability_class"] == "passable"
     assert f"{100.0 * refused.ground.unobserved_share:.1f} %" in refused.reason
 
-    allowed = Drive(make_terrain(waves), footprint_margin=MARGIN, blind_ground="allow_footprint")
-    allowed.look()
-    assert allowed.service.answer(START, GOAL).traversable
-
 
 def test_ground_beyond_the_start_is_not_assumed_again():
     drive = Drive(make_terrain(waves), footprint_margin=MARGIN)

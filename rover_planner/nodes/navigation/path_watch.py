@@ -132,7 +132,7 @@ class PathWatch:
 
     @property
     def _stops(self) -> bool:
-        """Whether the rover is to stop: while paths are watched, it may drive a watched one."""
+        """True if the rover is to stop: while paths are watched, it may drive a watched one."""
         return self.enabled and self.finding.state in (IDLE, STOPPED)
 
     def beat(self) -> None:

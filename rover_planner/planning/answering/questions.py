@@ -47,13 +47,13 @@ class ReachQuery:
     target: NDArray[np.float64] | None = None
     """Target (3,) of the tip [m], map frame; None if there is none or it was refused."""
     target_refusal: str = "no target was received yet; publish one on ~/tool_target"
-    """Why there is no target: a later query must not use an outdated one."""
+    """Reason why there is no target: a later query must not use an outdated one."""
     force: NDArray[np.float64] | None = None
     """Force (3,) [N] on the tip, map frame; None if there is none."""
     moment: NDArray[np.float64] | None = None
     """Moment (3,) [N m] on the tip, map frame; None if there is none."""
     wrench_refusal: str = ""
-    """Why the last wrench was refused; queries are refused until a valid one arrives."""
+    """Reason why the last wrench was refused; queries are refused until a valid one arrives."""
 
     def ask(self, snapshot: Snapshot) -> ArmJudgement:
         """Judge the rover at the last pose of the last path with its tool at the target.
@@ -171,7 +171,7 @@ class BadQuestion(Question):
     """A request that cannot be read."""
 
     reason: str
-    """Why not."""
+    """Reason why not."""
 
     def judge(self, _snapshot: Snapshot) -> Any:
         """Return the refusal."""

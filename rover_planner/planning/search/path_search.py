@@ -201,10 +201,10 @@ class _PathFinder:
         where = self._describe_extent()
         if not progress.exhausted:
             budget = self._settings.budget
-            reason = f"no way within {where} was found in the budget of {budget:g} s; "
+            reason = f"no path within {where} was found in the budget of {budget:g} s; "
             return self._make_result(OUT_OF_TIME, f"{reason}there may be one", search)
         closed = find_closed_area(search)
-        reason = f"no way within {where}: {closed.describe()}"
+        reason = f"no path within {where}: {closed.describe()}"
         return self._make_result(NO_WAY, reason, search, closed=closed)
 
     def _warn(self) -> str:
@@ -237,16 +237,16 @@ class _PathFinder:
 
         It is a first path, long before the lattice is prepared.
         """
-        for pieces in (self._memory.recall_path(self._query), self._make_direct_way()):
+        for pieces in (self._memory.recall_path(self._query), self._make_direct_path()):
             judged = self._judge.judge_pieces(pieces)
             if not pieces or any(one.code for one in judged):
                 continue
-            way = [replace(one, cost=new.cost) for one, new in zip(pieces, judged, strict=True)]
-            poses = join_pieces(way)[0]
-            if self._progress.keep(way, self._judge.check(poses, stop_at_failure=True)):
+            path = [replace(one, cost=new.cost) for one, new in zip(pieces, judged, strict=True)]
+            poses = join_pieces(path)[0]
+            if self._progress.keep(path, self._judge.check(poses, stop_at_failure=True)):
                 return
 
-    def _make_direct_way(self) -> list[Piece]:
+    def _make_direct_path(self) -> list[Piece]:
         """Return the direct curve from start to goal as one piece, none if they are the same."""
         poses = generate_candidates(
             self._start,

@@ -7,20 +7,13 @@ import threading
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from rover_physics.numerics.kernel_cache import KernelCache, KernelMissingError, loading_only
 from rover_physics.numerics.kernels import kernel
-from rover_physics.numerics.threads import CALLS_IN_WORK, run_chunks, run_in_turn
+from rover_physics.numerics.threads import CALLS_IN_WORK, run_in_turn
 
 REPOSITORY = Path(__file__).resolve().parents[3]
-
-
-@kernel
-def write_number(numbers, part):
-    for chunk in range(part[0], part[1]):
-        numbers[chunk] += chunk
 
 
 def test_a_kernel_that_only_kernels_call_has_no_machine_code():
@@ -45,13 +38,6 @@ def test_where_kernels_are_only_loaded_a_missing_one_raises_an_error():
     with loading_only(), pytest.raises(KernelMissingError, match="unknown"):
         unknown(1.0)
     assert unknown(1.0) == 1.0
-
-
-@pytest.mark.parametrize("threads", [1, 3])
-def test_each_chunk_of_a_sweep_runs_once(threads):
-    numbers = np.zeros(20)
-    run_chunks(write_number, (numbers,), 20, threads)
-    assert numbers.tolist() == list(range(20))
 
 
 @pytest.mark.parametrize("threads", [1, 3])
