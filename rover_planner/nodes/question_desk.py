@@ -27,8 +27,7 @@ from rover_planner.planning.answering.server_health import ServerHealth
 from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.verdict_report import IdentityReport
-from rover_planner.ros.guard import Guard, refuse_error
-from rover_planner.ros.handover import Handover
+from rover_planner.ros.guard import Guard, Handover, refuse_error
 from rover_planner.ros.paced_sender import PacedSender
 from rover_planner.ros.qos import topic_qos
 

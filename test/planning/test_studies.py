@@ -13,9 +13,8 @@ from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.studies.objectives import climbs, tallest_step
 from rover_planner.studies.rover_values import find_key, vary
-from rover_planner.studies.runner import find_rover, run_study
+from rover_planner.studies.runner import describe_ties, find_rover, run_study
 from rover_planner.studies.study_file import name_thing, study_from_dict
-from rover_planner.studies.summary import describe_ties
 
 LSR1 = load_rover("lsr1")
 PIVOT_X = {"name": "suspension.bogie_pivot.x", "from": 0.10, "to": 0.30, "count": 9}

@@ -35,8 +35,7 @@ from rover_planner.planning.navigation.monitor import (
     rehearse,
 )
 from rover_planner.planning.navigation.watched_path import WatchedPath
-from rover_planner.ros.guard import Guard
-from rover_planner.ros.handover import Handover
+from rover_planner.ros.guard import Guard, Handover
 from rover_planner.ros.qos import latched_qos
 
 PERIOD = 0.1
