@@ -34,11 +34,9 @@ LATENESS = ("waiting for ", " stale: none for ", "updates came too late", "the c
 class DrivenRover(Node):
     """A rover whose wheels turn at a constant rate, whatever the torques are."""
 
-    def __init__(
-        self, context: Context, namespace: str = "", rate: float = RATE, **arguments: Any
-    ):
-        """Send at `rate` [Hz] from now on; stamps are zero until `stamp` is replaced."""
-        super().__init__("rover", context=context, namespace=namespace, **arguments)
+    def __init__(self, context: Context):
+        """Send at RATE [Hz] from now on; stamps are zero until `stamp` is replaced."""
+        super().__init__("rover", context=context)
         self.joints = JointState(name=list(JOINTS))
         self.joints.position = [0.0] * len(JOINTS)
         self.joints.velocity = [0.2 if name in WHEEL_JOINTS else 0.0 for name in JOINTS]
@@ -47,8 +45,6 @@ class DrivenRover(Node):
         self.speed = 0.03
         self.stamp: Callable[[], int] = lambda: 0
         """Returns a header stamp [ns]."""
-        self.silent: set[str] = set()
-        """Topics that are not sent."""
         self.commands: list[tuple[float, float, float]] = []
         """Time of arrival [s], largest magnitude and sum of each command's torques [N m]."""
         self.command_stamps: list[int] = []
@@ -96,8 +92,7 @@ class DrivenRover(Node):
         twist.linear.x = self.speed
         messages = {"joint_states": self.joints, "imu": self.imu, "cmd_vel": self.twist}
         for name, sender in self._senders.items():
-            if name not in self.silent:
-                sender.publish(messages[name])
+            sender.publish(messages[name])
 
     def _hear_command(self, message: Float64MultiArray, info: dict[str, int]) -> None:
         self.command_stamps.append(info["source_timestamp"])

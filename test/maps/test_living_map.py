@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics.terrain.grid import Terrain
+from rover_physics import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.maps.changes import find_changes, find_overlap, have_same_layers
 from rover_planner.maps.layers import LOADED, UNKNOWN, lay_onto

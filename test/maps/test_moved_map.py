@@ -6,8 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from rover_physics import load_rover
-from rover_physics.terrain.grid import Terrain
+from rover_physics import Terrain, load_rover
 from rover_planner.errors import PlanningError
 from rover_planner.maps.cells import CellGrid
 from rover_planner.maps.layers import lay_onto

@@ -15,6 +15,7 @@ from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.results.grids import terrain_to_occupancy_grid
 from msg_adapters.sensing import BASE_FRAME
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
+from rover_physics.errors import RoverError
 from rover_physics.files.validation import show_file
 from rover_physics.terrain.grid import load_terrain
 from rover_planner.maps.living_map import MapSnapshot
@@ -27,8 +28,7 @@ from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.frames import Frames
-from rover_planner.ros.guard import INPUT_ERRORS, Guard
-from rover_planner.ros.handover import Handover
+from rover_planner.ros.guard import Guard, Handover
 from rover_planner.ros.logs import RepeatLog
 from rover_planner.ros.map_intake import CLOUD, GRID_MAP, MapIntake
 from rover_planner.ros.map_messages import LOOK_PERIOD, MapSettings, read_map
@@ -165,7 +165,7 @@ class MapTopics:
         try:
             terrain = open_map(url, map_limits(self._values))
             snapshot = self._keeper.load(terrain, self._now(), self._service.standing())
-        except INPUT_ERRORS as error:
+        except RoverError as error:
             self._node.get_logger().error(f"load_map: {error}")
             missing = isinstance(error, MapFileError)
             response.result = (

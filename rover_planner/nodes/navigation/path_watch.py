@@ -35,8 +35,7 @@ from rover_planner.planning.navigation.monitor import (
     rehearse,
 )
 from rover_planner.planning.navigation.watched_path import WatchedPath
-from rover_planner.ros.guard import Guard
-from rover_planner.ros.handover import Handover
+from rover_planner.ros.guard import Guard, Handover
 from rover_planner.ros.qos import latched_qos
 
 PERIOD = 0.1
@@ -133,7 +132,7 @@ class PathWatch:
 
     @property
     def _stops(self) -> bool:
-        """Whether the rover is to stop: while paths are watched, it may drive a watched one."""
+        """True if the rover is to stop: while paths are watched, it may drive a watched one."""
         return self.enabled and self.finding.state in (IDLE, STOPPED)
 
     def beat(self) -> None:

@@ -44,7 +44,7 @@ class ServiceSettings:
     max_map_age: float
     """Age from which a map is too old to be used [s]; 0 allows any age."""
     learn: str = SUGGEST
-    """What a learned friction does: OFF, SUGGEST or USE."""
+    """Use of a learned friction: OFF, SUGGEST or USE."""
     unobserved_ground: str = ALLOW
     """Rule for paths over never seen ground under the belly, one of UNOBSERVED_GROUND."""
 

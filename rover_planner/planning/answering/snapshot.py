@@ -64,9 +64,9 @@ class Snapshot:
     """(3,) x, y [m] and yaw [rad] of the body, map frame, measured just now together with the
     suspension; None if it is not known."""
     stale_map: str = ""
-    """Why the map is too old to be used; empty if it is not."""
+    """Reason why the map is too old to be used; empty if it is not."""
     ground: LearnedGround | None = None
-    """What was learned of the ground; the settings assume it if they are to."""
+    """The learned ground; the settings assume it if they are to."""
     marked: MarkedPlaces = NONE_MARKED
     """Places that are impassable."""
 

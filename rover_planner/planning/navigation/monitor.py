@@ -71,9 +71,9 @@ class Finding:
     path_hash: str = ""
     """Hash of the watched path."""
     judgement: PathJudgement | None = None
-    """Why the rover is to stop, or the last judgement on the rest of the path."""
+    """Reason to stop, or the last judgement on the rest of the path."""
     place: Place | None = None
-    """Where the rover is on the path."""
+    """Place of the rover on the path."""
     judged: int = 0
     """Number of times that the rest of this path was judged."""
     mismatch: dict[str, float] = field(default_factory=dict)

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
 from rover_planner.planning.angles import wrap
+from rover_planner.planning.candidates import turn_and_drive
 from rover_planner.planning.dubins import dubins_lengths, dubins_paths
 from rover_planner.planning.path_query import Pose
-from rover_planner.planning.point_turn import turn_and_drive
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.nodes import HEADINGS, Nodes, nearest_heading
 from rover_planner.planning.search.primitives import PRICES, Gear, Piece

@@ -189,7 +189,7 @@ class _PathFinder:
                 )
         progress = self._progress
         if not self._to_frontier:
-            self._try_known_ways()
+            self._try_known_paths()
         if self._settings.ends_at_first and progress.best is not None:
             self._memory.keep_path(self._query, progress.pieces)
             return self._make_result(FOUND, "", path=(progress.best, progress.cost))
@@ -201,10 +201,10 @@ class _PathFinder:
         where = self._describe_extent()
         if not progress.exhausted:
             budget = self._settings.budget
-            reason = f"no way within {where} was found in the budget of {budget:g} s; "
+            reason = f"no path within {where} was found in the budget of {budget:g} s; "
             return self._make_result(OUT_OF_TIME, f"{reason}there may be one", search)
         closed = find_closed_area(search)
-        reason = f"no way within {where}: {closed.describe()}"
+        reason = f"no path within {where}: {closed.describe()}"
         return self._make_result(NO_WAY, reason, search, closed=closed)
 
     def _warn(self) -> str:
@@ -232,12 +232,12 @@ class _PathFinder:
         cell = self._nodes.cell
         return f"the {columns * cell:.0f} m x {rows * cell:.0f} m around start and goal"
 
-    def _try_known_ways(self) -> None:
+    def _try_known_paths(self) -> None:
         """Take the last path between the same ends, or else the direct curve, if it passes.
 
         It is a first path, long before the lattice is prepared.
         """
-        for pieces in (self._memory.recall_path(self._query), self._make_direct_way()):
+        for pieces in (self._memory.recall_path(self._query), self._make_direct_path()):
             if not pieces:
                 continue
             path = self._judge.check(join_pieces(pieces)[0], stop_at_failure=True)
@@ -258,7 +258,7 @@ class _PathFinder:
         costs = dict(zip(new, (one.cost for one in judged), strict=True))
         return [replace(one, cost=costs.get(k, one.cost)) for k, one in enumerate(pieces)]
 
-    def _make_direct_way(self) -> list[Piece]:
+    def _make_direct_path(self) -> list[Piece]:
         """Return the direct curve from start to goal as one piece, none if they are the same."""
         poses = generate_candidates(
             self._start,

@@ -7,17 +7,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash
 from msg_adapters.imu import ImuMounting, imu_to_attitude
-from msg_adapters.joints import JointNames, read_joint_map
+from msg_adapters.joints import read_joint_map
 from msg_adapters.odometry import odometry_to_pose, odometry_to_tilt
 from msg_adapters.paths import path_to_poses
 from msg_adapters.sensing import BASE_FRAME
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.terrain.grid import Terrain, load_terrain
-from rover_planner.errors import PlanningError
 from rover_planner.maps.known_map import stamp_text
 from rover_planner.maps.living_map import MapSnapshot
 from rover_planner.maps.map_keeper import MapKeeper
@@ -114,7 +112,7 @@ class Replay:
         self._time = 0
         self.frames = Frames(values, lambda: self._time, sensor_poses(values))
         """Places of frames and sensors on the map."""
-        self.joint_names = _read_joint_map(values, self._service.all_joint_names)
+        self.joint_names = read_joint_map(values.joint_map, self._service.all_joint_names)
         """Names of the joints in messages."""
         self._imu = ImuMounting(values.imu_frame or BASE_FRAME, values.imu_mounting)
         self._take: dict[str, Callable[[Recorded], Iterator[ReplayAnswer]]] = {
@@ -132,7 +130,7 @@ class Replay:
         self._time = recorded.stamp
         try:
             yield from self._take[recorded.kind](recorded)
-        except (MessageError, PlanningError, RoverError) as error:
+        except RoverError as error:
             self.refused[recorded.kind] = self.refused.get(recorded.kind, 0) + 1
             if len(self.notes) < MAX_NOTES:
                 self.notes.append(f"{recorded.topic} at {stamp_text(recorded.stamp)}: {error}")
@@ -244,16 +242,8 @@ class Replay:
         number = self._register.next_number()
         try:
             judgement = ask(now).complete()
-        except (PlanningError, RoverError) as error:
+        except RoverError as error:
             judgement = refusal("bad_request", str(error))
         identity = self._register.identify(number, kind, "", now)
         identity = replace(identity, path_hash=now.path.hash, path_stamp=now.path.stamp)
         return ReplayAnswer(kind, stamp, judgement, identity, now.terrain)
-
-
-def _read_joint_map(values: TraverseServerParameters, known: tuple[str, ...]) -> JointNames:
-    """Return the joint map of the parameters; a wrong one is bad input, not a bad message."""
-    try:
-        return read_joint_map(values.joint_map, known)
-    except MessageError as error:
-        raise PlanningError(str(error)) from None

@@ -8,7 +8,8 @@ from typing import Annotated, Any
 
 import pytest
 
-from rover_physics.errors import RoverError, RoverFileError
+from rover_physics import Rover, RoverError
+from rover_physics.errors import RoverFileError
 from rover_physics.files.rules import (
     Keys,
     ListOfMappings,
@@ -20,7 +21,6 @@ from rover_physics.files.rules import (
     number,
 )
 from rover_physics.files.validation import describe, errors_of, find_unit, read_as, show_key
-from rover_physics.rover.model import Rover
 
 
 @dataclass(frozen=True)

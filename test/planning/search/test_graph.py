@@ -5,7 +5,7 @@ import numpy as np
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
-from rover_physics.rover.rover_file import load_rover
+from rover_physics import load_rover
 from rover_planner.planning.search.difficulty import NOT_LOOKED, Difficulty, Slopes
 from rover_planner.planning.search.edges import FAILS, PASSES, Edges
 from rover_planner.planning.search.graph import Seeds, ShortestPaths, edge_cost
