@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A kernel is compiled once with all that it calls, and can be called from Python as well."""
+"""Calls of kernels run in threads; kernels are made at the top of their modules."""
 
 import ast
 import functools
@@ -9,35 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from rover_physics.numerics.kernel_cache import KernelCache, KernelMissingError, loading_only
-from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.threads import CALLS_IN_WORK, run_in_turn
 
 REPOSITORY = Path(__file__).resolve().parents[3]
-
-
-def test_a_kernel_that_only_kernels_call_has_no_machine_code():
-    @kernel
-    def inner(x):
-        return 2.0 * x
-
-    @kernel
-    def outer(x):
-        return inner(x) + 1.0
-
-    assert outer(3.0) == 7.0
-    assert not inner.signatures and len(outer.signatures) == 1
-
-
-def test_where_kernels_are_only_loaded_a_missing_one_raises_an_error():
-    @kernel
-    def unknown(x):
-        return x
-
-    KernelCache(unknown.py_func).flush()  # an earlier run has kept it on disk
-    with loading_only(), pytest.raises(KernelMissingError, match="unknown"):
-        unknown(1.0)
-    assert unknown(1.0) == 1.0
 
 
 @pytest.mark.parametrize("threads", [1, 3])
