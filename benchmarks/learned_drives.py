@@ -38,7 +38,7 @@ from support.waiting import wait_until
 
 FRICTION = 0.45
 """Friction of the ground; rover, planner and controller are told 0.8."""
-SIZE, ROUGHNESS, ROCK_COVER = 12.0, 0.06, 0.05
+SIZE, ROUGHNESS, ROCK_COVER = 12.0, 0.1, 0.05
 """Size of a field [m], RMS height difference of its relief over 1 m [m], its cover by rocks."""
 DISTANCE = (2.5, 3.5)
 """Distances of goals [m]."""
@@ -47,7 +47,7 @@ SPEED = 0.08
 PATIENCE = 240.0
 """Time after which a drive has not arrived, of the simulator [s]."""
 SLACK = {
-    "traverse_server": {"search_budget": 10.0, "time_budget": 30.0},
+    "traverse_server": {"search_budget": 4.0, "time_budget": 8.0},
     "simulated_traction_controller": PATIENT | {"clock_timeout": 1.0},
 }
 """Parameters that leave the programs time on a busy machine."""

@@ -136,7 +136,7 @@ class GroundLearner:
         """Start without measurements; `told` is the friction without any (default: rover's)."""
         self._rover, wheel = rover, rover.wheel
         self._sense = ContactSense(rover, terrain)
-        self._windows = SlipWindows(wheel.radius)
+        self._windows = SlipWindows(wheel.radius, wheel.width)
         told = rover.friction if told is None else told
         self._whole = FrictionFilter(told)
         self._sides = {side: FrictionFilter(told) for side in SIDES}
@@ -273,7 +273,7 @@ class GroundLearner:
             np.maximum(SLIP_SHARE * np.abs(window.rolling), CERTAIN * window.deviation),
             SLIP_SPEED * self._rover.nominal_speed,
         )
-        return np.asarray(window.slip_speed > least)
+        return np.asarray(window.slip_speed > least + window.scrub)
 
     def _learn_friction(
         self, window: SlipWindow, slips: Flags, grips: Flags, elapsed: float
