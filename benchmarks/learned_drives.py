@@ -39,8 +39,10 @@ from support.waiting import wait_until
 
 FRICTION = 0.45
 """Friction of the ground; rover, planner and controller are told 0.8."""
-SIZE, ROUGHNESS, ROCK_COVER = 12.0, 0.1, 0.05
-"""Size of a field [m], RMS height difference of its relief over 1 m [m], its cover by rocks."""
+SIZE, ROCK_COVER = 12.0, 0.05
+"""Size of a field [m], and its cover by rocks."""
+ROUGHNESS = {False: 0.1, True: 0.05}
+"""RMS height difference of the relief over 1 m, on level fields and on slopes [m]."""
 DISTANCE = (2.5, 3.5)
 """Distances of goals [m]."""
 SPEED = 0.08
@@ -107,7 +109,11 @@ def draw_drive(number: int, slope: float) -> tuple[Terrain, np.ndarray, np.ndarr
     The field rises along x by a slope [deg], and goals on a slope are up it.
     """
     field = make_mars_terrain(
-        1 + number // 5, SIZE, roughness=ROUGHNESS, rock_cover=ROCK_COVER, crater_density=0.0
+        1 + number // 5,
+        SIZE,
+        roughness=ROUGHNESS[slope > 0.0],
+        rock_cover=ROCK_COVER,
+        crater_density=0.0,
     )
     x = np.linspace(*field.bounds[:2], field.elevation.shape[1])
     field = replace(field, elevation=field.elevation + np.tan(np.radians(slope)) * x)
@@ -152,7 +158,9 @@ def drive(number: int, learn: str, slope: float) -> dict[str, Any]:
             end = f"not there after {PATIENCE:.0f} s"
         rows, learned = np.array(ear.rows), ear.friction
     named = [event["event"] for event in events]
+    reasons = [event["answer"]["reason"] for event in events if event["event"] == "answer"]
     drove = "driving" in named or not events
+    end = end if drove else "".join(reasons)
     outcome = "arrived" if "arrived" in named else "no way on" if "no way on" in end else "stuck"
     away = np.hypot(*(rows[-1, 1:3] - goal[:2]))
     return {

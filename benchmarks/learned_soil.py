@@ -6,6 +6,7 @@ Run from the repository: python -m benchmarks.learned_soil [--grounds N] (extra 
 Each soil that yields is the truth in turn, and each other one is what the learner is told.
 """
 
+import itertools
 from collections import defaultdict
 from typing import Annotated
 
@@ -15,6 +16,7 @@ import typer
 from benchmarks.learning import add_noise
 from benchmarks.measure import print_table
 from rover_physics import Terrain, load_rover
+from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.soil_file import BEKKER_WONG_MODEL, load_soils
 from rover_physics.traction.balance import BalanceWriter
 from rover_planner.learning.ground_learner import GroundLearner
@@ -43,41 +45,36 @@ def quantities(estimate: SoilEstimate) -> dict[str, tuple[float, float]]:
     } | own
 
 
-def learn(truth: str, told: str, seed: int) -> SoilEstimate | None:
-    """Return what a drive tells; None where the rover did not get on."""
-    rover, ground = load_rover("lsr1"), make_ground(seed)
-    rows = drive_over_soil(rover, ground, truth, SECONDS)
-    if len(rows) < 300:
-        return None
-    learner = GroundLearner(rover, ground, soil=told)
+def learn(rows: Floats, ground: Terrain, told: str, seed: int) -> SoilEstimate:
+    """Return what the rows of a drive tell, with noise."""
+    learner = GroundLearner(load_rover("lsr1"), ground, soil=told)
     for row in add_noise(rows, "usual", seed):
         learner.take(row)
-    return learner.estimate.soil
+    soil = learner.estimate.soil
+    assert soil is not None
+    return soil
 
 
 def main(grounds: Annotated[int, typer.Option(help="Number of grounds.")] = 3) -> None:
     """Learn soils and print errors and coverage."""
     soft = [name for name, soil in load_soils().items() if soil.model == BEKKER_WONG_MODEL]
-    weight = BalanceWriter(load_rover("lsr1")).weight
-    drives, found = 0, defaultdict[str, list[tuple[float, float, bool]]](list)
-    for truth in soft:
-        true = quantities(SoilFit(load_rover("lsr1"), weight, truth).find_estimate())
-        for told in soft:
-            for seed in range(grounds) if told != truth else ():
-                estimate = learn(truth, told, seed)
-                if estimate is None:
-                    continue
-                drives += 1
-                for name, (mean, std) in quantities(estimate).items():
-                    miss, value = abs(mean - true[name][0]), true[name][0]
-                    found[name].append((miss / value, miss / std, name in estimate.told_apart))
+    rover, found = load_rover("lsr1"), defaultdict[str, list[tuple[float, float, bool]]](list)
+    for truth, seed in itertools.product(soft, range(grounds)):
+        ground = make_ground(seed)
+        rows = drive_over_soil(rover, ground, truth, SECONDS)
+        true = quantities(SoilFit(rover, BalanceWriter(rover).weight, truth).find_estimate())
+        for told in set(soft) - {truth}:
+            estimate = learn(rows, ground, told, seed)
+            for name, (mean, std) in quantities(estimate).items():
+                miss, value = abs(mean - true[name][0]), true[name][0]
+                found[name].append((miss / value, miss / std, name in estimate.told_apart))
     table = []
-    for name, rows in found.items():
-        errors, scores, told = np.array(rows, float).T
-        shares = np.median(errors), np.mean(scores < 1.96), told.mean()
+    for name, own in found.items():
+        errors, scores, apart = np.array(own, float).T
+        shares = np.median(errors), np.mean(scores < 1.96), apart.mean()
         table.append((name, *(f"{share:.0%}" for share in shares)))
     headings = "quantity", "median error", "within 1.96 std", "told apart"
-    print_table(f"{drives} drives over soil that another one was told of", headings, table)
+    print_table("Drives over soil, where another one was told", headings, table)
 
 
 if __name__ == "__main__":

@@ -96,6 +96,7 @@ def test_force_sensors_replace_loads_and_tractions(folder):
         (lambda text: text.splitlines()[0], "rows"),
         (lambda text: text + text[text.index("\n") + 1 :], "time goes back"),
         (lambda text: "", "time"),
+        (lambda text: text.replace("rear_right_steering", "time"), "two columns time"),
     ],
 )
 def test_a_bad_log_is_refused_in_one_line(folder, capfd, spoil, word):
