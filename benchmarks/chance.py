@@ -16,7 +16,14 @@ import numpy as np
 import typer
 
 from benchmarks.measure import print_table
-from support.chance_paths import CHANCES, HELD_OUT, TOLD, DrivenPath, find_chance, read_driven_paths
+from support.chance_paths import (
+    CHANCES,
+    HELD_OUT,
+    TOLD,
+    DrivenPath,
+    find_chance,
+    read_driven_paths,
+)
 
 MODEL_STDS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 """Model errors among which the calibration chooses."""

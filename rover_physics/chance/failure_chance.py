@@ -74,7 +74,7 @@ def find_failure_chance(
         enough: Chance above which it need not be known: the samples end there, and those that are
             left count as if they passed.
     """
-    n = len(swept.prediction.poses)
+    n, first = len(swept.prediction.poses), FIRST if on_path else SAMPLES
     rows = _all_rows(swept)
     settled = rows.results["status"] == PoseStatus.SETTLED
     samples = sort_by_strength(draw_samples(model.rover.uncertainty, SAMPLES))
@@ -110,8 +110,8 @@ def find_failure_chance(
         count = int(failed.any(axis=1).sum())
         if count > enough * SAMPLES:
             break
-        if count == k + 1 == FIRST:
-            failed = failed[:FIRST]
+        if count == k + 1 == first:
+            failed = failed[:first]
             break
     at = failed.mean(axis=0)
     place = int(at.argmax())
