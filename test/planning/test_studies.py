@@ -8,11 +8,10 @@ import pytest
 
 from rover_physics import load_rover
 from rover_physics.errors import RoverFileError
-from rover_physics.rover.rover_file import rover_to_dict
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.studies.objectives import climbs, tallest_step
-from rover_planner.studies.rover_values import find_key, vary
+from rover_planner.studies.rover_values import vary
 from rover_planner.studies.runner import describe_ties, find_rover, run_study
 from rover_planner.studies.study_file import name_thing, study_from_dict
 
@@ -154,24 +153,6 @@ def test_an_impossible_study_is_refused(changes, text):
     objective = {"objective": "worst_utilisation"} if "drives" in changes else {}
     with pytest.raises((PlanningError, RoverFileError), match=text):
         _ = run_study(study(**objective, **changes)).best
-
-
-def test_every_number_of_a_rover_has_a_name_and_a_unit():
-    contents = rover_to_dict(LSR1)
-    for name, unit, value in (
-        ("wheel.radius", "m", 0.1),
-        ("suspension.wheels.front.x", "m", 0.4),
-        ("masses.body.mass", "kg", 5.0),
-        ("manipulator.stowed.1", "rad", -0.2),
-        ("friction", "", 0.8),
-    ):
-        key, found = find_key(contents, name)
-        assert found == unit
-        inner = contents
-        for part in key:
-            inner = inner[part]
-        assert inner == value
-        assert vary(LSR1, {key: value}) == LSR1
 
 
 def test_the_command_writes_a_table_and_a_picture(tmp_path, capsys):
