@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 from rover_physics.bounds.path import SIGMAS
 from rover_physics.names import EQUAL, TORQUE_POLICIES
-from rover_planner.maps.living_map import MERGE_RULES, NEWEST
-from rover_planner.maps.map_keeper import AUTO as AUTO_UPDATES
-from rover_planner.maps.map_keeper import MAP_UPDATES
+from rover_planner.maps.living_map import AUTO as AUTO_UPDATES
+from rover_planner.maps.living_map import MAP_UPDATES, MERGE_RULES, NEWEST
 from rover_planner.maps.unobserved_ground import ALLOW, UNOBSERVED_GROUND
 from rover_planner.parameters import shared
 from rover_planner.parameters.table import ParameterError, ParameterTable, parameter
