@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A system clock that is stepped for some processes alone, by a library that they load first.
 
-Only what reads the system clock is changed. Sleeps and timed waits stay those of the machine:
-libfaketime changes them too, so that sleeps fail and answers are lost, which no clock step does.
+What reads the system clock reads the stepped one, and deadlines on the system clock, by which
+Fast DDS waits, are on it too. All else stays: libfaketime lets sleeps of Python fail and answers
+of services get lost, which no step of a clock does.
 """
 
 import os
@@ -15,12 +16,15 @@ _SOURCE = r"""
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <fcntl.h>
+#include <pthread.h>
+#include <semaphore.h>
 #include <stdlib.h>
 #include <sys/mman.h>
 #include <sys/time.h>
 #include <time.h>
 
-static volatile const long *ahead;  /* s */
+static const long none;
+static volatile const long *ahead = &none;  /* s */
 
 __attribute__((constructor)) static void open_file(void) {
   ahead = mmap(0, sizeof *ahead, PROT_READ, MAP_SHARED, open(getenv("CLOCK_AHEAD"), O_RDONLY), 0);
@@ -30,7 +34,7 @@ int clock_gettime(clockid_t clock, struct timespec *now) {
   static int (*read_clock)(clockid_t, struct timespec *);
   if (!read_clock) *(void **)&read_clock = dlsym(RTLD_NEXT, "clock_gettime");
   int result = read_clock(clock, now);
-  if (ahead && (clock == CLOCK_REALTIME || clock == CLOCK_REALTIME_COARSE)) now->tv_sec += *ahead;
+  if (clock == CLOCK_REALTIME || clock == CLOCK_REALTIME_COARSE) now->tv_sec += *ahead;
   return result;
 }
 
@@ -47,11 +51,38 @@ time_t time(time_t *now) {
   if (now) *now = exact.tv_sec;
   return exact.tv_sec;
 }
+
+static struct timespec on_machine(const struct timespec *until) {
+  struct timespec real = *until;
+  real.tv_sec -= *ahead;
+  return real;
+}
+
+int pthread_cond_timedwait(pthread_cond_t *condition, pthread_mutex_t *mutex,
+                           const struct timespec *until) {
+  int is_steady = condition->__data.__wrefs & 2;  /* as glibc marks CLOCK_MONOTONIC */
+  struct timespec real = is_steady ? *until : on_machine(until);
+  clockid_t clock = is_steady ? CLOCK_MONOTONIC : CLOCK_REALTIME;
+  return pthread_cond_clockwait(condition, mutex, clock, &real);
+}
+
+int pthread_mutex_timedlock(pthread_mutex_t *mutex, const struct timespec *until) {
+  struct timespec real = on_machine(until);
+  return pthread_mutex_clocklock(mutex, CLOCK_REALTIME, &real);
+}
+
+int sem_timedwait(sem_t *semaphore, const struct timespec *until) {
+  struct timespec real = on_machine(until);
+  return sem_clockwait(semaphore, CLOCK_REALTIME, &real);
+}
 """
 
 
 class SteppedClock:
-    """The clock of the processes that are started with its environment; needs a C compiler."""
+    """The clock of the processes that are started with its environment.
+
+    Needs glibc 2.30 or newer and a C compiler.
+    """
 
     def __init__(self, folder: Path):
         """Build the library in a folder."""
