@@ -14,7 +14,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from rover_physics.errors import RoverFileError
 from rover_physics.files.user_file import write_file
 from rover_physics.files.validation import errors_of, show_file
 from rover_planner.errors import PlanningError
@@ -100,11 +99,8 @@ def save_figure(path: Path, figure: Figure) -> None:
     check_picture(path)
     picture = io.BytesIO()
     figure.savefig(picture, dpi=130, format=path.suffix[1:].lower())
-    try:
-        with errors_of(path):
-            write_file(path, picture.getvalue())
-    except RoverFileError as error:
-        raise PlanningError(str(error)) from None
+    with errors_of(path, PlanningError):
+        write_file(path, picture.getvalue())
 
 
 def hill_shade(elevation: NDArray[np.float64], resolution: float) -> NDArray[np.float64]:

@@ -10,14 +10,14 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from msg_adapters.results.diagnostics import to_json
+from rover_physics.errors import RoverError
 from rover_planner.advice.advise import Advice, grow_within
 from rover_planner.advice.case import ACCEPTED_CHANCE, Case
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.planning.answering.budget import BUSY, CANCELLED, Budget, QuestionStoppedError
 from rover_planner.planning.answering.judgement import PathJudgement
 from rover_planner.ros.deferred_service import Reply, serve_later
-from rover_planner.ros.guard import INPUT_ERRORS, Guard
-from rover_planner.ros.handover import Handover
+from rover_planner.ros.guard import Guard, Handover
 from rover_planner.ros.qos import latched_qos
 
 NOTHING_REFUSED = "no path was refused yet; ask ~/can_traverse or ~/check_path first"
@@ -77,7 +77,7 @@ class AdviceTopics:
             self._handover.call(partial(self._answer, told, response, reply))
         except QuestionStoppedError as error:
             self._hand_refusal(error.code, str(error), response, reply)
-        except INPUT_ERRORS as error:
+        except RoverError as error:
             self._hand_refusal("bad_request", str(error), response, reply)
         except Exception as error:
             self._guard.report("advise", error)

@@ -19,6 +19,7 @@ from rclpy.node import Node
 from msg_adapters.identity import path_hash
 from msg_adapters.paths import path_to_poses
 from msg_adapters.stamps import stamp_to_ns
+from rover_physics.errors import RoverError
 from rover_planner.maps.known_map import stamp_text
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.planning.answering.budget import CANCELLED, STOPPING
@@ -28,7 +29,6 @@ from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.path_geometry import next_given_poses
 from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.deferred_service import Reply, serve_later
-from rover_planner.ros.guard import INPUT_ERRORS
 from rover_planner.ros.optional_types import find_type
 
 Publish = Callable[[PathJudgement, IdentityReport], Any]
@@ -75,7 +75,7 @@ class PathValidity:
         try:
             poses = path_to_poses(self._localise(path), self._frame)
             question = PathCheck(service, about, GivenPath(poses, "", about, stamp))
-        except INPUT_ERRORS as error:
+        except RoverError as error:
             question = BadQuestion(service, about, str(error))
 
         def send(answer: Answer) -> None:

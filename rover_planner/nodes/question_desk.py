@@ -27,8 +27,7 @@ from rover_planner.planning.answering.server_health import ServerHealth
 from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.verdict_report import IdentityReport
-from rover_planner.ros.guard import Guard, refuse_error
-from rover_planner.ros.handover import Handover
+from rover_planner.ros.guard import Guard, Handover, refuse_error
 from rover_planner.ros.paced_sender import PacedSender
 from rover_planner.ros.qos import topic_qos
 
@@ -158,7 +157,7 @@ class QuestionDesk:
 
     def _publish_progress(self, report: dict[str, Any]) -> None:
         text = (
-            "a way is found, a better one is searched" if report["found"] else "no way found yet"
+            "a path is found, a better one is searched" if report["found"] else "no path found yet"
         )
         name = self._service.settings.rover.name
         stamp = self._node.get_clock().now().to_msg()

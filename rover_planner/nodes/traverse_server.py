@@ -30,6 +30,7 @@ from msg_adapters.results.diagnostics import (
     to_json,
 )
 from msg_adapters.stamps import stamp_to_ns
+from rover_physics.errors import RoverError
 from rover_physics.numerics.kernel_cache import kernel_cache_note
 from rover_physics.warm_up import EXACT, UNCERTAIN
 from rover_planner.maps.known_map import stamp_text
@@ -72,7 +73,7 @@ from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.deferred_work import DeferredWork
 from rover_planner.ros.frames import NodeFrames, is_empty
-from rover_planner.ros.guard import INPUT_ERRORS, Guard
+from rover_planner.ros.guard import Guard
 from rover_planner.ros.map_intake import read_message
 from rover_planner.ros.polled_topics import PolledTopics
 from rover_planner.ros.qos import polled_qos, replace_reliability, topic_qos
@@ -222,7 +223,7 @@ class TraverseServer(Node):
             self.frames.take_odometry(here)
             self.service.take_pose(pose[[0, 1, 3]], body)
             self._maps.look_under_rover()
-        except INPUT_ERRORS as error:
+        except RoverError as error:
             self.get_logger().warning(
                 f"odometry not used, the suspension is not compared: {error}", once=True
             )
@@ -232,7 +233,7 @@ class TraverseServer(Node):
         now = self.get_clock().now().nanoseconds
         try:
             ground = parse_learned(message.data, "~/ground_estimate", stamp_text(now))
-        except INPUT_ERRORS as error:
+        except RoverError as error:
             self.get_logger().warning(f"not used: {error}", throttle_duration_sec=5.0)
             return
         self.service.take_ground(ground)
@@ -241,7 +242,7 @@ class TraverseServer(Node):
         """Take a place that is impassable from now on: JSON with x, y, radius, reason, date."""
         try:
             place = parse_place(message.data, "~/mark_place")
-        except INPUT_ERRORS as error:
+        except RoverError as error:
             self.get_logger().warning(f"not used: {error}")
             return
         self.service.mark(place)
@@ -264,7 +265,7 @@ class TraverseServer(Node):
             about = path_hash(path), stamp_text(stamp_to_ns(path.header.stamp))
             there = self.frames.localise_path(path)
             self.service.take_path(path_to_poses(there, self._values.map_frame), *about)
-        except INPUT_ERRORS as error:
+        except RoverError as error:
             self.service.refuse_path(str(error), *about)
             self.get_logger().error(f"~/path refused: {error}")
 
@@ -309,7 +310,7 @@ class TraverseServer(Node):
         about = plan_request_hash(begin, end, tolerance)
         try:
             return PathQuestion(service, about, *self._read_ends(begin, end), tolerance)
-        except INPUT_ERRORS as error:
+        except RoverError as error:
             return BadQuestion(service, about, str(error))
 
     def _read_ends(self, begin: PoseStamped, end: PoseStamped) -> tuple[Pose, Pose]:
@@ -327,7 +328,7 @@ class TraverseServer(Node):
         """Return the pose (3,) of the body by /tf, else by odometry of just now."""
         try:
             here = self.frames.find_here()
-        except INPUT_ERRORS:  # it is stale
+        except RoverError:  # it is stale
             return None
         return self.service.fresh_pose(MAX_POSE_AGE) if here is None else here
 

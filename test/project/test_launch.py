@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 import yaml
 
+from rover_physics import load_rover
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_physics.rover.rover_file import load_rover, preset_names
+from rover_physics.rover.rover_file import preset_names
 from rover_physics.rover.steering_joints import steering_joints
 from rover_physics.rover.urdf.write_urdf import write_urdf
 from rover_planner.nodes.programs import PROGRAMS

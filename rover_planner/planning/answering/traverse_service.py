@@ -176,7 +176,7 @@ class TraverseService:
         """
         now = time.monotonic()
         standing = self._measurements.pose_with_suspension(now)
-        ground = None if self.settings.learn == OFF else self._ground
+        ground = None if self.settings.parameters.learn == OFF else self._ground
         known = Snapshot(
             self.settings.on_ground(ground),
             self.given_path,
@@ -191,7 +191,7 @@ class TraverseService:
     def add_map(self, snapshot: Snapshot, ros_time: int | None = None) -> Snapshot:
         """Return a snapshot with the present map; `ros_time` as for `snapshot`."""
         ros_time = time.time_ns() if ros_time is None else ros_time
-        known, most = self.known_map, snapshot.settings.max_map_age
+        known, most = self.known_map, snapshot.settings.parameters.max_map_age
         if known is None:
             return replace(snapshot, known_map=None)
         steady = time.monotonic()
