@@ -124,7 +124,7 @@ class TraverseServer(Node):
             self,
             self.service,
             self._values,
-            lambda error: self.desk.health.take_map(error),
+            self._hear_of_map,
             self.frames,
             self.guard,
             self._heard,
@@ -197,6 +197,12 @@ class TraverseServer(Node):
     def _beat(self) -> None:
         self._heard.poll()
         self.watch.beat()
+
+    def _hear_of_map(self, error: str) -> None:
+        """Note why a map was refused, or have the watch look at a new one at once."""
+        self.desk.health.take_map(error)
+        if not error:
+            self.watch.look()
 
     def _take_joints(self, state: JointState, _arrival: float) -> None:
         try:

@@ -94,6 +94,15 @@ def test_a_wall_ahead_stops_and_one_behind_does_not(service):
     assert monitor.look(behind).state == WATCHING
 
 
+def test_what_is_near_is_judged_on_the_map_around_it_so_that_a_large_one_delays_no_stop(service):
+    monitor = watching(service)
+    large = make_terrain(wall_at(0.5), half=12.0)
+    service.take_terrain(large)
+    found = monitor.look(Sight(service.snapshot(), STRAIGHT[0], 1.0))
+    assert found.state == STOPPED
+    assert found.judgement.judge.terrain.elevation.size < 0.2 * large.elevation.size
+
+
 def test_the_rest_is_judged_once_for_each_map(service):
     monitor = watching(service)
     one = sight(service, STRAIGHT[10], 10.0)

@@ -223,6 +223,7 @@ class MapTopics:
     def _take(self, snapshot: MapSnapshot, source: str, stamp: int | None) -> None:
         is_new = self._keep(snapshot, source, stamp)
         self._report("")
+        self._service.prepare()
         if is_new:
             taken, now = self._service.terrain, time.monotonic()
             assert taken is not None

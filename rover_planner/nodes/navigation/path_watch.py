@@ -133,6 +133,10 @@ class PathWatch:
         """True if the rover is to stop: while paths are watched, it may drive a watched one."""
         return self.enabled and self.finding.state in (IDLE, STOPPED)
 
+    def look(self) -> None:
+        """Have a look taken at once, from any thread: there is a new map."""
+        self._handover.call(self.beat)
+
     def beat(self) -> None:
         """Have a look taken if one is due, and publish `~/stop`; to be called each PERIOD."""
         now = time.monotonic()

@@ -114,6 +114,12 @@ class TraverseService:
         if known is not None:
             self._keep_map(known)
 
+    def prepare(self) -> None:
+        """Pack the present map for bounds; the watch does not wait for that."""
+        terrain = self.terrain
+        if terrain is not None:
+            prepare_bounds(terrain, self.settings.query.map_sigmas)
+
     def take_path(self, poses: NDArray[np.float64], path_hash: str = "", stamp: str = "") -> None:
         """Keep a path for `check_last_path`.
 
@@ -207,14 +213,13 @@ class TraverseService:
     def _keep_map(self, about: KnownMap) -> bool:
         """Keep a map, of which only terrain and fingerprint are missing; return whether it is new.
 
-        Everything that takes time is done here, so that the first question about it is fast.
+        What takes time is done here, so that the first question about it is fast; see `prepare`.
         """
         with self._map_lock:
             received, gap = about.received, self.settings.largest_gap
             terrain = received.fill_gaps(gap) if gap > 0.0 else received
             forget_terrains()
             pack_ground(terrain)
-            prepare_bounds(terrain, self.settings.query.map_sigmas)
             before = self.known_map
             content = fingerprint(received)
             self.known_map = replace(about, terrain=terrain, fingerprint=content)

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.chance.ground import cut_around
+from rover_physics.errors import TerrainError
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.grid import Terrain
 from rover_planner.maps.known_map import KnownMap
@@ -29,6 +31,8 @@ NO_POSE, NO_JOINTS, OFF_PATH, SUSPENSION = "no_pose", "no_joints", "off_path", "
 NEAR = 3.0
 """Length of the part of the path that is judged before the whole rest [m]: the rover is told
 early of what is near."""
+AROUND = 3.0
+"""Map around that part that is looked at, in distances of the farthest wheel."""
 SHARE = 0.25
 """Share of the time that judging may take where the map changes all the time."""
 MAX_PAUSE = 0.2
@@ -253,7 +257,8 @@ class PathMonitor:
         first = 0 if self._finding.place is None else self._finding.place.index
         near = int(np.searchsorted(path.distances, path.distances[first] + NEAR)) + 1
         if near < len(path.poses):
-            judgement = _check(snapshot, path.poses[first:near])
+            ahead = path.poses[first:near]
+            judgement = _check(_cut_map(snapshot, ahead), ahead)
             if not judgement.traversable:
                 return judgement
         return _check(snapshot, path.poses[first:])
@@ -281,6 +286,18 @@ def rehearse(settings: ServiceSettings) -> None:
 
 def _check(snapshot: Snapshot, poses: NDArray[np.float64]) -> PathJudgement:
     return replace(snapshot, path=GivenPath(poses, "")).check_path()
+
+
+def _cut_map(snapshot: Snapshot, poses: NDArray[np.float64]) -> Snapshot:
+    """Return a snapshot with the map around poses (n, 3) alone: a large one takes long to pack."""
+    known, wheels = snapshot.known_map, snapshot.settings.rover.suspension.wheels
+    assert known is not None
+    reach = max(math.hypot(x, y) for x, y, _ in wheels.values())
+    try:
+        cut = cut_around(known.terrain, poses[:, :2], AROUND * reach)
+    except TerrainError:  # nothing is known there
+        return snapshot
+    return replace(snapshot, known_map=replace(known, terrain=cut, received=cut, cells=None))
 
 
 def describe_watch(finding: Finding, enabled: bool, tolerance: float) -> Health:
