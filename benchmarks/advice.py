@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Advice on refused paths of real and made maps: is it valid, least, and in time?
 
-Run from the repository: python -m benchmarks.advice FILE [--paths N] [--drives N] [--seconds S]
+Run from the repository: python -m benchmarks.advice FILE [--paths N] [--drives N] [--pairs N]
 The file gets a line of JSON for each path; lines that it has are kept. The drives in MuJoCo need
 the extra `bench`.
 """
@@ -9,7 +9,9 @@ the extra `bench`.
 import json
 import time
 from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import combinations, product
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -24,9 +26,10 @@ from rover_physics.names import EQUAL, SERVO
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_planner.advice.advise import Advice, grow_within
 from rover_planner.advice.case import Case
-from rover_planner.advice.levers import LEVERS, Span
+from rover_planner.advice.levers import LEVERS, Lever, Span
 from rover_planner.advice.refusal import Refusal
 from rover_planner.advice.remedy import Remedy
+from rover_planner.advice.seek import can_combine
 from rover_planner.nodes.warm_up import search_paths
 from rover_planner.planning.answering.budget import Budget
 
@@ -34,8 +37,8 @@ LENGTHS = {"lsr1": 4.0, "m2020": 10.0}
 """Length of the paths [m] by rover."""
 SPACING = 0.05
 """Distance of their waypoints [m]."""
-GRID = 100
-"""Values of a lever that the exhaustive search tries."""
+GRID, PAIRS_GRID = 100, 5
+"""Values of a lever, to each side, that the exhaustive search tries: alone, and in a pair."""
 SPEED = 0.06
 """Speed of the drives [m/s]."""
 
@@ -43,11 +46,12 @@ Row = dict[str, Any]
 """What came of a path."""
 
 
-def draw_case(grounds: list[Terrain], number: int) -> Case:
-    """Return a straight path at a random place that begins well and is refused further on."""
-    rng = np.random.default_rng(number)
+def draw_case(grounds: dict[str, Terrain], number: int) -> tuple[str, Case]:
+    """Return a straight path that begins well and is refused further on, and its ground's name."""
+    rng, names = np.random.default_rng(number), list(grounds)
     while True:
-        name, ground = rng.choice(list(LENGTHS)), grounds[rng.integers(len(grounds))]
+        name, place = rng.choice(list(LENGTHS)), names[rng.integers(len(grounds))]
+        ground = grounds[place]
         s = np.arange(0.0, LENGTHS[name], SPACING)
         xmin, xmax, ymin, ymax = ground.bounds
         x, y, yaw = rng.uniform((xmin, ymin, -np.pi), (xmax, ymax, np.pi))
@@ -59,7 +63,7 @@ def draw_case(grounds: list[Terrain], number: int) -> Case:
         verdict = case.judge().verdict
         starts_well = verdict.first_failure > 1.0 / SPACING
         if starts_well and verdict.code not in ("off_map", "unknown_ground"):
-            return case
+            return place, case
 
 
 def advise_on(case: Case, budget: float, drives: bool) -> Row:
@@ -119,20 +123,41 @@ def find_gap(remedy: Remedy) -> float | None:
 def find_missed(advice: Advice) -> list[str]:
     """Return the rover's own levers that help alone by some value though none was found to."""
     refusal = Refusal(advice.judged)
-    return [lever.name for lever in LEVERS if not lever.needs_others and _helps(lever, refusal)]
+    return [one.name for one in _own_levers(refusal) if _help([one], refusal, GRID)]
 
 
-def _helps(lever: Any, refusal: Refusal) -> bool:
+def find_missed_pairs(case: Case) -> list[str]:
+    """Return pairs of the rover's own levers that help together, of a path that none helps."""
+    refusal = Refusal(case.judge())
+    pairs = filter(can_combine, combinations(_own_levers(refusal), 2))
+    return [" + ".join(one.name for one in pair) for pair in pairs
+            if _help(pair, refusal, PAIRS_GRID)]  # fmt: skip
+
+
+def _own_levers(refusal: Refusal) -> list[Lever]:
+    return [one for one in LEVERS if not one.needs_others and one.settings(refusal) is not None]
+
+
+def _help(levers: Sequence[Lever], refusal: Refusal, count: int) -> bool:
+    """Return whether a path passes with levers set to any of their values."""
+    for values in product(*(_values(one, refusal, count) for one in levers)):
+        case: Case | None = refusal.case
+        for lever, value in zip(levers, values, strict=True):
+            case = None if case is None else lever.apply(case, refusal, value)
+        if case is not None and case.judge().passes:
+            return True
+    return False
+
+
+def _values(lever: Lever, refusal: Refusal, count: int) -> Iterator[Any]:
+    """Yield the values of a lever, of a range `count` to each side."""
     settings = lever.settings(refusal)
-    if settings is None:
-        return False
-    values = (
-        [settings.now + k / GRID * (end - settings.now)
-         for end in settings.ends for k in range(1, GRID + 1)]
-        if isinstance(settings, Span) else settings.values
-    )  # fmt: skip
-    cases = (lever.apply(refusal.case, refusal, value) for value in values)
-    return any(case is not None and case.judge().passes for case in cases)
+    assert settings is not None
+    if not isinstance(settings, Span):
+        yield from settings.values
+        return
+    for end in settings.ends:
+        yield from settings.now + np.arange(1, count + 1) / count * (end - settings.now)
 
 
 def can_be_driven(remedy: Remedy) -> bool:
@@ -166,6 +191,16 @@ def report(rows: list[Row]) -> None:
         f"{np.percentile(gaps, 95):.3f} of the range")  # fmt: skip
     say(f"no lever helps: {len(none)}; one of them alone does after all: "
         f"{sum(bool(one) for one in none)}")  # fmt: skip
+    pairs = [row["missed_pairs"] for row in rows if "missed_pairs" in row]
+    say(f"of {len(pairs)} of them tried with two levers: {sum(bool(one) for one in pairs)} pass")
+    for ground, rover in sorted({(row["ground"], row["rover"]) for row in rows}):
+        here = [row for row in rows if (row["ground"], row["rover"]) == (ground, rover)]
+        first = [row["first"] for row in here if row["first"] is not None] or [np.nan]
+        total = np.percentile([row["total"] for row in here], (50, 90))
+        say(
+            f"{ground}, {rover}, {len(here)} paths: CPU time to the first remedy "
+            f"{np.median(first):.2f} s; all trials {total[0]:.1f} s, 90 % {total[1]:.1f} s"
+        )
     for name, times in {
         "the first remedy": [row["first"] for row in rows if row["first"] is not None],
         "all trials, with a remedy": [row["total"] for row in rows if row["own"]],
@@ -182,17 +217,17 @@ def main(
     paths: Annotated[int, typer.Option(help="Number of refused paths.")] = 200,
     drives: Annotated[int, typer.Option(help="Number of the first paths that are driven.")] = 200,
     budget: Annotated[float, typer.Option(help="CPU time for each path [s].")] = 10.0,
-    seconds: Annotated[float, typer.Option(help="Time after which no path is begun [s].")] = 1e9,
+    pairs: Annotated[int, typer.Option(help="Number of hopeless ones tried with pairs.")] = 10,
 ) -> None:
     """Print what comes of advice on refused paths."""
     rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
-    grounds = [*all_grounds().values(), *real_maps().values(), made_reef()][1:]
-    began = time.monotonic()
+    grounds = dict(list((all_grounds() | real_maps() | {"reef": made_reef()}).items())[1:])
     search_paths()
     for number in range(len(rows), paths):
-        if time.monotonic() - began > seconds:
-            break
-        row = advise_on(draw_case(grounds, number), budget, number < drives)
+        ground, case = draw_case(grounds, number)
+        row = {"ground": ground, **advise_on(case, budget, number < drives)}
+        if row["complete"] and not row["found"] and pairs > 0:
+            row["missed_pairs"], pairs = find_missed_pairs(case), pairs - 1
         rows.append(row)
         with file.open("a") as target:
             target.write(json.dumps(row) + "\n")

@@ -112,23 +112,15 @@ class SearchCase:
 def run_case(case: SearchCase, asked: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield what is found of each pair of a ground.
 
-    `asked` has the options of `main`: count, seed, budget, longest, truth, truth_seconds and warm.
+    `asked` has the options of `main`: count, seed, budget, longest and warm.
     """
-    from benchmarks.best_of_lattice import NoTruthError, Truth
-
     pairs = case.pairs(asked["count"], asked["seed"])
     case.search(pairs[0], asked["budget"])  # compiles, and reads the code from the disk
-    truth = Truth(case) if asked["truth"] else None
     for index, pair in enumerate(pairs):
         row = try_pair(case, pair, asked["budget"])
         if row["outcome"] == OUT_OF_TIME and asked["longest"] > asked["budget"]:
             late = case.search(pair, asked["longest"], ends_at_first=True)
             row |= {"late": late.outcome == FOUND, "seconds_first": late.seconds_first}
-        if truth is not None and index < asked["truth"]:
-            try:
-                row["best"] = truth.find(pair, asked["truth_seconds"])
-            except NoTruthError:
-                row["best"] = np.nan
         if index < asked["warm"]:
             answer = try_warm(case, pair, asked["budget"], index)
             row |= {"warm_outcome": answer.outcome, "warm_first": answer.seconds_first}
@@ -201,9 +193,7 @@ def summarise(rows: Rows) -> Iterator[tuple[str, str]]:
     yield "outcomes", ", ".join(f"{name} {outcomes.count(name)}" for name in sorted({*outcomes}))
     yield "paths that judge_path passes", f"{sum(column('passes', found))} of {len(found)}"
     yield "first path [s]: median; 95 %", describe(column("seconds_first", found))
-    all_found = [
-        row for row in rows if row in found or row.get("late") or row.get("best", np.inf) < np.inf
-    ]
+    all_found = [row for row in rows if row in found or row.get("late")]
     yield "found in the budget, of all that any search finds", f"{len(found)} of {len(all_found)}"
     yield "first path of all [s]: median; 95 %", describe(column("seconds_first", all_found))
     yield "first path beyond 12 m [s]", f"{describe(column('seconds_first', far))} ({len(far)})"
@@ -212,14 +202,6 @@ def summarise(rows: Rows) -> Iterator[tuple[str, str]]:
     yield "judged edges [%]: mean", f"{100 * np.mean(column('judged_share')):.3f}"
     yield "bound: median; 95 %", describe(column("bound", found))
     yield "not ended by the clock", f"{sum(column('repeatable'))} of {len(rows)}"
-    known = [row for row in rows if not np.isnan(row.get("best", np.nan))]
-    if known:
-        found = [row for row in known if np.isfinite(row["best"]) and row["outcome"] == FOUND]
-        beyond = sum(row["outcome"] == FOUND for row in known) - len(found)
-        yield "pairs with known truth", str(len(known))
-        yield "found though not connected", str(beyond)
-        over = [100.0 * (row["cost"] / row["best"] - 1.0) for row in found]
-        yield "cost over the best [%]", describe(over, 1)
     warm = [row for row in rows if row.get("warm_outcome") == FOUND]
     if warm:
         yield "warm: first path [s]", f"{describe(column('warm_first', warm))} ({len(warm)})"
@@ -246,10 +228,6 @@ def main(
     policy: Annotated[str, typer.Option(help="Torque policy.")] = EQUAL,
     rover: Annotated[str, typer.Option(help="Rover.")] = "lsr1",
     seed: Annotated[int, typer.Option(help="Seed of the pairs.")] = 0,
-    truth: Annotated[int, typer.Option(help="Pairs for which the best is searched.")] = 0,
-    truth_seconds: Annotated[
-        float, typer.Option(help="Longest time for one of these in s.")
-    ] = 300,
     warm: Annotated[int, typer.Option(help="Pairs asked again after a change of the map.")] = 0,
     out: Annotated[Path | None, typer.Option(help="Write all rows as JSON.")] = None,
 ) -> None:

@@ -8,10 +8,10 @@ with a serialised nav_msgs/Path): the cost of the service alone.
 import contextlib
 import json
 import os
+import subprocess
 import sys
 import tempfile
 import threading
-import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -164,10 +164,6 @@ class Client:
         assert self._plans[node].wait_for_service(START_TIME), f"no service of {node}"
         return self.plan(start, goal, node=node)
 
-    def cancel(self) -> Trigger.Response:
-        """Call ~/cancel."""
-        return finish(self._cancel.call_async(Trigger.Request()), 10.0)
-
     def set_parameter(self, name: str, value: object) -> bool:
         """Set a parameter of the server; return whether it was accepted."""
         message: ParameterMessage = Parameter(name, value=value).to_parameter_msg()
@@ -189,19 +185,10 @@ def finish(future: Any, timeout: float) -> Any:
     return future.result()
 
 
-def memory_of(child: ChildProcess, kind: str = "VmRSS") -> float:
+def memory_of(child: ChildProcess | subprocess.Popen, kind: str = "VmRSS") -> float:
     """Return the memory that a process holds now [MB], or its peak for the kind VmHWM."""
     lines = Path(f"/proc/{child.pid}/status").read_text().splitlines()
     return next(int(line.split()[1]) for line in lines if line.startswith(kind)) / 1024
-
-
-def repeat(end: float, period: float, work: Any) -> None:
-    """Call a function at a fixed rate until an end on the steady clock [s]."""
-    due = time.monotonic()
-    while due < end:
-        time.sleep(max(0.0, due - time.monotonic()))
-        work()
-        due += period
 
 
 def serve_plan(file: Path) -> None:

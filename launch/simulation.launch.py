@@ -33,7 +33,7 @@ ARGUMENTS = {
 NUMBERS = ("start_x", "start_y", "start_yaw", "speed")
 SHARED = {
     "namespace": ("", "namespace of all nodes; diagnostics stay in /diagnostics"),
-    "use_sim_time": ("false", "true takes the time from /clock"),
+    "use_sim_time": ("false", "true takes the time from /clock, whose source is the simulator"),
     "respawn": ("true", "whether a node that has ended is started again"),
     "watch": ("true", "whether the rover drives watched paths only, and stops without its watch"),
     "rover_simulator_parameters": (str(PARAMETERS / "rover_simulator.yaml"), "parameter file"),

@@ -7,12 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_file import load_rover
+from rover_physics import Rover, SweepOptions, Terrain, judge_path, load_rover
 from rover_physics.rover.uncertainty import Uncertainty
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_path
 from support.reference_drives import DRIVES, drive_ground, unlimited
 
 CHANCES = DRIVES.with_name("chances.jsonl")

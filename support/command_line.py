@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rover_physics.terrain.grid import Terrain, save_terrain
+from rover_physics import Terrain, save_terrain
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 N = 30

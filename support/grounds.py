@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from rover_physics.terrain.grid import Terrain
+from rover_physics import Terrain
 
 
 def make_terrain(height, resolution=0.05, half=4.0) -> Terrain:

@@ -5,10 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
+from rover_physics import Rover, Terrain
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
-from rover_physics.rover.model import Rover
-from rover_physics.terrain.grid import Terrain
 from rover_planner.learning.drive_log import (
     PITCH,
     RATES,

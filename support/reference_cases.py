@@ -9,10 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_path, judge_poses
+from rover_physics import PathPrediction, Terrain, judge_path, judge_poses, load_rover
 
 DATA = Path(__file__).resolve().parents[1] / "test" / "data"
 FILES = ("settled_a.npz", "settled_b.npz")

@@ -9,13 +9,17 @@ from pathlib import Path
 
 import numpy as np
 
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_path, judge_poses
-from rover_physics.traversability.verdict import Verdict, hold_against_limits
+from rover_physics import (
+    PathPrediction,
+    Rover,
+    SweepOptions,
+    Terrain,
+    Verdict,
+    judge_path,
+    judge_poses,
+    load_rover,
+)
+from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import bouldered, fractal
 
 DRIVES = Path(__file__).resolve().parents[1] / "test" / "data" / "drives.json"

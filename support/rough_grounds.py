@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rover_physics.rover.model import Rover
-from rover_physics.terrain.grid import Terrain
+from rover_physics import Rover, Terrain
 
 RESOLUTION = 0.04
 """Cell size of the grounds [m]."""

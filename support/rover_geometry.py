@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.rover.model import Part, Rover
-from rover_physics.terrain.grid import Terrain
+from rover_physics import PathPrediction, Rover, Terrain
+from rover_physics.rover.model import Part
 
 UP = np.array([0.0, 0.0, 1.0])
 

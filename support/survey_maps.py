@@ -8,9 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain, save_terrain
+from rover_physics import SweepOptions, Terrain, load_rover, save_terrain
 from rover_planner.survey.chunk_survey import ChunkReport, SurveyJob, compute_chunk, survey_chunk
 from rover_planner.survey.layout import Index
 from rover_planner.survey.request import SurveyRequest

@@ -3,12 +3,9 @@
 
 import numpy as np
 
-from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.rover.model import Rover
-from rover_physics.terrain.grid import Terrain
+from rover_physics import PathPrediction, Rover, Terrain, judge_path
 from rover_physics.traction.balance import MeasuredState
 from rover_physics.traction.contact_ekf import Motion
-from rover_physics.traversability.judge import judge_path
 from support.rough_grounds import fractal, random_poses, rocky
 from support.rover_geometry import wheel_axes
 

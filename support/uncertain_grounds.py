@@ -7,11 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
+from rover_physics import Rover, SweepOptions, Terrain, judge_path
 from rover_physics.bounds.path import BOUNDED_VALUES, bound_path
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.model import Rover
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_path
 from support.rough_grounds import RESOLUTION, fractal, plane, rocky
 
 ROUNDING = 1e-6
@@ -90,9 +87,8 @@ class Outcome:
 
     waypoints: int
     """Number of waypoints with bounds, counted for each map."""
-    outside: dict[str, int]
-    """Number of these with a value outside its bounds, by value; "no pose" counts waypoints that
-    did not settle, "any" counts waypoints with any of these."""
+    outside: int
+    """Number of these that did not settle, or have a value outside its bounds."""
     unbounded: int
     """Number of waypoints that settle but have no bounds."""
     widths: dict[str, float]
@@ -115,19 +111,16 @@ def draw_path(
     rows = bounds.bounded
     limits = {name: getattr(bounds, name)[rows] for name in BOUNDED_VALUES}
     drawn: dict[str, list[np.ndarray]] = {name: [] for name in BOUNDED_VALUES}
-    outside = dict.fromkeys((*BOUNDED_VALUES, "no pose", "any"), 0)
+    outside = 0
     for sample in draw_maps(terrain, length, count, seed):
         swept = judge_path(rover, sample, poses, SweepOptions(policy=policy))[0]
         beyond = ~swept.settled[rows]
-        outside["no pose"] += int(beyond.sum())
         for name, limit in limits.items():
             value = getattr(swept, name)[rows]
             left = (value < limit[..., 0] - ROUNDING) | (value > limit[..., 1] + ROUNDING)
-            left = left.reshape(len(left), -1).any(axis=1)
-            outside[name] += int(left.sum())
-            beyond |= left
+            beyond |= left.reshape(len(left), -1).any(axis=1)
             drawn[name].append(value)
-        outside["any"] += int(beyond.sum())
+        outside += int(beyond.sum())
     return Outcome(
         waypoints=int(rows.sum()) * count,
         outside=outside,

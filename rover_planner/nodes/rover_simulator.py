@@ -14,9 +14,11 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TransformStamped, TwistStamped
 from nav_msgs.msg import Odometry, Path
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
+from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Bool, Float64MultiArray, String
 
@@ -28,6 +30,7 @@ from msg_adapters.joints import convert_steering
 from msg_adapters.paths import path_to_poses
 from msg_adapters.results.diagnostics import SIMULATOR, diagnostics, make_status
 from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_message
+from msg_adapters.stamps import NANOSECONDS, ns_to_stamp
 from rover_physics.names import WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_planner.maps.summary import describe_terrain
@@ -59,7 +62,11 @@ DIAGNOSTICS_PERIOD = 1.0
 
 
 class RoverSimulator(Node):
-    """Connects a Simulation to ROS topics."""
+    """Connects a Simulation to ROS topics.
+
+    With use_sim_time it is the source of /clock: its time goes on by a period with each step, so
+    that speeds and stamps agree however late its steps are.
+    """
 
     def __init__(self, **node_arguments: Any):
         super().__init__(NODE_NAME, **node_arguments)
@@ -80,12 +87,13 @@ class RoverSimulator(Node):
         self._create_publishers()
         self._create_subscriptions()
         self._state: PlantState = self.simulation.plant.state()
-        self.create_timer(self._period, self._advance)
+        self._start, steady = time.time_ns(), Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(self._period, self._advance, clock=steady)
         # A map takes longer than a step: other threads must not make the rover's sensors late.
         self._maps, self._map_in_work = ThreadPoolExecutor(1, "maps"), Future[None]()
         self._map_in_work.set_result(None)
-        self.create_timer(1.0 / parameters.map_rate, self._begin_map)
-        self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics)
+        self.create_timer(1.0 / parameters.map_rate, self._begin_map, clock=steady)
+        self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics, clock=steady)
         self._begin_map()
         warn_of_unknown_parameters(self, RoverSimulatorParameters)
         self.get_logger().info(
@@ -102,6 +110,9 @@ class RoverSimulator(Node):
         self._driven = self.create_publisher(String, "path_driven", latched_qos())
         self._cloud = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
+        self._clock_publisher = None
+        if self.get_parameter("use_sim_time").value:
+            self._clock_publisher = self.create_publisher(ClockMessage, "/clock", qos)
         self._commands = None
         if self._settings.parameters.follow_commands:
             self._commands = self.create_publisher(TwistStamped, "cmd_vel", qos)
@@ -153,7 +164,10 @@ class RoverSimulator(Node):
     def _advance(self) -> None:
         self._heard.poll()
         self._state = state = self.simulation.advance(time.monotonic(), self._period)
-        stamp = self.get_clock().now().to_msg()
+        self._steps += 1
+        stamp = self._stamp
+        if self._clock_publisher is not None:
+            self._clock_publisher.publish(ClockMessage(clock=stamp))
         efforts = dict(zip(WHEEL_JOINTS, state.wheel_torques.tolist(), strict=True))
         positions, velocities = (
             convert_steering(values, self._steering_sign)
@@ -170,7 +184,6 @@ class RoverSimulator(Node):
         self._imu.publish(
             imu_message(state.orientation, state.body_rates, gravity, DEVIATIONS[1], stamp)
         )
-        self._steps += 1
         is_due = any(self.simulation.steering) or self._steps % self._standing_steps == 0
         own = not self.simulation.has_speeds(time.monotonic())
         if self._commands is not None and is_due and own:
@@ -183,6 +196,13 @@ class RoverSimulator(Node):
         if self._path_hash and self.simulation.at_end:
             self._driven.publish(String(data=self._path_hash))
             self._path_hash = ""
+
+    @property
+    def _stamp(self) -> Any:
+        """Time now: that of the simulation if it is the source of /clock."""
+        if self._clock_publisher is None:
+            return self.get_clock().now().to_msg()
+        return ns_to_stamp(self._start + round(self._steps * self._period * NANOSECONDS))
 
     def _arm_angles(self) -> dict[str, float]:
         arm = self._settings.rover.manipulator
@@ -212,7 +232,7 @@ class RoverSimulator(Node):
             ("error", state.stopped) if state.stopped else ("ok", "nothing stops the rover")
         )
         status = make_status(SIMULATOR, level, text, values, self._settings.rover.name)
-        self._diagnostics.publish(diagnostics([status], self.get_clock().now().to_msg()))
+        self._diagnostics.publish(diagnostics([status], self._stamp))
 
     def destroy_node(self) -> None:
         """Finish the map in work, and destroy the node."""
@@ -223,7 +243,7 @@ class RoverSimulator(Node):
         """Have a map of what is seen now made in the thread, unless one is still in work."""
         if self._map_in_work.done():
             here = self._state.position, float(self.simulation.plant.pose()[2])
-            stamp = self.get_clock().now().to_msg()
+            stamp = self._stamp
             make = partial(self._publish_map, *here, stamp)
             self._map_in_work = self._maps.submit(self._guard.call, make)
 

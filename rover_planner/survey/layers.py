@@ -2,12 +2,12 @@
 """The layers of a survey: names, types, meanings and colours."""
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES
+from rover_physics.traversability.classification import IMPASSABLE, TRAVERSABILITY_CLASSES
 from rover_physics.traversability.verdict import codes_of_verdicts
 
 NOT_SURVEYED = 255
@@ -54,6 +54,28 @@ QUANTITIES = (
 def number_limits() -> dict[str, int]:
     """Return the number of each code of a verdict, as kept."""
     return {"": NO_LIMIT} | {code: 1 + k for k, code in enumerate(codes_of_verdicts())}
+
+
+def count_skipped(store: Any, most: int) -> int:
+    """Return of how many cells along a side of a survey one is drawn, for at most `most`."""
+    return max(1, -(-max(store.notes.layout.shape) // most))
+
+
+def read_drawn_classes(store: Any, every: int) -> NDArray:
+    """Return the numbers of the worst classes of every few cells of a survey, as they are drawn.
+
+    SOME_HEADINGS where the heading decides, NOT_SURVEYED also where the ground is unknown.
+    """
+    worst, best, first = (
+        np.asarray(store.layer(name)[::every, ::every])
+        for name in ("worst_class", "best_class", "first_limit")
+    )
+    impassable, limits = CLASS_NUMBERS[IMPASSABLE], number_limits()
+    shown = worst.copy()
+    shown[(worst == impassable) & (best < impassable)] = SOME_HEADINGS
+    off_ground = [limits[code] for code in ("off_map", "unknown_ground")]
+    shown[(best == impassable) & np.isin(first, off_ground)] = NOT_SURVEYED
+    return shown
 
 
 def bits_type(headings: int) -> np.dtype:

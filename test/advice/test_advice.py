@@ -7,9 +7,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.judge import judge_path
+from rover_physics import SweepOptions, judge_path, load_rover
 from rover_planner.advice import refusal
 from rover_planner.advice.advise import Advice, grow_advice, grow_within, path_of
 from rover_planner.advice.case import Case

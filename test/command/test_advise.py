@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from rover_physics.terrain.grid import save_terrain
+from rover_physics import save_terrain
 from rover_planner.cli import main
 from support.command_line import assert_refused
 from support.grounds import make_terrain

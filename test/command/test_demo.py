@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rover_physics.terrain.grid import Terrain, save_terrain
+from rover_physics import Terrain, save_terrain
 from rover_planner.cli import main
 from rover_planner.demo import demo as demo_module
 from rover_planner.worlds.mars_terrain import make_mars_terrain

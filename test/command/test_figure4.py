@@ -6,8 +6,7 @@ import pytest
 
 pytest.importorskip("matplotlib", reason="needs matplotlib")
 
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.judge import judge_path
+from rover_physics import judge_path, load_rover
 from rover_planner.cli import main
 from rover_planner.figures.figure4 import HELD, load_changes, loads_under_torque
 from support.rough_grounds import plane

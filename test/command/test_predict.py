@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rover_physics import load_terrain, save_terrain
 from rover_physics.names import WHEELS
-from rover_physics.terrain.grid import load_terrain, save_terrain
 from rover_planner.cli import main
 from support.command_line import N, assert_refused, predict_arguments, write_ground_and_path
 

@@ -6,10 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rover_physics import Terrain, judge_path, load_rover
 from rover_physics.names import SUSPENSION_JOINTS
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_path
 from rover_planner.maps.ground_beneath import Standing, find_ground_beneath
 from rover_planner.maps.layers import CONTACT, FOOTPRINT
 from rover_planner.maps.living_map import LivingMap

@@ -7,8 +7,8 @@ import time
 import numpy as np
 import pytest
 
-from rover_physics.errors import RoverError, TerrainError
-from rover_physics.terrain.grid import save_terrain
+from rover_physics import RoverError, save_terrain
+from rover_physics.errors import TerrainError
 from rover_planner.maps.map_file import MapFileError, MapLimits, open_map
 from support.grounds import make_terrain, waves
 from support.hostile_files import make_oddities

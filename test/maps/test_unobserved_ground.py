@@ -6,8 +6,7 @@ import time
 import numpy as np
 import pytest
 
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
+from rover_physics import Terrain, load_rover
 from rover_planner.maps.layers import FOOTPRINT, CellSources
 from rover_planner.maps.unobserved_ground import (
     ALLOW,

@@ -17,8 +17,8 @@ from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cl
 from msg_adapters.errors import MAX_TEXT, MessageError
 from msg_adapters.gridding import detect_raster
 from msg_adapters.results.grids import terrain_to_occupancy_grid
+from rover_physics import Terrain
 from rover_physics.errors import TerrainError
-from rover_physics.terrain.grid import Terrain
 
 FLOAT32, FLOAT64 = PointField.FLOAT32, PointField.FLOAT64
 XYZ = ("x", "y", "z")

@@ -12,10 +12,9 @@ from msg_adapters.commands import joint_order
 from msg_adapters.errors import MessageError
 from msg_adapters.joints import OWN_NAMES, convert_steering, read_joint_map
 from msg_adapters.results.predictions import JOINTS, joint_trajectory
+from rover_physics import judge_path, load_rover
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steering_joints import LEFT, RIGHT
-from rover_physics.traversability.judge import judge_path
 from support.grounds import make_terrain, waves
 
 KNOWN = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)

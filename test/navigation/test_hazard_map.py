@@ -6,12 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rover_physics import SweepOptions, Terrain, judge_poses, load_rover
 from rover_physics.numerics.interruption import interruptible
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES, classify_judged
-from rover_physics.traversability.judge import judge_poses
 from rover_physics.traversability.pose_classes import RoverOnMap, classify_poses
 from rover_planner.planning.navigation.hazard_map import HazardMap
 

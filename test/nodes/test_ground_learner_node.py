@@ -16,8 +16,8 @@ from std_msgs.msg import Bool, String
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.sensing import imu_message
 from msg_adapters.stamps import ns_to_stamp
+from rover_physics import load_rover
 from rover_physics.numerics.quaternions import xyzw_from_rpy
-from rover_physics.rover.rover_file import load_rover
 from rover_planner.learning.drive_log import PITCH, ROLL, TIME, YAW, X
 from rover_planner.nodes.ground_learner import (
     EMERGENCY_STOP,
@@ -103,13 +103,6 @@ def drive(node: GroundLearnerNode, rover: Rover, rows: np.ndarray) -> None:
             return False
 
         wait_until(arrives, "the odometry")
-
-
-@pytest.fixture
-def ros():
-    run = RosRun()
-    yield run
-    run.close()
 
 
 def test_a_drive_is_learned_and_a_rover_that_gets_stuck_is_stopped_and_its_place_marked(ros):

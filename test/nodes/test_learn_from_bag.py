@@ -5,8 +5,7 @@ import json
 
 import pytest
 
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import save_terrain
+from rover_physics import load_rover, save_terrain
 from rover_planner.cli import main
 from rover_planner.learning.drive_log import TIME
 from support.command_line import assert_refused

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
-from std_msgs.msg import Float64MultiArray, String
+from std_msgs.msg import String
 
-from rover_physics.terrain.grid import save_terrain
+from rover_physics import save_terrain
 from rover_planner.nodes.mission_planner import MissionPlanner
-from rover_planner.ros.qos import latched_qos, sensor_qos, topic_qos
+from rover_planner.ros.qos import latched_qos, sensor_qos
 from support.grounds import make_terrain, waves
 from support.project.launch_files import simulation_commands
 from support.ros_fixtures import domain_id
@@ -31,11 +31,9 @@ class Ear(Node):
         super().__init__("ear", context=ros.context)
         self.states: list[tuple[float, str]] = []
         self.speed = 0.0
-        self.largest_torque = 0.0
         for kind, topic, hear, qos in (
             (String, "traction_controller/state", self._hear_state, latched_qos()),
             (Odometry, "odometry", self._hear_odometry, sensor_qos()),
-            (Float64MultiArray, "traction_controller/commands", self._hear_torques, topic_qos()),
         ):
             self.create_subscription(kind, topic, hear, qos)
 
@@ -44,9 +42,6 @@ class Ear(Node):
 
     def _hear_odometry(self, message):
         self.speed = message.twist.twist.linear.x
-
-    def _hear_torques(self, message):
-        self.largest_torque = max(map(abs, message.data))
 
     @property
     def state(self):

@@ -5,8 +5,8 @@ from builtin_interfaces.msg import Time
 from rclpy.serialization import serialize_message
 
 from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cloud
+from rover_physics import load_rover
 from rover_physics.errors import ModelError
-from rover_physics.rover.rover_file import load_rover
 from rover_physics.traction.map_contacts import MapContactFinder
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.ros.frames import Frames

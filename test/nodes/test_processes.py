@@ -10,7 +10,7 @@ import time
 import numpy as np
 import pytest
 
-from rover_physics.terrain.grid import Terrain, save_terrain
+from rover_physics import Terrain, save_terrain
 from rover_planner.nodes.traverse_server import main
 from rover_planner.ros.process import take_priority
 from support.project.without_disk import fill_disk

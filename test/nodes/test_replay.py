@@ -21,11 +21,9 @@ from trajectory_msgs.msg import JointTrajectory
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.stamps import ns_to_stamp
+from rover_physics import Terrain, judge_path, load_rover, load_terrain, save_terrain
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
-from rover_physics.traversability.judge import judge_path
 from rover_planner.cli import main
 from rover_planner.nodes.result_topics import RESULT_KINDS
 from rover_planner.planning.navigation.transforms import Rigid

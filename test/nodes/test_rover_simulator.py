@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The simulator's node among the others: the whole system on one machine, without hardware."""
 
+import time
+
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray
@@ -11,10 +13,11 @@ from sensor_msgs.msg import Imu, JointState, PointCloud2
 
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.imu import imu_to_attitude
+from msg_adapters.stamps import stamp_to_ns
+from rover_physics import save_terrain
 from rover_physics.errors import SoilError
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.rover.steering_joints import steering_joints
-from rover_physics.terrain.grid import save_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.nodes.mission.drive import DriveSettings, drive_to
 from rover_planner.nodes.mission_planner import MissionPlanner
@@ -22,7 +25,7 @@ from rover_planner.nodes.rover_simulator import RoverSimulator, main
 from rover_planner.nodes.traction_controller import TractionController
 from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
 from support.grounds import make_terrain, waves
-from support.ros_fixtures import PATIENT
+from support.ros_fixtures import PATIENT, run_in_executor
 from support.waiting import wait_until
 
 START_X = -1.0
@@ -115,6 +118,19 @@ def test_it_publishes_what_a_rover_would_drives_as_commanded_and_stops_when_comm
     angles = wait_until(steers, "the rover to turn left, with the sign of its joints")
     assert angles["rear_left_steering"] == pytest.approx(-angles["front_left_steering"], abs=0.01)
     wait_until(lambda: plant.state().velocity[0] == 0.0, "the rover to stop")
+
+
+def test_with_simulated_time_it_is_the_source_of_the_clock_and_late_steps_do_not_show(
+    ros, ear, start_simulator
+):
+    simulator = start_simulator(use_sim_time=True, rate=100.0)
+    wait_until(lambda: len(ear.heard.get("joint_states", ())) > 20, "joint states")
+    run_in_executor(simulator, lambda: time.sleep(0.2))
+    have = len(ear.heard["joint_states"])
+    wait_until(lambda: len(ear.heard["joint_states"]) > have + 20, "more of them")
+    stamps = [stamp_to_ns(state.header.stamp) for state in ear.heard["joint_states"]]
+    assert set(np.diff(stamps)) == {10_000_000}
+    wait_until(lambda: simulator.get_clock().now().nanoseconds >= stamps[-1], "its own clock")
 
 
 def test_bad_parameters_are_refused_by_name(start_simulator, capfd):

@@ -13,9 +13,9 @@ from rover_planner.planning.candidates import (
     generate_candidates,
     lateral_offsets,
     path_length,
+    turn_and_drive,
 )
 from rover_planner.planning.dubins import dubins_paths
-from rover_planner.planning.point_turn import turn_and_drive
 
 METRES = st.floats(-20.0, 20.0)
 ANGLES = st.floats(-2 * np.pi, 2 * np.pi)
@@ -95,11 +95,6 @@ def test_awkward_goals_get_arcs_of_the_smallest_radius(goal):
 def test_a_u_turn_swings_out_instead_of_turning_on_the_spot():
     path = generate_candidates((0, 0, 0), (0, 4, np.pi))[0]
     assert path[:, 0].max() > 0.5 and path[:, 0].min() > -1e-9
-
-
-def test_start_equal_to_goal_is_a_single_pose():
-    paths = generate_candidates((1, 2, 7.0), (1, 2, 7.0))
-    assert len(paths) == 1 and paths[0].shape == (1, 3)
 
 
 @pytest.mark.parametrize(

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rover_physics import load_rover
 from rover_physics.limits.table import CHANCE
-from rover_physics.rover.rover_file import load_rover
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query

@@ -6,38 +6,22 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
+from rover_physics import load_rover
 from rover_planner.planning.path_query import (
     PathQueryOptions,
     answer_path_query,
     check_path,
     choose,
 )
+from support.grounds import make_terrain
 
+LSR1 = load_rover("lsr1")
 COARSE = PathQueryOptions(count=5, spacing=0.4, waypoint_spacing=0.1)
+FLAT = make_terrain(lambda x, y: 0.0 * x)
 
 
-@pytest.fixture(scope="module")
-def rover():
-    return load_rover("lsr1")
-
-
-def flat(size=10.0, resolution=0.05):
-    cells = int(size / resolution) + 1
-    return Terrain(np.zeros((cells, cells)), resolution, (-size / 2, -size / 2))
-
-
-def with_heights(terrain, heights):
-    """Return the terrain with heights that are a function of x and y."""
-    ny, nx = terrain.elevation.shape
-    x = terrain.origin[0] + terrain.resolution * np.arange(nx)[None, :]
-    y = terrain.origin[1] + terrain.resolution * np.arange(ny)[:, None]
-    return dataclasses.replace(terrain, elevation=np.broadcast_to(heights(x, y), (ny, nx)).copy())
-
-
-def test_level_ground_is_traversable_on_the_straight_connection(rover):
-    answer = answer_path_query(rover, flat(), (-2, 0, 0), (2, 0, 0), COARSE)
+def test_level_ground_is_traversable_on_the_straight_connection():
+    answer = answer_path_query(LSR1, FLAT, (-2, 0, 0), (2, 0, 0), COARSE)
     assert answer.traversable
     assert len(answer.candidates) == 5
     # all are equally safe; the straight one needs the least energy
@@ -47,21 +31,21 @@ def test_level_ground_is_traversable_on_the_straight_connection(rover):
     assert "5 of 5" in answer.explain()
 
 
-def test_a_rock_in_the_way_is_driven_around(rover):
+def test_a_rock_in_the_way_is_driven_around():
     def rock(x, y):
         return np.where(np.hypot(x, y - 0.3) < 0.15, 0.5, 0.0)
 
-    terrain = with_heights(flat(), rock)
-    answer = answer_path_query(rover, terrain, (-3, 0, 0), (3, 0, 0), COARSE)
+    terrain = make_terrain(rock)
+    answer = answer_path_query(LSR1, terrain, (-3, 0, 0), (3, 0, 0), COARSE)
     assert not answer.candidates[0].verdict.traversable
     assert answer.traversable
     assert answer.best > 0
     assert answer.chosen.verdict.traversable
 
 
-def test_a_ridge_across_all_candidates_is_refused_with_its_reason(rover):
-    terrain = with_heights(flat(), lambda x, y: np.where(np.abs(x - 1) < 0.3, 1.0, 0.0))
-    answer = answer_path_query(rover, terrain, (-3, 0, 0), (3, 0, 0), COARSE)
+def test_a_ridge_across_all_candidates_is_refused_with_its_reason():
+    terrain = make_terrain(lambda x, y: np.where(np.abs(x - 1) < 0.3, 1.0, 0.0))
+    answer = answer_path_query(LSR1, terrain, (-3, 0, 0), (3, 0, 0), COARSE)
     assert answer.best == -1
     assert not answer.traversable
     assert answer.chosen.verdict.reason
@@ -72,23 +56,23 @@ def test_a_ridge_across_all_candidates_is_refused_with_its_reason(rover):
     assert 0 < answer.chosen.passable_share < 1
 
 
-def test_the_goal_at_the_start_is_a_single_pose_that_is_judged(rover):
-    outside = answer_path_query(rover, flat(), (99, 0, 0), (99, 0, 0), COARSE)
+def test_the_goal_at_the_start_is_a_single_pose_that_is_judged():
+    outside = answer_path_query(LSR1, FLAT, (99, 0, 0), (99, 0, 0), COARSE)
     assert outside.chosen.poses.shape == (1, 3) and not outside.traversable
     assert outside.chosen.passable_share == 0.0 and outside.chosen.verdict.code == "off_map"
 
 
-def test_options_reach_the_model(rover):
-    slope = with_heights(flat(), lambda x, y: 0.2 * x + 0 * y)
+def test_options_reach_the_model():
+    slope = make_terrain(lambda x, y: 0.2 * x + 0 * y)
     grippy = COARSE.change(friction=1.0, max_torque=100.0)
     slippery = COARSE.change(friction=0.05, max_torque=100.0)
-    assert answer_path_query(rover, slope, (-2, 0, 0), (2, 0, 0), grippy).traversable
-    refused = answer_path_query(rover, slope, (-2, 0, 0), (2, 0, 0), slippery)
+    assert answer_path_query(LSR1, slope, (-2, 0, 0), (2, 0, 0), grippy).traversable
+    refused = answer_path_query(LSR1, slope, (-2, 0, 0), (2, 0, 0), slippery)
     assert refused.chosen.verdict.code == "friction"
 
 
-def test_the_safer_path_wins_and_energy_decides_between_equals(rover):
-    answer = answer_path_query(rover, flat(), (-2, 0, 0), (2, 0, 0), COARSE)
+def test_the_safer_path_wins_and_energy_decides_between_equals():
+    answer = answer_path_query(LSR1, FLAT, (-2, 0, 0), (2, 0, 0), COARSE)
     first, second, third = answer.candidates[:3]
     safe = dataclasses.replace(second, cost=(0.3, 90.0))
     thrifty = dataclasses.replace(third, cost=(0.3, 80.0))
@@ -100,14 +84,14 @@ def test_the_safer_path_wins_and_energy_decides_between_equals(rover):
     assert choose((risky, safe, refused)).best == 1
 
 
-def test_on_an_uncertain_map_the_bounds_are_the_risk(rover):
-    ground = flat(4.0)
+def test_on_an_uncertain_map_the_bounds_are_the_risk():
+    ground = FLAT
     uncertain = dataclasses.replace(ground, elevation_std=np.full(ground.elevation.shape, 0.003))
     pose = np.array([[0.0, 0.0, 0.0]])
-    sure = check_path(rover, ground, pose, COARSE).verdict.risk
+    sure = check_path(LSR1, ground, pose, COARSE).verdict.risk
     risks = [
         check_path(
-            rover, uncertain, pose, dataclasses.replace(COARSE, map_sigmas=sigmas)
+            LSR1, uncertain, pose, dataclasses.replace(COARSE, map_sigmas=sigmas)
         ).verdict.risk
         for sigmas in (0.0, 1.0, 3.0)
     ]

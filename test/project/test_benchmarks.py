@@ -16,8 +16,6 @@ from rover_physics import load_rover
 
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 SMALL = {
-    "faults": {"REPEATS": 1},
-    "load": {"QUESTIONS": 10, "BURSTS": {"light": (1.5, 0.05)}, "SECONDS": 2.0, "REPEATS": 1},
     "paths": {"REPEATS": 1, "MANY": 5_000},
     "poses": {"POSES": 20, "ARCS": (2, 2, 2), "MAP_CELLS": 60, "MAP_ROWS": (0, 40)},
     "rest": {"SETTLING": 0.5, "SECONDS": 1.0},
@@ -76,18 +74,18 @@ def test_every_benchmark_can_be_imported(name):
 
 @pytest.mark.slow
 @pytest.mark.long
-def test_ways_are_compared_with_the_best_of_the_lattice_in_a_small_size(capsys):
+def test_paths_are_searched_in_a_small_size(capsys):
     from benchmarks.path_search import SearchCase, run_case, show
     from rover_planner.worlds.mars_terrain import make_mars_terrain
 
     case = SearchCase("small", load_rover("lsr1"), make_mars_terrain(3, 8.0))
-    asked = {"count": 2, "seed": 0, "budget": 2.0, "truth": 2, "truth_seconds": 100.0, "warm": 1}
+    asked = {"count": 2, "seed": 0, "budget": 2.0, "longest": 2.0, "warm": 1}
     rows = list(run_case(case, asked))
     assert [row["outcome"] for row in rows] == ["found", "found"]
-    assert all(row["passes"] and 0.0 < row["best"] < np.inf for row in rows)
+    assert all(row["passes"] and 0.0 < row["cost"] < np.inf for row in rows)
     assert rows[0]["warm_outcome"] == "found"
     show(rows)
-    assert "found of connected" in capsys.readouterr().out
+    assert "of all that any search finds" in capsys.readouterr().out
 
 
 @pytest.mark.slow
@@ -98,17 +96,6 @@ def test_hostile_inputs_over_dds_do_no_harm():
     fuzzer = fuzz(seed=7, count=150)
     assert fuzzer.defects == []
     assert fuzzer.counts.total() == 150 and fuzzer.commands > 0
-
-
-def test_the_same_seed_damages_the_same_way_and_every_type_of_field():
-    from benchmarks.fuzz import MESSAGES, REQUESTS, Mutator, serialise
-
-    makes = [*MESSAGES.values(), *(make for _, make in REQUESTS.values())] * 20
-    ours, others = ([repr(m.damage(make())) for make in makes] for m in (Mutator(7), Mutator(7)))
-    assert ours == others
-    assert sum(one != repr(make()) for one, make in zip(ours, makes, strict=True)) > 150
-    mutator = Mutator(8)
-    assert all(serialise(mutator.damage(make())) for make in makes)  # DDS can carry them
 
 
 @pytest.mark.slow

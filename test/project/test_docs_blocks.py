@@ -19,7 +19,7 @@ pytest.importorskip("rclpy", reason="needs ROS 2")
 
 from support.project.checkout import TOP, console_scripts, setup_arguments
 from support.project.command_checks import check_command
-from support.project.doc_blocks import PAGES, Block, Command, read_blocks, split_commands
+from support.project.doc_blocks import PAGES, Block, read_blocks, split_commands
 from support.project.processes import ProcessToken
 from support.ros_fixtures import domain_id
 
@@ -155,14 +155,3 @@ def test_the_blocks_of_a_page_run_as_written(page, reader):
     for block in BLOCKS:
         if block.page == page and not block.not_run:
             reader.run(block)
-
-
-def test_commands_are_split_as_a_shell_does():
-    text = "a --b 'c d' > e &  # it's a comment\nf \\\n  g && h \"i\n  j\" | k; l\n"
-    assert split_commands(text) == [
-        Command(("a", "--b", "c d"), True),
-        Command(("f", "g"), False),
-        Command(("h", "i\n  j"), False),
-        Command(("k",), False),
-        Command(("l",), False),
-    ]

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What README and docs name exists: files, modules, links, options, and rooms in import order."""
+"""What README and docs name exists: files, modules, links, options and rooms."""
 
+import pkgutil
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from support.project.checkout import TOP, console_scripts, imported_names
+from support.project.checkout import TOP, console_scripts
 
 PAGES = sorted(
     path.relative_to(TOP)
@@ -15,6 +15,7 @@ PAGES = sorted(
 )
 CODE = re.compile(r"`([^`\n]+)`")
 PACKAGES = ("rover_physics", "rover_planner", "msg_adapters", "support", "benchmarks")
+FOLDERS = (*PACKAGES, "config", "docs", "examples", "launch", "test")
 SUFFIXES = (".py", ".md", ".yaml", ".npz", ".png", ".xml", ".txt")
 MADE = ("mars.npz", "poses.npz", "out.npz", "map.npz", "terrain.npz", "rough.npz", "figure4.png")
 """Files that a reader makes or brings."""
@@ -44,69 +45,53 @@ def is_file_name(word: str) -> bool:
     return bool(re.fullmatch(r"[\w./-]*\w\.\w+", word)) and word.endswith(SUFFIXES)
 
 
+def is_folder_name(word: str) -> bool:
+    return bool(re.fullmatch(r"[\w./-]+/", word)) and word.split("/")[0] in FOLDERS
+
+
 def exists(word: str, page: Path) -> bool:
     """Tell whether a file is there: from the top, beside the page, or somewhere by its name."""
     if (TOP / word).exists() or (TOP / page).parent.joinpath(word).exists():
         return True
     return "/" not in word and any(
         path.name == word and not any(part.startswith(".") for part in path.parts)
-        for folder in (*PACKAGES, "config", "docs", "test", "examples", "launch")
+        for folder in FOLDERS
         for path in (TOP / folder).rglob(word)
     )
 
 
-@pytest.mark.parametrize("page", PAGES, ids=str)
-def test_every_file_that_a_page_names_exists(page):
-    named = {word for word in code_spans(page) if is_file_name(word)}
-    missing = {
-        word
-        for word in named
-        if word not in MADE and not word.startswith(WRITTEN) and not exists(word, page)
+def is_in_code(dotted: str) -> bool:
+    """Tell whether a dotted name is a module, or stands in one."""
+    try:
+        pkgutil.resolve_name(dotted)
+    except (ImportError, AttributeError):
+        return False
+    return True
+
+
+def missing_files(page: Path) -> set[str]:
+    named = {word for word in code_spans(page) if is_file_name(word) or is_folder_name(word)}
+    named -= {*MADE, *(word for word in named if word.startswith(WRITTEN))}
+    links = {link for link in re.findall(r"\]\(([^)#]+)\)", read(page)) if "://" not in link}
+    return {word for word in named if not exists(word, page)} | {
+        link for link in links if not (TOP / page).parent.joinpath(link).exists()
     }
-    assert not missing
+
+
+def missing_names(page: Path) -> set[str]:
+    words = {
+        word.split("(")[0].rstrip(".") for word in re.findall(r"[\w.]+\(?", current_text(page))
+    }
+    dotted = {word for word in words if word.split(".")[0] in PACKAGES and "." in word}
+    return {word for word in dotted if not word.endswith((".py", ".md")) and not is_in_code(word)}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=str)
-def test_every_folder_that_a_page_names_exists(page):
-    tops = (*PACKAGES, "config", "docs", "examples", "launch", "test")
-    named = {word for word in code_spans(page) if re.fullmatch(r"[\w./-]+/", word)}
-    named = {word for word in named if word.split("/")[0] in tops}
-    assert not {word for word in named if not (TOP / word).is_dir()}
-
-
-@pytest.mark.parametrize("page", PAGES, ids=str)
-def test_every_link_of_a_page_leads_to_a_file(page):
-    links = re.findall(r"\]\(([^)#]+)\)", read(page))
-    local = [link for link in links if "://" not in link]
-    assert not [link for link in local if not (TOP / page).parent.joinpath(link).exists()]
-
-
-@pytest.mark.parametrize("page", PAGES, ids=str)
-def test_every_dotted_name_that_a_page_names_exists(page):
-    words = {word.split("(")[0] for word in re.findall(r"[\w.]+\(?", current_text(page))}
-    dotted = {word.rstrip(".") for word in words if word.split(".")[0] in PACKAGES and "." in word}
-    dotted = {word for word in dotted if not word.endswith((".py", ".md"))}
-    assert not {name for name in dotted if not is_module_or_name(name)}
-
-
-def is_module_or_name(dotted: str) -> bool:
-    """Tell whether a dotted name is a module, or is defined or imported at the top of one."""
-    parts = dotted.split(".")
-    if TOP.joinpath(*parts).is_dir() or TOP.joinpath(*parts).with_suffix(".py").is_file():
-        return True
-    module = TOP.joinpath(*parts[:-1])
-    path = module / "__init__.py" if module.is_dir() else module.with_suffix(".py")
-    return (
-        path.is_file()
-        and re.search(rf"\b{re.escape(parts[-1])}\b", path.read_text(encoding="utf-8")) is not None
-    )
-
-
-@pytest.mark.parametrize("page", PAGES, ids=str)
-def test_every_make_target_that_a_page_names_is_in_the_makefile(page):
+def test_files_links_names_and_targets_of_a_page_exist(page):
+    assert not missing_files(page)
+    assert not missing_names(page)
     targets = re.findall(r"^(\w+):", (TOP / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
-    named = set(re.findall(r"(?:`|^)make (\w+)", read(page), re.MULTILINE))
-    assert named <= set(targets)
+    assert set(re.findall(r"(?:`|^)make (\w+)", read(page), re.MULTILINE)) <= set(targets)
 
 
 def options_of_the_commands() -> dict[str, set[str]]:
@@ -140,30 +125,11 @@ def test_every_option_that_a_page_gives_to_a_command_exists(page):
             assert asked <= known[command], f"rover_planner {command}"
 
 
-def rooms_of_readme(package: str) -> list[str]:
-    """Return the rooms of a package in the order of README's table."""
-    table = read(Path("README.md")).split(f"| `{package}/` |", 1)[1].split("\n\n", 1)[0]
-    return re.findall(r"^\| `(\w+)/`", table, re.MULTILINE)
-
-
-def imports_between_rooms(package: str) -> Iterator[tuple[str, str]]:
-    """Yield pairs of rooms of which the first imports the second."""
-    for path in (TOP / package).rglob("*.py"):
-        room = path.relative_to(TOP / package).parts[0]
-        for name in imported_names(path):
-            parts = name.split(".")
-            if parts[0] == package and len(parts) > 1 and parts[1] != room:
-                yield room, parts[1]
-
-
 @pytest.mark.parametrize("package", ["rover_physics", "rover_planner"])
-def test_readme_lists_every_room_after_the_rooms_that_it_imports(package):
-    rooms = rooms_of_readme(package)
+def test_readme_lists_every_room(package):
+    table = read(Path("README.md")).split(f"| `{package}/` |", 1)[1].split("\n\n", 1)[0]
     folders = {path.parent.name for path in (TOP / package).glob("*/__init__.py")}
-    assert set(rooms) == folders
-    for room, other in imports_between_rooms(package):
-        if room in rooms and other in rooms:
-            assert rooms.index(other) < rooms.index(room), f"{room} imports {other}"
+    assert set(re.findall(r"^\| `(\w+)/`", table, re.MULTILINE)) == folders
 
 
 def test_every_node_and_command_that_is_installed_is_in_the_docs():

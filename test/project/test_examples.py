@@ -58,9 +58,8 @@ def test_an_example_prints_and_draws_what_it_claims(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", SHOWN)
-def test_an_example_is_a_page_and_imports_what_there_is(name):
+def test_an_example_imports_what_there_is(name):
     text = (FOLDER / f"{name}.py").read_text(encoding="utf-8")
-    assert len(text.splitlines()) <= 75
     for node in ast.parse(text).body:
         if isinstance(node, ast.ImportFrom) and node.module.startswith(("rover_", "msg_")):
             module = importlib.import_module(node.module)

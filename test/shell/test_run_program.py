@@ -8,17 +8,19 @@ import warnings
 
 import pytest
 
-from rover_physics.errors import RoverError
+from rover_physics import RoverError
 from rover_planner.cli import main
 from rover_planner.errors import DemoError, PlanningError
-from rover_planner.shell.exit_codes import (
+from rover_planner.shell.run_program import (
     EXIT_BAD_INPUT,
     EXIT_FAILED,
     EXIT_INTERRUPTED,
     EXIT_OK,
     EXIT_PIPE_CLOSED,
+    MAX_LINE,
+    one_line,
+    run_program,
 )
-from rover_planner.shell.run_program import MAX_LINE, one_line, run_program
 from support.command_line import REPOSITORY
 
 

@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("zarr", reason="install the extra survey")
 
-from rover_physics.terrain.grid import Terrain
+from rover_physics import Terrain
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.survey.cog import write_cog, write_layers

@@ -14,12 +14,11 @@ from hypothesis import strategies as st
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
-from rover_physics.terrain.grid import Terrain
+from rover_physics import Terrain
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.survey.layers import pack_bits, unpack_bits
-from rover_planner.survey.moves import find_moves
-from rover_planner.survey.reachable import HeadingGrid, find_reachable, search_area
+from rover_planner.survey.reachable import HeadingGrid, find_moves, find_reachable, search_area
 from rover_planner.survey.reachable_area import open_area
 from rover_planner.survey.store import NOTES
 from support.survey_maps import make_request, make_rough_map, survey_here

@@ -11,8 +11,7 @@ import pytest
 
 pytest.importorskip("zarr", reason="install the extra survey")
 
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import save_terrain
+from rover_physics import load_rover, save_terrain
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.survey.chunk_survey import compute_chunk, open_map

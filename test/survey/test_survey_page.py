@@ -9,9 +9,7 @@ import pytest
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 pytest.importorskip("zarr", reason="install the extra survey")
 
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
+from rover_physics import SweepOptions, Terrain, load_rover
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.survey.layers import CLASS_COLOURS, CLASS_NUMBERS

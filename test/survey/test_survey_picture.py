@@ -9,7 +9,7 @@ pytest.importorskip("matplotlib", reason="install the extra plots")
 import matplotlib.image
 import numpy as np
 
-from rover_physics.terrain.grid import Terrain
+from rover_physics import Terrain
 from rover_planner.figures.survey_picture import (
     choose_bar,
     draw_reachable,

@@ -6,11 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
+from rover_physics import SweepOptions, Terrain, judge_poses, load_rover
 from rover_physics.traversability.classification import classify_judged
-from rover_physics.traversability.judge import judge_poses
 from rover_planner.survey.layers import (
     CLASS_NUMBERS,
     NO_LIMIT,
@@ -66,6 +63,12 @@ def test_limits_and_classes_are_those_of_predict(ground, policy, std):
     if std is not None:
         std = np.where(np.isnan(ground.elevation), np.nan, std)
         ground, places = replace(ground, elevation_std=std), places[::5]
+    else:  # layers of the ground count as in predict
+        friction = np.where(np.arange(110) < 30, 0.2, np.nan) * np.ones((110, 1))
+        soil = np.where(np.arange(110)[:, None] > 80, 0, -1) * np.ones((1, 110))
+        ground = replace(
+            ground, friction=friction, soil=soil.astype(np.int32), soil_names=("dry_sand",)
+        )
     layers, poses = survey_tile(request, ground, places), poses_at(places, request)
     prediction, verdict = judged(request, ground, poses)
     told = classify_judged(

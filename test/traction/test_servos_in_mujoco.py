@@ -8,8 +8,7 @@ import pytest
 
 pytest.importorskip("mujoco", reason="install the extra bench")
 
-from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_file import load_rover
+from rover_physics import Rover, load_rover
 from rover_physics.rover.steered_drive import SteeredDrive
 from rover_planner.parameters.traction_controller import (
     BRAKE,

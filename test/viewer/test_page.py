@@ -198,14 +198,14 @@ def test_a_click_into_the_scene_sets_the_goal_and_one_into_the_sky_is_refused(vi
     wait_until(lambda: page.session.wanted.goal != goal, "another goal")
     assert max(map(abs, page.session.wanted.goal[:2])) < 4.0
     wait_for_rest(page)
-    page.requests.add(lambda: page.click(None, False))
+    page.requests.put(lambda: page.click(None, False))
     visitor.wait_for("refused: the click is beside the known ground")
 
 
 def test_a_layer_colours_the_ground_and_a_soil_lets_wheels_sink(visitor, page):
     visitor.open_tab("Ground")
-    visitor.choose("Colour by", "tilt")
-    visitor.wait_for("29.79 deg")
+    visitor.choose("Colour by", "use of tilt")
+    visitor.wait_for("beyond the limit")
     visitor.choose("Soil", "dry_sand")
     wait_until(lambda: page.session.shown.verdict.max_sinkage > 0.0, "wheels that sink")
     visitor.choose("Soil", "")

@@ -17,7 +17,7 @@ from rover_planner.planning.search.nodes import HEADINGS, Nodes, nodes_within
 from rover_planner.planning.search.unobserved_check import UnobservedCheck
 
 MAX_NODES = 1_500_000
-"""Largest number of nodes of a window; each takes 70 bytes."""
+"""Largest number of nodes of a window; each takes 80 bytes."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -90,7 +90,7 @@ def compare_drives(before: Judged, now: Judged) -> list[list[str]]:
         "verdict": lambda one: "passes" if one.verdict.traversable else "refused",
         "driven": lambda one: write(float(one.trajectory.distance[-1]), 2, "m"),
         "time": lambda one: write(float(one.trajectory.times[-1]), 1, "s"),
-        "energy": lambda one: write(float(one.trajectory.series("energy")[-1]), 1, "J"),
+        "energy": lambda one: write(one.trajectory.energy, 1, "J"),
     }
     rows = [[name, read(before), read(now)] for name, read in reads.items()]
     for lane in now.limits.lanes:

@@ -16,8 +16,8 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64MultiArray
 
+from rover_physics import load_rover
 from rover_physics.names import WHEEL_JOINTS
-from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steered_drive import SteeredDrive
 from rover_planner.nodes.traction_controller import TractionController
 from rover_planner.ros.qos import sensor_qos, topic_qos

@@ -7,8 +7,7 @@ from rclpy.parameter import Parameter
 from scipy import ndimage
 
 from benchmarks.grounds import real_maps
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain, save_terrain
+from rover_physics import Terrain, load_rover, save_terrain
 from rover_planner.nodes.mission.drive import DriveSettings, drive_to
 from rover_planner.nodes.mission_planner import MissionPlanner
 from rover_planner.nodes.rover_simulator import RoverSimulator

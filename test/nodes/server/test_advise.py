@@ -10,7 +10,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from msg_adapters.paths import stamped_pose
-from rover_physics.traversability.judge import judge_path
+from rover_physics import judge_path
 from rover_planner.ros.qos import latched_qos
 from support.grounds import make_terrain
 from support.planner_client import SERVER

@@ -8,7 +8,7 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped, WrenchStamped
 from std_srvs.srv import Trigger
 
-from rover_physics.traversability.reach import judge_reach
+from rover_physics import judge_reach
 from rover_planner.ros.qos import topic_qos
 from support.grounds import make_terrain
 from support.messages.tool_messages import make_target, make_wrench

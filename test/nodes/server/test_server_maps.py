@@ -12,9 +12,9 @@ from sensor_msgs.msg import Imu, JointState, PointCloud2
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import stamped_pose
+from rover_physics import Terrain, save_terrain
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
-from rover_physics.terrain.grid import Terrain, save_terrain
 from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.ros.qos import map_qos
 from support.grounds import make_terrain, wall_at, waves

@@ -2,7 +2,6 @@
 """Bad input of every kind is refused with a reason and a log line, and the node lives on."""
 
 import json
-import math
 
 import numpy as np
 import pytest
@@ -10,11 +9,10 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.paths import poses_path
-from rover_physics.terrain.grid import save_terrain
+from rover_physics import save_terrain
 from rover_planner.planning.answering.snapshot import Snapshot
 from support.grounds import make_terrain, waves
 from support.planner_client import GOAL, START, ask, verdict_of
-from support.waiting import wait_until
 
 
 def assert_refused(client, code, text, question):
@@ -114,17 +112,6 @@ def test_bad_parameters_are_refused_in_a_short_reason_and_good_ones_take_effect(
     accepted, reason = client.set_parameter("payload", 3.0)
     assert not accepted and "no manipulator" in reason
     assert client.set_parameter("rover", "lsr1") == (True, "")
-
-
-def test_joints_that_cannot_be_used_leave_the_angles_known_before(shared):
-    server, client = shared.server, shared.client
-    client.send_joints(["rocker_left"], [0.25])
-    wait_until(lambda: server.service.joints, "the joints")
-    client.send_joints(["rocker_left"], [math.nan])
-    client.wait_for_log("joint_states has position nan of rocker_left")
-    client.send_joints(["bogie_left"], [0.125])
-    wait_until(lambda: "bogie_left" in server.service.joints, "the other joint")
-    assert server.service.joints == {"rocker_left": 0.25, "bogie_left": 0.125}
 
 
 def test_a_fault_of_the_program_is_a_refusal_and_not_the_end(shared):

@@ -9,11 +9,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.status import PoseStatus
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_path
+from rover_physics import PathPrediction, PoseStatus, Terrain, judge_path, load_rover
 from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import bouldered, fractal, random_poses
 from support.rover_geometry import wheel_axes, wheel_gap

@@ -6,11 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rover_physics import PoseStatus, Terrain, judge_path, judge_poses, load_rover
 from rover_physics.results.record import QUANTITIES
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.status import PoseStatus
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_path, judge_poses
 from support.reference_cases import angle_errors, reference_predictions, steered_predictions
 from support.rough_grounds import fractal, plane, random_poses, rocky, scaled_for, smooth
 from support.rover_geometry import attitude_of, place_rover, wheel_axes, wheel_gaps

@@ -13,11 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from rover_physics.errors import RoverError, RoverFileError
+from rover_physics import RoverError, load_rover, load_terrain
+from rover_physics.errors import RoverFileError
 from rover_physics.files.npz_file import NpzReader, open_npz
 from rover_physics.files.user_file import read_regular_file, write_file
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import load_terrain
 from rover_planner.command.prediction_files import read_poses, read_prediction
 from rover_planner.errors import PlanningError
 from rover_planner.studies.study_file import load_study

@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Contents of a file become a type, or an error that names key, value and rule."""
 
-import subprocess
-import sys
 from dataclasses import dataclass
 from typing import Annotated, Any
 
 import pytest
 
-from rover_physics.errors import RoverError, RoverFileError
+from rover_physics import Rover, RoverError
+from rover_physics.errors import RoverFileError
 from rover_physics.files.rules import (
     Keys,
     ListOfMappings,
@@ -20,7 +19,6 @@ from rover_physics.files.rules import (
     number,
 )
 from rover_physics.files.validation import describe, errors_of, find_unit, read_as, show_key
-from rover_physics.rover.model import Rover
 
 
 @dataclass(frozen=True)
@@ -123,13 +121,3 @@ def test_long_values_and_keys_are_shown_briefly():
     assert show_key(("drives", 0, "length")) == "drives[0].length"
     assert show_key(("my soil", "n")) == "my soil.n"
     assert len(show_key(("x" * 1000,))) <= 60
-
-
-def test_pydantic_is_loaded_when_a_file_is_read_and_not_before():
-    code = (
-        "import sys, rover_planner.cli, rover_physics.rover.rover_file as files\n"
-        "assert 'pydantic' not in sys.modules\n"
-        "files.load_rover('lsr1')\n"
-        "assert 'pydantic' in sys.modules\n"
-    )
-    subprocess.run([sys.executable, "-c", code], check=True)

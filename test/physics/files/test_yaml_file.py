@@ -5,10 +5,10 @@ import time
 
 import pytest
 
-from rover_physics.errors import RoverError, RoverFileError
+from rover_physics import RoverError, load_rover
+from rover_physics.errors import RoverFileError
 from rover_physics.files.config_files import find_config
 from rover_physics.files.yaml_file import parse_yaml
-from rover_physics.rover.rover_file import load_rover
 
 PRESET = find_config("rovers/lsr1.yaml").read_text(encoding="utf-8")
 HOSTILE = [

@@ -8,16 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rover_physics import PoseStatus, Rover, SweepOptions, judge_path, judge_poses, load_rover
 from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES, balance_forces
 from rover_physics.forces.stability import tip_over_angles
 from rover_physics.prediction.evaluation import new_work
-from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.linkage import pack_linkage, place, place_masses
 from rover_physics.rover.manipulator import link_points
-from rover_physics.rover.model import Rover, Steering
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.status import PoseStatus
-from rover_physics.traversability.judge import judge_path, judge_poses
+from rover_physics.rover.model import Steering
 from support.reference_cases import reference_grounds, reference_predictions, steered_predictions
 from support.rough_grounds import fractal, plane, random_poses, rocky, scaled_for, smooth
 from support.rover_geometry import (
@@ -82,12 +79,15 @@ def test_all_nine_balance_equations_hold_on_rough_ground(
 @few
 @given(seeds, headings, vectors, vectors)
 def test_all_nine_balance_equations_hold_with_a_tool_load(seed, yaw, force, moment):
-    prediction = judge_path(
-        LSR1, smooth(seed), [[0.1, 0.2, yaw]], SweepOptions(tool_force=force, tool_moment=moment)
-    )[0]
-    placed, R = place_rover(LSR1, prediction, 0), attitude_of(prediction, 0)
-    arm = LSR1.manipulator
-    tip = placed.origin + R @ link_points(arm, np.array(arm.stowed))[3]
+    arm = replace(LSR1.manipulator, link_masses=(0.0, 0.0, 0.0))
+    rover, joints = replace(LSR1, manipulator=arm), (0.4, -0.5, 1.1)
+    options = SweepOptions(
+        joint_angles=dict(zip(arm.joints, joints, strict=True)),
+        tool_force=force, tool_moment=moment,
+    )  # fmt: skip
+    prediction = judge_path(rover, smooth(seed), [[0.1, 0.2, yaw]], options)[0]
+    placed, R = place_rover(rover, prediction, 0), attitude_of(prediction, 0)
+    tip = placed.origin + R @ link_points(arm, np.array(joints))[3]
     acting = [(R @ np.array(force), tip, None, False)]
     # A couple: two opposite forces, a metre apart along each axis in turn.
     for k in range(3):

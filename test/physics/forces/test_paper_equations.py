@@ -14,11 +14,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.rover.model import Part, Rover
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_path
+from rover_physics import PathPrediction, Rover, Terrain, judge_path, load_rover
+from rover_physics.rover.model import Part
 from support.grounds import make_terrain
 from support.rough_grounds import fractal, random_poses, rocky, smooth
 from support.rover_geometry import UP, attitude_of, place_rover

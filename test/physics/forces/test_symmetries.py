@@ -8,10 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_poses
+from rover_physics import SweepOptions, Terrain, judge_poses, load_rover
 from support.rough_grounds import (
     mirrored,
     plane,

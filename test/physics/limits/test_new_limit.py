@@ -6,14 +6,18 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from rover_physics import (
+    SweepOptions,
+    judge_path,
+    judge_pieces,
+    judge_poses,
+    load_rover,
+    score_poses,
+)
 from rover_physics.errors import RoverFileError
 from rover_physics.limits import table
 from rover_physics.limits.table import NEWTONS, Limit
-from rover_physics.prediction.map_sweep import score_poses
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.rover_file import load_rover, rover_from_dict, rover_to_dict
-from rover_physics.traversability.judge import judge_path, judge_poses
-from rover_physics.traversability.pieces import judge_pieces
+from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 from rover_physics.traversability.pose_classes import (
     IMPASSABLE,
     PASSABLE,

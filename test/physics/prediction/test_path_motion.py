@@ -8,16 +8,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rover_physics import PoseStatus, SweepOptions, Terrain, judge_path, judge_poses, load_rover
 from rover_physics.errors import PoseError
 from rover_physics.names import TORQUE_POLICIES
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
-from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Steering
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.status import PoseStatus
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_path, judge_poses
 from rover_physics.traversability.partwise import PartwiseJudge
 from support.rough_grounds import fractal, plane, random_poses
 

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sweeps: bad arguments, waypoints on their own, time and energy, scores, several at once."""
 
-import itertools
 import threading
 from contextlib import suppress
 from unittest.mock import Mock
@@ -12,16 +11,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rover_physics.prediction.map_sweep as map_sweep
+from rover_physics import (
+    PoseStatus,
+    SweepOptions,
+    Terrain,
+    judge_path,
+    judge_paths,
+    load_rover,
+    score_poses,
+    sweep_map,
+)
 from rover_physics.errors import ModelError, PoseError
 from rover_physics.numerics import interruption
-from rover_physics.numerics.interruption import check_interruption, interruptible, slices
-from rover_physics.prediction.map_sweep import score_poses, sweep_map
-from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.numerics.interruption import interruptible
 from rover_physics.results.record import QUANTITIES
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.status import PoseStatus
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_path, judge_paths
 from rover_physics.traversability.verdict import hold_against_limits
 from support.grounds import gap, make_terrain, waves
 from support.grounds import rocky as low_rock
@@ -170,7 +173,7 @@ def poses_on(terrain: Terrain, shape) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("ground", "shape"), [(low_rock, (5, 8)), (gap, (60, 50))])
-def test_scores_are_those_of_a_sweep_on_one_thread_and_on_several(ground, shape):
+def test_scores_are_those_of_a_sweep_and_its_verdict_on_one_thread_and_on_several(ground, shape):
     terrain = make_terrain(ground)
     poses = poses_on(terrain, shape)
     scores = score_poses(LSR1, terrain, poses, SweepOptions(friction=0.5))
@@ -189,17 +192,8 @@ def test_scores_are_those_of_a_sweep_on_one_thread_and_on_several(ground, shape)
         found = getattr(scores, name)
         assert found.shape == shape
         np.testing.assert_allclose(found.ravel(), values, rtol=1e-6, atol=1e-7)
-
-
-def test_what_is_within_limits_is_what_a_verdict_passes():
-    terrain = make_terrain(low_rock)
-    poses = poses_on(terrain, (60,))
-    within = score_poses(LSR1, terrain, poses).passable
-    passed = [
-        hold_against_limits(LSR1, judge_path(LSR1, terrain, pose[None])[0]).traversable
-        for pose in poses
-    ]
-    assert within.tolist() == passed and 0 < sum(passed) < 60
+    passed = [not code for code in hold_against_limits(LSR1, path).codes]
+    assert scores.passable.ravel().tolist() == passed and 0 < sum(passed) < len(passed)
 
 
 def test_a_map_is_swept_cell_by_cell(monkeypatch):
@@ -268,15 +262,6 @@ def test_a_short_sweep_does_not_wait_for_the_end_of_a_long_one():
     assert not ended.is_set()
     enough.set()
     thread.join()
-
-
-def test_slices_cover_all_items_once_and_in_order_and_without_a_check_there_is_one():
-    check_interruption()
-    assert list(slices(10**6)) == [slice(0, 10**6)]
-    with interruptible(lambda: None):
-        parts = list(slices(3000))
-    assert parts[0].start == 0 and parts[-1].stop == 3000 and len(parts) > 1
-    assert all(one.stop == other.start for one, other in itertools.pairwise(parts))
 
 
 def test_a_check_that_raises_ends_the_sweep_and_the_next_one_runs():

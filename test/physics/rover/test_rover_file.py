@@ -7,10 +7,11 @@ from typing import Any
 import pytest
 import yaml
 
-from rover_physics.errors import RoverError, RoverFileError
+from rover_physics import Rover, RoverError, load_rover
+from rover_physics.errors import RoverFileError
 from rover_physics.files.config_files import find_config
-from rover_physics.rover.model import Rover, Steering
-from rover_physics.rover.rover_file import load_rover, preset_names, rover_from_dict
+from rover_physics.rover.model import Steering
+from rover_physics.rover.rover_file import preset_names, rover_from_dict
 
 NAN, INF = float("nan"), float("inf")
 OPTIONAL = ("manipulator", "manipulator.payload", "steering", "wheel.servo_droop")

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rover_physics import Rover, load_rover
 from rover_physics.errors import ModelError
 from rover_physics.rover.linkage import pack_linkage
-from rover_physics.rover.model import Rover, Steering
-from rover_physics.rover.rover_file import load_rover
+from rover_physics.rover.model import Steering
 from rover_physics.rover.steered_drive import STAND_ERROR, SteeredDrive
 from rover_physics.rover.steering import steer_wheels
 from rover_physics.rover.steering_joints import (

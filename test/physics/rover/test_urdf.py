@@ -10,15 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rover_physics import Rover, load_rover
 from rover_physics.errors import RoverFileError
-from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_file import (
-    load_rover,
-    preset_names,
-    rover_to_dict,
-    save_rover,
-    save_yaml,
-)
+from rover_physics.rover.rover_file import preset_names, rover_to_dict, save_rover, save_yaml
 from rover_physics.rover.urdf.joint_map import map_of
 from rover_physics.rover.urdf.read_rover import Levelling, rover_from_urdf
 from rover_physics.rover.urdf.robot import JointTree, parse_robot, read_robot

@@ -7,12 +7,10 @@ import mujoco
 import numpy as np
 import pytest
 
+from rover_physics import Terrain, judge_poses, load_rover
 from rover_physics.names import WHEELS
 from rover_physics.numerics.quaternions import forward_from_xyzw, wxyz_from_rpy, xyzw_from_wxyz
-from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.urdf.write_urdf import write_urdf
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_poses
 
 TIMESTEP = 1e-3
 """[s]"""

@@ -5,7 +5,8 @@ import math
 
 import pytest
 
-from rover_physics.errors import RoverError, SoilError
+from rover_physics import RoverError
+from rover_physics.errors import SoilError
 from rover_physics.files.config_files import find_config
 from rover_physics.terrain.soil_file import load_soils, soil_named, soils_from_dict
 

@@ -11,10 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rover_physics import Terrain, load_rover, load_terrain, save_terrain
 from rover_physics.errors import TerrainError
 from rover_physics.prediction.packed_model import pack_model
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
 from rover_physics.terrain.ground import (
     BLOCK,
     SOIL_NUMBERS,
@@ -276,10 +275,15 @@ def test_blocks_hold_the_highest_ground(shape):
 def test_an_edit_of_the_array_that_was_given_does_not_reach_the_ground():
     """A table of block maxima that is older than the heights would hide obstacles."""
     heights = np.zeros((9, 9))
-    terrain = Terrain(heights, 0.1)
-    packed = pack_ground(terrain)
-    heights[4, 4] = 5.0
-    assert terrain.elevation[4, 4] == packed.arrays["elevation"][4, 4] == 0.0
+    view = heights[:]
+    view.flags.writeable = False  # its owner still writes
+    for given_array in (heights, view):
+        heights[4, 4] = 0.0
+        terrain = Terrain(given_array, 0.1)
+        packed = pack_ground(terrain)
+        heights[4, 4] = 5.0
+        assert terrain.elevation[4, 4] == packed.arrays["elevation"][4, 4] == 0.0
+    assert Terrain(terrain.elevation, 0.1).elevation is terrain.elevation  # nothing to protect
     with pytest.raises(ValueError, match="read-only"):
         terrain.elevation[4, 4] = 5.0
     with pytest.raises(ValueError, match="read-only"):

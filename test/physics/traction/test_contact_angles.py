@@ -4,9 +4,8 @@
 import numpy as np
 import pytest
 
+from rover_physics import Terrain, load_rover
 from rover_physics.errors import ModelError
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
 from rover_physics.traction.balance import MeasuredState
 from rover_physics.traction.contact_ekf import MotionContactEstimator
 from rover_physics.traction.map_contacts import MapContactFinder

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rover_physics import judge_path, judge_poses, load_rover
 from rover_physics.errors import ModelError
-from rover_physics.rover.rover_file import load_rover
 from rover_physics.traction.balance import BalanceWriter, MeasuredState
 from rover_physics.traction.contact_ekf import Motion, MotionContactEstimator
 from rover_physics.traction.layout import LOADS, TRACTIONS
@@ -15,7 +15,6 @@ from rover_physics.traction.line_search import measure_peak
 from rover_physics.traction.map_contacts import MapContactFinder
 from rover_physics.traction.program import ProgramInputs
 from rover_physics.traction.solver import TractionWorkspace, solve_traction
-from rover_physics.traversability.judge import judge_path, judge_poses
 from support.best_torques import can_stand
 from support.rough_grounds import fractal, plane, random_poses
 from support.rover_geometry import balance_matrix, free_balance_matrix, place_rover

@@ -6,10 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rover_physics import SweepOptions, classify_path, judge_path, load_rover
 from rover_physics.errors import ModelError
 from rover_physics.names import WHEELS
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.rover_file import load_rover
 from rover_physics.traversability.classification import (
     IMPASSABLE,
     PASSABLE,
@@ -17,10 +16,8 @@ from rover_physics.traversability.classification import (
     WITH_SPEED_SERVOS,
     WITH_TRACTION_CONTROL,
     classify_judged,
-    classify_path,
     deciding_waypoint,
 )
-from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import bowl, plane, random_poses, rocky
@@ -232,11 +229,3 @@ def test_the_margin_holds_within_the_bounds_of_an_uncertain_map():
 def test_a_margin_outside_its_range_is_named(margin):
     with pytest.raises(ModelError, match="control_margin"):
         SweepOptions(control_margin=margin)
-
-
-def test_a_bump_that_takes_all_the_torque_of_one_side_is_not_promised():
-    rover, ground = unlimited(LSR1), drive_ground("bump_one_side", 0.16)
-    options = SweepOptions(friction=0.8, max_torque=0.81, policy="optimal")
-    assert judge_path(rover, ground, drive_path(), options)[1].traversable
-    promised = judge_path(rover, ground, drive_path(), replace(options, control_margin=0.1))[1]
-    assert not promised.traversable and "control margin" in promised.reason

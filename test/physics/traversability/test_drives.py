@@ -9,8 +9,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.judge import judge_path
+from rover_physics import judge_path, load_rover
 from rover_physics.traversability.verdict import hold_against_limits
 from support.reference_drives import (
     PASSED,

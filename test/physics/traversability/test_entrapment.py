@@ -8,10 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_path
+from rover_physics import SweepOptions, Terrain, judge_path, load_rover
 from support.rough_grounds import bowl
 
 RESOLUTION = 0.02

@@ -9,21 +9,25 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rover_physics.errors import ModelError, RoverError
+from rover_physics import (
+    PoseStatus,
+    RoverError,
+    SweepOptions,
+    Terrain,
+    classify_path,
+    find_torque_ranges,
+    judge_path,
+    load_rover,
+    score_poses,
+)
+from rover_physics.errors import ModelError
 from rover_physics.names import EQUAL, OPTIMAL
-from rover_physics.prediction.map_sweep import score, score_poses
+from rover_physics.prediction.map_sweep import score
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.sweep import predict_poses
-from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.record import QUANTITIES
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.status import PoseStatus
-from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.bounded_verdict import refuse_worst_case
-from rover_physics.traversability.classification import classify_path
-from rover_physics.traversability.judge import judge_path
-from rover_physics.traversability.torque_ranges import find_torque_ranges
 from rover_physics.traversability.verdict import hold_against_limits
 from rover_planner.planning.path_query import path_cost
 from support.rough_grounds import plane

@@ -9,18 +9,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from benchmarks.invariants import changes_of
+from rover_physics import (
+    PathPrediction,
+    SweepOptions,
+    Terrain,
+    Verdict,
+    judge_path,
+    judge_paths,
+    judge_pieces,
+    load_rover,
+)
 from rover_physics.bounds.path import BOUNDED_VALUES
 from rover_physics.prediction import sweep
 from rover_physics.prediction.packed_model import PackedModel, pack_model
-from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.record import QUANTITIES
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_path, judge_paths
 from rover_physics.traversability.partwise import PartwiseJudge
-from rover_physics.traversability.pieces import SAFE, find_exposure, judge_pieces
-from rover_physics.traversability.verdict import Verdict, hold_against_limits
+from rover_physics.traversability.pieces import SAFE, find_exposure
+from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import bouldered, bowl, fractal, rocky
 
 ROVER = load_rover("lsr1")
@@ -34,7 +39,7 @@ OPTIONS = {
 }
 
 
-def straight(x: float, y: float, length: float, yaw: float, spacing: float) -> np.ndarray:
+def straight(y: float, length=9.0, x=0.0, yaw=0.0, spacing=0.02) -> np.ndarray:
     """Return poses (n, 3) on a straight line with its middle at x, y."""
     along = np.arange(-0.5 * length, 0.5 * length, spacing)
     return np.column_stack([x + along * np.cos(yaw), y + along * np.sin(yaw), 0.0 * along + yaw])
@@ -53,7 +58,7 @@ def courses(draw) -> tuple[Terrain, np.ndarray]:
     places = st.floats(-0.7, 0.7)
     length, spacing = draw(st.floats(0.5, 3.9)), draw(st.sampled_from((0.01, 0.02, 0.05, 0.11)))
     yaw = draw(st.floats(-np.pi, np.pi))
-    return ground, straight(draw(places), draw(places), length, yaw, spacing)
+    return ground, straight(draw(places), length, draw(places), yaw, spacing)
 
 
 def first_refusal(verdict: Verdict) -> tuple:
@@ -85,7 +90,7 @@ def test_a_stopped_sweep_is_the_beginning_of_the_whole_one_to_the_last_bit(cours
 def test_a_wheel_on_its_way_off_an_edge_at_the_end_of_a_block_is_no_failure(monkeypatch):
     """A sweep that took the end of a block for that of the path would refuse the fall."""
     ground = GROUND
-    poses = straight(0.0, -3.0, 9.0, 0.0, 0.02)
+    poses = straight(-3.0)
     _, whole = judge_path(ROVER, ground, poses)
     assert whole.traversable and whole.max_wheel_drop > 0.0
     for block in (1, 2, 3, 5, 7, 11):
@@ -95,7 +100,7 @@ def test_a_wheel_on_its_way_off_an_edge_at_the_end_of_a_block_is_no_failure(monk
 
 def test_several_paths_stop_each_at_its_own_failure():
     ground = GROUND
-    paths = [straight(0.0, y, length, 0.0, 0.02) for y in (-3.0, -1.0, 3.0) for length in (4, 9)]
+    paths = [straight(y, length) for y in (-3.0, -1.0, 3.0) for length in (4, 9)]
     options = SweepOptions(friction=0.5)
     together = judge_paths(ROVER, ground, paths, options, stop_at_failure=True)
     for path, (prediction, verdict) in zip(paths, together, strict=True):
@@ -108,7 +113,7 @@ def test_several_paths_stop_each_at_its_own_failure():
 def test_nothing_is_evaluated_or_searched_far_beyond_a_failure_at_the_start(monkeypatch):
     ground = GROUND
     unknown = np.where(np.arange(ground.elevation.shape[1]) < 60, np.nan, ground.elevation)
-    poses = straight(0.0, -3.0, 9.0, 0.0, 0.02)
+    poses = straight(-3.0)
     evaluated = []
     evaluate = PackedModel.evaluate
 
@@ -124,18 +129,12 @@ def test_nothing_is_evaluated_or_searched_far_beyond_a_failure_at_the_start(monk
 
 def test_bounds_refuse_the_same_waypoint_with_and_without_stopping():
     ground = replace(GROUND, elevation_std=np.full_like(GROUND.elevation, 0.004))
-    poses = straight(0.0, -3.0, 3.0, 0.0, 0.05)
+    poses = straight(-3.0, 3.0, spacing=0.05)
     options = SweepOptions(policy="optimal", friction=0.6)
     whole, verdict = judge_path(ROVER, ground, poses, options)
     cut, stopped = judge_path(ROVER, ground, poses, options, stop_at_failure=True)
     assert first_refusal(stopped) == first_refusal(verdict)
     np.testing.assert_array_equal(cut.bounds.status, whole.bounds.status[: len(cut.poses)])
-
-
-def line(y: float = -3.0, length: float = 9.0) -> np.ndarray:
-    """Return poses (n, 3) along x, 2 cm apart."""
-    x = np.arange(-0.5 * length, 0.5 * length, 0.02)
-    return np.column_stack([x, np.full_like(x, y), np.zeros_like(x)])
 
 
 def inclined(slope: float) -> Terrain:
@@ -156,15 +155,15 @@ def unknown(start: float) -> Terrain:
 
 
 CASES = {
-    "rocks": (GROUND, line(), SweepOptions()),
-    "downhill": (inclined(-0.25), line(1.0), SweepOptions(friction=0.8)),
-    "backwards down": (inclined(0.2), line()[::-1].copy(), SweepOptions(backward=True)),
-    "slippery": (GROUND, line(-1.0), SweepOptions(friction=0.4)),
-    "sand": (GROUND, line(3.0), SweepOptions(soil="dry_sand")),
-    "margin": (GROUND, line(3.0), SweepOptions("optimal", control_margin=0.3, friction=0.5)),
-    "high stairs": (steps_down(0.05), line(0.0), SweepOptions("optimal", friction=0.9)),
-    "ledges": (steps_down(0.16), line(0.0), SweepOptions()),
-    "unknown ground": (unknown(8.0), line(), SweepOptions()),
+    "rocks": (GROUND, straight(-3.0), SweepOptions()),
+    "downhill": (inclined(-0.25), straight(1.0), SweepOptions(friction=0.8)),
+    "backwards down": (inclined(0.2), straight(-3.0)[::-1].copy(), SweepOptions(backward=True)),
+    "slippery": (GROUND, straight(-1.0), SweepOptions(friction=0.4)),
+    "sand": (GROUND, straight(3.0), SweepOptions(soil="dry_sand")),
+    "margin": (GROUND, straight(3.0), SweepOptions("optimal", control_margin=0.3, friction=0.5)),
+    "high stairs": (steps_down(0.05), straight(0.0), SweepOptions("optimal", friction=0.9)),
+    "ledges": (steps_down(0.16), straight(0.0), SweepOptions()),
+    "unknown ground": (unknown(8.0), straight(-3.0), SweepOptions()),
 }
 
 
@@ -194,7 +193,7 @@ def test_all_numbers_and_the_verdict_are_those_of_the_whole_path(case, monkeypat
 def test_bounds_are_those_of_the_whole_path(monkeypatch):
     monkeypatch.setattr(sweep, "PART", 16)
     ground = replace(GROUND, elevation_std=np.full_like(GROUND.elevation, 0.003))
-    options, poses = SweepOptions(friction=0.7), line(length=2.0)
+    options, poses = SweepOptions(friction=0.7), straight(-3.0, 2.0)
     whole, verdict = judge_path(ROVER, ground, poses, options, sigmas=2.0)
     taken, found = judge_in_parts(ground, poses, options, sigmas=2.0)
     assert found.to_dict() == verdict.to_dict()
@@ -207,7 +206,7 @@ def test_a_trap_at_the_end_of_a_long_path_is_found(monkeypatch):
     monkeypatch.setattr(sweep, "PART", 32)
     ground, poses, options = (
         bowl(0.37, 1.5, 0.35),
-        line(0.0, 10.0)[:250],
+        straight(0.0, 10.0)[:250],
         SweepOptions(soil="dry_sand"),
     )
     _, verdict = judge_path(ROVER, ground, poses, options)
@@ -218,7 +217,7 @@ def test_a_trap_at_the_end_of_a_long_path_is_found(monkeypatch):
 
 def test_no_part_is_much_longer_than_asked_even_where_nothing_settles(monkeypatch):
     monkeypatch.setattr(sweep, "PART", 50)
-    taken, verdict = judge_in_parts(unknown(0.0), line(), SweepOptions())
+    taken, verdict = judge_in_parts(unknown(0.0), straight(-3.0), SweepOptions())
     assert verdict.code == "unknown_ground"
     assert max(len(part.poses) for part in taken) <= 50
 

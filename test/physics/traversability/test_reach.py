@@ -8,13 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from rover_physics import Rover, SweepOptions, judge_path, judge_reach, load_rover
 from rover_physics.errors import ModelError
-from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.manipulator import arm_angles, inverse_kinematics, link_points
-from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.judge import judge_path
-from rover_physics.traversability.reach import judge_reach
 from support.rough_grounds import plane, smooth
 from support.rover_geometry import attitude_of
 

@@ -7,11 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rover_physics import PoseStatus, judge_path, load_rover
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.results.record import numbers_of
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.status import PoseStatus
-from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import codes_of_verdicts, hold_against_limits
 from support.rough_grounds import plane
 

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from rover_physics import judge_path, load_rover
 from rover_physics.numerics.interruption import check_interruption
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.judge import judge_path
 from rover_planner.planning.answering.budget import (
     BUSY,
     CANCELLED,

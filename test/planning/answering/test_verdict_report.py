@@ -94,13 +94,3 @@ def test_a_refusal_says_why_and_nothing_of_a_path():
         "reason": "no map was received yet",
         "first_failure": -1,
     }
-
-
-def test_the_report_and_its_classes_are_computed_once_and_when_asked_for(full, monkeypatch):
-    asked, classes, judgement = [], full.complete().classes, replace(full.complete())
-    monkeypatch.setattr(full.judge, "classify", lambda _: asked.append(1) or classes)
-    assert judgement.summary().startswith("refused") and not judgement.traversable
-    assert asked == []
-    assert judgement.report is judgement.report
-    judgement.changes()
-    assert asked == [1]

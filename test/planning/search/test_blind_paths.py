@@ -3,8 +3,7 @@
 
 import numpy as np
 
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain
+from rover_physics import Terrain, load_rover
 from rover_planner.maps.unobserved_ground import (
     ALLOW_FOOTPRINT,
     ASSUMED,

@@ -7,9 +7,7 @@ import numba
 import numpy as np
 import pytest
 
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain, load_terrain
-from rover_physics.traversability.judge import judge_path
+from rover_physics import Terrain, judge_path, load_rover, load_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
 from rover_planner.planning.search.edge_memory import EdgeMemory

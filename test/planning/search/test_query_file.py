@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of the files that hold a question for a way."""
+"""Tests of the files that hold a question for a path."""
 
 import json
 
 import numpy as np
 import pytest
 
-from rover_physics.errors import RoverError
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import load_terrain, save_terrain
+from rover_physics import RoverError, load_rover, load_terrain, save_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
@@ -41,7 +39,7 @@ def test_a_question_is_read_as_it_was_written(written):
 
 def test_a_terrain_file_is_no_question(tmp_path):
     save_terrain(tmp_path / "ground.npz", make_terrain(waves))
-    with pytest.raises(PlanningError, match="ground.npz holds no question for a way"):
+    with pytest.raises(PlanningError, match="ground.npz holds no question for a path"):
         read_query(tmp_path / "ground.npz")
 
 

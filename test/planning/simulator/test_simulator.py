@@ -4,9 +4,8 @@
 import numpy as np
 import pytest
 
+from rover_physics import judge_path, load_rover
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.traversability.judge import judge_path
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.simulator.mujoco_plant import MujocoPlant
