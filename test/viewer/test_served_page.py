@@ -311,7 +311,7 @@ def test_a_failed_request_is_told_until_a_request_succeeds(page):
     wait_until(lambda: told(page, "errors") == [], "the notice to go")
 
 
-def test_a_failed_picture_is_not_drawn_again_before_the_next_request(page, monkeypatch):
+def test_a_failed_picture_is_not_drawn_again_at_once(page, monkeypatch):
     tried = []
     ask(page, lambda: None)  # nothing else is asked any more
 

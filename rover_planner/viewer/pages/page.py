@@ -478,7 +478,7 @@ class Page(PageBase):
             return state
         if abs(at - failure.time) > AT_FAILURE:
             return state
-        return replace(failure.state.change(energy=state.energy), spin=state.spin)
+        return replace(failure.state, spin=state.spin)
 
 
 def _differ_in_size(one: Rover, other: Rover) -> bool:
