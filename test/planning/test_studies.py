@@ -8,11 +8,19 @@ import pytest
 
 from rover_physics import load_rover
 from rover_physics.errors import RoverFileError
-from rover_physics.rover.rover_file import rover_to_dict
+from rover_physics.rover.rover_file import preset_names, rover_to_dict
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.studies.objectives import climbs, tallest_step
-from rover_planner.studies.rover_values import find_key, vary
+from rover_planner.studies.rover_values import (
+    find_key,
+    get_value,
+    list_values,
+    read_rover,
+    vary,
+    with_value,
+    write_rover,
+)
 from rover_planner.studies.runner import find_rover, run_study
 from rover_planner.studies.study_file import name_thing, study_from_dict
 from rover_planner.studies.summary import describe_ties
@@ -155,6 +163,24 @@ def test_an_impossible_study_is_refused(changes, text):
     objective = {"objective": "worst_utilisation"} if "drives" in changes else {}
     with pytest.raises((PlanningError, RoverFileError), match=text):
         _ = run_study(study(**objective, **changes)).best
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_a_rover_that_is_written_and_read_again_is_the_same(name):
+    rover = load_rover(name)
+    assert read_rover(write_rover(rover), "here") == rover
+
+
+@pytest.mark.parametrize("name", preset_names())
+def test_every_value_is_within_its_range_and_can_be_set(name):
+    rover = load_rover(name)
+    data = rover_to_dict(rover)
+    for values in list_values(rover).values():
+        for value in values:
+            now = get_value(data, value.keys[0])
+            assert value.low <= now <= value.high and value.low < value.high, value.label
+            assert value.label.endswith("]"), value.label
+            assert with_value(rover, value.keys, now) == rover
 
 
 def test_every_number_of_a_rover_has_a_name_and_a_unit():
