@@ -147,6 +147,15 @@ def test_a_changed_number_is_told_with_what_it_changes_and_can_be_undone_and_res
         wait_for_rest(page)
 
 
+def test_a_number_or_an_angle_beyond_the_ends_of_its_slider_is_that_at_its_end(page):
+    sliders = {one[0]: one for part in told(page, "sliders")["parts"] for one in part["sliders"]}
+    for label in (FRICTION, "arm_yaw [rad]"):
+        page.hear({"ask": "value", "label": label, "value": 9999.0}, None)
+        most = sliders[label][2]
+        wait_until(lambda at=label, most=most: told(page, "values")[at][0] == most, label)
+    wait_for_rest(page)
+
+
 def test_a_rover_file_and_a_preset_are_loaded_and_the_arm_follows(page):
     text = write_rover(replace(LSR1, name="bare", manipulator=None))
     page.hear({"ask": "upload", "name": "bare.yaml", "text": text}, None)

@@ -308,13 +308,14 @@ function drawCurves() {
 function plot(curve, write, limit, old) {
   const known = [...curve.y.flat(), ...(old ? old.y.flat() : [])].filter((value) => value !== null);
   const top = Math.min(Math.max(limit ? 1.2 : 0, ...known, 1e-9), limit ? 3 : Infinity);
+  const down = (value) => 100 * (1 - Math.min(value, top) / (1.04 * top)); // a line at the top is seen
   const box = draw("svg", { viewBox: "0 0 1000 100", preserveAspectRatio: "none" });
   const end = state.limits.end || 1;
   const line = (x, y, attributes) => {
     let path = "", pen = "M";
     x.forEach((distance, k) => {
       if (y[k] === null) { pen = "M"; return; }
-      path += `${pen}${(1000 * distance / end).toFixed(1)} ${(100 * (1 - Math.min(y[k], top) / top)).toFixed(2)}`;
+      path += `${pen}${(1000 * distance / end).toFixed(1)} ${down(y[k]).toFixed(2)}`;
       pen = "L";
     });
     if (x.length === 1) path += "h1000";
@@ -331,7 +332,7 @@ function plot(curve, write, limit, old) {
     ticks.push([limit, write(limit)]);
   }
   return make("div", { class: "plot", onclick: goTo }, box,
-    ...ticks.map(([value, words]) => make("span", { class: "tick", style: `top:${100 * (1 - value / top)}%` }, words)),
+    ...ticks.map(([value, words]) => make("span", { class: "tick", style: `top:${down(value)}%` }, words)),
     make("span", { class: "end" }, `${(state.limits.end || 0).toFixed(2)} m`), make("div", { class: "cursor" }));
 }
 
