@@ -7,7 +7,7 @@ const chosen = { tab: "Drive", lane: "", link: "", program: "", dragged: null };
 const at = (id) => document.getElementById(id);
 const SVG = "http://www.w3.org/2000/svg";
 const COLOURS = { rear: "#0072b2", middle: "#d55e00", front: "#00795a" };
-const PRESS = 3000; // [ms] for which a press lasts at most
+const PRESS = 10000; // [ms] for which a press lasts at most
 const SETTLE = 500; // [ms] after which a box shows the program's value, also if its own was refused
 const CLASSES = [["little", "to 50 %"], ["half", "to 80 %"], ["near", "to 100 %"],
   ["broken", "broken"], ["unasked", "not asked"]];
