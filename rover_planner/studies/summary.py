@@ -2,7 +2,7 @@
 """Describes a study and its result in lines of text, for the terminal and for the page."""
 
 from rover_planner.studies.runner import StudyResult, Trial, count_trials
-from rover_planner.studies.study_file import OBJECTIVES, Study
+from rover_planner.studies.study_file import OBJECTIVES, Study, name_thing
 
 MAX_NAMED = 6
 """Most equally good rovers that are named one by one."""
@@ -55,7 +55,7 @@ def describe_ties(result: StudyResult) -> str:
         return f"as good{within}: {len(ties)} others"
     parameter = study.parameters[0]
     values = ", ".join(f"{trial.values[0]:.4g}" for trial in ties)
-    return f"as good{within}: {parameter.name} = {values} {parameter.unit}".rstrip()
+    return f"as good{within}: {name_thing(parameter.name)} {values} {parameter.unit}".rstrip()
 
 
 def _describe_trial(name: str, trial: Trial, study: Study) -> list[str]:

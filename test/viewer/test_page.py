@@ -200,7 +200,7 @@ def test_a_button_that_is_pressed_while_what_it_stands_on_is_told_anew_takes_the
         visitor.tab.wait_for_timeout(300)
         visitor.tab.mouse.up()
         wait_until(lambda: page.session.is_stopped, "the end of the work")
-    visitor.press("Reset")
+    page.hear({"ask": "reset"}, None)
     wait_until(lambda: page.session.shown.scenario.rover == LSR1, "the loaded rover")
     wait_for_rest(page)
 
