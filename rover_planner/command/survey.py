@@ -20,10 +20,8 @@ from rover_planner.command.options import (
     flag,
     option,
 )
-from rover_planner.shell.end_signals import end_as_by_ctrl_c
-from rover_planner.shell.exit_codes import EXIT_FAILED, EXIT_OK
 from rover_planner.shell.extras import need
-from rover_planner.shell.run_program import end_with
+from rover_planner.shell.run_program import EXIT_FAILED, EXIT_OK, end_as_by_ctrl_c, end_with
 
 if TYPE_CHECKING:
     from rover_planner.survey.dask_cluster import ClusterSettings

@@ -70,10 +70,10 @@ def draw_reachable(path: Path, store: SurveyStore, area: ReachableArea) -> None:
     distance = area.distance[::every, ::every]
     shown = np.where(np.isfinite(distance), distance, np.nan)
     longest = area.longest or 0.0
-    title = f"reached and returned from: {area.area:.1f} m2, longest way {longest:.1f} m"
+    title = f"reached and returned from: {area.area:.1f} m2, longest path {longest:.1f} m"
     colours = matplotlib.colormaps["viridis"]
     shares = (0.0, 0.5, 1.0) if longest > 0.0 else ()
-    labels = [(f"way of {share * longest:.1f} m", colours(share)) for share in shares]
+    labels = [(f"path of {share * longest:.1f} m", colours(share)) for share in shares]
     left, low = store.notes.frame.origin
     start = left + area.start[1] * area.cell, low + area.start[0] * area.cell
     _draw(path, store, shown, (colours, 0.0, max(longest, 1e-9)), labels, title, start)

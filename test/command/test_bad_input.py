@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from rover_planner.cli import main
-from rover_planner.shell.exit_codes import EXIT_INTERRUPTED
-from rover_planner.shell.run_program import MAX_LINE
+from rover_planner.shell.run_program import EXIT_INTERRUPTED, MAX_LINE
 from support.command_line import REPOSITORY, write_ground_and_path
 
 LONG = "n" * 300

@@ -10,8 +10,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from rover_physics.errors import PoseError
-from rover_planner.ros.guard import Guard, GuardedExecutor, refuse_error
-from rover_planner.ros.handover import Handover
+from rover_planner.ros.guard import Guard, GuardedExecutor, Handover, refuse_error
 from rover_planner.ros.logs import REPEAT_PERIOD, RepeatLog, TransitionLog
 from support.ros_fixtures import call
 from support.waiting import wait_until

@@ -13,7 +13,6 @@ from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.studies.objectives import climbs, tallest_step
 from rover_planner.studies.rover_values import (
-    find_key,
     get_value,
     list_values,
     read_rover,
@@ -21,9 +20,8 @@ from rover_planner.studies.rover_values import (
     with_value,
     write_rover,
 )
-from rover_planner.studies.runner import find_rover, run_study
+from rover_planner.studies.runner import describe_ties, find_rover, run_study
 from rover_planner.studies.study_file import name_thing, study_from_dict
-from rover_planner.studies.summary import describe_ties
 
 LSR1 = load_rover("lsr1")
 PIVOT_X = {"name": "suspension.bogie_pivot.x", "from": 0.10, "to": 0.30, "count": 9}
@@ -181,24 +179,6 @@ def test_every_value_is_within_its_range_and_can_be_set(name):
             assert value.low <= now <= value.high and value.low < value.high, value.label
             assert value.label.endswith("]"), value.label
             assert with_value(rover, value.keys, now) == rover
-
-
-def test_every_number_of_a_rover_has_a_name_and_a_unit():
-    contents = rover_to_dict(LSR1)
-    for name, unit, value in (
-        ("wheel.radius", "m", 0.1),
-        ("suspension.wheels.front.x", "m", 0.4),
-        ("masses.body.mass", "kg", 5.0),
-        ("manipulator.stowed.1", "rad", -0.2),
-        ("friction", "", 0.8),
-    ):
-        key, found = find_key(contents, name)
-        assert found == unit
-        inner = contents
-        for part in key:
-            inner = inner[part]
-        assert inner == value
-        assert vary(LSR1, {key: value}) == LSR1
 
 
 def test_the_command_writes_a_table_and_a_picture(tmp_path, capsys):
