@@ -8,6 +8,7 @@ with a serialised nav_msgs/Path): the cost of the service alone.
 import contextlib
 import json
 import os
+import subprocess
 import sys
 import tempfile
 import threading
@@ -184,7 +185,7 @@ def finish(future: Any, timeout: float) -> Any:
     return future.result()
 
 
-def memory_of(child: ChildProcess, kind: str = "VmRSS") -> float:
+def memory_of(child: ChildProcess | subprocess.Popen, kind: str = "VmRSS") -> float:
     """Return the memory that a process holds now [MB], or its peak for the kind VmHWM."""
     lines = Path(f"/proc/{child.pid}/status").read_text().splitlines()
     return next(int(line.split()[1]) for line in lines if line.startswith(kind)) / 1024

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The errors that this package raises."""
 
+from rover_physics.errors import RoverError
 
-class PlanningError(Exception):
+
+class PlanningError(RoverError):
     """An invalid request; the text names the argument and the allowed values."""
 
 

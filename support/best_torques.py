@@ -1,35 +1,52 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Decides by independent linear programs if any torques keep to a friction utilisation."""
+"""Independent linear programs in the forces on the wheels, with pyramids for friction cones."""
 
 import numpy as np
 from scipy.optimize import linprog
 
-from support.rover_geometry import balance_matrix
+from support.rover_geometry import balance_matrix, free_balance_matrix
 
-SIDES_OF_THE_CONE = 64
+SIDES = 96
 """Sides of the pyramid that replaces a friction cone."""
+INSIDE = float(np.cos(np.pi / SIDES))
+"""Share of the friction at which a pyramid lies inside the cone; at 1 it is around the cone."""
 
 
-def can_stand(rover, prediction, i, utilisation, max_torque) -> bool:
-    """Return whether forces within the friction cones of `utilisation` balance waypoint i.
+def solve_forces(rover, prediction, i, cost, max_torque, friction_share=1.0, shared=True):
+    """Minimise cost (12,) @ (N, T) over the forces that balance waypoint i; return the answer.
 
-    The unknowns are N (6), T (6), s0, s1. Each cone is replaced by a circumscribed pyramid, so
-    that an infeasible program proves that the cones are infeasible too.
+    Forces are in units of the weight. The unknowns are N (6), T (6) and the lateral forces, which
+    are s0 + s1 along the rover where `shared`, else each wheel has its own. A share of the
+    friction may be used.
     """
     A, b, along = balance_matrix(rover, prediction, i)
-    turns = 2.0 * np.pi * np.arange(SIDES_OF_THE_CONE) / SIDES_OF_THE_CONE
-    rows = np.zeros((6, SIDES_OF_THE_CONE, 14))
+    sideways = np.column_stack([np.ones(6), along])
+    if not shared:
+        A, b = free_balance_matrix(rover, prediction, i)
+        sideways = np.eye(6)
+    turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
+    rows = np.zeros((6, SIDES, A.shape[1]))
     for wheel in range(6):
-        rows[wheel, :, wheel] = -utilisation * prediction.friction[i, wheel]
+        rows[wheel, :, wheel] = -friction_share * prediction.friction[i, wheel]
         rows[wheel, :, 6 + wheel] = np.cos(turns)
-        rows[wheel, :, 12:] = np.sin(turns)[:, None] * [1.0, along[wheel]]
-    rows = rows.reshape(-1, 14)
+        rows[wheel, :, 12:] = np.outer(np.sin(turns), sideways[wheel])
+    rows = rows.reshape(-1, A.shape[1])
     pull = max_torque / (rover.wheel.radius * rover.weight)
-    bounds = [(0.0, None)] * 6 + [(-pull, pull)] * 6 + [(None, None)] * 2
-    program = np.zeros(14), rows, np.zeros(len(rows)), A, b, bounds
+    lateral = [(None, None)] * sideways.shape[1]
+    bounds = [(0.0, None)] * 6 + [(-pull, pull)] * 6 + lateral
+    program = np.append(cost, np.zeros(len(lateral))), rows, np.zeros(len(rows)), A, b, bounds
     for method in ("highs", "highs-ipm", "highs-ds"):  # the others where one does not decide
         answer = linprog(*program, method=method)
         if answer.status in (0, 2):
             break
     assert answer.status in (0, 2), answer.message
+    return answer
+
+
+def can_stand(rover, prediction, i, utilisation, max_torque) -> bool:
+    """Return whether forces within the friction cones of `utilisation` balance waypoint i.
+
+    The pyramids are around the cones: where they are infeasible, so are the cones.
+    """
+    answer = solve_forces(rover, prediction, i, np.zeros(12), max_torque, utilisation)
     return answer.status == 0

@@ -25,7 +25,7 @@ ENDS_APART = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Advice:
-    """What would make a path pass."""
+    """The changes that would make a path pass."""
 
     judged: JudgedCase
     """The path as it was judged."""

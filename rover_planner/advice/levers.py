@@ -46,7 +46,7 @@ TORQUES = {OPTIMAL: "Switch on traction control", SERVO: "Drive the wheels by sp
 
 @dataclass(frozen=True)
 class Span:
-    """What a lever may be set to: any value from now to either end."""
+    """The range of a lever: any value from now to either end."""
 
     now: float
     """The value of the refused case."""
@@ -56,7 +56,7 @@ class Span:
 
 @dataclass(frozen=True)
 class Choice:
-    """What a lever may be set to: one of a few values."""
+    """The values of a lever: one of a few."""
 
     now: Any
     """The value of the refused case."""

@@ -22,7 +22,7 @@ BEFORE = 1.5
 EDGE = 2.0
 """Length of path around a failure that decides whether a wheel falls there [wheel radii]."""
 SEARCH = LatticeSettings(budget=1.0, ends_at_first=True)
-"""How a path around is searched."""
+"""Settings of the search of a path around."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,8 +34,8 @@ Values = tuple[Any, ...]
 
 
 @dataclass(frozen=True)
-class Trial:
-    """What has been tried: a few levers, and the remedy if there is one."""
+class LeverTrial:
+    """A trial of a few levers, and the remedy if there is one."""
 
     levers: tuple[Lever, ...]
     """The levers."""
@@ -44,8 +44,8 @@ class Trial:
 
 
 @dataclass(frozen=True)
-class Failure:
-    """Where a case failed."""
+class FailedPlace:
+    """The waypoint at which a case failed."""
 
     place: int
     """Index of the waypoint."""
@@ -55,7 +55,7 @@ class Failure:
     """True if it may be the path before it that decides."""
 
 
-def seek_remedies(refusal: Refusal) -> Iterator[Trial]:
+def seek_remedies(refusal: Refusal) -> Iterator[LeverTrial]:
     """Yield all trials: one lever after the other, and several of them if none helps alone.
 
     Only what the rover does by itself is tried in fine steps and combined.
@@ -70,7 +70,7 @@ def seek_remedies(refusal: Refusal) -> Iterator[Trial]:
             if steps is FINE and isinstance(settings[0], Choice):
                 continue
             remedy = seeker.seek(levers, steps)
-            yield Trial(levers, remedy)
+            yield LeverTrial(levers, remedy)
             helped = helped or (remedy is not None and not remedy.needs_others)
         if helped:
             return
@@ -91,8 +91,8 @@ class _Seeker:
 
     def __init__(self, refusal: Refusal):
         self._refusal = refusal
-        self._failed: list[Failure] = []
-        """Where cases failed, the last first."""
+        self._failed: list[FailedPlace] = []
+        """Places where cases failed, the last first."""
         self._note(refusal.judged)
 
     def seek(self, levers: Sequence[Lever], steps: Sequence[float]) -> Remedy | None:
@@ -212,9 +212,9 @@ class _Seeker:
         verdict = judged.verdict
         if verdict.code != TRAPPED:
             by_chance = verdict.code == CHANCE
-            self._remember(Failure(verdict.first_failure, by_chance, judged.fails_by_sum))
+            self._remember(FailedPlace(verdict.first_failure, by_chance, judged.fails_by_sum))
 
-    def _remember(self, known: Failure) -> None:
+    def _remember(self, known: FailedPlace) -> None:
         others = [one for one in self._failed if one != known]
         self._failed = [known, *others][:MOST_PLACES]
 

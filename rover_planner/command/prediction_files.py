@@ -63,7 +63,7 @@ def read_poses(path: Path) -> NDArray[np.float64]:
         PlanningError: The file is missing or not an .npz file, has no such array of numbers, or
             one of more than MAX_POSES poses.
     """
-    with _errors_of(path), open_npz(path) as archive:
+    with errors_of(path, PlanningError), open_npz(path) as archive:
         header = archive.read_header("poses")
         if header.dtype.kind not in "fiu":
             raise RoverFileError(f"poses are of type {header.dtype}; they must be numbers")
@@ -81,7 +81,7 @@ def read_curvature(path: Path, count: int) -> NDArray[np.float64] | None:
     Raises:
         PlanningError: It is not an array of as many numbers as poses, or one of them is NaN.
     """
-    with _errors_of(path), open_npz(path) as archive:
+    with errors_of(path, PlanningError), open_npz(path) as archive:
         if "curvature" not in archive.names:
             return None
         header = archive.read_header("curvature")
@@ -110,7 +110,7 @@ def read_prediction(path: Path) -> tuple[PathPrediction, tuple[str, ...]]:
     Raises:
         PlanningError: The file is missing or is not a file of predictions.
     """
-    with _errors_of(path), open_npz(path) as archive:
+    with errors_of(path, PlanningError), open_npz(path) as archive:
         reason = archive.read_header("reason")
         if reason.dtype.kind != "U" or len(reason.shape) != 1 or reason.size == 0:
             raise RoverFileError("reason must be an array (n,) of texts, one for each waypoint")
@@ -136,7 +136,7 @@ def read_recorded_assumptions(path: Path) -> Assumptions | None:
     Raises:
         PlanningError: The file is missing, or the assumptions are invalid.
     """
-    with _errors_of(path), open_npz(path) as archive:
+    with errors_of(path, PlanningError), open_npz(path) as archive:
         if ASSUMPTIONS not in archive.names:
             return None
         header = archive.read_header(ASSUMPTIONS)
@@ -147,16 +147,6 @@ def read_recorded_assumptions(path: Path) -> Assumptions | None:
         return read_assumptions(text)
     except PlanningError as error:
         raise PlanningError(f"{show_file(path)}: {error}") from None
-
-
-@contextmanager
-def _errors_of(path: Path) -> Iterator[None]:
-    """Turn the errors of files into a PlanningError that names the file."""
-    try:
-        with errors_of(path):
-            yield
-    except RoverFileError as error:
-        raise PlanningError(str(error)) from None
 
 
 def _check_count(name: str, count: int) -> None:
@@ -222,7 +212,7 @@ def write_prediction(
             texts = np.array([getattr(waypoint, name) for waypoint in classes], dtype=np.str_)
             arrays[name if name == "traversability_class" else f"class_{name}"] = texts
         arrays["class_margin"] = np.array([waypoint.margin for waypoint in classes])
-    with _errors_of(path):
+    with errors_of(path, PlanningError):
         write_npz(path, arrays, compressed=False)
 
 
@@ -240,7 +230,7 @@ def writing_parts(
     Raises:
         PlanningError: A file cannot be written.
     """
-    with _errors_of(path), NpzParts(path.absolute().parent, count) as parts:
+    with errors_of(path, PlanningError), NpzParts(path.absolute().parent, count) as parts:
         yield PartsFile(path, parts, assumptions)
 
 

@@ -54,7 +54,7 @@ def replay(
     from rover_planner.shell.progress import show_bar
 
     if start is not None and goal is None:
-        raise PlanningError("--start is that of a way to --goal, which is not given")
+        raise PlanningError("--start is that of a path to --goal, which is not given")
     if out.exists():
         raise PlanningError(f"{out} exists already; OUT must be a new folder")
     given = {"rover": rover, "map_frame": map_frame, "map_resolution": resolution}
@@ -89,7 +89,7 @@ def replay(
         typer.echo(f"not used: {note}", err=True)
     if work.without_start:
         typer.echo(
-            f"no way was asked for on {work.without_start} maps: no odometry before them tells "
+            f"no path was asked for on {work.without_start} maps: no odometry before them tells "
             "where it starts; give --start",
             err=True,
         )

@@ -23,10 +23,15 @@ def study(
     need("matplotlib", "the picture of a study")
     from rover_planner.shell.progress import show_bar
     from rover_planner.studies.rover_values import write_rover
-    from rover_planner.studies.runner import count_trials, find_rover, run_study
+    from rover_planner.studies.runner import (
+        count_trials,
+        describe_question,
+        describe_result,
+        find_rover,
+        run_study,
+    )
     from rover_planner.studies.study_file import find_examples, load_study
     from rover_planner.studies.study_plot import draw_study
-    from rover_planner.studies.summary import describe_question, describe_result
 
     task = load_study(find_examples().get(str(file), file))
     typer.echo("\n".join(describe_question(task)))

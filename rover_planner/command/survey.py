@@ -20,10 +20,8 @@ from rover_planner.command.options import (
     flag,
     option,
 )
-from rover_planner.shell.end_signals import end_as_by_ctrl_c
-from rover_planner.shell.exit_codes import EXIT_FAILED, EXIT_OK
 from rover_planner.shell.extras import need
-from rover_planner.shell.run_program import end_with
+from rover_planner.shell.run_program import EXIT_FAILED, EXIT_OK, end_as_by_ctrl_c, end_with
 
 if TYPE_CHECKING:
     from rover_planner.survey.dask_cluster import ClusterSettings
@@ -43,6 +41,9 @@ def survey(
     friction: Friction = None,
     turns: Annotated[
         bool, flag("--turns", "Judge turns on the spot, too; takes up to 3 x.")
+    ] = False,
+    chance: Annotated[
+        bool, flag("--chance", "Find the chances of failure, too; takes up to 30 x.")
     ] = False,
     sigmas: Sigmas = 3.0,
     max_gap: MaxGap = 0.0,
@@ -85,6 +86,7 @@ def survey(
         headings=headings,
         step=step,
         turns=turns,
+        chance=chance,
         sigmas=sigmas,
     )
     if geotiff is not None:  # before hours of work

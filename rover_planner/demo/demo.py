@@ -32,8 +32,8 @@ from rover_planner.demo.child_process import ChildProcess, stopping_children
 from rover_planner.errors import DemoError, PlanningError
 from rover_planner.maps.summary import describe_terrain
 from rover_planner.planning.goals import Mission, choose_mission
-from rover_planner.shell.exit_codes import EXIT_NOT_TRAVERSABLE, EXIT_OK
 from rover_planner.shell.progress import Steps
+from rover_planner.shell.run_program import EXIT_NOT_TRAVERSABLE, EXIT_OK
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 COMPILER = "rover_physics.warm_up"

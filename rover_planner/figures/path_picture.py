@@ -56,7 +56,7 @@ def draw_path(path: Path, question: SearchQuery, answer: SearchResult, map_name:
         if answer.path is not None:
             x, y, _ = answer.path.poses.T
             halo = [withStroke(linewidth=4.5, foreground="white")]
-            axes.plot(x, y, color=PASSABLE, linewidth=2.2, path_effects=halo, label="way")
+            axes.plot(x, y, color=PASSABLE, linewidth=2.2, path_effects=halo, label="path")
         _draw_end(axes, "start", np.asarray(question.start), INK)
         _draw_end(axes, "goal", np.asarray(question.goal), REFUSED)
         title = f"{question.rover.name} on {map_name}: {_title(answer)}"
@@ -116,7 +116,7 @@ def _title(answer: SearchResult) -> str:
         return answer.reason
     prediction = answer.path.prediction
     return (
-        f"way of {answer.path.length:.1f} m, {float(prediction.energy[-1]):.0f} J, "
+        f"path of {answer.path.length:.1f} m, {float(prediction.energy[-1]):.0f} J, "
         f"{float(prediction.time[-1]) / 60.0:.1f} min; "
         f"{answer.edges_judged} of {answer.edges} edges judged in {answer.seconds:.1f} s"
     )

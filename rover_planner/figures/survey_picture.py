@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap, to_rgb
 from matplotlib.patches import Patch, Rectangle
 
-from rover_physics.traversability.classification import IMPASSABLE
 from rover_planner.figures.pictures import (
     INK,
     LEVEL,
@@ -24,17 +23,15 @@ from rover_planner.survey.chunk_survey import open_map
 from rover_planner.survey.layers import (
     CLASS_COLOURS,
     CLASS_LABELS,
-    CLASS_NUMBERS,
     NOT_SURVEYED,
     SOME_HEADINGS,
     UNKNOWN_LABEL,
-    number_limits,
+    count_skipped,
+    read_drawn_classes,
 )
 from rover_planner.survey.reachable_area import ReachableArea
 from rover_planner.survey.store import SurveyStore
 
-_IMPASSABLE = CLASS_NUMBERS[IMPASSABLE]
-_OFF_GROUND = [number_limits()[code] for code in ("off_map", "unknown_ground")]
 _MAX_CELLS = 1200
 _STRENGTH = 0.55
 
@@ -49,14 +46,8 @@ def draw_survey(path: Path, store: SurveyStore) -> None:
     Raises:
         PlanningError: The file cannot be written, or the map cannot be read any more.
     """
-    every = _thinning(store)
-    worst, best = (store.layer(name)[::every, ::every] for name in ("worst_class", "best_class"))
-    decides = (worst == _IMPASSABLE) & (best < _IMPASSABLE)
-    shown = np.where(decides, SOME_HEADINGS, worst).astype(float)
-    limits = store.layer("first_limit")[::every, ::every]
-    shown[(worst == NOT_SURVEYED) | ((best == _IMPASSABLE) & np.isin(limits, _OFF_GROUND))] = (
-        np.nan
-    )
+    classes = read_drawn_classes(store, _thinning(store))
+    shown = np.where(classes == NOT_SURVEYED, np.nan, classes)
     labels = [*zip(CLASS_LABELS, CLASS_COLOURS, strict=True), (UNKNOWN_LABEL, UNKNOWN)]
     rover = store.notes.description["rover"]["name"]
     title = f"{rover}: worst class over {store.notes.headings} headings"
@@ -79,10 +70,10 @@ def draw_reachable(path: Path, store: SurveyStore, area: ReachableArea) -> None:
     distance = area.distance[::every, ::every]
     shown = np.where(np.isfinite(distance), distance, np.nan)
     longest = area.longest or 0.0
-    title = f"reached and returned from: {area.area:.1f} m2, longest way {longest:.1f} m"
+    title = f"reached and returned from: {area.area:.1f} m2, longest path {longest:.1f} m"
     colours = matplotlib.colormaps["viridis"]
     shares = (0.0, 0.5, 1.0) if longest > 0.0 else ()
-    labels = [(f"way of {share * longest:.1f} m", colours(share)) for share in shares]
+    labels = [(f"path of {share * longest:.1f} m", colours(share)) for share in shares]
     left, low = store.notes.frame.origin
     start = left + area.start[1] * area.cell, low + area.start[0] * area.cell
     _draw(path, store, shown, (colours, 0.0, max(longest, 1e-9)), labels, title, start)
@@ -155,4 +146,4 @@ def choose_bar(width: float) -> float:
 
 def _thinning(store: SurveyStore) -> int:
     """Return every how many cells are drawn."""
-    return max(1, -(-max(store.notes.layout.shape) // _MAX_CELLS))
+    return count_skipped(store, _MAX_CELLS)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the wheels tell about the ground they drive on: friction, slip, resistance; without ROS."""
+"""The ground as the wheels feel it: friction, slip, resistance; without ROS."""

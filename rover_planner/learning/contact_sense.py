@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the wheels do to the ground at one time: loads and shears from the model's balance.
+"""Forces of the wheels on the ground at one time: loads and shears from the model's balance.
 
 The loads follow from the nine equations of `balance` with the measured torques, attitude and
 suspension, at contacts from the map. Nothing of it needs the friction of the ground.

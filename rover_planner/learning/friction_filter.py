@@ -30,7 +30,7 @@ relative standard deviation."""
 WORTHLESS = 0.01
 """Share of measurements that tell nothing."""
 CHANGE = 0.02
-"""Chance that the ground changes on a metre of way."""
+"""Chance that the ground changes on a metre."""
 MEMORY = 3.0
 """Way after which a bound has lost a factor e [m]."""
 BOUNDED = 0.975
@@ -67,11 +67,11 @@ class FrictionFilter:
         self.slips = 0.0
         """Number of independent slips that count, of this ground."""
 
-    def drive(self, way: float) -> None:
-        """Take that the rover has gone on some way [m]: the ground may have changed."""
-        kept = float(np.exp(-CHANGE * way))
+    def drive(self, distance: float) -> None:
+        """Take that the rover has driven a distance [m]: the ground may have changed."""
+        kept = float(np.exp(-CHANGE * distance))
         self._chances = kept * self._chances + (1.0 - kept) * self._prior
-        self._bound *= float(np.exp(-way / MEMORY))
+        self._bound *= float(np.exp(-distance / MEMORY))
 
     def slip(self, use: float, noise: float, weight: float) -> None:
         """Take the shear over the load of wheels that slip.

@@ -78,7 +78,7 @@ _SIDE_WHEELS = tuple(np.array([wheel.endswith(side) for wheel in WHEELS]) for si
 
 @dataclass(frozen=True, eq=False)
 class GroundEstimate:
-    """What is known of the ground at one time."""
+    """The estimate of the ground at one time."""
 
     time: float
     """Time of the last measurement [s]."""
@@ -91,7 +91,7 @@ class GroundEstimate:
     immobilised_time: float | None
     """First time the rover was seen to be stuck [s]."""
     stuck: str
-    """Why it is stuck now; empty if it is not."""
+    """Reason why it is stuck now; empty if it is not."""
     slip_ratios: Floats
     """(6,) slip ratios of the last window; NaN before."""
     side_slip: float
@@ -174,7 +174,7 @@ class GroundLearner:
         self._slip_time: float | None = None
         self._immobilised_time: float | None = None
         self.ground = GroundMap(terrain, wheel.width)
-        """What is known where the wheels have been."""
+        """The estimates where the wheels have been."""
         self.window: SlipWindow | None = None
         """The last window; None before the first."""
         self.commanded: float | None = None
@@ -182,7 +182,7 @@ class GroundLearner:
 
     @property
     def stuck(self) -> str:
-        """Why the rover is stuck now; empty if it is not."""
+        """Reason why the rover is stuck now; empty if it is not."""
         return self._stuck.reason
 
     def change_map(self, terrain: Terrain) -> None:
@@ -316,7 +316,7 @@ class GroundLearner:
         tells &= sticking < MOST_STICKING
         tells &= window.doubts < MOST_DOUBT * loads
         tells &= self._turns_freely(window)
-        way = abs(float(np.median(window.travel))) * elapsed
+        distance = abs(float(np.median(window.travel))) * elapsed
         weights = self._weigh(window, tells, elapsed)
         doubt = EXCESS_NOISE * window.excess / self._sense.weight
         every = np.arange(WHEEL_COUNT)
@@ -325,7 +325,7 @@ class GroundLearner:
             *zip(self._sides.values(), _SIDE_WHEELS, strict=True),
         ]
         for one, own in filters:
-            one.drive(way)
+            one.drive(distance)
             told = np.flatnonzero(tells & own)
             if len(told):
                 shear = float((np.abs(tractions) / along)[told].sum())
@@ -365,7 +365,7 @@ class GroundLearner:
 
     @property
     def estimate(self) -> GroundEstimate:
-        """What is known now."""
+        """The estimate now."""
         window = self.window
         ratios = np.full(WHEEL_COUNT, np.nan) if window is None else window.ratio
         side_slip = 0.0

@@ -28,7 +28,7 @@ class GroundMap:
         self._origin, self._resolution = np.array(terrain.origin), terrain.resolution
         shape = terrain.elevation.shape
         self.layers = GroundLayers(np.full(shape, np.nan), np.full(shape, np.nan))
-        """What is known; the last visit counts."""
+        """The estimates; the last visit counts."""
         reach = max(round(0.5 * width / terrain.resolution), 0)
         steps = np.arange(-reach, reach + 1)
         self._around = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)

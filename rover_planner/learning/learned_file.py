@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.errors import RoverFileError
 from rover_physics.files.user_file import write_file
 from rover_physics.files.validation import errors_of
 from rover_physics.names import WHEELS
@@ -52,11 +51,8 @@ def write_learned(path: Path, contents: dict[str, Any]) -> None:
     Raises:
         PlanningError: It cannot be written.
     """
-    try:
-        with errors_of(path):
-            write_file(path, (json.dumps(contents, indent=1) + "\n").encode())
-    except RoverFileError as error:
-        raise PlanningError(str(error)) from None
+    with errors_of(path, PlanningError):
+        write_file(path, (json.dumps(contents, indent=1) + "\n").encode())
 
 
 def _describe_soil(soil: SoilEstimate) -> dict[str, Any]:

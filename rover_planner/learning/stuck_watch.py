@@ -35,7 +35,7 @@ class StuckWatch:
         self._most = PUSHING * max_torque
         self._past: deque[tuple[float, Floats, float, bool]] = deque()
         self.reason = ""
-        """Why the rover is stuck; empty if it is not."""
+        """Reason why the rover is stuck; empty if it is not."""
 
     def update(
         self,

@@ -18,11 +18,11 @@ OTHERS = 3
 SIGN_TIME = 2.0
 """Time constant of the search for wrong signs [s]."""
 SIGN_SHARE = 0.25
-"""What is left of a contradiction when one sign is turned, if this sign is wrong."""
+"""Share of a contradiction that is left when one sign is turned, if this sign is wrong."""
 LEAST_EXCESS = 0.03
 """Contradiction of the tractions from which signs are looked at, over the weight."""
 TURNING_BACK = 0.3
-"""How well a wheel's rolling must be the opposite of its travel if its rate has the wrong sign."""
+"""Correlation of a wheel's rolling with minus its travel if its rate has the wrong sign."""
 
 
 class WheelHealth:
@@ -80,7 +80,7 @@ class WheelHealth:
 
     @property
     def faults(self) -> dict[str, str]:
-        """What is wrong with which wheels."""
+        """Faults, with the wheels that have them."""
         found: dict[str, str] = {}
         frozen = self._still > FROZEN_TIME
         signs = np.zeros(WHEEL_COUNT, dtype=bool)

@@ -63,7 +63,7 @@ class Regression:
 
 @dataclass(frozen=True)
 class WheelMotion:
-    """What wheels and IMU measure at one time."""
+    """Measurements of wheels and IMU at one time."""
 
     time: float
     """Time [s]."""
@@ -88,7 +88,7 @@ class WheelOdometry:
         self._y = np.repeat([-1.0, 1.0], 3) * np.tile(places[:, 1], 2)
         self._radius, self._piece = rover.wheel.radius, 0.5 * rover.wheelbase
         self.forward, self.side = Regression(FORWARD_PRIOR), Regression(SIDE_PRIOR)
-        """What is lost of the way ahead, and what is gone aside; may be that of another drive."""
+        """Shares of the distance lost ahead and gone aside; may be those of another drive."""
         self.friction = rover.friction
         """Friction of the ground, as far as it is known."""
         self.pose = np.zeros(3)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the wheels slip over the last half second, from motion that was not measured at the wheels.
+"""Slip of the wheels over the last half second, from motion not measured at the wheels.
 
 Measurements are averaged over blocks of a tenth of a second, or one sample if these come less
 often. Slopes of straight lines through the blocks of a window are the speeds. The scatter about
@@ -29,7 +29,7 @@ LONGEST_GAP = 0.5
 
 @dataclass(frozen=True, eq=False)
 class SlipWindow:
-    """What the wheels did over a window."""
+    """Motion of the wheels over a window."""
 
     time: float
     """Time of its last block [s]."""

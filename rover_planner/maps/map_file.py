@@ -9,7 +9,7 @@ from urllib.parse import unquote, urlparse
 
 from rover_physics.errors import RoverFileError, TerrainError
 from rover_physics.files.user_file import OPEN_FLAGS, check_regular, wrap_descriptor
-from rover_physics.files.validation import show_file
+from rover_physics.files.validation import errors_of, show_file
 from rover_physics.terrain.grid import Terrain, read_terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.errors import PlanningError
@@ -49,17 +49,14 @@ def open_map(url: str, limits: MapLimits) -> Terrain:
             folder, is not a regular file, or cannot be read.
         TerrainError: The file is too large, or not a terrain file.
     """
-    try:
-        with _open_below(file_of_url(url), limits.folder) as file:
-            size = os.fstat(file.fileno()).st_size
-            if size > limits.max_bytes:
-                raise TerrainError(
-                    f"{show_file(url)}: the file has {size} bytes; the limit (max_map_bytes) is "
-                    f"{limits.max_bytes}"
-                )
-            return read_terrain(file, show_file(url), limits.max_cells)
-    except RoverFileError as error:
-        raise MapFileError(f"{show_file(url)}: {error}") from error
+    with errors_of(url, MapFileError), _open_below(file_of_url(url), limits.folder) as file:
+        size = os.fstat(file.fileno()).st_size
+        if size > limits.max_bytes:
+            raise TerrainError(
+                f"{show_file(url)}: the file has {size} bytes; the limit (max_map_bytes) is "
+                f"{limits.max_bytes}"
+            )
+        return read_terrain(file, show_file(url), limits.max_cells)
 
 
 def file_of_url(url: str) -> Path:

@@ -11,8 +11,7 @@ from msg_adapters.errors import MessageError
 from msg_adapters.results.diagnostics import to_json
 from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
 from rover_planner.nodes.question_desk import QuestionDesk
-from rover_planner.planning.answering.questions import Answer, ReachCheck
-from rover_planner.planning.answering.reach_query import ArmJudgement, ReachQuery
+from rover_planner.planning.answering.questions import Answer, ArmJudgement, ReachCheck, ReachQuery
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.subscriptions import subscribe_to_requests
 

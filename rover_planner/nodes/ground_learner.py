@@ -20,6 +20,7 @@ from msg_adapters.frames import check_frame
 from msg_adapters.joints import read_joint_map
 from msg_adapters.odometry import planar_odometry
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
+from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.rover_file import load_rover
@@ -37,7 +38,7 @@ from rover_planner.parameters.declare import (
     warn_of_unknown_parameters,
 )
 from rover_planner.parameters.ground_learner import GroundLearnerParameters
-from rover_planner.ros.guard import INPUT_ERRORS, Guard
+from rover_planner.ros.guard import Guard
 from rover_planner.ros.map_intake import CLOUD
 from rover_planner.ros.qos import latched_qos, sensor_qos
 from rover_planner.ros.row_collector import RowCollector
@@ -107,7 +108,7 @@ class GroundLearnerNode(Node):
         def receive(message: Any) -> None:
             try:
                 take(message)
-            except INPUT_ERRORS as error:
+            except RoverError as error:
                 self.get_logger().warning(f"{name} not used: {error}", throttle_duration_sec=5.0)
             except Exception as error:
                 self._guard.report(name, error)

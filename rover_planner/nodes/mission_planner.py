@@ -13,8 +13,7 @@ import json
 import sys
 import threading
 import time
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -37,13 +36,12 @@ from msg_adapters.identity import path_hash, plan_request_hash
 from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.paths import path_to_poses, poses_path, stamped_pose
 from msg_adapters.results.predictions import array_values
+from rover_physics.errors import RoverError
 from rover_physics.terrain.grid import Terrain, load_terrain
-from rover_planner.nodes.mission.advice import choose_remedy
 from rover_planner.nodes.mission.drive import DriveFailedError, DriveSettings, drive_to
 from rover_planner.nodes.mission.options import MissionOptions
 from rover_planner.nodes.programs import read_arguments
 from rover_planner.planning.answering.budget import STOPPING
-from rover_planner.ros.guard import INPUT_ERRORS
 from rover_planner.ros.process import init_ros
 from rover_planner.ros.qos import (
     latched_qos,
@@ -53,16 +51,17 @@ from rover_planner.ros.qos import (
     service_qos,
     topic_qos,
 )
-from rover_planner.shell.exit_codes import (
+from rover_planner.shell.poses import Pose
+from rover_planner.shell.run_program import (
     EXIT_BAD_INPUT,
     EXIT_FAILED,
     EXIT_INTERRUPTED,
     EXIT_NO_ANSWER,
     EXIT_NOT_TRAVERSABLE,
     EXIT_OK,
+    end_with,
+    run_program,
 )
-from rover_planner.shell.poses import Pose
-from rover_planner.shell.run_program import end_with, run_program
 
 NODE_NAME = "mission_planner"
 REPEAT = 10.0
@@ -71,6 +70,9 @@ SERVER = "traverse_server"
 """Name of the server's node, relative to this node's namespace; remap services and topics to use
 another one."""
 
+OWN_OPTIONS = {"policy", "backward"}
+"""Options of a remedy that a mission planner can see to: the server's torque policy, and the
+direction, which is that of the path. Arm and payload are others' work."""
 TEXTS = ("_hash", "_stamp", "server")
 """Ends of keys whose values are texts, even if they look like numbers."""
 
@@ -366,7 +368,7 @@ def _run(argv: Sequence[str] | None) -> int:
         if options == EXIT_OK:  # help was printed
             return EXIT_OK
         terrain = load_terrain(options.map_name) if options.map_name else None
-    except INPUT_ERRORS as error:
+    except RoverError as error:
         return end_with(NODE_NAME, EXIT_BAD_INPUT, str(error))
     init_ros(argv)
     node = MissionPlanner(options.map_frame, options.timeout)
@@ -401,28 +403,29 @@ def _carry_out(node: MissionPlanner, terrain: Terrain | None, options: MissionOp
         node.publish_map(terrain)
     codes = set()
     for number, goal in enumerate(options.goals, start=1):
-        report({"event": "asking", "goal": number})
+
+        def tell(text: str, goal: int = number) -> None:
+            report({"event": text, "goal": goal})
+
+        tell("asking")
         asked = time.monotonic()
         answer = node.ask(options.start, goal)
         answer["response_time"] = time.monotonic() - asked
         report({"event": "answer", "goal": number, "answer": answer})
         if options.advise and _was_judged(answer) and not answer["traversable"]:
-            advised = _take_advice(
-                node, options.start, goal, partial(_report_advice, report, number)
-            )
+            advised = _take_advice(node, options.start, goal, tell)
             if advised is not None:
                 answer = advised
                 report({"event": "answer", "goal": number, "answer": answer})
         codes.add(_exit_code(answer))
         if options.drive and answer["traversable"]:
-            report({"event": "driving", "goal": number})
-            report_change = partial(_report_change, report, number)
+            tell("driving")
             try:
                 settings = DriveSettings(options.position_tolerance, options.heading_tolerance)
-                drive_to(node, goal, answer["poses"], settings, report_change)
+                drive_to(node, goal, answer["poses"], settings, tell)
             except NoAnswerError as error:
                 raise DriveFailedError(str(error)) from error
-            report({"event": "arrived", "goal": number})
+            tell("arrived")
     return next(code for code in (EXIT_FAILED, EXIT_NOT_TRAVERSABLE, EXIT_OK) if code in codes)
 
 
@@ -433,9 +436,10 @@ def _take_advice(
     advice = node.ask_advice()
     remedy = choose_remedy(advice)
     if remedy is None:
-        tell(f"none that a mission planner can take; {advice.get('words', advice['reason'])}")
+        words = advice.get("words", advice["reason"])
+        tell(f"advice: none that a mission planner can take; {words}")
         return None
-    tell(remedy["words"])
+    tell(f"advice: {remedy['words']}")
     if "policy" in remedy["options"]:
         node.set_policy(remedy["options"]["policy"])
     if "poses" not in remedy:
@@ -470,14 +474,6 @@ def spin_until(ended: threading.Event, executor: SingleThreadedExecutor) -> None
             return  # ROS was shut down while the executor began to wait
 
 
-def _report_advice(report: Callable[[dict[str, Any]], None], goal: int, words: str) -> None:
-    report({"event": f"advice: {words}", "goal": goal})
-
-
-def _report_change(report: Callable[[dict[str, Any]], None], goal: int, text: str) -> None:
-    report({"event": text, "goal": goal})
-
-
 def _print_json(event: dict[str, Any]) -> None:
     print(json.dumps(event), flush=True)
 
@@ -500,6 +496,14 @@ def _value(entry: KeyValue) -> Any:
         return json.loads(entry.value)
     except ValueError:
         return entry.value
+
+
+def choose_remedy(advice: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Return the first remedy of ~/advise that needs nobody else, None if there is none."""
+    for remedy in advice["remedies"]:
+        if not remedy["needs_others"] and set(remedy["options"]) <= OWN_OPTIONS:
+            return dict(remedy)
+    return None
 
 
 if __name__ == "__main__":

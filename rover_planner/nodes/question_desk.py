@@ -27,8 +27,7 @@ from rover_planner.planning.answering.server_health import ServerHealth
 from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.verdict_report import IdentityReport
-from rover_planner.ros.guard import Guard, refuse_error
-from rover_planner.ros.handover import Handover
+from rover_planner.ros.guard import Guard, Handover, refuse_error
 from rover_planner.ros.paced_sender import PacedSender
 from rover_planner.ros.qos import topic_qos
 
@@ -77,7 +76,6 @@ class QuestionDesk:
         self._node, self._service, self._maps, self._guard = node, service, maps, guard
         self._sender, self._listen = PacedSender(node, guard), listen
         self._register = Register()
-        self._time_budget = 1.0
         self.health = ServerHealth()
         """Counts of answers and faults."""
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -95,18 +93,15 @@ class QuestionDesk:
         """Number of questions without an answer."""
         return self._queue.open_count
 
-    def set_limits(self, time_budget: float, max_waiting: int) -> None:
-        """Set the time [s] of each question to come, and the number of questions that may wait."""
-        self._time_budget = time_budget
-        self._queue.max_waiting = max_waiting
-
     def ask(self, question: Question, reply: Reply) -> None:
         """Take a question; its answer follows within its budget and GRACE."""
         self._listen()
         now = self._node.get_clock().now().nanoseconds
+        values = self._service.settings.parameters
+        self._queue.max_waiting = values.max_waiting
         inquiry = Inquiry(
             question,
-            Budget(self._time_budget),
+            Budget(values.time_budget),
             reply=reply,
             snapshot=replace(self._service.snapshot(now), watch=self._watch()),
             number=self._register.next_number(),
@@ -158,7 +153,7 @@ class QuestionDesk:
 
     def _publish_progress(self, report: dict[str, Any]) -> None:
         text = (
-            "a way is found, a better one is searched" if report["found"] else "no way found yet"
+            "a path is found, a better one is searched" if report["found"] else "no path found yet"
         )
         name = self._service.settings.rover.name
         stamp = self._node.get_clock().now().to_msg()

@@ -18,10 +18,11 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
+from rover_physics.errors import RoverError
 from rover_planner.nodes.programs import read_arguments
-from rover_planner.ros.guard import INPUT_ERRORS, GuardedExecutor
+from rover_planner.ros.guard import GuardedExecutor
 from rover_planner.ros.process import init_ros, warn_of_disk
-from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
+from rover_planner.shell.run_program import EXIT_BAD_INPUT, EXIT_OK
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 LOOK_FOR_STOP = 0.5
@@ -39,7 +40,7 @@ def run_node(
     Args:
         name: One of the PROGRAMS.
         argv: Its arguments; None takes those of the process.
-        make: Returns the node for the values of its options; may raise INPUT_ERRORS.
+        make: Returns the node for the values of its options; may raise RoverError.
         switch_interval: Longest time for which a thread may delay the executor's whenever that
             needs Python's lock [s]; None leaves Python's thread switch interval.
 
@@ -62,7 +63,7 @@ def run_node(
         sys.setswitchinterval(switch_interval or sys.getswitchinterval())
         while not stop.wanted:
             executor.spin_once(timeout_sec=LOOK_FOR_STOP)
-    except INPUT_ERRORS as error:
+    except RoverError as error:
         logger.fatal(str(error))
         return EXIT_BAD_INPUT
     except (KeyboardInterrupt, ExternalShutdownException):

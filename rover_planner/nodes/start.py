@@ -7,9 +7,8 @@ import sys
 
 from rover_planner.errors import PlanningError
 from rover_planner.nodes.programs import HELP_WORDS, print_help
-from rover_planner.shell.exit_codes import EXIT_BAD_INPUT, EXIT_OK
 from rover_planner.shell.extras import explain_import, need
-from rover_planner.shell.run_program import end_with
+from rover_planner.shell.run_program import EXIT_BAD_INPUT, EXIT_OK, end_with
 
 
 def start_traverse_server() -> int:

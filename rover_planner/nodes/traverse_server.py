@@ -30,6 +30,7 @@ from msg_adapters.results.diagnostics import (
     to_json,
 )
 from msg_adapters.stamps import stamp_to_ns
+from rover_physics.errors import RoverError
 from rover_physics.numerics.kernel_cache import kernel_cache_note
 from rover_physics.warm_up import EXACT, UNCERTAIN
 from rover_planner.maps.known_map import stamp_text
@@ -72,7 +73,7 @@ from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.deferred_work import DeferredWork
 from rover_planner.ros.frames import NodeFrames, is_empty
-from rover_planner.ros.guard import INPUT_ERRORS, Guard
+from rover_planner.ros.guard import Guard
 from rover_planner.ros.map_intake import read_message
 from rover_planner.ros.polled_topics import PolledTopics
 from rover_planner.ros.qos import polled_qos, replace_reliability, topic_qos
@@ -123,20 +124,19 @@ class TraverseServer(Node):
             self,
             self.service,
             self._values,
-            lambda error: self.desk.health.take_map(error),
+            self._hear_of_map,
             self.frames,
             self.guard,
             self._heard,
         )
         self.desk = QuestionDesk(self, self.service, self._maps, self.guard, self._heard.poll)
         """Takes the questions of all services."""
-        self.desk.set_limits(self._values.time_budget, self._values.max_waiting)
         self._create_subscriptions(reliability)
         serve_later(self, GetPlan, "~/can_traverse", self._can_traverse)
         serve_later(self, Trigger, "~/check_path", self._check_path)
         PathValidity(self.desk, frame, self.publish, self.localise_path).serve(self)
         PathComputation.serve(self, self.desk, self.read_question, self.publish)
-        self._advice = AdviceTopics(self, self.desk, self.guard, self._values.advice_time)
+        self._advice = AdviceTopics(self, self.service, self.desk, self.guard)
         self.create_service(Trigger, "~/cancel", self._cancel)
         self.create_service(Trigger, "~/clear_places", self._clear_marks)
         self.arm = ArmTopics(self, self.desk, frame, reliability)
@@ -189,8 +189,6 @@ class TraverseServer(Node):
     def _apply_parameters(self, parameters: TraverseServerParameters) -> None:
         self._values = parameters
         self.service.settings = load_service_settings(parameters)
-        self.desk.set_limits(parameters.time_budget, parameters.max_waiting)
-        self._advice.seconds = parameters.advice_time
         self._maps.apply(parameters)
         self.watch.apply(parameters)
         self.frames.apply_timeout(parameters.transform_timeout)
@@ -199,6 +197,12 @@ class TraverseServer(Node):
     def _beat(self) -> None:
         self._heard.poll()
         self.watch.beat()
+
+    def _hear_of_map(self, error: str) -> None:
+        """Note why a map was refused, or have the watch look at a new one at once."""
+        self.desk.health.take_map(error)
+        if not error:
+            self.watch.look()
 
     def _take_joints(self, state: JointState, _arrival: float) -> None:
         try:
@@ -216,7 +220,7 @@ class TraverseServer(Node):
             self.frames.take_odometry(here)
             self.service.take_pose(pose[[0, 1, 3]], body)
             self._maps.look_under_rover()
-        except INPUT_ERRORS as error:
+        except RoverError as error:
             self.get_logger().warning(
                 f"odometry not used, the suspension is not compared: {error}", once=True
             )
@@ -226,7 +230,7 @@ class TraverseServer(Node):
         now = self.get_clock().now().nanoseconds
         try:
             ground = parse_learned(message.data, "~/ground_estimate", stamp_text(now))
-        except INPUT_ERRORS as error:
+        except RoverError as error:
             self.get_logger().warning(f"not used: {error}", throttle_duration_sec=5.0)
             return
         self.service.take_ground(ground)
@@ -235,7 +239,7 @@ class TraverseServer(Node):
         """Take a place that is impassable from now on: JSON with x, y, radius, reason, date."""
         try:
             place = parse_place(message.data, "~/mark_place")
-        except INPUT_ERRORS as error:
+        except RoverError as error:
             self.get_logger().warning(f"not used: {error}")
             return
         self.service.mark(place)
@@ -258,7 +262,7 @@ class TraverseServer(Node):
             about = path_hash(path), stamp_text(stamp_to_ns(path.header.stamp))
             there = self.frames.localise_path(path)
             self.service.take_path(path_to_poses(there, self._values.map_frame), *about)
-        except INPUT_ERRORS as error:
+        except RoverError as error:
             self.service.refuse_path(str(error), *about)
             self.get_logger().error(f"~/path refused: {error}")
 
@@ -303,7 +307,7 @@ class TraverseServer(Node):
         about = plan_request_hash(begin, end, tolerance)
         try:
             return PathQuestion(service, about, *self._read_ends(begin, end), tolerance)
-        except INPUT_ERRORS as error:
+        except RoverError as error:
             return BadQuestion(service, about, str(error))
 
     def _read_ends(self, begin: PoseStamped, end: PoseStamped) -> tuple[Pose, Pose]:
@@ -321,7 +325,7 @@ class TraverseServer(Node):
         """Return the pose (3,) of the body by /tf, else by odometry of just now."""
         try:
             here = self.frames.find_here()
-        except INPUT_ERRORS:  # it is stale
+        except RoverError:  # it is stale
             return None
         return self.service.fresh_pose(MAX_POSE_AGE) if here is None else here
 

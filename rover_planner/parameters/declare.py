@@ -18,9 +18,7 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from msg_adapters.errors import MessageError
 from rover_physics.errors import RoverError
-from rover_planner.errors import PlanningError
 from rover_planner.parameters.table import ParameterError, ParameterSpec, ParameterTable, specs_of
 from rover_planner.shell.run_program import one_line
 
@@ -75,7 +73,7 @@ def follow_changes(
             changes = _changes(type(values), parameters)
             if changes:
                 accept(replace(values, **changes))
-        except (MessageError, PlanningError, RoverError) as error:
+        except RoverError as error:
             return SetParametersResult(successful=False, reason=one_line(str(error)))
         except Exception as error:
             # An internal error must not end the node.

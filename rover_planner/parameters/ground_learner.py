@@ -3,13 +3,7 @@
 
 from dataclasses import dataclass
 
-from rover_planner.parameters.shared import (
-    CELL_HEIGHT,
-    INPUT_RELIABILITY,
-    JOINT_MAP,
-    MAP_DURABILITY,
-    MAP_RESOLUTION,
-)
+from rover_planner.parameters import shared
 from rover_planner.parameters.table import ParameterTable, parameter
 
 
@@ -48,8 +42,8 @@ class GroundLearnerParameters(ParameterTable):
     odometry_frame: str = parameter(
         "odom", "Frame of the wheel odometry on ~/odometry.", read_only=True
     )
-    joint_map: tuple[str, ...] = JOINT_MAP
-    map_resolution: float = MAP_RESOLUTION
-    cell_height: str = CELL_HEIGHT
-    map_durability: str = MAP_DURABILITY
-    input_reliability: str = INPUT_RELIABILITY
+    joint_map: tuple[str, ...] = shared.JOINT_MAP
+    map_resolution: float = shared.MAP_RESOLUTION
+    cell_height: str = shared.CELL_HEIGHT
+    map_durability: str = shared.MAP_DURABILITY
+    input_reliability: str = shared.INPUT_RELIABILITY

@@ -4,11 +4,7 @@
 from dataclasses import dataclass
 
 from rover_physics.names import CONTROL_POLICIES, EQUAL, WHEEL_JOINTS
-from rover_planner.parameters.shared import (
-    STEERING_SIGN,
-    max_map_cells_parameter,
-    stop_timeout_parameter,
-)
+from rover_planner.parameters import shared
 from rover_planner.parameters.table import ParameterTable, parameter
 
 ALL_AROUND = 6.28
@@ -22,112 +18,77 @@ ENGINES = (QUASI_STATIC, MUJOCO)
 class RoverSimulatorParameters(ParameterTable):
     """Parameters of `/rover_simulator`; the fields document themselves."""
 
-    rover: str = parameter(
-        "lsr1", "Rover that is simulated: a preset's name or a rover file.", read_only=True
-    )
+    all_read_only = True
+
+    rover: str = parameter("lsr1", "Rover that is simulated: a preset's name or a rover file.")
     terrain_file: str = parameter(
-        "",
-        "Terrain to drive on: a preset's name or a terrain file; empty makes one.",
-        read_only=True,
+        "", "Terrain to drive on: a preset's name or a terrain file; empty makes one."
     )
-    max_map_cells: int = max_map_cells_parameter(read_only=True)
-    start_x: float = parameter(
-        0.0, "Start of the rover, x.", unit="m", bounds=(-1e6, 1e6), read_only=True
-    )
-    start_y: float = parameter(
-        0.0, "Start of the rover, y.", unit="m", bounds=(-1e6, 1e6), read_only=True
-    )
-    start_yaw: float = parameter(
-        0.0, "Heading at the start.", unit="rad", bounds=(-6.3, 6.3), read_only=True
-    )
+    max_map_cells: int = shared.MAX_MAP_CELLS
+    start_x: float = parameter(0.0, "Start of the rover, x.", unit="m", bounds=(-1e6, 1e6))
+    start_y: float = parameter(0.0, "Start of the rover, y.", unit="m", bounds=(-1e6, 1e6))
+    start_yaw: float = parameter(0.0, "Heading at the start.", unit="rad", bounds=(-6.3, 6.3))
     engine: str = parameter(
         QUASI_STATIC,
         "Physics engine: the quasi-static model, or MuJoCo (extra bench).",
         choices=ENGINES,
-        read_only=True,
     )
     friction: float = parameter(
         0.0,
         "Coulomb friction of the ground; 0 uses that of the terrain or the rover file.",
         bounds=(0.0, 10.0),
-        read_only=True,
     )
     soil: str = parameter(
         "",
         "Soil of config/soils.yaml where the terrain names none; empty is Coulomb friction. "
         "Quasi-static engine only.",
-        read_only=True,
     )
     policy: str = parameter(
         EQUAL,
         "How the rover's own servos share the traction. Quasi-static engine only, and not with "
         "follow_commands.",
         choices=CONTROL_POLICIES,
-        read_only=True,
     )
     speed: float = parameter(
         0.0,
         "Speed along a path; 0 uses the rover's nominal speed.",
         unit="m/s",
         bounds=(0.0, 10.0),
-        read_only=True,
     )
     follow_commands: bool = parameter(
-        False, "Whether torques from traction_controller/commands drive the rover.", read_only=True
+        False, "Whether torques from traction_controller/commands drive the rover."
     )
     joints: tuple[str, ...] = parameter(
-        WHEEL_JOINTS, "Wheel joints in the order of the values of the torques.", read_only=True
+        WHEEL_JOINTS, "Wheel joints in the order of the values of the torques."
     )
     timeout: float = parameter(
-        0.5,
-        "Age above which cmd_vel and torques are ignored.",
-        unit="s",
-        bounds=(0.01, 10.0),
-        read_only=True,
+        0.5, "Age above which cmd_vel and torques are ignored.", unit="s", bounds=(0.01, 10.0)
     )
-    stop_timeout: float = stop_timeout_parameter(read_only=True)
-    rate: float = parameter(
-        50.0, "Steps per second.", unit="1/s", bounds=(5.0, 500.0), read_only=True
-    )
-    map_rate: float = parameter(
-        0.5, "Maps per second.", unit="1/s", bounds=(0.01, 20.0), read_only=True
-    )
+    stop_timeout: float = shared.STOP_TIMEOUT
+    rate: float = parameter(50.0, "Steps per second.", unit="1/s", bounds=(5.0, 500.0))
+    map_rate: float = parameter(0.5, "Maps per second.", unit="1/s", bounds=(0.01, 20.0))
     sensor_range: float = parameter(
-        6.0, "Range of the terrain sensor.", unit="m", bounds=(0.5, 1e3), read_only=True
+        6.0, "Range of the terrain sensor.", unit="m", bounds=(0.5, 1e3)
     )
     sensor_noise: float = parameter(
         0.0,
         "Standard deviation of the measured heights, published as elevation_std.",
         unit="m",
         bounds=(0.0, 1.0),
-        read_only=True,
     )
     sensor_height: float = parameter(
-        0.8,
-        "Height of the sensor over the body's origin.",
-        unit="m",
-        bounds=(0.0, 10.0),
-        read_only=True,
+        0.8, "Height of the sensor over the body's origin.", unit="m", bounds=(0.0, 10.0)
     )
-    sensor_occlusion: bool = parameter(
-        True, "Whether high ground hides the ground behind it.", read_only=True
-    )
+    sensor_occlusion: bool = parameter(True, "Whether high ground hides the ground behind it.")
     sensor_field_of_view: float = parameter(
         ALL_AROUND,
         "Angle over which the sensor sees; 6.28 is all around.",
         unit="rad",
         bounds=(0.01, ALL_AROUND),
-        read_only=True,
     )
     sensor_least_range: float = parameter(
-        0.0,
-        "Distance of the nearest ground that the sensor sees.",
-        unit="m",
-        bounds=(0.0, 100.0),
-        read_only=True,
+        0.0, "Distance of the nearest ground that the sensor sees.", unit="m", bounds=(0.0, 100.0)
     )
-    seed: int = parameter(
-        1, "Seed of noise and of a generated terrain.", bounds=(0, 2**31 - 1), read_only=True
-    )
-    steering_sign: str = STEERING_SIGN
-    map_frame: str = parameter("map", "Frame of map, path and odometry.", read_only=True)
+    seed: int = parameter(1, "Seed of noise and of a generated terrain.", bounds=(0, 2**31 - 1))
+    steering_sign: str = shared.STEERING_SIGN
+    map_frame: str = parameter("map", "Frame of map, path and odometry.")

@@ -86,29 +86,18 @@ CELL_HEIGHT: str = parameter(
 )
 
 
-def max_map_cells_parameter(read_only: bool = False) -> int:
-    """Return the field of the parameter max_map_cells [cells]."""
-    return parameter(
-        MAX_CELLS, "Largest terrain file.", unit="cells", bounds=(4, 10**9), read_only=read_only
-    )
-
-
+MAX_MAP_CELLS: int = parameter(MAX_CELLS, "Largest terrain file.", unit="cells", bounds=(4, 10**9))
 STOP = "traverse_server/stop"
 """Topic on which the watch of the accepted path says whether the rover is to stop."""
 
 
-def stop_timeout_parameter(read_only: bool = False) -> float:
-    """Return the field of the parameter stop_timeout [s]."""
-    return parameter(
-        0.0,
-        "Time without a message of traverse_server/stop after which the rover stops; 0 expects "
-        "none, and only stops while it is true.",
-        unit="s",
-        bounds=(0.0, 10.0),
-        read_only=read_only,
-    )
-
-
+STOP_TIMEOUT: float = parameter(
+    0.0,
+    "Time without a message of traverse_server/stop after which the rover stops; 0 expects "
+    "none, and only stops while it is true.",
+    unit="s",
+    bounds=(0.0, 10.0),
+)
 IMU_FRAME: str = parameter(
     "", "Frame of the IMU; empty is that of the body. Another frame_id is refused.", read_only=True
 )

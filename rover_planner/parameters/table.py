@@ -3,7 +3,7 @@
 
 import math
 from dataclasses import dataclass, field, fields
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, ClassVar, TypeVar, get_type_hints
 
 from rover_planner.errors import PlanningError
 
@@ -134,6 +134,9 @@ class ParameterTable:
         ParameterError: `ParameterSpec.check` refuses a value.
     """
 
+    all_read_only: ClassVar[bool] = False
+    """True if no value changes after the start of the node."""
+
     def __post_init__(self) -> None:
         for spec in specs_of(type(self)):
             spec.check(getattr(self, spec.name))
@@ -143,6 +146,11 @@ def specs_of(table: type[ParameterTable]) -> tuple[ParameterSpec, ...]:
     """Return the rows of a table in the order of its fields."""
     types = get_type_hints(table)
     return tuple(
-        ParameterSpec(row.name, _ROS_TYPES[types[row.name]], row.default, **row.metadata)
+        ParameterSpec(
+            row.name,
+            _ROS_TYPES[types[row.name]],
+            row.default,
+            **{**row.metadata, "read_only": table.all_read_only or row.metadata["read_only"]},
+        )
         for row in fields(table)
     )

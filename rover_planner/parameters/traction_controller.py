@@ -4,21 +4,7 @@
 from dataclasses import dataclass
 
 from rover_physics.names import CONTROL_POLICIES, OPTIMAL, WHEEL_JOINTS
-from rover_planner.parameters.shared import (
-    BASE_OFFSET,
-    CELL_HEIGHT,
-    IMU_FRAME,
-    IMU_MOUNTING,
-    INPUT_RELIABILITY,
-    JOINT_MAP,
-    MAP_DURABILITY,
-    MAP_RESOLUTION,
-    MAX_TORQUE,
-    PAYLOAD,
-    STEERING_LIMIT,
-    STEERING_SIGN,
-    stop_timeout_parameter,
-)
+from rover_planner.parameters import shared
 from rover_planner.parameters.table import ParameterTable, parameter
 
 HOLD, BRAKE, COAST = "hold", "brake", "coast"
@@ -69,7 +55,7 @@ class TractionControllerParameters(ParameterTable):
     cmd_vel_timeout: float = parameter(
         0.5, "Age above which cmd_vel is stale, a fault.", unit="s", bounds=(0.01, 10.0)
     )
-    stop_timeout: float = stop_timeout_parameter()
+    stop_timeout: float = shared.STOP_TIMEOUT
     odometry_timeout: float = parameter(
         0.5, "Age above which odometry is not used.", unit="s", bounds=(0.01, 10.0)
     )
@@ -94,8 +80,8 @@ class TractionControllerParameters(ParameterTable):
     friction: float = parameter(
         0.0, "Assumed Coulomb friction; 0 uses that of the rover file.", bounds=(0.0, 10.0)
     )
-    max_torque: float = MAX_TORQUE
-    payload: float = PAYLOAD
+    max_torque: float = shared.MAX_TORQUE
+    payload: float = shared.PAYLOAD
     policy: str = parameter(
         OPTIMAL,
         "How the wheels share the traction: smallest peak friction utilisation, or equal torques.",
@@ -122,9 +108,9 @@ class TractionControllerParameters(ParameterTable):
         unit="s/m",
         bounds=(0.0, 1e3),
     )
-    steering_limit: float = STEERING_LIMIT
-    steering_sign: str = STEERING_SIGN
-    joint_map: tuple[str, ...] = JOINT_MAP
+    steering_limit: float = shared.STEERING_LIMIT
+    steering_sign: str = shared.STEERING_SIGN
+    joint_map: tuple[str, ...] = shared.JOINT_MAP
     map_frame: str = parameter(
         "map",
         "Frame of the map; odometry in another frame needs a transform of /tf.",
@@ -135,18 +121,18 @@ class TractionControllerParameters(ParameterTable):
         "Frame of the body; odometry of another child frame is refused.",
         read_only=True,
     )
-    base_offset: tuple[float, ...] = BASE_OFFSET
+    base_offset: tuple[float, ...] = shared.BASE_OFFSET
     transform_timeout: float = parameter(
         0.5, "Age from which a transform of /tf is refused.", unit="s", bounds=(0.01, 60.0)
     )
-    imu_frame: str = IMU_FRAME
-    imu_mounting: tuple[float, ...] = IMU_MOUNTING
+    imu_frame: str = shared.IMU_FRAME
+    imu_mounting: tuple[float, ...] = shared.IMU_MOUNTING
     cmd_vel_stamped: bool = parameter(
         True,
         "Whether cmd_vel is a geometry_msgs/TwistStamped; false for a geometry_msgs/Twist.",
         read_only=True,
     )
-    map_resolution: float = MAP_RESOLUTION
-    cell_height: str = CELL_HEIGHT
-    map_durability: str = MAP_DURABILITY
-    input_reliability: str = INPUT_RELIABILITY
+    map_resolution: float = shared.MAP_RESOLUTION
+    cell_height: str = shared.CELL_HEIGHT
+    map_durability: str = shared.MAP_DURABILITY
+    input_reliability: str = shared.INPUT_RELIABILITY

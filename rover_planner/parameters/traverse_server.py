@@ -5,26 +5,11 @@ from dataclasses import dataclass
 
 from rover_physics.bounds.path import SIGMAS
 from rover_physics.names import EQUAL, TORQUE_POLICIES
-from rover_planner.maps.living_map import MERGE_RULES, NEWEST
-from rover_planner.maps.map_keeper import AUTO as AUTO_UPDATES
-from rover_planner.maps.map_keeper import MAP_UPDATES
+from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
+from rover_planner.maps.living_map import AUTO as AUTO_UPDATES
+from rover_planner.maps.living_map import MAP_UPDATES, MERGE_RULES, NEWEST
 from rover_planner.maps.unobserved_ground import ALLOW, UNOBSERVED_GROUND
-from rover_planner.parameters.shared import (
-    BASE_OFFSET,
-    CELL_HEIGHT,
-    CONTROL_MARGIN,
-    IMU_FRAME,
-    IMU_MOUNTING,
-    INPUT_RELIABILITY,
-    JOINT_MAP,
-    MAP_DURABILITY,
-    MAP_RESOLUTION,
-    MAX_TORQUE,
-    PAYLOAD,
-    STEERING_LIMIT,
-    STEERING_SIGN,
-    max_map_cells_parameter,
-)
+from rover_planner.parameters import shared
 from rover_planner.parameters.table import ParameterError, ParameterTable, parameter
 
 MIN_PLAN_SPACING = 0.001
@@ -55,11 +40,11 @@ class TraverseServerParameters(ParameterTable):
         "assume its friction and uncertainty where the map has none (use).",
         choices=(OFF, SUGGEST, USE),
     )
-    max_torque: float = MAX_TORQUE
+    max_torque: float = shared.MAX_TORQUE
     soil: str = parameter(
         "", "Soil of config/soils.yaml where the map names none; empty is Coulomb friction."
     )
-    payload: float = PAYLOAD
+    payload: float = shared.PAYLOAD
     policy: str = parameter(
         EQUAL,
         "How the wheels share the traction: equal torques, speed servos (servo), or optimal with "
@@ -67,7 +52,7 @@ class TraverseServerParameters(ParameterTable):
         choices=TORQUE_POLICIES,
     )
     control_margin: float = parameter(
-        CONTROL_MARGIN,
+        shared.CONTROL_MARGIN,
         "Share of friction and torque that is left to a traction controller; 0 is the physical "
         "limit.",
         bounds=(0.0, 0.9),
@@ -106,9 +91,9 @@ class TraverseServerParameters(ParameterTable):
         unit="m",
         bounds=(0.0, 100.0),
     )
-    steering_limit: float = STEERING_LIMIT
-    steering_sign: str = STEERING_SIGN
-    joint_map: tuple[str, ...] = JOINT_MAP
+    steering_limit: float = shared.STEERING_LIMIT
+    steering_sign: str = shared.STEERING_SIGN
+    joint_map: tuple[str, ...] = shared.JOINT_MAP
     map_frame: str = parameter(
         "map",
         "Frame of the map; requests in another frame need a transform of /tf.",
@@ -117,7 +102,7 @@ class TraverseServerParameters(ParameterTable):
     base_frame: str = parameter(
         "base_link", "Frame of the robot on /tf, where tf2_msgs is installed.", read_only=True
     )
-    base_offset: tuple[float, ...] = BASE_OFFSET
+    base_offset: tuple[float, ...] = shared.BASE_OFFSET
     transform_timeout: float = parameter(
         0.5,
         "Age from which a transform of /tf is refused, and odometry for clouds of a sensor.",
@@ -130,10 +115,10 @@ class TraverseServerParameters(ParameterTable):
         "m and rad. Other frames are looked up on /tf.",
         read_only=True,
     )
-    map_resolution: float = MAP_RESOLUTION
-    cell_height: str = CELL_HEIGHT
-    map_durability: str = MAP_DURABILITY
-    input_reliability: str = INPUT_RELIABILITY
+    map_resolution: float = shared.MAP_RESOLUTION
+    cell_height: str = shared.CELL_HEIGHT
+    map_durability: str = shared.MAP_DURABILITY
+    input_reliability: str = shared.INPUT_RELIABILITY
     elevation_layer: str = parameter(
         "elevation", "Layer of heights in a GridMap on elevation_map.", read_only=True
     )
@@ -196,8 +181,8 @@ class TraverseServerParameters(ParameterTable):
         "Whether roll and pitch of the standing rover are those of imu instead of odometry.",
         read_only=True,
     )
-    imu_frame: str = IMU_FRAME
-    imu_mounting: tuple[float, ...] = IMU_MOUNTING
+    imu_frame: str = shared.IMU_FRAME
+    imu_mounting: tuple[float, ...] = shared.IMU_MOUNTING
     blind_ground: str = parameter(
         ALLOW,
         "Ground below the belly that was never seen: allow, only if filled (allow_footprint), or "
@@ -218,7 +203,7 @@ class TraverseServerParameters(ParameterTable):
         bounds=(0.0, 10.0),
     )
     accepted_chance: float = parameter(
-        1.0,
+        ACCEPTED_CHANCE,
         "Largest chance of failure of a path that is traversable; 1 does not ask for it.",
         bounds=(0.0, 1.0),
     )
@@ -262,7 +247,7 @@ class TraverseServerParameters(ParameterTable):
     max_map_bytes: int = parameter(
         1_000_000_000, "Largest file that ~/load_map reads.", unit="bytes", bounds=(1000, 10**12)
     )
-    max_map_cells: int = max_map_cells_parameter()
+    max_map_cells: int = shared.MAX_MAP_CELLS
     suspension_tolerance: float = parameter(
         0.1,
         "Largest difference of measured and predicted suspension angles without a warning.",

@@ -20,7 +20,6 @@ from rover_physics.numerics.kernels import exact_kernel
 from rover_planner.errors import PlanningError
 from rover_planner.planning.angles import wrap
 from rover_planner.planning.dubins import dubins_paths
-from rover_planner.planning.point_turn import turn_and_drive
 
 MIN_RADIUS = 0.8
 """Default smallest radius of a candidate [m]: the wheelbase of the LSR-1 preset.
@@ -31,6 +30,8 @@ If the radius equals the wheelbase, the inner end wheels are steered by about 40
 MAX_WAYPOINTS = 100_000
 """Longest path [waypoints]; a longer one is probably an error in the units of the request."""
 
+LEAST_TURN = 1e-3
+"""Turn on the spot [rad] below which it is left out."""
 _SAME_PLACE = 1e-9
 """Distance below which start and goal are the same position [m]."""
 _LONG_WAY_ROUND = 1.5
@@ -53,7 +54,7 @@ class BumpedCurve(NamedTuple):
     """A Hermite cubic between two points plus a cosine bump; vectors (2,) in [m]."""
 
     start: np.ndarray
-    """Where it begins."""
+    """Start of the curve."""
     chord: np.ndarray
     """Vector from the start to the end of the curve."""
     m0: np.ndarray
@@ -292,3 +293,48 @@ def follow_curve(t, curve, poses, slopes):
             slope = 6 * u * rest * chord[i]
             slope = slope + rest * (1 - 3 * u) * m0[i] + u * (3 * u - 2) * m1[i]
             slopes[i, k] = slope + np.pi * offset * sine * left[i]
+
+
+def turn_and_drive(
+    start: np.ndarray, goal: np.ndarray, swing_radius: float, waypoint_spacing: float
+) -> tuple[np.ndarray, float]:
+    """Return the path that turns, drives straight ahead and turns, and its length.
+
+    Args:
+        start: (3,) x, y [m] and yaw [rad].
+        goal: (3,) x, y [m] and yaw [rad].
+        swing_radius: Distance of the outermost wheel from the body origin [m].
+        waypoint_spacing: Largest distance between waypoints [m]; in the turns, that of the
+            outermost wheel.
+
+    Returns:
+        Waypoints (n, 3), and the straight distance plus that of the outer wheel in turns [m].
+    """
+    away = goal[:2] - start[:2]
+    length = float(np.hypot(*away))
+    heading = float(np.arctan2(away[1], away[0])) if length > 0.0 else float(start[2])
+    first, last = float(wrap(heading - start[2])), float(wrap(goal[2] - heading))
+    step = waypoint_spacing / swing_radius
+    shares = np.linspace(0.0, 1.0, 1 + max(1, int(np.ceil(length / waypoint_spacing - 1e-9))))
+    line = np.column_stack([start[:2] + shares[:, None] * away, np.full(len(shares), heading)])
+    parts = [
+        turn_on_the_spot(start[:2], start[2], first, step)[:-1],
+        line if length > 0.0 else line[:1],
+        turn_on_the_spot(goal[:2], heading, last, step)[1:],
+    ]
+    return np.concatenate(parts), length + swing_radius * (abs(first) + abs(last))
+
+
+def turn_on_the_spot(place: np.ndarray, yaw: float, turn: float, step: float) -> np.ndarray:
+    """Return poses (k, 3) of a turn on the spot, both ends included; one if it is left out.
+
+    Args:
+        place: (2,) x, y [m].
+        yaw: Heading at its begin [rad].
+        turn: Turn to the left [rad].
+        step: Largest turn between two poses [rad].
+    """
+    if abs(turn) < LEAST_TURN:
+        return np.array([[*place, yaw]])
+    count = 1 + max(1, int(np.ceil(abs(turn) / step - 1e-9)))
+    return np.column_stack([np.tile(place, (count, 1)), yaw + np.linspace(0.0, turn, count)])

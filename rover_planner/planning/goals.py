@@ -84,7 +84,7 @@ class _Ground:
 
 
 class _View(NamedTuple):
-    """Where the cells (ny, nx) of a map are as seen from the start."""
+    """Places of the cells (ny, nx) of a map as seen from the start."""
 
     distance: NDArray[np.float64]
     """Distance [m]."""

@@ -25,7 +25,7 @@ class LearnedGround:
     low: float
     """Lower end of the 95 % interval."""
     is_bounded: bool
-    """Whether wheels slipped, so that the mean was measured."""
+    """True if wheels slipped, so that the mean was measured."""
     since: str = ""
     """Time of the estimate, "seconds.nanoseconds"; empty if it has none."""
 

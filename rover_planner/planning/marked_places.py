@@ -33,7 +33,7 @@ class MarkedPlace:
     radius: float
     """Radius [m]."""
     reason: str
-    """Why it is impassable."""
+    """Reason why it is impassable."""
     date: str
     """When this was found."""
 

@@ -17,7 +17,7 @@ REPORTED = (*EXTREMES, "risk", "map_sigmas", *BOUNDS, "failure_chance")
 
 
 TOLD, LEARNED = "told", "learned"
-"""Where the friction of a question comes from."""
+"""Source of the friction of a question."""
 
 
 @dataclass(frozen=True)

@@ -1,24 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """Keeps a node alive: errors are refusals with a reason; an unexpected one is logged once."""
 
+import contextlib
 import functools
 import math
 import time
 import traceback
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable
 from typing import Any, TypeVar
 
 from rclpy.event_handler import EventHandler
+from rclpy.exceptions import InvalidHandle
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from msg_adapters.errors import MessageError
 from rover_physics.errors import RoverError
-from rover_planner.errors import PlanningError
-
-INPUT_ERRORS = (MessageError, PlanningError, RoverError)
-"""Errors of the input; any other error is an internal error."""
 
 EVENT_PERIOD, EVENT_WINDOW = 1.0, 0.01
 """Time between two looks at events of publishers and subscriptions, such as profiles that do not
@@ -66,11 +63,30 @@ class Guard:
             self.report(getattr(function, "__name__", "a callback"), error)
 
 
+class Handover:
+    """Calls functions in the executor's thread, in order."""
+
+    def __init__(self, node: Node, guard: Guard):
+        self._waiting: deque[Callable[[], object]] = deque()
+        self._ready = node.create_guard_condition(self._call_all)
+        self._guard = guard
+
+    def call(self, function: Callable[[], object]) -> None:
+        """Call a function soon in the executor's thread; any thread may ask for it."""
+        self._waiting.append(function)
+        with contextlib.suppress(InvalidHandle):  # the node is gone, and with it who waits
+            self._ready.trigger()
+
+    def _call_all(self) -> None:
+        while self._waiting:
+            self._guard.call(self._waiting.popleft())
+
+
 def refuse_error(
     guard: Guard, request: str, error: Exception, refuse: Callable[[str, str], Refusal]
 ) -> Refusal:
     """Return `refuse(code, reason)` for an error; the guard counts and logs internal errors."""
-    if isinstance(error, INPUT_ERRORS):
+    if isinstance(error, RoverError):
         return refuse("bad_request", str(error))
     text = guard.report(request, error)
     return refuse("internal_error", f"internal error: {text}")

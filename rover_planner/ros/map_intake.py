@@ -16,9 +16,9 @@ from std_msgs.msg import Header
 
 from msg_adapters.errors import MessageError
 from msg_adapters.stamps import stamp_to_ns
+from rover_physics.errors import RoverError
 from rover_planner.planning.navigation.transforms import Rigid, TransformError
 from rover_planner.ros.frames import Frames
-from rover_planner.ros.guard import INPUT_ERRORS
 
 WAIT = 0.02
 """Time between two checks of who waits for a map [s]."""
@@ -44,7 +44,7 @@ class MapIntake(Generic[Map]):
 
         Args:
             prepare: Makes a map of a message and of where its frame is in that of the map, None
-                if it is that; called in the thread; may raise INPUT_ERRORS.
+                if it is that; called in the thread; may raise RoverError.
             refuse: Called in the thread with the reason why a message cannot be used.
             frames: Knows where frames are on the map; asked in the thread.
         """
@@ -169,7 +169,7 @@ class MapIntake(Generic[Map]):
         try:
             read = read_message(message, kind)
             self._ready = self._prepare(read, self._find_source(read.header))
-        except INPUT_ERRORS as error:
+        except RoverError as error:
             self._refuse(str(error))
 
     def _find_source(self, header: Header) -> Rigid | None:

@@ -1,24 +1,36 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs a program so that it always ends with an exit code and at most one line on stderr."""
+"""Runs a program: it ends with an exit code and at most one line on stderr, also on a signal."""
 
 import contextlib
 import os
+import signal
 import sys
+import threading
 import traceback
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from types import FrameType
 from typing import Any
 
 from rover_physics.errors import RoverError
-from rover_planner.errors import DemoError, PlanningError
-from rover_planner.shell.exit_codes import (
-    EXIT_BAD_INPUT,
-    EXIT_FAILED,
-    EXIT_INTERRUPTED,
-    EXIT_OK,
-    EXIT_PIPE_CLOSED,
-)
+from rover_planner.errors import DemoError
 
+EXIT_OK = 0
+"""The program ran, with any verdict of the model."""
+EXIT_FAILED = 1
+"""The input was good, but a part of the system failed, or the program has a defect."""
+EXIT_BAD_INPUT = 2
+"""The input is invalid or a library is missing; one line on stderr names it."""
+EXIT_NOT_TRAVERSABLE = 3
+"""mission_planner only: all queries were answered, and at least one goal is not traversable."""
+EXIT_NO_ANSWER = 4
+"""mission_planner only: no server, or no answer in time."""
+EXIT_PIPE_CLOSED = 141
+"""Nobody reads the output any more, as in `rover_planner ... | head`: 128 + SIGPIPE."""
+EXIT_INTERRUPTED = 130
+"""Interrupted by Ctrl-C: 128 + SIGINT, as in shells."""
+END_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
+"""Signals of batch systems and closed terminals."""
 MAX_LINE = 300
 """Largest number of characters of a line on stderr."""
 
@@ -41,7 +53,7 @@ def run_program(name: str, run: Callable[[], Any]) -> int:
             code = run()
         if sys.stdout is not None:
             sys.stdout.flush()
-    except (RoverError, PlanningError) as error:
+    except RoverError as error:
         return end_with(name, EXIT_BAD_INPUT, str(error))
     except DemoError as error:
         return end_with(name, EXIT_FAILED, str(error))
@@ -58,6 +70,27 @@ def run_program(name: str, run: Callable[[], Any]) -> int:
             traceback.print_exc()
         return end_with(name, EXIT_FAILED, f"internal error: {type(error).__name__}: {error}")
     return code if isinstance(code, int) else EXIT_OK
+
+
+@contextlib.contextmanager
+def end_as_by_ctrl_c() -> Iterator[None]:
+    """Let SIGTERM and SIGHUP end the block as Ctrl-C does, so that child processes end in order.
+
+    A signal that is ignored or handled already stays so, such as SIGHUP under nohup.
+    """
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    is_main = threading.current_thread() is threading.main_thread()
+    mine = [one for one in END_SIGNALS if is_main and signal.getsignal(one) == signal.SIG_DFL]
+    for one in mine:
+        signal.signal(one, interrupt)
+    try:
+        yield
+    finally:
+        for one in mine:
+            signal.signal(one, signal.SIG_DFL)
 
 
 def end_with(name: str, code: int, text: str) -> int:

@@ -89,11 +89,11 @@ def measure_state(here: PathPrediction, on_bogie: NDArray[np.bool_]) -> Measured
     return MeasuredState(
         float(here.roll[0]), float(here.pitch[0]), float(here.rocker_angle[0, 0]),
         here.bogie_angle[0], here.contact_angle[0],
-        np.sum(arms * _find_axles(here, on_bogie), axis=1), here.steering_angle[0],
+        np.sum(arms * find_axles(here, on_bogie), axis=1), here.steering_angle[0],
     )  # fmt: skip
 
 
-def _find_axles(here: PathPrediction, on_bogie: NDArray[np.bool_]) -> Floats:
+def find_axles(here: PathPrediction, on_bogie: NDArray[np.bool_]) -> Floats:
     """Return the directions (6, 3) of the axles, positive to the left, map frame."""
     yaw = float(here.poses[0, 2])
     R = matrix_from_xyzw(xyzw_from_rpy(float(here.roll[0]), float(here.pitch[0]), yaw))

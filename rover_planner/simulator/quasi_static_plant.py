@@ -147,24 +147,26 @@ class QuasiStaticPlant:
             return
         self._torques = np.zeros(6)
         self._take_course()
-        way = float(np.sign(self._speed))
-        way = way or self._course.sign * float(np.sign(self._find_forces(self._torques, way).push))
-        locked = -way * self._course.sign * self._rolling.directions * self._writer.weight
-        forces = self._find_forces(locked * self._rover.wheel.radius, way)
+        direction = float(np.sign(self._speed))
+        direction = direction or self._course.sign * float(
+            np.sign(self._find_forces(self._torques, direction).push)
+        )
+        locked = -direction * self._course.sign * self._rolling.directions * self._writer.weight
+        forces = self._find_forces(locked * self._rover.wheel.radius, direction)
         speed = self._accelerate(forces, 0.0, duration)
-        self._speed = speed if speed * way > 0.0 else 0.0
+        self._speed = speed if speed * direction > 0.0 else 0.0
         spin = self._spin.copy()
         motion = self._speed * self._course.sign * self._rolling.motion
         self._move(motion, self._angles, duration, forces)
         self._spin, self._wheel_rates, self._braked_at = spin, np.zeros(6), self._here
 
-    def _find_forces(self, torques: Floats, way: float) -> DrivingForces:
+    def _find_forces(self, torques: Floats, direction: float) -> DrivingForces:
         """Return the forces under torques (6,) [N m] of a rover that moves along its speed.
 
-        `way` is 1 for a rover that moves, -1 for one that moves back, 0 for one that stands.
+        `direction` is 1 for a rover that moves, -1 for one that moves back, 0 for one that stands.
         """
-        radius, way = self._rover.wheel.radius, self._course.sign * way
-        return find_driving_forces(self._writer, radius, self._here, torques, way)
+        radius, direction = self._rover.wheel.radius, self._course.sign * direction
+        return find_driving_forces(self._writer, radius, self._here, torques, direction)
 
     def _accelerate(self, forces: DrivingForces, drag: float, duration: float) -> float:
         """Return the speed [m/s] after a duration [s]; the rover stops before it reverses."""

@@ -10,9 +10,8 @@ from matplotlib.figure import Figure
 from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_planner.figures.pictures import WHEEL_COLOURS, drawing
-from rover_planner.studies.runner import StudyResult
+from rover_planner.studies.runner import StudyResult, describe_ties
 from rover_planner.studies.study_file import OBJECTIVES, label_of, name_thing
-from rover_planner.studies.summary import describe_ties
 
 POINT, BEST, NOW = "#0072B2", "#D55E00", "#009E73"
 """Colours that are safe for colour-blind readers (Okabe and Ito); each has its own marker."""

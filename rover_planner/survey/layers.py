@@ -2,12 +2,12 @@
 """The layers of a survey: names, types, meanings and colours."""
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES
+from rover_physics.traversability.classification import IMPASSABLE, TRAVERSABILITY_CLASSES
 from rover_physics.traversability.verdict import codes_of_verdicts
 
 NOT_SURVEYED = 255
@@ -56,27 +56,50 @@ def number_limits() -> dict[str, int]:
     return {"": NO_LIMIT} | {code: 1 + k for k, code in enumerate(codes_of_verdicts())}
 
 
+def count_skipped(store: Any, most: int) -> int:
+    """Return of how many cells along a side of a survey one is drawn, for at most `most`."""
+    return max(1, -(-max(store.notes.layout.shape) // most))
+
+
+def read_drawn_classes(store: Any, every: int) -> NDArray:
+    """Return the numbers of the worst classes of every few cells of a survey, as they are drawn.
+
+    SOME_HEADINGS where the heading decides, NOT_SURVEYED also where the ground is unknown.
+    """
+    worst, best, first = (
+        np.asarray(store.layer(name)[::every, ::every])
+        for name in ("worst_class", "best_class", "first_limit")
+    )
+    impassable, limits = CLASS_NUMBERS[IMPASSABLE], number_limits()
+    shown = worst.copy()
+    shown[(worst == impassable) & (best < impassable)] = SOME_HEADINGS
+    off_ground = [limits[code] for code in ("off_map", "unknown_ground")]
+    shown[(best == impassable) & np.isin(first, off_ground)] = NOT_SURVEYED
+    return shown
+
+
 def bits_type(headings: int) -> np.dtype:
     """Return the smallest unsigned type with a bit for each heading."""
     bits = next(bits for bits in (8, 16, 32, 64) if bits >= headings)
     return np.dtype(f"u{bits // 8}")
 
 
-def types_of_layers(headings: int, turns: bool) -> dict[str, np.dtype]:
+def types_of_layers(headings: int, turns: bool, chance: bool) -> dict[str, np.dtype]:
     """Return the layers of a survey and their types.
 
     Args:
         headings: Number of headings.
         turns: Whether turns on the spot are judged.
+        chance: Whether chances of failure are found.
     """
     types: dict[str, np.dtype] = {name: np.dtype("u1") for name in ("worst_class", "best_class")}
     types["first_limit"] = np.dtype("u1")
     types["passable_headings"] = bits_type(headings)
     if turns:
         types["turnable_headings"] = bits_type(headings)
-    for quantity in QUANTITIES:
+    for name in (*(one.name for one in QUANTITIES), *(("failure_chance",) if chance else ())):
         for which in ("worst", "best"):
-            types[f"{which}_{quantity.name}"] = np.dtype("f4")
+            types[f"{which}_{name}"] = np.dtype("f4")
     return types
 
 

@@ -19,6 +19,9 @@ MIN_SPEED_RATIO, MAX_SPEED_RATIO = 0.2, 2.0
 """Bounds of the speed of a wheel's centre, over the mean of all wheels."""
 STALL_RATIO = 0.3
 """Share of the wanted rate below which the rover counts as stalled."""
+SLOW_SHARE = 0.1
+"""Share of the fastest wanted rate below which a wheel tells nothing about a stall."""
+NOT_BLOCKED = np.zeros(WHEEL_COUNT)
 STALL_DELAY = 0.5
 """Delay between stall and takeover by the speed servos, in units of TAKEOVER_TIME."""
 MAP_STALL_DELAY = 2.5
@@ -125,7 +128,7 @@ class PushLoop(PIController):
 
 
 @dataclass(frozen=True, eq=False)
-class WheelMotion:
+class WheelRates:
     """Measured and wanted motion of the wheels, each in the direction in which it rolls."""
 
     rates: Floats
@@ -159,7 +162,7 @@ class StallDetector:
         self.climbs = False
         """True if the suspension has moved by CLIMBING_ANGLE with the last update."""
 
-    def update(self, motion: WheelMotion, duration: float) -> float:
+    def update(self, motion: WheelRates, duration: float) -> float:
         """Return the share of the speed servos, 0 to 1.
 
         Args:
@@ -229,7 +232,7 @@ class SlipControl:
         """Start as for a rover that moves."""
         self.detector = StallDetector()
 
-    def correct(self, torques: Floats, motion: WheelMotion, duration: float) -> Floats:
+    def correct(self, torques: Floats, motion: WheelRates, duration: float) -> Floats:
         """Return torques (6,) [N m] with slip control.
 
         Args:
@@ -247,7 +250,7 @@ class SlipControl:
         return torques + share * (servo - torques)
 
 
-def _find_slip(motion: WheelMotion) -> Floats:
+def _find_slip(motion: WheelRates) -> Floats:
     """Return the differences (6,) between the wheels' rates and those of rolling [rad/s].
 
     While one wheel climbs a steep face, the median rate is about zero and would call that wheel
@@ -286,3 +289,49 @@ def limit_rate(torques: Floats, last: Floats, max_change: float) -> Floats:
     largest = float(np.abs(change).max())
     share = 1.0 if largest <= max_change else max_change / largest
     return last + share * change
+
+
+class StallWatch:
+    """Counts the time without progress; stalled until the command is zero or reverses."""
+
+    def __init__(self) -> None:
+        """Start with a rover that moves."""
+        self._time = 0.0
+        self._blocked = NOT_BLOCKED
+
+    def reset(self) -> None:
+        """Forget the stall."""
+        self._time, self._blocked = 0.0, NOT_BLOCKED
+
+    def reset_time(self) -> None:
+        """Start to count anew, for a rover that climbs."""
+        self._time = 0.0
+
+    def update(self, rates: Floats, wanted: Floats, duration: float, stall_time: float) -> bool:
+        """Return whether the rover is stalled.
+
+        Args:
+            rates: (6,) wheel rates [rad/s].
+            wanted: (6,) wanted rates of the wheels [rad/s].
+            duration: Time since the last call [s].
+            stall_time: Time without progress after which the rover is stalled [s].
+        """
+        if float(wanted @ self._blocked) > 0.0:
+            return True
+        self._blocked = NOT_BLOCKED
+        if not wanted.any():
+            self._time = 0.0
+            return False
+        stands = _find_progress(rates, wanted) < STALL_RATIO
+        self._time = max(self._time + (duration if stands else -duration), 0.0)
+        if self._time < stall_time:
+            return False
+        self._time, self._blocked = 0.0, wanted
+        return True
+
+
+def _find_progress(rates: Floats, wanted: Floats) -> float:
+    """Return the median of the wheels' rates over their wanted rates."""
+    slowest = SLOW_SHARE * float(np.abs(wanted).max())
+    pairs = zip(rates.tolist(), wanted.tolist(), strict=True)
+    return median([rate / own for rate, own in pairs if abs(own) > slowest])

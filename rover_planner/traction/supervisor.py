@@ -18,9 +18,8 @@ import numpy as np
 from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
 from rover_planner.parameters.traction_controller import BRAKE, HOLD
-from rover_planner.traction.loops import WheelServos
+from rover_planner.traction.loops import StallWatch, WheelServos
 from rover_planner.traction.settings import TractionSettings
-from rover_planner.traction.stall_watch import StallWatch
 from rover_planner.traction.traction_service import MAX_STEP, TractionService, TractionUpdate
 
 DISABLED, EMERGENCY_STOP, FAULT = "disabled", "emergency_stop", "fault"

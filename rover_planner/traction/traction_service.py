@@ -40,7 +40,7 @@ from rover_planner.traction.loops import (
     PIController,
     PushLoop,
     SlipControl,
-    WheelMotion,
+    WheelRates,
     limit_rate,
 )
 from rover_planner.traction.settings import TractionSettings
@@ -384,7 +384,7 @@ class TractionService:
             torques += self._radius * moment * course.turning_shares
         if self._optimal:
             ahead = course.directions
-            motion = WheelMotion(
+            motion = WheelRates(
                 ahead * self.joints.wheel_rates, course.sign * ahead * rows.wheel_speeds,
                 self.joints.suspension_angles, self._mean_wanted() / self._radius, self._from_map,
                 course.ratios,

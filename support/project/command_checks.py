@@ -132,36 +132,21 @@ def _check_ros2(words: tuple[str, ...]) -> None:
         assert rest[0] == "rover_planner" and rest[1] in console_scripts(), rest
         check_command(rest[1:])
     elif verb == "launch":
-        _check_launch(rest)
-    elif verb == "param":
-        assert rest[0] in ("set", "get", "describe"), rest
-        if rest[0] == "set":
-            check_parameters(rest[1].lstrip("/"), {rest[2]: yaml.safe_load(rest[3])})
-    elif (verb, rest[0]) == ("node", "info"):
-        assert rest[1].lstrip("/") in PROGRAMS, rest
-    elif (verb, rest[0]) == ("topic", "echo"):
-        node, _, topic = rest[-1].strip("/").partition("/")
-        assert f"~/{topic}" in PROGRAMS[node].topics, f"{node} has no topic {topic}"
+        assert rest[0] == "rover_planner", words
+        text = (TOP / "launch" / rest[1]).read_text(encoding="utf-8")
+        for word in rest[2:]:
+            assert f'"{word.split(":=")[0]}"' in text, f"{rest[1]} has no argument {word}"
+    elif words[:2] == ("param", "set"):
+        check_parameters(rest[1].lstrip("/"), {rest[2]: yaml.safe_load(rest[3])})
     else:
-        assert (verb, rest[0]) == ("service", "call"), words
-        _check_call(*rest[1:4])
-
-
-def _check_launch(words: tuple[str, ...]) -> None:
-    """Look for a launch file and its arguments."""
-    assert words[0] == "rover_planner", words
-    text = (TOP / "launch" / words[1]).read_text(encoding="utf-8")
-    for word in words[2:]:
-        assert f'"{word.split(":=")[0]}"' in text, f"{words[1]} has no argument {word}"
-
-
-def _check_call(service: str, kind: str, request: str = "{}") -> None:
-    """Look for a service and its type, and put the request into a message of it."""
-    package, _, name = kind.split("/")
-    node, _, topic = service.strip("/").partition("/")
-    assert f"~/{topic}" in PROGRAMS[node].topics, f"{node} serves no {topic}"
-    message = getattr(importlib.import_module(f"{package}.srv"), name).Request()
-    _fill(message, yaml.safe_load(request))
+        (name,) = (word for word in rest if word.startswith("/"))
+        node, _, topic = name.strip("/").partition("/")
+        assert node in PROGRAMS, words
+        assert not topic or f"~/{topic}" in PROGRAMS[node].topics, f"{node} has no {topic}"
+    if words[:2] == ("service", "call"):
+        package, _, kind = rest[2].split("/")
+        message = getattr(importlib.import_module(f"{package}.srv"), kind).Request()
+        _fill(message, yaml.safe_load(rest[3] if len(rest) > 3 else "{}"))
 
 
 def _fill(message: Any, values: dict[str, Any]) -> None:

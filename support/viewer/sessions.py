@@ -76,7 +76,7 @@ def ask(page: Any, action: Callable[[], Any]) -> None:
         finally:
             done.set()
 
-    page.requests.add(act)
+    page.requests.put(act)
     assert done.wait(PATIENCE), "the page's thread does nothing"
     wait_until(lambda: not page._fulfils, "what the action makes the page say", PATIENCE)
 

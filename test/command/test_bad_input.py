@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from rover_planner.cli import main
-from rover_planner.shell.exit_codes import EXIT_INTERRUPTED
-from rover_planner.shell.run_program import MAX_LINE
+from rover_planner.shell.run_program import EXIT_INTERRUPTED, MAX_LINE
 from support.command_line import REPOSITORY, write_ground_and_path
 
 LONG = "n" * 300
@@ -46,13 +45,11 @@ REFUSED = [
     (predict("--friction", "high"), "friction"),
     (predict(terrain="none.npz"), "none.npz"),
     (predict(terrain="poses.npz"), "elevation"),
-    (predict(terrain="/dev/zero"), "it is a device"),
     (predict(poses=LONG), "cannot be read: File name too long"),
     (predict(out=LONG), "cannot be written: File name"),
     (predict(out="/dev/full"), "No space left on device"),
     (predict("--max-cells", "99"), "limit is"),
     (predict("--policy", "lucky"), "policy"),
-    (predict("--sigmas", "-1"), "sigmas is -1.0"),
     (predict("--tool-force", "0", "1"), "tool-force"),
     (predict("--arm", "arm_yaw=nan"), "NAME=RAD"),
     (predict("--arm", "arm_wrist=0.1"), "arm_elbow"),
@@ -63,10 +60,8 @@ REFUSED = [
     (["plan", "lsr1", "terrain.npz", "o.npz", "--start=1,2", "--goal=1,0,0"], "'1,2' is no pose"),
     (["urdf", "lsr1", "no/out.urdf"], "no/out.urdf: cannot be written"),
     (["rover", "out.yaml"], "--from-urdf"),
-    (["terrain", "t.npz", "--craters", "1e12"], "crater density is 1000000000000.0 1/m^2"),
     (["terrain", "t.npz", "--size", "1e308", "--resolution", "1e307"], "at most 1e+06 m"),
     (["terrain", "t.npz", "--seed", DIGITS * 20], "--seed"),
-    (["study", "."], "it is a directory; it must be a regular file"),
     (["study", "\x1b[2J\n\udcff"], "no study file \\x1b[2J\\n\\udcff"),
     (["figure4", "."], "must be a .png, .svg, .pdf file"),
     (["figure4", "no/such/folder/a.png"], "no/such/folder"),

@@ -3,14 +3,14 @@
 
 import time
 
+import pytest
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from rover_physics.errors import PoseError
-from rover_planner.ros.guard import Guard, GuardedExecutor, refuse_error
-from rover_planner.ros.handover import Handover
+from rover_planner.ros.guard import Guard, GuardedExecutor, Handover, refuse_error
 from rover_planner.ros.logs import REPEAT_PERIOD, RepeatLog, TransitionLog
 from support.ros_fixtures import call
 from support.waiting import wait_until
@@ -124,12 +124,25 @@ class Lines(list):
     warning = info = list.append
 
 
-def test_a_condition_that_stays_is_told_once_and_its_end_once():
+@pytest.mark.parametrize(
+    ("told", "expected"),
+    [
+        # one that stays is told once, and its end once
+        ([(0.01 * k, "nan" if k < 500 else "") for k in range(1000)], ["nan", "back"]),
+        # one that began again within a second is told with its new reason
+        ([(0.0, "waiting"), (0.3, ""), *((0.1 * k, "nan") for k in range(5, 15))],
+         ["waiting", "nan"]),
+        # one that ended before it could be told is told with its end
+        ([(0.0, "waiting"), (1.5, ""), (1.6, "nan"), (1.7, ""), (3.0, "")],
+         ["waiting", "back", "back; it was for less than 1 s: nan"]),
+    ],
+)  # fmt: skip
+def test_a_condition_is_told_when_it_begins_and_when_it_ends(told, expected):
     lines = Lines()
     log = TransitionLog(lines)
-    for k in range(1000):
-        log.update("imu", "imu is nan" if k < 500 else "", "imu is back", 0.01 * k)
-    assert lines == ["imu is nan", "imu is back"]
+    for at, reason in told:
+        log.update("imu", reason, "back", at)
+    assert lines == expected
 
 
 def test_one_that_flaps_is_told_once_a_second_at_most():
@@ -138,26 +151,6 @@ def test_one_that_flaps_is_told_once_a_second_at_most():
     for k in range(1000):
         log.update("imu", "imu is nan" if k % 2 else "", "imu is back", 0.01 * k)
     assert 2 <= len(lines) <= 10
-
-
-def test_one_that_ended_and_began_again_within_a_second_is_told_with_its_new_reason():
-    lines = Lines()
-    log = TransitionLog(lines)
-    log.update("imu", "waiting for imu", "imu is back", 0.0)
-    log.update("imu", "", "imu is back", 0.3)
-    for k in range(5, 15):
-        log.update("imu", "imu is nan", "imu is back", 0.1 * k)
-    assert lines == ["waiting for imu", "imu is nan"]
-
-
-def test_one_that_ended_before_it_could_be_told_is_told_with_its_end():
-    lines = Lines()
-    log = TransitionLog(lines)
-    for at, reason in ((0.0, "waiting"), (1.5, ""), (1.6, "imu is nan"), (1.7, ""), (3.0, "")):
-        log.update("imu", reason, "imu is back", at)
-    assert lines == [
-        "waiting", "imu is back", "imu is back; it was for less than 1 s: imu is nan"
-    ]  # fmt: skip
 
 
 def test_texts_that_differ_in_numbers_are_told_once_in_a_period_and_counted():

@@ -13,9 +13,9 @@ from rover_planner.planning.candidates import (
     generate_candidates,
     lateral_offsets,
     path_length,
+    turn_and_drive,
 )
 from rover_planner.planning.dubins import dubins_paths
-from rover_planner.planning.point_turn import turn_and_drive
 
 METRES = st.floats(-20.0, 20.0)
 ANGLES = st.floats(-2 * np.pi, 2 * np.pi)

@@ -16,7 +16,6 @@ from rover_physics import load_rover
 
 FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 SMALL = {
-    "faults": {"REPEATS": 1},
     "paths": {"REPEATS": 1, "MANY": 5_000},
     "poses": {"POSES": 20, "ARCS": (2, 2, 2), "MAP_CELLS": 60, "MAP_ROWS": (0, 40)},
     "rest": {"SETTLING": 0.5, "SECONDS": 1.0},

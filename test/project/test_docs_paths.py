@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What README and docs name exists: files, modules, links, options and rooms."""
 
+import pkgutil
 import re
 from pathlib import Path
 
@@ -59,49 +60,38 @@ def exists(word: str, page: Path) -> bool:
     )
 
 
-@pytest.mark.parametrize("page", PAGES, ids=str)
-def test_every_file_and_folder_that_a_page_names_exists(page):
+def is_in_code(dotted: str) -> bool:
+    """Tell whether a dotted name is a module, or stands in one."""
+    try:
+        pkgutil.resolve_name(dotted)
+    except (ImportError, AttributeError):
+        return False
+    return True
+
+
+def missing_files(page: Path) -> set[str]:
     named = {word for word in code_spans(page) if is_file_name(word) or is_folder_name(word)}
-    assert not {
-        word
-        for word in named
-        if word not in MADE and not word.startswith(WRITTEN) and not exists(word, page)
+    named -= {*MADE, *(word for word in named if word.startswith(WRITTEN))}
+    links = {link for link in re.findall(r"\]\(([^)#]+)\)", read(page)) if "://" not in link}
+    return {word for word in named if not exists(word, page)} | {
+        link for link in links if not (TOP / page).parent.joinpath(link).exists()
     }
 
 
-@pytest.mark.parametrize("page", PAGES, ids=str)
-def test_every_link_of_a_page_leads_to_a_file(page):
-    links = re.findall(r"\]\(([^)#]+)\)", read(page))
-    local = [link for link in links if "://" not in link]
-    assert not [link for link in local if not (TOP / page).parent.joinpath(link).exists()]
+def missing_names(page: Path) -> set[str]:
+    words = {
+        word.split("(")[0].rstrip(".") for word in re.findall(r"[\w.]+\(?", current_text(page))
+    }
+    dotted = {word for word in words if word.split(".")[0] in PACKAGES and "." in word}
+    return {word for word in dotted if not word.endswith((".py", ".md")) and not is_in_code(word)}
 
 
 @pytest.mark.parametrize("page", PAGES, ids=str)
-def test_every_dotted_name_that_a_page_names_exists(page):
-    words = {word.split("(")[0] for word in re.findall(r"[\w.]+\(?", current_text(page))}
-    dotted = {word.rstrip(".") for word in words if word.split(".")[0] in PACKAGES and "." in word}
-    dotted = {word for word in dotted if not word.endswith((".py", ".md"))}
-    assert not {name for name in dotted if not is_module_or_name(name)}
-
-
-def is_module_or_name(dotted: str) -> bool:
-    """Tell whether a dotted name is a module, or is defined or imported at the top of one."""
-    parts = dotted.split(".")
-    if TOP.joinpath(*parts).is_dir() or TOP.joinpath(*parts).with_suffix(".py").is_file():
-        return True
-    module = TOP.joinpath(*parts[:-1])
-    path = module / "__init__.py" if module.is_dir() else module.with_suffix(".py")
-    return (
-        path.is_file()
-        and re.search(rf"\b{re.escape(parts[-1])}\b", path.read_text(encoding="utf-8")) is not None
-    )
-
-
-@pytest.mark.parametrize("page", PAGES, ids=str)
-def test_every_make_target_that_a_page_names_is_in_the_makefile(page):
+def test_files_links_names_and_targets_of_a_page_exist(page):
+    assert not missing_files(page)
+    assert not missing_names(page)
     targets = re.findall(r"^(\w+):", (TOP / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
-    named = set(re.findall(r"(?:`|^)make (\w+)", read(page), re.MULTILINE))
-    assert named <= set(targets)
+    assert set(re.findall(r"(?:`|^)make (\w+)", read(page), re.MULTILINE)) <= set(targets)
 
 
 def options_of_the_commands() -> dict[str, set[str]]:

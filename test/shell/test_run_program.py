@@ -11,14 +11,16 @@ import pytest
 from rover_physics import RoverError
 from rover_planner.cli import main
 from rover_planner.errors import DemoError, PlanningError
-from rover_planner.shell.exit_codes import (
+from rover_planner.shell.run_program import (
     EXIT_BAD_INPUT,
     EXIT_FAILED,
     EXIT_INTERRUPTED,
     EXIT_OK,
     EXIT_PIPE_CLOSED,
+    MAX_LINE,
+    one_line,
+    run_program,
 )
-from rover_planner.shell.run_program import MAX_LINE, one_line, run_program
 from support.command_line import REPOSITORY
 
 

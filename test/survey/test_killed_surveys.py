@@ -12,7 +12,7 @@ import pytest
 
 pytest.importorskip("distributed", reason="install the extra survey")
 
-from rover_planner.shell.end_signals import END_SIGNALS
+from rover_planner.shell.run_program import END_SIGNALS
 from rover_planner.survey.dask_cluster import ClusterSettings
 from rover_planner.survey.runner import run_survey
 from rover_planner.survey.store import SurveyStore

@@ -18,8 +18,7 @@ from rover_physics import Terrain
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.survey.layers import pack_bits, unpack_bits
-from rover_planner.survey.moves import find_moves
-from rover_planner.survey.reachable import HeadingGrid, find_reachable, search_area
+from rover_planner.survey.reachable import HeadingGrid, find_moves, find_reachable, search_area
 from rover_planner.survey.reachable_area import open_area
 from rover_planner.survey.store import NOTES
 from support.survey_maps import make_request, make_rough_map, survey_here

@@ -21,7 +21,7 @@ from distributed import LocalCluster
 from rover_physics import save_terrain
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
-from rover_planner.shell.end_signals import end_as_by_ctrl_c
+from rover_planner.shell.run_program import end_as_by_ctrl_c
 from rover_planner.survey import dask_cluster
 from rover_planner.survey.chunk_survey import survey_chunk
 from rover_planner.survey.cog import write_layers

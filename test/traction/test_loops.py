@@ -10,7 +10,7 @@ from rover_planner.traction.loops import (
     PIController,
     PushLoop,
     StallDetector,
-    WheelMotion,
+    WheelRates,
     estimate_rolling_rates,
     limit_rate,
 )
@@ -18,7 +18,7 @@ from rover_planner.traction.loops import (
 
 def moves(rate, wanted=0.3, suspension=(0.0, 0.0, 0.0, 0.0)):
     """Return wheels that all turn at a rate."""
-    return WheelMotion(np.full(6, rate), np.ones(6), np.array(suspension), wanted)
+    return WheelRates(np.full(6, rate), np.ones(6), np.array(suspension), wanted)
 
 
 def test_a_push_that_cannot_be_given_does_not_add_up():

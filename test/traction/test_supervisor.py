@@ -6,8 +6,8 @@ import pytest
 
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_planner.parameters.traction_controller import TractionControllerParameters
+from rover_planner.traction.loops import StallWatch
 from rover_planner.traction.settings import load_traction_settings
-from rover_planner.traction.stall_watch import StallWatch
 from rover_planner.traction.supervisor import RECOVERY_TIME, STANDSTILL_DELAY, TractionSupervisor
 
 PERIOD = 0.02

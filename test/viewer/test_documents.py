@@ -2,7 +2,6 @@
 """What the page tells: limits along a path, the failure, the board, paths, and their words."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -227,6 +226,7 @@ def test_a_failure_between_waypoints_has_the_pose_at_which_the_model_was_asked()
     first = path.verdict.first_failure
     before, after = prediction.distance[first - 1 : first + 1]
     assert before < failure.distance < after
+    assert failure.state.energy == prediction.energy[first - 1] > 0.0
     places = prediction.between.position[prediction.between.waypoint == first]
     assert np.isclose(places, failure.state.position).all(axis=1).any()
 
@@ -286,7 +286,7 @@ def test_the_board_has_all_loads_and_unknown_values_are_none_or_a_question_mark(
         f"{load:.1f} N" for load in state.wheel_loads
     ]
     assert [len(cells) for _, cells in board["table"]] == [6] * 6
-    unknown = replace(state, wheel_loads=np.full(6, np.nan), friction_use=np.full(6, np.nan))
+    unknown = state.change(wheel_loads=np.full(6, np.nan), friction_utilisation=np.full(6, np.nan))
     board = describe_board(unknown)
     assert {one["load"] for one in board["wheels"]} == {"?"}
     assert {one["bars"][0][1] for one in board["wheels"]} == {None}

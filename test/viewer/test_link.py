@@ -9,21 +9,14 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from rover_physics.rover.rover_file import load_rover
+from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 from rover_planner.errors import PlanningError
-from rover_planner.studies.rover_values import read_rover, write_rover
-from rover_planner.viewer.state.link import (
-    KEY,
-    PageLink,
-    change_values,
-    list_changed_values,
-    read_link,
-    write_link,
-)
-from support.viewer.sessions import FAR
+from rover_planner.viewer.state.link import KEY, PageLink, read_link, write_link
+from support.viewer.sessions import FAR, LSR1
 
 LINK = PageLink(
-    rover="lsr1",
+    loaded=rover_to_dict(LSR1),
+    rover=rover_to_dict(replace(LSR1, name="bob", friction=1.0 / 3.0)),
     ground="00ab12cd",
     start=(FAR[0] - 1.25, FAR[1], -0.1),
     goal=(1e-7, 3.0, 1e20),
@@ -31,12 +24,10 @@ LINK = PageLink(
     soil="dry_sand",
     path=3,
     time=12.5,
-    layer="friction utilisation",
+    layer="use of friction",
     heading=-90.0,
-    values={"body centre x [m]": -0.05, "friction [-]": 0.5},
     joints={"arm_yaw": -1.0},
     along=True,
-    rover_file="name: bob\nfriction: 0.5  # \u03bc\n",
 )
 
 
@@ -84,20 +75,10 @@ def test_a_damaged_or_huge_link_is_refused(query, names):
         read_link(query)
 
 
-def test_changed_numbers_of_a_rover_come_back_by_their_labels():
-    loaded = load_rover("lsr1")
-    values = {"friction [-]": 0.5, "wheels z [m]": -0.21, "body centre x [m]": -0.05}
-    assert list_changed_values(loaded, change_values(loaded, values)) == values
-    assert list_changed_values(loaded, loaded) == {}
-    with pytest.raises(PlanningError, match="'wings', which lsr1 does not have"):
-        change_values(loaded, {"wings": 2.0})
-
-
-def test_a_rover_of_a_file_comes_back_from_a_link_exactly_and_a_huge_one_is_refused():
-    rover = replace(load_rover("lsr1"), name="bob", friction=1.0 / 3.0)
-    query = write_link(replace(LINK, rover_file=write_rover(rover)))
+def test_a_changed_rover_comes_back_from_a_link_exactly_and_a_huge_one_is_refused():
+    query = write_link(LINK)
     assert len(query) < 1500
-    assert read_rover(read_link(query).rover_file, "link") == rover
+    assert rover_from_dict(read_link(query).rover, "link").friction == 1.0 / 3.0
     letters = "".join(chr(33 + k % 90) for k in np.random.default_rng(1).integers(0, 90, 20_000))
-    with pytest.raises(PlanningError, match="of lsr1; an address holds 8000. Save the rover file"):
-        write_link(replace(LINK, rover_file=letters))
+    with pytest.raises(PlanningError, match="of bob; an address holds 8000. Save the rover file"):
+        write_link(replace(LINK, loaded={**LINK.loaded, "name": letters}))

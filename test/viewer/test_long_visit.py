@@ -1,16 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A visit of ten minutes to the program itself, on three grounds, as a demanding person clicks."""
 
-import subprocess
-import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
 
 import pytest
 
+from benchmarks.bench_page import MOST_MEMORY, open_view
 from benchmarks.grounds import made_reef
+from benchmarks.processes import memory_of
 from rover_physics.terrain.grid import save_terrain
 from support.viewer.browser import Visitor, needs_browser, open_browser, wait_until
 
@@ -18,31 +15,9 @@ pytestmark = [needs_browser, pytest.mark.long]
 
 MINUTES = 10.0
 """Time of all visits."""
-MOST_MEMORY = 600.0
-"""Largest resident memory of the program [MB]."""
 STEADY = 1.06
 """Largest memory at the end over that after a third of a visit."""
 FRICTION, RADIUS, HEIGHT = "friction [-]", "radius [m]", "wheels z [m]"
-
-
-@contextmanager
-def program(*arguments: str, port: int = 0) -> Iterator[tuple[subprocess.Popen, str]]:
-    """Run `rover_planner view` and yield its process and address."""
-    command = [sys.executable, "-m", "rover_planner", "view", *arguments, "--port", str(port)]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
-    try:
-        assert process.stdout is not None
-        line = next(line for line in process.stdout if line.startswith("open "))
-        yield process, line.split()[1]
-    finally:
-        process.kill()
-        process.wait()
-
-
-def read_memory(process: subprocess.Popen) -> float:
-    """Return the resident memory of a process [MB]."""
-    lines = Path(f"/proc/{process.pid}/status").read_text(encoding="utf-8").splitlines()
-    return next(float(line.split()[1]) for line in lines if line.startswith("VmRSS")) / 1024.0
 
 
 def wait_for_rest(visitor: Visitor) -> None:
@@ -117,7 +92,7 @@ def click_through(visitor: Visitor) -> None:
     if tab.get_by_role("button", name="Pause").count():  # a path that fails at once is over
         visitor.press("Pause")
     visitor.open_tab("Ground")
-    for layer in ("friction utilisation", "slope", "height"):
+    for layer in ("use of all limits", "slope", "height"):
         visitor.choose("Colour by", layer)
         wait_until(lambda layer=layer: layer in visitor.text("#legend"), layer)
     assert visitor.text("#errors") == "" and visitor.page_errors == []
@@ -135,18 +110,17 @@ def test_a_long_visit_keeps_path_comparison_and_memory(ground, browser, tmp_path
     if ground == "reef":
         save_terrain(tmp_path / "reef.npz", made_reef())
         arguments = ["lsr1", str(tmp_path / "reef.npz")]
-    with program(*arguments) as (process, url):
+    with open_view(*arguments) as (process, url):
         visitor, begin, memory = Visitor(browser, url), time.monotonic(), []
         while time.monotonic() - begin < 20.0 * MINUTES:
             click_through(visitor)
-            memory.append(read_memory(process))
+            memory.append(memory_of(process))
         change(visitor, friction="0.7")
         wait_for_rest(visitor)
     assert max(memory) < MOST_MEMORY, memory
     assert memory[-1] < STEADY * memory[len(memory) // 3], memory
     visitor.wait_for("No connection to the program")
-    with program(*arguments, port=int(url.rsplit(":", 1)[1])):
+    with open_view(*arguments, port=int(url.rsplit(":", 1)[1])):
         visitor.wait_for("The program was started again; what you had changed is taken up.")
-        wait_until(lambda: "(changed)" in visitor.text("#subject"), "the changed rover")
-        assert "0.7" in visitor.text("#subject")
+        wait_until(lambda: "friction 0.7" in visitor.text("#subject"), "the changed rover")
     visitor.tab.close()

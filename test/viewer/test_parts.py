@@ -10,7 +10,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics.traversability.judge import judge_path
+from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS
+from rover_physics.results.uses import find_uses, limits_of
+from rover_physics.traversability.judge import judge_path, judge_poses
 from rover_planner.planning.path_query import check_path
 from rover_planner.viewer.state.colours import (
     PASSABLE,
@@ -19,10 +21,10 @@ from rover_planner.viewer.state.colours import (
     colour_use,
     map_colours,
 )
-from rover_planner.viewer.state.layers import FRICTION, list_layers
+from rover_planner.viewer.state.inbox import Inbox
+from rover_planner.viewer.state.layers import FRICTION, PREDICTED, list_layers, predict_use
 from rover_planner.viewer.state.playback import FAST, Playback
-from rover_planner.viewer.state.trajectory import Trajectory, find_axles
-from rover_planner.viewer.state.visitor_requests import VisitorRequests
+from rover_planner.viewer.state.trajectory import Trajectory
 from support.grounds import gap, make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, straight
 
@@ -61,9 +63,9 @@ def test_states_are_those_of_the_prediction_and_between_waypoints_their_mean():
 
 
 def test_a_trajectory_ends_where_the_path_is_refused():
-    trajectory = trajectory_on(wall_at(0.5))
-    assert not trajectory.verdict.traversable
-    assert trajectory.length <= trajectory.verdict.first_failure + 1
+    prediction, verdict = judge_path(LSR1, make_terrain(wall_at(0.5)), straight())
+    trajectory = Trajectory(LSR1, prediction, verdict)
+    assert verdict.first_failure >= 0 and trajectory.length <= verdict.first_failure + 1
     assert trajectory.length < len(trajectory.prediction.poses)
 
 
@@ -131,19 +133,13 @@ def test_steps_go_from_waypoint_to_waypoint():
     assert seen == [2.0, 3.0, 3.0, 2.0, 1.0, 0.0, 0.0]
 
 
-# Requests of visitors.
-
-
-def test_a_later_request_of_a_kind_replaces_the_earlier_one():
-    requests, done = VisitorRequests(), []
-    for number in range(5):
-        requests.add(lambda number=number: done.append(number), "slider")
-    requests.add(lambda: done.append("step"))
-    requests.add(lambda: done.append("step"))
-    for action in requests.take_all():
-        action()
-    assert done == [4, "step", "step"]
-    assert requests.take_all() == []
+def test_a_later_value_of_a_name_replaces_the_earlier_one():
+    inbox = Inbox({"slider": "first"})
+    for value in ("second", "third"):
+        inbox.put("step")
+        inbox.put(value, "slider")
+    assert inbox.wait() and list(inbox.take().values()) == ["step", "step", "third"]
+    assert not inbox.wait(0.0) and inbox.take() == {}
 
 
 # Colours.
@@ -203,6 +199,24 @@ def test_the_friction_of_a_map_is_a_layer_where_it_is_known_and_else_none():
     assert np.ptp(unknown, axis=1).max() == 0.0  # grey
 
 
+def test_the_ground_has_a_layer_for_the_use_of_each_limit_of_a_pose_and_one_for_all():
+    assert {"use of all limits", "use of tilt", "use of friction"} <= set(PREDICTED)
+    assert "use of drop" not in PREDICTED  # it is of a path
+    ground = make_terrain(lambda x, y: gap(x, y) + 0.3 * x)
+    at = np.array([-1.0, 0.75]), np.array([0.0])
+    tilt, every = (
+        predict_use(code, LSR1, ground, 0.0, at, DEFAULT_OPTIONS)[0] for code in ("tilt", "")
+    )
+    pose = [[-1.0, 0.0, 0.0]]
+    uses = find_uses(limits_of(LSR1, "equal"), judge_poses(LSR1, ground, pose)[0].results)
+    row = [limit.code for limit in uses.limits.rows].index("tilt")
+    assert tilt[0] == pytest.approx(uses.use[0, row], rel=1e-6) and tilt[0] > 0.5
+    assert every[0] == pytest.approx(np.nanmax(uses.use), rel=1e-6)
+    assert np.isnan([tilt[1], every[1]]).all()  # unknown ground
+    hatched = build_ground_mesh(LSR1, make_terrain(lambda x, y: x), "use of tilt").mesh.picture
+    assert np.median(hatched[..., 0]) > np.median(hatched[..., 2])  # beyond it is vermillion
+
+
 def test_another_reader_finds_the_same_surface_and_picture_in_the_file_of_a_ground():
     mesh = build_ground_mesh(LSR1, make_terrain(gap), "slope").mesh
     origin = np.array([0.5, -0.25, 0.0])
@@ -242,7 +256,7 @@ def drive(poses, ground=lambda x, y: 0.0 * x):
 def test_the_axles_are_those_of_the_model_on_rough_ground():
     rover, state = drive(arc(1.0), waves)
     outwards = state.wheel_centres - state.contact_points
-    away = np.abs((outwards * find_axles(rover, state)).sum(axis=1))
+    away = np.abs((outwards * state.axles).sum(axis=1))
     assert (away <= 0.5 * rover.wheel.width + 1e-6).all()
     radial = np.sqrt((outwards**2).sum(axis=1) - away**2)
     assert radial == pytest.approx(np.full(6, rover.wheel.radius), abs=2e-3)

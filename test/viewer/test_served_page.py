@@ -12,6 +12,7 @@ import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
+from rover_physics.names import WHEELS
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import write_rover
 from rover_planner.viewer.state.link import read_link, write_link
@@ -118,10 +119,10 @@ def test_no_press_of_a_key_is_lost_and_of_a_slider_only_the_last_value_counts(pa
         page.hear({"ask": "step", "by": 1}, None)
     wait_until(lambda: abs(page.playback.time - times[3]) < 1e-6, "three steps")
     busy, go_on = threading.Event(), threading.Event()
-    page.requests.add(lambda: (busy.set(), go_on.wait(PATIENCE)))
+    page.requests.put(lambda: (busy.set(), go_on.wait(PATIENCE)))
     assert busy.wait(PATIENCE)
     page._answers["seek"], seek = (
-        lambda words, _box: asked.append(words["time"]),
+        lambda words: asked.append(words["time"]),
         page._answers["seek"],
     )
     for time_asked in (1.0, 2.0, 3.0):
@@ -144,6 +145,15 @@ def test_a_changed_number_is_told_with_what_it_changes_and_can_be_undone_and_res
         page.hear({"ask": word}, None)
         wait_until(lambda f=friction: told(page, "values")[FRICTION] == [f, 0.8], word)
         wait_for_rest(page)
+
+
+def test_a_number_or_an_angle_beyond_the_ends_of_its_slider_is_that_at_its_end(page):
+    sliders = {one[0]: one for part in told(page, "sliders")["parts"] for one in part["sliders"]}
+    for label in (FRICTION, "arm_yaw [rad]"):
+        page.hear({"ask": "value", "label": label, "value": 9999.0}, None)
+        most = sliders[label][2]
+        wait_until(lambda at=label, most=most: told(page, "values")[at][0] == most, label)
+    wait_for_rest(page)
 
 
 def test_a_rover_file_and_a_preset_are_loaded_and_the_arm_follows(page):
@@ -216,9 +226,26 @@ def test_the_ghost_of_a_failure_stays_for_the_next_one_and_hides_without(page):
             mark._ghost._root.position, page.scene.frame.to_scene(failure.state.position)
         )
     assert ghosts[0] is ghosts[1] and mark._root.visible
-    assert [node.name for node in mark._nodes] == ["/failure/outline", "/failure/leader"]
+    assert mark._ghost._meshes[failure.link].color == REFUSED
+    assert mark.make_room(failure.state) == failure.link and not mark._ghost.visible
+    assert mark.make_room(None) == "" and mark._ghost.visible
     mark.show(LSR1, None)
-    assert not mark._root.visible and not mark._nodes
+    assert not mark._root.visible and mark.make_room(failure.state) == ""
+
+
+def test_the_link_that_fails_has_the_colour_of_that_and_its_own_again_where_none_does(page):
+    state = page.session.shown.path.trajectory.state_at(0.0)
+    visual = RoverVisual(page.server.scene, LSR1, page.scene.frame, "/test/rover", 0.5)
+    before = {link: mesh.color for link, mesh in visual._meshes.items()}
+    for link in ("bogie_left", "body", "front_left"):
+        visual.show(state, link)
+        changed = {name for name, mesh in visual._meshes.items() if mesh.color == REFUSED}
+        assert changed == {link} and visual._meshes[link].opacity == 1.0
+    visual.show(state)
+    for link, colour in before.items():
+        assert link in WHEELS or visual._meshes[link].color == colour
+        assert visual._meshes[link].opacity == 0.5
+    visual.remove()
 
 
 def test_a_path_is_drawn_in_the_colour_of_its_verdict_up_to_where_it_is_refused(page):
@@ -270,26 +297,6 @@ def test_a_trail_has_a_colour_from_blue_to_yellow_at_each_place(page):
     overlay.show_trail(LSR1, ground, None)
 
 
-def test_a_rover_of_another_shape_is_drawn_as_a_new_one(page):
-    scene = page.server.scene
-    wide = replace(LSR1, wheel=replace(LSR1.wheel, radius=1.3 * LSR1.wheel.radius))
-    pivots = {name: (x, 1.2 * y, z) for name, (x, y, z) in LSR1.suspension.wheels.items()}
-    wide = replace(wide, suspension=replace(LSR1.suspension, wheels=pivots))
-    shaped, new = (
-        RoverVisual(scene, rover, page.scene.frame, name)
-        for rover, name in ((LSR1, "/test/a"), (wide, "/test/b"))
-    )
-    shaped.shape(wide)
-    assert shaped._meshes.keys() == new._meshes.keys()
-    for name, mesh in new._meshes.items():
-        np.testing.assert_array_equal(shaped._meshes[name].vertices, mesh.vertices)
-        np.testing.assert_array_equal(shaped._meshes[name].faces, mesh.faces)
-    for name, joint in new._joints.items():
-        np.testing.assert_array_equal(shaped._joints[name].position, joint.position)
-    shaped.remove()
-    new.remove()
-
-
 # Errors.
 
 
@@ -313,7 +320,7 @@ def test_a_failed_request_is_told_until_a_request_succeeds(page):
     wait_until(lambda: told(page, "errors") == [], "the notice to go")
 
 
-def test_a_failed_picture_is_not_drawn_again_before_the_next_request(page, monkeypatch):
+def test_a_failed_picture_is_not_drawn_again_at_once(page, monkeypatch):
     tried = []
     ask(page, lambda: None)  # nothing else is asked any more
 
@@ -346,7 +353,7 @@ def test_a_refused_value_is_told_and_put_back(page):
 def test_a_closed_page_leaves_no_thread_behind():
     before = set(threading.enumerate())
     page = Page(session_on(ramp), port=0)
-    page.requests.add(page.session.judge_again)
+    page.requests.put(page.session.judge_again)
     page.close()
     left = {thread.name for thread in set(threading.enumerate()) - before}
     assert not left & {"page", "judge", "ground"}
@@ -440,7 +447,7 @@ def test_a_program_that_was_started_again_takes_up_the_link_that_the_last_one_to
     change_friction(page, 0.7)
     wait_until(lambda: page.session.wanted.rover.friction == 0.7, "the value")
     wait_for_rest(page)
-    wait_until(lambda: read_link(told(page, "current")).values == {FRICTION: 0.7}, "the link")
+    wait_until(lambda: read_link(told(page, "current")).rover["friction"] == 0.7, "the link")
     again = Page(session_on(ramp), port=0)
     try:
         assert told(again, "program") != told(page, "program")

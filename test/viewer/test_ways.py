@@ -57,7 +57,7 @@ def test_where_there_is_no_way_the_reason_is_told():
     assert shown.around.outcome == NO_WAY and len(shown.paths) == 5
     details = describe_verdict(shown, Work())["details"]
     assert details[0] == shown.verdict.reason
-    assert details[1].startswith("no way: no way within the map: ") and "closed in" in details[1]
+    assert details[1].startswith("no way: no path within the map: ") and "closed in" in details[1]
 
 
 def test_nothing_is_searched_where_a_candidate_passes_off_the_map_or_for_a_recorded_path():

@@ -78,7 +78,7 @@ class Stretch(NamedTuple):
     hindrance: str
     """Reason why it does not go on; empty at the end of the plan."""
     is_marked: bool
-    """Whether it is that a place ahead was marked as impassable: the rover may be stuck."""
+    """True if a place ahead was marked as impassable: the rover may be stuck."""
     behind: Poses
     """(n, 3) waypoints of the plan up to there."""
 
@@ -145,7 +145,7 @@ class _Drive:
             stops = self._stops.count(pose)
         if stops > MAX_STOPS:
             raise DriveFailedError(
-                f"{MAX_STOPS} other ways led nowhere from {_describe(pose)}: {stretch.hindrance}"
+                f"{MAX_STOPS} other paths led nowhere from {_describe(pose)}: {stretch.hindrance}"
             )
         answer = None if stops >= 2 or stretch.is_marked else self._ask(pose)
         if answer is None or not answer["traversable"]:
@@ -154,7 +154,7 @@ class _Drive:
                 pose = self._stand(pose)
                 answer = self._ask(pose)
         if not answer["traversable"]:
-            raise DriveFailedError(f"no way on from {_describe(pose)}: {answer['reason']}")
+            raise DriveFailedError(f"no path on from {_describe(pose)}: {answer['reason']}")
         self._report(f"another plan from {_describe(pose)}")
         return np.array(answer["poses"])
 

@@ -15,6 +15,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from msg_adapters.results.grids import classes_to_grid
+from rover_physics.errors import RoverError
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.pose_classes import UNKNOWN, RoverOnMap
@@ -23,8 +24,7 @@ from rover_planner.planning.answering.budget import STOPPING, QuestionStoppedErr
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.hazard_map import HazardMap, HazardView
-from rover_planner.ros.guard import INPUT_ERRORS, Guard
-from rover_planner.ros.handover import Handover
+from rover_planner.ros.guard import Guard, Handover
 from rover_planner.ros.lazy_publisher import LazyPublisher
 from rover_planner.ros.logs import TransitionLog
 
@@ -145,7 +145,7 @@ class HazardTopics:
                     self._update(hazards)
             except QuestionStoppedError:
                 return
-            except INPUT_ERRORS as error:  # such as a soil of the map that is not known
+            except RoverError as error:  # such as a soil of the map that is not known
                 self._log.update("hazards", f"no hazard map: {error}", "", time.monotonic())
             except Exception as error:
                 self._guard.report("hazard map", error)

@@ -15,13 +15,14 @@ from msg_adapters.commands import twist_to_speeds
 from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.joints import convert_steering, read_joint_map
 from msg_adapters.odometry import odometry_to_pose
+from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.steering_joints import STEERING_SIGNS, steering_joints
 from rover_planner.parameters.shared import STOP
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.ros.frames import NodeFrames
-from rover_planner.ros.guard import INPUT_ERRORS, Guard
+from rover_planner.ros.guard import Guard
 from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.map_intake import CLOUD, MapIntake
 from rover_planner.ros.polled_topics import PolledTopics
@@ -123,7 +124,7 @@ class TractionInputs:
                 take(message, now)
             except StampError as error:
                 self._service.monitor.ignore(name, str(error))
-            except INPUT_ERRORS as error:
+            except RoverError as error:
                 self._refuse(name, str(error), now)
             except Exception as error:
                 self._refuse(name, f"internal error: {self._errors.report(name, error)}", now)

@@ -4,14 +4,12 @@
 import time
 from collections.abc import Callable
 
-from rover_planner.errors import PlanningError
-
 BUSY, TOO_LONG, CANCELLED, STOPPING = "busy", "too_long", "cancelled", "stopping"
 """Codes of questions that were not answered in time, or stopped."""
 
 
-class QuestionStoppedError(PlanningError):
-    """A question was stopped before its answer was found."""
+class QuestionStoppedError(Exception):
+    """A question was stopped before its answer was found; no fault of its input."""
 
     def __init__(self, code: str, reason: str):
         """Keep the code, such as TOO_LONG, and the reason in words."""

@@ -5,7 +5,6 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from rover_planner.errors import PlanningError
 from rover_planner.maps.known_map import KnownMap
 from rover_planner.planning.search.lattice_search import SearchProgress
 
@@ -13,7 +12,7 @@ PERIOD = 0.2
 """Least time between two reports [s]."""
 
 
-class NewerMapError(PlanningError):
+class NewerMapError(Exception):
     """The map has changed while a path was searched on it."""
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where sensors are: their mounts on the robot, and the robot at the time of a measurement."""
+"""Poses of sensors: their mounts on the robot, and the robot at the time of a measurement."""
 
 import math
 from collections.abc import Mapping, Sequence

@@ -25,7 +25,7 @@ MOST_AHEAD = 10.0
 
 @dataclass(frozen=True)
 class Place:
-    """Where on a path the rover is."""
+    """Place of the rover on a path."""
 
     index: int
     """Index of the nearest waypoint."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Why there is no path: the closed area around the start or the goal, and what closes it in."""
+"""The closed area around start or goal because of which there is no path, and what closes it."""
 
 from collections import Counter
 from dataclasses import dataclass

@@ -88,9 +88,9 @@ def read_query(path: Path, max_cells: int = MAX_CELLS) -> tuple[SearchQuery, Lat
         with errors_of(path), open_npz(path) as file:
             content = json.loads(str(file.read(_ENTRY, most=_MOST)))
     except (RoverFileError, json.JSONDecodeError) as error:
-        raise PlanningError(f"{path} holds no question for a way: {error}") from None
+        raise PlanningError(f"{path} holds no question for a path: {error}") from None
     with errors_of(path):
-        asked: _Content = read_as(_Content, content, "a question for a way")
+        asked: _Content = read_as(_Content, content, "a question for a path")
     question = SearchQuery(
         rover=rover_from_dict(asked.rover, str(path)),
         terrain=terrain,

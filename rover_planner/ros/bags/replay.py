@@ -7,17 +7,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash
 from msg_adapters.imu import ImuMounting, imu_to_attitude
-from msg_adapters.joints import JointNames, read_joint_map
+from msg_adapters.joints import read_joint_map
 from msg_adapters.odometry import odometry_to_pose, odometry_to_tilt
 from msg_adapters.paths import path_to_poses
 from msg_adapters.sensing import BASE_FRAME
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.terrain.grid import Terrain, load_terrain
-from rover_planner.errors import PlanningError
 from rover_planner.maps.known_map import stamp_text
 from rover_planner.maps.living_map import MapSnapshot
 from rover_planner.maps.map_keeper import MapKeeper
@@ -26,8 +24,8 @@ from rover_planner.planning.answering.judgement import PathJudgement, refusal
 from rover_planner.planning.answering.measurements import Measurements
 from rover_planner.planning.answering.questions import Register
 from rover_planner.planning.answering.service_settings import (
-    keeper_settings,
     load_service_settings,
+    map_rules,
 )
 from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
@@ -45,7 +43,7 @@ from rover_planner.ros.bags.bag_reader import (
 )
 from rover_planner.ros.bags.recorded_drive import Measured, RecordedDrive
 from rover_planner.ros.frames import Frames
-from rover_planner.ros.map_messages import LOOK_PERIOD, MapSettings, read_map
+from rover_planner.ros.map_messages import LOOK_PERIOD, read_map
 
 DRIVEN, CHECKED, PLANNED = "driven", "check_path", "can_traverse"
 """Kinds of questions: the drive that was recorded, a path that was recorded, a goal."""
@@ -101,8 +99,7 @@ class Replay:
     def __post_init__(self) -> None:
         self._service = TraverseService(load_service_settings(self.parameters))
         values = self.parameters
-        self._keeper = MapKeeper(self._service.settings.rover, keeper_settings(values))
-        self._map_settings = MapSettings.of(values)
+        self._keeper = MapKeeper(self._service.settings.rover, map_rules(values))
         if values.terrain_file:
             terrain = load_terrain(values.terrain_file, values.max_map_cells)
             self._keep(self._keeper.load(terrain, 0.0, None), values.terrain_file, None)
@@ -114,7 +111,7 @@ class Replay:
         self._time = 0
         self.frames = Frames(values, lambda: self._time, sensor_poses(values))
         """Places of frames and sensors on the map."""
-        self.joint_names = _read_joint_map(values, self._service.all_joint_names)
+        self.joint_names = read_joint_map(values.joint_map, self._service.all_joint_names)
         """Names of the joints in messages."""
         self._imu = ImuMounting(values.imu_frame or BASE_FRAME, values.imu_mounting)
         self._take: dict[str, Callable[[Recorded], Iterator[ReplayAnswer]]] = {
@@ -132,7 +129,7 @@ class Replay:
         self._time = recorded.stamp
         try:
             yield from self._take[recorded.kind](recorded)
-        except (MessageError, PlanningError, RoverError) as error:
+        except RoverError as error:
             self.refused[recorded.kind] = self.refused.get(recorded.kind, 0) + 1
             if len(self.notes) < MAX_NOTES:
                 self.notes.append(f"{recorded.topic} at {stamp_text(recorded.stamp)}: {error}")
@@ -146,7 +143,7 @@ class Replay:
         header = recorded.message.header
         stamp = stamp_to_ns(header.stamp)
         source = self.frames.find_source(header.frame_id, stamp, recorded.topic)
-        terrain = read_map(recorded.message, self._map_settings, source, self._keeper)
+        terrain = read_map(recorded.message, self.parameters, source, self._keeper)
         since = (recorded.stamp if stamp is None else stamp) / NANOSECONDS
         standing = self._measured.standing(recorded.stamp / NANOSECONDS)
         kept = self._keeper.take(terrain, recorded.topic, since, standing)
@@ -244,16 +241,8 @@ class Replay:
         number = self._register.next_number()
         try:
             judgement = ask(now).complete()
-        except (PlanningError, RoverError) as error:
+        except RoverError as error:
             judgement = refusal("bad_request", str(error))
         identity = self._register.identify(number, kind, "", now)
         identity = replace(identity, path_hash=now.path.hash, path_stamp=now.path.stamp)
         return ReplayAnswer(kind, stamp, judgement, identity, now.terrain)
-
-
-def _read_joint_map(values: TraverseServerParameters, known: tuple[str, ...]) -> JointNames:
-    """Return the joint map of the parameters; a wrong one is bad input, not a bad message."""
-    try:
-        return read_joint_map(values.joint_map, known)
-    except MessageError as error:
-        raise PlanningError(str(error)) from None

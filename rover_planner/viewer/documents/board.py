@@ -8,7 +8,7 @@ from rover_physics.names import WHEELS
 from rover_planner.viewer.documents.numbers import plain, write
 from rover_planner.viewer.state.colours import colour_use, to_css
 from rover_planner.viewer.state.limits import write_use
-from rover_planner.viewer.state.trajectory import RoverState
+from rover_planner.viewer.state.rover_state import RoverState
 
 WHEEL_ROWS = {
     "normal force N [N]": ("wheel_loads", 1.0, 1),
@@ -49,14 +49,12 @@ def describe_board(
                 "fails": failing == name,
             }
         )
-    roll, pitch, _ = state.attitude
-    tilt = math.acos(min(max(math.cos(roll) * math.cos(pitch), -1.0), 1.0))
     numbers = {
         "time": write(state.time, 1, "s"),
         "distance": write(100.0 * state.distance, 1, "cm"),
         "speed": write(100.0 * state.speed, 1, "cm/s"),
         "energy": write(state.energy, 2, "J"),
-        "tilt": write(math.degrees(tilt), 1, "deg"),
+        "tilt": write(math.degrees(state.tilt), 1, "deg"),
         "belly": write(100.0 * state.belly_clearance, 1, "cm"),
         "margin": write(state.tip_over_ratio, 2),
         "x, y": f"{state.position[0]:.2f}, {state.position[1]:.2f} m",

@@ -7,26 +7,22 @@ from typing import Any
 import numpy as np
 
 from rover_planner.viewer.state.colours import UNKNOWN, ColourScale, map_colours, to_css
+from rover_planner.viewer.state.layers import Colouring
 from rover_planner.viewer.state.survey_layers import ColouredGround
 
 STOPS = 9
 """Colours from which the gradient is made."""
 
 
-def describe_scale(name: str, scale: ColourScale) -> dict[str, Any]:
+def describe_scale(how: Colouring, scale: ColourScale) -> dict[str, Any]:
     """Return the legend of a layer: title, gradient with its ends, keys (colour, words)."""
-    keys = [[to_css(colour), word] for word, colour in scale.classes]
-    bound = "" if scale.limit is None else f"{scale.limit:.2f} {scale.unit}".strip()
-    if bound or scale.classes:
-        words = "breaks a limit" if scale.classes else f"beyond the limit of {bound}"
-        keys.append(["hatched", words])
+    keys = [["hatched", "beyond the limit"]] if how.is_predicted else []
     keys.append([to_css(UNKNOWN), "unknown, or the rover cannot stand"])
-    gradient: Sequence[str] = []
-    if not scale.classes:
-        colours = map_colours(np.linspace(0.0, 1.0, STOPS), 0.0, 1.0)
-        gradient = [to_css((int(r), int(g), int(b))) for r, g, b in colours]
-    ends = [f"{value:.2f} {scale.unit}".strip() for value in (scale.low, scale.high)]
-    return {"title": name, "gradient": gradient, "ends": ends, "keys": keys, "notes": []}
+    colours = map_colours(np.linspace(0.0, 1.0, STOPS), 0.0, 1.0)
+    gradient = [to_css((int(r), int(g), int(b))) for r, g, b in colours]
+    ends = [f"{value:.{scale.digits}f} {scale.unit}".strip() for value in (scale.low, scale.high)]
+    title = how.describe()
+    return {"title": title, "gradient": gradient, "ends": ends, "keys": keys, "notes": []}
 
 
 def describe_survey(

@@ -32,8 +32,6 @@ def _describe_row(path: Judged, number: int, waits: str, best: bool) -> dict[str
     limits = path.limits
     uses = [float(np.nanmax(one.used, initial=0.0)) for one in limits.lanes]
     most = limits.lanes[int(np.argmax(uses))].limit.title
-    energy = path.candidate.prediction.energy[: verdict.first_failure + 1 or None]
-    known = energy[~np.isnan(energy)]
     word = "passes" if verdict.traversable else "refused"
     return {
         "number": number,
@@ -41,7 +39,7 @@ def _describe_row(path: Judged, number: int, waits: str, best: bool) -> dict[str
         "word": f"{word}, best" if best else word,
         "waits": waits,
         "length": length if verdict.traversable else f"{limits.end:.2f} of {length}",
-        "energy": write(float(known[-1]) if known.size else 0.0, 1),
+        "energy": write(path.trajectory.energy, 1),
         "use": write_use(max(uses)),
         "limit": most,
         "reason": verdict.reason,

@@ -25,6 +25,15 @@ def list_numbers(rover: Rover) -> list[RoverValue]:
     return [value for values in list_values(rover).values() for value in values]
 
 
+def list_joints(rover: Rover) -> dict[str, tuple[float, float]]:
+    """Return the smallest and largest angle [rad] of each joint of a rover's arm by name."""
+    arm = rover.manipulator
+    if arm is None:
+        return {}
+    ends = arm.joint_limits or ((-FULL_TURN, FULL_TURN),) * 3
+    return dict(zip(arm.joints, ends, strict=True))
+
+
 def describe_sliders(loaded: Rover) -> dict[str, Any]:
     """Return the sliders of a rover that was loaded: label, ends and step, by part."""
     parts = [
@@ -34,12 +43,8 @@ def describe_sliders(loaded: Rover) -> dict[str, Any]:
         }
         for title, values in list_values(loaded).items()
     ]
-    if (arm := loaded.manipulator) is not None:
-        ends = arm.joint_limits or ((-FULL_TURN, FULL_TURN),) * 3
-        joints = [
-            [f"{joint} [rad]", low, high, 0.01]
-            for joint, (low, high) in zip(arm.joints, ends, strict=True)
-        ]
+    joints = [[f"{name} [rad]", *ends, 0.01] for name, ends in list_joints(loaded).items()]
+    if joints:
         parts.append({"title": "Arm", "sliders": joints})
     return {"rover": loaded.name, "parts": parts}
 
@@ -90,7 +95,7 @@ def compare_drives(before: Judged, now: Judged) -> list[list[str]]:
         "verdict": lambda one: "passes" if one.verdict.traversable else "refused",
         "driven": lambda one: write(float(one.trajectory.distance[-1]), 2, "m"),
         "time": lambda one: write(float(one.trajectory.times[-1]), 1, "s"),
-        "energy": lambda one: write(float(one.trajectory.series("energy")[-1]), 1, "J"),
+        "energy": lambda one: write(one.trajectory.energy, 1, "J"),
     }
     rows = [[name, read(before), read(now)] for name, read in reads.items()]
     for lane in now.limits.lanes:

@@ -13,6 +13,8 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.sync.server import ServerConnection, serve
 
+from rover_planner.viewer.state.inbox import Inbox
+
 CHANNEL = "/channel"
 """Path of the channel; all others are files."""
 FILES = {
@@ -26,36 +28,10 @@ MAX_MESSAGE = 1 << 20
 
 Part = Any
 """A part of what is shown: dicts, lists, texts, numbers, True, False and None."""
-Hear = Callable[[dict[str, Any], "Mailbox"], None]
+Mailbox = Inbox[Part]
+"""Parts on their way to one visitor."""
+Hear = Callable[[dict[str, Any], Mailbox], None]
 """Takes a visitor's words and where to answer."""
-
-
-class Mailbox:
-    """Parts on their way to one visitor: a newer one replaces an older one of the same name."""
-
-    def __init__(self, parts: Mapping[str, Part]):
-        self._parts = dict(parts)
-        self._changed = threading.Condition()
-        self._is_open = True
-
-    def put(self, parts: Mapping[str, Part]) -> None:
-        """Send parts soon."""
-        with self._changed:
-            self._parts.update(parts)
-            self._changed.notify()
-
-    def take(self) -> dict[str, Part]:
-        """Wait for parts and return them; nothing once it is closed."""
-        with self._changed:
-            self._changed.wait_for(lambda: self._parts or not self._is_open)
-            parts, self._parts = self._parts, {}
-        return parts
-
-    def close(self) -> None:
-        """Wake whoever waits."""
-        with self._changed:
-            self._is_open, self._parts = False, {}
-            self._changed.notify()
 
 
 class Channel:
@@ -66,7 +42,7 @@ class Channel:
     """
 
     def __init__(self, host: str, port: int, hear: Hear):
-        """Start to serve; `hear` is called in a thread of the visitor and must be quick."""
+        """Take the port; `hear` is called in a thread of the visitor and must be quick."""
         self._hear = hear
         self._lock = threading.Lock()
         self._parts: dict[str, Part] = {"program": uuid4().hex}
@@ -76,6 +52,9 @@ class Channel:
             self._serve, host, port, process_request=_answer, max_size=MAX_MESSAGE
         )
         self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
+
+    def open(self) -> None:
+        """Serve those who wait, and who come: what they get first is all that was told so far."""
         self._thread.start()
 
     @property
@@ -95,7 +74,7 @@ class Channel:
         with self._lock:
             self._parts = {**self._parts, name: part}
             for mailbox in self._mailboxes:
-                mailbox.put({name: part})
+                mailbox.put(part, name)
 
     def tell_made(self, name: str, made_of: tuple[Any, ...], make: Callable[[], Part]) -> None:
         """Show a part that is made anew only if one of the objects has changed of which it is."""
@@ -113,7 +92,7 @@ class Channel:
 
     def _serve(self, connection: ServerConnection) -> None:
         with self._lock:
-            mailbox = Mailbox(self._parts)
+            mailbox: Mailbox = Inbox(self._parts)
             self._mailboxes.add(mailbox)
         sender = threading.Thread(target=_send, args=(connection, mailbox), daemon=True)
         sender.start()
@@ -140,8 +119,8 @@ def _read(message: str | bytes) -> dict[str, Any]:
 def _send(connection: ServerConnection, mailbox: Mailbox) -> None:
     """Send what a mailbox gets until it is closed."""
     try:
-        while parts := mailbox.take():
-            connection.send(json.dumps(parts, allow_nan=False))
+        while mailbox.wait():
+            connection.send(json.dumps(mailbox.take(), allow_nan=False))
     except ConnectionClosed:
         return
     connection.close()

@@ -32,7 +32,6 @@ from rover_physics.errors import RoverError
 from rover_physics.names import WHEEL_JOINTS
 from rover_physics.numerics.quaternions import rpy_from_xyzw
 from rover_physics.terrain.grid import Terrain
-from rover_planner.errors import PlanningError
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.ros.qos import (
     latched_qos,
@@ -324,7 +323,7 @@ class LiveListener(Node):
         """Warn of a bad message instead of taking it."""
         try:
             yield
-        except (MessageError, PlanningError, RoverError) as error:
+        except RoverError as error:
             self.get_logger().warning(f"{what} not shown: {error}")
 
 

@@ -10,14 +10,11 @@ import numpy as np
 
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
-from rover_physics.numerics.records import new_record
-from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place
-from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
 from rover_planner.planning.learned_ground import LearnedGround
-from rover_planner.viewer.state.trajectory import RoverState
+from rover_planner.viewer.state.rover_state import RoverState, place_state
 
-MAX_AGE = 3.0
+MAX_AGE = 2.0
 """Age from which a topic that is published all the time is stale [s]."""
 TRAIL_STEP, MAX_TRAIL = 0.1, 1000
 """Distance of two places of a trail [m], and their largest number."""
@@ -139,51 +136,27 @@ class LiveValues:
     """Work of the wheel motors since then [J]."""
 
 
-class StateBuilder:
-    """Builds the state of the page from live values, with the linkage of the rover."""
-
-    def __init__(self, rover: Rover):
-        """Prepare for a rover."""
-        self._rover = rover
-        self._linkage = pack_linkage(rover, *body_mass_and_com(rover))
-        self._placement = new_record(PLACEMENT)
-
-    def build(self, values: LiveValues) -> RoverState | None:
-        """Return the state; None before the first odometry."""
-        if values.position is None:
-            return None
-        angles = [values.joints.get(name, 0.0) for name in SUSPENSION_JOINTS]
-        roll, pitch, yaw = values.attitude
-        x, y, z = values.position
-        q = np.array([z, roll, pitch, 0.5 * (angles[0] - angles[1]), *angles[2:]])
-        place(self._linkage, np.array([x, y, yaw]), q, self._placement)
-        centres = self._placement.centres.copy()
-        radius = self._rover.wheel.radius
-        s, c = np.sin(values.contact_angles)[:, None], np.cos(values.contact_angles)[:, None]
-        contacts = centres + radius * (s * self._placement.forward - c * self._placement.up)
-        torques = np.array([values.efforts.get(name, np.nan) for name in WHEEL_JOINTS])
-        return RoverState(
-            time=values.time,
-            distance=values.distance,
-            energy=values.energy,
-            speed=values.speed,
-            position=np.array(values.position),
-            attitude=np.array(values.attitude),
-            rocker_angle=np.array(angles[:2]),
-            bogie_angle=np.array(angles[2:]),
-            steering_angle=self._placement.steering.copy(),
-            motion=np.array([values.speed, 0.0, 0.0]),
-            spin=np.array([values.joints.get(name, 0.0) for name in WHEEL_JOINTS]),
-            wheel_centres=centres,
-            contact_points=contacts,
-            wheel_loads=values.wheel_loads,
-            tangential=torques / radius,
-            lateral=np.zeros(6),
-            friction_use=values.friction_utilisation / self._rover.limits.friction_utilisation,
-            torque_use=np.abs(torques)
-            / self._rover.wheel.max_torque
-            / self._rover.limits.torque_saturation,
-            slip_ratio=values.slip_ratio,
-            tip_over_ratio=values.tip_over_ratio,
-            belly_clearance=float("nan"),
-        )
+def read_state(rover: Rover, values: LiveValues) -> RoverState | None:
+    """Return the state of a rover; None before the first odometry."""
+    if values.position is None:
+        return None
+    torques = np.array([values.efforts.get(name, np.nan) for name in WHEEL_JOINTS])
+    return place_state(
+        rover,
+        values.position,
+        values.attitude,
+        np.array([values.joints.get(name, 0.0) for name in SUSPENSION_JOINTS]),
+        values.contact_angles,
+        spin=[values.joints.get(name, 0.0) for name in WHEEL_JOINTS],
+        time=values.time,
+        distance=values.distance,
+        energy=values.energy,
+        motion=[values.speed, 0.0, 0.0],
+        wheel_loads=values.wheel_loads,
+        tangential=torques / rover.wheel.radius,
+        lateral=np.zeros(6),
+        friction_utilisation=values.friction_utilisation,
+        torque_saturation=np.abs(torques) / rover.wheel.max_torque,
+        slip_ratio=values.slip_ratio,
+        tip_over_ratio=values.tip_over_ratio,
+    )

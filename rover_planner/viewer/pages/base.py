@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The base of every page: its channel, viser's scene, and the one thread that changes them."""
 
-import math
 import socket
 import threading
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from functools import partial
 from typing import Any
 
@@ -17,24 +17,29 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
-from rover_planner.viewer.front.channel import Channel, Mailbox
+from rover_planner.viewer.front.channel import Channel, Mailbox, Part
 from rover_planner.viewer.pages.drawings import Action, Drawings, Errors
-from rover_planner.viewer.scene.cameras import VIEWS
+from rover_planner.viewer.pages.ground_painter import PaintedGround, PaintRequest, paint
+from rover_planner.viewer.scene.cameras import START, VIEWS
 from rover_planner.viewer.scene.ground_mesh import intersect_ground
 from rover_planner.viewer.scene.scene import Scene
+from rover_planner.viewer.state.background_work import BackgroundWork
+from rover_planner.viewer.state.inbox import Inbox
+from rover_planner.viewer.state.layers import PREDICTED, Colouring
 from rover_planner.viewer.state.session import REFUSALS
-from rover_planner.viewer.state.visitor_requests import VisitorRequests
 
 PERIOD = 0.04
 """Time between two pictures [s]."""
+RETRY = 2.0
+"""Time from an error in a picture to the next one without a request [s]."""
 RESTART = 1.0
 """Time until a stopped page starts again [s]."""
 FOLLOW, STAY = "Follow", "Stay"
 """The last button of the camera: go along with the rover, or stop that."""
 Words = dict[str, Any]
 """What a visitor asks: the word `ask` and its values."""
-Answer = Callable[[Words, Mailbox | None], None]
-"""Acts on what a visitor asks, whose mailbox it gets."""
+Answer = Callable[[Words], Mapping[str, Part] | None]
+"""Acts on what a visitor asks; returns parts for this visitor alone, if there are any."""
 HOTKEYS: dict[Any, tuple[str, Words]] = {
     "space": ("Play or pause", {"ask": "toggle"}),
     "arrowleft": ("Step back", {"ask": "step", "by": -1}),
@@ -51,12 +56,9 @@ class PageBase(ABC):
     """A served page. Callbacks of browsers only add requests for the page's own thread.
 
     No error ends that thread. The page shows an error in a request and takes the next request. An
-    error in a picture stops the pictures until the next request, or for `retry_after` [s]. After
-    any other error the page says that it has stopped and why, and starts again by itself.
+    error in a picture stops the pictures until the next request, or for RETRY. After any other
+    error the page says that it has stopped and why, and starts again by itself.
     """
-
-    retry_after = math.inf
-    """Time from an error in a picture to the next picture without a request [s]."""
 
     def __init__(self, rover: Rover, terrain: Terrain, host: str, port: int):
         """Start the servers; `start` starts the thread.
@@ -70,12 +72,16 @@ class PageBase(ABC):
         import viser
 
         self._host = host
-        self.requests = VisitorRequests()
+        self.requests: Inbox[Action] = Inbox()
+        self.moved = True
+        """True if the next picture may differ from the last one."""
+        self.colouring, self.forces = Colouring(), True
         self._ended = threading.Event()
         self._fulfils = False
         self._stopped_at: float | None = None
         """When an error stopped the pictures [s]; None while they go on."""
-        self._answers = self.list_answers()
+        own: dict[str, Answer] = {"colour": self._colour, "forces": self._show_forces}
+        self._answers = {**own, **self.list_answers()}
         try:
             self.channel = Channel(host, port, self.hear)
         except OSError:  # the port is taken
@@ -88,6 +94,9 @@ class PageBase(ABC):
         self.scene.frame.move_to(terrain)
         self.scene.draw_rover(rover, {})
         self._add_camera()
+        self.painter: BackgroundWork[PaintRequest, PaintedGround] = BackgroundWork(
+            paint, lambda: self.requests.put(self._take_ground, "painted"), "ground"
+        )
         self.channel.tell("scene", {"port": self.server.get_port()})
         self._last = self._due = time.monotonic()
         self._thread = threading.Thread(target=self._run, name="page", daemon=True)
@@ -125,6 +134,7 @@ class PageBase(ABC):
         """End the page."""
         self._ended.set()
         self._thread.join(5.0)
+        self.painter.close()
         self.channel.close()
         self.server.stop()
 
@@ -139,11 +149,25 @@ class PageBase(ABC):
         if answer is not None:
             word = words["ask"]
             kind = f"{word} {words.get('label', '')}" if word in CONTINUOUS else ""
-            self.requests.add(lambda: answer(words, mailbox), kind)
+            self.requests.put(partial(self._answer, answer, words, mailbox), kind)
+
+    def _answer(self, answer: Answer, words: Words, mailbox: Mailbox | None) -> None:
+        parts, self.moved = answer(words) or {}, True
+        for name, part in parts.items() if mailbox is not None else ():
+            mailbox.put(part, name)  # type: ignore[union-attr]
 
     @abstractmethod
     def list_answers(self) -> Mapping[str, Answer]:
         """Return what the page does by the word `ask`; refusals are raised as errors."""
+
+    @property
+    @abstractmethod
+    def layers(self) -> Sequence[str]:
+        """The layers that may colour the ground."""
+
+    @abstractmethod
+    def describe_ground(self) -> PaintRequest | None:
+        """Return what is painted as the ground; None while it is not known."""
 
     @property
     @abstractmethod
@@ -152,13 +176,8 @@ class PageBase(ABC):
 
     @property
     @abstractmethod
-    def ends(self) -> tuple[Any, Any]:
-        """Start and goal, x and y first [m], along which a new camera looks."""
-
-    @property
-    @abstractmethod
     def points(self) -> Floats:
-        """X and y (n, 2) [m] of what a view of everything shows."""
+        """X and y (n, 2) [m] of what a view of everything shows, the start first."""
 
     @abstractmethod
     def click(self, point: Floats | None, shift: bool) -> None:
@@ -176,8 +195,42 @@ class PageBase(ABC):
     def show_refusal(self, reason: str) -> None:
         """Show why a request was refused."""
 
+    def list_layers(self) -> dict[str, Any]:
+        """Return the part `offers` as far as each page has it."""
+        return {"layers": list(self.layers), "predicted": list(PREDICTED)}
+
+    def list_chosen(self) -> dict[str, Any]:
+        """Return the part `chosen` as far as each page has it."""
+        return {**asdict(self.colouring), "forces": self.forces}
+
+    def paint(self) -> None:
+        """Begin to colour the ground."""
+        request = self.describe_ground()
+        if request is not None:
+            self.painter.ask(request)
+
+    def _take_ground(self) -> None:
+        self.errors.run("the ground is not drawn", self._draw_ground)
+
+    def _draw_ground(self) -> None:
+        for one in self.painter.take():
+            if one.error is not None or one.result is None:
+                raise one.error or ValueError("nothing was painted")
+            self.scene.draw_ground(one.result.glb)
+            self.channel.tell("legend", one.result.legend)
+
+    def _colour(self, words: Words) -> None:
+        if words["layer"] not in self.layers:
+            raise PlanningError(f"there is no layer {words['layer']!r}")
+        self.colouring = Colouring(words["layer"], float(words["heading"]), bool(words["along"]))
+        self.paint()
+
+    def _show_forces(self, words: Words) -> None:
+        self.forces = bool(words["shown"])
+        self.scene.show_forces(self.forces)
+
     def _aim_camera(self, client: Any) -> None:
-        self.scene.aim_camera(client, self.ground, *self.ends)
+        self._look(client, START)
 
     def _press(self, words: Words, _event: Any) -> None:
         self.hear(words, None)
@@ -185,7 +238,7 @@ class PageBase(ABC):
     def _request_view(self, event: Any) -> None:
         client, name = event.client, event.target.value
         act = self._follow if name in (FOLLOW, STAY) else self._look
-        self.requests.add(lambda: act(client, name))
+        self.requests.put(lambda: act(client, name))
 
     def _look(self, client: Any, view: str) -> None:
         self.scene.look(client, view, self.ground, self.points)
@@ -206,9 +259,11 @@ class PageBase(ABC):
             start = self.scene.frame.to_map(origin)
             self.click(intersect_ground(self.ground, start, direction), shift)
 
-        self.requests.add(click, "click")
+        self.requests.put(click, "click")
 
     def _run(self) -> None:
+        self.errors.run("what is shown is old", self.tell)
+        self.channel.open()
         while not self._ended.is_set():
             if not self.errors.run("stopped", self._run_period):
                 self._ended.wait(RESTART)
@@ -220,7 +275,7 @@ class PageBase(ABC):
         """
         self.requests.wait(0.0 if self.drawings.waiting else self._due - time.monotonic())
         self._fulfils = True
-        for action in self.requests.take_all():
+        for action in self.requests.take().values():
             self._fulfil(action)
         self._fulfils = False
         self.errors.run("what is shown is old", self.tell)
@@ -229,7 +284,7 @@ class PageBase(ABC):
         if self.drawings.waiting and now < self._due:
             return
         passed, self._last, self._due = now - self._last, now, now + PERIOD
-        if self._stopped_at is None or now - self._stopped_at > self.retry_after:
+        if self._stopped_at is None or now - self._stopped_at > RETRY:
             self._draw_picture(passed)
 
     def _fulfil(self, request: Action) -> None:
@@ -245,7 +300,7 @@ class PageBase(ABC):
         self._stopped_at = None
 
     def _draw_picture(self, passed: float) -> None:
-        """Draw the next picture; after an error no more, for the same would fail again."""
+        """Draw the next picture; after an error none for a while, as the same may fail again."""
         with self.server.atomic():  # one message to wake the server for all that is sent
             drawn = self.errors.run("drawing stopped", lambda: self.advance(passed))
         self._stopped_at = None if drawn else time.monotonic()

@@ -2,9 +2,7 @@
 """The page that follows a live rover: the data of its topics, and plans asked of its server."""
 
 import time
-from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -13,34 +11,37 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.viewer.documents.board import describe_board
-from rover_planner.viewer.documents.legend import describe_scale
 from rover_planner.viewer.documents.live import choose_answer, describe_learned, list_topics
 from rover_planner.viewer.live.listener import LiveData, LiveListener
-from rover_planner.viewer.live.live_state import StateBuilder
-from rover_planner.viewer.pages.base import Answer, PageBase, Words
-from rover_planner.viewer.pages.ground_painter import Colouring
-from rover_planner.viewer.scene.glb import write_glb
-from rover_planner.viewer.scene.ground_mesh import build_ground_mesh
-from rover_planner.viewer.state.layers import LAYERS, list_layers
+from rover_planner.viewer.live.live_state import read_state
+from rover_planner.viewer.pages.base import Answer, PageBase
+from rover_planner.viewer.pages.ground_painter import PaintRequest
+from rover_planner.viewer.state.layers import list_layers
 from rover_planner.viewer.state.link import read_link
-from rover_planner.viewer.state.trajectory import RoverState
+from rover_planner.viewer.state.rover_state import RoverState
 
 BOARD_PERIOD = 0.2
 """Time between two updates of the board [s]."""
 GROUND_PERIOD = 2.0
 """Shortest time between two pictures of the ground [s]."""
-RETRY = 2.0
-"""Time from an error in a picture to the next one, which shows newer data [s]."""
 ARM_STEP = 0.01
 """Smallest turn of the arm that is drawn [rad]."""
+FORCES = (
+    "wheel_loads",
+    "tangential",
+    "lateral",
+    "friction_utilisation",
+    "torque_saturation",
+    "slip_ratio",
+    "tip_over_ratio",
+)
+"""What nobody knows any more of a rover whose odometry is stale: grey wheels without arrows."""
 AHEAD = np.array([4.0, 0.0])
 """From the rover to where a new camera looks [m]."""
 
 
 class LivePage(PageBase):
     """Shows the data of a listener; a click on the ground asks the server for a plan."""
-
-    retry_after = RETRY
 
     def __init__(
         self,
@@ -63,7 +64,6 @@ class LivePage(PageBase):
         """
         self._listener, self._rover, self._terrain = listener, rover, terrain
         self._ground_name, self._refusal = ground_name, ""
-        self._colouring, self._forces = Colouring(), True
         self._data: LiveData = listener.latest()
         self._first: Floats | None = None
         """Where the rover was first seen (2,) [m]."""
@@ -72,21 +72,27 @@ class LivePage(PageBase):
         self._drawn_trail: Floats | None = None
         self._told_at = self._ground_at = 0.0
         super().__init__(rover, terrain, host, port)
-        self._builder = StateBuilder(rover)
-        predicted = [name for name, layer in LAYERS.items() if layer.is_predicted]
-        self.channel.tell("offers", {"layers": list_layers(terrain), "predicted": predicted})
-        if ground_name:
-            self._draw_ground()
+        self.channel.tell("offers", self.list_layers())
+        self.paint()
         self.start()
 
     def list_answers(self) -> Mapping[str, Answer]:
         """Return what the page does by the word `ask`."""
         return {
-            "newest": lambda _words, _mailbox: self._listener.forget_click(),
-            "colour": lambda words, _mailbox: self._colour(words),
-            "forces": lambda words, _mailbox: self._show_forces(bool(words["shown"])),
-            "open": lambda words, _mailbox: _refuse_link(words["query"]),
+            "newest": lambda _words: self._listener.forget_click(),
+            "open": lambda words: _refuse_link(words["query"]),
         }
+
+    @property
+    def layers(self) -> Sequence[str]:
+        """The layers that may colour the ground."""
+        return list_layers(self._terrain)
+
+    def describe_ground(self) -> PaintRequest | None:
+        """Return the ground as it is known."""
+        origin = self.scene.frame.origin
+        request = PaintRequest(self._rover, self._terrain, self.colouring, origin)
+        return request if self._ground_name else None
 
     @property
     def ground(self) -> Terrain:
@@ -94,15 +100,10 @@ class LivePage(PageBase):
         return self._terrain
 
     @property
-    def ends(self) -> tuple[Any, Any]:
-        """Where the rover was first seen, and ahead of it."""
-        first = np.zeros(2) if self._first is None else self._first
-        return first, first + AHEAD
-
-    @property
     def points(self) -> Floats:
-        """X and y (2, 2) [m] of the same places."""
-        return np.array(self.ends)
+        """X and y (2, 2) [m] of where the rover was first seen, and of a place ahead of it."""
+        first = np.zeros(2) if self._first is None else self._first
+        return np.array([first, first + AHEAD])
 
     def click(self, point: Floats | None, shift: bool) -> None:
         """Ask the server for a plan to a point."""
@@ -113,25 +114,6 @@ class LivePage(PageBase):
     def show_refusal(self, reason: str) -> None:
         """Show why a request was refused."""
         self._refusal = reason
-
-    def _colour(self, words: Words) -> None:
-        self._colouring = Colouring(words["layer"], float(words["heading"]))
-        if self._ground_name:
-            self._draw_ground()
-
-    def _show_forces(self, shown: bool) -> None:
-        self._forces = shown
-        self.scene.show_forces(shown)
-
-    def _draw_ground(self) -> None:
-        self.errors.run("the ground is not drawn", self._build_ground)
-
-    def _build_ground(self) -> None:
-        how = self._colouring
-        heading = float(np.radians(how.heading))
-        ground = build_ground_mesh(self._rover, self._terrain, how.layer, heading)
-        self.scene.draw_ground(write_glb(ground.mesh, self.scene.frame.origin))
-        self.channel.tell("legend", describe_scale(how.describe(), ground.scale))
 
     def tell(self) -> None:
         """Tell whose answer is shown and how old it is; the plan has the same age."""
@@ -144,10 +126,7 @@ class LivePage(PageBase):
         ground = self._ground_name or "not known yet"
         facts = {"rover": self._rover.name, "map": ground, "soil": soil, "mode": data.freshness}
         tell("subject", facts)
-        how = self._colouring
-        tell("chosen", {
-            "layer": how.layer, "heading": how.heading, "along": False, "forces": self._forces,
-        })  # fmt: skip
+        tell("chosen", self.list_chosen())
         tell("learned", describe_learned(data.learned))
         trail = None if data.learned is None else data.learned.places
         if trail is not self._drawn_trail:
@@ -169,9 +148,9 @@ class LivePage(PageBase):
         data = self._data = self._listener.latest()
         now = time.monotonic()
         self._take_terrain(data, now)
-        state = self._builder.build(data.values)
+        state = read_state(self._rover, data.values)
         if state is not None and data.odometry.is_stale:
-            state = _forget_forces(state)
+            state = state.change(**{name: np.nan * getattr(state, name) for name in FORCES})
         self.scene.show(state)
         if state is not None:
             self._turn_arm(data)
@@ -200,7 +179,8 @@ class LivePage(PageBase):
         if self.scene.frame.move_to(terrain):
             self._first = None
         self._drawn_plan = self._drawn_trail = None
-        self._draw_ground()
+        self.channel.tell("offers", self.list_layers())
+        self.paint()
 
     def _turn_arm(self, data: LiveData) -> None:
         arm = self._rover.manipulator
@@ -209,14 +189,6 @@ class LivePage(PageBase):
             known = {name: joints[name] for name in arm.joints if name in joints}
             steps = {name: ARM_STEP * round(angle / ARM_STEP) for name, angle in known.items()}
             self.scene.turn_arm(steps)
-
-
-def _forget_forces(state: RoverState) -> RoverState:
-    """Return a state of which nobody knows the forces any more: grey wheels without arrows."""
-    unknown = np.full(6, np.nan)
-    names = ("wheel_loads", "tangential", "lateral", "friction_use", "torque_use", "slip_ratio")
-    values: dict[str, Any] = dict.fromkeys(names, unknown)
-    return replace(state, **values, tip_over_ratio=float("nan"))
 
 
 def _refuse_link(query: str) -> None:

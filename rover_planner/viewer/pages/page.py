@@ -2,13 +2,15 @@
 """The page that plans: what visitors ask of the session, and one function that shows its state."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover, preset_names
+from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.soil_file import load_soils
 from rover_planner.advice.remedy import Remedy
@@ -27,22 +29,22 @@ from rover_planner.viewer.documents.rover import (
     describe_changes,
     describe_sliders,
     describe_values,
+    list_joints,
     list_numbers,
 )
 from rover_planner.viewer.documents.verdict import Work, describe_verdict
-from rover_planner.viewer.front.channel import Mailbox
 from rover_planner.viewer.pages.base import Answer, PageBase, Words
-from rover_planner.viewer.pages.ground_painter import Colouring, GroundPainter, PaintRequest
-from rover_planner.viewer.pages.sharing import MapPrint, make_link, read_scenario, write_file
+from rover_planner.viewer.pages.ground_painter import PaintRequest
+from rover_planner.viewer.pages.sharing import make_link, read_scenario, write_file
 from rover_planner.viewer.scene.cameras import find_radius
-from rover_planner.viewer.state.layers import LAYERS, list_layers
+from rover_planner.viewer.state.layers import Colouring, list_layers
 from rover_planner.viewer.state.link import PageLink, read_link, write_link
 from rover_planner.viewer.state.path_advice import PathAdvice, apply_remedy
 from rover_planner.viewer.state.playback import SPEEDS, Playback
+from rover_planner.viewer.state.rover_state import RoverState
 from rover_planner.viewer.state.scenario import Scenario, Shown
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.survey_layers import ShownSurvey
-from rover_planner.viewer.state.trajectory import RoverState
 
 DRAWING_TIME, DRAWING_POLL = 0.2, 0.002
 """Longest time for which judging waits for the drawings, and between two looks at them [s]."""
@@ -82,33 +84,26 @@ class Page(PageBase):
         self.session, self.playback = session, Playback()
         self._ground_name = ground_name or name_ground(session.wanted.terrain)
         self._survey = survey
-        self._layers = (
-            *(survey.names if survey is not None else ()),
-            *list_layers(session.wanted.terrain),
-        )
-        self._colouring = Colouring(self._layers[0])
-        self._map_print = MapPrint(session.wanted.terrain)
-        self._click_sets, self._forces = "goal", True
+        self._click_sets = "goal"
         self._drawn: Shown | None = None
         """What the scene shows, or will when its drawings are done."""
         self._greyed: frozenset[int] = frozenset()
         self._opening: tuple[PageLink, Scenario] | None = None
         """The link whose path and time are not shown yet, and what it asks for."""
-        self._moved, self._told_at = True, 0.0
+        self._told_at = 0.0
         super().__init__(session.wanted.rover, session.wanted.terrain, host, port)
-        self._advice = PathAdvice(lambda: self.requests.add(self._take_advice, "advice"))
-        self._painter = GroundPainter(lambda: self.requests.add(self._take_ground, "painted"))
+        self.colouring = Colouring(self.layers[0])
+        self._advice = PathAdvice(lambda: self.requests.put(self._take_advice, "advice"))
         self.channel.tell("offers", self._list_offers())
         session.judge_in_background(self._show_and_wait)
         self._show(session.shown)
-        self._paint()
+        self.paint()
         self.start()
 
     def _list_offers(self) -> dict[str, Any]:
         """Return what the page's boxes offer."""
         return {
-            "layers": list(self._layers),
-            "predicted": [name for name, layer in LAYERS.items() if layer.is_predicted],
+            **self.list_layers(),
             "presets": list(preset_names()),
             "soils": list(load_soils()),
             "policies": [[name, title] for name, title in POLICY_TITLES.items()],
@@ -118,7 +113,7 @@ class Page(PageBase):
     @property
     def is_busy(self) -> bool:
         """True if something is judged, or judged and not shown yet."""
-        works = self.session, self._painter.work
+        works = self.session, self.painter
         is_judged = any(work.progress is not None or work.has_news for work in works)
         is_judged = is_judged or self._advice.is_busy
         return is_judged or self.is_drawing  # in this order: what was taken is drawn
@@ -128,18 +123,25 @@ class Page(PageBase):
         super().close()
         self.session.close()
         self._advice.close()
-        self._painter.work.close()
+
+    @property
+    def layers(self) -> Sequence[str]:
+        """The layers that may colour the ground, those of a survey first."""
+        surveyed = () if self._survey is None else self._survey.names
+        return [*surveyed, *list_layers(self.ground)]
+
+    def describe_ground(self) -> PaintRequest:
+        """Return the ground with what is shown on it."""
+        path, now = self.session.shown.path.poses, self.session.shown.scenario
+        return PaintRequest(
+            now.rover, now.terrain, self.colouring, self.scene.frame.origin,
+            now.asked_options.model, path, self._survey,
+        )  # fmt: skip
 
     @property
     def ground(self) -> Terrain:
         """The ground that is shown."""
         return self.session.shown.scenario.terrain
-
-    @property
-    def ends(self) -> tuple[Any, Any]:
-        """Start and goal."""
-        now = self.session.shown.scenario
-        return now.start, now.goal
 
     @property
     def points(self) -> Floats:
@@ -151,7 +153,7 @@ class Page(PageBase):
     def list_answers(self) -> Mapping[str, Answer]:
         """Return what the page does by the word `ask`."""
         session, playback = self.session, self.playback
-        plain: dict[str, Any] = {
+        return {
             "show": lambda words: session.show_path(int(words["index"])),
             "value": lambda words: self._change_value(words["label"], float(words["value"])),
             "options": lambda words: session.change_options(**_read_options(words)),
@@ -165,8 +167,6 @@ class Page(PageBase):
             "upload": lambda words: session.take_rover(read_rover(words["text"], words["name"])),
             "open": lambda words: self._open(read_link(words["query"])),
             "click": lambda words: setattr(self, "_click_sets", words["sets"]),
-            "colour": lambda words: self._colour(words),
-            "forces": lambda words: self._show_forces(bool(words["shown"])),
             "toggle": lambda _words: playback.toggle(),
             "rewind": lambda _words: playback.rewind(),
             "step": lambda words: playback.step(session.shown.path.trajectory.times, words["by"]),
@@ -177,21 +177,10 @@ class Page(PageBase):
             "advise": lambda _words: self._advice.ask(session.shown.path),
             "ghost": lambda words: self._show_ghost(words["index"]),
             "remedy": lambda words: self._take_remedy(int(words["index"])),
+            "save rover": lambda _words: self._save_rover(),
+            "save page": lambda words: self._save_page(str(words.get("base", ""))),
+            "link": lambda _words: {"link": write_link(self._link())},
         }
-        answers = {word: self._answer(act) for word, act in plain.items()}
-        files: dict[str, Answer] = {
-            "save rover": lambda _words, mailbox: _send_file(mailbox, *self._save_rover()),
-            "save page": lambda words, mailbox: _send_file(mailbox, *self._save_page(words)),
-            "link": lambda _words, mailbox: _send(mailbox, {"link": write_link(self._link())}),
-        }
-        return {**answers, **files}
-
-    def _answer(self, act: Any) -> Answer:
-        def answer(words: Words, _mailbox: Mailbox | None) -> None:
-            act(words)
-            self._moved = True
-
-        return answer
 
     def click(self, point: Floats | None, shift: bool) -> None:
         """Set goal or start, and plan."""
@@ -208,9 +197,10 @@ class Page(PageBase):
 
     def _change_value(self, label: str, number: float) -> None:
         """Change a number of the rover, or turn a joint, by the label of its slider."""
-        joint = label.removesuffix(" [rad]")
-        if joint in self.session.wanted.arm:
-            self.session.change_arm(joint, number)
+        joint, joints = label.removesuffix(" [rad]"), list_joints(self.session.wanted.loaded)
+        if joint in joints:
+            low, high = joints[joint]
+            self.session.change_arm(joint, min(max(number, low), high))
             return
         known = {one.label: one for one in list_numbers(self.session.wanted.loaded)}
         if label not in known:
@@ -221,18 +211,7 @@ class Page(PageBase):
     def _cancel(self) -> None:
         self.session.cancel()
         self._advice.stop()
-        self._painter.work.cancel()
-
-    def _colour(self, words: Words) -> None:
-        if words["layer"] not in self._layers:
-            raise PlanningError(f"there is no layer {words['layer']!r}")
-        along = bool(words["along"])
-        self._colouring = Colouring(words["layer"], float(words["heading"]), along)
-        self._paint()
-
-    def _show_forces(self, shown: bool) -> None:
-        self._forces = shown
-        self.scene.show_forces(shown)
+        self.painter.cancel()
 
     def _go_to_place(self, distance: float) -> None:
         self.playback.go_to(self.session.shown.path.limits.time_at(distance))
@@ -266,11 +245,14 @@ class Page(PageBase):
 
     # Files and links.
 
+    @cached_property
+    def _map_print(self) -> str:
+        """The fingerprint of the map, computed when it is first asked for."""
+        return fingerprint(self.ground)
+
     def _link(self) -> PageLink:
-        how = self._colouring
-        colours = {"layer": how.layer, "heading": how.heading, "along": how.along}
         time_shown = round(self.playback.time, 3)
-        return make_link(self.session.shown, self._map_print.text, time_shown, colours)
+        return make_link(self.session.shown, self._map_print, time_shown, self.colouring)
 
     def _write_current(self) -> str:
         """Return the link that a browser opens on a program that was started again."""
@@ -279,12 +261,12 @@ class Page(PageBase):
         except PlanningError:  # it would be too long
             return ""
 
-    def _save_rover(self) -> tuple[str, str]:
+    def _save_rover(self) -> dict[str, Any]:
         rover = self.session.wanted.rover
-        return f"{rover.name.removesuffix('.yaml')}.yaml", write_rover(rover)
+        return _file(f"{rover.name.removesuffix('.yaml')}.yaml", write_rover(rover))
 
-    def _save_page(self, words: Words) -> tuple[str, str]:
-        """Return name and text of a file, with the rover where the path is refused if it is."""
+    def _save_page(self, base: str) -> dict[str, Any]:
+        """Return the page as a file, with the rover where the path is refused if it is."""
         self.tell()
         path, parts = self.session.shown.path, dict(self.channel.parts)
         if path.failure is not None:
@@ -295,20 +277,20 @@ class Page(PageBase):
                 "drive": {**parts["drive"], "time": at, "distance": path.failure.distance},
             }
         rover = path.scenario.rover
-        text = write_file(self.server, parts, self._link(), rover, str(words.get("base", "")))
-        return f"{rover.name}.html", text
+        text = write_file(self.server, parts, self._link(), rover, base)
+        return _file(f"{rover.name}.html", text)
 
     def _open(self, link: PageLink | None) -> None:
         """Judge what a link holds, and show it."""
         if link is None:
             return
-        if link.layer not in self._layers:
+        if link.layer not in self.layers:
             raise PlanningError(f"the link names the layer {link.layer!r}, which there is not")
-        asked = read_scenario(link, self.session.wanted, self._map_print.text)
-        self._colouring = Colouring(link.layer, link.heading, link.along)
+        asked = read_scenario(link, self.session.wanted, self._map_print)
+        self.colouring = Colouring(link.layer, link.heading, link.along)
         self.session.take_scenario(asked)
         self._opening = link, asked
-        self._paint()
+        self.paint()
 
     def _go_on_opening(self) -> None:
         """Show path and time of the link that was opened, as soon as they are judged."""
@@ -335,7 +317,7 @@ class Page(PageBase):
         What is judged next would slow down the drawings, so it waits for them; a newer change does
         not.
         """
-        self.requests.add(self._take_judged, "judged")
+        self.requests.put(self._take_judged, "judged")
         wanted, end = self.session.wanted, time.monotonic() + DRAWING_TIME
         while self.session.has_news or self.is_drawing:
             if self.session.wanted is not wanted or time.monotonic() > end:
@@ -365,10 +347,10 @@ class Page(PageBase):
                 self.drawings.ask("the cameras are not moved", self._fit_cameras)
         if before is None or now.paths != before.paths or now.index != before.index:
             self.drawings.ask("the paths are not drawn", self._draw_paths)
-        depends = self._colouring.is_predicted or self._survey is not None
+        depends = self.colouring.is_predicted or self._survey is not None
         if was is not None and depends and asked is not was:
-            self._paint()
-        self._moved = True
+            self.paint()
+        self.moved = True
 
     def _draw_rover(self) -> None:
         asked = self.session.shown.scenario
@@ -388,25 +370,10 @@ class Page(PageBase):
         shown = self.session.shown
         self.scene.failure.show(shown.scenario.rover, shown.path.failure)
 
-    def _paint(self) -> None:
-        shown, origin = self.session.shown, self.scene.frame.origin
-        self._painter.paint(
-            PaintRequest(shown.scenario, self._colouring, shown.path.poses, self._survey, origin)
-        )
-
     def _take_advice(self) -> None:
         self._advice.take()
         if self._advice.failure:
             raise PlanningError(f"no advice: {self._advice.failure}")
-
-    def _take_ground(self) -> None:
-        self.errors.run("the ground is not drawn", self._draw_ground)
-
-    def _draw_ground(self) -> None:
-        painted = self._painter.take()
-        if painted is not None:
-            self.scene.draw_ground(painted.glb)
-            self.channel.tell("legend", painted.legend)
 
     # What is told.
 
@@ -414,7 +381,7 @@ class Page(PageBase):
         """Return what is worked on, and whether the verdict is an old one meanwhile."""
         session, judging, old = self.session, "", ""
         progress = session.progress
-        shown = progress or self._painter.work.progress
+        shown = progress or self.painter.progress
         if shown is not None and shown.seconds > NOTICE_DELAY:
             judging = f"{shown.describe()} ... {int(shown.seconds)} s"
             old = f"judging {progress.describe()}" if progress is not None else ""
@@ -446,7 +413,7 @@ class Page(PageBase):
         )
         advice, asked = self._advice.about(path), self._advice.is_asked(path)
         tell("advice", describe_advice(advice, asked, asked and self._advice.is_busy))
-        made("current", (shown, self._colouring), self._write_current)
+        made("current", (shown, self.colouring), self._write_current)
         made("sliders", (wanted.loaded,), lambda: describe_sliders(wanted.loaded))
         made("values", (wanted, session.refusal), lambda: describe_values(wanted))
         kept = session.kept
@@ -458,11 +425,10 @@ class Page(PageBase):
         along = path, reference, shown.chance
         made("limits", along, lambda: describe_limits(*along))
         made("curves", along, lambda: describe_curves(*along))
-        model, how = wanted.options.model, self._colouring
+        model = wanted.options.model
         tell("chosen", {
-            "policy": model.policy, "soil": model.soil or "", "sets": self._click_sets,
-            "layer": how.layer, "heading": how.heading, "along": how.along,
-            "forces": self._forces, "speed": self.playback.speed, "preset": wanted.loaded.name,
+            **self.list_chosen(), "policy": model.policy, "soil": model.soil or "",
+            "sets": self._click_sets, "speed": self.playback.speed, "preset": wanted.loaded.name,
         })  # fmt: skip
 
     def _grey(self, old: frozenset[int]) -> None:
@@ -474,15 +440,15 @@ class Page(PageBase):
     def advance(self, seconds: float) -> None:
         """Play on by a time of the visitor [s], and show what has changed."""
         playback = self.playback
-        self._moved = playback.advance(seconds) or self._moved
-        if not self._moved:
+        self.moved = playback.advance(seconds) or self.moved
+        if not self.moved:
             return
         state = self._find_state()
         self.scene.show(state)
-        self._moved = False
+        self.moved = False
         now = time.monotonic()
         if now - self._told_at < BOARD_PERIOD and playback.rate != 0.0:
-            self._moved = True
+            self.moved = True
             return
         self._told_at = now
         self._tell_drive(state)
@@ -514,7 +480,7 @@ class Page(PageBase):
             return state
         if abs(at - failure.time) > AT_FAILURE:
             return state
-        return replace(failure.state, spin=state.spin, energy=state.energy)
+        return replace(failure.state, spin=state.spin)
 
 
 def _differ_in_size(one: Rover, other: Rover) -> bool:
@@ -533,10 +499,5 @@ def _read_options(words: Words) -> dict[str, Any]:
     return found
 
 
-def _send(mailbox: Mailbox | None, parts: Mapping[str, Any]) -> None:
-    if mailbox is not None:
-        mailbox.put(parts)
-
-
-def _send_file(mailbox: Mailbox | None, name: str, text: str) -> None:
-    _send(mailbox, {"file": {"name": name, "text": text}})
+def _file(name: str, text: str) -> dict[str, Any]:
+    return {"file": {"name": name, "text": text}}

@@ -12,19 +12,13 @@ from typing import Any
 
 import rover_physics
 from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_file import load_rover, preset_names
-from rover_physics.terrain.fingerprint import fingerprint
-from rover_physics.terrain.grid import Terrain
+from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 from rover_physics.terrain.soil_file import soil_named
 from rover_planner.errors import PlanningError
-from rover_planner.studies.rover_values import read_rover, write_rover
+from rover_planner.studies.rover_values import write_rover
 from rover_planner.viewer.front.channel import read_file
-from rover_planner.viewer.state.link import (
-    PageLink,
-    change_values,
-    list_changed_values,
-    write_link,
-)
+from rover_planner.viewer.state.layers import Colouring
+from rover_planner.viewer.state.link import PageLink, write_link
 from rover_planner.viewer.state.scenario import Scenario, Shown
 
 PACKAGES = ("numpy", "scipy", "numba", "viser")
@@ -34,31 +28,19 @@ CODE_TAG = '<script type="module" src="page.js"></script>'
 """Lines of page.html for which a file that is sent has the contents."""
 
 
-class MapPrint:
-    """The fingerprint of a map, computed when it is first asked for."""
-
-    def __init__(self, terrain: Terrain):
-        self._terrain, self._text = terrain, ""
-
-    @property
-    def text(self) -> str:
-        """The fingerprint."""
-        self._text = self._text or fingerprint(self._terrain)
-        return self._text
-
-
-def make_link(shown: Shown, ground: str, time: float, colours: Mapping[str, Any]) -> PageLink:
+def make_link(shown: Shown, ground: str, time: float, colouring: Colouring) -> PageLink:
     """Return the link to what is shown.
 
     Args:
         shown: What is shown.
         ground: Fingerprint of the map.
         time: Time of the drive [s].
-        colours: The fields `layer`, `heading` and `along` of the link.
+        colouring: What the ground is coloured by.
     """
     now = shown.scenario
     return PageLink(
-        rover=now.loaded.name,
+        loaded=rover_to_dict(now.loaded),
+        rover=rover_to_dict(now.rover),
         ground=ground,
         start=now.start,
         goal=now.goal,
@@ -66,10 +48,8 @@ def make_link(shown: Shown, ground: str, time: float, colours: Mapping[str, Any]
         soil=now.options.model.soil or "",
         path=shown.index + 1,
         time=time,
-        values=list_changed_values(now.loaded, now.rover),
         joints=dict(now.arm_angles),
-        rover_file="" if _is_preset(now.loaded) else write_rover(now.loaded),
-        **colours,
+        **dataclasses.asdict(colouring),
     )
 
 
@@ -81,7 +61,9 @@ def read_scenario(link: PageLink, wanted: Scenario, ground: str) -> Scenario:
     """
     if link.ground != ground:
         raise PlanningError("the link is about another map than this page shows")
-    loaded = _read_loaded(link)
+    loaded, rover = (
+        rover_from_dict(dict(one), "the rover in the link") for one in (link.loaded, link.rover)
+    )
     if loaded == wanted.loaded:
         loaded = wanted.loaded
     known = () if loaded.manipulator is None else loaded.manipulator.joints
@@ -95,28 +77,13 @@ def read_scenario(link: PageLink, wanted: Scenario, ground: str) -> Scenario:
     return dataclasses.replace(
         wanted,
         loaded=loaded,
-        rover=change_values(loaded, link.values),
+        rover=rover,
         start=link.start,
         goal=link.goal,
         options=options,
         arm_angles=dict(link.joints),
         recorded=wanted.recorded if same else None,
     )
-
-
-def _is_preset(rover: Rover) -> bool:
-    return rover.name in preset_names() and load_rover(rover.name) == rover
-
-
-def _read_loaded(link: PageLink) -> Rover:
-    """Return the rover that was loaded when a link was made."""
-    if link.rover_file:
-        return read_rover(link.rover_file, "the rover file in the link")
-    if link.rover not in preset_names():
-        raise PlanningError(
-            f"the link is about the rover {link.rover}, which is no preset; it has no file"
-        )
-    return load_rover(link.rover)
 
 
 def write_file(

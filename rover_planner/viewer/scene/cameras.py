@@ -11,7 +11,7 @@ from rover_physics.rover.model import Rover
 from rover_planner.viewer.scene.local_frame import LocalFrame
 from rover_planner.viewer.state.failure import Failure
 
-FIT, TOP, SIDE = "Fit", "Top", "Side"
+FIT, TOP, SIDE, START = "Fit", "Top", "Side", "Start"
 VIEWS = (FIT, TOP, SIDE)
 """Views that a visitor can choose."""
 SLANT = 0.9
@@ -37,7 +37,8 @@ class Cameras:
         Args:
             client: The visitor's client of viser.
             view: FIT all of the path from behind and beside; TOP the same from above, north at
-                the top; SIDE the rover from the right side of its path.
+                the top; SIDE the rover from the right side of its path; START along the path from
+                behind and beside its start.
             rover: The rover, for its size.
             path: (n, 3) points of the path.
             at: Where the rover is.
@@ -45,34 +46,23 @@ class Cameras:
         ahead = path[-1, :2] - path[0, :2]
         length = float(np.linalg.norm(ahead))
         ahead = ahead / length if length > 0.0 else np.array([1.0, 0.0])
-        beside, away = np.array([ahead[1], -ahead[0]]), MIN_AWAY * rover.wheel.radius
+        beside, least = np.array([ahead[1], -ahead[0]]), MIN_AWAY * rover.wheel.radius
         if view == SIDE:
-            self._place(client, at + 1.5 * away * np.array([*beside, 0.25]), at)
-            return
-        fov, aspect = _field_of_view(client)
-        middle = 0.5 * (path.min(axis=0) + path.max(axis=0))
-        radius = float(np.linalg.norm(path - middle, axis=1).max()) + find_radius(rover)
-        flat = 0.45 * beside - 0.65 * ahead
-        towards = np.array([*flat, SLANT] if view == FIT else [0.0, -1e-3, 1.0])
-        towards /= np.linalg.norm(towards)
-        away = MARGIN * max(radius, away) / np.sin(0.5 * fov) / min(aspect, 1.0)
-        self._place(client, middle + away * towards, middle)
-
-    def aim(self, client: Any, first: Floats, ahead: Floats, wheel_radius: float) -> None:
-        """Aim a visitor's camera along a line, from behind and beside its start.
-
-        Args:
-            client: The visitor's client of viser.
-            first: Start of the line.
-            ahead: (2,) from the start of the line to its end [m].
-            wheel_radius: [m]
-        """
-        length = max(float(np.linalg.norm(ahead)), 1.0)
-        beside = np.array([ahead[1], -ahead[0]]) / length
-        away = min(0.25 * length, 3.0) + 0.5 * MIN_AWAY * wheel_radius
-        flat = 0.9 * beside - 0.8 * ahead / length
-        position = first + away * np.array([*flat, SLANT])
-        self._place(client, position, first + np.array([*(0.12 * ahead), 0.0]))
+            towards, away, middle = np.array([*beside, 0.25]), 1.5 * least, at
+        elif view == START:
+            towards = np.array([*(0.9 * beside - 0.8 * ahead), SLANT])
+            away = min(0.25 * max(length, 1.0), 3.0) + 0.5 * least
+            middle = path[0] + [*(0.12 * length * ahead), 0.0]
+        else:
+            fov, aspect = _field_of_view(client)
+            middle = 0.5 * (path.min(axis=0) + path.max(axis=0))
+            radius = float(np.linalg.norm(path - middle, axis=1).max()) + find_radius(rover)
+            flat = 0.45 * beside - 0.65 * ahead
+            towards = np.array([*flat, SLANT] if view == FIT else [0.0, -1e-3, 1.0])
+            towards /= np.linalg.norm(towards)
+            away = MARGIN * max(radius, least) / np.sin(0.5 * fov) / min(aspect, 1.0)
+        from_here = path[0] if view == START else middle
+        self._place(client, from_here + away * towards, middle)
 
     def centre(self, place: Floats) -> None:
         """Let all cameras look at a place from the same side and distance as before."""

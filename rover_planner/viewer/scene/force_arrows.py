@@ -8,7 +8,7 @@ import numpy as np
 from rover_physics.rover.model import Rover
 from rover_planner.viewer.scene.local_frame import LocalFrame
 from rover_planner.viewer.state.colours import LOAD, TRACTION
-from rover_planner.viewer.state.trajectory import RoverState, find_axles
+from rover_planner.viewer.state.rover_state import RoverState
 
 WEIGHT_LENGTH = 4.0
 """Length of the arrow of a sixth of the rover's weight [wheel radii]."""
@@ -19,7 +19,7 @@ class ForceArrows:
 
     def __init__(self, scene: Any, rover: Rover, frame: LocalFrame, name: str = "/forces"):
         """Add arrows of no length to the scene, below a node `name`."""
-        self._frame, self._rover = frame, rover
+        self._frame = frame
         self._scale = WEIGHT_LENGTH * rover.wheel.radius / (rover.weight / 6.0)
         radius = rover.wheel.radius
         no_arrows = np.zeros((6, 2, 3))
@@ -33,8 +33,7 @@ class ForceArrows:
 
     def show(self, state: RoverState) -> None:
         """Draw the forces of a state, in proportion; one that is not known has no length."""
-        axis = find_axles(self._rover, state)
-        outwards = state.wheel_centres - state.contact_points
+        axis, outwards = state.axles, state.wheel_centres - state.contact_points
         normal = outwards - (outwards * axis).sum(axis=1, keepdims=True) * axis
         normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
         along = np.cross(axis, normal)

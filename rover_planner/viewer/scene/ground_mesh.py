@@ -13,14 +13,14 @@ from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.viewer.scene.glb import TexturedMesh
-from rover_planner.viewer.state.colours import BEYOND, GOOD, ColourScale, map_colours
+from rover_planner.viewer.state.colours import BEYOND, ColourScale, map_colours
 from rover_planner.viewer.state.layers import (
     FRICTION,
-    LAYERS,
+    PREDICTED,
     SLOPE,
-    colour_span,
+    STEEP,
     compute_slope,
-    predict_layer,
+    predict_use,
 )
 from rover_planner.viewer.state.survey_layers import ColouredGround, ShownSurvey
 
@@ -64,7 +64,7 @@ def build_ground_mesh(
     Args:
         rover: The rover, for layers that are predicted.
         terrain: The ground.
-        layer_name: One of LAYERS.
+        layer_name: One of `list_layers`.
         heading: Yaw of the rover, where layers are predicted [rad]; or a path (n, 3) whose yaw at
             the nearest waypoint it has.
         options: Options of the model for those.
@@ -72,35 +72,35 @@ def build_ground_mesh(
     Raises:
         RoverError: The model refuses an option.
     """
-    layer = LAYERS[layer_name]
     x, y, heights = subsample(terrain)
-    if layer.is_predicted:
+    beyond = np.zeros(heights.shape, bool)
+    if layer_name in PREDICTED:
         coarse_x, coarse_y, _ = subsample(terrain, MAX_PREDICTED)
         at = (coarse_x, coarse_y)
-        values, broken = predict_layer(layer, rover, terrain, heading, at, options)
-        beyond = _resample_nearest(broken, at, (x, y))
-        low, high = colour_span(layer, rover, values)
-        if layer.has_classes:
-            values = np.where(values == 1.0, values, np.nan)
-        colours = _resample_nearest(map_colours(values, low, high), at, (x, y))
-        if layer.has_classes:
-            known = _resample_nearest(np.isfinite(values), at, (x, y))
-            colours[known] = GOOD
+        used = predict_use(PREDICTED[layer_name], rover, terrain, heading, at, options)
+        values, scale = 100.0 * used, ColourScale(0.0, 100.0, "%", 0)
+        colours = _resample_nearest(map_colours(values, 0.0, 100.0), at, (x, y))
+        beyond = _resample_nearest(used > 1.0, at, (x, y))
         colours[beyond] = BEYOND
     else:
-        values = compute_slope(x, y, heights) if layer_name == SLOPE else heights
-        if layer_name == FRICTION and terrain.friction is not None:
-            stride = round((x[1] - x[0]) / terrain.resolution)
-            values = terrain.friction[::stride, ::stride]
-        beyond = np.zeros(heights.shape, bool)
-        low, high = colour_span(layer, rover, values)
-        colours = map_colours(values, low, high)
+        values, scale = _read_ground(terrain, layer_name, x, y, heights)
+        colours = map_colours(values, scale.low, scale.high)
     texture = _texture(_shade_hills(colours, x, y, heights), x, y, beyond)
-    classes = (("keeps all limits", GOOD),) if layer.has_classes else ()
-    return GroundMesh(
-        _build_textured_mesh(x, y, heights, texture),
-        ColourScale(low, high, layer.unit, layer.find_limit(rover), classes),
-    )
+    return GroundMesh(_build_textured_mesh(x, y, heights, texture), scale)
+
+
+def _read_ground(
+    terrain: Terrain, layer_name: str, x: Floats, y: Floats, heights: Floats
+) -> tuple[Floats, ColourScale]:
+    """Return the values (ny, nx) of a layer of the ground alone, and their colours."""
+    if layer_name == SLOPE:
+        return compute_slope(x, y, heights), ColourScale(0.0, STEEP, "deg", 0)
+    if layer_name == FRICTION and terrain.friction is not None:
+        stride = round((x[1] - x[0]) / terrain.resolution)
+        return terrain.friction[::stride, ::stride], ColourScale(0.0, 1.0, "")
+    known = heights[np.isfinite(heights)]
+    ends = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+    return heights, ColourScale(*ends, "m")
 
 
 def build_survey_mesh(

@@ -54,12 +54,12 @@ class PathOverlay:
     def __init__(self, scene: Any, labels: Labels, frame: LocalFrame):
         """Draw nothing yet."""
         self._scene, self._labels, self._frame = scene, labels, frame
-        self._poles: dict[str, Any] = {}
         self.ribbons: dict[int, Ribbon] = {}
         """The drawn paths by their index."""
         self._plan = Ribbon(scene, "/paths/plan")
         self._ghost = Ribbon(scene, "/paths/ghost")
         self._trail = Ribbon(scene, "/paths/trail")
+        self._poles = Ribbon(scene, "/paths/poles")
         self._old: set[int] = set()
         """Indices of the paths that are greyed."""
         self._numbers: dict[int, Floats] = {}
@@ -146,10 +146,9 @@ class PathOverlay:
 
     def clear(self) -> None:
         """Remove all that was drawn but the labels, which are moved to other places."""
-        for node in (*self.ribbons.values(), self._plan, self._ghost, *self._poles.values()):
+        for node in (*self.ribbons.values(), self._plan, self._ghost, self._poles):
             node.remove()
         self.ribbons.clear()
-        self._poles.clear()
         self._numbers.clear()
         self._old.clear()
 
@@ -213,24 +212,14 @@ class PathOverlay:
 
     def _draw_flags(self, terrain: Terrain, flags: Mapping[str, Floats], radius: float) -> None:
         """Draw poles of six wheel radii [m] with names at poses (3,)."""
-        labels = {}
-        for name, pose in flags.items():
-            place = np.array([pose[0], pose[1], _ground_height(terrain, pose[0], pose[1])])
-            foot = self._frame.to_scene(place)
+        labels, poles = {}, []
+        for name, (x, y, *_) in flags.items():
+            foot = self._frame.to_scene([x, y, _ground_height(terrain, x, y)])
             top = foot + np.array([0.0, 0.0, 6.0 * radius])
-            self._draw_pole(name, np.array([[foot, top]]), 0.1 * radius)
+            poles.append(Strand(np.array([foot, top]), UNKNOWN))
             labels[name] = Label(name, top)
+        self._poles.show(poles, NARROW)
         self._labels.show(FLAGS, labels)
-
-    def _draw_pole(self, name: str, line: Floats, width: float) -> None:
-        """Draw a line (1, 2, 3) of a width [m], or move the one of this name there."""
-        pole = self._poles.get(name)
-        if pole is None:
-            self._poles[name] = self._scene.add_line_segments(
-                f"/poles/{name}", line, UNKNOWN, thickness=width
-            )
-        else:
-            pole.points, pole.thickness = line, width
 
 
 def _thin(count: int) -> NDArray[np.intp]:

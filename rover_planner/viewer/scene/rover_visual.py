@@ -15,8 +15,8 @@ from rover_physics.numerics.quaternions import wxyz_about_y, wxyz_from_rpy
 from rover_physics.rover.manipulator import link_points
 from rover_physics.rover.model import Manipulator, Rover
 from rover_planner.viewer.scene.local_frame import LocalFrame
-from rover_planner.viewer.state.colours import BODY, DARK, METAL, colour_use
-from rover_planner.viewer.state.trajectory import RoverState
+from rover_planner.viewer.state.colours import BODY, DARK, METAL, REFUSED, Colour, colour_use
+from rover_planner.viewer.state.rover_state import RoverState
 
 GROUSERS = 16
 """Grousers of a wheel as it is drawn."""
@@ -39,34 +39,29 @@ class RoverVisual:
         self._root = scene.add_frame(name, show_axes=False)
         self._joints: dict[str, Any] = {}
         self._meshes: dict[str, Any] = {}
-        self._tyres: dict[str, Any] = {}
-        self.shape(rover)
-
-    def shape(self, rover: Rover) -> None:
-        """Give the nodes the shapes of a rover with the same parts, its arm stowed."""
-        self._put("body", make_body(rover), BODY)
+        """By the name of the link; that of a wheel is its tyre."""
+        self._colours: dict[str, Colour] = {}
+        self._failing = ""
+        self._put("body", "body", make_body(rover), BODY)
         wheel = make_wheel(rover)
         for side in SIDES:
             self._put_side(rover, side, wheel)
         self.turn_arm(rover, {})
 
-    def _put(self, name: str, mesh: trimesh.Trimesh, colour: tuple[int, int, int]) -> Any:
-        """Add a mesh, or give the one of this name another shape."""
-        node = self._meshes.get(name)
+    def _put(self, link: str, path: str, mesh: trimesh.Trimesh, colour: Colour) -> None:
+        """Add the mesh of a link, or give the one that is there another shape."""
+        node = self._meshes.get(link)
         if node is not None:
             node.vertices, node.faces = mesh.vertices, mesh.faces
-            return node
-        self._meshes[name] = self._scene.add_mesh_simple(
-            f"{self._name}/{name}", mesh.vertices, mesh.faces, color=colour, flat_shading=True,
+            return
+        self._colours[link] = colour
+        self._meshes[link] = self._scene.add_mesh_simple(
+            f"{self._name}/{path}", mesh.vertices, mesh.faces, color=colour, flat_shading=True,
             opacity=self._opacity, cast_shadow=self._opacity is None,
         )  # fmt: skip
-        return self._meshes[name]
 
-    def _put_joint(self, key: str, path: str, position: Floats) -> None:
-        if key in self._joints:
-            self._joints[key].position = position
-            return
-        self._joints[key] = self._scene.add_frame(
+    def _put_joint(self, link: str, path: str, position: Floats) -> None:
+        self._joints[link] = self._scene.add_frame(
             f"{self._name}/{path}", show_axes=False, position=position
         )
 
@@ -79,36 +74,49 @@ class RoverVisual:
         bogie = on_side(suspension.bogie_pivot, side)
         wheels = {name: on_side(suspension.wheels[name], side) for name in WHEEL_POSITIONS}
         rocker_path, bogie_path = f"rocker_{side}", f"rocker_{side}/bogie"
-        self._put_joint(rocker_path, rocker_path, rocker)
+        self._put_joint(f"rocker_{side}", rocker_path, rocker)
         self._put_joint(f"bogie_{side}", bogie_path, bogie - rocker)
         radius = 0.16 * rover.wheel.radius
         ends = [bogie - rocker, wheels[suspension.rocker_wheel] - rocker]
-        self._put(f"{rocker_path}/beams", make_beams(ends, radius), METAL)
+        self._put(f"rocker_{side}", f"{rocker_path}/beams", make_beams(ends, radius), METAL)
         ends = [wheels[name] - bogie for name in suspension.bogie_wheels]
-        self._put(f"{bogie_path}/beams", make_beams(ends, radius), METAL)
-        for name, centre in wheels.items():
-            on_bogie = name in suspension.bogie_wheels
-            path = f"{bogie_path if on_bogie else rocker_path}/{name}"
-            self._put_joint(f"{name}_{side}", path, centre - (bogie if on_bogie else rocker))
-            self._tyres[f"{name}_{side}"] = self._put(f"{path}/tyre", wheel[0], METAL)
-            self._put(f"{path}/grousers", wheel[1], DARK)
+        self._put(f"bogie_{side}", f"{bogie_path}/beams", make_beams(ends, radius), METAL)
+        for position, centre in wheels.items():
+            on_bogie, name = position in suspension.bogie_wheels, f"{position}_{side}"
+            path = f"{bogie_path if on_bogie else rocker_path}/{position}"
+            self._put_joint(name, path, centre - (bogie if on_bogie else rocker))
+            self._put(name, f"{path}/tyre", wheel[0], METAL)
+            self._put(f"{name} grousers", f"{path}/grousers", wheel[1], DARK)
 
     def turn_arm(self, rover: Rover, angles: Mapping[str, float]) -> None:
         """Show the arm at angles [rad] by joint name; joints without an angle are stowed."""
         if rover.manipulator is not None:
-            self._put("arm", make_arm(rover.manipulator, angles, rover.wheel.radius), DARK)
+            arm = make_arm(rover.manipulator, angles, rover.wheel.radius)
+            self._put("arm", "arm", arm, DARK)
 
-    def show(self, state: RoverState) -> None:
-        """Bring the joints and the colours of the wheels to a state."""
+    def show(self, state: RoverState, failing: str = "") -> None:
+        """Bring the joints and the colours of the wheels to a state.
+
+        Args:
+            state: The state.
+            failing: A link that fails there and has the colour of that: a name of WHEELS, body,
+                or rocker or bogie with its side, such as bogie_left; empty for none.
+        """
         self._root.position = self._frame.to_scene(state.position)
         self._root.wxyz = wxyz_from_rpy(*state.attitude)
         for k, side in enumerate(SIDES):
             self._joints[f"rocker_{side}"].wxyz = wxyz_about_y(float(state.rocker_angle[k]))
             self._joints[f"bogie_{side}"].wxyz = wxyz_about_y(float(state.bogie_angle[k]))
+        uses = state.friction_use
         for k, wheel in enumerate(WHEELS):
             turn = 0.0, float(state.spin[k]), float(state.steering_angle[k])
             self._joints[wheel].wxyz = wxyz_from_rpy(*turn)
-            self._tyres[wheel].color = colour_use(float(state.friction_use[k]))
+            self._meshes[wheel].color = colour_use(float(uses[k]))
+        for link in {self._failing, failing} - {""}:
+            colour = self._colours[link] if link not in WHEELS else self._meshes[link].color
+            self._meshes[link].color = REFUSED if link == failing else colour
+            self._meshes[link].opacity = self._opacity if link != failing else 1.0
+        self._failing = failing
 
     def remove(self) -> None:
         """Remove all nodes."""
@@ -131,13 +139,6 @@ def look_alike(one: Rover, other: Rover) -> bool:
     return (
         replace(one, wheel=wheel, friction=friction, nominal_speed=speed, limits=limits) == other
     )
-
-
-def have_same_parts(one: Rover, other: Rover) -> bool:
-    """Return whether two rovers differ in shape only: the same links, and an arm or none."""
-    a, b = one.suspension, other.suspension
-    same = (a.rocker_wheel, a.bogie_wheels) == (b.rocker_wheel, b.bogie_wheels)
-    return same and (one.manipulator is None) == (other.manipulator is None)
 
 
 def on_side(point: tuple[float, float, float], side: str) -> Floats:

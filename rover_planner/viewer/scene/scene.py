@@ -15,8 +15,8 @@ from rover_planner.viewer.scene.force_arrows import ForceArrows
 from rover_planner.viewer.scene.labels import Labels
 from rover_planner.viewer.scene.local_frame import LocalFrame
 from rover_planner.viewer.scene.overlays import PathOverlay
-from rover_planner.viewer.scene.rover_visual import RoverVisual, have_same_parts, look_alike
-from rover_planner.viewer.state.trajectory import RoverState
+from rover_planner.viewer.scene.rover_visual import RoverVisual, look_alike
+from rover_planner.viewer.state.rover_state import RoverState
 
 
 class Scene:
@@ -53,13 +53,10 @@ class Scene:
         """
         if self._visual is None or not look_alike(self._rover, rover):
             visual, self._visual = self._visual, None  # an error must not leave half a rover
-            if visual is not None and have_same_parts(self._rover, rover):
-                visual.shape(rover)
-            else:
-                if visual is not None:
-                    visual.remove()
-                visual = RoverVisual(self._scene, rover, self.frame)
-            self._visual, self._rover, self._arm = visual, rover, {}
+            if visual is not None:
+                visual.remove()
+            self._visual = RoverVisual(self._scene, rover, self.frame)
+            self._rover, self._arm = rover, {}
             self._forces = ForceArrows(self._scene, rover, self.frame)
             self.show(self._state)
         self.turn_arm(arm_angles)
@@ -82,12 +79,12 @@ class Scene:
             return
         self._visual.visible = state is not None
         self._forces.visible = self._forces_shown and state is not None
-        self.failure.make_room(state)
+        failing = self.failure.make_room(state)
         if state is None:
             self._last_position = None
             return
         with self._server.atomic():
-            self._visual.show(state)
+            self._visual.show(state, failing)
             self._forces.show(state)
             if self._last_position is not None:
                 self.cameras.go_along(state.position - self._last_position)
@@ -99,24 +96,12 @@ class Scene:
         if follows and self._last_position is not None:
             self.cameras.centre(self._last_position)
 
-    def aim_camera(self, client: Any, terrain: Terrain, start: Any, goal: Any) -> None:
-        """Aim the camera of a visitor along the line from start to goal, from behind and beside.
-
-        Args:
-            client: The visitor's client of viser.
-            terrain: The ground.
-            start: x and y [m], further values are not used.
-            goal: The same.
-        """
-        first = _lift(terrain, np.array([start[:2]]))[0]
-        self.cameras.aim(client, first, np.subtract(goal[:2], start[:2]), self._rover.wheel.radius)
-
     def look(self, client: Any, view: str, terrain: Terrain, points: Floats) -> None:
         """Let the camera of a visitor look at a path (n, 2) [m], or at the rover on it.
 
         Args:
             client: The visitor's client of viser.
-            view: One of VIEWS.
+            view: A view of `Cameras.look`.
             terrain: The ground.
             points: x and y of the path.
         """

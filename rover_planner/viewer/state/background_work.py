@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 from rover_physics.numerics.interruption import interruptible
-from rover_planner.errors import PlanningError
 
 PATIENCE = 0.2
 """Time for which work may go on to its first result although a newer request waits [s]: a slider
@@ -55,7 +54,7 @@ class Delivery(Generic[Request, Result]):
     """The error; None with a result."""
 
 
-class _StoppedError(PlanningError):
+class _StoppedError(Exception):
     """Leaves work that was cancelled or replaced."""
 
 

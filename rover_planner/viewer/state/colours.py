@@ -24,8 +24,6 @@ MIDDLE = (240, 228, 66)
 METAL, DARK, BODY = (150, 155, 160), (50, 52, 56), (225, 220, 205)
 BEYOND = REFUSED
 """Vermillion, hatched: ground where a limit is broken."""
-GOOD = (143, 196, 224)
-"""Pale blue: ground where the rover keeps its limits."""
 UNKNOWN = (110, 110, 110)
 CASING = (16, 16, 16)
 """The line from a label to what it is about."""
@@ -41,10 +39,8 @@ class ColourScale:
     """Value of the last colour."""
     unit: str
     """Unit of both, empty for none."""
-    limit: float | None = None
-    """Limit of the rover; None if it has none. Ground beyond it is hatched in BEYOND."""
-    classes: tuple[tuple[str, Colour], ...] = ()
-    """Words and colours of classes, for a layer without a scale."""
+    digits: int = 2
+    """Digits behind the point of both."""
 
 
 def map_colours(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.uint8]:

@@ -1,20 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """The first failure of a judged path: limit, value, wheel or link, place and time."""
 
-from dataclasses import dataclass, fields
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
 from rover_physics.names import SIDES, WHEEL_POSITIONS, WHEELS
-from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.planning.asked_poses import AskedPoses
 from rover_planner.viewer.state.limits import ShownLimit
 from rover_planner.viewer.state.path_limits import PathLimits
-from rover_planner.viewer.state.trajectory import RoverState, make_state, read_series
+from rover_planner.viewer.state.rover_state import RoverState, place_state
 
 BODY = "body"
 """Name of the body among the links."""
@@ -122,43 +120,24 @@ def find_failure(
 
 
 def _state_at(rover: Rover, rows: AskedPoses, at: int) -> RoverState:
-    """Return the state at a row at which the rover settles, with unturned wheels."""
-    series = read_series(rover, rows.prediction.select([at]))
-    series |= {"distance": rows.distance[[at]], "time": rows.time[[at]], "spin": np.zeros((1, 6))}
-    return make_state({name: values[0] for name, values in series.items()})
+    """Return the state at a row at which the rover settles, with unturned wheels.
+
+    Between waypoints it has the energy of the last one.
+    """
+    here, spent = rows.prediction.select([at]), rows.prediction.energy[: at + 1]
+    spent = spent[~rows.is_between[: at + 1]]
+    driven = {"distance": rows.distance[at], "time": rows.time[at], "energy": spent[-1]}
+    return RoverState(rover, here, np.zeros(6)).change(**driven)
 
 
 def level_state(rover: Rover, terrain: Terrain, rows: AskedPoses, at: int) -> RoverState:
-    """Return a level rover without forces at a row, above the ground below its origin."""
+    """Return a level rover of unknown forces at a row, above the ground below its origin."""
     x, y, yaw = rows.prediction.poses[at].tolist()
-    height = float(terrain.elevation_at(x, y))
-    height = height if np.isfinite(height) else 0.0
+    height = float(np.nan_to_num(terrain.elevation_at(x, y)))
     standing = rover.wheel.radius - rover.suspension.wheels["middle"][2]
+    driven = {"distance": rows.distance[at], "time": rows.time[at]}
     position = np.array([x, y, height + standing])
-    c, s = np.cos(yaw), np.sin(yaw)
-    centres = place_wheels(rover) @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    sizes = {"rocker_angle": 2, "bogie_angle": 2, "motion": 3}
-    values: dict[str, Any] = {
-        field.name: 0.0 if field.type is float else np.zeros(sizes.get(field.name, 6))
-        for field in fields(RoverState)
-    }
-    values |= {
-        "distance": float(rows.distance[at]),
-        "time": float(rows.time[at]),
-        "position": position,
-        "attitude": np.array([0.0, 0.0, yaw]),
-        "wheel_centres": position + centres,
-        "contact_points": position + centres - [0.0, 0.0, rover.wheel.radius],
-    }
-    return RoverState(**values)
-
-
-def place_wheels(rover: Rover) -> Floats:
-    """Return the wheel centres (6, 3) on flat ground, body frame [m]."""
-    sides = {"left": (1.0, 1.0, 1.0), "right": (1.0, -1.0, 1.0)}
-    names = (name.rsplit("_", 1) for name in WHEELS)
-    wheels = rover.suspension.wheels
-    return np.array([np.multiply(wheels[position], sides[side]) for position, side in names])
+    return place_state(rover, position, np.array([0.0, 0.0, yaw]), **driven)
 
 
 def _find_link(rover: Rover, terrain: Terrain, code: str, rows: AskedPoses, at: int) -> str:

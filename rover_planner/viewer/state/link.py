@@ -5,15 +5,12 @@ import base64
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Any
 from urllib.parse import parse_qs
 
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
-from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_file import rover_to_dict
 from rover_planner.errors import PlanningError
-from rover_planner.studies.rover_values import get_value, list_values, with_value
 from rover_planner.viewer.state.scenario import Pose
 
 KEY = "view"
@@ -30,8 +27,10 @@ class PageLink:
 
     __pydantic_config__ = ConfigDict(allow_inf_nan=False, extra="forbid")
 
-    rover: str
-    """Name of the rover as it was loaded."""
+    loaded: Mapping[str, Any]
+    """Content of the file of the rover as it was loaded."""
+    rover: Mapping[str, Any]
+    """The same with its numbers as they were changed since."""
     ground: str
     """Fingerprint of the map."""
     start: Pose
@@ -50,43 +49,13 @@ class PageLink:
     """Name of the layer that colours the ground."""
     heading: Annotated[float, Field(ge=-180.0, le=180.0)]
     """Heading of the rover for predicted layers [deg]."""
-    values: Mapping[str, float] = field(default_factory=dict)
-    """Changed numbers of the rover by label."""
     joints: Mapping[str, float] = field(default_factory=dict)
     """Angles of the arm's joints by name [rad]."""
     along: bool = False
     """True if predicted layers are for the heading of the path, not for `heading`."""
-    rover_file: str = ""
-    """Text of the file of the rover as it was loaded; empty for a preset."""
 
 
 LINK = TypeAdapter(PageLink)
-
-
-def list_changed_values(loaded: Rover, rover: Rover) -> dict[str, float]:
-    """Return the numbers, by label, in which a rover differs from the one that was loaded."""
-    old, new, found = rover_to_dict(loaded), rover_to_dict(rover), {}
-    for one in (value for part in list_values(loaded).values() for value in part):
-        was, now = (get_value(data, one.keys[0]) for data in (old, new))
-        if abs(was - now) > 1e-9:
-            found[one.label] = now
-    return found
-
-
-def change_values(loaded: Rover, values: Mapping[str, float]) -> Rover:
-    """Return a rover with changed numbers, by label.
-
-    Raises:
-        PlanningError: There is no such number.
-        RoverError: The changed rover is invalid.
-    """
-    known = {value.label: value for part in list_values(loaded).values() for value in part}
-    rover = loaded
-    for label, number in values.items():
-        if label not in known:
-            raise PlanningError(f"the link changes {label!r}, which {loaded.name} does not have")
-        rover = with_value(rover, known[label].keys, number)
-    return rover
 
 
 def write_link(link: PageLink) -> str:
@@ -99,8 +68,8 @@ def write_link(link: PageLink) -> str:
     query = f"{KEY}={packed.decode().rstrip('=')}"
     if len(query) >= MAX_LENGTH:
         raise PlanningError(
-            f"the link would have {len(query)} characters with the file of {link.rover}; an "
-            f"address holds {MAX_LENGTH}. Save the rover file and the HTML file instead"
+            f"the link would have {len(query)} characters with the file of {link.rover['name']}; "
+            f"an address holds {MAX_LENGTH}. Save the rover file and the HTML file instead"
         )
     return query
 

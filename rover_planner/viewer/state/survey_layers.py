@@ -2,7 +2,6 @@
 """A survey whose layers colour the ground: opened, compared with what is shown, and read."""
 
 import json
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,6 @@ from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.classification import IMPASSABLE
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
 from rover_planner.survey.chunk_survey import open_map
@@ -25,11 +23,10 @@ from rover_planner.survey.geotiff import GeoTiffMap
 from rover_planner.survey.layers import (
     CLASS_COLOURS,
     CLASS_LABELS,
-    CLASS_NUMBERS,
-    NOT_SURVEYED,
-    SOME_HEADINGS,
     UNKNOWN_LABEL,
+    count_skipped,
     number_limits,
+    read_drawn_classes,
 )
 from rover_planner.survey.store import SurveyStore
 from rover_planner.viewer.state.colours import UNKNOWN, Colour, from_css
@@ -70,14 +67,15 @@ class ShownSurvey:
 
         Each is that of the nearest surveyed cell that is read.
         """
-        limits = number_limits()
         if name == CLASS:
-            numbers, colours = self._read_classes(limits), list_class_colours()
+            numbers = read_drawn_classes(self._store, self._every)
+            colours: tuple[Colour, ...] = tuple(map(from_css, CLASS_COLOURS))
             labels: tuple[str, ...] = CLASS_LABELS
         else:
-            names = {number: code.replace("_", " ") for code, number in limits.items()}
+            names = {number: code.replace("_", " ") for code, number in number_limits().items()}
             labels = tuple(names[k] or "none: all headings pass" for k in sorted(names))
-            numbers, colours = self._read("first_limit"), list_limit_colours()
+            every, colours = self._every, list_limit_colours()
+            numbers = np.asarray(self._store.layer("first_limit")[::every, ::every])
         table = np.full((256, 3), UNKNOWN, np.uint8)
         table[: len(colours)] = colours
         found = np.unique(numbers)
@@ -115,20 +113,7 @@ class ShownSurvey:
     @property
     def _every(self) -> int:
         """Of how many cells along a side one is read."""
-        return max(1, -(-max(self._store.notes.layout.shape) // MAX_READ))
-
-    def _read(self, layer: str) -> NDArray:
-        return np.asarray(self._store.layer(layer)[:: self._every, :: self._every])
-
-    def _read_classes(self, limits: Mapping[str, int]) -> NDArray:
-        """Return the numbers of classes; NOT_SURVEYED where the ground is unknown, too."""
-        worst, best, first = map(self._read, ("worst_class", "best_class", "first_limit"))
-        impassable = CLASS_NUMBERS[IMPASSABLE]
-        shown = worst.copy()
-        shown[(worst == impassable) & (best < impassable)] = SOME_HEADINGS
-        off_ground = [limits[code] for code in ("off_map", "unknown_ground")]
-        shown[(best == impassable) & np.isin(first, off_ground)] = NOT_SURVEYED
-        return shown
+        return count_skipped(self._store, MAX_READ)
 
     def _place(self, colours: NDArray[np.uint8], x: Floats, y: Floats) -> NDArray[np.uint8]:
         """Return the colours of cells at x and y, grey off the survey."""
@@ -198,11 +183,6 @@ def load_map(path: Path, max_cells: int) -> Terrain:
     return Terrain(
         **grids, resolution=frame.resolution, origin=frame.origin, soil_names=source.soil_names
     )
-
-
-def list_class_colours() -> tuple[Colour, ...]:
-    """Return the colours of the classes by number."""
-    return tuple(map(from_css, CLASS_COLOURS))
 
 
 def list_limit_colours() -> tuple[Colour, ...]:

@@ -94,7 +94,8 @@ def test_a_rover_at_a_hill_that_no_map_shows_goes_back_and_gives_up_at_last(make
     rover = make_rover(make_terrain(hill, half=4.0))
     goal, told = (1.5, 0.0, 0.0), []
     plan = rover.ask(rover.plant.pose(), goal)["poses"]
-    with pytest.raises(DriveFailedError, match="3 other ways led nowhere from .* stood for 0.3 s"):
+    hindrance = "3 other paths led nowhere from .* stood for 0.3 s"
+    with pytest.raises(DriveFailedError, match=hindrance):
         drive_to(rover, goal, plan, SETTINGS, told.append)
     first, again = rover.asked[1], rover.asked[2]
     assert first[0] - again[0] == pytest.approx(0.4, abs=0.15)  # back along the plan

@@ -281,10 +281,7 @@ def test_on_rough_soil_servos_drive_wherever_equal_torques_suffice(soil, curvatu
 
 BAND, FULL = 0.01, 0.2
 RADIUS, WIDTH, WEIGHT = 0.1, 0.1, 80.0
-SOILS = {
-    name: pack_soils((name,))[-1]
-    for name in ("lunar_nominal", "mars_simulant", "dry_sand", "lete_sand")
-}
+SOILS = {name: pack_soils((name,))[-1] for name in SOFT}
 
 ways = st.floats(-1.5, 1.5)
 velocities = st.tuples(ways, ways, st.floats(-0.05, 0.05))
@@ -296,28 +293,13 @@ limits = st.floats(0.02, 0.5)
 many = settings(max_examples=100)
 
 
-def servo_of(limit, droop=0.3, share=1.0):
+def servo_of(limit, droop, share=1.0):
     """Return the SERVO of one wheel that is commanded to roll at the nominal speed."""
     servo = new_record(
         SERVO_RECORD, droop=droop, full_traction=FULL, max_traction=limit, creep=BAND,
         friction_share=share, radius=RADIUS, width=WIDTH, weight=WEIGHT,
     )  # fmt: skip
     servo.command[0] = 1.0
-    return servo
-
-
-def roll(grip, velocity, droop=0.3, limit=0.2):
-    """Return the SERVO of a wheel on firm ground with the friction force `grip` [weights]."""
-    servo = servo_of(limit, droop)
-    roll_wheel(servo, 0, grip, velocity)
-    return servo
-
-
-def roll_soft(soil, load, velocity, droop=0.3, limit=0.2, share=1.0):
-    """Return the SERVO of a wheel on soil with a load [weights]."""
-    servo = servo_of(limit, droop, share)
-    servo.soil[0], servo.load[0], servo.slip[0] = SOILS[soil], load, np.nan
-    roll_on_soil(servo, 0, velocity)
     return servo
 
 
@@ -349,7 +331,9 @@ def expected(grip, velocity, droop, limit) -> np.ndarray:
 @given(grips, velocities, droops, limits)
 def test_forces_are_those_of_servo_and_friction_law(grip, velocity, droop, limit):
     assume(abs(limit - grip) >= 1e-3 * grip)  # all friction along the wheel: slip is unbounded
-    force = roll(grip, velocity, droop, limit).force[0]
+    servo = servo_of(limit, droop)
+    roll_wheel(servo, 0, grip, velocity)
+    force = servo.force[0]
     np.testing.assert_allclose(force, expected(grip, velocity, droop, limit), atol=1e-7)
     assert np.hypot(force[T], force[S]) <= grip + 1e-9
     assert abs(force[T]) <= limit + 1e-12
@@ -377,7 +361,9 @@ def soil_forces(soil, load, velocity, rim) -> tuple[np.ndarray, float]:
 @many
 @given(soils, loads, velocities, droops, st.floats(0.5, 1.0))
 def test_forces_are_those_of_servo_and_soil(soil, load, velocity, droop, share):
-    servo = roll_soft(soil, load, velocity, droop, 10.0, share)
+    servo = servo_of(10.0, droop, share)
+    servo.soil[0], servo.load[0], servo.slip[0] = SOILS[soil], load, np.nan
+    roll_on_soil(servo, 0, velocity)
 
     def excess(rim):
         shear, resistance = soil_forces(soil, load, velocity, rim)

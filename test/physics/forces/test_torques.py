@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.optimize import linprog
 
 from rover_physics import SweepOptions, find_torque_ranges, judge_path, load_rover
 from rover_physics.traversability.verdict import hold_against_limits
-from support.best_torques import can_stand
+from support.best_torques import INSIDE, can_stand, solve_forces
 from support.reference_cases import reference_ground
 from support.rough_grounds import fractal, plane, random_poses, rocky, smooth
-from support.rover_geometry import balance_matrix, free_balance_matrix
+from support.rover_geometry import balance_matrix
 
 LSR1 = load_rover("lsr1")
 STEP = reference_ground("settled_a/step")
@@ -85,39 +84,15 @@ def test_neither_policy_nor_tool_load_moves_the_rover():
         assert not np.array_equal(here.wheel_loads, there.wheel_loads)
 
 
-SIDES = 96
-
-
 def range_by_program(prediction, i, wheel, max_torque, *, inside: bool, shared: bool):
-    """Return the range [N m] of a wheel's torque by linear programs in N, T and lateral forces.
-
-    The friction cones are replaced by pyramids around them or inside them. Lateral forces are
-    s0 + s1 along where shared, else each wheel has its own.
-    """
-    A, b = free_balance_matrix(LSR1, prediction, i)
-    sideways = np.eye(6)
-    if shared:
-        A, b, along = balance_matrix(LSR1, prediction, i)
-        sideways = np.column_stack([np.ones(6), along])
-    turns = 2.0 * np.pi * np.arange(SIDES) / SIDES
-    shrink = np.cos(np.pi / SIDES) if inside else 1.0
-    rows = np.zeros((6 * SIDES, A.shape[1]))
-    for w in range(6):
-        own = slice(w * SIDES, (w + 1) * SIDES)
-        rows[own, w] = -shrink * prediction.friction[i, w]
-        rows[own, 6 + w] = np.cos(turns)
-        rows[own, 12:] = np.outer(np.sin(turns), sideways[w])
-    pull = max_torque / (LSR1.wheel.radius * LSR1.weight)
-    lateral = [(None, None)] * sideways.shape[1]
-    bounds = [(0.0, None)] * 6 + [(-pull, pull)] * 6 + lateral
-    ends = []
-    for sign in (1.0, -1.0):
-        cost = np.zeros(A.shape[1])
-        cost[6 + wheel] = sign
-        answer = linprog(cost, rows, np.zeros(len(rows)), A, b, bounds, method="highs")
-        assert answer.status == 0, answer.message
-        ends.append(sign * answer.fun * LSR1.wheel.radius * LSR1.weight)
-    return np.array(ends)
+    """Return the range [N m] of a wheel's torque by linear programs."""
+    unit, share = LSR1.wheel.radius * LSR1.weight, INSIDE if inside else 1.0
+    cost = np.eye(12)[6 + wheel]
+    ends = [
+        sign * solve_forces(LSR1, prediction, i, sign * cost, max_torque, share, shared).fun
+        for sign in (1.0, -1.0)
+    ]
+    return unit * np.array(ends)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sweeps: bad arguments, waypoints on their own, time and energy, scores, several at once."""
 
-import itertools
 import threading
 from contextlib import suppress
 from unittest.mock import Mock
@@ -24,7 +23,7 @@ from rover_physics import (
 )
 from rover_physics.errors import ModelError, PoseError
 from rover_physics.numerics import interruption
-from rover_physics.numerics.interruption import check_interruption, interruptible, slices
+from rover_physics.numerics.interruption import interruptible
 from rover_physics.results.record import QUANTITIES
 from rover_physics.traversability.verdict import hold_against_limits
 from support.grounds import gap, make_terrain, waves
@@ -263,15 +262,6 @@ def test_a_short_sweep_does_not_wait_for_the_end_of_a_long_one():
     assert not ended.is_set()
     enough.set()
     thread.join()
-
-
-def test_slices_cover_all_items_once_and_in_order_and_without_a_check_there_is_one():
-    check_interruption()
-    assert list(slices(10**6)) == [slice(0, 10**6)]
-    with interruptible(lambda: None):
-        parts = list(slices(3000))
-    assert parts[0].start == 0 and parts[-1].stop == 3000 and len(parts) > 1
-    assert all(one.stop == other.start for one, other in itertools.pairwise(parts))
 
 
 def test_a_check_that_raises_ends_the_sweep_and_the_next_one_runs():

@@ -9,7 +9,7 @@ import pytest
 from rover_physics import load_rover
 from rover_physics.rover.steering_joints import tightest_radius
 from rover_planner.planning.angles import wrap
-from rover_planner.planning.search.nodes import HEADINGS, STEPS, YAWS, opposite
+from rover_planner.planning.search.nodes import HEADINGS, YAWS
 from rover_planner.planning.search.primitives import Gear, make_primitives
 
 SPACING = 0.02
@@ -51,10 +51,3 @@ def test_a_primitive_is_driven_in_its_gear_and_fixed_wheels_do_not_turn_on_the_s
         sign = {Gear.FORWARD: 1.0, Gear.BACKWARD: -1.0, Gear.ON_THE_SPOT: 0.0}[one.gear]
         np.testing.assert_array_equal(np.sign(np.round(ahead, 12)), sign)
         np.testing.assert_allclose(aside, 0.0, atol=5e-3 * SPACING)
-
-
-def test_headings_point_along_their_steps_and_turn_all_around():
-    assert len(set(STEPS)) == HEADINGS
-    for heading, (x, y) in enumerate(STEPS):
-        assert YAWS[heading] == pytest.approx(np.arctan2(y, x))
-        assert STEPS[opposite(heading)] == (-x, -y)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tests of the files that hold a question for a way."""
+"""Tests of the files that hold a question for a path."""
 
 import json
 
@@ -39,7 +39,7 @@ def test_a_question_is_read_as_it_was_written(written):
 
 def test_a_terrain_file_is_no_question(tmp_path):
     save_terrain(tmp_path / "ground.npz", make_terrain(waves))
-    with pytest.raises(PlanningError, match="ground.npz holds no question for a way"):
+    with pytest.raises(PlanningError, match="ground.npz holds no question for a path"):
         read_query(tmp_path / "ground.npz")
 
 

@@ -38,8 +38,8 @@ from rover_planner.viewer.live.live_state import (
     Click,
     LearnedTrail,
     LiveVerdict,
-    StateBuilder,
     TopicAge,
+    read_state,
 )
 from support.grounds import make_terrain, wall_at
 from support.waiting import wait_until
@@ -105,7 +105,7 @@ def test_the_state_has_the_measured_joints(listener, talker):
         lambda: len(listener.latest().values.joints) == 10 and listener.latest().values.speed,
         "joints and odometry",
     )
-    state = StateBuilder(LSR1).build(listener.latest().values)
+    state = read_state(LSR1, listener.latest().values)
     assert state is not None
     np.testing.assert_allclose(state.position, [1.0, 2.0, 0.3])
     np.testing.assert_allclose(state.rocker_angle, [0.1, -0.1])
@@ -152,7 +152,7 @@ def test_estimates_of_the_controller_take_precedence_over_predictions(listener, 
 
 
 def test_invalid_messages_are_skipped_and_values_without_a_topic_are_nan(ros, listener, talker):
-    assert StateBuilder(LSR1).build(listener.latest().values) is None
+    assert read_state(LSR1, listener.latest().values) is None
     assert listener.latest().terrain is None and listener.latest().verdict is None
     broken = JointState(name=["rocker_right"], position=[float("nan")])
     talker.joints.publish(broken)
@@ -165,7 +165,7 @@ def test_invalid_messages_are_skipped_and_values_without_a_topic_are_nan(ros, li
     )
     assert ros.is_alive(listener)
     assert "rocker_right" not in listener.latest().values.joints
-    state = StateBuilder(LSR1).build(listener.latest().values)
+    state = read_state(LSR1, listener.latest().values)
     assert state is not None and np.isnan(state.tip_over_ratio)
     for values in (state.wheel_loads, state.friction_use, state.torque_use):
         assert np.isnan(values).all()
@@ -244,7 +244,7 @@ def test_a_rover_its_map_and_the_answers_of_its_server_are_followed(ros, listene
     wait_until(lambda: joints <= set(listener.latest().values.joints), "the joints")
     data = listener.latest()
     assert data.verdict.traversable
-    state = StateBuilder(LSR1).build(data.values)
+    state = read_state(LSR1, data.values)
     assert state is not None
     plant = simulator.simulation.plant
     assert state.position == pytest.approx(plant.state().position, abs=1e-6)

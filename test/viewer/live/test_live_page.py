@@ -24,7 +24,7 @@ pytestmark = pytest.mark.slow
 
 LSR1 = load_rover("lsr1")
 QUERY = write_link(
-    PageLink("lsr1", "0", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), "equal", "", 1, 0.0, "height", 0.0)
+    PageLink({}, {}, "0", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), "equal", "", 1, 0.0, "height", 0.0)
 )
 LEVEL = Terrain(np.zeros((160, 160)), 0.05, (-4.0, -4.0))
 
