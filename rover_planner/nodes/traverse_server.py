@@ -131,13 +131,12 @@ class TraverseServer(Node):
         )
         self.desk = QuestionDesk(self, self.service, self._maps, self.guard, self._heard.poll)
         """Takes the questions of all services."""
-        self.desk.set_limits(self._values.time_budget, self._values.max_waiting)
         self._create_subscriptions(reliability)
         serve_later(self, GetPlan, "~/can_traverse", self._can_traverse)
         serve_later(self, Trigger, "~/check_path", self._check_path)
         PathValidity(self.desk, frame, self.publish, self.localise_path).serve(self)
         PathComputation.serve(self, self.desk, self.read_question, self.publish)
-        self._advice = AdviceTopics(self, self.desk, self.guard, self._values.advice_time)
+        self._advice = AdviceTopics(self, self.service, self.desk, self.guard)
         self.create_service(Trigger, "~/cancel", self._cancel)
         self.create_service(Trigger, "~/clear_places", self._clear_marks)
         self.arm = ArmTopics(self, self.desk, frame, reliability)
@@ -190,8 +189,6 @@ class TraverseServer(Node):
     def _apply_parameters(self, parameters: TraverseServerParameters) -> None:
         self._values = parameters
         self.service.settings = load_service_settings(parameters)
-        self.desk.set_limits(parameters.time_budget, parameters.max_waiting)
-        self._advice.seconds = parameters.advice_time
         self._maps.apply(parameters)
         self.watch.apply(parameters)
         self.frames.apply_timeout(parameters.transform_timeout)

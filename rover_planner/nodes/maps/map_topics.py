@@ -19,11 +19,11 @@ from rover_physics.errors import RoverError
 from rover_physics.files.validation import show_file
 from rover_physics.terrain.grid import load_terrain
 from rover_planner.maps.living_map import MapSnapshot
-from rover_planner.maps.map_file import MapFileError, open_map
+from rover_planner.maps.map_file import MapFileError, MapLimits, open_map
 from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.maps.summary import describe_terrain
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.service_settings import map_limits, map_rules
+from rover_planner.planning.answering.service_settings import map_rules
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.deferred_service import Reply, serve_later
@@ -164,7 +164,9 @@ class MapTopics:
     def _load(self, url: str, response: LoadMap.Response) -> None:
         """Take the map of a file and fill the response."""
         try:
-            terrain = open_map(url, map_limits(self._values))
+            values = self._values
+            limits = MapLimits(values.map_folder, values.max_map_bytes, values.max_map_cells)
+            terrain = open_map(url, limits)
             snapshot = self._keeper.load(terrain, self._now(), self._service.standing())
         except RoverError as error:
             self._node.get_logger().error(f"load_map: {error}")

@@ -10,7 +10,6 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steering_joints import check_joint_limit
 from rover_physics.terrain.soil_file import soil_named
 from rover_planner.maps.living_map import MapRules
-from rover_planner.maps.map_file import MapLimits
 from rover_planner.parameters.shared import payload_or_none
 from rover_planner.parameters.traverse_server import (
     INTERPOLATE,
@@ -56,11 +55,6 @@ class ServiceSettings:
         """Names of the manipulator's joints, () if the rover has no manipulator."""
         manipulator = self.rover.manipulator
         return tuple(manipulator.joints) if manipulator is not None else ()
-
-
-def map_limits(parameters: TraverseServerParameters) -> MapLimits:
-    """Return what clients may load as a map."""
-    return MapLimits(parameters.map_folder, parameters.max_map_bytes, parameters.max_map_cells)
 
 
 def map_rules(parameters: TraverseServerParameters) -> MapRules:
