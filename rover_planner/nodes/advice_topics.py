@@ -11,8 +11,9 @@ from std_srvs.srv import Trigger
 
 from msg_adapters.results.diagnostics import to_json
 from rover_physics.errors import RoverError
+from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.advice.advise import Advice, grow_within
-from rover_planner.advice.case import ACCEPTED_CHANCE, Case
+from rover_planner.advice.case import Case
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.planning.answering.budget import BUSY, CANCELLED, Budget, QuestionStoppedError
 from rover_planner.planning.answering.judgement import PathJudgement

@@ -24,9 +24,9 @@ SLACK = 1.1
 """Costs to the goal are measured up to this multiple of the cost from start to goal."""
 FEW = 500
 """Number of nodes that a search may expand beside those of its path before it counts as misled."""
-GUESSED = 3000
+GUESSED, EAGERNESS = 8000, 1.5
 """Number of nodes that searches may expand so before costs to the goal that are guessed are
-measured."""
+measured, and guessed costs over those on level ground: the larger, the sooner is a path found."""
 GIVEN_UP = -2
 """Result of a search that would expand too many nodes."""
 
@@ -417,7 +417,7 @@ class ShortestPaths:
     def _guess(self, caution: float, goals: Seeds) -> None:
         """Take the costs to the goal for those on level ground as the crow flies."""
         nodes = self._edges.nodes
-        cell = nodes.cell * (1.0 + caution * PRICE * LEAST_DIFFICULTY)
+        cell = EAGERNESS * nodes.cell * (1.0 + caution * PRICE * LEAST_DIFFICULTY)
         (row, column), radius = nodes.surround(goals.nodes)
         rows, columns = np.ogrid[: nodes.shape[0], : nodes.shape[1]]
         away = np.maximum(cell * np.hypot(rows - row, columns - column) - radius, 0.0)
