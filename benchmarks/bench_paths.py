@@ -28,7 +28,7 @@ from rover_physics import (
     score_poses,
 )
 from rover_physics.names import EQUAL, SERVO
-from rover_planner.command.options import ACCEPTED_CHANCE
+from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.command.prediction_files import read_poses, write_prediction
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
 from rover_planner.worlds.mars_terrain import make_mars_terrain

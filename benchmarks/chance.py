@@ -16,7 +16,14 @@ import numpy as np
 import typer
 
 from benchmarks.measure import print_table
-from support.chance_paths import HELD_OUT, TOLD, DrivenPath, find_chance, read_driven_paths
+from support.chance_paths import (
+    CHANCES,
+    HELD_OUT,
+    TOLD,
+    DrivenPath,
+    find_chance,
+    read_driven_paths,
+)
 
 MODEL_STDS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 """Model errors among which the calibration chooses."""
@@ -156,13 +163,14 @@ def main(
         bool, typer.Option("--calibrate", help="Score model errors on the other drives.")
     ] = False,
     picture: Annotated[Path | None, typer.Option(help="Picture to draw.")] = None,
-    file: Annotated[Path | None, typer.Option(help="Drives; default: those of the tests.")] = None,
+    file: Annotated[
+        Path | None, typer.Option(help="Drives held out; default: those of the tests.")
+    ] = None,
 ) -> None:
     """Print the tables."""
-    paths = read_driven_paths(file) if file else read_driven_paths()
     if calibrate_too:
-        calibrate([one for one in paths if one.stream != HELD_OUT])
-    held = [one for one in paths if one.stream == HELD_OUT]
+        calibrate([one for one in read_driven_paths() if one.stream != HELD_OUT])
+    held = [one for one in read_driven_paths(file or CHANCES) if file or one.stream == HELD_OUT]
     found = compare(held)
     headings = ("chance", "paths", "drives", "told", "failed", "95 %")
     print_table(f"Reliability; {TOLD}", headings, reliability(found))

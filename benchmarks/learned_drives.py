@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drives of all programs on rocks slicker than the planner was told, with learning or without.
 
-Run from the repository: python -m benchmarks.learned_drives FOLDER [--drives 20] [--learn off|use]
+Run from the repository: python -m benchmarks.learned_drives FOLDER [--learn off|use] [--slope DEG]
 
 Simulator (MuJoCo, friction 0.45), server and controller (told 0.8) are those of
 simulation.launch.py, each a process; a mission planner drives to a goal, and with `use` a ground
@@ -12,6 +12,7 @@ is there is printed. It needs the extra `bench`.
 
 import json
 import signal
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -38,8 +39,10 @@ from support.waiting import wait_until
 
 FRICTION = 0.45
 """Friction of the ground; rover, planner and controller are told 0.8."""
-SIZE, ROUGHNESS, ROCK_COVER = 12.0, 0.06, 0.05
-"""Size of a field [m], RMS height difference of its relief over 1 m [m], its cover by rocks."""
+SIZE, ROCK_COVER = 12.0, 0.05
+"""Size of a field [m], and its cover by rocks."""
+ROUGHNESS = {False: 0.1, True: 0.05}
+"""RMS height difference of the relief over 1 m, on level fields and on slopes [m]."""
 DISTANCE = (2.5, 3.5)
 """Distances of goals [m]."""
 SPEED = 0.08
@@ -47,7 +50,7 @@ SPEED = 0.08
 PATIENCE = 240.0
 """Time after which a drive has not arrived, of the simulator [s]."""
 SLACK = {
-    "traverse_server": {"search_budget": 10.0, "time_budget": 30.0},
+    "traverse_server": {"search_budget": 4.0, "time_budget": 8.0},
     "simulated_traction_controller": PATIENT | {"clock_timeout": 1.0},
 }
 """Parameters that leave the programs time on a busy machine."""
@@ -100,16 +103,25 @@ def count_stuck(rows: np.ndarray) -> int:
     return count
 
 
-def draw_drive(number: int) -> tuple[Terrain, np.ndarray, np.ndarray]:
-    """Return a field, and a start and a goal (3,) where the told rover can stand."""
+def draw_drive(number: int, slope: float) -> tuple[Terrain, np.ndarray, np.ndarray]:
+    """Return a field, and a start and a goal (3,) where the told rover can stand.
+
+    The field rises along x by a slope [deg], and goals on a slope are up it.
+    """
     field = make_mars_terrain(
-        1 + number // 5, SIZE, roughness=ROUGHNESS, rock_cover=ROCK_COVER, crater_density=0.0
+        1 + number // 5,
+        SIZE,
+        roughness=ROUGHNESS[slope > 0.0],
+        rock_cover=ROCK_COVER,
+        crater_density=0.0,
     )
+    x = np.linspace(*field.bounds[:2], field.elevation.shape[1])
+    field = replace(field, elevation=field.elevation + np.tan(np.radians(slope)) * x)
     rng, rover = np.random.default_rng(number), load_rover("lsr1")
     while True:
         most = 0.5 * SIZE - 1.0
         x, y = rng.uniform(-most, most, 2)
-        yaw, far = rng.uniform(-np.pi, np.pi), rng.uniform(*DISTANCE)
+        yaw, far = rng.uniform(-1.0, 1.0) * (1.0 if slope else np.pi), rng.uniform(*DISTANCE)
         start = np.array([x, y, yaw])
         goal = start + far * np.array([np.cos(yaw), np.sin(yaw), 0.0])
         if np.abs(goal[:2]).max() < most and all(
@@ -118,9 +130,9 @@ def draw_drive(number: int) -> tuple[Terrain, np.ndarray, np.ndarray]:
             return field, start, goal
 
 
-def drive(number: int, learn: str) -> dict[str, Any]:
+def drive(number: int, learn: str, slope: float) -> dict[str, Any]:
     """Drive once; return what became of it."""
-    field, start, goal = draw_drive(number)
+    field, start, goal = draw_drive(number, slope)
     with open_nodes() as nodes:
         file = nodes.folder / "field.npz"
         save_terrain(file, field)
@@ -146,7 +158,9 @@ def drive(number: int, learn: str) -> dict[str, Any]:
             end = f"not there after {PATIENCE:.0f} s"
         rows, learned = np.array(ear.rows), ear.friction
     named = [event["event"] for event in events]
+    reasons = [event["answer"]["reason"] for event in events if event["event"] == "answer"]
     drove = "driving" in named or not events
+    end = end if drove else "".join(reasons)
     outcome = "arrived" if "arrived" in named else "no way on" if "no way on" in end else "stuck"
     away = np.hypot(*(rows[-1, 1:3] - goal[:2]))
     return {
@@ -213,6 +227,9 @@ def main(
     folder: Annotated[Path, typer.Argument(help="Keeps a line per drive.")],
     drives: Annotated[int, typer.Option(help="Number of drives.")] = 20,
     learn: Annotated[str, typer.Option(help="off or use; empty only prints.")] = "",
+    slope: Annotated[
+        float, typer.Option(help="Slope of the field in degrees, up to goals.")
+    ] = 0.0,
 ) -> None:
     """Drive, and print what became of all drives."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # its programs end with it
@@ -220,7 +237,7 @@ def main(
     file = folder / f"{learn}.jsonl"
     done = {one["drive"] for one in read_drives(file)} if learn else set(range(drives))
     for number in sorted(set(range(drives)) - done):
-        result = drive(number, learn)
+        result = drive(number, learn, slope)
         with file.open("a") as lines:
             lines.write(json.dumps(result) + "\n")
         print(json.dumps(result), flush=True)

@@ -114,6 +114,10 @@ class LearningDrive:
         first = y[:, None] + 0.0 * x < 0.0 if self.layout == SIDES else x + 0.0 * y[:, None] < 0.0
         return replace(ground, friction=np.where(first, *self.frictions))
 
+    def add_noise(self, rows: np.ndarray) -> np.ndarray:
+        """Return the rows that are kept, with noise."""
+        return add_noise(rows, self.noise, self.seed, self.step)
+
     @property
     def label(self) -> str:
         """All of it in one line."""
@@ -202,11 +206,11 @@ def row_of(plant: MujocoRover) -> np.ndarray:
     return row
 
 
-def add_noise(rows: np.ndarray, drive: LearningDrive) -> np.ndarray:
-    """Return every `step`-th row with the drive's noise."""
-    rows = rows[:: drive.step].copy()
-    position, drift, attitude, suspension, torque, rate = NOISE[drive.noise]
-    rng = np.random.default_rng(drive.seed)
+def add_noise(rows: np.ndarray, noise: str, seed: int, step: int = 1) -> np.ndarray:
+    """Return every `step`-th row with noise, a key of NOISE."""
+    rows = rows[::step].copy()
+    position, drift, attitude, suspension, torque, rate = NOISE[noise]
+    rng = np.random.default_rng(seed)
     ways = np.append(0.0, np.hypot(*np.diff(rows[:, [X, Y]], axis=0).T))
     for columns, sigma in (
         ([X, Y], position),
@@ -249,7 +253,7 @@ def learn(drive: LearningDrive, keep: Path | None = None) -> Learned | None:
         return None
     rover = told_rover()
     learner = GroundLearner(rover, drive.obstacle.ground)
-    rows = add_noise(recorded.rows, drive)
+    rows = drive.add_noise(recorded.rows)
     early = None
     began = time.process_time()
     for row in rows:
@@ -293,7 +297,7 @@ def print_odometry(drives: list[LearningDrive], keep: Path) -> None:
         recorded = record(drive, keep)
         if not recorded.passed:
             continue
-        truth, rows = recorded.rows[:: drive.step], add_noise(recorded.rows, drive)
+        truth, rows = recorded.rows[:: drive.step], drive.add_noise(recorded.rows)
         motions = measure_motion(rows, truth, drive.seed)
         known, pupil, plain = WheelOdometry(rover), WheelOdometry(rover), np.zeros(2)
         for one in (known, pupil):
@@ -358,7 +362,7 @@ def main(
     """Learn from drives and print errors, coverage and times."""
     if example is not None:
         example.mkdir(parents=True, exist_ok=True)
-        write_csv(example / "drive.csv", add_noise(record(EXAMPLE).rows, EXAMPLE))
+        write_csv(example / "drive.csv", EXAMPLE.add_noise(record(EXAMPLE).rows))
         save_terrain(example / "terrain.npz", EXAMPLE.obstacle.ground)
         return
     keep = keep or Path(tempfile.mkdtemp())

@@ -2,14 +2,12 @@
 """A soak: all programs drive a rover to random goals, on a busy machine, and are disturbed.
 
 Run from the repository: python -m benchmarks.soak [--minutes 60] [--load 4] [--every 40]
-[--faketime LIBRARY]
 
 Simulator, server and controller are those of simulation.launch.py, with a page and a mission
 planner beside them. Every so often, in turn, one of them is killed; the server gets another map
-and friction; and the system clock of all is stepped by 5 s, ahead or back, if libfaketime is given
-(package libfaketime of Debian and Ubuntu). The report has the drives done, the faults by cause,
-memory and latency at start and end, and the torques that were heard while the controller was to
-rest.
+and friction; and the system clock of all is stepped by 5 s, ahead or back. The report has the
+drives done, the faults by cause, memory and latency at start and end, the load of the machine, and
+the torques that were heard while the controller was to rest.
 """
 
 import contextlib
@@ -42,6 +40,7 @@ from benchmarks.processes import (
     memory_of,
     open_nodes,
 )
+from benchmarks.stepped_clock import SteppedClock
 from msg_adapters.odometry import odometry_to_pose
 from rover_physics import save_terrain
 from rover_planner.demo.child_process import ChildProcess
@@ -54,7 +53,7 @@ from support.waiting import wait_until
 START_TIME = 300.0
 """Longest wait for the start of all programs [s]."""
 FLIGHT = 0.1
-"""Age of a stop from which no torque is on its way any more [s]."""
+"""Time for which a controller that comes to rest may still send torques [s]."""
 PATIENCE = 10.0
 """Longest wait for an answer [s]."""
 REACH = 3.0
@@ -65,8 +64,8 @@ VICTIMS = ("traverse_server", "traction_controller", PAGE, MISSION, "rover_simul
 """Programs that are killed in turn."""
 ROCKS = (0.01, 0.005, 0.015)
 """Cover by rocks of the maps, all of one relief; the first is the ground."""
-CLOCKS = ("+5s", "+0s")
-"""What the system clock is ahead by, in turn."""
+STEPS = (5, 0)
+"""What the system clock is ahead by, in turn [s]."""
 
 
 class Ear(Node):
@@ -76,8 +75,7 @@ class Ear(Node):
         super().__init__("ear", context=ros.context)
         self.pose = np.full(3, np.nan)
         self.faults: Counter[str] = Counter()
-        self.torques_at_rest = 0
-        self._rests_since, self._fault = np.inf, ""
+        self.rest, self._fault = RestWatch(), ""
         for kind, topic, hear, qos in (
             (Odometry, "odometry", self._hear_odometry, sensor_qos()),
             (String, "traction_controller/state", self._hear_state, latched_qos()),
@@ -89,12 +87,11 @@ class Ear(Node):
     def _hear_odometry(self, odometry: Odometry) -> None:
         self.pose = odometry_to_pose(odometry, "map")[0][[0, 1, 3]]
 
-    def _hear_state(self, state: String) -> None:
-        self._rests_since = np.inf if state.data == "driving" else time.monotonic()
+    def _hear_state(self, state: String, about: dict[str, int]) -> None:
+        self.rest.take(about["source_timestamp"] / 1e9, state=state.data)
 
-    def _hear_torques(self, message: Float64MultiArray) -> None:
-        rests = time.monotonic() - self._rests_since > FLIGHT
-        self.torques_at_rest += rests and any(message.data)
+    def _hear_torques(self, message: Float64MultiArray, about: dict[str, int]) -> None:
+        self.rest.take(about["source_timestamp"] / 1e9, turns=any(message.data))
 
     def _hear_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -102,6 +99,42 @@ class Ear(Node):
                 fault = without_numbers(status.message) if status.level == b"\2" else ""
                 self.faults[fault] += bool(fault) and fault != self._fault
                 self._fault = fault
+
+
+class RestWatch:
+    """Counts the torques that a controller sends while it is to rest, by its own stamps.
+
+    An update sends its torques before a new state, so the first torques of a drive are none.
+    """
+
+    def __init__(self) -> None:
+        self._count, self._sent = 0, list[tuple[float, str, bool]]()
+        self._last, self._since = 0.0, np.inf
+
+    @property
+    def count(self) -> int:
+        """Torques until now."""
+        self._judge()
+        return self._count
+
+    def take(self, sent: float, state: str = "", turns: bool = False) -> None:
+        """Take a state, or whether torques turn a wheel, sent at a time [s]."""
+        if abs(sent - self._last) > 0.5 * max(STEPS):  # the clock was stepped
+            self._judge()
+            self._since = -np.inf if np.isfinite(self._since) else self._since
+        self._last = sent
+        self._sent.append((sent, state, turns))
+
+    def _judge(self) -> None:
+        """Count in the order of sending, which is not that of arrival."""
+        doubt = False
+        for at, state, turns in sorted(self._sent):
+            if state:
+                self._since, doubt = np.inf if state == "driving" else at, False
+            elif at - self._since > FLIGHT:
+                self._count += doubt
+                doubt = turns
+        self._sent.clear()
 
 
 def without_numbers(text: str) -> str:
@@ -112,16 +145,9 @@ def without_numbers(text: str) -> str:
 class Programs:
     """The programs by name; each can be killed and started again."""
 
-    def __init__(self, nodes: NodeProcesses, terrain: Path, faketime: str):
-        self._nodes, self._clock = nodes, nodes.folder / "clock"
-        self._clocks = itertools.cycle(CLOCKS)
-        self._clock.write_text(CLOCKS[-1])
-        self._environment = {
-            "LD_PRELOAD": faketime,
-            "FAKETIME_TIMESTAMP_FILE": str(self._clock),
-            "FAKETIME_CACHE_DURATION": "1",
-            "DONT_FAKE_MONOTONIC": "1",
-        }
+    def __init__(self, nodes: NodeProcesses, terrain: Path):
+        self._nodes, self._clock = nodes, SteppedClock(nodes.folder)
+        self._steps = itertools.cycle(STEPS)
         rests = self._write("simulated_traction_controller", rest_policy="brake")  # no torques
         reads = self._write("traverse_server", map_folder=str(nodes.folder))
         commands = simulation_commands(
@@ -151,7 +177,7 @@ class Programs:
 
     def start(self, name: str, module: list[str] | None = None) -> None:
         """Start a program, with its module and words or others."""
-        words, environment = module or self._modules[name], self._environment
+        words, environment = module or self._modules[name], self._clock.environment
         self._running[name] = self._nodes.start_module(*words, environment=environment)
 
     def kill(self, name: str) -> None:
@@ -161,7 +187,7 @@ class Programs:
 
     def step_clock(self) -> None:
         """Step the system clock of all programs."""
-        self._clock.write_text(next(self._clocks))
+        self._clock.set_ahead(next(self._steps))
 
     def exit_code(self, name: str) -> int | None:
         """Return the exit code of a program, None while it runs."""
@@ -176,9 +202,7 @@ class Programs:
         return {name: memory_of(child) for name, child in self._running.items() if child.running}
 
 
-def run_soak(
-    minutes: float, load: int, every: float, seed: int, faketime: str
-) -> dict[str, object]:
+def run_soak(minutes: float, load: int, every: float, seed: int) -> dict[str, object]:
     """Run a soak; return its report."""
     with open_nodes() as nodes:
         for _ in range(load):
@@ -187,13 +211,12 @@ def run_soak(
         for file, cover in zip(maps, ROCKS, strict=True):
             ground = make_mars_terrain(seed, 24.0, 0.05, rock_cover=cover, crater_density=0.0)
             save_terrain(file, ground)
-        programs, ear = Programs(nodes, maps[0], faketime), nodes.ros.spin(Ear(nodes.ros))
+        programs, ear = Programs(nodes, maps[0]), nodes.ros.spin(Ear(nodes.ros))
         client = nodes.client("soak")
         wait_until(lambda: np.isfinite(ear.pose).all(), "the simulator", START_TIME)
         client.connect()
-        soak = Soak(programs, ear, client, maps, np.random.default_rng(seed))
-        soak.disturbances = soak.disturbances if faketime else soak.disturbances[:2]
-        return soak.run(60.0 * minutes, every)
+        rng = np.random.default_rng(seed)
+        return Soak(programs, ear, client, maps, rng).run(60.0 * minutes, every)
 
 
 class Soak:
@@ -211,8 +234,7 @@ class Soak:
         self._maps, self._victims = itertools.cycle(maps), itertools.cycle(VICTIMS)
         self._load = client.node.create_client(LoadMap, "/traverse_server/load_map")
         self._drives, self._events = Counter[str](), Counter[str]()
-        self.disturbances = [self._kill, self._change_map, self._step_clock]
-        """What happens in turn."""
+        self._disturbances = itertools.cycle((self._kill, self._change_map, self._step_clock))
 
     def run(self, seconds: float, every: float) -> dict[str, object]:
         """Drive and disturb for some time, with a disturbance each so many seconds, or none for 0.
@@ -220,7 +242,7 @@ class Soak:
         Returns:
             The report.
         """
-        programs, disturbances = self._programs, itertools.cycle(self.disturbances)
+        programs, loads = self._programs, []
         self._ear.faults.clear()
         memory, latency = programs.memory(), self._find_latency()
         begin = time.monotonic()
@@ -228,6 +250,7 @@ class Soak:
         self._start_mission()
         while time.monotonic() < begin + seconds:
             time.sleep(0.5)
+            loads.append(os.getloadavg()[0])
             code = programs.exit_code(MISSION)
             if code is not None:
                 end = _ENDS.get(code) or without_numbers(programs.last_words(MISSION))
@@ -235,13 +258,14 @@ class Soak:
                 self._start_mission()
             if time.monotonic() > due:
                 due += every
-                next(disturbances)()
+                next(self._disturbances)()
         return {
             "minutes": round((time.monotonic() - begin) / 60.0, 1),
+            "median and largest load of the machine": np.quantile(loads, (0.5, 1.0)).tolist(),
             "drives": dict(self._drives),
             "disturbances": dict(self._events),
             "faults": {cause: count for cause, count in self._ear.faults.items() if count},
-            "torques at rest": self._ear.torques_at_rest,
+            "torques at rest": self._ear.rest.count,
             "memory at start [MB]": memory,
             "memory at end [MB]": programs.memory(),
             "answer at start [ms]": latency,
@@ -301,11 +325,10 @@ def main(
     load: Annotated[int, typer.Option(help="Processes that do nothing but compute.")] = 4,
     every: Annotated[float, typer.Option(help="Time between disturbances in s; 0: none.")] = 40.0,
     seed: Annotated[int, typer.Option(help="Seed of ground and goals.")] = 1,
-    faketime: Annotated[str, typer.Option(help="File libfaketimeMT.so.1: steps the clock.")] = "",
 ) -> None:
     """Run a soak and print its report as JSON."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # its programs end with it
-    print(json.dumps(run_soak(minutes, load, every, seed, faketime), indent=2))
+    print(json.dumps(run_soak(minutes, load, every, seed), indent=2))
 
 
 if __name__ == "__main__":

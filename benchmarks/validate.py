@@ -100,10 +100,14 @@ def print_curves() -> None:
 
 
 def print_traces() -> None:
-    """Print the median errors of wheel forces and mean torques along the traces of curves."""
+    """Print the median errors of wheel forces and torques along the traces of curves.
+
+    The scatter is the standard deviation, over the poses of a trace, of a wheel's torque in MuJoCo
+    less the model's.
+    """
     weight, rows = load_rover("lsr1").weight, []
     for mode in ("steered", "spot", "skid", "skid_spot"):
-        forces, torques = [], []
+        forces, torques, scatter = [], [], []
         for curve in read_curves():
             if curve.mode == mode and len(curve.poses):
                 found = predict_trace(curve)
@@ -112,10 +116,15 @@ def print_traces() -> None:
                 errors = np.sqrt(sum(part**2 for part in parts)) - curve.forces
                 forces.append(100.0 * np.abs(errors[drives]).ravel() / weight)
                 ours, theirs = np.abs([found.torque[drives], curve.torques[drives]]).mean((1, 2))
-                torques.append(100.0 * (ours / theirs - 1.0))
-        values = np.median(np.concatenate(forces)), np.median(torques)
-        rows.append((mode, len(forces), *(f"{value:.1f}" for value in values)))
-    headings = ("mode", "curves", "wheel force [% of the weight]", "mean torque [%]")
+                torques.append((100.0 * (ours / theirs - 1.0), theirs - ours))
+                rest = curve.torques[drives] - found.torque[drives]
+                scatter.append(rest.std(axis=0).mean())
+        share, missing = np.median(torques, axis=0)
+        error = f"{np.median(np.concatenate(forces)):.1f}"
+        torque = f"{share:.1f}", f"{missing:.3f}", f"{np.median(scatter):.3f}"
+        rows.append((mode, len(forces), error, *torque))
+    torque_headings = "mean torque [%]", "missing [N m]", "scatter [N m]"
+    headings = ("mode", "curves", "wheel force [% of the weight]", *torque_headings)
     print_table("Along the traces of curves, under servo torques", headings, rows)
 
 

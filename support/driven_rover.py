@@ -42,24 +42,22 @@ class DrivenRover(Node):
         self.joints.velocity = [0.2 if name in WHEEL_JOINTS else 0.0 for name in JOINTS]
         self.imu = Imu()
         self.twist: TwistStamped | Twist = TwistStamped()
-        self.speed = 0.03
         self.stamp: Callable[[], int] = lambda: 0
         """Returns a header stamp [ns]."""
-        self.commands: list[tuple[float, float, float]] = []
-        """Time of arrival [s], largest magnitude and sum of each command's torques [N m]."""
-        self.command_stamps: list[int] = []
-        """Time [ns] at which each of them was sent."""
-        self.states: list[str] = []
+        self.commands: list[tuple[int, float, float]] = []
+        """Time at which each was sent [ns], largest magnitude and sum of its torques [N m]."""
+        self.state = ""
+        """The last state of the controller."""
+        self.status: Any = DiagnosticStatus()
+        """Its last status on diagnostics."""
         self.brakes: list[bool] = []
-        self.diagnostics: list[tuple[float, Any]] = []
-        """Time of arrival [s] and status."""
         self.log: list[str] = []
         self._sent_at = 0
         self._senders = {
             "joint_states": self.create_publisher(JointState, "joint_states", sensor_qos()),
             "imu": self.create_publisher(Imu, "imu", sensor_qos()),
         }
-        self.listen()
+        self._listen()
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self.create_timer(1.0 / RATE, self._send, clock=steady)
 
@@ -68,13 +66,13 @@ class DrivenRover(Node):
         self.twist = kind()
         self._senders["cmd_vel"] = self.create_publisher(kind, "cmd_vel", sensor_qos())
 
-    def listen(self) -> None:
+    def _listen(self) -> None:
         """Subscribe to what the controller publishes."""
         latched = QoSProfile(depth=QUEUE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         queue = QoSProfile(depth=QUEUE)
         for kind, name, hear, qos in (
             (Float64MultiArray, f"{CONTROLLER}/commands", self._hear_command, queue),
-            (String, f"{CONTROLLER}/state", lambda m: self.states.append(m.data), latched),
+            (String, f"{CONTROLLER}/state", self._hear_state, latched),
             (Bool, f"{CONTROLLER}/brake", lambda m: self.brakes.append(m.data), latched),
             (DiagnosticArray, "diagnostics", self._hear_diagnostics, queue),
             (Log, "/rosout", self._hear_log, latched),
@@ -89,29 +87,27 @@ class DrivenRover(Node):
         twist = self.twist
         if isinstance(twist, TwistStamped):
             twist.header.stamp, twist = now, twist.twist
-        twist.linear.x = self.speed
+        twist.linear.x = 0.03
         messages = {"joint_states": self.joints, "imu": self.imu, "cmd_vel": self.twist}
         for name, sender in self._senders.items():
             sender.publish(messages[name])
 
     def _hear_command(self, message: Float64MultiArray, info: dict[str, int]) -> None:
-        self.command_stamps.append(info["source_timestamp"])
         torques = list(message.data)
-        self.commands.append((time.monotonic(), max(map(abs, torques)), sum(torques)))
+        sent = info["source_timestamp"]
+        self.commands.append((sent, max(map(abs, torques)), sum(torques)))
+
+    def _hear_state(self, message: String) -> None:
+        self.state = message.data
 
     def _hear_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
             if status.name.startswith(CONTROLLER):
-                self.diagnostics.append((time.monotonic(), status))
+                self.status = status
 
     def _hear_log(self, message: Log) -> None:
         if CONTROLLER in message.name:
             self.log.append(message.msg)
-
-    @property
-    def state(self) -> str:
-        """The last state of the controller; empty if there is none."""
-        return self.states[-1] if self.states else ""
 
     @property
     def torque(self) -> float:
@@ -122,11 +118,6 @@ class DrivenRover(Node):
     def push(self) -> float:
         """The sum of the torques of the last command [N m]; 0 if there is none."""
         return self.commands[-1][2] if self.commands else 0.0
-
-    @property
-    def status(self) -> Any:
-        """The controller's last status on diagnostics; an empty one if there is none."""
-        return self.diagnostics[-1][1] if self.diagnostics else DiagnosticStatus()
 
     @property
     def faults(self) -> list[str]:
@@ -148,8 +139,7 @@ class DrivenRover(Node):
 
     def commands_after(self, stamp: int) -> list[tuple[int, float]]:
         """Return time [ns] and sum of torques of the commands that were sent after a time [ns]."""
-        sent = zip(self.command_stamps, self.commands, strict=False)
-        return [(at, push) for at, (*_, push) in sent if at > stamp]
+        return [(at, push) for at, _, push in self.commands if at > stamp]
 
     def wait_for_send(self) -> int:
         """Return when the first message was sent of those that are sent from now on [ns]."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Drives that the ground is learned from: up a plane by the model, up a slope in MuJoCo; CSV."""
+"""Drives that the ground is learned from: up a plane and over soil by the model; CSV."""
 
 from pathlib import Path
 
@@ -8,6 +8,7 @@ import numpy as np
 from rover_physics import Rover, Terrain
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
+from rover_physics.numerics.quaternions import matrix_from_xyzw
 from rover_planner.learning.drive_log import (
     PITCH,
     RATES,
@@ -21,6 +22,7 @@ from rover_planner.learning.drive_log import (
     X,
     Y,
 )
+from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from support.rough_grounds import plane
 
 RATE = 50.0
@@ -54,6 +56,24 @@ def climb(rover: Rover, slope: float, seconds: float, speed: float = 0.06) -> Fl
     rows[:, TORQUES] += 0.01 * rng.standard_normal((len(rows), 6))
     rows[:, RATES] += 1e-3 * rng.standard_normal((len(rows), 6))
     return rows
+
+
+def drive_over_soil(rover: Rover, ground: Terrain, soil: str, seconds: float) -> Floats:
+    """Return rows of a drive along +x at the nominal speed in the quasi-static simulator."""
+    plant, period, rows = QuasiStaticPlant(rover, ground, (-1.5, 0.0, 0.0), soil=soil), 0.1, []
+    for step in range(round(seconds / period)):
+        plant.drive(rover.nominal_speed, 0.0, period)
+        state, pose, row = plant.state(), plant.pose(), np.full(WIDTH, np.nan)
+        if state.stopped:
+            break
+        R = matrix_from_xyzw(state.orientation)
+        row[[TIME, X, Y, YAW]] = (step + 1) * period, *pose
+        row[[ROLL, PITCH]] = np.arctan2(R[2, 1], R[2, 2]), np.arcsin(-R[2, 0])
+        row[SUSPENSION] = [state.joint_positions[name] for name in SUSPENSION_JOINTS]
+        row[RATES] = [state.joint_velocities[name] for name in WHEEL_JOINTS]
+        row[TORQUES], row[STEERING] = state.wheel_torques, 0.0
+        rows.append(row)
+    return np.array(rows).reshape(-1, WIDTH)
 
 
 def ramp(slope: float) -> Terrain:

@@ -7,7 +7,7 @@ others are evaluated anew in each sample, with the contacts that they have there
 between waypoints are those of the prediction.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ from rover_physics.prediction.servo_path import (
 from rover_physics.prediction.sweep import SweptPath
 from rover_physics.results.record import place_results
 from rover_physics.results.uses import find_uses
-from rover_physics.status import PoseStatus
+from rover_physics.status import PoseStatus, Stall
 from rover_physics.terrain.grid import Terrain
 
 SAMPLES = 32
@@ -39,7 +39,7 @@ in all of them fails for sure."""
 FAR = 0.5
 """Use of a limit below which no sample breaks it: it would have to double. Less where friction or
 torque of a sample may be less than half."""
-NEAR = 0.9
+NEAR = 0.95
 """Use with the least friction and torque of all samples below which no sample breaks a limit."""
 SUMS = ("turn_off", "slide_off", "lift_height")
 """Quantities of limits that are sums along the path."""
@@ -67,6 +67,8 @@ def find_failure_chance(
 ) -> FailureChance:
     """Return the chance that a swept path fails; 1 where the rover does not settle.
 
+    A control margin is not asked of samples: it is left for what they hold.
+
     Args:
         model: The model of the sweep.
         swept: All of the path.
@@ -74,20 +76,27 @@ def find_failure_chance(
         enough: Chance above which it need not be known: the samples end there, and those that are
             left count as if they passed.
     """
-    n = len(swept.prediction.poses)
-    rows = _all_rows(swept)
+    n, first = len(swept.prediction.poses), FIRST if on_path else SAMPLES
+    rows, records = _all_rows(swept), model.records[-1:].copy()
+    records["settings"]["control_margin"] = 0.0
+    model = replace(model, records=records)
     settled = rows.results["status"] == PoseStatus.SETTLED
     samples = sort_by_strength(draw_samples(model.rover.uncertainty, SAMPLES))
+    if enough * SAMPLES < FIRST:
+        samples = samples[::-1]  # those with the least friction and torque refuse first
     worst_two = worst_of(samples)
     far = min(FAR, NEAR * min(worst_two[0].friction[0], worst_two[0].torque))
     near = settled & _find_near(model, swept, rows.results, on_path, far)
     is_exact = model.terrain.elevation_std is None
     if near.any() and is_exact:
         closer = _find_near(model, swept, rows.results, on_path, NEAR)
+        summed = _needs_path(model, rows.results)
         for sample in worst_two:
             worst = _evaluate_near(model, swept, sample, (rows, near), on_path)
             closer |= _find_near(model, swept, worst, on_path, NEAR)
+            summed |= _needs_path(model, worst)
         near &= closer
+        on_path &= summed
     failed = np.zeros((SAMPLES if near.any() else 1, n), bool)
     failed[:, rows.waypoint[~settled]] = True
     counts = np.zeros((n, len(model.limits)), np.int64)
@@ -96,19 +105,29 @@ def find_failure_chance(
         check_interruption()
         drawn = model if is_exact else change_heights(model, part, k)
         results = _evaluate_near(drawn, swept, sample, (rows, near), on_path)
-        broken = find_uses(model.limits, results).use > 1.0
-        failed[k, rows.waypoint[broken.any(axis=1)]] = True
-        np.add.at(counts, rows.waypoint, broken)
+        asked = np.flatnonzero(near | _differ(results, rows.results))
+        broken = find_uses(model.limits, results[asked]).use > 1.0
+        fails = broken.any(axis=1)
+        waypoints = rows.waypoint[asked[fails]]
+        failed[k, waypoints] = True
+        np.add.at(counts, waypoints, broken[fails])
         count = int(failed.any(axis=1).sum())
-        if count == k + 1 == FIRST:
-            failed = failed[:FIRST]
-        if count > enough * SAMPLES or len(failed) == FIRST:
+        if count > enough * SAMPLES:
+            break
+        if count == k + 1 == first:
+            failed = failed[:first]
             break
     at = failed.mean(axis=0)
     place = int(at.argmax())
     most = int(counts[place].argmax())
     limit = model.limits.rows[most].title if counts[place, most] else ""
     return FailureChance(float(failed.any(axis=1).mean()), at, limit)
+
+
+def _differ(results: np.ndarray, others: np.ndarray) -> NDArray[np.bool_]:
+    """Return for each row (n,) whether two RESULTs of it differ."""
+    whole = f"V{results.itemsize}"
+    return np.asarray(results.view(whole) != others.view(whole))
 
 
 def _cut_around(model: PackedModel, poses: Floats) -> Terrain:
@@ -146,6 +165,17 @@ def _find_near(
     for i in np.flatnonzero(np.fmax.reduce(uses[:n][:, sums], axis=1, initial=0.0) > least):
         leads[np.searchsorted(distance, distance[i] - window) : i + 1] = True
     return np.asarray(near | np.append(leads, leads[swept.crossings.waypoint]))
+
+
+def _needs_path(model: PackedModel, results: np.ndarray) -> bool:
+    """Return whether what only the path decides may break a limit at RESULTs, or save from that.
+
+    These are drift and lifts, momentum and wedged wheels.
+    """
+    sums = [row.reads in SUMS for row in model.limits.rows]
+    near = find_uses(model.limits, results).use[:, sums] > FAR
+    wedged = results["stalls"] == Stall.WEDGED
+    return bool(near.any() or results["deficit"].any() or wedged.any())
 
 
 def _evaluate_near(

@@ -240,11 +240,9 @@ def find_drift(
     sums[1:] = np.cumsum(0.5 * (rate[1:] + rate[:-1]) * distances[:, None], axis=0)
     place = np.append(0.0, np.cumsum(distances))
     built_up = sums - sums[np.searchsorted(place, place - window)]
-    drift = np.zeros((n, 2))
     owner = np.append(np.arange(n), turns.waypoint)[order]
     found = np.column_stack([np.abs(built_up[:, 2]), np.hypot(built_up[:, 0], built_up[:, 1])])
-    np.maximum.at(drift, owner, found)
-    return drift
+    return np.asarray(np.maximum.reduceat(found, np.searchsorted(owner, np.arange(n))))
 
 
 def _in_order(n: int, place: np.ndarray) -> np.ndarray:

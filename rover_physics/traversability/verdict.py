@@ -205,8 +205,8 @@ def refuse_chance(verdict: Verdict, chance: FailureChance, accepted: float) -> V
     worst, codes, reasons = int(at.argmax()), list(verdict.codes), list(verdict.reasons)
     codes[worst] = CHANCE
     reasons[worst] = (
-        f"the path fails with a chance of {path:.2f}, accepted {accepted:g}: most often here, "
-        f"{at[worst]:.2f}, by the limit of {chance.limit}"
+        f"the path passes as told, but fails with a chance of {path:.2f} by what is uncertain, "
+        f"accepted {accepted:g}: most often here, {at[worst]:.2f}, by the limit of {chance.limit}"
     )
     return with_refusals(known, codes, reasons)
 

@@ -18,12 +18,10 @@ from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.uses import RoverLimits, find_uses, limits_of
 from rover_physics.rover.model import Rover
+from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path, judge_paths
 from rover_physics.traversability.verdict import Verdict
-
-ACCEPTED_CHANCE = 0.05
-"""Largest chance of failure of a path that is advised: one drive of twenty."""
 
 
 @dataclass(frozen=True, eq=False)

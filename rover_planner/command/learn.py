@@ -38,6 +38,9 @@ def learn(
     friction: Annotated[
         float | None, option("MU", "Friction that is assumed at first; default: the rover's.")
     ] = None,
+    soil: Annotated[
+        str | None, option("NAME", "Soil that is assumed at first, on ground that yields.")
+    ] = None,
     odometry_topic: Annotated[
         str, option("TOPIC", "Odometry of a bag that does not come from the wheels.")
     ] = "",
@@ -66,7 +69,7 @@ def learn(
 
         check_picture(picture)
     rows = _read_log(log, model, odometry_topic)
-    learner = GroundLearner(model, map_, told)
+    learner = GroundLearner(model, map_, told, soil)
     places, estimates = [], []
     with show_bar("learn", len(rows)) as step:
         for row in rows:
@@ -99,6 +102,9 @@ def learn(
         draw_learning(picture, map_, np.array(places), estimates, layers.friction)
     found = learner.estimate.friction
     high = "not bounded above" if found.high is None else f"at most {found.high:.2f}"
+    if learner.estimate.soil is not None:
+        sunk, strength = learner.estimate.soil.sinkage[0], learner.estimate.soil.strength[0]
+        high += f"; sinkage {1e3 * sunk:.1f} mm, strength {strength:.2f} of the load"
     typer.echo(f"wrote {out}: friction {found.mean:.2f}, at least {found.low:.2f}, {high}")
 
 

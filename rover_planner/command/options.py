@@ -59,8 +59,6 @@ MaxGap = Annotated[
 MaxCells = Annotated[
     int, option("N", "Largest terrain file in cells; more are not unpacked.", min=4)
 ]
-ACCEPTED_CHANCE = 0.05
-"""Default of --accepted-chance where chances are asked for: one path of twenty may fail."""
 MAX_CELLS = 25_000_000
 """Default of the option --max-cells; a test compares it with that of `load_terrain`."""
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.command.options import (
     MAX_CELLS,
     AcceptedChance,
@@ -52,7 +53,7 @@ def plan(
         bool, flag("--frontier", "Plan as near as possible to a goal on unknown ground.")
     ] = False,
     sigmas: Sigmas = 3.0,
-    accepted_chance: AcceptedChance = 1.0,
+    accepted_chance: AcceptedChance = ACCEPTED_CHANCE,
     picture: Picture = None,
     dump: Annotated[
         Path | None, option("FILE", "Write the question for replay-plan, .npz.")

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.command.options import (
-    ACCEPTED_CHANCE,
     MAX_CELLS,
     AcceptedChance,
     Friction,

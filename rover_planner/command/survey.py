@@ -42,6 +42,9 @@ def survey(
     turns: Annotated[
         bool, flag("--turns", "Judge turns on the spot, too; takes up to 3 x.")
     ] = False,
+    chance: Annotated[
+        bool, flag("--chance", "Find the chances of failure, too; takes up to 30 x.")
+    ] = False,
     sigmas: Sigmas = 3.0,
     max_gap: MaxGap = 0.0,
     scheduler: Annotated[
@@ -83,6 +86,7 @@ def survey(
         headings=headings,
         step=step,
         turns=turns,
+        chance=chance,
         sigmas=sigmas,
     )
     if geotiff is not None:  # before hours of work

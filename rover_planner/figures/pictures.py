@@ -77,28 +77,12 @@ def drawing(
     Raises:
         PlanningError: The suffix names no format, or the file cannot be written.
     """
-    with matplotlib.rc_context(STYLE | dict(style or {})):
-        figure = new_figure(size)
-        yield figure
-        save_figure(path, figure)
-
-
-def new_figure(size: tuple[float, float]) -> Figure:
-    """Return an empty figure of a width and height [inch]."""
-    figure = Figure(figsize=size, layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
-
-
-def save_figure(path: Path, figure: Figure) -> None:
-    """Write a picture to a file; the suffix sets the format.
-
-    Raises:
-        PlanningError: The suffix names no format, or the file cannot be written.
-    """
     check_picture(path)
-    picture = io.BytesIO()
-    figure.savefig(picture, dpi=130, format=path.suffix[1:].lower())
+    with matplotlib.rc_context(STYLE | dict(style or {})):
+        figure, picture = Figure(figsize=size, layout="constrained"), io.BytesIO()
+        FigureCanvasAgg(figure)
+        yield figure
+        figure.savefig(picture, dpi=130, format=path.suffix[1:].lower())
     with errors_of(path, PlanningError):
         write_file(path, picture.getvalue())
 

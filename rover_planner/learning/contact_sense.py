@@ -65,6 +65,8 @@ class WheelState:
     """(6,) 1 where a wheel has one clear contact, else 0."""
     links: Floats
     """(6,) angles of the links that carry the wheels, to the horizontal [rad], nose down."""
+    steering: Floats
+    """(6,) steering angles [rad]."""
 
 
 class ContactSense:
@@ -145,6 +147,7 @@ class ContactSense:
             excess=excess,
             clear=clear.astype(float),
             links=links,
+            steering=steering,
         )
 
     def _balance_at(

@@ -38,8 +38,8 @@ def read_csv(path: Path, current_constant: float | None) -> Floats:
         current_constant: Torque over motor current [N m/A], for files with currents.
 
     Raises:
-        PlanningError: The file cannot be read, lacks a column or has a field that is no number;
-            times do not increase, or currents have no constant.
+        PlanningError: The file cannot be read, lacks a column, has one twice or a field that is no
+            number; times do not increase, or currents have no constant.
     """
     try:
         with path.open(newline="", encoding="utf-8-sig") as file:
@@ -94,12 +94,16 @@ def _find_columns(
             f"{source}: has no column {lacking[0]}; needed are {', '.join(MOTION)}, "
             "<wheel>_wheel_rate and <wheel>_wheel_torque or <wheel>_wheel_current"
         )
+    twice = {name for name in header if name and header.count(name) > 1}
     wanted = [(name, k, 1.0) for k, name in enumerate([*MOTION, *rates])]
     factor = current_constant if by_current and current_constant is not None else 1.0
     wanted += [(name, TORQUES.start + k, factor) for k, name in enumerate(needed[-6:])]
     wanted += [(name, STEERING.start + k, 1.0) for k, name in enumerate(STEERING_JOINTS)]
     felt = [f"{name}_f{axis}" for name in WHEELS for axis in "xyz"]
     wanted += [(name, FORCES.start + k, 1.0) for k, name in enumerate(felt)]
+    for name, _, _ in wanted:
+        if name in twice:
+            raise PlanningError(f"{source}: has two columns {name}; it must be one")
     return [(header.index(name), to, factor) for name, to, factor in wanted if name in header]
 
 

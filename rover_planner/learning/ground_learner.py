@@ -28,6 +28,7 @@ from rover_planner.learning.drive_log import (
 )
 from rover_planner.learning.friction_filter import FrictionEstimate, FrictionFilter
 from rover_planner.learning.ground_map import GroundMap
+from rover_planner.learning.soil_fit import SoilEstimate, SoilFit
 from rover_planner.learning.stuck_watch import StuckWatch
 from rover_planner.learning.wheel_health import WheelHealth
 from rover_planner.learning.wheel_slip import BLOCK, LONGEST_GAP, WINDOW, SlipWindow, SlipWindows
@@ -101,6 +102,8 @@ class GroundEstimate:
     """Standard deviation of it."""
     faults: dict[str, str]
     """Sensors that are not believed, by wheel, and why."""
+    soil: SoilEstimate | None
+    """The soil, on ground that yields."""
 
 
 @dataclass
@@ -132,11 +135,28 @@ class _Block:
 class GroundLearner:
     """The recursive estimator of one rover on one map."""
 
-    def __init__(self, rover: Rover, terrain: Terrain, told: float | None = None):
-        """Start without measurements; `told` is the friction without any (default: rover's)."""
+    def __init__(
+        self,
+        rover: Rover,
+        terrain: Terrain,
+        told: float | None = None,
+        soil: str | None = None,
+    ):
+        """Start without measurements.
+
+        Args:
+            rover: The rover.
+            terrain: Its map.
+            told: Friction without any measurement (default: the rover's).
+            soil: Name of the soil that is assumed at first, on ground that yields.
+
+        Raises:
+            SoilError: No soil of that name, or one that does not yield.
+        """
         self._rover, wheel = rover, rover.wheel
         self._sense = ContactSense(rover, terrain)
-        self._windows = SlipWindows(wheel.radius)
+        self._windows = SlipWindows(wheel.radius, wheel.width)
+        self._soil = None if soil is None else SoilFit(rover, self._sense.weight, soil)
         told = rover.friction if told is None else told
         self._whole = FrictionFilter(told)
         self._sides = {side: FrictionFilter(told) for side in SIDES}
@@ -263,9 +283,16 @@ class GroundLearner:
         steady = abs(window.unsteadiness) < MAX_UNSTEADY * self._rover.gravity * window.duration
         if not steady or not measured.any():
             return
+        if self._soil is not None:
+            self._soil.take(window, good & self._turns_freely(window), elapsed)
         if grips.all() and abs(float(window.rolling.mean())) > 3.0 * window.deviation:
             self._take_resistance(window, elapsed)
         self._learn_friction(window, slips, grips & good, elapsed)
+
+    def _turns_freely(self, window: SlipWindow) -> Flags:
+        """Return (6,) whether motors are slow enough to give the torque they are asked for."""
+        wheel = self._rover.wheel
+        return np.asarray(np.abs(window.rolling) < FASTEST * wheel.max_speed * wheel.radius)
 
     def _find_slips(self, window: SlipWindow) -> Flags:
         """Return (6,) whether wheels slip."""
@@ -273,13 +300,13 @@ class GroundLearner:
             np.maximum(SLIP_SHARE * np.abs(window.rolling), CERTAIN * window.deviation),
             SLIP_SPEED * self._rover.nominal_speed,
         )
-        return np.asarray(window.slip_speed > least)
+        return np.asarray(window.slip_speed > least + window.scrub)
 
     def _learn_friction(
         self, window: SlipWindow, slips: Flags, grips: Flags, elapsed: float
     ) -> None:
         """Take what the wheels of a window tell about the friction."""
-        unit, wheel = self._sense.weight / WHEEL_COUNT, self._rover.wheel
+        unit = self._sense.weight / WHEEL_COUNT
         loads, tractions = window.loads, window.tractions
         tractions = tractions - self._resistance * loads * np.sign(window.rolling)
         counts = (window.clear > 0.0) & (loads > MIN_LOAD * unit) & (loads < MAX_LOAD * unit)
@@ -288,7 +315,7 @@ class GroundLearner:
         tells = slips & counts & (along > ALONG) & (window.slip * tractions > 0.0)
         tells &= sticking < MOST_STICKING
         tells &= window.doubts < MOST_DOUBT * loads
-        tells &= np.abs(window.rolling) < FASTEST * wheel.max_speed * wheel.radius
+        tells &= self._turns_freely(window)
         distance = abs(float(np.median(window.travel))) * elapsed
         weights = self._weigh(window, tells, elapsed)
         doubt = EXCESS_NOISE * window.excess / self._sense.weight
@@ -357,6 +384,7 @@ class GroundLearner:
             resistance=float(self._resistance),
             resistance_std=float(spread) if self._steady else float("inf"),
             faults=self._health.faults,
+            soil=None if self._soil is None else self._soil.find_estimate(),
         )
 
 

@@ -13,6 +13,7 @@ from rover_physics.files.validation import errors_of
 from rover_physics.names import WHEELS
 from rover_planner.errors import PlanningError
 from rover_planner.learning.ground_learner import GroundEstimate
+from rover_planner.learning.soil_fit import SoilEstimate
 
 
 def describe(estimate: GroundEstimate, told: float) -> dict[str, Any]:
@@ -23,7 +24,7 @@ def describe(estimate: GroundEstimate, told: float) -> dict[str, Any]:
         told: Friction that was assumed before anything was measured.
     """
     ratios = estimate.slip_ratios
-    return {
+    found = {
         "friction": asdict(estimate.friction),
         "slip_time": estimate.slip_time,
         "immobilised_time": estimate.immobilised_time,
@@ -41,6 +42,7 @@ def describe(estimate: GroundEstimate, told: float) -> dict[str, Any]:
         "stuck": estimate.stuck,
         "faults": estimate.faults,
     }
+    return found if estimate.soil is None else found | {"soil": _describe_soil(estimate.soil)}
 
 
 def write_learned(path: Path, contents: dict[str, Any]) -> None:
@@ -51,6 +53,12 @@ def write_learned(path: Path, contents: dict[str, Any]) -> None:
     """
     with errors_of(path, PlanningError):
         write_file(path, (json.dumps(contents, indent=1) + "\n").encode())
+
+
+def _describe_soil(soil: SoilEstimate) -> dict[str, Any]:
+    pairs = {"sinkage": soil.sinkage, "resistance": soil.resistance, "strength": soil.strength}
+    values = {name: {"mean": m, "std": s} for name, (m, s) in (pairs | soil.parameters).items()}
+    return values | {"told_apart": soil.told_apart, "cohesion_angle_correlation": soil.trade}
 
 
 def _finite(value: float) -> float | None:

@@ -53,21 +53,22 @@ class StuckWatch:
             commanded: Commanded speed [m/s], None if it is not known: then wheels that turn, or
                 push as hard as they can, tell that the rover is to move.
         """
-        speed = float(np.median(np.abs(window.rolling)))
+        speed = float(np.median(np.maximum(np.abs(window.rolling) - window.scrub, 0.0)))
         wanted = bool((np.abs(torques) >= self._most).sum() >= WHEEL_COUNT // 3)
         if commanded is not None:
             wanted = abs(commanded) > self._slowest
         past = self._past
         if past and window.time - past[-1][0] > LONGEST_GAP:
             past.clear()
-        past.append((window.time, window.places.mean(axis=0), speed, wanted))
+        past.append((window.time, window.places, speed, wanted))
         while len(past) > 1 and window.time - past[1][0] >= PATIENCE - 1e-6:
             past.popleft()
         times, places, speeds, wishes = zip(*past, strict=True)
         elapsed = times[-1] - times[0]
         self.reason = ""
         if elapsed >= PATIENCE - 1e-6 and climb < CLIMBING:
-            moved = float(np.hypot(*(places[-1] - places[0]))) / elapsed
+            # On the spot the middle of the wheels stays, and each goes its way.
+            moved = float(np.hypot(*(places[-1] - places[0]).T).mean()) / elapsed
             if min(speeds) > self._slowest and moved < NO_PROGRESS * np.mean(speeds):
                 self.reason = "wheels turn and the rover stays"
             elif all(wishes) and max(moved, *speeds) < self._slowest:

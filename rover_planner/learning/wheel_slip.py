@@ -43,6 +43,9 @@ class SlipWindow:
     """(6,) speeds of the wheel centres along their axles, to the left [m/s]."""
     deviation: float
     """Standard deviation of the speeds [m/s]."""
+    scrub: Floats
+    """(6,) speeds up to which treads may roll because the wheels are steered [m/s]: a wheel turns
+    about the middle of its contact, which is somewhere along its width."""
     places: Floats
     """(6, 2) mean positions of the wheels [m]."""
     loads: Floats
@@ -82,9 +85,9 @@ class SlipWindow:
 class SlipWindows:
     """Forms windows from the blocks of a drive."""
 
-    def __init__(self, radius: float):
-        """Start for wheels of a radius [m]."""
-        self._radius = radius
+    def __init__(self, radius: float, width: float):
+        """Start for wheels of a radius and a width [m]."""
+        self._radius, self._half_width = radius, 0.5 * width
         self._scatter, self._scatter_known = 0.0, False
         self._blocks: deque[tuple[float, Floats, WheelState]] = deque(maxlen=WINDOW)
 
@@ -107,6 +110,7 @@ class SlipWindows:
         states = [block[2] for block in self._blocks]
         rolled = self._radius * np.array([block[1] + block[2].links for block in self._blocks])
         centres = np.array([state.centres[:, :2] for state in states])
+        steering = np.array([state.steering for state in states])
         values = np.concatenate([rolled, centres.reshape(WINDOW, -1)], axis=1)
         centred = times - times.mean()
         spread = float(centred @ centred)
@@ -135,6 +139,7 @@ class SlipWindows:
             travel=(speeds[:, 0] * axles[:, 1] - speeds[:, 1] * axles[:, 0]) / across,
             aside=(along[:, 0] * speeds[:, 1] - along[:, 1] * speeds[:, 0]) / across,
             deviation=scatter / np.sqrt(spread),
+            scrub=self._half_width * np.ptp(steering, axis=0) / (times[-1] - times[0]),
             places=means[WHEEL_COUNT:].reshape(WHEEL_COUNT, 2),
             loads=np.mean([state.loads for state in states], axis=0),
             doubts=np.mean([state.doubts for state in states], axis=0),

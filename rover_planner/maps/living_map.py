@@ -32,6 +32,10 @@ from rover_planner.maps.layers import (
 NEWEST, SUREST = "newest", "surest"
 MERGE_RULES = (NEWEST, SUREST)
 """Which of two heights of a cell counts: the newer one, or the one with the smaller deviation."""
+AUTO, MERGE, REPLACE = "auto", "merge", "replace"
+MAP_UPDATES = (AUTO, MERGE, REPLACE)
+"""Effects of a local map: it merges if there is a loaded map and else replaces the last one; it
+always merges; or it always replaces."""
 GROWTH = 32
 """Cells by which a window grows at least, so that it does not grow with each map."""
 ROLL = 8
@@ -43,8 +47,8 @@ FINER = 0.75
 
 
 @dataclass(frozen=True)
-class MergeRules:
-    """Rules by which maps merge."""
+class MapRules:
+    """Rules by which maps are kept, merge and are filled under the rover."""
 
     rule: str = NEWEST
     """One of MERGE_RULES."""
@@ -56,6 +60,14 @@ class MergeRules:
     """Side of the window around the rover [m]; 0 covers the loaded map and all local ones."""
     max_cells: int = MAX_CELLS
     """Largest window [cells]."""
+    updates: str = AUTO
+    """One of MAP_UPDATES."""
+    fills: bool = True
+    """True if unknown cells under the standing rover are filled."""
+    fill_margin: float = 0.0
+    """Width around the wheels' outline that is filled where the rover started [m]."""
+    fill_std: float = 0.02
+    """Standard deviation of filled heights on a map that has deviations [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +83,8 @@ class MapSnapshot:
 class LivingMap:
     """Merges maps; each change makes new arrays, so earlier snapshots stay as they are."""
 
-    def __init__(self, rules: MergeRules | None = None):
-        self.rules = rules or MergeRules()
+    def __init__(self, rules: MapRules | None = None):
+        self.rules = rules or MapRules()
         """Rules by which maps merge from now on."""
         self._names = list(FIRST_NAMES)
         self._last: dict[str, float] = {}

@@ -1,54 +1,28 @@
 # SPDX-License-Identifier: Apache-2.0
 """Keeps the map of a server: what a loaded map, local maps and the standing rover add to it."""
 
-from dataclasses import dataclass, field
-
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.maps.ground_beneath import GroundBeneath, Standing, find_ground_beneath
-from rover_planner.maps.living_map import LivingMap, MapSnapshot, MergeRules
+from rover_planner.maps.living_map import AUTO, MERGE, LivingMap, MapRules, MapSnapshot
 from rover_planner.maps.moved_map import MapMove, move_map
-
-AUTO, MERGE, REPLACE = "auto", "merge", "replace"
-MAP_UPDATES = (AUTO, MERGE, REPLACE)
-"""Effects of a local map: it merges if there is a loaded map and else replaces the last one; it
-always merges; or it always replaces."""
-
-
-@dataclass(frozen=True)
-class KeeperSettings:
-    """Settings of a `MapKeeper`."""
-
-    updates: str = AUTO
-    """One of MAP_UPDATES."""
-    rules: MergeRules = field(default_factory=MergeRules)
-    """Rules by which maps merge."""
-    fill: bool = True
-    """True if unknown cells under the standing rover are filled."""
-    margin: float = 0.0
-    """Width around the wheels' outline that is filled where the rover started [m]."""
-    std: float = 0.02
-    """Standard deviation of filled heights on a map that has deviations [m]."""
 
 
 class MapKeeper:
     """Makes one map of all that a server hears; without ROS."""
 
-    def __init__(self, rover: Rover, settings: KeeperSettings | None = None):
-        self._rover = rover
-        self._settings = settings or KeeperSettings()
-        self._living = LivingMap(self._settings.rules)
+    def __init__(self, rover: Rover, rules: MapRules | None = None):
+        self._rover, self._living = rover, LivingMap(rules)
         self._start: GroundBeneath | None = None
 
-    def apply(self, rover: Rover, settings: KeeperSettings) -> None:
-        """Use another rover and other settings from now on; the map stays."""
-        self._rover, self._settings = rover, settings
-        self._living.rules = settings.rules
+    def apply(self, rover: Rover, rules: MapRules) -> None:
+        """Use another rover and other rules from now on; the map stays."""
+        self._rover, self._living.rules = rover, rules
 
     @property
     def merges(self) -> bool:
         """True if the next local map merges."""
-        updates = self._settings.updates
+        updates = self._living.rules.updates
         return updates == MERGE or (updates == AUTO and self._living.has_loaded)
 
     def load(self, terrain: Terrain, time: float, standing: Standing | None) -> MapSnapshot:
@@ -70,7 +44,7 @@ class MapKeeper:
             PlanningError: As `move_map`.
         """
         grid = self._living.grid_for(terrain) if self.merges else None
-        return move_map(terrain, move, grid, self._settings.rules.max_cells)
+        return move_map(terrain, move, grid, self._living.rules.max_cells)
 
     def take(
         self, terrain: Terrain, source: str, time: float, standing: Standing | None
@@ -100,12 +74,12 @@ class MapKeeper:
         Raises:
             PlanningError: The window would be too large.
         """
-        if not (self._settings.fill and self._living.has_cells):
+        if not (self._living.rules.fills and self._living.has_cells):
             return None
         return self._living.snapshot() if self._fill(standing, time) else None
 
     def _filled(self, standing: Standing | None, time: float) -> MapSnapshot:
-        if self._settings.fill:
+        if self._living.rules.fills:
             self._fill(standing, time)
         snapshot = self._living.snapshot()
         assert snapshot is not None
@@ -122,11 +96,11 @@ class MapKeeper:
             changed |= self._fill_with(now, 0.0, time)
             self._start = self._start or now
         if self._start is not None:
-            changed |= self._fill_with(self._start, self._settings.margin, time)
+            changed |= self._fill_with(self._start, self._living.rules.fill_margin, time)
         return changed
 
     def _fill_with(self, ground: GroundBeneath, margin: float, time: float) -> bool:
         grid = self._living.grid
         assert grid is not None
-        patch, is_contact = ground.patch(grid, margin, self._settings.std)
+        patch, is_contact = ground.patch(grid, margin, self._living.rules.fill_std)
         return self._living.fill(patch, is_contact, time)

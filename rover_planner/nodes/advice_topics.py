@@ -11,11 +11,13 @@ from std_srvs.srv import Trigger
 
 from msg_adapters.results.diagnostics import to_json
 from rover_physics.errors import RoverError
+from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.advice.advise import Advice, grow_within
-from rover_planner.advice.case import ACCEPTED_CHANCE, Case
+from rover_planner.advice.case import Case
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.planning.answering.budget import BUSY, CANCELLED, Budget, QuestionStoppedError
 from rover_planner.planning.answering.judgement import PathJudgement
+from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.guard import Guard, Handover
 from rover_planner.ros.qos import latched_qos
@@ -26,10 +28,8 @@ NOTHING_REFUSED = "no path was refused yet; ask ~/can_traverse or ~/check_path f
 class AdviceTopics:
     """Seeks advice on the path that was refused last, in a thread that gives way to questions."""
 
-    def __init__(self, node: Node, desk: QuestionDesk, guard: Guard, seconds: float):
-        self.seconds = seconds
-        """Time for the advice to come [s]."""
-        self._node, self._desk, self._guard = node, desk, guard
+    def __init__(self, node: Node, service: TraverseService, desk: QuestionDesk, guard: Guard):
+        self._node, self._service, self._desk, self._guard = node, service, desk, guard
         self._handover = Handover(node, guard)
         self._refused: PathJudgement | None = None
         self._pool, self._budget = ThreadPoolExecutor(1, "advice"), Budget(0.0)
@@ -61,7 +61,7 @@ class AdviceTopics:
         elif self._in_work is not None and not self._in_work.done():
             self._refuse(BUSY, "other advice is in work; ask again later", response, reply)
         else:
-            self._budget = Budget(self.seconds)
+            self._budget = Budget(self._service.settings.parameters.advice_time)
             work = partial(self._work, _case_of(judgement), self._budget, response, reply)
             self._in_work = self._pool.submit(work)
 

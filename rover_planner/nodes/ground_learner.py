@@ -27,6 +27,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_planner.learning.drive_log import YAW, X, Y
 from rover_planner.learning.ground_learner import GroundLearner
 from rover_planner.learning.learned_file import describe
+from rover_planner.learning.soil_fit import SoilFit
 from rover_planner.learning.stuck_place import find_place_ahead
 from rover_planner.learning.wheel_odometry import WheelOdometry
 from rover_planner.nodes.running import run_node
@@ -63,6 +64,8 @@ class GroundLearnerNode(Node):
         self._values = values = declare_parameters(self, GroundLearnerParameters)
         load_kernels(LEARNING, (), self.get_logger().info)
         self._rover = load_rover(values.rover)
+        if values.soil:
+            SoilFit(self._rover, 1.0, values.soil)  # refuses a name that is wrong
         self._told = values.friction or self._rover.friction
         known = (*SUSPENSION_JOINTS, *WHEEL_JOINTS, *STEERING_JOINTS)
         self._rows = RowCollector(read_joint_map(values.joint_map, known))
@@ -117,7 +120,8 @@ class GroundLearnerNode(Node):
         check_frame(cloud.header.frame_id, values.map_frame, CLOUD)
         terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height)
         if self.learner is None:
-            self.learner = GroundLearner(self._rover, terrain, self._told)
+            soil = values.soil or None
+            self.learner = GroundLearner(self._rover, terrain, self._told, soil)
         else:
             self.learner.change_map(terrain)
 

@@ -14,7 +14,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -404,28 +403,29 @@ def _carry_out(node: MissionPlanner, terrain: Terrain | None, options: MissionOp
         node.publish_map(terrain)
     codes = set()
     for number, goal in enumerate(options.goals, start=1):
-        report({"event": "asking", "goal": number})
+
+        def tell(text: str, goal: int = number) -> None:
+            report({"event": text, "goal": goal})
+
+        tell("asking")
         asked = time.monotonic()
         answer = node.ask(options.start, goal)
         answer["response_time"] = time.monotonic() - asked
         report({"event": "answer", "goal": number, "answer": answer})
         if options.advise and _was_judged(answer) and not answer["traversable"]:
-            advised = _take_advice(
-                node, options.start, goal, partial(_report_advice, report, number)
-            )
+            advised = _take_advice(node, options.start, goal, tell)
             if advised is not None:
                 answer = advised
                 report({"event": "answer", "goal": number, "answer": answer})
         codes.add(_exit_code(answer))
         if options.drive and answer["traversable"]:
-            report({"event": "driving", "goal": number})
-            report_change = partial(_report_change, report, number)
+            tell("driving")
             try:
                 settings = DriveSettings(options.position_tolerance, options.heading_tolerance)
-                drive_to(node, goal, answer["poses"], settings, report_change)
+                drive_to(node, goal, answer["poses"], settings, tell)
             except NoAnswerError as error:
                 raise DriveFailedError(str(error)) from error
-            report({"event": "arrived", "goal": number})
+            tell("arrived")
     return next(code for code in (EXIT_FAILED, EXIT_NOT_TRAVERSABLE, EXIT_OK) if code in codes)
 
 
@@ -436,9 +436,10 @@ def _take_advice(
     advice = node.ask_advice()
     remedy = choose_remedy(advice)
     if remedy is None:
-        tell(f"none that a mission planner can take; {advice.get('words', advice['reason'])}")
+        words = advice.get("words", advice["reason"])
+        tell(f"advice: none that a mission planner can take; {words}")
         return None
-    tell(remedy["words"])
+    tell(f"advice: {remedy['words']}")
     if "policy" in remedy["options"]:
         node.set_policy(remedy["options"]["policy"])
     if "poses" not in remedy:
@@ -471,14 +472,6 @@ def spin_until(ended: threading.Event, executor: SingleThreadedExecutor) -> None
             if executor.context.ok():
                 raise
             return  # ROS was shut down while the executor began to wait
-
-
-def _report_advice(report: Callable[[dict[str, Any]], None], goal: int, words: str) -> None:
-    report({"event": f"advice: {words}", "goal": goal})
-
-
-def _report_change(report: Callable[[dict[str, Any]], None], goal: int, text: str) -> None:
-    report({"event": text, "goal": goal})
 
 
 def _print_json(event: dict[str, Any]) -> None:

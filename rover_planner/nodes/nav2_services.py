@@ -22,6 +22,7 @@ from msg_adapters.stamps import stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_planner.maps.known_map import stamp_text
 from rover_planner.nodes.question_desk import QuestionDesk
+from rover_planner.planning.answering.budget import CANCELLED, STOPPING
 from rover_planner.planning.answering.judgement import PathJudgement
 from rover_planner.planning.answering.questions import Answer, BadQuestion, PathCheck, Question
 from rover_planner.planning.answering.snapshot import GivenPath
@@ -93,18 +94,15 @@ class PathValidity:
         self._desk.ask(question, send)
 
 
-ERROR_CODES = {
-    "": 0,
-    "bad_request": 201,
-    "no_map": 201,
-    "stale_map": 201,
-    "off_map": 204,
-    "too_long": 208,
-    "out_of_time": 208,
-    "busy": 208,
+ERRORS = {
+    "": "NONE",
+    "off_map": "GOAL_OUTSIDE_MAP",
+    **dict.fromkeys(("too_long", "out_of_time", "busy"), "TIMEOUT"),
+    **dict.fromkeys(("bad_request", "no_map", "stale_map", "internal_error"), "UNKNOWN"),
+    **dict.fromkeys((CANCELLED, STOPPING), "UNKNOWN"),
 }
-"""Error codes of ComputePathToPose by the code of a verdict; others are NO_VALID_PATH."""
-NO_VALID_PATH = 209
+"""Names of the errors of ComputePathToPose by the code of a verdict; others are NO_VALID_PATH.
+Their numbers differ between releases of Nav2."""
 
 
 class PathComputation:
@@ -150,8 +148,7 @@ class PathComputation:
             result.path, _ = self._publish(judged, answer.identity)
             seconds = time.monotonic() - begin
             result.planning_time = Duration(seconds=seconds).to_msg()
-            code = "" if judged.traversable else judged.code
-            result.error_code = ERROR_CODES.get(code, NO_VALID_PATH)
+            result.error_code = getattr(result, _name_error(judged))
             if hasattr(result, "error_msg"):  # newer than Jazzy's first release
                 result.error_msg = "" if judged.traversable else judged.reason
             self._answers[id(handle)] = judged.traversable, result
@@ -167,6 +164,15 @@ class PathComputation:
         else:
             handle.abort()
         return result
+
+
+def _name_error(judged: PathJudgement) -> str:
+    """Return the name of the error of ComputePathToPose for a judgement."""
+    if judged.traversable:
+        return ERRORS[""]
+    name, chosen = ERRORS.get(judged.code, "NO_VALID_PATH"), judged.candidate
+    starts_there = chosen is not None and chosen.verdict.first_failure == 0
+    return "START_OUTSIDE_MAP" if name == "GOAL_OUTSIDE_MAP" and starts_there else name
 
 
 def find_invalid_poses(codes: Sequence[str], given: NDArray[np.intp]) -> list[int]:

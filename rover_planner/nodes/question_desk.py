@@ -76,7 +76,6 @@ class QuestionDesk:
         self._node, self._service, self._maps, self._guard = node, service, maps, guard
         self._sender, self._listen = PacedSender(node, guard), listen
         self._register = Register()
-        self._time_budget = 1.0
         self.health = ServerHealth()
         """Counts of answers and faults."""
         steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -94,18 +93,15 @@ class QuestionDesk:
         """Number of questions without an answer."""
         return self._queue.open_count
 
-    def set_limits(self, time_budget: float, max_waiting: int) -> None:
-        """Set the time [s] of each question to come, and the number of questions that may wait."""
-        self._time_budget = time_budget
-        self._queue.max_waiting = max_waiting
-
     def ask(self, question: Question, reply: Reply) -> None:
         """Take a question; its answer follows within its budget and GRACE."""
         self._listen()
         now = self._node.get_clock().now().nanoseconds
+        values = self._service.settings.parameters
+        self._queue.max_waiting = values.max_waiting
         inquiry = Inquiry(
             question,
-            Budget(self._time_budget),
+            Budget(values.time_budget),
             reply=reply,
             snapshot=replace(self._service.snapshot(now), watch=self._watch()),
             number=self._register.next_number(),

@@ -124,20 +124,19 @@ class TraverseServer(Node):
             self,
             self.service,
             self._values,
-            lambda error: self.desk.health.take_map(error),
+            self._hear_of_map,
             self.frames,
             self.guard,
             self._heard,
         )
         self.desk = QuestionDesk(self, self.service, self._maps, self.guard, self._heard.poll)
         """Takes the questions of all services."""
-        self.desk.set_limits(self._values.time_budget, self._values.max_waiting)
         self._create_subscriptions(reliability)
         serve_later(self, GetPlan, "~/can_traverse", self._can_traverse)
         serve_later(self, Trigger, "~/check_path", self._check_path)
         PathValidity(self.desk, frame, self.publish, self.localise_path).serve(self)
         PathComputation.serve(self, self.desk, self.read_question, self.publish)
-        self._advice = AdviceTopics(self, self.desk, self.guard, self._values.advice_time)
+        self._advice = AdviceTopics(self, self.service, self.desk, self.guard)
         self.create_service(Trigger, "~/cancel", self._cancel)
         self.create_service(Trigger, "~/clear_places", self._clear_marks)
         self.arm = ArmTopics(self, self.desk, frame, reliability)
@@ -190,16 +189,23 @@ class TraverseServer(Node):
     def _apply_parameters(self, parameters: TraverseServerParameters) -> None:
         self._values = parameters
         self.service.settings = load_service_settings(parameters)
-        self.desk.set_limits(parameters.time_budget, parameters.max_waiting)
-        self._advice.seconds = parameters.advice_time
         self._maps.apply(parameters)
         self.watch.apply(parameters)
         self.frames.apply_timeout(parameters.transform_timeout)
         self._hazards.apply(parameters)
 
     def _beat(self) -> None:
+        """Do all that is done ten times a second; each timer of its own would cost a wake-up."""
         self._heard.poll()
         self.watch.beat()
+        self._results.serve_late_comers()
+        self._hazards.catch_up()
+
+    def _hear_of_map(self, error: str) -> None:
+        """Note why a map was refused, or have the watch look at a new one at once."""
+        self.desk.health.take_map(error)
+        if not error:
+            self.watch.look()
 
     def _take_joints(self, state: JointState, _arrival: float) -> None:
         try:

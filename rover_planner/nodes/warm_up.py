@@ -12,6 +12,7 @@ from rover_physics.traversability.pose_classes import RoverOnMap, classify_poses
 from rover_physics.warm_up import EXACT, SCORES, SINGLE, UNCERTAIN
 from rover_planner.learning.contact_sense import ContactSense
 from rover_planner.learning.drive_log import FORCES, WIDTH
+from rover_planner.learning.soil_fit import SoilFit
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.planning.candidates import generate_candidates
 from rover_planner.planning.path_query import PathQueryOptions
@@ -72,7 +73,9 @@ def feel_ground() -> None:
     """Feel level ground."""
     ground = Terrain(np.zeros((60, 60)), 0.05, (-1.5, -1.5))
     row = np.where(np.arange(WIDTH) < FORCES.start, 0.0, np.nan)
-    ContactSense(load_rover("lsr1"), ground).feel(row, np.ones(6))
+    rover = load_rover("lsr1")
+    ContactSense(rover, ground).feel(row, np.ones(6))
+    SoilFit(rover, 80.0, "dry_sand").find_estimate()
 
 
 def simulate() -> None:

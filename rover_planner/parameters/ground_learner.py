@@ -20,6 +20,12 @@ class GroundLearnerParameters(ParameterTable):
         bounds=(0.0, 10.0),
         read_only=True,
     )
+    soil: str = parameter(
+        "",
+        "Soil of config/soils.yaml that is assumed at first, on ground that yields; its "
+        "parameters are learned.",
+        read_only=True,
+    )
     stop_when_stuck: bool = parameter(
         False,
         "Whether a rover that is stuck gets an emergency stop on "

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 from rover_physics.bounds.path import SIGMAS
 from rover_physics.names import EQUAL, TORQUE_POLICIES
-from rover_planner.maps.living_map import MERGE_RULES, NEWEST
-from rover_planner.maps.map_keeper import AUTO as AUTO_UPDATES
-from rover_planner.maps.map_keeper import MAP_UPDATES
+from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
+from rover_planner.maps.living_map import AUTO as AUTO_UPDATES
+from rover_planner.maps.living_map import MAP_UPDATES, MERGE_RULES, NEWEST
 from rover_planner.maps.unobserved_ground import ALLOW, UNOBSERVED_GROUND
 from rover_planner.parameters import shared
 from rover_planner.parameters.table import ParameterError, ParameterTable, parameter
@@ -203,7 +203,7 @@ class TraverseServerParameters(ParameterTable):
         bounds=(0.0, 10.0),
     )
     accepted_chance: float = parameter(
-        1.0,
+        ACCEPTED_CHANCE,
         "Largest chance of failure of a path that is traversable; 1 does not ask for it.",
         bounds=(0.0, 1.0),
     )

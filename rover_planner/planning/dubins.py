@@ -6,9 +6,11 @@ Journal of Mathematics 79(3). The six words are solved in the normalised form of
 (2001), Classification of the Dubins set, Robotics and Autonomous Systems 34.
 """
 
-import math
-
 import numpy as np
+from numpy.typing import NDArray
+
+Angles = NDArray[np.float64]
+"""Angles or lengths (n,), or a single one."""
 
 _TURN = {"L": 1.0, "S": 0.0, "R": -1.0}
 """Curvature of each letter of a word, in 1 / radius, positive to the left."""
@@ -37,56 +39,60 @@ def dubins_paths(
         waypoints.
     """
     words = _words_between(start, goal, radius)
-    words.sort(key=lambda word: sum(word[1]))
-    return [_drive(start, word, pieces, radius, waypoint_spacing) for word, pieces in words[:most]]
+    lengths = words.sum(axis=1)
+    shortest = np.argsort(lengths, kind="stable")[: np.isfinite(lengths).sum()]
+    return [_drive(start, _WORDS[k], words[k], radius, waypoint_spacing) for k in shortest[:most]]
 
 
-def dubins_length(start: np.ndarray, goal: np.ndarray, radius: float) -> float:
-    """Return the length [m] of the shortest Dubins path; arguments as for `dubins_paths`."""
-    return radius * min(sum(pieces) for _, pieces in _words_between(start, goal, radius))
+def dubins_lengths(
+    starts: NDArray[np.float64], goals: NDArray[np.float64], radius: float
+) -> NDArray[np.float64]:
+    """Return the lengths (n,) [m] of the shortest Dubins paths between poses, (n, 3) or (3,).
+
+    `radius` is as for `dubins_paths`.
+    """
+    lengths: NDArray[np.float64] = radius * _words_between(starts, goals, radius).sum(axis=1).min(
+        0
+    )
+    return lengths
 
 
 def _words_between(
-    start: np.ndarray, goal: np.ndarray, radius: float
-) -> list[tuple[str, tuple[float, float, float]]]:
-    """Return the words between two poses; pieces as `_solve_words` returns them."""
-    dx, dy = ((goal[:2] - start[:2]) / radius).tolist()
-    bearing, distance = math.atan2(dy, dx), math.hypot(dx, dy)
-    return _solve_words(
-        _turn(float(start[2]) - bearing), _turn(float(goal[2]) - bearing), distance
-    )
+    starts: NDArray[np.float64], goals: NDArray[np.float64], radius: float
+) -> NDArray[np.float64]:
+    """Return the lengths (6, 3, n) of the three pieces of all words [radii; rad on arcs].
 
-
-def _solve_words(a: float, b: float, d: float) -> list[tuple[str, tuple[float, float, float]]]:
-    """Solve the six words for headings a, b relative to the chord [rad] and its length d [radii].
-
-    Return each word that exists, with the lengths of its three pieces [radii; rad on arcs].
+    They are infinite where there is no such word; without n for single poses (3,).
     """
-    found = _solve_left(a, b, d, "LSL", "LSR", "LRL") | _solve_left(-a, -b, d, "RSR", "RSL", "RLR")
-    return [(word, found[word]) for word in _WORDS if word in found]
+    away = (goals - starts)[..., :2] / radius
+    bearing, distance = np.arctan2(away[..., 1], away[..., 0]), np.hypot(*away.T)
+    a, b = _turn(starts[..., 2] - bearing), _turn(goals[..., 2] - bearing)
+    with np.errstate(invalid="ignore"):
+        left, right = _solve_left(a, b, distance), _solve_left(-a, -b, distance)
+    words = np.array([left[0], right[0], left[1], right[1], right[2], left[2]])
+    return np.where(np.isnan(words), np.inf, words)
 
 
-def _solve_left(
-    a: float, b: float, d: float, same: str, crossed: str, curved: str
-) -> dict[str, tuple[float, float, float]]:
-    """Solve the words that begin to the left; with mirrored headings those to the right."""
-    sa, ca, sb, cb, cab = math.sin(a), math.cos(a), math.sin(b), math.cos(b), math.cos(a - b)
-    found = {}
-    square = 2 + d * d - 2 * cab + 2 * d * (sa - sb)
-    if square >= 0:
-        line = math.atan2(cb - ca, d + sa - sb)
-        found[same] = _turn(line - a), math.sqrt(square), _turn(b - line)
-    square = -2 + d * d + 2 * cab + 2 * d * (sa + sb)
-    if square >= 0:
-        p = math.sqrt(square)
-        line = math.atan2(-ca - cb, d + sa + sb) - math.atan2(-2.0, p)
-        found[crossed] = _turn(line - a), p, _turn(line - b)
-    cosine = (6 - d * d + 2 * cab + 2 * d * (sb - sa)) / 8
-    if abs(cosine) <= 1:
-        p = 2 * math.pi - math.acos(cosine)
-        t = _turn(-a - math.atan2(ca - cb, d + sa - sb) + p / 2)
-        found[curved] = t, p, _turn(b - a - t + p)
-    return found
+def _solve_left(a: Angles, b: Angles, d: Angles) -> list[list[Angles]]:
+    """Return the pieces of the words LSL, LSR and LRL, NaN where there is none.
+
+    With mirrored headings they are those of RSR, RSL and RLR.
+
+    Args:
+        a: Heading at the start, relative to the chord [rad].
+        b: Heading at the goal.
+        d: Length of the chord [radii].
+    """
+    sa, ca, sb, cb, cab = np.sin(a), np.cos(a), np.sin(b), np.cos(b), np.cos(a - b)
+    line = np.arctan2(cb - ca, d + sa - sb)
+    p = np.sqrt(2.0 + d * d - 2.0 * cab + 2.0 * d * (sa - sb))
+    same = [_turn(line - a), p, _turn(b - line)]
+    p = np.sqrt(-2.0 + d * d + 2.0 * cab + 2.0 * d * (sa + sb))
+    line = np.arctan2(-ca - cb, d + sa + sb) - np.arctan2(-2.0, p)
+    crossed = [_turn(line - a), p, _turn(line - b)]
+    p = 2.0 * np.pi - np.arccos((6.0 - d * d + 2.0 * cab + 2.0 * d * (sb - sa)) / 8.0)
+    t = _turn(-a - np.arctan2(ca - cb, d + sa - sb) + p / 2.0)
+    return [same, crossed, [t, p, _turn(b - a - t + p)]]
 
 
 def _drive(start, word, pieces, radius, waypoint_spacing):
@@ -115,7 +121,7 @@ def _advance(x, y, yaw, turn, s):
     )
 
 
-def _turn(angle: float) -> float:
-    """Wrap an angle [rad] into 0 to 2 pi; a full turn within rounding errors becomes 0."""
-    turned = angle % (2.0 * math.pi)
-    return 0.0 if 2.0 * math.pi - turned < 1e-9 else turned
+def _turn(angle: Angles) -> Angles:
+    """Wrap angles [rad] into 0 to 2 pi; a full turn within rounding errors becomes 0."""
+    turned = angle % (2.0 * np.pi)
+    return np.where(2.0 * np.pi - turned < 1e-9, 0.0, turned)

@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.bounds.path import SIGMAS
+from rover_physics.limits.table import CHANCE
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
+from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path, judge_paths
 from rover_physics.traversability.verdict import Verdict
@@ -41,7 +43,7 @@ class PathQueryOptions:
     """Torque policy, friction, torque, soil, payload and arm of the model."""
     map_sigmas: float = SIGMAS
     """Standard deviations to allow for on an uncertain map; 0 treats heights as exact."""
-    accepted_chance: float = 1.0
+    accepted_chance: float = ACCEPTED_CHANCE
     """Largest chance of failure of a path that is traversable; 1 does not ask for it."""
 
     def change(self, **changes: Any) -> "PathQueryOptions":
@@ -209,9 +211,13 @@ def choose_by_chance(
     while (answer := choose(tuple(candidates))).traversable:
         best = answer.best
         if options.accepted_chance >= 1.0 or candidates[best].verdict.failure_chance_at:
-            break
-        candidates[best] = check_path(rover, terrain, candidates[best].poses, options)
-    return answer
+            return answer
+        candidates[best] = check_path(
+            rover, terrain, candidates[best].poses, options, stop_at_failure=True
+        )
+    if answer.chosen.verdict.code == CHANCE:
+        candidates[answer.nearest] = check_path(rover, terrain, answer.chosen.poses, options)
+    return choose(tuple(candidates))
 
 
 def generate_paths(
@@ -243,8 +249,9 @@ def check_path(
 ) -> Candidate:
     """Evaluate and judge a given path of poses (n, 3); other arguments as `answer_path_query`.
 
-    With `stop_at_failure`, the waypoints beyond the first failure are left out. The chance of
-    failure is asked only of a path that is traversable without it, so refusals are quick.
+    With `stop_at_failure`, the waypoints beyond the first failure are left out, and a chance of
+    failure above the accepted one may be larger than told. It is asked only of a path that is
+    traversable without it, so refusals are quick.
 
     Raises:
         RoverError: The model refuses an option (ModelError) or the poses (PoseError).
@@ -252,20 +259,21 @@ def check_path(
     options = options or PathQueryOptions()
     poses = np.array(poses, np.float64)
 
-    def judge(accepted: float | None) -> tuple[PathPrediction, Verdict]:
+    def judge(stop: bool, accepted: float | None) -> tuple[PathPrediction, Verdict]:
         return judge_path(
             rover,
             terrain,
             poses,
             options.model,
             sigmas=options.map_sigmas,
-            stop_at_failure=stop_at_failure,
+            stop_at_failure=stop,
             accepted_chance=accepted,
         )
 
-    prediction, verdict = judge(None)
-    if verdict.traversable and options.accepted_chance < 1.0:
-        prediction, verdict = judge(options.accepted_chance)
+    asked = options.accepted_chance if options.accepted_chance < 1.0 else None
+    prediction, verdict = judge(stop_at_failure or asked is not None, asked)
+    if not (verdict.traversable or stop_at_failure or asked is None):
+        prediction, verdict = judge(False, asked if verdict.code == CHANCE else None)
     return Candidate(poses, prediction, verdict, path_cost(prediction, verdict))
 
 

@@ -16,8 +16,8 @@ from rover_planner.ros.qos import (
     topic_qos,
 )
 
-PERIOD = 1.0
-"""Time between two looks at the types of publishers [s]."""
+PERIOD = 5.0
+"""Time between two looks at the types of publishers [s]; one takes a millisecond per topic."""
 
 
 def subscribe_to_requests(
@@ -84,7 +84,7 @@ def _subscribe(
 
 
 class PublisherCheck:
-    """Looks for publishers of other types once a second; each problem is logged once."""
+    """Looks for publishers of other types each PERIOD; each problem is logged once."""
 
     def __init__(self, node: Node, types: Mapping[str, str], advice: Mapping[str, str]):
         """Check topics of a node.

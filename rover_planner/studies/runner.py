@@ -17,7 +17,7 @@ from rover_physics.rover.model import Rover
 from rover_planner.errors import PlanningError
 from rover_planner.studies.objectives import evaluate, load_shares
 from rover_planner.studies.rover_values import vary
-from rover_planner.studies.study_file import OBJECTIVES, Study, label_of
+from rover_planner.studies.study_file import OBJECTIVES, Study, label_of, name_thing
 
 MAX_NAMED = 6
 """Most equally good rovers that are named one by one."""
@@ -245,7 +245,7 @@ def describe_ties(result: StudyResult) -> str:
         return f"as good{within}: {len(ties)} others"
     parameter = study.parameters[0]
     values = ", ".join(f"{trial.values[0]:.4g}" for trial in ties)
-    return f"as good{within}: {parameter.name} = {values} {parameter.unit}".rstrip()
+    return f"as good{within}: {name_thing(parameter.name)} {values} {parameter.unit}".rstrip()
 
 
 def _describe_trial(name: str, trial: Trial, study: Study) -> list[str]:

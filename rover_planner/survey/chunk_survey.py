@@ -119,7 +119,7 @@ def compute_chunk(job: SurveyJob, chunk: Index) -> dict[str, np.ndarray]:
     shape = tuple(span.stop - span.start for span in cells)
     layers = {
         name: np.empty(shape, kind)
-        for name, kind in types_of_layers(request.headings, request.turns).items()
+        for name, kind in types_of_layers(request.headings, request.turns, request.chance).items()
     }
     for tile in layout.tiles_of(chunk):
         part = layout.window_of(tile)
@@ -151,7 +151,8 @@ def estimate_memory(job: SurveyJob) -> int:
         min((side - 1) * layout.step + 1 + 2 * layout.halo + BLOCK, size)
         for side, size in zip((rows, columns), layout.map_shape, strict=True)
     ]
-    kinds = types_of_layers(job.request.headings, job.request.turns).values()
+    asked = job.request
+    kinds = types_of_layers(asked.headings, asked.turns, asked.chance).values()
     kept = 2 * rows * columns * sum(kind.itemsize for kind in kinds)
     poses = 4 * max(BATCH, job.request.headings) * RESULT.itemsize
     return BYTES_OF_PROCESS + BYTES_OF_CELL * sides[0] * sides[1] + kept + poses

@@ -84,21 +84,22 @@ def bits_type(headings: int) -> np.dtype:
     return np.dtype(f"u{bits // 8}")
 
 
-def types_of_layers(headings: int, turns: bool) -> dict[str, np.dtype]:
+def types_of_layers(headings: int, turns: bool, chance: bool) -> dict[str, np.dtype]:
     """Return the layers of a survey and their types.
 
     Args:
         headings: Number of headings.
         turns: Whether turns on the spot are judged.
+        chance: Whether chances of failure are found.
     """
     types: dict[str, np.dtype] = {name: np.dtype("u1") for name in ("worst_class", "best_class")}
     types["first_limit"] = np.dtype("u1")
     types["passable_headings"] = bits_type(headings)
     if turns:
         types["turnable_headings"] = bits_type(headings)
-    for quantity in QUANTITIES:
+    for name in (*(one.name for one in QUANTITIES), *(("failure_chance",) if chance else ())):
         for which in ("worst", "best"):
-            types[f"{which}_{quantity.name}"] = np.dtype("f4")
+            types[f"{which}_{name}"] = np.dtype("f4")
     return types
 
 

@@ -39,6 +39,8 @@ class SurveyRequest:
     """Distance of surveyed cells [map cells]."""
     turns: bool = False
     """True to judge turns on the spot, too."""
+    chance: bool = False
+    """True to find the chances of failure, too."""
     sigmas: float = SIGMAS
     """Standard deviations to allow for where the map has them."""
 
@@ -66,6 +68,7 @@ class SurveyRequest:
             "headings": self.headings,
             "step": self.step,
             "turns": self.turns,
+            "chance": self.chance,
             "sigmas": self.sigmas,
             "map": map_hash,
             "version": rover_physics.__version__,

@@ -67,6 +67,11 @@ class StoreNotes:
         return bool(self.description["turns"])
 
     @property
+    def chance(self) -> bool:
+        """True if chances of failure were found."""
+        return bool(self.description["chance"])
+
+    @property
     def cell(self) -> float:
         """Distance of surveyed cells [m]."""
         return self.layout.step * self.frame.resolution
@@ -260,7 +265,7 @@ class SurveyStore:
 
     def layer_names(self) -> list[str]:
         """Return the names of the layers."""
-        return list(types_of_layers(self.notes.headings, self.notes.turns))
+        return list(types_of_layers(self.notes.headings, self.notes.turns, self.notes.chance))
 
     def layer(self, name: str) -> KeptLayer:
         """Return a layer (rows, columns)."""
@@ -313,7 +318,7 @@ def create_store(path: Path, notes: StoreNotes, terrain: Terrain | None) -> None
     try:
         group: Any = zarr.open_group(DurableStore(aside), mode="w")
         side = min(layout.chunk, max(layout.shape))
-        for name, kind in types_of_layers(notes.headings, notes.turns).items():
+        for name, kind in types_of_layers(notes.headings, notes.turns, notes.chance).items():
             group.create_array(
                 name,
                 shape=layout.shape,

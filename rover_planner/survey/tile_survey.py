@@ -78,7 +78,7 @@ def warm_up_survey(request: SurveyRequest) -> None:
 
 def refuse_all(request: SurveyRequest, cells: int) -> dict[str, np.ndarray]:
     """Return the layers (cells,) of a tile of unknown ground."""
-    types = types_of_layers(request.headings, request.turns)
+    types = types_of_layers(request.headings, request.turns, request.chance)
     layers = {name: np.full(cells, fill_of(name), kind) for name, kind in types.items()}
     layers["worst_class"][:] = layers["best_class"][:] = CLASS_NUMBERS[IMPASSABLE]
     layers["first_limit"][:] = number_limits()["unknown_ground"]
@@ -121,6 +121,10 @@ class TileJudge:
         numbers = find_scores(results).astype(np.float32)
         classes = self._classify(poses, limits, refused)
         layers = _sum_up(numbers, limits, classes, headings)
+        if self._request.chance:
+            chances = self._find_chances(poses, limits == NO_LIMIT).reshape(-1, headings)
+            layers["worst_failure_chance"] = chances.max(axis=1)
+            layers["best_failure_chance"] = chances.min(axis=1)
         if self._request.turns:
             layers["turnable_headings"] = pack_bits(
                 self._find_turns(poses, limits == NO_LIMIT).reshape(-1, headings)
@@ -185,6 +189,14 @@ class TileJudge:
             if len(rows):
                 turns[rows] = self.judge(self._policy, poses[rows], bend)[1] == NO_LIMIT
         return turns
+
+    def _find_chances(self, poses: np.ndarray, passes: np.ndarray) -> np.ndarray:
+        """Return the chance of failure (n,) of each pose, 1 where it fails as told."""
+        chances, rows = np.ones(len(poses), np.float32), np.flatnonzero(passes)
+        if len(rows):
+            asked = self._rover, self._terrain, poses[rows], None, self._request.options
+            chances[rows] = judge_poses(*asked, sigmas=0, accepted_chance=1.0)[1].failure_chance_at
+        return chances
 
     def _find_unknown_below(self, poses: np.ndarray) -> np.ndarray:
         """Return (n,) whether unknown ground is below the rover, seen from above."""

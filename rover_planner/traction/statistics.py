@@ -52,9 +52,8 @@ class TractionStatistics:
             "fallbacks": self.fallbacks,
         }
         if self._times:
-            times = 1e3 * self.times
-            values["update_time_median_ms"] = round(float(np.median(times)), 3)
-            values["update_time_p99_ms"] = round(float(np.percentile(times, 99)), 3)
+            median, p99 = (1e3 * np.quantile(self.times, (0.5, 0.99))).round(3).tolist()
+            values |= {"update_time_median_ms": median, "update_time_p99_ms": p99}
         return values if self.last is None else values | _describe_update(self.last)
 
 

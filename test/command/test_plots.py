@@ -16,12 +16,8 @@ from rover_planner.planning.path_query import PathQueryOptions, answer_path_quer
 from rover_planner.planning.search.path_search import find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 
+LSR1 = load_rover("lsr1")
 COARSE = PathQueryOptions(count=3, spacing=0.4, waypoint_spacing=0.1)
-
-
-@pytest.fixture(scope="module")
-def rover():
-    return load_rover("lsr1")
 
 
 @pytest.fixture(scope="module")
@@ -31,31 +27,31 @@ def holed():
     return Terrain(elevation, 0.1, (-6.0, -4.0))
 
 
-def ask(rover, terrain, name, goal):
+def ask(terrain, name, goal):
     return LabelledAnswer(
-        name, "plain", answer_path_query(rover, terrain, (-4, 0, 0), goal, COARSE)
+        name, "plain", answer_path_query(LSR1, terrain, (-4, 0, 0), goal, COARSE)
     )
 
 
-def test_a_picture_shows_accepted_and_refused_answers_each_with_its_curves(tmp_path, rover, holed):
+def test_a_picture_shows_accepted_and_refused_answers_each_with_its_curves(tmp_path, holed):
     answers = [
-        ask(rover, holed, "A", (0, 0, 0)),
-        ask(rover, holed, "B", (4, 3, 0.5)),
-        ask(rover, holed, "C", (9, 0, 0)),
+        ask(holed, "A", (0, 0, 0)),
+        ask(holed, "B", (4, 3, 0.5)),
+        ask(holed, "C", (9, 0, 0)),
     ]
     assert [one.answer.traversable for one in answers] == [True, False, False]
     path = tmp_path / "picture.svg"
-    draw_answers(path, rover, holed, answers, "title")
+    draw_answers(path, LSR1, holed, answers, "title")
     text = path.read_text()
     titles = ("A (plain):", "chosen path, 4.0 m", "B (plain):", "C (plain):", "refused, off map")
     assert [title for title in titles if title not in text] == []
 
 
 def test_the_picture_of_a_plan_names_rover_and_map_and_shows_the_use_of_each_limit(
-    tmp_path, rover
+    tmp_path,
 ):
     ground = Terrain(np.zeros((41, 41)), 0.1, (-2.0, -2.0))
-    question = SearchQuery(rover, ground, (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), PathQueryOptions())
+    question = SearchQuery(LSR1, ground, (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), PathQueryOptions())
     answer = find_path(question, LatticeSettings(budget=5.0, ends_at_first=True))
     draw_path(tmp_path / "plan.svg", question, answer, "hill.npz")
     text = (tmp_path / "plan.svg").read_text()
@@ -63,21 +59,21 @@ def test_the_picture_of_a_plan_names_rover_and_map_and_shows_the_use_of_each_lim
     assert [one for one in words if one not in text] == []
 
 
-def test_the_use_along_a_plan_has_the_peaks_between_waypoints(rover):
+def test_the_use_along_a_plan_has_the_peaks_between_waypoints():
     x = 0.05 * np.arange(121) - 3.0
     bump = Terrain(
         np.tile(np.where((x > 0.3) & (x < 0.5), 0.06, 0.0), (81, 1)), 0.05, (-3.0, -2.0)
     )
     poses = np.column_stack([np.linspace(-1.0, 1.0, 41), np.zeros((41, 2))])
-    path = check_path(rover, bump, poses)
+    path = check_path(LSR1, bump, poses)
     axes = Figure().subplots()
-    _draw_uses(axes, rover, path)
+    _draw_uses(axes, LSR1, path)
     highest = max(np.nanmax(line.get_ydata()) for line in axes.lines[:-1])
     assert highest >= path.verdict.risk > path.prediction.friction_utilisation.max()
 
 
 @pytest.fixture
-def draw(tmp_path, rover, holed, monkeypatch):
+def draw(tmp_path, holed, monkeypatch):
     """Return a function that draws one answer, and returns the axes of the map and the others."""
     drawn = []
     save = Figure.savefig
@@ -87,7 +83,7 @@ def draw(tmp_path, rover, holed, monkeypatch):
 
     def draw_one(labelled):
         path = tmp_path / "picture.png"
-        draw_answers(path, rover, holed, [labelled])
+        draw_answers(path, LSR1, holed, [labelled])
         assert path.read_bytes().startswith(b"\x89PNG")
         on_map = next(axes for axes in drawn[-1].axes if axes.get_xlabel() == "x [m]")
         return on_map, [axes for axes in drawn[-1].axes if axes is not on_map]
@@ -95,12 +91,12 @@ def draw(tmp_path, rover, holed, monkeypatch):
     return draw_one
 
 
-def test_forces_that_no_verdict_asks_for_are_shaded(draw, rover):
+def test_forces_that_no_verdict_asks_for_are_shaded(draw):
     """A wheel that rolls off an edge may use more friction than the verdict tells."""
     x = 0.05 * np.arange(121) - 4.5
     ledge = Terrain(np.tile(np.where(x < -2.5, 0.06, 0.0), (81, 1)), 0.05, (-4.5, -2.0))
     options = dataclasses.replace(COARSE, count=1, waypoint_spacing=0.02)
-    answer = answer_path_query(rover, ledge, (-3.5, 0, 0), (-1.5, 0, 0), options)
+    answer = answer_path_query(LSR1, ledge, (-3.5, 0, 0), (-1.5, 0, 0), options)
     prediction = answer.chosen.prediction
     falls = prediction.falling.any(axis=1)
     assert 0 < falls.sum() < len(falls)
@@ -109,7 +105,7 @@ def test_forces_that_no_verdict_asks_for_are_shaded(draw, rover):
     for name in ("wheel load [N]", "friction", "torque"):
         assert shaded[name] >= falls.sum()
     assert shaded["tip-over margin"] == 0
-    before = answer_path_query(rover, ledge, (-3.5, 0, 0), (-3.2, 0, 0), options)
+    before = answer_path_query(LSR1, ledge, (-3.5, 0, 0), (-3.2, 0, 0), options)
     assert before.traversable
     assert not any(axes.patches for axes in draw(LabelledAnswer("B", "level", before))[1])
 

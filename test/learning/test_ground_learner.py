@@ -49,6 +49,14 @@ def test_wheels_that_grip_prove_a_friction_and_nothing_above(step):
     assert np.abs(estimate.slip_ratios).max() < 0.05
 
 
+def test_wheels_that_roll_because_they_are_steered_do_not_slip():
+    rows = climb(ROVER, 0.0, 10.0, speed=0.0)
+    offset, rate = 0.04, 0.35  # from a contact at the rim of the width
+    rows[:, STEERING.start] = rate * (rows[:, TIME] % 4.0)
+    rows[:, RATES.start] += offset * rate / ROVER.wheel.radius
+    assert learn(rows, ramp(0.0)).estimate.slip_time is None
+
+
 def test_ground_is_marked_where_wheels_have_been():
     learner = learn(climb(ROVER, SLOPE, 20.0))
     known = np.isfinite(learner.ground.layers.friction)

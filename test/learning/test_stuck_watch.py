@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A rover that creeps is not stuck; one that stands while it pushes is, within 2 s."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,9 @@ from rover_planner.learning.wheel_slip import SlipWindow
 SPEED, MAX_TORQUE, PERIOD, DURATION = 0.06, 5.0, 0.1, 0.5
 
 
-def window(time: float, x: float, rolling: float, deviation: float) -> SlipWindow:
+def window(
+    time: float, x: float, rolling: float, deviation: float, scrub: float = 0.0
+) -> SlipWindow:
     """Return a window at whose middle the wheels were at x."""
     none = np.zeros(6)
     return SlipWindow(
@@ -20,6 +24,7 @@ def window(time: float, x: float, rolling: float, deviation: float) -> SlipWindo
         travel=none,
         aside=none,
         deviation=deviation,
+        scrub=np.full(6, scrub),
         places=np.tile([x, 0.0], (6, 1)),
         loads=none,
         doubts=none,
@@ -58,3 +63,14 @@ def test_a_rover_that_creeps_is_not_stuck_however_noisy_its_speed_is(speed, roll
 def test_a_rover_that_rests_or_climbs_is_not_stuck():
     assert first_notice(0.0, 0.0, 0.5) is None
     assert first_notice(0.0, SPEED, 1.0, climb=0.05) is None
+
+
+def test_a_rover_that_turns_on_the_spot_or_steers_is_not_stuck():
+    turns, steers = StuckWatch(SPEED, MAX_TORQUE), StuckWatch(SPEED, MAX_TORQUE)
+    for time in PERIOD * np.arange(1, 60):
+        around = 0.15 * time + np.arange(6.0)
+        one = window(float(time), 0.0, SPEED, deviation=0.02)
+        places = 0.4 * np.column_stack([np.cos(around), np.sin(around)])
+        assert not turns.update(replace(one, places=places), np.ones(6), 0.0)
+        one = window(float(time), 0.0, 0.2 * SPEED, deviation=0.02, scrub=0.25 * SPEED)
+        assert not steers.update(one, np.ones(6), 0.0)

@@ -14,8 +14,8 @@ from rover_planner.maps.map_keeper import MERGE, MapKeeper
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
 from rover_planner.planning.answering.service_settings import (
-    keeper_settings,
     load_service_settings,
+    map_rules,
 )
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.simulator.simulation import Simulation, load_simulation_settings
@@ -44,7 +44,7 @@ class Drive:
         self.simulation = Simulation(settings)
         asked = TraverseServerParameters(map_updates=MERGE, planner=FAN, **parameters)
         self.service = TraverseService(load_service_settings(asked))
-        self.keeper = MapKeeper(settings.rover, keeper_settings(asked))
+        self.keeper = MapKeeper(settings.rover, map_rules(asked))
         self.time = 0.0
 
     def look(self) -> None:

@@ -84,10 +84,9 @@ def test_an_orientation_of_zeros_is_not_set_and_taken_as_unturned():
 def _set(path, value):
     def change(message):
         *inner, last = path.split(".")
-        part = message
         for name in inner:
-            part = part[int(name)] if name.isdigit() else getattr(part, name)
-        setattr(part, last, value)
+            message = message[int(name)] if name.isdigit() else getattr(message, name)
+        setattr(message, last, value)
 
     return change
 

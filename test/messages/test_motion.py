@@ -2,6 +2,7 @@
 """Attitude, odometry, commands, tool targets and wrenches: impossible ones are refused."""
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -77,20 +78,10 @@ def test_a_target_is_its_place_and_a_wrench_is_force_and_moment():
     assert (force.tolist(), moment.tolist()) == ([1.0, 2.0, 3.0], [4.0, 5.0, 6.0])
 
 
-def read_imu(message):
-    return imu_to_attitude(message, ImuMounting("base_link"))
-
-
-def read_odometry(message):
-    return odometry_to_pose(message, "map", "base_link")
-
-
-def read_target(message):
-    return target_to_point(message, "map")
-
-
-def read_wrench(message):
-    return wrench_to_force_and_moment(message, "map")
+read_imu = partial(imu_to_attitude, mounting=ImuMounting("base_link"))
+read_odometry = partial(odometry_to_pose, map_frame="map", base_frame="base_link")
+read_target = partial(target_to_point, map_frame="map")
+read_wrench = partial(wrench_to_force_and_moment, map_frame="map")
 
 
 def transform(x=0.0, length=1.0, child="odom"):

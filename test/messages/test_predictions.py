@@ -22,16 +22,12 @@ from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.rover.steering_joints import steered_wheels, steering_joints
 
+LSR1 = load_rover("lsr1")
 STAMP = Time(sec=12, nanosec=34)
 
 
 @pytest.fixture(scope="module")
-def rover():
-    return load_rover("lsr1")
-
-
-@pytest.fixture(scope="module")
-def prediction(rover):
+def prediction():
     """Return 60 waypoints over waves, the last ten of them off the map."""
     axis = np.arange(101) * 0.05 - 2.5
     x, y = np.meshgrid(axis, axis)
@@ -40,7 +36,7 @@ def prediction(rover):
     poses[:, 0] = -1.0 + 0.05 * np.arange(60)
     poses[50:, 0] += 3.0
     poses[:, 2] = 0.1
-    predicted = judge_path(rover, terrain, poses)[0]
+    predicted = judge_path(LSR1, terrain, poses)[0]
     assert predicted.settled[:50].all() and not predicted.settled[50:].any()
     return predicted
 
@@ -65,11 +61,11 @@ def test_an_array_whose_length_disagrees_is_refused():
         array_values(Float64MultiArray())
 
 
-def test_the_trajectory_names_its_joints_and_ends_where_the_rover_cannot_settle(prediction, rover):
-    message = joint_trajectory(prediction, rover, "map", STAMP)
+def test_the_trajectory_names_its_joints_and_ends_where_the_rover_cannot_settle(prediction):
+    message = joint_trajectory(prediction, LSR1, "map", STAMP)
     assert message.header.frame_id == "map" and message.header.stamp == STAMP
     assert JOINTS == SUSPENSION_JOINTS + WHEEL_JOINTS
-    assert tuple(message.joint_names) == JOINTS + steering_joints(rover)
+    assert tuple(message.joint_names) == JOINTS + steering_joints(LSR1)
     assert len(message.points) == 50
     for i in (0, 20, 49):
         point = message.points[i]
@@ -84,43 +80,43 @@ def test_the_trajectory_names_its_joints_and_ends_where_the_rover_cannot_settle(
         assert seconds == pytest.approx(prediction.time[i], abs=1e-8)
 
 
-def test_a_trajectory_of_points_filled_anew_is_the_same_as_one_of_new_points(prediction, rover):
+def test_a_trajectory_of_points_filled_anew_is_the_same_as_one_of_new_points(prediction):
     stock = []
     for unsettled in (49, 10, 50):
         cut = np.arange(len(prediction.settled)) < unsettled
         results = prediction.results.copy()
         results["status"][~cut] = PoseStatus.NOT_SETTLED
         part = replace(prediction, results=results)
-        trajectory = joint_trajectory(part, rover, "map", STAMP, stock)
+        trajectory = joint_trajectory(part, LSR1, "map", STAMP, stock)
         assert len(trajectory.points) == unsettled
-        assert trajectory == joint_trajectory(part, rover, "map", STAMP)
+        assert trajectory == joint_trajectory(part, LSR1, "map", STAMP)
 
 
-def test_a_trajectory_has_the_angles_of_the_steered_wheels_with_the_sign_of_the_rover(rover):
+def test_a_trajectory_has_the_angles_of_the_steered_wheels_with_the_sign_of_the_rover():
     turned = np.linspace(0.0, 0.5, 30)
     path = np.column_stack([np.sin(turned), 1.0 - np.cos(turned), turned])
     flat = Terrain(np.zeros((81, 81)), 0.05, (-2.0, -2.0))
-    prediction = judge_path(rover, flat, path)[0]
+    prediction = judge_path(LSR1, flat, path)[0]
     for positive, sign in (("left", 1.0), ("right", -1.0)):
-        message = joint_trajectory(prediction, rover, "map", STAMP, positive_steering=positive)
+        message = joint_trajectory(prediction, LSR1, "map", STAMP, positive_steering=positive)
         for i, point in enumerate(message.points):
             angles = dict(zip(message.joint_names, point.positions, strict=True))
-            own = {name: angles[name] for name in steering_joints(rover)}
+            own = {name: angles[name] for name in steering_joints(LSR1)}
             assert list(own.values()) == pytest.approx(
-                sign * prediction.steering_angle[i, steered_wheels(rover)]
+                sign * prediction.steering_angle[i, steered_wheels(LSR1)]
             )
         assert sign * own["front_left_steering"] > 0.3
-    fixed = replace(rover, steering=None)
+    fixed = replace(LSR1, steering=None)
     message = joint_trajectory(judge_path(fixed, flat, path)[0], fixed, "map", STAMP)
     assert tuple(message.joint_names) == JOINTS and len(message.points[0].positions) == 10
 
 
-def test_in_a_turn_on_the_spot_wheels_of_one_side_roll_forwards_and_of_the_other_back(rover):
+def test_in_a_turn_on_the_spot_wheels_of_one_side_roll_forwards_and_of_the_other_back():
     turned = np.linspace(0.0, 1.0, 30)
     flat = Terrain(np.zeros((81, 81)), 0.05, (-2.0, -2.0))
     path = np.column_stack([0.0 * turned, 0.0 * turned, turned])
-    last = joint_trajectory(judge_path(rover, flat, path)[0], rover, "map", STAMP).points[-1]
-    reach = np.hypot([0.4, 0.0, 0.4], 0.31) / rover.wheel.radius
+    last = joint_trajectory(judge_path(LSR1, flat, path)[0], LSR1, "map", STAMP).points[-1]
+    reach = np.hypot([0.4, 0.0, 0.4], 0.31) / LSR1.wheel.radius
     assert last.positions[4:10] == pytest.approx([*reach, *-reach], rel=0.01)
     assert (np.sign(last.velocities[4:10]) == np.sign(last.positions[4:10])).all()
 

@@ -18,7 +18,6 @@ from rover_planner.planning.navigation.monitor import (
     PathMonitor,
     Sight,
     SuspensionDrift,
-    WatchSettings,
     describe_watch,
 )
 from rover_planner.planning.navigation.watched_path import WatchedPath
@@ -41,8 +40,8 @@ def sight(service, pose, time=0.0, ground=waves):
     return Sight(service.snapshot(), pose, time)
 
 
-def watching(service, **limits):
-    monitor = PathMonitor(WatchSettings(**limits))
+def watching(service):
+    monitor = PathMonitor()
     assert monitor.take_path(WatchedPath(STRAIGHT, "abc"), sight(service, STRAIGHT[0]))
     assert monitor.look(sight(service, STRAIGHT[0])).state == WATCHING
     return monitor
@@ -64,7 +63,7 @@ def test_a_path_that_comes_back_to_its_start_is_watched_from_the_start(service):
     turn = np.linspace(0.0, 2.0 * np.pi, 400)
     loop = np.column_stack([np.sin(turn), 1.0 - np.cos(turn), turn])
     for error in ((0.0, 0.0, -0.02), (-0.01, 0.0, 0.0), (-0.02, 0.01, -0.01)):
-        monitor = PathMonitor(WatchSettings())
+        monitor = PathMonitor()
         assert monitor.take_path(WatchedPath(loop), sight(service, error))
         found = monitor.look(sight(service, error))
         assert found.state == WATCHING and found.place.remaining > 6.0
@@ -93,6 +92,15 @@ def test_a_wall_ahead_stops_and_one_behind_does_not(service):
     assert monitor.take_path(WatchedPath(STRAIGHT), sight(service, STRAIGHT[120], 4.0))
     behind = sight(service, STRAIGHT[120], 5.0, lambda x, y: waves(x, y) + (x < -1.5))
     assert monitor.look(behind).state == WATCHING
+
+
+def test_what_is_near_is_judged_on_the_map_around_it_so_that_a_large_one_delays_no_stop(service):
+    monitor = watching(service)
+    large = make_terrain(wall_at(0.5), half=12.0)
+    service.take_terrain(large)
+    found = monitor.look(Sight(service.snapshot(), STRAIGHT[0], 1.0))
+    assert found.state == STOPPED
+    assert found.judgement.judge.terrain.elevation.size < 0.2 * large.elevation.size
 
 
 def test_the_rest_is_judged_once_for_each_map(service):
@@ -124,10 +132,11 @@ def test_the_end_of_the_path_ends_the_watch(service):
 
 
 def test_a_rover_off_its_path_or_lost_is_to_stop(service):
-    monitor = watching(service, max_offset=0.3)
-    found = monitor.look(sight(service, (-2.0, 0.4, 0.0), 1.0))
+    monitor = watching(service)
+    assert monitor.look(sight(service, (-2.0, 0.4, 0.0), 0.9)).state == WATCHING
+    found = monitor.look(sight(service, (-2.0, 0.6, 0.0), 1.0))
     assert (found.state, found.judgement.code) == (STOPPED, "off_path")
-    monitor = watching(service, pose_timeout=1.0)
+    monitor = watching(service)
     assert monitor.look(sight(service, None, 0.9)).state == WATCHING
     found = monitor.look(sight(service, None, 1.1))
     assert found.judgement.code == "no_pose" and "1.1 s" in found.judgement.reason
@@ -136,7 +145,7 @@ def test_a_rover_off_its_path_or_lost_is_to_stop(service):
 
 
 def test_joint_states_that_cease_stop_a_rover_that_had_them(service):
-    monitor = watching(service, pose_timeout=1.0)
+    monitor = watching(service)
     here = sight(service, STRAIGHT[0])
     assert monitor.look(replace(here, time=9.0)).state == WATCHING  # it never had any
     measured = replace(here, snapshot=replace(here.snapshot, measured_pose=STRAIGHT[0]))

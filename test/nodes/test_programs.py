@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node programs have help that is true, need ROS only to run, and name wrong words."""
 
+import importlib
 import json
 import os
 import re
@@ -10,39 +11,17 @@ import sys
 
 import pytest
 import yaml
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from rover_planner.nodes import start
-from rover_planner.nodes.ground_learner import GroundLearnerNode
-from rover_planner.nodes.ground_learner import main as ground_learner
-from rover_planner.nodes.mission_planner import MissionPlanner
-from rover_planner.nodes.mission_planner import main as mission_planner
 from rover_planner.nodes.programs import PROGRAMS
-from rover_planner.nodes.rover_simulator import RoverSimulator
-from rover_planner.nodes.rover_simulator import main as rover_simulator
-from rover_planner.nodes.traction_controller import TractionController
-from rover_planner.nodes.traction_controller import main as traction_controller
-from rover_planner.nodes.traverse_server import TraverseServer
-from rover_planner.nodes.traverse_server import main as traverse_server
 from rover_planner.shell.extras import PLAIN
 from support.command_line import REPOSITORY
 from support.project.checkout import setup_arguments
 from support.waiting import wait_until
 
-MAINS = {
-    "traverse_server": traverse_server,
-    "traction_controller": traction_controller,
-    "rover_simulator": rover_simulator,
-    "ground_learner": ground_learner,
-    "mission_planner": mission_planner,
-}
-NODES = {
-    "traverse_server": TraverseServer,
-    "traction_controller": TractionController,
-    "rover_simulator": RoverSimulator,
-    "ground_learner": GroundLearnerNode,
-    "mission_planner": MissionPlanner,
-}
+MODULES = {name: importlib.import_module(f"rover_planner.nodes.{name}") for name in PROGRAMS}
 PARAMETER_FILES = REPOSITORY / "config" / "parameters"
 OF_ROS = re.compile(r"/(parameter_events|rosout|.*/(\w+_parameters?\w*|get_type_description))$")
 
@@ -144,7 +123,7 @@ def test_what_a_plain_installation_brings_is_known_by_its_modules():
     ],
 )
 def test_wrong_words_are_exit_code_2_and_named(name, words, said, capfd):
-    assert MAINS[name](words) == 2
+    assert MODULES[name].main(words) == 2
     err = capfd.readouterr().err
     assert said in err and "Traceback" not in err and "/rcl/" not in err
 
@@ -157,9 +136,11 @@ def test_a_node_in_a_namespace_has_the_topics_of_the_help_and_tells_of_wrong_par
     if file.exists():
         words += ["--params-file", str(file), "-r", "diagnostics:=/diagnostics"]
         wrong = [Parameter("rovr", value="lsr1"), Parameter("use_sim_time", value=False)]
-    node = NODES[name](
-        context=ros.context, cli_args=["--ros-args", *words], parameter_overrides=wrong
-    )
+    (kind,) = (
+        one for one in vars(MODULES[name]).values()
+        if isinstance(one, type) and issubclass(one, Node) and one.__module__.endswith(name)
+    )  # fmt: skip
+    node = kind(context=ros.context, cli_args=["--ros-args", *words], parameter_overrides=wrong)
     ros.spin(node)
     assert node.get_fully_qualified_name() == f"/one/{name}"
     if file.exists():

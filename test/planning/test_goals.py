@@ -11,10 +11,7 @@ from rover_planner.errors import PlanningError
 from rover_planner.planning.goals import choose_mission, footprint_radius
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
-
-@pytest.fixture(scope="module")
-def rover():
-    return load_rover("lsr1")
+LSR1 = load_rover("lsr1")
 
 
 @pytest.fixture(scope="module")
@@ -30,20 +27,20 @@ def by_intent(mission):
     return {goal.intent: goal.pose for goal in mission.goals}
 
 
-def test_start_and_plain_goals_stand_on_known_ground(rover, holed):
-    mission = choose_mission(holed, rover)
+def test_start_and_plain_goals_stand_on_known_ground(holed):
+    mission = choose_mission(holed, LSR1)
     plain = [goal.pose for goal in mission.goals if goal.intent == "plain"]
     assert len(plain) >= 2
     for x, y, _ in [mission.start, *plain]:
         turn = np.linspace(0, 2 * np.pi, 20)
-        radius = 0.5 * footprint_radius(rover)
+        radius = 0.5 * footprint_radius(LSR1)
         assert np.isfinite(
             holed.elevation_at(x + radius * np.cos(turn), y + radius * np.sin(turn))
         ).all()
 
 
-def test_hard_goals_are_what_they_say(rover, holed):
-    places = by_intent(choose_mission(holed, rover))
+def test_hard_goals_are_what_they_say(holed):
+    places = by_intent(choose_mission(holed, LSR1))
     assert not holed.contains(*places["off the map"][:2])
     x, y, _ = places["unknown ground"]
     assert holed.contains(x, y)
@@ -51,25 +48,25 @@ def test_hard_goals_are_what_they_say(rover, holed):
     assert np.isfinite(holed.elevation_at(*places["steep"][:2]))
 
 
-def test_the_height_of_a_map_with_holes_does_not_matter(rover, holed):
+def test_the_height_of_a_map_with_holes_does_not_matter(holed):
     raised = Terrain(holed.elevation + 100.0, holed.resolution, holed.origin)
-    assert choose_mission(raised, rover) == choose_mission(holed, rover)
+    assert choose_mission(raised, LSR1) == choose_mission(holed, LSR1)
 
 
-def test_no_plain_goal_is_beside_the_start_and_all_ground_to_the_rough_one_is_known(rover):
+def test_no_plain_goal_is_beside_the_start_and_all_ground_to_the_rough_one_is_known():
     spirit = load_terrain("spirit").fill_gaps(0.2)
     for seed in (1, 2):
-        mission = choose_mission(spirit, rover, seed)
+        mission = choose_mission(spirit, LSR1, seed)
         line = np.linspace(mission.start[:2], by_intent(mission)["rough"][:2], 200)
         assert np.isfinite(spirit.elevation_at(line[:, 0], line[:, 1])).all()
         plain = [goal.pose for goal in mission.goals if goal.intent == "plain"]
         assert len(plain) >= 2
         away = [math.hypot(x - mission.start[0], y - mission.start[1]) for x, y, _ in plain]
-        assert min(away) > 2.0 * footprint_radius(rover)
+        assert min(away) > 2.0 * footprint_radius(LSR1)
 
 
-def test_a_map_smaller_than_the_rover_is_refused(rover):
-    level = by_intent(choose_mission(Terrain(np.zeros((40, 40)), 0.05), rover))
+def test_a_map_smaller_than_the_rover_is_refused():
+    level = by_intent(choose_mission(Terrain(np.zeros((40, 40)), 0.05), LSR1))
     assert "off the map" in level and "unknown ground" not in level
     with pytest.raises(PlanningError, match="no place"):
-        choose_mission(Terrain(np.zeros((8, 8)), 0.1), rover)
+        choose_mission(Terrain(np.zeros((8, 8)), 0.1), LSR1)

@@ -15,12 +15,15 @@ from rover_physics.rover.rover_file import preset_names
 from rover_physics.rover.steering_joints import steering_joints
 from rover_physics.rover.urdf.write_urdf import write_urdf
 from rover_planner.nodes.programs import PROGRAMS
+from support.project import nav2_jazzy
 from support.project.checkout import TOP, console_scripts
 from support.project.command_checks import check_parameter_file, check_parameters
 from support.project.launch_files import describe, start_rover
 
 PARAMETER_FILES = sorted((TOP / "config" / "parameters").glob("*.yaml"))
 LAYOUTS = sorted((TOP / "config" / "views").iterdir())
+MAPS = ("map_topic", "mask_topic")
+"""Parameters of Nav2 that name a topic with a grid."""
 OF_OTHERS = {"robot_description", "diagnostics"}
 """Topics in layouts that are not published by a node under its own help's name."""
 
@@ -171,7 +174,24 @@ def test_ros2_control_has_what_the_urdf_tells_and_the_controller_reads_and_comma
 
 
 @pytest.mark.parametrize("file", ["hazard_layer.yaml", "hazard_filter.yaml"])
-def test_the_files_for_nav2_read_the_topics_of_the_server(file):
-    text = (CONFIG / "nav2" / file).read_text(encoding="utf-8")
-    assert yaml.safe_load(text)["global_costmap"]["global_costmap"]["ros__parameters"]
-    assert ": /traverse_server/hazard_map/worst" in text
+def test_the_files_for_nav2_have_its_parameters_and_read_the_topic_of_the_server(file):
+    content = yaml.safe_load((CONFIG / "nav2" / file).read_text(encoding="utf-8"))
+    costmap = content.pop("global_costmap")["global_costmap"]["ros__parameters"]
+    names = [name for kind in ("plugins", "filters") for name in costmap.get(kind, ())]
+    plugins = [costmap.pop(name) for name in names]
+    check_types(costmap, nav2_jazzy.COSTMAP)
+    for plugin in plugins:
+        check_types(plugin, nav2_jazzy.PLUGINS[plugin.pop("plugin")])
+    servers = [server["ros__parameters"] for server in content.values()]
+    assert content.keys() <= {"costmap_filter_info_server"}
+    for server in servers:
+        check_types(server, nav2_jazzy.FILTER_INFO)
+        assert server["filter_info_topic"] == plugins[0]["filter_info_topic"]
+    read = [one[key] for one in (*plugins, *servers) for key in one if key in MAPS]
+    said = PROGRAMS["traverse_server"].topics.replace("~", "/traverse_server")
+    assert len(read) == 1 and read[0] in said.split("publishes")[1]
+
+
+def check_types(given, types):
+    """Fail where a parameter is not one of those of Nav2, or of another type."""
+    assert {name: type(value) for name, value in given.items()}.items() <= types.items()

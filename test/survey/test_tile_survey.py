@@ -118,6 +118,22 @@ def test_the_layers_sum_up_the_headings_of_each_cell_and_turns_to_both_sides(gro
     assert turns.any() and (bits & ~turns).any()
 
 
+def test_the_chance_of_a_cell_is_that_of_its_headings_and_1_where_one_fails_as_told(ground):
+    request, places = make_request(chance=True), places_on(ground)
+    layers = survey_tile(request, ground, places)
+    passes = unpack_bits(layers["passable_headings"], 4).ravel()
+    poses, chances = poses_at(places, request), np.ones(len(passes), np.float32)
+    for row in np.flatnonzero(passes):  # one by one: no pose counts for another one
+        verdict = judge_poses(
+            request.rover, ground, poses[row][None], options=request.options, accepted_chance=1.0
+        )[1]
+        chances[row] = verdict.failure_chance
+    by_cell = chances.reshape(-1, 4)
+    np.testing.assert_array_equal(layers["worst_failure_chance"], by_cell.max(axis=1))
+    np.testing.assert_array_equal(layers["best_failure_chance"], by_cell.min(axis=1))
+    assert ((chances > 0.0) & (chances < 1.0)).any() and (chances[passes] == 0.0).any()
+
+
 def test_no_cell_passes_whose_outline_touches_unknown_ground():
     request = make_request(headings=16)
     heights = np.zeros((60, 60))
@@ -146,7 +162,7 @@ def test_ground_that_is_all_unknown_is_impassable():
     assert (layers["best_class"] == CLASS_NUMBERS["impassable"]).all()
     assert (layers["first_limit"] == number_limits()["unknown_ground"]).all()
     assert not layers["passable_headings"].any() and np.isnan(layers["worst_tilt"]).all()
-    assert {name: layer.dtype for name, layer in layers.items()} == types_of_layers(4, True)
+    assert {name: layer.dtype for name, layer in layers.items()} == types_of_layers(4, True, False)
 
 
 @pytest.mark.parametrize("headings", [1, 9, 64])

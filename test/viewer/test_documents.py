@@ -226,6 +226,7 @@ def test_a_failure_between_waypoints_has_the_pose_at_which_the_model_was_asked()
     first = path.verdict.first_failure
     before, after = prediction.distance[first - 1 : first + 1]
     assert before < failure.distance < after
+    assert failure.state.energy == prediction.energy[first - 1] > 0.0
     places = prediction.between.position[prediction.between.waypoint == first]
     assert np.isclose(places, failure.state.position).all(axis=1).any()
 

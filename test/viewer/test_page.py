@@ -17,7 +17,7 @@ from support.viewer.browser import (
     open_browser,
     wait_until,
 )
-from support.viewer.sessions import LSR1, ask, blocked_session, wait_for_rest
+from support.viewer.sessions import LSR1, ask, blocked_session, held, wait_for_rest
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
@@ -184,6 +184,32 @@ def test_a_dragged_number_is_judged_and_the_reason_of_a_refused_one_stays_on_the
     visitor.press("Reset")
     wait_until(lambda: session.shown.scenario.rover == LSR1, "the loaded rover")
     wait_for_rest(page)
+
+
+def test_a_button_that_is_pressed_while_what_it_stands_on_is_told_anew_takes_the_click(
+    visitor, page
+):
+    with held(page.session._background):
+        page.hear({"ask": "value", "label": FRICTION, "value": 0.75}, None)
+        visitor.tab.get_by_role("button", name="Cancel").wait_for()
+        x, y = visitor.tab.evaluate(PLACE_OF_CANCEL)
+        visitor.tab.mouse.move(x, y)
+        visitor.tab.mouse.down()
+        told = page.channel.parts["verdict"]["judging"]
+        wait_until(lambda: page.channel.parts["verdict"]["judging"] != told, "another second")
+        visitor.tab.wait_for_timeout(300)
+        visitor.tab.mouse.up()
+        wait_until(lambda: page.session.is_stopped, "the end of the work")
+    page.hear({"ask": "reset"}, None)
+    wait_until(lambda: page.session.shown.scenario.rover == LSR1, "the loaded rover")
+    wait_for_rest(page)
+
+
+PLACE_OF_CANCEL = """() => {
+  const is = (button) => button.textContent === "Cancel";
+  const box = [...document.querySelectorAll("button")].find(is).getBoundingClientRect();
+  return [box.x + box.width / 2, box.y + box.height / 2];
+}"""
 
 
 def test_a_click_into_the_scene_sets_the_goal_and_one_into_the_sky_is_refused(visitor, page):

@@ -147,6 +147,15 @@ def test_a_changed_number_is_told_with_what_it_changes_and_can_be_undone_and_res
         wait_for_rest(page)
 
 
+def test_a_number_or_an_angle_beyond_the_ends_of_its_slider_is_that_at_its_end(page):
+    sliders = {one[0]: one for part in told(page, "sliders")["parts"] for one in part["sliders"]}
+    for label in (FRICTION, "arm_yaw [rad]"):
+        page.hear({"ask": "value", "label": label, "value": 9999.0}, None)
+        most = sliders[label][2]
+        wait_until(lambda at=label, most=most: told(page, "values")[at][0] == most, label)
+    wait_for_rest(page)
+
+
 def test_a_rover_file_and_a_preset_are_loaded_and_the_arm_follows(page):
     text = write_rover(replace(LSR1, name="bare", manipulator=None))
     page.hear({"ask": "upload", "name": "bare.yaml", "text": text}, None)
@@ -311,7 +320,7 @@ def test_a_failed_request_is_told_until_a_request_succeeds(page):
     wait_until(lambda: told(page, "errors") == [], "the notice to go")
 
 
-def test_a_failed_picture_is_not_drawn_again_before_the_next_request(page, monkeypatch):
+def test_a_failed_picture_is_not_drawn_again_at_once(page, monkeypatch):
     tried = []
     ask(page, lambda: None)  # nothing else is asked any more
 

@@ -10,7 +10,7 @@ import pytest
 from rover_physics.errors import RoverFileError
 from rover_physics.names import WHEELS
 from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.rover_file import load_rover, preset_names, rover_to_dict
+from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.traversability.judge import judge_path
 from rover_planner.command.prediction_files import (
@@ -20,14 +20,7 @@ from rover_planner.command.prediction_files import (
 )
 from rover_planner.command.view import SEED, choose_ends, name_ground
 from rover_planner.errors import PlanningError
-from rover_planner.planning.assumptions import assume, read_assumptions
-from rover_planner.studies.rover_values import (
-    get_value,
-    list_values,
-    read_rover,
-    with_value,
-    write_rover,
-)
+from rover_planner.planning.assumptions import assume
 from rover_planner.viewer.documents.header import name_ground as name_by_size
 from rover_planner.viewer.documents.paths import list_paths
 from rover_planner.viewer.documents.rover import describe_changes
@@ -37,27 +30,6 @@ from rover_planner.viewer.state.trajectory import Trajectory
 from support.grounds import make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, blocked_session, ramp, session_on, straight
 from support.waiting import wait_until
-
-# The values of a rover.
-
-
-@pytest.mark.parametrize("name", preset_names())
-def test_a_rover_that_is_written_and_read_again_is_the_same(name):
-    rover = load_rover(name)
-    assert read_rover(write_rover(rover), "here") == rover
-
-
-@pytest.mark.parametrize("name", preset_names())
-def test_every_value_is_within_its_range_and_can_be_set(name):
-    rover = load_rover(name)
-    data = rover_to_dict(rover)
-    for values in list_values(rover).values():
-        for value in values:
-            now = get_value(data, value.keys[0])
-            assert value.low <= now <= value.high and value.low < value.high, value.label
-            assert value.label.endswith("]"), value.label
-            assert with_value(rover, value.keys, now) == rover
-
 
 # What a person looks at, and what it is compared with.
 
@@ -243,31 +215,6 @@ def test_a_recorded_reason_takes_precedence_over_the_model(tmp_path):
     assert session.shown.verdict.reason == "the wheel is stuck"
 
 
-def test_a_file_without_predictions_is_refused_by_name(tmp_path):
-    np.savez(tmp_path / "poses.npz", poses=straight())
-    with pytest.raises(PlanningError, match=r"no array reason; it has poses"):
-        read_prediction(tmp_path / "poses.npz")
-
-
-@pytest.mark.parametrize(
-    ("changes", "names"),
-    [
-        ({"assumptions": np.float64(1.0)}, "assumptions must be one text"),
-        ({"roll": np.float64(1.0)}, r"roll has shape \(\); it must be \(101,\)"),
-        ({"settled": np.zeros(101)}, "settled is of type float64; it must hold bools"),
-        ({"reason": np.zeros(101)}, r"reason must be an array \(n,\) of texts"),
-        ({"position": np.full((101, 3), np.nan)}, "position has a value that is NaN or beyond"),
-    ],
-)
-def test_a_file_of_other_shapes_or_types_is_refused(tmp_path, changes, names):
-    recorded(tmp_path, straight())
-    with np.load(tmp_path / "out.npz") as out:
-        np.savez(tmp_path / "bad.npz", **(dict(out) | changes))
-    with pytest.raises(PlanningError, match=names):
-        read_recorded_assumptions(tmp_path / "bad.npz")
-        read_prediction(tmp_path / "bad.npz")
-
-
 def test_a_change_of_the_rover_judges_the_recorded_path_again(tmp_path):
     session, prediction, _ = recorded(tmp_path, straight())
     session.change_rover([("friction",)], 0.4)
@@ -300,16 +247,6 @@ def test_a_replay_keeps_the_soil_the_policy_and_the_arm_it_was_predicted_with(tm
     _, expected = judge_path(rover, ground, poses, again, sigmas=2.0)
     assert session.shown.verdict.max_sinkage == expected.max_sinkage > verdict.max_sinkage
     assert session.shown.verdict.policy == "optimal"
-
-
-@pytest.mark.parametrize(
-    "text",
-    ["", '{"rover": "lsr1"}', '{"rover": "lsr1", "policy": "equal", "friction": NaN}',
-     '{"rover": "lsr1", "policy": "equal", "colour": "red"}'],
-)  # fmt: skip
-def test_damaged_assumptions_are_refused(text):
-    with pytest.raises(PlanningError, match="assumptions are invalid"):
-        read_assumptions(text)
 
 
 def test_default_ends_are_on_known_ground_where_the_rover_can_stand_at_most_10_m_apart():

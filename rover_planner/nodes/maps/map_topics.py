@@ -19,11 +19,11 @@ from rover_physics.errors import RoverError
 from rover_physics.files.validation import show_file
 from rover_physics.terrain.grid import load_terrain
 from rover_planner.maps.living_map import MapSnapshot
-from rover_planner.maps.map_file import MapFileError, open_map
+from rover_planner.maps.map_file import MapFileError, MapLimits, open_map
 from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.maps.summary import describe_terrain
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.service_settings import keeper_settings, map_limits
+from rover_planner.planning.answering.service_settings import map_rules
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.deferred_service import Reply, serve_later
@@ -31,7 +31,7 @@ from rover_planner.ros.frames import Frames
 from rover_planner.ros.guard import Guard, Handover
 from rover_planner.ros.logs import RepeatLog
 from rover_planner.ros.map_intake import CLOUD, GRID_MAP, MapIntake
-from rover_planner.ros.map_messages import LOOK_PERIOD, MapSettings, read_map
+from rover_planner.ros.map_messages import LOOK_PERIOD, read_map
 from rover_planner.ros.optional_types import find_type
 from rover_planner.ros.polled_topics import PolledTopics
 from rover_planner.ros.qos import polled_qos
@@ -76,8 +76,8 @@ class MapTopics:
         """
         self._node, self._service, self._report = node, service, report
         self._guard, self._handover, self._heard = guard, Handover(node, guard), heard
-        self._values, self._settings = parameters, MapSettings.of(parameters)
-        self._keeper = MapKeeper(service.settings.rover, keeper_settings(parameters))
+        self._values = parameters
+        self._keeper = MapKeeper(service.settings.rover, map_rules(parameters))
         self._is_from_topic = False
         self._looked = -float("inf")
         self._logged_at, self._logged_kind = -float("inf"), ("", False)
@@ -136,11 +136,12 @@ class MapTopics:
 
         Those of merging and filling count from the next map on.
         """
-        before, self._settings = self._settings, MapSettings.of(parameters)
-        self._values = parameters
-        settings, rover = keeper_settings(parameters), self._service.settings.rover
-        self._intake.do(lambda: self._keeper.apply(rover, settings))
-        if self._is_from_topic and before != self._settings:
+        before, self._values = self._values, parameters
+        rules, rover = map_rules(parameters), self._service.settings.rover
+        self._intake.do(lambda: self._keeper.apply(rover, rules))
+        names = ("map_resolution", "cell_height")
+        is_new = any(getattr(before, name) != getattr(parameters, name) for name in names)
+        if self._is_from_topic and is_new:
             self._intake.repeat()
         else:
             self._intake.do(self._service.refresh_map)
@@ -163,7 +164,9 @@ class MapTopics:
     def _load(self, url: str, response: LoadMap.Response) -> None:
         """Take the map of a file and fill the response."""
         try:
-            terrain = open_map(url, map_limits(self._values))
+            values = self._values
+            limits = MapLimits(values.map_folder, values.max_map_bytes, values.max_map_cells)
+            terrain = open_map(url, limits)
             snapshot = self._keeper.load(terrain, self._now(), self._service.standing())
         except RoverError as error:
             self._node.get_logger().error(f"load_map: {error}")
@@ -178,7 +181,7 @@ class MapTopics:
         self._is_from_topic = False
         self._take(snapshot, show_file(url), None)
         stamp = self._node.get_clock().now().to_msg()
-        response.map = terrain_to_occupancy_grid(terrain, self._settings.frame, stamp)
+        response.map = terrain_to_occupancy_grid(terrain, self._values.map_frame, stamp)
         response.result = LoadMap.Response.RESULT_SUCCESS
 
     def look_under_rover(self) -> None:
@@ -199,7 +202,7 @@ class MapTopics:
             self._service.renew_map()
 
     def _take_message(self, message: Any, source: Rigid | None) -> None:
-        terrain = read_map(message, self._settings, source, self._keeper)
+        terrain = read_map(message, self._values, source, self._keeper)
         topic, stamp = self._intake.topic, stamp_to_ns(message.header.stamp)
         since = self._now() if stamp is None else stamp / NANOSECONDS
         kept = self._keeper.take(terrain, topic, since, self._service.standing())
@@ -220,6 +223,7 @@ class MapTopics:
     def _take(self, snapshot: MapSnapshot, source: str, stamp: int | None) -> None:
         is_new = self._keep(snapshot, source, stamp)
         self._report("")
+        self._service.prepare()
         if is_new:
             taken, now = self._service.terrain, time.monotonic()
             assert taken is not None
@@ -232,7 +236,7 @@ class MapTopics:
 
     def _keep(self, snapshot: MapSnapshot, source: str, stamp: int | None = None) -> bool:
         return self._service.take_terrain(
-            snapshot.terrain, source, stamp, snapshot.sources, self._settings.frame
+            snapshot.terrain, source, stamp, snapshot.sources, self._values.map_frame
         )
 
     def _now(self) -> float:

@@ -30,7 +30,6 @@ from rover_planner.planning.navigation.monitor import (
     Finding,
     PathMonitor,
     Sight,
-    WatchSettings,
     describe_watch,
     rehearse,
 )
@@ -81,7 +80,7 @@ class PathWatch:
         """
         self._node, self._service, self._guard = node, service, guard
         self._find_pose, self._report_stop = find_pose, report_stop
-        self._monitor = PathMonitor(watch_settings(parameters))
+        self._monitor = PathMonitor()
         self.finding = self._monitor.finding
         """The last finding; belongs to the executor's thread."""
         self.enabled = False
@@ -104,7 +103,6 @@ class PathWatch:
 
     def apply(self, parameters: TraverseServerParameters) -> None:
         """Take new parameters."""
-        self._monitor.settings = watch_settings(parameters)
         if parameters.monitor == self.enabled:
             return
         self.enabled = parameters.monitor
@@ -126,7 +124,7 @@ class PathWatch:
 
     def describe(self) -> Health:
         """Return what is watched and what was found, for diagnostics."""
-        tolerance = self._service.settings.suspension_tolerance
+        tolerance = self._service.settings.parameters.suspension_tolerance
         health = describe_watch(self.finding, self.enabled, tolerance)
         return replace(health, values={**health.values, "map_age": f"{self._map_age:.1f} s"})
 
@@ -134,6 +132,10 @@ class PathWatch:
     def _stops(self) -> bool:
         """True if the rover is to stop: while paths are watched, it may drive a watched one."""
         return self.enabled and self.finding.state in (IDLE, STOPPED)
+
+    def look(self) -> None:
+        """Have a look taken at once, from any thread: there is a new map."""
+        self._handover.call(self.beat)
 
     def beat(self) -> None:
         """Have a look taken if one is due, and publish `~/stop`; to be called each PERIOD."""
@@ -254,12 +256,3 @@ class PathWatch:
             logger.error(f"monitor: stop: {finding.judgement.reason}")
         else:
             logger.info(f"monitor: {finding.state}")
-
-
-def watch_settings(parameters: TraverseServerParameters) -> WatchSettings:
-    """Return the limits of a monitor from the parameters."""
-    return WatchSettings(
-        max_offset=parameters.monitor_offset,
-        pose_timeout=parameters.monitor_timeout,
-        max_mismatch=parameters.monitor_mismatch,
-    )

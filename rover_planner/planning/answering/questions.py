@@ -226,7 +226,7 @@ class Register:
             return identity
         return replace(
             identity,
-            ground=LEARNED if snapshot.settings.learn == USE else TOLD,
+            ground=LEARNED if snapshot.settings.parameters.learn == USE else TOLD,
             ground_friction=ground.mean,
             ground_friction_std=ground.std,
             ground_since=ground.since,

@@ -9,14 +9,10 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steering_joints import check_joint_limit
 from rover_physics.terrain.soil_file import soil_named
-from rover_planner.maps.living_map import MergeRules
-from rover_planner.maps.map_file import MapLimits
-from rover_planner.maps.map_keeper import KeeperSettings
-from rover_planner.maps.unobserved_ground import ALLOW
+from rover_planner.maps.living_map import MapRules
 from rover_planner.parameters.shared import payload_or_none
 from rover_planner.parameters.traverse_server import (
     INTERPOLATE,
-    SUGGEST,
     USE,
     TraverseServerParameters,
 )
@@ -33,24 +29,20 @@ class ServiceSettings:
     """The rover of all queries."""
     query: PathQueryOptions
     """Options of the generation and judgement of candidates."""
-    largest_gap: float
-    """Widest unknown region of a map that is interpolated [m]; 0 interpolates none."""
-    suspension_tolerance: float
-    """Largest allowed difference between measured and predicted suspension angles [rad]."""
-    planner: str
-    """FAN, LATTICE or AUTO."""
     lattice: LatticeSettings
     """Settings of searches around obstacles."""
-    max_map_age: float
-    """Age from which a map is too old to be used [s]; 0 allows any age."""
-    learn: str = SUGGEST
-    """Use of a learned friction: OFF, SUGGEST or USE."""
-    unobserved_ground: str = ALLOW
-    """Rule for paths over never seen ground under the belly, one of UNOBSERVED_GROUND."""
+    parameters: TraverseServerParameters
+    """The parameters themselves."""
+
+    @property
+    def largest_gap(self) -> float:
+        """Widest unknown region of a map that is interpolated [m]; 0 interpolates none."""
+        values = self.parameters
+        return values.max_gap if values.unknown_cells == INTERPOLATE else 0.0
 
     def on_ground(self, ground: LearnedGround | None) -> "ServiceSettings":
         """Return the settings of new questions; with USE they assume the learned ground."""
-        if ground is None or self.learn != USE:
+        if ground is None or self.parameters.learn != USE:
             return self
         told = (
             self.rover.friction if self.query.model.friction is None else self.query.model.friction
@@ -65,23 +57,15 @@ class ServiceSettings:
         return tuple(manipulator.joints) if manipulator is not None else ()
 
 
-def map_limits(parameters: TraverseServerParameters) -> MapLimits:
-    """Return what clients may load as a map."""
-    return MapLimits(parameters.map_folder, parameters.max_map_bytes, parameters.max_map_cells)
-
-
-def keeper_settings(parameters: TraverseServerParameters) -> KeeperSettings:
+def map_rules(parameters: TraverseServerParameters) -> MapRules:
     """Return how maps are kept and merged."""
-    rules = MergeRules(
+    return MapRules(
         parameters.map_merge,
         parameters.map_ageing,
         parameters.loaded_std,
         parameters.map_window,
         parameters.max_map_cells,
-    )
-    return KeeperSettings(
         parameters.map_updates,
-        rules,
         parameters.fill_under_rover,
         parameters.footprint_margin,
         parameters.footprint_std,
@@ -120,15 +104,10 @@ def load_service_settings(parameters: TraverseServerParameters) -> ServiceSettin
             map_sigmas=parameters.map_sigmas,
             accepted_chance=parameters.accepted_chance,
         ),
-        largest_gap=parameters.max_gap if parameters.unknown_cells == INTERPOLATE else 0.0,
-        suspension_tolerance=parameters.suspension_tolerance,
-        planner=parameters.planner,
         lattice=LatticeSettings(
             budget=parameters.search_budget,
             cell=parameters.lattice_cell or None,
             frontier=parameters.search_frontier,
         ),
-        max_map_age=parameters.max_map_age,
-        unobserved_ground=parameters.blind_ground,
-        learn=parameters.learn,
+        parameters=parameters,
     )

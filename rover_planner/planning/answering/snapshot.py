@@ -101,7 +101,7 @@ class Snapshot:
         if refused is not None:
             return refused
         judge, ends = self._judge(), (np.asarray(start, float), np.asarray(goal, float))
-        if self.settings.planner == LATTICE:
+        if self.settings.parameters.planner == LATTICE:
             return self._search_around(judge, ends, None)
         are_on_map = all(judge.terrain.contains(*end[:2]) for end in ends)
         if not (are_on_map or tolerance):  # no candidate helps: one tells as much as all
@@ -114,7 +114,7 @@ class Snapshot:
             judged.code == UNOBSERVED_CODE and search.answer.chosen.verdict.first_failure == 0
         )
         is_final = judged.traversable or starts_unobserved
-        if is_final or self.settings.planner == FAN:
+        if is_final or self.settings.parameters.planner == FAN:
             return judged
         return self._search_around(judge, ends, judged)
 
@@ -199,7 +199,8 @@ class Snapshot:
         assert self.known_map is not None
         settings = self.settings
         options = settings.query.change(joint_angles=self._manipulator_angles())
-        check = UnobservedCheck(settings.rover, self.known_map.seen, settings.unobserved_ground)
+        rule = settings.parameters.blind_ground
+        check = UnobservedCheck(settings.rover, self.known_map.seen, rule)
         return PathJudge(settings.rover, self.known_map.terrain, options, check, self.marked)
 
     def _describe(
@@ -227,7 +228,7 @@ class Snapshot:
         if not mismatch or not prediction.settled[0]:
             return None
         largest = max(abs(difference) for difference in mismatch.values())
-        return SuspensionReport(mismatch, largest <= self.settings.suspension_tolerance)
+        return SuspensionReport(mismatch, largest <= self.settings.parameters.suspension_tolerance)
 
     def _manipulator_angles(self) -> dict[str, float] | None:
         """Return the measured manipulator angles [rad], None (stowed) until all are known."""

@@ -114,6 +114,12 @@ class TraverseService:
         if known is not None:
             self._keep_map(known)
 
+    def prepare(self) -> None:
+        """Pack the present map for bounds; the watch does not wait for that."""
+        terrain = self.terrain
+        if terrain is not None:
+            prepare_bounds(terrain, self.settings.query.map_sigmas)
+
     def take_path(self, poses: NDArray[np.float64], path_hash: str = "", stamp: str = "") -> None:
         """Keep a path for `check_last_path`.
 
@@ -170,7 +176,7 @@ class TraverseService:
         """
         now = time.monotonic()
         standing = self._measurements.pose_with_suspension(now)
-        ground = None if self.settings.learn == OFF else self._ground
+        ground = None if self.settings.parameters.learn == OFF else self._ground
         known = Snapshot(
             self.settings.on_ground(ground),
             self.given_path,
@@ -185,7 +191,7 @@ class TraverseService:
     def add_map(self, snapshot: Snapshot, ros_time: int | None = None) -> Snapshot:
         """Return a snapshot with the present map; `ros_time` as for `snapshot`."""
         ros_time = time.time_ns() if ros_time is None else ros_time
-        known, most = self.known_map, snapshot.settings.max_map_age
+        known, most = self.known_map, snapshot.settings.parameters.max_map_age
         if known is None:
             return replace(snapshot, known_map=None)
         steady = time.monotonic()
@@ -207,14 +213,13 @@ class TraverseService:
     def _keep_map(self, about: KnownMap) -> bool:
         """Keep a map, of which only terrain and fingerprint are missing; return whether it is new.
 
-        Everything that takes time is done here, so that the first question about it is fast.
+        What takes time is done here, so that the first question about it is fast; see `prepare`.
         """
         with self._map_lock:
             received, gap = about.received, self.settings.largest_gap
             terrain = received.fill_gaps(gap) if gap > 0.0 else received
             forget_terrains()
             pack_ground(terrain)
-            prepare_bounds(terrain, self.settings.query.map_sigmas)
             before = self.known_map
             content = fingerprint(received)
             self.known_map = replace(about, terrain=terrain, fingerprint=content)

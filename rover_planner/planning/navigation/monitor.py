@@ -11,9 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.chance.ground import cut_around
+from rover_physics.errors import TerrainError
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.grid import Terrain
 from rover_planner.maps.known_map import KnownMap
+from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.judgement import PathJudgement, refusal
 from rover_planner.planning.answering.server_health import ERROR, OK, WARN, Health
 from rover_planner.planning.answering.service_settings import ServiceSettings
@@ -28,26 +31,14 @@ NO_POSE, NO_JOINTS, OFF_PATH, SUSPENSION = "no_pose", "no_joints", "off_path", "
 NEAR = 3.0
 """Length of the part of the path that is judged before the whole rest [m]: the rover is told
 early of what is near."""
+AROUND = 3.0
+"""Map around that part that is looked at, in distances of the farthest wheel."""
 SHARE = 0.25
 """Share of the time that judging may take where the map changes all the time."""
 MAX_PAUSE = 0.2
 """Longest pause after a judgement [s]."""
 DRIFT_TIME = 1.0
 """Time for which a difference of the suspension must last to be a reason to stop [s]."""
-
-
-@dataclass(frozen=True)
-class WatchSettings:
-    """Limits of a monitor."""
-
-    max_offset: float = 0.5
-    """Largest distance of the rover from its path [m]."""
-    pose_timeout: float = 1.0
-    """Time without a measured pose, or without suspension angles that were measured before, after
-    which the rover is to stop [s]."""
-    max_mismatch: float = 0.3
-    """Difference of measured and predicted suspension angles from which the rover is to stop if it
-    lasts [rad]; 0 never stops for it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +51,11 @@ class Sight:
     """(3,) x, y [m] and yaw [rad] of the body, measured just now; None if it is not known."""
     time: float
     """Time of the steady clock [s]."""
+
+    @property
+    def limits(self) -> TraverseServerParameters:
+        """The parameters with the limits of the watch."""
+        return self.snapshot.settings.parameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,9 +118,7 @@ class PathMonitor:
     All methods belong to one thread.
     """
 
-    def __init__(self, settings: WatchSettings):
-        self.settings = settings
-        """The limits."""
+    def __init__(self) -> None:
         self._path: WatchedPath | None = None
         self._drift = SuspensionDrift(DRIFT_TIME)
         self._finding = Finding(IDLE)
@@ -146,7 +140,7 @@ class PathMonitor:
         """
         if sight.pose is not None:
             offset = path.find_place(sight.pose).offset
-            if offset > self.settings.max_offset:
+            if offset > sight.limits.monitor_offset:
                 return False
         self._path, self._judged_on, self._pose_time = path, None, sight.time
         self._joints_time = None
@@ -173,7 +167,9 @@ class PathMonitor:
         if self._path is None or self._finding.state != WATCHING:
             return self._finding
         refused = (
-            self._find_place(self._path, sight) or self._miss_joints(sight) or self._refuse_drift()
+            self._find_place(self._path, sight)
+            or self._miss_joints(sight)
+            or self._refuse_drift(sight)
         )
         if refused is None:
             refused = self._judge_rest(self._path, sight)
@@ -187,14 +183,14 @@ class PathMonitor:
         """Find the place of the rover; return a refusal if it is unknown or off the path."""
         if sight.pose is None:
             missing = sight.time - self._pose_time
-            if missing <= self.settings.pose_timeout:
+            if missing <= sight.limits.monitor_timeout:
                 return None
             return refusal(NO_POSE, f"the rover's pose is not known for {missing:.1f} s")
         self._pose_time = sight.time
         last = self._finding.place
         place = path.find_place(sight.pose, None if last is None else last.index)
         self._finding = replace(self._finding, place=place)
-        most = self.settings.max_offset
+        most = sight.limits.monitor_offset
         if place.offset <= most:
             return None
         reason = f"the rover is {place.offset:.2f} m beside its path, limit {most:.2f} m"
@@ -202,12 +198,12 @@ class PathMonitor:
 
     def _miss_joints(self, sight: Sight) -> PathJudgement | None:
         """Return a refusal if the suspension is compared, and is no longer measured."""
-        if not self.settings.max_mismatch:
+        if not sight.limits.monitor_mismatch:
             return None
         if sight.snapshot.measured_pose is not None:
             self._joints_time = sight.time
         missing = 0.0 if self._joints_time is None else sight.time - self._joints_time
-        if missing <= self.settings.pose_timeout:
+        if missing <= sight.limits.monitor_timeout:
             return None
         reason = f"suspension angles and odometry are not known together for {missing:.1f} s"
         return refusal(NO_JOINTS, reason)
@@ -217,9 +213,9 @@ class PathMonitor:
         self._drift.take(sight.snapshot.compare_standing(), sight.time)
         self._finding = replace(self._finding, mismatch=dict(self._drift.latest))
 
-    def _refuse_drift(self) -> PathJudgement | None:
+    def _refuse_drift(self, sight: Sight) -> PathJudgement | None:
         """Return a refusal if the suspension has differed too much for some time."""
-        lasting, most = self._drift.lasting(), self.settings.max_mismatch
+        lasting, most = self._drift.lasting(), sight.limits.monitor_mismatch
         if not 0.0 < most < lasting:
             return None
         latest = self._drift.latest
@@ -261,7 +257,8 @@ class PathMonitor:
         first = 0 if self._finding.place is None else self._finding.place.index
         near = int(np.searchsorted(path.distances, path.distances[first] + NEAR)) + 1
         if near < len(path.poses):
-            judgement = _check(snapshot, path.poses[first:near])
+            ahead = path.poses[first:near]
+            judgement = _check(_cut_map(snapshot, ahead), ahead)
             if not judgement.traversable:
                 return judgement
         return _check(snapshot, path.poses[first:])
@@ -282,13 +279,25 @@ def rehearse(settings: ServiceSettings) -> None:
         known_map=KnownMap(ground, ground, "", None, 0.0, ""),
         measured_pose=poses[0],
     )
-    monitor, sight = PathMonitor(WatchSettings()), Sight(snapshot, poses[0], 0.0)
+    monitor, sight = PathMonitor(), Sight(snapshot, poses[0], 0.0)
     monitor.take_path(WatchedPath(poses), sight)
     monitor.look(sight)
 
 
 def _check(snapshot: Snapshot, poses: NDArray[np.float64]) -> PathJudgement:
     return replace(snapshot, path=GivenPath(poses, "")).check_path()
+
+
+def _cut_map(snapshot: Snapshot, poses: NDArray[np.float64]) -> Snapshot:
+    """Return a snapshot with the map around poses (n, 3) alone: a large one takes long to pack."""
+    known, wheels = snapshot.known_map, snapshot.settings.rover.suspension.wheels
+    assert known is not None
+    reach = max(math.hypot(x, y) for x, y, _ in wheels.values())
+    try:
+        cut = cut_around(known.terrain, poses[:, :2], AROUND * reach)
+    except TerrainError:  # nothing is known there
+        return snapshot
+    return replace(snapshot, known_map=replace(known, terrain=cut, received=cut, cells=None))
 
 
 def describe_watch(finding: Finding, enabled: bool, tolerance: float) -> Health:

@@ -3,17 +3,19 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property, partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
 from rover_planner.planning.angles import wrap
 from rover_planner.planning.candidates import turn_and_drive
-from rover_planner.planning.dubins import dubins_length, dubins_paths
+from rover_planner.planning.dubins import dubins_lengths, dubins_paths
 from rover_planner.planning.path_query import Pose
 from rover_planner.planning.search.judge import PathJudge
-from rover_planner.planning.search.nodes import HEADINGS, YAWS, Nodes, nearest_heading
+from rover_planner.planning.search.nodes import HEADINGS, Nodes, nearest_heading
 from rover_planner.planning.search.primitives import PRICES, Gear, Piece
 
 MAX_DISTANCE = 3.0
@@ -35,20 +37,34 @@ FRONTIER_BATCH = 1000
 """Number of poses at the frontier that the model is asked about at once."""
 
 Ends = Callable[[Pose], tuple[Pose, Pose]]
-"""Function of a node's pose that returns the first and the last pose of a piece of path."""
+"""Function of the poses of nodes that returns the first and the last poses of pieces of path."""
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Connection(Piece):
-    """A piece of path between the start or the goal and a node; its cost is that on level ground.
+@dataclass(frozen=True, eq=False)
+class Connection:
+    """A piece of path between the start or the goal and a node.
 
     At the frontier of the known ground it is a single pose.
     """
 
     node: int
     """The node."""
+    gear: Gear
+    """Gear in which it is driven."""
+    cost: float
+    """Its cost on level ground [m]."""
+    make: Callable[[], Pose]
+    """Makes its waypoints (n, 3)."""
     surcharge: float = 0.0
     """Cost that comes to that of driving [m]."""
+
+    def piece(self, cost: float = np.nan) -> Piece:
+        """Return it as a piece of path with its cost [m], if it is judged."""
+        return Piece(self._poses, self.gear, cost)
+
+    @cached_property
+    def _poses(self) -> Pose:
+        return self.make()
 
 
 def connect_start(
@@ -84,15 +100,15 @@ class _Maker:
 
         `ends` gives first and last pose of the curve to or from a node, as if driven forwards.
         """
-        radius, found = tightest_radius(self.rover), []
-        for node, there in _nodes_beside(self.nodes, pose, side):
-            length = dubins_length(*ends(there), radius)
-            if length <= DETOUR * np.hypot(*(there - pose)[:2]) + 1e-9:
-                found.append((PRICES[gear] * length, node, there))
-        found.sort(key=lambda one: one[:2])
+        nodes, there = _nodes_beside(self.nodes, pose, side)
+        lengths = dubins_lengths(*ends(there), tightest_radius(self.rover))
+        fits = lengths <= DETOUR * np.hypot(*(there - pose)[:, :2].T) + 1e-9
+        nodes, there, costs = nodes[fits], there[fits], PRICES[gear] * lengths[fits]
         return [
-            Connection(self._drive(*ends(there), gear), gear, cost, node=node)
-            for cost, node, there in found[:MOST_CURVES]
+            Connection(
+                int(nodes[k]), gear, float(costs[k]), partial(self._drive, *ends(there[k]), gear)
+            )
+            for k in np.lexsort((nodes, costs))[:MOST_CURVES].tolist()
         ]
 
     def _drive(self, here: Pose, there: Pose, gear: Gear) -> np.ndarray:
@@ -109,23 +125,25 @@ class _Maker:
         swing, found = swing_radius(self.rover), []
         for node, there in _turned_nodes(self.nodes, pose, side):
             poses, length = turn_and_drive(*ends(there), swing, self.waypoint_spacing)
-            cost = PRICES[Gear.ON_THE_SPOT] * length
-            found.append(Connection(poses, Gear.ON_THE_SPOT, cost, node=node))
+            gear, make = Gear.ON_THE_SPOT, partial(np.asarray, poses)
+            found.append(Connection(node, gear, PRICES[gear] * length, make))
         return found
 
 
-def _nodes_beside(nodes: Nodes, pose: Pose, side: float) -> Iterator[tuple[int, Pose]]:
-    """Yield the nodes near a pose, ahead of it (side 1) or behind it (-1), hardly turned."""
+def _nodes_beside(nodes: Nodes, pose: Pose, side: float) -> tuple[NDArray[np.int64], Pose]:
+    """Return the nodes (n,) near a pose, ahead of it (side 1) or behind it (-1), hardly turned.
+
+    Their poses (n, 3) are the second.
+    """
     ahead = side * np.array([np.cos(pose[2]), np.sin(pose[2])])
-    nearest = nearest_heading(pose[2])
-    for place in nodes.places_near(pose, MAX_DISTANCE * nodes.cell):
-        away = nodes.cell * (place + nodes.first) - pose[:2]
-        distance = float(np.hypot(*away))
-        if distance < 1e-6 or away @ ahead < 0.5 * distance:
-            continue
-        for turn in range(-LARGEST_TURN, LARGEST_TURN + 1):
-            heading = (nearest + turn) % HEADINGS
-            yield _node(nodes, place, heading)
+    places = nodes.places_near(pose, MAX_DISTANCE * nodes.cell)
+    away = nodes.cell * (places + nodes.first) - pose[:2]
+    distance = np.hypot(*away.T)
+    places = places[(distance >= 1e-6) & (away @ ahead >= 0.5 * distance)]
+    turns = nearest_heading(pose[2]) + np.arange(-LARGEST_TURN, LARGEST_TURN + 1)
+    headings = np.tile(turns % HEADINGS, len(places))
+    found = nodes.index(np.repeat(places, len(turns), axis=0), headings)
+    return found, nodes.poses(found)
 
 
 def _turned_nodes(nodes: Nodes, pose: Pose, side: float) -> Iterator[tuple[int, Pose]]:
@@ -135,18 +153,13 @@ def _turned_nodes(nodes: Nodes, pose: Pose, side: float) -> Iterator[tuple[int, 
     for row in np.argsort(np.hypot(*aways.T), kind="stable")[:TURNED_PLACES]:
         x, y = side * aways[row]
         heading = nearest_heading(np.arctan2(y, x) if np.hypot(x, y) > 1e-6 else pose[2])
-        yield _node(nodes, places[row], heading)
-
-
-def _node(nodes: Nodes, place: np.ndarray, heading: int) -> tuple[int, Pose]:
-    node = int(nodes.index(place[None, :], np.array([heading]))[0])
-    position = nodes.cell * (place + nodes.first)
-    return node, np.array([*position, YAWS[heading]])
+        node = nodes.index(places[row : row + 1], np.array([heading]))
+        yield int(node[0]), nodes.poses(node)[0]
 
 
 def _about(pose: Pose) -> Pose:
-    """Return the pose (3,) that heads the other way."""
-    return np.array([pose[0], pose[1], wrap(pose[2] + np.pi)])
+    """Return the pose (3,), or poses (n, 3), that heads the other way."""
+    return np.concatenate([pose[..., :2], wrap(pose[..., 2:] + np.pi)], axis=-1)
 
 
 def connect_frontier(judge: PathJudge, nodes: Nodes, goal: Pose) -> list[Connection]:
@@ -174,7 +187,6 @@ def connect_frontier(judge: PathJudge, nodes: Nodes, goal: Pose) -> list[Connect
                     return found
                 chosen.append(pose)
             price = FRONTIER_PRICE * float(np.hypot(*(pose - goal)[:2]))
-            found.append(
-                Connection(pose[None, :], Gear.FORWARD, 0.0, node=int(node), surcharge=price)
-            )
+            make = partial(np.asarray, pose[None, :])
+            found.append(Connection(int(node), Gear.FORWARD, 0.0, make, price))
     return found

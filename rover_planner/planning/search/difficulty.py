@@ -8,6 +8,7 @@ the questions to the model and decides nothing.
 """
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -30,16 +31,35 @@ and for the largest one along the drive, both in shares of what the rover can cl
 verdicts on random edges of made and real maps, two rovers."""
 STEPS_PER_UNIT = 30
 """Steps per unit in which difficulties are kept."""
+LEAST_DIFFICULTY = 0.5 / STEPS_PER_UNIT
+"""Difficulty of level ground."""
 NOT_LOOKED = 255
 """Difficulty of an edge that was not looked at."""
 
 
-class Difficulty(NamedTuple):
-    """The estimate for all edges of a window, as kernels read it."""
+class Slopes(NamedTuple):
+    """Slopes of the ground as wheels feel it, and where the wheels are, as kernels read them."""
 
+    along_x: np.ndarray
+    """(ny, nx) float32 slope along x of the steepest cell around each place."""
+    along_y: np.ndarray
+    """(ny, nx) as `along_x`, along y."""
+    shifts: np.ndarray
+    """(HEADINGS, 6, 2) int64 places in x and y from the body origin to the wheels."""
+    ahead: np.ndarray
+    """(HEADINGS, 2) unit vectors along the headings."""
+    climb: float
+    """Slope at which a climb ends [rise over run]."""
+
+
+class Difficulty(NamedTuple):
+    """The estimate for all edges of a window, as kernels read it; found where it is asked for."""
+
+    slopes: Slopes
+    """What it is made of."""
     steps: np.ndarray
     """(HEADINGS, ny, nx) uint8 difficulty with the body origin at a place, in steps; at most 254
-    of them, which is far beyond what any path takes."""
+    of them, which is far beyond what any path takes; NOT_LOOKED until it is asked for."""
     first: np.ndarray
     """(2,) x and y of the first place, from the first place of the lattice [m]."""
     spacing: float
@@ -71,23 +91,26 @@ def estimate_difficulty(
     """
     blocks = round(SHARE * nodes.cell / terrain.resolution)
     stride = max(1, min(blocks, *terrain.elevation.shape))
-    slopes = _slopes(_felt_surface(terrain, rover.wheel.radius), terrain.resolution, stride)
+    along_x, along_y = _slopes(
+        _felt_surface(terrain, rover.wheel.radius), terrain.resolution, stride
+    )
     spacing = stride * terrain.resolution
-    steepness = np.hypot(*slopes)
     own = np.array([place[:2] for place in rover.suspension.wheels.values()])
     wheels = np.concatenate([own, own * (1.0, -1.0)])
-    steps = np.empty((HEADINGS, *steepness.shape), np.uint8)
-    for heading, yaw in enumerate(YAWS):
-        c, s = np.cos(yaw), np.sin(yaw)
-        along = np.abs(np.float32(c) * slopes[0] + np.float32(s) * slopes[1])
-        shifts = np.rint(wheels @ np.array([[c, s], [-s, c]]) / spacing).astype(int)
-        mean, most = _below_wheels(steepness, along, shifts)
-        logit = LEVEL + (ALL_WHEELS / climb) * mean + (ONE_WHEEL / climb) * most
-        steps[heading] = np.minimum(STEPS_PER_UNIT * np.log1p(np.exp(np.minimum(logit, 8.0))), 254)
+    ahead = np.column_stack([np.cos(YAWS), np.sin(YAWS)])
+    turns = np.stack([ahead, ahead[:, ::-1] * (-1.0, 1.0)], axis=1)
+    shifts = np.rint(wheels @ turns / spacing).astype(np.int64)
     first = np.asarray(terrain.origin) - nodes.cell * np.array(nodes.first)
     first += 0.5 * (stride - 1) * terrain.resolution
-    edges = np.full((nodes.count, samples.shape[1]), NOT_LOOKED, np.uint8)
-    return Difficulty(steps, first, spacing, nodes.cell, samples, edges)
+    return Difficulty(
+        Slopes(along_x, along_y, shifts, ahead, climb),
+        np.full((HEADINGS, *along_x.shape), NOT_LOOKED, np.uint8),
+        first,
+        spacing,
+        nodes.cell,
+        samples,
+        np.full((nodes.count, samples.shape[1]), NOT_LOOKED, np.uint8),
+    )
 
 
 def steepest_climb(rover: Rover, friction: float) -> float:
@@ -147,27 +170,7 @@ def _blocks(values: NDArray[np.float32], stride: int) -> NDArray[np.float32]:
     return cut.swapaxes(1, 2).reshape(ny, nx, -1)
 
 
-def _below_wheels(
-    steepness: NDArray[np.float32], along: NDArray[np.float32], shifts: NDArray[np.int64]
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Return (ny, nx) the mean steepness and the largest slope along the drive below the wheels.
-
-    Args:
-        steepness: (ny, nx) slopes.
-        along: (ny, nx) slopes along the drive, absolute values.
-        shifts: (6, 2) cells in x and y from the body origin to the wheels.
-    """
-    (ny, nx), margin = steepness.shape, int(np.abs(shifts).max())
-    steepness, along = (np.pad(values, margin, mode="edge") for values in (steepness, along))
-    mean, most = np.zeros((ny, nx), np.float32), np.zeros((ny, nx), np.float32)
-    for column, row in shifts + margin:
-        place = slice(row, row + ny), slice(column, column + nx)
-        mean += steepness[place]
-        np.maximum(most, along[place], out=most)
-    mean /= len(shifts)
-    return mean, most
-
-
+@lru_cache(maxsize=8)
 def sample_primitives(
     primitives: tuple[tuple[Primitive, ...], ...], spacing: float
 ) -> NDArray[np.float64]:
@@ -223,5 +226,23 @@ def _look_along(difficulty, columns, node, k):
             break
         i = min(max(int((x + sample[0]) / difficulty.spacing + 0.5), 0), nx - 1)
         j = min(max(int((y + sample[1]) / difficulty.spacing + 0.5), 0), ny - 1)
-        largest = max(largest, difficulty.steps[int(sample[2]), j, i])
+        steps = difficulty.steps[int(sample[2])]
+        if steps[j, i] == NOT_LOOKED:
+            steps[j, i] = _look_at(difficulty.slopes, int(sample[2]), j, i)
+        largest = max(largest, steps[j, i])
     return largest
+
+
+@exact_kernel
+def _look_at(slopes, heading, j, i):
+    """Return the difficulty in steps with the body origin at place j, i, with a heading."""
+    ny, nx = slopes.along_x.shape
+    steepness, most = 0.0, 0.0
+    for wheel in range(6):
+        column = min(max(i + slopes.shifts[heading, wheel, 0], 0), nx - 1)
+        row = min(max(j + slopes.shifts[heading, wheel, 1], 0), ny - 1)
+        x, y = slopes.along_x[row, column], slopes.along_y[row, column]
+        steepness += math.hypot(x, y)
+        most = max(most, abs(slopes.ahead[heading, 0] * x + slopes.ahead[heading, 1] * y))
+    logit = LEVEL + (ALL_WHEELS * steepness / 6.0 + ONE_WHEEL * most) / slopes.climb
+    return np.uint8(min(STEPS_PER_UNIT * math.log1p(math.exp(min(logit, 8.0))), 254.0))

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Remembers judged edges and the last path, from one search to the next."""
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from rover_physics.rover.steering_joints import swing_radius
 from rover_planner.maps.changes import find_changes, have_same_layers
 from rover_planner.maps.unobserved_ground import ALLOW
+from rover_planner.planning.search.cell_counts import CellCounts
 from rover_planner.planning.search.edges import Edges
 from rover_planner.planning.search.nodes import HEADINGS, Nodes
 from rover_planner.planning.search.primitives import Piece, make_primitives
@@ -32,7 +34,7 @@ class EdgeMemory:
     def recall_path(self, query: SearchQuery) -> list[Piece]:
         """Return the pieces of the last path if it was between the same ends for the same rover.
 
-        They are to be judged again: the map or the options may be others.
+        Their cost is NaN where the map or the options may have changed it.
         """
         if self._path is None:
             return []
@@ -42,31 +44,37 @@ class EdgeMemory:
             and np.array_equal(asked.start, query.start)
             and np.array_equal(asked.goal, query.goal)
         )
-        return pieces if is_same else []
+        if not is_same:
+            return []
+        changed = None
+        if _is_alike(asked, query):
+            changed = CellCounts(query.terrain, _find_changed(asked, query))
+        reach = _reach_of(query)
+        return [
+            replace(one, cost=np.nan)
+            if changed is None or changed.are_near(one.poses[:, :2], reach).any()
+            else one
+            for one in pieces
+        ]
 
     def recall(self, query: SearchQuery, nodes: Nodes) -> Edges:
         """Return the edges between nodes with what is known of them; what is added is kept."""
-        if self._last is None or not _is_alike(*self._last, query, nodes):
+        last = self._last
+        if last is None or last[1].nodes != nodes or not _is_alike(last[0], query):
             spacing = query.options.waypoint_spacing
             edges = Edges(nodes, make_primitives(query.rover, nodes.cell, spacing))
         else:
-            asked, edges = self._last
-            before, now = _seen(asked), _seen(query)
-            if asked.terrain is not query.terrain or before is not now:
-                changed = find_changes(asked.terrain, query.terrain)[1:-1, 1:-1]
-                if before is not None and now is not None:
-                    changed |= before != now
-                edges.forget(_find_touching(query, edges, changed))
+            asked, edges = last
+            edges.forget(_find_touching(query, edges, _find_changed(asked, query)))
         self._last = query, edges
         return edges
 
 
-def _is_alike(asked: SearchQuery, edges: Edges, query: SearchQuery, nodes: Nodes) -> bool:
-    """Return whether edges judged for one query hold for another, apart from the heights."""
+def _is_alike(asked: SearchQuery, query: SearchQuery) -> bool:
+    """Return whether what was judged for one query holds for another, apart from the heights."""
     old, new = asked.terrain, query.terrain
     return (
-        edges.nodes == nodes
-        and asked.rover == query.rover
+        asked.rover == query.rover
         and asked.options == query.options
         and _rule_of(asked) == _rule_of(query)
         and asked.marked == query.marked
@@ -91,18 +99,28 @@ def _seen(query: SearchQuery) -> NDArray[np.uint8] | None:
     )
 
 
+def _find_changed(asked: SearchQuery, query: SearchQuery) -> NDArray[np.bool_]:
+    """Return (ny, nx) True for cells in which the maps of two queries that are alike differ."""
+    before, now = _seen(asked), _seen(query)
+    if asked.terrain is query.terrain and before is now:
+        return np.zeros(query.terrain.elevation.shape, bool)
+    changed = find_changes(asked.terrain, query.terrain)[1:-1, 1:-1]
+    if before is not None and now is not None:
+        changed |= before != now
+    return changed
+
+
+def _reach_of(query: SearchQuery) -> float:
+    """Return how far from the body origin ground may count for a pose [m]."""
+    rover = query.rover
+    return swing_radius(rover) + 2.0 * rover.wheel.radius + 2.0 * query.terrain.resolution
+
+
 def _find_touching(
     query: SearchQuery, edges: Edges, changed: NDArray[np.bool_]
 ) -> NDArray[np.int64]:
     """Return the places (k,) of nodes from which an edge may lead over changed cells."""
-    if not changed.any():
-        return np.empty(0, np.int64)
-    rover, terrain, nodes = query.rover, query.terrain, edges.nodes
     longest = max(one.length for own in edges.primitives for one in own)
-    margin = longest + swing_radius(rover) + 2.0 * rover.wheel.radius + 2.0 * terrain.resolution
-    away = terrain.resolution * ndimage.distance_transform_edt(~changed)
-    x, y, _ = nodes.poses(np.arange(0, nodes.count, HEADINGS)).T
-    ny, nx = changed.shape
-    column = np.clip(np.rint((x - terrain.origin[0]) / terrain.resolution), 0, nx - 1)
-    row = np.clip(np.rint((y - terrain.origin[1]) / terrain.resolution), 0, ny - 1)
-    return np.flatnonzero(away[row.astype(int), column.astype(int)] <= margin + nodes.cell)
+    places = edges.nodes.poses(np.arange(0, edges.nodes.count, HEADINGS))[:, :2]
+    counts = CellCounts(query.terrain, changed)
+    return np.flatnonzero(counts.are_near(places, longest + _reach_of(query)))

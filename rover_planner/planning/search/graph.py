@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.numerics.kernels import allocating_kernel, exact_kernel
-from rover_planner.planning.search.difficulty import Difficulty, difficulty_of
+from rover_planner.planning.search.difficulty import LEAST_DIFFICULTY, Difficulty, difficulty_of
 from rover_planner.planning.search.edges import FAILS, PASSES, Edges, PrimitiveTable
 from rover_planner.planning.search.nodes import HEADINGS
 
@@ -24,6 +24,11 @@ SLACK = 1.1
 """Costs to the goal are measured up to this multiple of the cost from start to goal."""
 FEW = 500
 """Number of nodes that a search may expand beside those of its path before it counts as misled."""
+GUESSED, EAGERNESS = 8000, 1.5
+"""Number of nodes that searches may expand so before costs to the goal that are guessed are
+measured, and guessed costs over those on level ground: the larger, the sooner is a path found."""
+GIVEN_UP = -2
+"""Result of a search that would expand too many nodes."""
 
 
 class Graph(NamedTuple):
@@ -221,7 +226,7 @@ def _enter_before(graph, node, to_goal, heap):
 
 
 @allocating_kernel
-def find_shortest(graph, starts, goals, to_goal, tree):
+def find_shortest(graph, starts, goals, to_goal, tree, most):
     """Find the shortest path from the start to the goal (A*).
 
     Args:
@@ -230,10 +235,11 @@ def find_shortest(graph, starts, goals, to_goal, tree):
         goals: Seeds with the costs from the nodes to the goal.
         to_goal: ToGoal, and the limit up to which it is measured.
         tree: SearchTree, written.
+        most: Number of nodes that it may expand.
 
     Returns:
-        Index of the goal's seed that the path ends with, -1 if there is no path; its cost [m]; and
-        the number of nodes expanded.
+        Index of the goal's seed that the path ends with, -1 if there is no path, GIVEN_UP if it is
+        not known; its cost [m]; and the number of nodes expanded.
     """
     measured, limit = to_goal
     tree.cost[:] = np.inf
@@ -258,6 +264,8 @@ def find_shortest(graph, starts, goals, to_goal, tree):
             break
         if -negative > tree.cost[node]:
             continue
+        if expanded == most:
+            return np.int64(GIVEN_UP), np.inf, expanded
         expanded += 1
         if leave[node] >= 0 and -negative + goals.costs[leave[node]] < best:
             best, found = -negative + goals.costs[leave[node]], leave[node]
@@ -362,7 +370,7 @@ class ShortestPaths:
         self._edges, self._doubt, self._difficulty = edges, doubt, difficulty
         nodes, count = edges.nodes, edges.nodes.count
         self._to_goal = ToGoal(np.empty(count), *nodes.surround(starts.nodes), nodes.cell)
-        self._limit, self._measured = np.inf, 0
+        self._limit, self._measured, self._most = np.inf, 0, 0
         self._tree = SearchTree(np.empty(count), np.empty(count, np.int64))
         self._caution, self._misled = -1.0, 0
         self.expanded = 0
@@ -380,18 +388,17 @@ class ShortestPaths:
         """
         graph = self.graph(caution)
         if caution != self._caution:
+            self._begin(graph, starts, goals)
+        goal, cost = self._search(graph, starts, goals)
+        if goal == GIVEN_UP:
             self._measure(graph, starts, goals)
-            self._caution = caution
-        to_goal = self._to_goal, self._limit
-        goal, cost, expanded = find_shortest(graph, starts, goals, to_goal, self._tree)
-        self.expanded, self.last_expanded = self.expanded + expanded, expanded
-        self._misled += max(0, expanded - FEW)
+            goal, cost = self._search(graph, starts, goals)
         if self._misled > self._measured:  # the costs to the goal are worn out
             self._measure(graph, starts, goals)
         if goal < 0:
             return None
         start, edges = self._follow_back(int(goals.nodes[goal]))
-        return Route(start, edges, int(goal), float(cost))
+        return Route(start, edges, goal, cost)
 
     def graph(self, caution: float) -> Graph:
         """Return the lattice as kernels read it."""
@@ -399,9 +406,35 @@ class ShortestPaths:
         known = edges.state, edges.cost, edges.standing, self._doubt, self._difficulty
         return Graph(edges.table, *known, caution, *edges.nodes.shape)
 
+    def _begin(self, graph: Graph, starts: Seeds, goals: Seeds) -> None:
+        """Begin with another caution: guess the costs to the goal at first, later measure them."""
+        is_first, self._caution = self._caution < 0.0, graph.caution
+        if is_first and graph.caution > 0.0:
+            self._guess(graph.caution, goals)
+        else:
+            self._measure(graph, starts, goals)
+
+    def _guess(self, caution: float, goals: Seeds) -> None:
+        """Take the costs to the goal for those on level ground as the crow flies."""
+        nodes = self._edges.nodes
+        cell = EAGERNESS * nodes.cell * (1.0 + caution * PRICE * LEAST_DIFFICULTY)
+        (row, column), radius = nodes.surround(goals.nodes)
+        rows, columns = np.ogrid[: nodes.shape[0], : nodes.shape[1]]
+        away = np.maximum(cell * np.hypot(rows - row, columns - column) - radius, 0.0)
+        self._to_goal.cost.reshape(-1, HEADINGS)[:] = away.reshape(-1, 1)
+        self._limit, self._measured, self._most = np.inf, GUESSED, GUESSED
+
+    def _search(self, graph: Graph, starts: Seeds, goals: Seeds) -> tuple[int, float]:
+        """Return the goal's seed, -1 or GIVEN_UP, and the cost [m] of the shortest path."""
+        to_goal, most = (self._to_goal, self._limit), self._most - self._misled
+        goal, cost, expanded = find_shortest(graph, starts, goals, to_goal, self._tree, most)
+        self.expanded, self.last_expanded = self.expanded + expanded, expanded
+        self._misled += max(0, expanded - FEW)
+        return int(goal), float(cost)
+
     def _measure(self, graph: Graph, starts: Seeds, goals: Seeds) -> None:
         """Measure the costs to the goal again."""
-        self._misled = 0
+        self._misled, self._most = 0, np.iinfo(np.int64).max
         self._limit, self._measured = measure_to_goal(graph, goals, starts, SLACK, self._to_goal)
 
     def _follow_back(self, node: int) -> tuple[int, NDArray[np.int64]]:

@@ -16,6 +16,7 @@ from scipy import ndimage
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
+from rover_planner.planning.search.cell_counts import CellCounts
 from rover_planner.planning.search.nodes import HEADINGS, YAWS, Nodes
 
 FULL_DOUBT = 4.0
@@ -80,8 +81,12 @@ def estimate_ground(rover: Rover, terrain: Terrain, nodes: Nodes) -> GroundEstim
         terrain.resolution,
     )
     found = GroundEstimate(np.zeros(nodes.count, bool), np.zeros(nodes.count, np.float32))
-    window = nodes.cell, nodes.first[0], nodes.first[1], nodes.shape[1]
-    estimate_nodes(ground, wheels, window, found)
+    at = nodes.poses(np.arange(0, nodes.count, HEADINGS))[:, :2]
+    reach = float(np.hypot(*places.T).max())
+    low, high = np.reshape(terrain.bounds, (2, 2)).T
+    doubtful = ((at - reach < low) | (at + reach > high)).any(axis=1)
+    doubtful |= CellCounts(terrain, ~known).are_near(at, reach)
+    estimate_nodes(ground, wheels, at, np.flatnonzero(doubtful), found)
     return found
 
 
@@ -125,28 +130,34 @@ def _distance_to_known(elevation: NDArray[np.float64], resolution: float) -> NDA
 
 
 @exact_kernel
-def estimate_nodes(ground, wheels, window, found):
-    """Write the estimates of all nodes.
+def estimate_nodes(ground, wheels, at, chosen, found):
+    """Write the estimates of the nodes at some places.
 
     Args:
         ground: _Map.
         wheels: _Wheels.
-        window: Cell [m], first column and row, and number of columns of the nodes.
+        at: (n, 2) x and y of all places [m].
+        chosen: (k,) the places to look at.
         found: GroundEstimate of zeros, written where it differs.
     """
-    cell, first_column, first_row, columns = window
-    for node in range(found.doubt.size):
-        heading, place = node % HEADINGS, node // HEADINGS
-        x = cell * (place % columns + first_column)
-        y = cell * (place // columns + first_row)
-        for wheel in range(6):
-            u = (x + wheels.offsets[heading, wheel, 0]) / ground.resolution
-            v = (y + wheels.offsets[heading, wheel, 1]) / ground.resolution
-            if not _is_known(ground, u, v):
-                found.doubt[node] = FULL_DOUBT
-                if _distance(ground, u, v) > wheels.shift:
-                    found.groundless[node] = True
-                    break
+    for place in chosen:
+        for heading in range(HEADINGS):
+            pose = at[place, 0], at[place, 1], heading
+            _estimate_node(ground, wheels, pose, place * HEADINGS + heading, found)
+
+
+@exact_kernel
+def _estimate_node(ground, wheels, pose, node, found):
+    """Write the estimate of a node, of which `pose` has x, y [m] and heading."""
+    x, y, heading = pose
+    for wheel in range(6):
+        u = (x + wheels.offsets[heading, wheel, 0]) / ground.resolution
+        v = (y + wheels.offsets[heading, wheel, 1]) / ground.resolution
+        if not _is_known(ground, u, v):
+            found.doubt[node] = FULL_DOUBT
+            if _distance(ground, u, v) > wheels.shift:
+                found.groundless[node] = True
+                return
 
 
 @exact_kernel

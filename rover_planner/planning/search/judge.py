@@ -23,13 +23,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
+from rover_physics.results.uses import find_codes
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.classification import ClassifiedWaypoint, classify_judged
 from rover_physics.traversability.judge import judge_poses
-from rover_physics.traversability.pieces import PieceVerdict, judge_pieces
+from rover_physics.traversability.pieces import PieceVerdict, find_exposure, judge_pieces
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.maps.unobserved_ground import UNOBSERVED_CODE
 from rover_planner.planning.marked_places import MARKED_CODE, NONE_MARKED, MarkedPlaces
@@ -231,10 +233,19 @@ class PathJudge:
 
     def stand(self, poses: NDArray[np.float64]) -> tuple[str, ...]:
         """Return the codes (n,) of what fails at single poses (n, 3), wheels ahead; "" if none."""
-        codes = list(self._judge_standing(poses).codes)
+        if self._is_map_exact:
+            self.poses += len(poses)
+            model = pack_model(self.rover, self.terrain, self.options.model)
+            codes = find_codes(model.limits, model.evaluate(poses))
+        else:
+            codes = list(self._judge_standing(poses).codes)
         for row in self._find_unobserved(poses[:, None, :], codes):
             codes[row] = UNOBSERVED_CODE
         return tuple(codes)
+
+    @property
+    def _is_map_exact(self) -> bool:
+        return self.terrain.elevation_std is None or not self.options.map_sigmas
 
     def refuse(self, pose: Pose) -> tuple[str, str]:
         """Return code and reason why the rover cannot stand at a pose, empty if it can."""
@@ -260,6 +271,13 @@ class PathJudge:
             return []
         refused = self.unobserved_check.refuses([pieces[row] for row in passing])
         return [passing[row] for row in np.flatnonzero(refused).tolist()]
+
+
+def cost_of_path(rover: Rover, gear: Gear, path: Candidate) -> float:
+    """Return the cost [m] of a path that passes and is one piece."""
+    time, energy = float(path.prediction.time[-1]), float(path.prediction.energy[-1])
+    exposure = find_exposure(rover, path.prediction)
+    return find_cost(rover, gear, PieceVerdict("", time, energy, exposure))
 
 
 def find_cost(rover: Rover, gear: Gear, piece: PieceVerdict) -> float:

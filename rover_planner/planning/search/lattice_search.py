@@ -11,7 +11,7 @@ that the cost of the shortest path is a bound from below on that of any path on 
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -212,19 +212,23 @@ class LatticeSearch:
             rows = np.flatnonzero(~ends.judged)
             self._stand(np.unique(self._unjudged(ends.nodes[rows])))
             stands = self.edges.standing[ends.nodes[rows]] == PASSES
-            self._judge([(ends.connections[k], ends, k) for k in rows[stands].tolist()])
+            self._judge(self._open_ends(ends, *rows[stands].tolist()))
             ends.judged[:] = True
 
     def _open_pieces(self, route: Route) -> list[Open]:
         """Return the pieces of a route that are not judged, in the order of the drive."""
         starts, goals = self.ends
         open_edges = route.edges[self.edges.state.flat[route.edges] == UNJUDGED]
-        found: list[Open] = [
-            (starts.connections[route.start], starts, route.start),
-            *((self.edges.piece(edge), None, edge) for edge in open_edges.tolist()),
-            (goals.connections[route.goal], goals, route.goal),
+        inner: list[Open] = [(self.edges.piece(edge), None, edge) for edge in open_edges.tolist()]
+        return [
+            *self._open_ends(starts, route.start),
+            *inner,
+            *self._open_ends(goals, route.goal),
         ]
-        return [one for one in found if one[1] is None or not one[1].judged[one[2]]]
+
+    def _open_ends(self, ends: _Ends, *indices: int) -> list[Open]:
+        """Return the connections of some indices that are not judged."""
+        return [(ends.connections[k].piece(), ends, k) for k in indices if not ends.judged[k]]
 
     def _judge(self, pieces: Sequence[Open]) -> list[bool]:
         """Judge pieces, keep what is found, and return whether they pass."""
@@ -266,9 +270,9 @@ class LatticeSearch:
         starts, goals = self.ends
         first, last = starts.connections[route.start], goals.connections[route.goal]
         return [
-            replace(first, cost=float(starts.costs[route.start])),
+            first.piece(float(starts.costs[route.start])),
             *(self.edges.piece(edge) for edge in route.edges),
-            replace(last, cost=float(goals.costs[route.goal])),
+            last.piece(float(goals.costs[route.goal])),
         ]
 
     def _refuse(self, route: Route, piece: int, code: str) -> None:

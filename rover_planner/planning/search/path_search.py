@@ -27,7 +27,7 @@ from rover_planner.planning.search.difficulty import estimate_difficulty, steepe
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.edges import UNJUDGED
 from rover_planner.planning.search.ground_estimate import estimate_ground
-from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.judge import PathJudge, cost_of_path
 from rover_planner.planning.search.lattice_search import LatticeSearch, SearchProgress, join_pieces
 from rover_planner.planning.search.nodes import HEADINGS, Nodes
 from rover_planner.planning.search.primitives import Gear, Piece
@@ -189,7 +189,7 @@ class _PathFinder:
                 )
         progress = self._progress
         if not self._to_frontier:
-            self._try_known_ways()
+            self._try_known_paths()
         if self._settings.ends_at_first and progress.best is not None:
             self._memory.keep_path(self._query, progress.pieces)
             return self._make_result(FOUND, "", path=(progress.best, progress.cost))
@@ -232,19 +232,31 @@ class _PathFinder:
         cell = self._nodes.cell
         return f"the {columns * cell:.0f} m x {rows * cell:.0f} m around start and goal"
 
-    def _try_known_ways(self) -> None:
+    def _try_known_paths(self) -> None:
         """Take the last path between the same ends, or else the direct curve, if it passes.
 
         It is a first path, long before the lattice is prepared.
         """
         for pieces in (self._memory.recall_path(self._query), self._make_direct_path()):
-            judged = self._judge.judge_pieces(pieces)
-            if not pieces or any(one.code for one in judged):
+            if not pieces:
                 continue
-            path = [replace(one, cost=new.cost) for one, new in zip(pieces, judged, strict=True)]
-            poses = join_pieces(path)[0]
-            if self._progress.keep(path, self._judge.check(poses, stop_at_failure=True)):
+            path = self._judge.check(join_pieces(pieces)[0], stop_at_failure=True)
+            if not path.verdict.traversable:
+                continue
+            priced = self._price(pieces, path)
+            if all(np.isfinite(one.cost) for one in priced):
+                self._progress.keep(priced, path)
                 return
+
+    def _price(self, pieces: list[Piece], path: Candidate) -> list[Piece]:
+        """Return the pieces of a path that passes with their costs."""
+        if len(pieces) == 1:
+            cost = cost_of_path(self._query.rover, pieces[0].gear, path)
+            return [replace(pieces[0], cost=cost)]
+        new = [k for k, one in enumerate(pieces) if np.isnan(one.cost)]
+        judged = self._judge.judge_pieces([pieces[k] for k in new])
+        costs = dict(zip(new, (one.cost for one in judged), strict=True))
+        return [replace(one, cost=costs.get(k, one.cost)) for k, one in enumerate(pieces)]
 
     def _make_direct_path(self) -> list[Piece]:
         """Return the direct curve from start to goal as one piece, none if they are the same."""

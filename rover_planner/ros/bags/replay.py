@@ -24,8 +24,8 @@ from rover_planner.planning.answering.judgement import PathJudgement, refusal
 from rover_planner.planning.answering.measurements import Measurements
 from rover_planner.planning.answering.questions import Register
 from rover_planner.planning.answering.service_settings import (
-    keeper_settings,
     load_service_settings,
+    map_rules,
 )
 from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
@@ -43,7 +43,7 @@ from rover_planner.ros.bags.bag_reader import (
 )
 from rover_planner.ros.bags.recorded_drive import Measured, RecordedDrive
 from rover_planner.ros.frames import Frames
-from rover_planner.ros.map_messages import LOOK_PERIOD, MapSettings, read_map
+from rover_planner.ros.map_messages import LOOK_PERIOD, read_map
 
 DRIVEN, CHECKED, PLANNED = "driven", "check_path", "can_traverse"
 """Kinds of questions: the drive that was recorded, a path that was recorded, a goal."""
@@ -99,8 +99,7 @@ class Replay:
     def __post_init__(self) -> None:
         self._service = TraverseService(load_service_settings(self.parameters))
         values = self.parameters
-        self._keeper = MapKeeper(self._service.settings.rover, keeper_settings(values))
-        self._map_settings = MapSettings.of(values)
+        self._keeper = MapKeeper(self._service.settings.rover, map_rules(values))
         if values.terrain_file:
             terrain = load_terrain(values.terrain_file, values.max_map_cells)
             self._keep(self._keeper.load(terrain, 0.0, None), values.terrain_file, None)
@@ -144,7 +143,7 @@ class Replay:
         header = recorded.message.header
         stamp = stamp_to_ns(header.stamp)
         source = self.frames.find_source(header.frame_id, stamp, recorded.topic)
-        terrain = read_map(recorded.message, self._map_settings, source, self._keeper)
+        terrain = read_map(recorded.message, self.parameters, source, self._keeper)
         since = (recorded.stamp if stamp is None else stamp) / NANOSECONDS
         standing = self._measured.standing(recorded.stamp / NANOSECONDS)
         kept = self._keeper.take(terrain, recorded.topic, since, standing)

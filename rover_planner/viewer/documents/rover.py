@@ -25,6 +25,15 @@ def list_numbers(rover: Rover) -> list[RoverValue]:
     return [value for values in list_values(rover).values() for value in values]
 
 
+def list_joints(rover: Rover) -> dict[str, tuple[float, float]]:
+    """Return the smallest and largest angle [rad] of each joint of a rover's arm by name."""
+    arm = rover.manipulator
+    if arm is None:
+        return {}
+    ends = arm.joint_limits or ((-FULL_TURN, FULL_TURN),) * 3
+    return dict(zip(arm.joints, ends, strict=True))
+
+
 def describe_sliders(loaded: Rover) -> dict[str, Any]:
     """Return the sliders of a rover that was loaded: label, ends and step, by part."""
     parts = [
@@ -34,12 +43,8 @@ def describe_sliders(loaded: Rover) -> dict[str, Any]:
         }
         for title, values in list_values(loaded).items()
     ]
-    if (arm := loaded.manipulator) is not None:
-        ends = arm.joint_limits or ((-FULL_TURN, FULL_TURN),) * 3
-        joints = [
-            [f"{joint} [rad]", low, high, 0.01]
-            for joint, (low, high) in zip(arm.joints, ends, strict=True)
-        ]
+    joints = [[f"{name} [rad]", *ends, 0.01] for name, ends in list_joints(loaded).items()]
+    if joints:
         parts.append({"title": "Arm", "sliders": joints})
     return {"rover": loaded.name, "parts": parts}
 

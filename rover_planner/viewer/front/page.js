@@ -7,6 +7,7 @@ const chosen = { tab: "Drive", lane: "", link: "", program: "", dragged: null };
 const at = (id) => document.getElementById(id);
 const SVG = "http://www.w3.org/2000/svg";
 const COLOURS = { rear: "#0072b2", middle: "#d55e00", front: "#00795a" };
+const PRESS = 10000; // [ms] for which a press lasts at most
 const SETTLE = 500; // [ms] after which a box shows the program's value, also if its own was refused
 const CLASSES = [["little", "to 50 %"], ["half", "to 80 %"], ["near", "to 100 %"],
   ["broken", "broken"], ["unasked", "not asked"]];
@@ -35,6 +36,7 @@ const button = (words, question, attributes = {}) =>
 
 let socket = null;
 let heard = 0;
+let held = null; // parts that wait while something is pressed: drawn anew, it would lose the click
 
 function ask(question) {
   if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(question));
@@ -53,6 +55,7 @@ function showLost(is) {
 }
 
 function take(parts) {
+  if (held) { Object.assign(held, parts); return; }
   Object.assign(state, parts);
   if ("program" in parts) greet(parts.program);
   for (const name of Object.keys(parts)) if (DRAW[name]) DRAW[name](parts[name]);
@@ -308,13 +311,14 @@ function drawCurves() {
 function plot(curve, write, limit, old) {
   const known = [...curve.y.flat(), ...(old ? old.y.flat() : [])].filter((value) => value !== null);
   const top = Math.min(Math.max(limit ? 1.2 : 0, ...known, 1e-9), limit ? 3 : Infinity);
+  const down = (value) => 100 * (1 - Math.min(value, top) / (1.04 * top)); // a line at the top is seen
   const box = draw("svg", { viewBox: "0 0 1000 100", preserveAspectRatio: "none" });
   const end = state.limits.end || 1;
   const line = (x, y, attributes) => {
     let path = "", pen = "M";
     x.forEach((distance, k) => {
       if (y[k] === null) { pen = "M"; return; }
-      path += `${pen}${(1000 * distance / end).toFixed(1)} ${(100 * (1 - Math.min(y[k], top) / top)).toFixed(2)}`;
+      path += `${pen}${(1000 * distance / end).toFixed(1)} ${down(y[k]).toFixed(2)}`;
       pen = "L";
     });
     if (x.length === 1) path += "h1000";
@@ -331,7 +335,7 @@ function plot(curve, write, limit, old) {
     ticks.push([limit, write(limit)]);
   }
   return make("div", { class: "plot", onclick: goTo }, box,
-    ...ticks.map(([value, words]) => make("span", { class: "tick", style: `top:${100 * (1 - value / top)}%` }, words)),
+    ...ticks.map(([value, words]) => make("span", { class: "tick", style: `top:${down(value)}%` }, words)),
     make("span", { class: "end" }, `${(state.limits.end || 0).toFixed(2)} m`), make("div", { class: "cursor" }));
 }
 
@@ -459,6 +463,17 @@ document.addEventListener("keydown", (event) => {
   target.blur();
   ask(question);
 });
+function release() {
+  const parts = held;
+  held = null;
+  if (parts) take(parts);
+}
+document.addEventListener("pointerdown", (event) => {
+  if (!event.target.closest("button, [tabindex], tbody")) return;
+  held = held || {};
+  setTimeout(release, PRESS);
+});
+for (const end of ["pointerup", "pointercancel"]) document.addEventListener(end, () => setTimeout(release));
 document.addEventListener("click", (event) => {
   if (event.detail > 0) event.target.closest("button")?.blur(); // pressed with the pointer
 });

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The base of every page: its channel, viser's scene, and the one thread that changes them."""
 
-import math
 import socket
 import threading
 import time
@@ -31,6 +30,8 @@ from rover_planner.viewer.state.session import REFUSALS
 
 PERIOD = 0.04
 """Time between two pictures [s]."""
+RETRY = 2.0
+"""Time from an error in a picture to the next one without a request [s]."""
 RESTART = 1.0
 """Time until a stopped page starts again [s]."""
 FOLLOW, STAY = "Follow", "Stay"
@@ -55,12 +56,9 @@ class PageBase(ABC):
     """A served page. Callbacks of browsers only add requests for the page's own thread.
 
     No error ends that thread. The page shows an error in a request and takes the next request. An
-    error in a picture stops the pictures until the next request, or for `retry_after` [s]. After
-    any other error the page says that it has stopped and why, and starts again by itself.
+    error in a picture stops the pictures until the next request, or for RETRY. After any other
+    error the page says that it has stopped and why, and starts again by itself.
     """
-
-    retry_after = math.inf
-    """Time from an error in a picture to the next picture without a request [s]."""
 
     def __init__(self, rover: Rover, terrain: Terrain, host: str, port: int):
         """Start the servers; `start` starts the thread.
@@ -286,7 +284,7 @@ class PageBase(ABC):
         if self.drawings.waiting and now < self._due:
             return
         passed, self._last, self._due = now - self._last, now, now + PERIOD
-        if self._stopped_at is None or now - self._stopped_at > self.retry_after:
+        if self._stopped_at is None or now - self._stopped_at > RETRY:
             self._draw_picture(passed)
 
     def _fulfil(self, request: Action) -> None:
@@ -302,7 +300,7 @@ class PageBase(ABC):
         self._stopped_at = None
 
     def _draw_picture(self, passed: float) -> None:
-        """Draw the next picture; after an error no more, for the same would fail again."""
+        """Draw the next picture; after an error none for a while, as the same may fail again."""
         with self.server.atomic():  # one message to wake the server for all that is sent
             drawn = self.errors.run("drawing stopped", lambda: self.advance(passed))
         self._stopped_at = None if drawn else time.monotonic()

@@ -24,8 +24,6 @@ BOARD_PERIOD = 0.2
 """Time between two updates of the board [s]."""
 GROUND_PERIOD = 2.0
 """Shortest time between two pictures of the ground [s]."""
-RETRY = 2.0
-"""Time from an error in a picture to the next one, which shows newer data [s]."""
 ARM_STEP = 0.01
 """Smallest turn of the arm that is drawn [rad]."""
 FORCES = (
@@ -44,8 +42,6 @@ AHEAD = np.array([4.0, 0.0])
 
 class LivePage(PageBase):
     """Shows the data of a listener; a click on the ground asks the server for a plan."""
-
-    retry_after = RETRY
 
     def __init__(
         self,

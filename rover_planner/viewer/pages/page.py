@@ -29,6 +29,7 @@ from rover_planner.viewer.documents.rover import (
     describe_changes,
     describe_sliders,
     describe_values,
+    list_joints,
     list_numbers,
 )
 from rover_planner.viewer.documents.verdict import Work, describe_verdict
@@ -196,9 +197,10 @@ class Page(PageBase):
 
     def _change_value(self, label: str, number: float) -> None:
         """Change a number of the rover, or turn a joint, by the label of its slider."""
-        joint = label.removesuffix(" [rad]")
-        if joint in self.session.wanted.arm:
-            self.session.change_arm(joint, number)
+        joint, joints = label.removesuffix(" [rad]"), list_joints(self.session.wanted.loaded)
+        if joint in joints:
+            low, high = joints[joint]
+            self.session.change_arm(joint, min(max(number, low), high))
             return
         known = {one.label: one for one in list_numbers(self.session.wanted.loaded)}
         if label not in known:
@@ -478,7 +480,7 @@ class Page(PageBase):
             return state
         if abs(at - failure.time) > AT_FAILURE:
             return state
-        return replace(failure.state.change(energy=state.energy), spin=state.spin)
+        return replace(failure.state, spin=state.spin)
 
 
 def _differ_in_size(one: Rover, other: Rover) -> bool:

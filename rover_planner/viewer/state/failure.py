@@ -120,10 +120,14 @@ def find_failure(
 
 
 def _state_at(rover: Rover, rows: AskedPoses, at: int) -> RoverState:
-    """Return the state at a row at which the rover settles, with unturned wheels."""
-    here = rows.prediction.select([at])
-    here = here.change(distance=rows.distance[[at]], time=rows.time[[at]])
-    return RoverState(rover, here, np.zeros(6))
+    """Return the state at a row at which the rover settles, with unturned wheels.
+
+    Between waypoints it has the energy of the last one.
+    """
+    here, spent = rows.prediction.select([at]), rows.prediction.energy[: at + 1]
+    spent = spent[~rows.is_between[: at + 1]]
+    driven = {"distance": rows.distance[at], "time": rows.time[at], "energy": spent[-1]}
+    return RoverState(rover, here, np.zeros(6)).change(**driven)
 
 
 def level_state(rover: Rover, terrain: Terrain, rows: AskedPoses, at: int) -> RoverState:

@@ -4,8 +4,9 @@
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
+from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.advice.advise import Advice, grow_advice
-from rover_planner.advice.case import ACCEPTED_CHANCE, Case
+from rover_planner.advice.case import Case
 from rover_planner.advice.remedy import Remedy
 from rover_planner.viewer.state.background_work import BackgroundWork
 from rover_planner.viewer.state.scenario import Judged, Scenario

@@ -7,8 +7,9 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped
 
 from msg_adapters.paths import path_to_poses, poses_path, stamped_pose
-from rover_planner.nodes.nav2_services import NO_VALID_PATH, PathComputation, PathValidity
+from rover_planner.nodes.nav2_services import PathComputation, PathValidity
 from support.grounds import make_terrain, wall_at, waves
+from support.project.nav2_jazzy import COMPUTE_PATH_TO_POSE
 from support.waiting import wait_until
 
 
@@ -66,8 +67,11 @@ class GoalHandle:
 
 def compute(server, start, goal):
     """Hand a goal to the handlers of the action, as rclpy would."""
-    result = SimpleNamespace
-    computation = PathComputation(server.desk, server.read_question, server.publish, result)
+
+    def make_result():
+        return SimpleNamespace(**COMPUTE_PATH_TO_POSE)
+
+    computation = PathComputation(server.desk, server.read_question, server.publish, make_result)
     handle = GoalHandle(computation, start, goal)
     computation.take(handle)
     wait_until(lambda: handle.ends, "the end of the goal")
@@ -78,9 +82,11 @@ def test_a_path_to_a_pose_is_the_plan_of_can_traverse_and_a_goal_without_one_has
     start_server, client, lasting
 ):
     server, start, goal = start_server(planner="fan"), (-1.0, 0.0, 0.0), (1.0, 0.2, 0.0)
-    assert compute(server, start, goal).result.error_code == 201  # no map
+    assert compute(server, start, goal).result.error_code == 200  # no map
     server.service.take_terrain(make_terrain(waves))
-    assert compute(server, None, goal).result.error_code == 201  # nobody knows where it is
+    assert compute(server, None, goal).result.error_code == 200  # nobody knows where it is
+    assert compute(server, start, (99.0, 0.0, 0.0)).result.error_code == 204
+    assert compute(server, (99.0, 0.0, 0.0), goal).result.error_code == 203
     plan = path_to_poses(client.can_traverse(start, goal), "map")
     handle = compute(server, start, goal)
     assert handle.ends == ["succeeded"] and handle.result.error_code == 0
@@ -91,5 +97,5 @@ def test_a_path_to_a_pose_is_the_plan_of_can_traverse_and_a_goal_without_one_has
     np.testing.assert_allclose(path_to_poses(here.result.path, "map"), plan, atol=1e-9)
     server.service.take_terrain(make_terrain(wall_at(0.5)))
     handle = compute(server, start, (1.5, 0.0, 0.0))
-    assert handle.ends == ["aborted"] and handle.result.error_code == NO_VALID_PATH
+    assert handle.ends == ["aborted"] and handle.result.error_code == 208
     assert handle.result.path.poses == []
