@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drives of all programs on rocks slicker than the planner was told, with learning or without.
 
-Run from the repository: python -m benchmarks.learned_drives FOLDER [--learn off|use] [--slope DEG]
+Run from the repository: python -m benchmarks.learned_drives FOLDER [--learn off|use]
 
 Simulator (MuJoCo, friction 0.45), server and controller (told 0.8) are those of
 simulation.launch.py, each a process; a mission planner drives to a goal, and with `use` a ground
@@ -12,7 +12,6 @@ is there is printed. It needs the extra `bench`.
 
 import json
 import signal
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -39,10 +38,8 @@ from support.waiting import wait_until
 
 FRICTION = 0.45
 """Friction of the ground; rover, planner and controller are told 0.8."""
-SIZE, ROCK_COVER = 12.0, 0.05
-"""Size of a field [m], and its cover by rocks."""
-ROUGHNESS = {False: 0.1, True: 0.05}
-"""RMS height difference of the relief over 1 m, on level fields and on slopes [m]."""
+SIZE, ROUGHNESS, ROCK_COVER = 12.0, 0.1, 0.05
+"""Size of a field [m], RMS height difference of its relief over 1 m [m], its cover by rocks."""
 DISTANCE = (2.5, 3.5)
 """Distances of goals [m]."""
 SPEED = 0.08
@@ -103,25 +100,16 @@ def count_stuck(rows: np.ndarray) -> int:
     return count
 
 
-def draw_drive(number: int, slope: float) -> tuple[Terrain, np.ndarray, np.ndarray]:
-    """Return a field, and a start and a goal (3,) where the told rover can stand.
-
-    The field rises along x by a slope [deg], and goals on a slope are up it.
-    """
+def draw_drive(number: int) -> tuple[Terrain, np.ndarray, np.ndarray]:
+    """Return a field, and a start and a goal (3,) where the told rover can stand."""
     field = make_mars_terrain(
-        1 + number // 5,
-        SIZE,
-        roughness=ROUGHNESS[slope > 0.0],
-        rock_cover=ROCK_COVER,
-        crater_density=0.0,
+        1 + number // 5, SIZE, roughness=ROUGHNESS, rock_cover=ROCK_COVER, crater_density=0.0
     )
-    x = np.linspace(*field.bounds[:2], field.elevation.shape[1])
-    field = replace(field, elevation=field.elevation + np.tan(np.radians(slope)) * x)
     rng, rover = np.random.default_rng(number), load_rover("lsr1")
     while True:
         most = 0.5 * SIZE - 1.0
         x, y = rng.uniform(-most, most, 2)
-        yaw, far = rng.uniform(-1.0, 1.0) * (1.0 if slope else np.pi), rng.uniform(*DISTANCE)
+        yaw, far = rng.uniform(-np.pi, np.pi), rng.uniform(*DISTANCE)
         start = np.array([x, y, yaw])
         goal = start + far * np.array([np.cos(yaw), np.sin(yaw), 0.0])
         if np.abs(goal[:2]).max() < most and all(
@@ -130,9 +118,9 @@ def draw_drive(number: int, slope: float) -> tuple[Terrain, np.ndarray, np.ndarr
             return field, start, goal
 
 
-def drive(number: int, learn: str, slope: float) -> dict[str, Any]:
+def drive(number: int, learn: str) -> dict[str, Any]:
     """Drive once; return what became of it."""
-    field, start, goal = draw_drive(number, slope)
+    field, start, goal = draw_drive(number)
     with open_nodes() as nodes:
         file = nodes.folder / "field.npz"
         save_terrain(file, field)
@@ -227,9 +215,6 @@ def main(
     folder: Annotated[Path, typer.Argument(help="Keeps a line per drive.")],
     drives: Annotated[int, typer.Option(help="Number of drives.")] = 20,
     learn: Annotated[str, typer.Option(help="off or use; empty only prints.")] = "",
-    slope: Annotated[
-        float, typer.Option(help="Slope of the field in degrees, up to goals.")
-    ] = 0.0,
 ) -> None:
     """Drive, and print what became of all drives."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # its programs end with it
@@ -237,7 +222,7 @@ def main(
     file = folder / f"{learn}.jsonl"
     done = {one["drive"] for one in read_drives(file)} if learn else set(range(drives))
     for number in sorted(set(range(drives)) - done):
-        result = drive(number, learn, slope)
+        result = drive(number, learn)
         with file.open("a") as lines:
             lines.write(json.dumps(result) + "\n")
         print(json.dumps(result), flush=True)

@@ -53,7 +53,7 @@ from support.waiting import wait_until
 START_TIME = 300.0
 """Longest wait for the start of all programs [s]."""
 FLIGHT = 0.1
-"""Age of a stop from which no torque is on its way any more [s]."""
+"""Time for which a controller that comes to rest may still send torques [s]."""
 PATIENCE = 10.0
 """Longest wait for an answer [s]."""
 REACH = 3.0
@@ -75,8 +75,7 @@ class Ear(Node):
         super().__init__("ear", context=ros.context)
         self.pose = np.full(3, np.nan)
         self.faults: Counter[str] = Counter()
-        self.torques_at_rest = 0
-        self._rests_since, self._fault = np.inf, ""
+        self.rest, self._fault = RestWatch(), ""
         for kind, topic, hear, qos in (
             (Odometry, "odometry", self._hear_odometry, sensor_qos()),
             (String, "traction_controller/state", self._hear_state, latched_qos()),
@@ -88,12 +87,11 @@ class Ear(Node):
     def _hear_odometry(self, odometry: Odometry) -> None:
         self.pose = odometry_to_pose(odometry, "map")[0][[0, 1, 3]]
 
-    def _hear_state(self, state: String) -> None:
-        self._rests_since = np.inf if state.data == "driving" else time.monotonic()
+    def _hear_state(self, state: String, about: dict[str, int]) -> None:
+        self.rest.take(about["source_timestamp"] / 1e9, state=state.data)
 
-    def _hear_torques(self, message: Float64MultiArray) -> None:
-        rests = time.monotonic() - self._rests_since > FLIGHT
-        self.torques_at_rest += rests and any(message.data)
+    def _hear_torques(self, message: Float64MultiArray, about: dict[str, int]) -> None:
+        self.rest.take(about["source_timestamp"] / 1e9, turns=any(message.data))
 
     def _hear_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -101,6 +99,42 @@ class Ear(Node):
                 fault = without_numbers(status.message) if status.level == b"\2" else ""
                 self.faults[fault] += bool(fault) and fault != self._fault
                 self._fault = fault
+
+
+class RestWatch:
+    """Counts the torques that a controller sends while it is to rest, by its own stamps.
+
+    An update sends its torques before a new state, so the first torques of a drive are none.
+    """
+
+    def __init__(self) -> None:
+        self._count, self._sent = 0, list[tuple[float, str, bool]]()
+        self._last, self._since = 0.0, np.inf
+
+    @property
+    def count(self) -> int:
+        """Torques until now."""
+        self._judge()
+        return self._count
+
+    def take(self, sent: float, state: str = "", turns: bool = False) -> None:
+        """Take a state, or whether torques turn a wheel, sent at a time [s]."""
+        if abs(sent - self._last) > 0.5 * max(STEPS):  # the clock was stepped
+            self._judge()
+            self._since = -np.inf if np.isfinite(self._since) else self._since
+        self._last = sent
+        self._sent.append((sent, state, turns))
+
+    def _judge(self) -> None:
+        """Count in the order of sending, which is not that of arrival."""
+        doubt = False
+        for at, state, turns in sorted(self._sent):
+            if state:
+                self._since, doubt = np.inf if state == "driving" else at, False
+            elif at - self._since > FLIGHT:
+                self._count += doubt
+                doubt = turns
+        self._sent.clear()
 
 
 def without_numbers(text: str) -> str:
@@ -231,7 +265,7 @@ class Soak:
             "drives": dict(self._drives),
             "disturbances": dict(self._events),
             "faults": {cause: count for cause, count in self._ear.faults.items() if count},
-            "torques at rest": self._ear.torques_at_rest,
+            "torques at rest": self._ear.rest.count,
             "memory at start [MB]": memory,
             "memory at end [MB]": programs.memory(),
             "answer at start [ms]": latency,

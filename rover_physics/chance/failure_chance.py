@@ -7,7 +7,7 @@ others are evaluated anew in each sample, with the contacts that they have there
 between waypoints are those of the prediction.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +67,8 @@ def find_failure_chance(
 ) -> FailureChance:
     """Return the chance that a swept path fails; 1 where the rover does not settle.
 
+    A control margin is not asked of samples: it is left for what they hold.
+
     Args:
         model: The model of the sweep.
         swept: All of the path.
@@ -75,7 +77,9 @@ def find_failure_chance(
             left count as if they passed.
     """
     n, first = len(swept.prediction.poses), FIRST if on_path else SAMPLES
-    rows = _all_rows(swept)
+    rows, records = _all_rows(swept), model.records[-1:].copy()
+    records["settings"]["control_margin"] = 0.0
+    model = replace(model, records=records)
     settled = rows.results["status"] == PoseStatus.SETTLED
     samples = sort_by_strength(draw_samples(model.rover.uncertainty, SAMPLES))
     if enough * SAMPLES < FIRST:

@@ -10,7 +10,6 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import OccupancyGrid, Path
 from numpy.typing import NDArray
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
@@ -45,8 +44,6 @@ WHEEL_TOPICS = {
     "torque_saturation": "torque_saturation",
 }
 """Topics with one value per waypoint and wheel, and the field of the prediction on each."""
-LOOK_OUT = 0.2
-"""Period of the check for new subscribers [s]."""
 MAX_STOCK = 2000
 """Number of pose and point messages that are kept for reuse."""
 SET_BACK = 1_000_000_000
@@ -94,8 +91,6 @@ class ResultTopics:
         self._topics = {
             name: LazyPublisher(node, kind, f"~/{name}") for name, kind in RESULT_KINDS.items()
         }
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        node.create_timer(LOOK_OUT, self._serve_late_comers, clock=steady)
 
     def take(
         self,
@@ -163,7 +158,8 @@ class ResultTopics:
         else:
             self._node.get_logger().warning(text)
 
-    def _serve_late_comers(self) -> None:
+    def serve_late_comers(self) -> None:
+        """Publish the last results to new subscribers."""
         awaited = [topic for topic in self._topics.values() if topic.is_awaited]
         if awaited:
             self._deferred_work.do(*(topic.catch_up for topic in awaited))

@@ -195,8 +195,11 @@ class TraverseServer(Node):
         self._hazards.apply(parameters)
 
     def _beat(self) -> None:
+        """Do all that is done ten times a second; each timer of its own would cost a wake-up."""
         self._heard.poll()
         self.watch.beat()
+        self._results.serve_late_comers()
+        self._hazards.catch_up()
 
     def _hear_of_map(self, error: str) -> None:
         """Note why a map was refused, or have the watch look at a new one at once."""

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from msg_adapters.results.grids import classes_to_grid
@@ -30,8 +29,6 @@ from rover_planner.ros.logs import TransitionLog
 
 PERIOD = 0.5
 """Time between two looks for a new map [s]; comparing two large maps takes a tenth of it."""
-CATCH_UP = 0.2
-"""Period of the check for new subscribers [s]."""
 SLICE = 0.2
 """Time after which the thread looks for a newer map, and for questions [s]."""
 SHOW_PERIOD = 1.0
@@ -70,8 +67,6 @@ class HazardTopics:
         self._done: tuple[Terrain, ServiceSettings] | None = None
         self._topics: dict[str, LazyPublisher] = {}
         node.create_service(GetMap, "~/get_hazard_map", self._get)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        node.create_timer(CATCH_UP, self._catch_up, clock=steady)
         self._withdrawals = 0
         self._enabled = threading.Event()
         self._ending = threading.Event()
@@ -132,7 +127,8 @@ class HazardTopics:
         self._node.get_logger().warning(f"get_hazard_map: an empty grid, {missing}")
         return response
 
-    def _catch_up(self) -> None:
+    def catch_up(self) -> None:
+        """Publish the grids to new subscribers."""
         for topic in list(self._topics.values()):
             topic.catch_up()
 

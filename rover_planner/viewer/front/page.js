@@ -8,6 +8,7 @@ const at = (id) => document.getElementById(id);
 const SVG = "http://www.w3.org/2000/svg";
 const COLOURS = { rear: "#0072b2", middle: "#d55e00", front: "#00795a" };
 const PRESS = 10000; // [ms] for which a press lasts at most
+const ROOMY = 900; // [px] of height from which the board begins with all its numbers
 const SETTLE = 500; // [ms] after which a box shows the program's value, also if its own was refused
 const CLASSES = [["little", "to 50 %"], ["half", "to 80 %"], ["near", "to 100 %"],
   ["broken", "broken"], ["unasked", "not asked"]];
@@ -363,7 +364,7 @@ function drawBoard(board) {
     make("div", { class: "quiet" }, "from above, the front at the top; bars: use of the limit, which is the line"),
     make("div", { class: "wheels" }, ...wheels),
     make("div", { class: "numbers" }, ...Object.entries(board.numbers).map(([name, value]) => make("div", {}, make("span", {}, name), make("b", {}, value)))),
-    make("details", { open: document.body.className === "sent" || at("board").querySelector("details")?.open },
+    make("details", { open: document.body.className === "sent" || (at("board").querySelector("details")?.open ?? innerHeight > ROOMY) },
       make("summary", {}, "all numbers of the wheels"),
       make("table", { id: "wheels" },
         make("tr", {}, make("th"), ...board.wheels.map((wheel) => make("th", {}, wheel.name))),

@@ -60,6 +60,16 @@ def test_a_path_that_passes_in_the_best_sample_alone_does_not_fail_for_sure():
     assert chance_on(ground, weak).failure_chance == 1.0 - 1.0 / SAMPLES
 
 
+def test_a_control_margin_is_not_asked_of_samples():
+    rover, ground = rover_with(friction=0.1), uphill(0.42)
+    options = SweepOptions("optimal", friction=FRICTION)
+    told, kept = (
+        judge_path(rover, ground, straight(5), one, accepted_chance=1.0)[1]
+        for one in (options, replace(options, control_margin=0.1))
+    )
+    assert kept.traversable and 0.0 < kept.failure_chance == told.failure_chance < 0.5
+
+
 @pytest.mark.parametrize("name", ["max_torque", "model"])
 def test_the_torque_limit_counts_like_friction(name):
     rover, ground = rover_with(**{name: 0.1}), uphill(0.2)
