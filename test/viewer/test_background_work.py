@@ -13,7 +13,7 @@ from rover_physics.names import TORQUE_POLICIES
 from rover_physics.terrain.grid import load_terrain
 from rover_physics.traversability.judge import judge_path
 from rover_planner.command.view import choose_ends
-from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
+from rover_planner.planning.path_query import PathQueryOptions, answer_path_query, check_path
 from rover_planner.viewer.state.background_work import BackgroundWork, Progress
 from rover_planner.viewer.state.judging import PATH, JudgeRequest, judge_request
 from rover_planner.viewer.state.scenario import Scenario
@@ -74,9 +74,14 @@ def test_what_is_judged_in_the_background_is_what_the_library_says(judge, spirit
     assert judge.has_news
     first, *_, last = judge.take()
     assert woken and judge.take() == [] and not judge.has_news
-    answer = answer_path_query(LSR1, spirit.terrain, spirit.start, spirit.goal, spirit.options)
+    ground, options = spirit.terrain, spirit.options
+    answer = answer_path_query(LSR1, ground, spirit.start, spirit.goal, options)
+    verdicts = [
+        check_path(LSR1, ground, candidate.poses, options, stop_at_failure=True).verdict
+        for candidate in answer.candidates
+    ]
     for found in (first.result, last.result):
-        assert [path.verdict for path in found.paths] == [c.verdict for c in answer.candidates]
+        assert [path.verdict for path in found.paths] == verdicts
         assert found.best == answer.best and found.index == answer.nearest
     assert all(one.is_old for one in first.result.by_policy[1:])
     assert [one.policy for one in last.result.by_policy] == list(TORQUE_POLICIES)
