@@ -33,9 +33,6 @@ from rover_physics.terrain.grid import Terrain
 
 SAMPLES = 32
 """Number of samples."""
-FIRST = 16
-"""Number of samples, those with the most friction and torque, after which a path that has failed
-in all of them fails for sure."""
 FAR = 0.5
 """Use of a limit below which no sample breaks it: it would have to double. Less where friction or
 torque of a sample may be less than half."""
@@ -76,13 +73,13 @@ def find_failure_chance(
         enough: Chance above which it need not be known: the samples end there, and those that are
             left count as if they passed.
     """
-    n, first = len(swept.prediction.poses), FIRST if on_path else SAMPLES
+    n = len(swept.prediction.poses)
     rows, records = _all_rows(swept), model.records[-1:].copy()
     records["settings"]["control_margin"] = 0.0
     model = replace(model, records=records)
     settled = rows.results["status"] == PoseStatus.SETTLED
     samples = sort_by_strength(draw_samples(model.rover.uncertainty, SAMPLES))
-    if enough * SAMPLES < FIRST:
+    if enough < 0.5:
         samples = samples[::-1]  # those with the least friction and torque refuse first
     worst_two = worst_of(samples)
     far = min(FAR, NEAR * min(worst_two[0].friction[0], worst_two[0].torque))
@@ -111,11 +108,7 @@ def find_failure_chance(
         waypoints = rows.waypoint[asked[fails]]
         failed[k, waypoints] = True
         np.add.at(counts, waypoints, broken[fails])
-        count = int(failed.any(axis=1).sum())
-        if count > enough * SAMPLES:
-            break
-        if count == k + 1 == first:
-            failed = failed[:first]
+        if failed.any(axis=1).sum() > enough * SAMPLES:
             break
     at = failed.mean(axis=0)
     place = int(at.argmax())

@@ -60,6 +60,16 @@ def test_a_path_that_passes_in_the_best_sample_alone_does_not_fail_for_sure():
     assert chance_on(ground, weak).failure_chance == 1.0 - 1.0 / SAMPLES
 
 
+def test_what_fails_for_sure_further_on_changes_no_chance_before_it():
+    ground, rover = uphill(0.3), rover_with(friction=0.1)
+    x = ground.origin[0] + ground.resolution * np.arange(ground.elevation.shape[1])
+    friction = np.broadcast_to(np.where(x > 0.45, 0.05, FRICTION), ground.elevation.shape)
+    layered = replace(ground, friction=friction)
+    found = chance_on(layered, rover, n=41)
+    assert found.failure_chance == 1.0
+    assert found.failure_chance_at[0] == chance_on(ground, rover, n=1).failure_chance > 0.1
+
+
 def test_a_control_margin_is_not_asked_of_samples():
     rover, ground = rover_with(friction=0.1), uphill(0.42)
     options = SweepOptions("optimal", friction=FRICTION)
