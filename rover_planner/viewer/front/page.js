@@ -7,7 +7,7 @@ const chosen = { tab: "Drive", lane: "", link: "", program: "", dragged: null };
 const at = (id) => document.getElementById(id);
 const SVG = "http://www.w3.org/2000/svg";
 const COLOURS = { rear: "#0072b2", middle: "#d55e00", front: "#00795a" };
-const PRESS = 10000; // [ms] for which a press lasts at most
+const PRESS = 5000; // [ms] for which a press lasts at most
 const ROOMY = 900; // [px] of height from which the board begins with all its numbers
 const SETTLE = 500; // [ms] after which a box shows the program's value, also if its own was refused
 const CLASSES = [["little", "to 50 %"], ["half", "to 80 %"], ["near", "to 100 %"],
@@ -38,6 +38,7 @@ const button = (words, question, attributes = {}) =>
 let socket = null;
 let heard = 0;
 let held = null; // parts that wait while something is pressed: drawn anew, it would lose the click
+let pressed = 0; // timer that ends the press
 
 function ask(question) {
   if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(question));
@@ -472,7 +473,8 @@ function release() {
 document.addEventListener("pointerdown", (event) => {
   if (!event.target.closest("button, [tabindex], tbody")) return;
   held = held || {};
-  setTimeout(release, PRESS);
+  clearTimeout(pressed); // that of an earlier press
+  pressed = setTimeout(release, PRESS);
 });
 for (const end of ["pointerup", "pointercancel"]) document.addEventListener(end, () => setTimeout(release));
 document.addEventListener("click", (event) => {
