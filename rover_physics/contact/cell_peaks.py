@@ -3,10 +3,9 @@
 
 import numpy as np
 
-from rover_physics.contact.contact_record import NOTICED
-from rover_physics.contact.intrusion import ROUNDING, is_below, is_beside, take_point
+from rover_physics.contact.intrusion import ROUNDING, is_below, take_point
+from rover_physics.contact.rim_search import STEEPEST
 from rover_physics.numerics.kernels import kernel
-from rover_physics.terrain.ground import elevation_of
 
 INTERIOR_STEPS = 8
 """Largest number of steps of the search inside a cell."""
@@ -14,62 +13,10 @@ FLAT_RATE = 3e-3
 """Change of the intrusion along the heading at which that search stops."""
 LEAST_CHANGE = 0.3
 """Lower bound of the derivative in that search, where the ground bends almost like the wheel."""
-STEEPEST = 0.9999
-"""Share of the radius up to which the wheel's slope is finite enough for Newton's method."""
-GENTLE = 0.8
-"""Share of the radius up to which the wheel is close to a parabola."""
 
 
 @kernel
-def look_into_cells(ground, search, i, j):
-    """Search the four cells around vertex (i, j) where they are twisted so that it may pay.
-
-    A cell is searched at the vertex that comes nearest, by the wheel's parabola.
-    """
-    ex, ey, scale = search.ahead_x, search.ahead_y, ground.inverse_resolution
-    here = elevation_of(ground, i, j)
-    x, y = j - search.x, i - search.y
-    s, t, curl = x * ex + y * ey, y * ex - x * ey, 0.5 / (search.radius * search.cosine)
-    gentle = abs(s) < GENTLE * search.radius
-    for cell in range(4):
-        row, column = i - cell // 2, j - cell % 2
-        if row < 0 or column < 0 or row > ground.rows - 2 or column > ground.columns - 2:
-            continue
-        di, dj = 1 - 2 * (cell // 2), 1 - 2 * (cell % 2)
-        along, aside = di * ex, -dj * ey
-        if is_beside(
-            search, t + min(along, 0.0) + min(aside, 0.0), t + max(along, 0.0) + max(aside, 0.0)
-        ):
-            continue
-        beside = (elevation_of(ground, i, j + dj) - here) * scale
-        above = (elevation_of(ground, i + di, j) - here) * scale
-        across = (elevation_of(ground, i + di, j + dj) - here) * scale
-        twist = (across - beside - above) * (di * dj)
-        # Along the axle the ground bends by -2 twist ex ey; the gain over the edges is a quarter.
-        if not twist * ex * ey * 0.5 > NOTICED * search.radius:
-            continue
-        s_beside, s_above = s + dj * ex, s + di * ey
-        s_across = s_beside + di * ey
-        beside += search.tangent * dj * ey
-        above -= search.tangent * di * ex
-        across += search.tangent * (dj * ey - di * ex)
-        bend = curl * s * s
-        if gentle and (
-            beside - curl * s_beside * s_beside > -bend
-            or above - curl * s_above * s_above > -bend
-            or across - curl * s_across * s_across > -bend
-        ):
-            continue
-        a = elevation_of(ground, row, column)
-        b = (elevation_of(ground, row, column + 1) - a) * scale
-        c = (elevation_of(ground, row + 1, column) - a) * scale
-        dx, dy = column - search.x, row - search.y
-        corner = dx * ex + dy * ey, dy * ex - dx * ey
-        _look_into_cell(search, corner, ((a - search.z) * scale, b, c, twist))
-
-
-@kernel
-def _look_into_cell(search, corner, shape):
+def look_into_cell(search, corner, heading, shape):
     """Search a twisted cell for a peak of the intrusion in its inside.
 
     Across the wheel the ground bends down, so for each s there is a best t in closed form. What is
@@ -77,11 +24,12 @@ def _look_into_cell(search, corner, shape):
 
     Args:
         search: CELL_SEARCH.
-        corner: s and t of the cell's corner [cells].
+        corner: s and t of a corner of the cell [cells].
+        heading: The heading along its sides u and v, which begin at the corner, u right of v.
         shape: (a, b, c, d) of the ground a + b u + c v + d u v above the wheel's centre, u and v
             along the cell's sides from the corner [cells].
     """
-    ex, ey, R, inverse = search.ahead_x, search.ahead_y, search.radius, 1.0 / search.cosine
+    (ex, ey), R, inverse = heading, search.radius, 1.0 / search.cosine
     s0, t0 = corner
     a, b, c, d = shape
     sag, skew = d * ex * ey, d * (ex * ex - ey * ey)
@@ -113,15 +61,15 @@ def _look_into_cell(search, corner, shape):
     if level + R * inverse + highest < search.best - ROUNDING:
         return
     if rest > 0.0:
-        _look_on_line(search, (s0, t0), shape, (rise, bend, low, high))
+        _look_on_line(search, corner, heading, shape, (rise, bend, low, high))
         return
     # Only where the wheel bends more than the ground there are peaks: on its steep sides.
     q = (0.5 * R * R * inverse / bend) ** (1.0 / 3.0)
     inflection = np.sqrt(max(R * R - q * q, 0.0))
     if high > inflection:
-        _look_on_line(search, (s0, t0), shape, (rise, bend, max(low, inflection), high))
+        _look_on_line(search, corner, heading, shape, (rise, bend, max(low, inflection), high))
     if low < -inflection:
-        _look_on_line(search, (s0, t0), shape, (rise, bend, low, min(high, -inflection)))
+        _look_on_line(search, corner, heading, shape, (rise, bend, low, min(high, -inflection)))
 
 
 @kernel
@@ -142,17 +90,18 @@ def span_of_peaks(place, ex, ey):
 
 
 @kernel
-def _look_on_line(search, corner, shape, line):
+def _look_on_line(search, corner, heading, shape, line):
     """Find the peak on the line of best t in a cell, and keep it if it is in the cell.
 
     Args:
         search: CELL_SEARCH.
-        corner: As for `_look_into_cell`.
-        shape: As for `_look_into_cell`.
+        corner: As for `look_into_cell`, as are heading and shape.
+        heading: Above.
+        shape: Above.
         line: Slope and half the second derivative of the ground along the line, and the least and
             largest s.
     """
-    ex, ey, R, inverse = search.ahead_x, search.ahead_y, search.radius, 1.0 / search.cosine
+    (ex, ey), R, inverse = heading, search.radius, 1.0 / search.cosine
     s0, t0 = corner
     a, b, c, d = shape
     rise, bend, low, high = line
@@ -181,4 +130,4 @@ def _look_on_line(search, corner, shape, line):
         return
     if is_below(search, s, t0 + aside):
         ground = a + b * u + c * v + d * u * v
-        take_point(search, s, t0 + aside, ground - search.tangent * (t0 + aside))
+        take_point(search, 0, s, t0 + aside, ground - search.tangent * (t0 + aside))

@@ -1,30 +1,31 @@
 # SPDX-License-Identifier: Apache-2.0
 """Search for the highest ground under the whole width of a wheel.
 
-Along the edge of a cell the ground is straight, so the largest intrusion has a closed form. Within
-a cell the intrusion can only be larger if the ground is twisted. So vertices are looked at first,
-then the edges and cells next to those that come near. Where an edge leaves the footprint, it
-crosses a rim. `intrusion.py` explains the terms; lengths are in cells.
+The wheel is nowhere below a parabola along its heading, and a cell bends above its corners by no
+more than an eighth of that. So a cell whose highest corner is too low is left out unseen, and a
+cell or edge is searched from its nearest corner only: where the ground is straight, along an edge,
+the largest intrusion has a closed form; within a cell it can be larger if the ground is twisted,
+or where a rim cuts the cell. `intrusion.py` explains the terms; lengths are in cells.
 """
 
 import numpy as np
 from numba import int64
 
-from rover_physics.contact.cell_peaks import GENTLE, look_into_cells
+from rover_physics.contact.cell_peaks import look_into_cell
+from rover_physics.contact.circle_search import search_circle
+from rover_physics.contact.contact_record import NOTICED
 from rover_physics.contact.intrusion import begin_search, is_below, is_beside, take_point
-from rover_physics.contact.rim_search import LEVEL, RIM_BEND, cross_rim, look_along_rims
-from rover_physics.contact.tracking import keep_contact
+from rover_physics.contact.rim_search import LEVEL, away_from_zero, look_along_rim
+from rover_physics.contact.tracking import keep_contact, take_circle
 from rover_physics.numerics.kernels import kernel
 from rover_physics.status import ContactStatus
-from rover_physics.terrain.ground import elevation_of, is_cell_on_map
+from rover_physics.terrain.ground import elevation_of
 
-BEND = 0.19
-"""Intrusion of an edge above that of its ends, over the curvature of the wheel: 1/8 for a
-parabola, with a margin for a circle."""
-STEEP = 0.64
-"""(s / R)^2 beyond which the wheel's curvature is too large for that estimate."""
-MIN_COSINE = 0.3
-"""Cosine of the contact angle below which no bound is tried."""
+BEND = 0.126
+"""Intrusion in a cell above that of its corners, over the curvature of the wheel's parabola: 1/8,
+with a margin for rounding."""
+STEEP = 0.95
+"""Share of the radius from which on the wheel's parabola bounds the intrusion, not its circle."""
 LEAST_UPRIGHT = 0.1
 """Cosine of the camber below which a wheel lies on its side and is not searched."""
 
@@ -49,15 +50,17 @@ def look_everywhere(model, work, wheel, tops):
     begin_search(model, work, wheel)
     status = _look_at_vertices(model.ground, search, tops)
     if search.found:
-        _take_peak(model.ground, search, contacts, wheel)
-    look_along_rims(model, work, wheel)
+        keep_contact(contacts, wheel)
+        if search.best_rim == 0:
+            _take_peak(model.ground, search, contacts, wheel)
+        else:
+            _take_rim(model, work, wheel)
     return status
 
 
 @kernel
 def _take_peak(ground, search, contacts, wheel):
     """Take the best point between the rims as the contact."""
-    keep_contact(contacts, wheel)
     s, t, radius, cell = search.best_s, search.best_t, search.radius, search.cell
     q = np.sqrt(max(radius * radius - s * s, 0.0))
     contacts.gap[wheel], contacts.inside[wheel] = -search.best * cell, 1
@@ -70,11 +73,22 @@ def _take_peak(ground, search, contacts, wheel):
 
 
 @kernel
+def _take_rim(model, work, wheel):
+    """Take the best point of the rims as the contact, after a search of the rim from there on."""
+    contacts, search = work.contacts, work.cells
+    contacts.across[wheel] = search.best_rim * model.samples.half_width
+    sine = search.best_s / search.radius
+    turn = sine, np.sqrt(1.0 - sine * sine)
+    take_circle(contacts, wheel, search_circle(model, work, (wheel, contacts.across[wheel]), turn))
+
+
+@kernel
 def _look_at_vertices(ground, search, tops):
     """Look at all vertices of cells that may come near, and around those that do."""
     ex, ey, R = search.ahead_x, search.ahead_y, search.radius
     cosine, tangent, scale = search.cosine, search.tangent, ground.inverse_resolution
-    inverse = 1.0 / cosine
+    top = R / cosine + 2.0 * BEND * search.curl
+    curl = search.curl
     lean = search.sine * R
     low_t = -search.half_width + min(lean, 0.0)
     high_t = search.half_width + max(lean, 0.0)
@@ -84,15 +98,16 @@ def _look_at_vertices(ground, search, tops):
     high_s = _find_extent(search, front, tilt, scale)
     if not low_s < high_s:
         return ContactStatus.IN_CONTACT
-    # One cell more on all sides: edges extend beyond the footprint.
-    low_s, high_s, low_t, high_t = low_s - 1.0, high_s + 1.0, low_t - 1.0, high_t + 1.0
+    # A cell more on all sides: cells extend beyond the footprint.
+    more = abs(ex) + abs(ey)
+    low_s, high_s, low_t, high_t = low_s - more, high_s + more, low_t - more, high_t + more
     high_y = max(low_s * ey, high_s * ey) + max(low_t * ex, high_t * ex)
     low_y = min(low_s * ey, high_s * ey) + min(low_t * ex, high_t * ex)
     status = ContactStatus.IN_CONTACT
     first = max(int64(np.ceil(search.y + low_y)), 0)
     last = min(int64(np.floor(search.y + high_y)), ground.rows - 1)
-    slant_x, slant_y = 1.0 / _away_from_zero(ex), 1.0 / _away_from_zero(ey)
-    flat, x, y, z = 1.0 / (R * R), search.x, search.y, search.z
+    slant_x, slant_y = 1.0 / away_from_zero(ex), 1.0 / away_from_zero(ey)
+    x, y, z = search.x, search.y, search.z
     for i in range(first, last + 1):
         dy = i - y
         one, other = (low_s - dy * ey) * slant_x, (high_s - dy * ey) * slant_x
@@ -103,31 +118,11 @@ def _look_at_vertices(ground, search, tops):
             dx = j - x
             s, t = dx * ex + dy * ey, dy * ex - dx * ey
             base = (elevation_of(ground, i, j) - z) * scale - tangent * t
-            if base + _bound_dome(s, R, flat) * inverse > search.best:
+            if base + (top - curl * s * s) > search.best:
                 _look_around(ground, search, (i, j), (s, t, base))
             elif base != base and abs(s) < R and is_below(search, s, t):
                 status = ContactStatus.UNKNOWN_GROUND
     return status
-
-
-@kernel
-def _away_from_zero(part):
-    """Return part of a direction, at least so large that its inverse times a place is finite."""
-    return part if abs(part) > LEVEL else LEVEL
-
-
-@kernel
-def _bound_dome(s, R, flat):
-    """Return an upper bound of sqrt(R^2 - s^2), and of what an edge next to s may add to it.
-
-    `flat` is 1 / R^2. A parabola is above the circle; the polynomial is above the curvature of the
-    circle over that at the bottom.
-    """
-    x = s * s * flat
-    if x < STEEP:
-        return R * (1.0 - 0.5 * x) + BEND * (1.0 + x * (1.5 + 6.5 * x)) / R
-    inward = max(abs(s) - 1.0, 0.0)
-    return R * (1.0 - 0.5 * inward * inward * flat)
 
 
 @kernel
@@ -143,60 +138,86 @@ def _find_extent(search, top, tilt, scale):
 
 @kernel
 def _look_around(ground, search, vertex, there):
-    """Search a vertex (i, j), those of its edges that may pay, and its cells if they are twisted.
+    """Search a vertex (i, j), and the edges and cells around it of which it is the nearest corner.
 
     `there` is s, t and the intrusion of the vertex without the wheel's dome.
     """
     i, j = vertex
     s, t, base = there
-    ex, ey, R = search.ahead_x, search.ahead_y, search.radius
-    scale, inverse = ground.inverse_resolution, 1.0 / search.cosine
+    R, curl, tangent = search.radius, search.curl, search.tangent
     q = np.sqrt(max(R * R - s * s, 0.0))
-    intrusion = base + q * inverse
-    if intrusion > search.best and q > 0.0 and is_below(search, s, t):
-        take_point(search, s, t, base)
-    steep, curl, gentle_s = q < MIN_COSINE * R, 0.5 * inverse / R, GENTLE * R
-    lean = search.sine * q
-    inside = abs(t - lean) <= search.half_width
-    rim_bend = 0.0
-    if not steep:
-        rim_bend = RIM_BEND * R * R / (q * q * q * max(ex * ex, ey * ey)) * inverse
-    fall = 0.0 if steep else s / q * inverse
+    most, fall = base + 2.0 * curl * R * R - curl * s * s, 2.0 * curl * s
+    if abs(s) < STEEP * R:
+        most, fall = base + q / search.cosine, s / (q * search.cosine)
+    if q > 0.0 and is_below(search, s, t):
+        take_point(search, 0, s, t, base)
     here = elevation_of(ground, i, j)
-    for edge in range(4):
-        di, dj = 0, 1
-        along_s, along_t = ex, -ey
-        if edge >= 2:
-            di, dj = 1, 0
-            along_s, along_t = ey, ex
-        if edge % 2 == 1:
-            di, dj, along_s, along_t = -di, -dj, -along_s, -along_t
-        if is_beside(search, t + min(along_t, 0.0), t + max(along_t, 0.0)):
-            continue
-        if not is_cell_on_map(ground, j + dj, i + di):
-            continue
-        rise = (elevation_of(ground, i + di, j + dj) - here) * scale - search.tangent * along_t
-        # The end that comes nearer, by the wheel's parabola, owns the edge.
-        crosses = inside != (abs(t + along_t - lean) <= search.half_width)
-        if crosses and steep:
-            cross_rim(search, (s, t, base), (along_s, along_t, rise))
-        gentle = abs(s) < gentle_s and abs(s + along_s) < gentle_s
-        if gentle and rise - curl * along_s * (2.0 * s + along_s) > 0.0:
-            continue
-        if not steep:
-            # The wheel bends at least as at its bottom, so a parabola is above the intrusion.
-            gain, bend = rise - fall * along_s, along_s * along_s * inverse / R
-            if gain > bend:
-                gain -= 0.5 * bend
-            elif gain > 0.0:
-                gain *= 0.5 * gain / bend
-            most = intrusion + max(gain, 0.0)
-            if crosses and most + rim_bend > search.best:
-                cross_rim(search, (s, t, base), (along_s, along_t, rise))
-            if not most > search.best:
-                continue
-        look_along_edge(search, (s, t, base), (along_s, along_t, rise))
-    look_into_cells(ground, search, i, j)
+    # The sides of a cell: u along (di, dj) and v to its left; the heading along them.
+    di, dj, ex, ey = 0, 1, search.ahead_x, search.ahead_y
+    rise = _rise_to(ground, here, i, j + 1)
+    for _ in range(4):
+        beside = _rise_to(ground, here, i + dj, j - di)
+        twist = _rise_to(ground, here, i + di + dj, j + dj - di) - rise - beside
+        b, c = rise + tangent * ey, beside - tangent * ex
+        if b <= curl * ex * (2.0 * s + ex):
+            gain = _bound_side(b - fall * ex, curl * ex * ex)
+            if most + gain > search.best and not is_beside(
+                search, t - max(ey, 0.0), t - min(ey, 0.0)
+            ):
+                look_along_edge(search, (s, t, base), (ex, -ey, b))
+            if (
+                c <= curl * ey * (2.0 * s + ey)
+                and b + c + twist <= curl * (ex + ey) * (2.0 * s + ex + ey)
+                and most + _bound_cell(curl, (ex, ey), (b - fall * ex, c - fall * ey, twist))
+                > search.best
+            ):
+                _look_at_cell(search, (s, t), (ex, ey), (base, b, c, twist))
+        di, dj, ex, ey, rise = dj, -di, ey, -ex, beside
+
+
+@kernel
+def _look_at_cell(search, corner, heading, shape):
+    """Search the rims in a cell, and its inside if it is twisted; as `look_along_rim` does."""
+    (ex, ey), (a, b, c, d), t = heading, shape, corner[1]
+    low, high = t + min(ex, 0.0) - max(ey, 0.0), t + max(ex, 0.0) - min(ey, 0.0)
+    if is_beside(search, low, high):
+        return
+    for rim in (-1, 1):
+        lean, side = search.sine * search.radius, rim * search.half_width
+        if low < side + max(lean, 0.0) and high > side + min(lean, 0.0):
+            look_along_rim(search, rim, corner, heading, shape)
+    if d * ex * ey * 0.5 > NOTICED * search.radius:
+        tangent = search.tangent
+        ground = a + tangent * t, b - tangent * ey, c + tangent * ex, d
+        look_into_cell(search, corner, heading, ground)
+
+
+@kernel
+def _rise_to(ground, here, i, j):
+    """Return the height of a vertex above `here` [m], in cells; NaN off the map."""
+    if i < 0 or j < 0 or i >= ground.rows or j >= ground.columns:
+        return np.nan
+    return (elevation_of(ground, i, j) - here) * ground.inverse_resolution
+
+
+@kernel
+def _bound_side(slope, bend):
+    """Return the largest value of slope u - bend u^2 for 0 <= u <= 1."""
+    if slope > 2.0 * bend:
+        return slope - bend
+    return 0.25 * slope * slope / bend if slope > 0.0 else 0.0
+
+
+@kernel
+def _bound_cell(curl, heading, rates):
+    """Return a bound of b u + c v + d u v - curl (ex u + ey v)^2 in a cell; `rates` is b, c, d."""
+    (ex, ey), (b, c, d) = heading, rates
+    bend_u, bend_v, bulge = curl * ex * ex, curl * ey * ey, d - 2.0 * curl * ex * ey
+    if bulge <= 0.0:
+        return _bound_side(b, bend_u) + _bound_side(c, bend_v)
+    ahead, aside = b - bend_u, c - bend_v
+    highest = max(max(ahead, aside), max(ahead + aside + bulge, 0.0))
+    return highest + 2.0 * BEND * curl
 
 
 @kernel
@@ -219,5 +240,5 @@ def look_along_edge(search, start, along):
     best_s, best_t = s + share * along_s, t + share * along_t
     if abs(best_s) < R and is_below(search, best_s, best_t):
         if share > 0.0:
-            take_point(search, best_s, best_t, base + share * rise)
+            take_point(search, 0, best_s, best_t, base + share * rise)
         return

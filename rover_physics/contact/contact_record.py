@@ -26,8 +26,6 @@ class SearchScope(IntEnum):
 
 NOTICED = 1e-4
 """Difference of gaps [wheel radii] up to which a contact elsewhere is not taken."""
-CROSSINGS = 8
-"""Places where edges cross rims that are searched; more replace the first ones."""
 KEPT = 4
 """Earlier contacts of a wheel that are looked at again."""
 
@@ -68,13 +66,8 @@ CELL_SEARCH = record_type(
     ("best", float),  # largest intrusion of the ground so far [cells]
     ("best_s", float),  # its place along the heading [cells]
     ("best_t", float),  # its place to the left [cells]
-    ("peak", float, (2,)),  # largest intrusion found on the right and left rim [cells]
-    ("peak_s", float, (2,)),  # its place along the heading [cells]
-    ("peak_q", float, (2,)),  # its distance from the axle, in the wheel's up direction [cells]
-    ("crossings", np.int64),  # number of places where edges cross a rim that may come near
-    ("crossing", float, (CROSSINGS,)),  # intrusions there [cells]
-    ("crossing_s", float, (CROSSINGS,)),  # their places along the heading [cells]
-    ("crossing_rim", np.int64, (CROSSINGS,)),  # -1 on the right rim, 1 on the left one
+    ("best_rim", np.int64),  # -1 on the right rim, 1 on the left one, 0 between them
+    ("curl", float),  # half the least curvature of the wheel along its heading [1/cells]
     ("found", np.int64),  # 1 if the search has found it
 )
 """Work space of `look_everywhere`."""

@@ -33,13 +33,8 @@ def begin_search(model, work, wheel):
     lean = search.sine * search.radius
     search.right = min(lean, 0.0) - search.half_width
     search.left = max(lean, 0.0) + search.half_width
-    search.found = search.crossings = 0
-    contacts = work.contacts
-    search.peak[0] = search.peak[1] = -np.inf
-    if not contacts.inside[wheel] and contacts.across[wheel] != 0.0:
-        turn = contacts.sine[wheel], contacts.cosine[wheel]
-        side = 1 if contacts.across[wheel] > 0.0 else 0
-        note_peak(search, side, contacts.gap[wheel], turn)
+    search.found = 0
+    search.curl = 0.5 / (search.radius * search.cosine)
     search.best = -work.contacts.gap[wheel] * scale + NOTICED * search.radius
 
 
@@ -57,16 +52,9 @@ def is_beside(search, low, high):
 
 
 @kernel
-def take_point(search, s, t, base):
+def take_point(search, rim, s, t, base):
     """Keep a point if it is the best so far; `base` is its intrusion without the wheel's dome."""
     dome = np.sqrt(max(search.radius * search.radius - s * s, 0.0)) / search.cosine
     if base + dome > search.best:
         search.best, search.best_s, search.best_t = base + dome, s, t
-        search.found = 1
-
-
-@kernel
-def note_peak(search, side, gap, turn):
-    """Note the peak of a rim, 0 right or 1 left, by its gap [m] and angle (sine, cosine)."""
-    search.peak[side] = -gap / search.cell
-    search.peak_s[side], search.peak_q[side] = turn[0] * search.radius, turn[1] * search.radius
+        search.found, search.best_rim = 1, rim

@@ -1,105 +1,78 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Search of a wheel's rims, beginning where edges of cells cross them; lengths are in cells."""
+"""Search of the part of a wheel's rim that lies in one cell; lengths are in cells."""
 
 import numpy as np
-from numba import int64
 
-from rover_physics.contact.circle_search import search_circle
-from rover_physics.contact.contact_record import CROSSINGS, NOTICED
-from rover_physics.contact.intrusion import note_peak
-from rover_physics.contact.tracking import keep_contact, take_circle
+from rover_physics.contact.intrusion import ROUNDING, take_point
 from rover_physics.numerics.kernels import kernel
-from rover_physics.terrain.ground import look_up_cell
 
-RIM_BEND = 0.14
-"""The same for a rim that crosses a cell in parallel to a side; aslant, it is up to twice that."""
-RIM_STEPS = 2
-"""Steps for the place where an edge crosses a rim."""
-BESIDE_SHARE = 0.8
-"""Share of the rise of the wheel: where the gap grows less, the ground is not a plane, and the rim
-may touch elsewhere."""
-BEYOND = 0.3
-"""Distance from a crossing, to both sides, at which a rim is looked at [cells]."""
 LEVEL = 1e-9
 """Part of an edge along a direction [cells] below which it is across that direction."""
+STEEPEST = 0.9999
+"""Share of the radius up to which the wheel's slope is finite enough for Newton's method."""
+FIRST = 0.8
+"""Largest share of the radius at which the search begins."""
+RIM_STEPS = 3
+"""Steps of the search: the first bounds it, the others are of Newton's method."""
 
 
 @kernel
-def cross_rim(search, start, along):
-    """Note where an edge crosses a rim, if the rim may come near there.
+def look_along_rim(search, rim, corner, heading, shape):
+    """Search the part of a rim, -1 right or 1 left, that lies in a cell.
 
-    `start` and `along` are as for `look_along_edge`.
+    A cambered rim is bent as seen from above. It is taken as straight at the best place so far.
+
+    Args:
+        search: CELL_SEARCH.
+        rim: The rim.
+        corner: s and t of a corner of the cell.
+        heading: The heading along its sides u and v, which begin at the corner, u right of v.
+        shape: (a, b, c, d) of the intrusion a + b u + c v + d u v, without the wheel's dome.
     """
-    s, t, base = start
-    along_s, along_t, rise = along
-    R, inverse = search.radius, 1.0 / search.cosine
-    if not abs(along_t) > LEVEL:
-        return
-    side = 1.0 if t + 0.5 * along_t > search.sine * R * 0.5 else -1.0
-    q, share = R, 0.5
-    for _ in range(RIM_STEPS):
-        at = s + share * along_s
-        q = np.sqrt(max(R * R - at * at, 0.0))
-        share = (side * search.half_width + search.sine * q - t) / along_t
-    if not (share >= 0.0 and share <= 1.0 and q > 0.0):
-        return
-    at = s + share * along_s
-    intrusion = base + share * rise + q * inverse
-    side_on = max(search.ahead_x * search.ahead_x, search.ahead_y * search.ahead_y)
-    bend = RIM_BEND * R * R / (max(q, 0.2 * R) ** 3 * side_on) * inverse
-    if not intrusion + bend > search.best:
-        return
-    k = search.crossings % CROSSINGS
-    search.crossing_s[k], search.crossing_rim[k] = at, int64(side)
-    search.crossing[k] = intrusion
-    search.crossings += 1
+    R, curl = search.radius, search.curl
+    s0, t0 = corner
+    ex, ey = heading
+    a, b, c, d = shape
+    s = min(max(s0 + 0.5 * (ex + ey), -FIRST * R), FIRST * R)
+    bent = 2.0 * curl * abs(search.sine) * (abs(b) + abs(c))
+    for step in range(RIM_STEPS):
+        q = np.sqrt(R * R - s * s)
+        turn, aside = -search.sine * s / q, rim * search.half_width + search.sine * q - t0
+        u, v = (s - s0) * ex - aside * ey, (s - s0) * ey + aside * ex
+        du, dv = ex - turn * ey, ey + turn * ex
+        base, slope = a + b * u + c * v + d * u * v, b * du + c * dv + d * (u * dv + v * du)
+        if step > 0 and abs(u - 0.5) < 0.5 + ROUNDING and abs(v - 0.5) < 0.5 + ROUNDING:
+            take_point(search, rim, s, t0 + aside, base)
+        low, high = _part_in_cell((u, v), (away_from_zero(du), away_from_zero(dv)))
+        low, high = max(low, -STEEPEST * R - s), min(high, STEEPEST * R - s)
+        if not low < high:
+            return
+        rest = -2.0 * d * du * dv
+        if step > 0:
+            slope -= s / (q * search.cosine)
+            rest += R * R / (q * q * q * search.cosine)
+        else:
+            slope -= 2.0 * curl * s
+            rest += 2.0 * curl
+        at = high if slope - 0.5 * rest * (low + high) > 0.0 else low
+        if rest > 0.0:
+            at = min(max(slope / rest, low), high)
+        if step == 0:
+            most = base + 2.0 * curl * R * R - curl * s * s + (slope - 0.5 * rest * at) * at
+            if most + bent <= search.best:
+                return
+        s += at
 
 
 @kernel
-def look_along_rims(model, work, wheel):
-    """Search the rims at each crossing and on both sides of it, where they may come near."""
-    search, gap = work.cells, work.contacts.gap
-    for k in range(min(search.crossings, CROSSINGS)):
-        if search.crossing[k] > -gap[wheel] / search.cell + NOTICED * search.radius:
-            _search_rim(model, work, wheel, search.crossing_rim[k], search.crossing_s[k])
-        for beyond in (-BEYOND, BEYOND):
-            rim, s = search.crossing_rim[k], search.crossing_s[k] + beyond
-            if abs(s) < search.radius and not _is_covered(model.ground, search, rim, s):
-                _search_rim(model, work, wheel, rim, s)
+def _part_in_cell(place, direction):
+    """Return the distances along a direction from (u, v) between which a line is in a cell."""
+    (u, v), (du, dv) = place, direction
+    one, other, right, left = -u / du, (1.0 - u) / du, -v / dv, (1.0 - v) / dv
+    return max(min(one, other), min(right, left)), min(max(one, other), max(right, left))
 
 
 @kernel
-def _is_covered(ground, search, rim, s):
-    """Return whether a rim, -1 right or 1 left, is as far from the ground as over a plane.
-
-    `s` is a place on the rim; the plane is that of the last peak of this rim.
-    """
-    R, side = search.radius, (rim + 1) // 2
-    if search.peak[side] == -np.inf:
-        return False
-    q = np.sqrt(R * R - s * s)
-    t = rim * search.half_width + search.sine * q
-    x = search.x + s * search.ahead_x - t * search.ahead_y
-    y = search.y + s * search.ahead_y + t * search.ahead_x
-    height = (look_up_cell(ground, x, y)[0] - search.z) / search.cell
-    intrusion = height + q / search.cosine - search.tangent * t
-    # From a contact on a plane the gap grows with the rise of the wheel.
-    rise = R - (s * search.peak_s[side] + q * search.peak_q[side]) / R
-    return search.peak[side] - intrusion >= BESIDE_SHARE * rise
-
-
-@kernel
-def _search_rim(model, work, wheel, rim, s):
-    """Search a rim, -1 right or 1 left, from s [cells], and take what is found if it is nearer."""
-    contacts, search, samples = work.contacts, work.cells, model.samples
-    across = rim * samples.half_width
-    sine = s / search.radius
-    turn = sine, np.sqrt(1.0 - sine * sine)
-    gap, turn, slope = search_circle(model, work, (wheel, across), turn)
-    if not gap < np.inf:
-        return
-    note_peak(search, (rim + 1) // 2, gap, turn)
-    if gap < contacts.gap[wheel] - NOTICED * samples.radius:
-        keep_contact(contacts, wheel)
-        contacts.across[wheel] = across
-        take_circle(contacts, wheel, (gap, turn, slope))
+def away_from_zero(part):
+    """Return part of a direction, at least so large that its inverse times a place is finite."""
+    return part if abs(part) > LEVEL else LEVEL

@@ -12,7 +12,7 @@ import pytest
 from rover_physics import PathPrediction, PoseStatus, Terrain, judge_path, load_rover
 from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import bouldered, fractal, random_poses
-from support.rover_geometry import wheel_axes, wheel_gap
+from support.rover_geometry import wheel_axes, wheel_gap, wheel_gaps
 
 LSR1 = load_rover("lsr1")
 few_and_all = pytest.mark.parametrize("seeds", [1, pytest.param(10, marks=pytest.mark.long)])
@@ -51,6 +51,16 @@ def test_999_of_1000_wheels_touch_within_a_tenth_of_a_millimetre_and_none_is_in_
     assert gaps.size >= 39 * seeds
     assert (np.abs(gaps) <= 1e-4).mean() >= 0.999
     assert gaps.min() >= -1e-3 and gaps.max() <= 1e-4
+
+
+def test_rims_that_touch_inside_cells_almost_as_large_as_the_wheel_are_found():
+    fine = bouldered(2)
+    ground = Terrain(2.0 * fine.elevation, 0.09, (-6.75, -6.75))
+    poses = random_poses(2, 200, 4.0)[20:60]
+    prediction = judge_poses(LSR1, ground, poses, np.zeros(len(poses)))[0]
+    assert prediction.settled.all()
+    gaps = np.array([wheel_gaps(LSR1, ground, prediction, i) for i in range(len(poses))])
+    assert np.abs(gaps).max() <= 1e-4
 
 
 ALONG = np.arange(-0.5, 0.5, 0.02)
