@@ -51,25 +51,25 @@ def look_everywhere(model, work, wheel, tops):
     status = _look_at_vertices(model.ground, search, tops)
     if search.found:
         keep_contact(contacts, wheel)
-        if search.best_rim == 0:
-            _take_peak(model.ground, search, contacts, wheel)
-        else:
-            _take_rim(model, work, wheel)
+        _take_peak(model.ground, search, contacts, wheel)
+    if search.best_rim != 0:
+        keep_contact(contacts, wheel)
+        _take_rim(model, work, wheel)
     return status
 
 
 @kernel
 def _take_peak(ground, search, contacts, wheel):
     """Take the best point between the rims as the contact."""
-    s, t, radius, cell = search.best_s, search.best_t, search.radius, search.cell
+    s, t, radius, cell = search.peak_s, search.peak_t, search.radius, search.cell
     q = np.sqrt(max(radius * radius - s * s, 0.0))
-    contacts.gap[wheel], contacts.inside[wheel] = -search.best * cell, 1
+    contacts.gap[wheel], contacts.inside[wheel] = -search.peak * cell, 1
     contacts.across[wheel] = (t / search.cosine - search.tangent * q) * cell
     contacts.sine[wheel], contacts.cosine[wheel] = s / radius, q / radius
     peak = contacts.peak[wheel]
     peak[0] = (search.x + s * search.ahead_x - t * search.ahead_y) * cell + ground.x0
     peak[1] = (search.y + s * search.ahead_y + t * search.ahead_x) * cell + ground.y0
-    peak[2] = search.z + (search.best + search.tangent * t - q / search.cosine) * cell
+    peak[2] = search.z + (search.peak + search.tangent * t - q / search.cosine) * cell
 
 
 @kernel

@@ -66,9 +66,12 @@ CELL_SEARCH = record_type(
     ("best", float),  # largest intrusion of the ground so far [cells]
     ("best_s", float),  # its place along the heading [cells]
     ("best_t", float),  # its place to the left [cells]
+    ("peak", float),  # largest intrusion so far between the rims, if found [cells]
+    ("peak_s", float),  # its place [cells]
+    ("peak_t", float),
     ("best_rim", np.int64),  # -1 on the right rim, 1 on the left one, 0 between them
     ("curl", float),  # half the least curvature of the wheel along its heading [1/cells]
-    ("found", np.int64),  # 1 if the search has found it
+    ("found", np.int64),  # 1 if the search has found one between the rims
 )
 """Work space of `look_everywhere`."""
 

@@ -33,7 +33,7 @@ def begin_search(model, work, wheel):
     lean = search.sine * search.radius
     search.right = min(lean, 0.0) - search.half_width
     search.left = max(lean, 0.0) + search.half_width
-    search.found = 0
+    search.found = search.best_rim = 0
     search.curl = 0.5 / (search.radius * search.cosine)
     search.best = -work.contacts.gap[wheel] * scale + NOTICED * search.radius
 
@@ -57,4 +57,6 @@ def take_point(search, rim, s, t, base):
     dome = np.sqrt(max(search.radius * search.radius - s * s, 0.0)) / search.cosine
     if base + dome > search.best:
         search.best, search.best_s, search.best_t = base + dome, s, t
-        search.found, search.best_rim = 1, rim
+        search.best_rim = rim
+        if rim == 0:
+            search.peak, search.peak_s, search.peak_t, search.found = base + dome, s, t, 1
