@@ -130,4 +130,4 @@ def _look_on_line(search, corner, heading, shape, line):
         return
     if is_below(search, s, t0 + aside):
         ground = a + b * u + c * v + d * u * v
-        take_point(search, 0, s, t0 + aside, ground - search.tangent * (t0 + aside))
+        take_point(search, s, t0 + aside, ground - search.tangent * (t0 + aside))

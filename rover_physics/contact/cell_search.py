@@ -52,7 +52,7 @@ def look_everywhere(model, work, wheel, tops):
     if search.found:
         keep_contact(contacts, wheel)
         _take_peak(model.ground, search, contacts, wheel)
-    if search.best_rim != 0:
+    if search.rim != 0:
         keep_contact(contacts, wheel)
         _take_rim(model, work, wheel)
     return status
@@ -61,23 +61,23 @@ def look_everywhere(model, work, wheel, tops):
 @kernel
 def _take_peak(ground, search, contacts, wheel):
     """Take the best point between the rims as the contact."""
-    s, t, radius, cell = search.peak_s, search.peak_t, search.radius, search.cell
+    s, t, radius, cell = search.best_s, search.best_t, search.radius, search.cell
     q = np.sqrt(max(radius * radius - s * s, 0.0))
-    contacts.gap[wheel], contacts.inside[wheel] = -search.peak * cell, 1
+    contacts.gap[wheel], contacts.inside[wheel] = -search.best * cell, 1
     contacts.across[wheel] = (t / search.cosine - search.tangent * q) * cell
     contacts.sine[wheel], contacts.cosine[wheel] = s / radius, q / radius
     peak = contacts.peak[wheel]
     peak[0] = (search.x + s * search.ahead_x - t * search.ahead_y) * cell + ground.x0
     peak[1] = (search.y + s * search.ahead_y + t * search.ahead_x) * cell + ground.y0
-    peak[2] = search.z + (search.peak + search.tangent * t - q / search.cosine) * cell
+    peak[2] = search.z + (search.best + search.tangent * t - q / search.cosine) * cell
 
 
 @kernel
 def _take_rim(model, work, wheel):
     """Take the best point of the rims as the contact, after a search of the rim from there on."""
     contacts, search = work.contacts, work.cells
-    contacts.across[wheel] = search.best_rim * model.samples.half_width
-    sine = search.best_s / search.radius
+    contacts.across[wheel] = search.rim * model.samples.half_width
+    sine = search.rim_s / search.radius
     turn = sine, np.sqrt(1.0 - sine * sine)
     take_circle(contacts, wheel, search_circle(model, work, (wheel, contacts.across[wheel]), turn))
 
@@ -150,7 +150,7 @@ def _look_around(ground, search, vertex, there):
     if abs(s) < STEEP * R:
         most, fall = base + q / search.cosine, s / (q * search.cosine)
     if q > 0.0 and is_below(search, s, t):
-        take_point(search, 0, s, t, base)
+        take_point(search, s, t, base)
     here = elevation_of(ground, i, j)
     # The sides of a cell: u along (di, dj) and v to its left; the heading along them.
     di, dj, ex, ey = 0, 1, search.ahead_x, search.ahead_y
@@ -240,5 +240,5 @@ def look_along_edge(search, start, along):
     best_s, best_t = s + share * along_s, t + share * along_t
     if abs(best_s) < R and is_below(search, best_s, best_t):
         if share > 0.0:
-            take_point(search, 0, best_s, best_t, base + share * rise)
+            take_point(search, best_s, best_t, base + share * rise)
         return

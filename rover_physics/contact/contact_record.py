@@ -63,15 +63,14 @@ CELL_SEARCH = record_type(
     ("sine", float),  # of the camber
     ("cosine", float),
     ("tangent", float),
-    ("best", float),  # largest intrusion of the ground so far [cells]
+    ("best", float),  # largest intrusion so far between the rims [cells]
     ("best_s", float),  # its place along the heading [cells]
     ("best_t", float),  # its place to the left [cells]
-    ("peak", float),  # largest intrusion so far between the rims, if found [cells]
-    ("peak_s", float),  # its place [cells]
-    ("peak_t", float),
-    ("best_rim", np.int64),  # -1 on the right rim, 1 on the left one, 0 between them
+    ("found", np.int64),  # 1 if the search has found it
+    ("best_on_rim", float),  # largest intrusion so far of rims and between them [cells]
+    ("rim_s", float),  # its place along the heading, if it is on a rim [cells]
+    ("rim", np.int64),  # -1 if it is on the right rim, 1 on the left one, else 0
     ("curl", float),  # half the least curvature of the wheel along its heading [1/cells]
-    ("found", np.int64),  # 1 if the search has found one between the rims
 )
 """Work space of `look_everywhere`."""
 

@@ -33,9 +33,10 @@ def begin_search(model, work, wheel):
     lean = search.sine * search.radius
     search.right = min(lean, 0.0) - search.half_width
     search.left = max(lean, 0.0) + search.half_width
-    search.found = search.best_rim = 0
+    search.found = search.rim = 0
     search.curl = 0.5 / (search.radius * search.cosine)
     search.best = -work.contacts.gap[wheel] * scale + NOTICED * search.radius
+    search.best_on_rim = search.best
 
 
 @kernel
@@ -52,11 +53,27 @@ def is_beside(search, low, high):
 
 
 @kernel
-def take_point(search, rim, s, t, base):
-    """Keep a point if it is the best so far; `base` is its intrusion without the wheel's dome."""
-    dome = np.sqrt(max(search.radius * search.radius - s * s, 0.0)) / search.cosine
-    if base + dome > search.best:
-        search.best, search.best_s, search.best_t = base + dome, s, t
-        search.best_rim = rim
-        if rim == 0:
-            search.peak, search.peak_s, search.peak_t, search.found = base + dome, s, t, 1
+def take_point(search, s, t, base):
+    """Keep a point between the rims if it is the best of them so far.
+
+    `base` is its intrusion without the wheel's dome.
+    """
+    intrusion = base + _dome(search, s)
+    if intrusion > search.best:
+        search.best, search.best_s, search.best_t, search.found = intrusion, s, t, 1
+        if intrusion > search.best_on_rim:
+            search.best_on_rim, search.rim = intrusion, 0
+
+
+@kernel
+def take_rim_point(search, rim, s, base):
+    """Keep a point of a rim if it is the best of all so far; `base` is as for `take_point`."""
+    intrusion = base + _dome(search, s)
+    if intrusion > search.best_on_rim:
+        search.best_on_rim, search.rim_s, search.rim = intrusion, s, rim
+
+
+@kernel
+def _dome(search, s):
+    """Return the height of the wheel's axle above its lower side [cells]."""
+    return np.sqrt(max(search.radius * search.radius - s * s, 0.0)) / search.cosine

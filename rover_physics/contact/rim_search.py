@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from rover_physics.contact.intrusion import ROUNDING, take_point
+from rover_physics.contact.intrusion import ROUNDING, take_rim_point
 from rover_physics.numerics.kernels import kernel
 
 LEVEL = 1e-9
@@ -42,7 +42,7 @@ def look_along_rim(search, rim, corner, heading, shape):
         du, dv = ex - turn * ey, ey + turn * ex
         base, slope = a + b * u + c * v + d * u * v, b * du + c * dv + d * (u * dv + v * du)
         if step > 0 and abs(u - 0.5) < 0.5 + ROUNDING and abs(v - 0.5) < 0.5 + ROUNDING:
-            take_point(search, rim, s, t0 + aside, base)
+            take_rim_point(search, rim, s, base)
         low, high = _part_in_cell((u, v), (away_from_zero(du), away_from_zero(dv)))
         low, high = max(low, -STEEPEST * R - s), min(high, STEEPEST * R - s)
         if not low < high:
@@ -59,7 +59,7 @@ def look_along_rim(search, rim, corner, heading, shape):
             at = min(max(slope / rest, low), high)
         if step == 0:
             most = base + 2.0 * curl * R * R - curl * s * s + (slope - 0.5 * rest * at) * at
-            if most + bent <= search.best:
+            if most + bent <= search.best_on_rim:
                 return
         s += at
 
