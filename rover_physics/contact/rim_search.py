@@ -3,24 +3,32 @@
 
 import numpy as np
 
-from rover_physics.contact.intrusion import ROUNDING, take_rim_point
+from rover_physics.contact.intrusion import take_rim_point
 from rover_physics.numerics.kernels import kernel
 
 LEVEL = 1e-9
 """Part of an edge along a direction [cells] below which it is across that direction."""
 STEEPEST = 0.9999
 """Share of the radius up to which the wheel's slope is finite enough for Newton's method."""
-FIRST = 0.8
+FIRST = 0.95
 """Largest share of the radius at which the search begins."""
-RIM_STEPS = 3
-"""Steps of the search: the first bounds it, the others are of Newton's method."""
+RIM_STEPS = 4
+"""Largest number of places that the search looks at."""
+FOUND = 1e-3
+"""Step [cells] at which the search stops."""
+BEYOND = 1e-4
+"""Distance from the cell [cells] up to which a place counts as in it."""
+LEAST_CHANGE = 0.3
+"""Lower bound of the derivative in that search, where the ground bends almost like the wheel."""
 
 
 @kernel
 def look_along_rim(search, rim, corner, heading, shape):
     """Search the part of a rim, -1 right or 1 left, that lies in a cell.
 
-    A cambered rim is bent as seen from above. It is taken as straight at the best place so far.
+    The unknown of Newton's method is the wheel's slope s / q at height q below its axle. On a
+    plane, one step finds it, however steep it is. A cambered rim is bent as seen from above: for
+    its way out of the cell it is taken as straight at the last place.
 
     Args:
         search: CELL_SEARCH.
@@ -29,39 +37,34 @@ def look_along_rim(search, rim, corner, heading, shape):
         heading: The heading along its sides u and v, which begin at the corner, u right of v.
         shape: (a, b, c, d) of the intrusion a + b u + c v + d u v, without the wheel's dome.
     """
-    R, curl = search.radius, search.curl
+    R, sine = search.radius, search.sine
     s0, t0 = corner
     ex, ey = heading
     a, b, c, d = shape
-    s = min(max(s0 + 0.5 * (ex + ey), -FIRST * R), FIRST * R)
-    bent = 2.0 * curl * abs(search.sine) * (abs(b) + abs(c))
-    for step in range(RIM_STEPS):
+    s, change = min(max(s0 + 0.5 * (ex + ey), -FIRST * R), FIRST * R), np.inf
+    for _ in range(RIM_STEPS):
         q = np.sqrt(R * R - s * s)
-        turn, aside = -search.sine * s / q, rim * search.half_width + search.sine * q - t0
+        aside = rim * search.half_width + sine * q - t0
         u, v = (s - s0) * ex - aside * ey, (s - s0) * ey + aside * ex
+        if change < np.inf and abs(u - 0.5) < 0.5 + BEYOND and abs(v - 0.5) < 0.5 + BEYOND:
+            take_rim_point(search, rim, s, a + b * u + c * v + d * u * v)
+            if abs(change) < FOUND:
+                return
+        turn = -sine * s / q
         du, dv = ex - turn * ey, ey + turn * ex
-        base, slope = a + b * u + c * v + d * u * v, b * du + c * dv + d * (u * dv + v * du)
-        if step > 0 and abs(u - 0.5) < 0.5 + ROUNDING and abs(v - 0.5) < 0.5 + ROUNDING:
-            take_rim_point(search, rim, s, base)
         low, high = _part_in_cell((u, v), (away_from_zero(du), away_from_zero(dv)))
-        low, high = max(low, -STEEPEST * R - s), min(high, STEEPEST * R - s)
         if not low < high:
             return
-        rest = -2.0 * d * du * dv
-        if step > 0:
-            slope -= s / (q * search.cosine)
-            rest += R * R / (q * q * q * search.cosine)
-        else:
-            slope -= 2.0 * curl * s
-            rest += 2.0 * curl
-        at = high if slope - 0.5 * rest * (low + high) > 0.0 else low
-        if rest > 0.0:
-            at = min(max(slope / rest, low), high)
-        if step == 0:
-            most = base + 2.0 * curl * R * R - curl * s * s + (slope - 0.5 * rest * at) * at
-            if most + bent <= search.best_on_rim:
-                return
-        s += at
+        along_u, along_v = b + d * v, c + d * u
+        fall = sine * (along_v * ex - along_u * ey) + 1.0 / search.cosine
+        if not fall > 0.0:
+            return
+        slope, inverse = (along_u * ex + along_v * ey) / fall, q / (R * R)
+        bend = d * (dv * ex + du * ey - slope * sine * (du * ex - dv * ey)) / fall
+        steep = s / q
+        steep += (slope - steep) / max(1.0 - bend * q * q * inverse, LEAST_CHANGE)
+        change = min(max(R * steep / np.sqrt(1.0 + steep * steep) - s, low), high)
+        s = min(max(s + change, -STEEPEST * R), STEEPEST * R)
 
 
 @kernel
