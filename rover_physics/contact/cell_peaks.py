@@ -4,13 +4,14 @@
 import numpy as np
 
 from rover_physics.contact.intrusion import ROUNDING, is_below, take_point
-from rover_physics.contact.rim_search import STEEPEST
 from rover_physics.numerics.kernels import kernel
 
 INTERIOR_STEPS = 8
 """Largest number of steps of the search inside a cell."""
 FLAT_RATE = 3e-3
 """Change of the intrusion along the heading at which that search stops."""
+STEEPEST = 0.9999
+"""Share of the radius up to which the wheel's slope is finite enough for Newton's method."""
 LEAST_CHANGE = 0.3
 """Lower bound of the derivative in that search, where the ground bends almost like the wheel."""
 

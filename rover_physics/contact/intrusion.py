@@ -58,22 +58,15 @@ def take_point(search, s, t, base):
 
     `base` is its intrusion without the wheel's dome.
     """
-    intrusion = base + _dome(search, s)
-    if intrusion > search.best:
-        search.best, search.best_s, search.best_t, search.found = intrusion, s, t, 1
-        if intrusion > search.best_on_rim:
-            search.best_on_rim, search.rim = intrusion, 0
+    dome = np.sqrt(max(search.radius * search.radius - s * s, 0.0)) / search.cosine
+    if base + dome > search.best:
+        search.best, search.best_s, search.best_t, search.found = base + dome, s, t, 1
+        if search.best > search.best_on_rim:
+            search.best_on_rim, search.rim = search.best, 0
 
 
 @kernel
-def take_rim_point(search, rim, s, base):
-    """Keep a point of a rim if it is the best of all so far; `base` is as for `take_point`."""
-    intrusion = base + _dome(search, s)
+def take_rim_point(search, rim, s, intrusion):
+    """Keep a point of a rim, -1 right or 1 left, if it is the best of all so far."""
     if intrusion > search.best_on_rim:
         search.best_on_rim, search.rim_s, search.rim = intrusion, s, rim
-
-
-@kernel
-def _dome(search, s):
-    """Return the height of the wheel's axle above its lower side [cells]."""
-    return np.sqrt(max(search.radius * search.radius - s * s, 0.0)) / search.cosine

@@ -8,14 +8,16 @@ from rover_physics.numerics.kernels import kernel
 
 LEVEL = 1e-9
 """Part of an edge along a direction [cells] below which it is across that direction."""
-STEEPEST = 0.9999
-"""Share of the radius up to which the wheel's slope is finite enough for Newton's method."""
+LEAST_Q = 0.01
+"""Least height below the axle [radii]."""
 FIRST = 0.95
 """Largest share of the radius at which the search begins."""
 RIM_STEPS = 4
 """Largest number of places that the search looks at."""
-FOUND = 1e-3
-"""Step [cells] at which the search stops."""
+FOUND = 1e-4
+"""Turn [rad] at which the search stops."""
+MISSED = 0.1
+"""Turn [rad] by which a straight line may miss a cell that the bent rim crosses."""
 BEYOND = 1e-4
 """Distance from the cell [cells] up to which a place counts as in it."""
 LEAST_CHANGE = 0.3
@@ -26,9 +28,9 @@ LEAST_CHANGE = 0.3
 def look_along_rim(search, rim, corner, heading, shape):
     """Search the part of a rim, -1 right or 1 left, that lies in a cell.
 
-    The unknown of Newton's method is the wheel's slope s / q at height q below its axle. On a
-    plane, one step finds it, however steep it is. A cambered rim is bent as seen from above: for
-    its way out of the cell it is taken as straight at the last place.
+    Newton's method turns the place on the rim: on a plane, one step finds it, however steep it is.
+    A cambered rim is bent as seen from above: for its way out of the cell it is taken as straight
+    at the last place.
 
     Args:
         search: CELL_SEARCH.
@@ -37,34 +39,33 @@ def look_along_rim(search, rim, corner, heading, shape):
         heading: The heading along its sides u and v, which begin at the corner, u right of v.
         shape: (a, b, c, d) of the intrusion a + b u + c v + d u v, without the wheel's dome.
     """
-    R, sine = search.radius, search.sine
+    R, sine, inverse = search.radius, search.sine, 1.0 / search.cosine
     s0, t0 = corner
     ex, ey = heading
     a, b, c, d = shape
-    s, change = min(max(s0 + 0.5 * (ex + ey), -FIRST * R), FIRST * R), np.inf
+    s, turn = min(max(s0 + 0.5 * (ex + ey), -FIRST * R), FIRST * R), np.inf
+    q = np.sqrt(R * R - s * s)
     for _ in range(RIM_STEPS):
-        q = np.sqrt(R * R - s * s)
         aside = rim * search.half_width + sine * q - t0
         u, v = (s - s0) * ex - aside * ey, (s - s0) * ey + aside * ex
-        if change < np.inf and abs(u - 0.5) < 0.5 + BEYOND and abs(v - 0.5) < 0.5 + BEYOND:
-            take_rim_point(search, rim, s, a + b * u + c * v + d * u * v)
-            if abs(change) < FOUND:
+        if turn < np.inf and abs(u - 0.5) < 0.5 + BEYOND and abs(v - 0.5) < 0.5 + BEYOND:
+            take_rim_point(search, rim, s, a + b * u + c * v + d * u * v + q * inverse)
+            if abs(turn) < FOUND:
                 return
-        turn = -sine * s / q
-        du, dv = ex - turn * ey, ey + turn * ex
+        du, dv = q * ex + sine * s * ey, q * ey - sine * s * ex
         low, high = _part_in_cell((u, v), (away_from_zero(du), away_from_zero(dv)))
-        if not low < high:
+        if not low < high + MISSED:
             return
         along_u, along_v = b + d * v, c + d * u
-        fall = sine * (along_v * ex - along_u * ey) + 1.0 / search.cosine
-        if not fall > 0.0:
-            return
-        slope, inverse = (along_u * ex + along_v * ey) / fall, q / (R * R)
-        bend = d * (dv * ex + du * ey - slope * sine * (du * ex - dv * ey)) / fall
-        steep = s / q
-        steep += (slope - steep) / max(1.0 - bend * q * q * inverse, LEAST_CHANGE)
-        change = min(max(R * steep / np.sqrt(1.0 + steep * steep) - s, low), high)
-        s = min(max(s + change, -STEEPEST * R), STEEPEST * R)
+        ahead, up = along_u * ex + along_v * ey, sine * (along_v * ex - along_u * ey) + inverse
+        rate, bend = ahead * q - up * s, ahead * s + up * q
+        change = bend - d * (q * (dv * ex + du * ey) - s * sine * (du * ex - dv * ey))
+        turn = high if rate > 0.0 else low
+        if bend > 0.0:
+            turn = min(max(rate / max(change, LEAST_CHANGE * bend), low), high)
+        s, q = s + turn * q, max(q - turn * s, LEAST_Q * R)
+        longer = R / np.sqrt(s * s + q * q)
+        s, q = s * longer, q * longer
 
 
 @kernel
