@@ -14,7 +14,7 @@ from numba import int64
 from rover_physics.contact.cell_peaks import look_into_cell
 from rover_physics.contact.circle_search import search_circle
 from rover_physics.contact.contact_record import NOTICED
-from rover_physics.contact.intrusion import begin_search, is_below, is_beside, take_point
+from rover_physics.contact.intrusion import ROUNDING, begin_search, is_below, is_beside, take_point
 from rover_physics.contact.rim_search import LEVEL, away_from_zero, look_along_rim
 from rover_physics.contact.tracking import keep_contact, take_circle
 from rover_physics.numerics.kernels import kernel
@@ -159,15 +159,15 @@ def _look_around(ground, search, vertex, there):
         beside = _rise_to(ground, here, i + dj, j - di)
         twist = _rise_to(ground, here, i + di + dj, j + dj - di) - rise - beside
         b, c = rise + tangent * ey, beside - tangent * ex
-        if b <= curl * ex * (2.0 * s + ex):
+        if b <= curl * ex * (2.0 * s + ex) + ROUNDING:
             gain = _bound_side(b - fall * ex, curl * ex * ex)
             if most + gain > search.best and not is_beside(
                 search, t - max(ey, 0.0), t - min(ey, 0.0)
             ):
                 look_along_edge(search, (s, t, base), (ex, -ey, b))
             if (
-                c <= curl * ey * (2.0 * s + ey)
-                and b + c + twist <= curl * (ex + ey) * (2.0 * s + ex + ey)
+                c <= curl * ey * (2.0 * s + ey) + ROUNDING
+                and b + c + twist <= curl * (ex + ey) * (2.0 * s + ex + ey) + ROUNDING
                 and most + _bound_cell(curl, (ex, ey), (b - fall * ex, c - fall * ey, twist))
                 > search.best
             ):

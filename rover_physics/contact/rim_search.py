@@ -43,29 +43,49 @@ def look_along_rim(search, rim, corner, heading, shape):
     s0, t0 = corner
     ex, ey = heading
     a, b, c, d = shape
-    s, turn = min(max(s0 + 0.5 * (ex + ey), -FIRST * R), FIRST * R), np.inf
+    s, turn = min(max(s0 + 0.5 * (ex + ey), -FIRST * R), FIRST * R), 0.0
     q = np.sqrt(R * R - s * s)
-    for _ in range(RIM_STEPS):
+    for step in range(RIM_STEPS):
         aside = rim * search.half_width + sine * q - t0
         u, v = (s - s0) * ex - aside * ey, (s - s0) * ey + aside * ex
-        if turn < np.inf and abs(u - 0.5) < 0.5 + BEYOND and abs(v - 0.5) < 0.5 + BEYOND:
-            take_rim_point(search, rim, s, a + b * u + c * v + d * u * v + q * inverse)
+        along_u, along_v = b + d * v, c + d * u
+        ahead, up = along_u * ex + along_v * ey, sine * (along_v * ex - along_u * ey) + inverse
+        intrusion = a + b * u + c * v + d * u * v + q * inverse
+        if step == 0:
+            low, high = s0 + min(ex, 0.0) + min(ey, 0.0), s0 + max(ex, 0.0) + max(ey, 0.0)
+            most = intrusion + _gain_on_rim(R, (s, q), (ahead, up), (max(low, -R), min(high, R)))
+            bend = abs(d) * (0.5 + abs(u - 0.5)) * (0.5 + abs(v - 0.5))
+            if most + bend <= search.best_on_rim:
+                return
+        elif abs(u - 0.5) < 0.5 + BEYOND and abs(v - 0.5) < 0.5 + BEYOND:
+            take_rim_point(search, rim, s, intrusion)
             if abs(turn) < FOUND:
                 return
         du, dv = q * ex + sine * s * ey, q * ey - sine * s * ex
         low, high = _part_in_cell((u, v), (away_from_zero(du), away_from_zero(dv)))
         if not low < high + MISSED:
             return
-        along_u, along_v = b + d * v, c + d * u
-        ahead, up = along_u * ex + along_v * ey, sine * (along_v * ex - along_u * ey) + inverse
-        rate, bend = ahead * q - up * s, ahead * s + up * q
-        change = bend - d * (q * (dv * ex + du * ey) - s * sine * (du * ex - dv * ey))
+        rate, fall = ahead * q - up * s, ahead * s + up * q
         turn = high if rate > 0.0 else low
-        if bend > 0.0:
-            turn = min(max(rate / max(change, LEAST_CHANGE * bend), low), high)
+        if fall > 0.0:
+            bend = d * (q * (dv * ex + du * ey) - s * sine * (du * ex - dv * ey))
+            turn = min(max(rate / max(fall - bend, LEAST_CHANGE * fall), low), high)
         s, q = s + turn * q, max(q - turn * s, LEAST_Q * R)
         longer = R / np.sqrt(s * s + q * q)
         s, q = s * longer, q * longer
+
+
+@kernel
+def _gain_on_rim(R, place, slopes, span):
+    """Return the largest gain of the intrusion over that at a place (s, q) of a rim on a plane.
+
+    It is looked for at `span`, the least and largest s; `slopes` are the rates by s and q.
+    """
+    (s, q), (ahead, up), (low, high) = place, slopes, span
+    if not up > 0.0:
+        return np.inf
+    at = min(max(R * ahead / np.sqrt(ahead * ahead + up * up), low), high)
+    return ahead * (at - s) + up * (np.sqrt(max(R * R - at * at, 0.0)) - q)
 
 
 @kernel

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Settling: all six wheels touch, where MuJoCo says; the belly is clear of what is below."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -8,6 +10,7 @@ from hypothesis import strategies as st
 
 from rover_physics import PoseStatus, Terrain, judge_path, judge_poses, load_rover
 from rover_physics.results.record import QUANTITIES
+from rover_physics.rover.urdf.read_rover import rover_from_urdf
 from support.reference_cases import angle_errors, reference_predictions, steered_predictions
 from support.rough_grounds import fractal, plane, random_poses, rocky, scaled_for, smooth
 from support.rover_geometry import attitude_of, place_rover, wheel_axes, wheel_gaps
@@ -71,6 +74,19 @@ def test_a_peak_below_a_wheel_is_found_wherever_it_is():
     assert prediction.settled.all()
     lift = prediction.wheel_centres[:, 1, 2] - LSR1.wheel.radius
     assert lift == pytest.approx(0.03, abs=2e-3)
+
+
+def test_a_wheel_whose_rim_touches_the_edge_of_a_step_settles():
+    """The rim slips off the edge while the rover is turned; the edge below the wheel holds it."""
+    files = Path(__file__).parents[3] / "examples" / "rover"
+    rover = rover_from_urdf(files / "kit_rover.urdf", files / "kit_rover_joints.yaml").rover
+    x = np.arange(-1.0, 1.0, 0.01)
+    ground = Terrain(np.tile(np.where(x > 0.0, 0.06, 0.0), (101, 1)), 0.01, (-1.0, -0.5))
+    poses = np.array([[x, 0.0, yaw] for x in (0.18, 0.19, 0.2) for yaw in (0.0, 0.04)])
+    prediction = judge_poses(rover, ground, poses, np.zeros(len(poses)))[0]
+    assert prediction.settled.all()
+    gaps = np.array([wheel_gaps(rover, ground, prediction, i) for i in range(len(poses))])
+    assert np.abs(gaps).max() <= 1e-4
 
 
 @both_sets
