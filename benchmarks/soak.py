@@ -104,7 +104,7 @@ class Ear(Node):
 class RestWatch:
     """Counts the torques that a controller sends while it is to rest, by its own stamps.
 
-    An update sends its torques before a new state, so the first torques of a drive are none.
+    The first torques of a drive, which are sent before its state, are zero.
     """
 
     def __init__(self) -> None:
@@ -127,13 +127,11 @@ class RestWatch:
 
     def _judge(self) -> None:
         """Count in the order of sending, which is not that of arrival."""
-        doubt = False
         for at, state, turns in sorted(self._sent):
             if state:
-                self._since, doubt = np.inf if state == "driving" else at, False
-            elif at - self._since > FLIGHT:
-                self._count += doubt
-                doubt = turns
+                self._since = np.inf if state == "driving" else at
+            else:
+                self._count += turns and at - self._since > FLIGHT
         self._sent.clear()
 
 

@@ -209,6 +209,7 @@ class TractionController(Node):
         )
         if not sent:
             command = self._supervisor.fail(LOOP_FAULT)
+            self._write(command)  # torques of a sending that hung are not the last ones
         self._topics.publish_forces(command.update)
         self.statistics.take(command.update, start, time.perf_counter())
         self._log_changes(command, now)
