@@ -57,6 +57,9 @@ def plan(
     ] = False,
     sigmas: Sigmas = 3.0,
     accepted_chance: AcceptedChance = ACCEPTED_CHANCE,
+    chance_weight: Annotated[
+        float, option("M", "Length in m that a path may be longer to fail never, not always.")
+    ] = 0.0,
     picture: Picture = None,
     dump: Annotated[
         Path | None, option("FILE", "Write the question for replay-plan, .npz.")
@@ -74,7 +77,9 @@ def plan(
     from rover_planner.planning.search.query import LatticeSettings, SearchQuery
     from rover_planner.planning.search.query_file import write_query
 
-    settings = LatticeSettings(budget=budget, cell=cell, frontier=frontier)
+    settings = LatticeSettings(
+        budget=budget, cell=cell, frontier=frontier, chance_weight=chance_weight
+    )
     question = SearchQuery(
         load_rover(rover),
         load_terrain(terrain, max_cells),
