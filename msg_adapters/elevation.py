@@ -93,7 +93,8 @@ def read_points(cloud: PointCloud2, move: PointMove | None = None) -> CloudPoint
     if move is not None:
         xyz = xyz @ move[0].T + move[1]  # NaN where a coordinate is
         precision = rounding_error(points["x"], points["y"], points["z"])
-    return CloudPoints(xyz, *(columns.get(name) for name in LAYERS), precision)
+    layers = {layer: columns.get(name) for name, layer in LAYERS.items()}
+    return CloudPoints(xyz=xyz, precision=precision, **layers)
 
 
 @quiet

@@ -307,5 +307,5 @@ def make_terrain(
     if ground_class is not None:
         ground_class[~np.isfinite(ground_class) | (ground_class < 0.0)] = np.nan
     layers = {"friction": friction, "elevation_std": std, "ground_class": ground_class}
-    sealed = {name: seal_array(layer) for name, layer in layers.items() if layer is not None}
+    sealed: dict[str, Any] = {name: seal_array(layer) for name, layer in layers.items() if layer is not None}
     return Terrain(seal_array(elevation), resolution, origin, **sealed)

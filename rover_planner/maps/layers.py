@@ -210,6 +210,7 @@ def _combine(terrain: Terrain, grid: CellGrid, box: CellBox) -> Patch:
     rows, columns = _cells_of(terrain, grid)
     at = (rows - box.row)[:, None], (columns - box.column)[None, :]
     layers: dict[str, Layer] = {}
+    combined: Layer
     for name, layer in layers_of(terrain).items():
         if name == "soil":
             combined = np.full((box.rows, box.columns), -1, np.int32)
