@@ -40,7 +40,8 @@ def learn(
         float | None, option("MU", "Friction that is assumed at first; default: the rover's.")
     ] = None,
     soil: Annotated[
-        str | None, option("NAME", "Soil that is assumed at first, on ground that yields.")
+        str | None,
+        option("NAME", "Soil that is assumed at first, on ground that yields; it is learned."),
     ] = None,
     odometry_topic: Annotated[
         str, option("TOPIC", "Odometry of a bag that does not come from the wheels.")

@@ -58,7 +58,8 @@ def predict(
     ] = 0.0,
     soil: SoilName = None,
     arm: Annotated[
-        list[str] | None, option("NAME=RAD", "Angle of a joint of the arm in rad; give all.")
+        list[str] | None,
+        option("NAME=RAD", "Angle of a joint of the arm in rad; give all; default: stowed."),
     ] = None,
     payload: Payload = None,
     tool_force: Annotated[
@@ -68,7 +69,11 @@ def predict(
         Vector | None, option("MX MY MZ", "Moment on the arm's tip in N m, body frame.")
     ] = None,
     backward: Annotated[
-        bool, flag("--backward", "The rover drives backwards along the poses.")
+        bool,
+        flag(
+            "--backward",
+            "The rover drives backwards where poses do not tell: single ones, long steps.",
+        ),
     ] = False,
     sigmas: Sigmas = 3.0,
     classes: Annotated[

@@ -110,6 +110,7 @@ def load_service_settings(parameters: TraverseServerParameters) -> ServiceSettin
             budget=parameters.search_budget,
             cell=parameters.lattice_cell or None,
             frontier=parameters.search_frontier,
+            chance_weight=parameters.chance_weight,
         ),
         parameters=parameters,
     )
