@@ -32,7 +32,7 @@ from support.learning_drives import row_of_plant
 from support.reference_drives import drive_ground
 
 MUJOCO, QUASI_STATIC, SOIL = "MuJoCo", "quasi-static", "quasi-static, soil"
-SOFT = "loam"
+SOFT = "lunar_nominal"
 """Soil of drives over soil."""
 TURN, RADII = 0.1, (0.8, 3.0)
 """Rate of turns on the spot [rad/s], and smallest and largest radius of curves [m]."""
