@@ -306,6 +306,8 @@ def make_terrain(
     """
     if ground_class is not None:
         ground_class[~np.isfinite(ground_class) | (ground_class < 0.0)] = np.nan
-    layers: Any = {"friction": friction, "elevation_std": std, "ground_class": ground_class}
-    sealed = {name: seal_array(layer) for name, layer in layers.items() if layer is not None}
+    layers = {"friction": friction, "elevation_std": std, "ground_class": ground_class}
+    sealed: dict[str, Any] = {
+        name: seal_array(layer) for name, layer in layers.items() if layer is not None
+    }
     return Terrain(seal_array(elevation), resolution, origin, **sealed)
