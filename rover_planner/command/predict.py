@@ -112,11 +112,14 @@ def predict(
     gc.freeze()
     gc.enable()
     model = load_rover(rover)
-    if learned is not None:
-        from rover_planner.planning.learned_ground import rover_on_learned_ground
-
-        model = rover_on_learned_ground(model, learned)
     ground = load_terrain(terrain, max_cells)
+    if learned is not None:
+        from rover_planner.planning.learned_ground import lay_friction, read_learned
+
+        known = read_learned(learned)
+        told = model.friction if friction is None else friction
+        ground = lay_friction(ground, known.assume_classes(ground, told))
+        model = known.change(model)
     path = read_poses(poses)
     curvature = read_curvature(poses, len(path))
     options = SweepOptions(
