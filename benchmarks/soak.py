@@ -56,6 +56,8 @@ FLIGHT = 0.1
 """Time for which a controller that comes to rest may still send torques [s]."""
 PATIENCE = 10.0
 """Longest wait for an answer [s]."""
+PRIORITY = 50
+"""Real-time priority of simulator and controller, as the drivers of a rover have."""
 REACH = 3.0
 """Largest distance of a goal [m]."""
 PARAMETERS = ROOT / "config" / "parameters"
@@ -104,7 +106,7 @@ class Ear(Node):
 class RestWatch:
     """Counts the torques that a controller sends while it is to rest, by its own stamps.
 
-    An update sends its torques before a new state, so the first torques of a drive are none.
+    The first torques of a drive, which are sent before its state, are zero.
     """
 
     def __init__(self) -> None:
@@ -127,13 +129,11 @@ class RestWatch:
 
     def _judge(self) -> None:
         """Count in the order of sending, which is not that of arrival."""
-        doubt = False
         for at, state, turns in sorted(self._sent):
             if state:
-                self._since, doubt = np.inf if state == "driving" else at, False
-            elif at - self._since > FLIGHT:
-                self._count += doubt
-                doubt = turns
+                self._since = np.inf if state == "driving" else at
+            else:
+                self._count += turns and at - self._since > FLIGHT
         self._sent.clear()
 
 
@@ -148,11 +148,17 @@ class Programs:
     def __init__(self, nodes: NodeProcesses, terrain: Path):
         self._nodes, self._clock = nodes, SteppedClock(nodes.folder)
         self._steps = itertools.cycle(STEPS)
-        rests = self._write("simulated_traction_controller", rest_policy="brake")  # no torques
+        rests = self._write(
+            "simulated_traction_controller",
+            rest_policy="brake",  # no torques
+            realtime_priority=PRIORITY,
+        )
+        drives = self._write("rover_simulator", realtime_priority=PRIORITY)
         reads = self._write("traverse_server", map_folder=str(nodes.folder))
         commands = simulation_commands(
             terrain_file=str(terrain),
             speed="0.08",
+            rover_simulator_parameters=drives,
             traction_controller_parameters=rests,
             traverse_server_parameters=reads,
         )
@@ -163,7 +169,7 @@ class Programs:
         for name in self._modules:
             self.start(name)
 
-    def _write(self, stem: str, **values: str) -> str:
+    def _write(self, stem: str, **values: str | int) -> str:
         """Write a parameter file of the package with other values; return its name."""
         content = yaml.safe_load((PARAMETERS / f"{stem}.yaml").read_text())
         content["/**"]["ros__parameters"] |= values

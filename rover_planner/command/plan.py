@@ -44,16 +44,22 @@ def plan(
     max_torque: MaxTorque = None,
     soil: SoilName = None,
     payload: Payload = None,
-    budget: Annotated[float, option("S", "Time for the search in s.")] = 2.0,
+    budget: Annotated[
+        float, option("S", "Time for the search in s; smoothing takes up to a fifth more.")
+    ] = 2.0,
     cell: Annotated[
         float | None,
-        option("M", "Distance of the lattice's nodes in m; a quarter of the wheelbase."),
+        option("M", "Distance of the lattice's nodes in m; default: a quarter of the wheelbase."),
     ] = None,
     frontier: Annotated[
-        bool, flag("--frontier", "Plan as near as possible to a goal on unknown ground.")
+        bool,
+        flag("--frontier", "Plan as near as possible to a goal on unknown ground or off the map."),
     ] = False,
     sigmas: Sigmas = 3.0,
     accepted_chance: AcceptedChance = ACCEPTED_CHANCE,
+    chance_weight: Annotated[
+        float, option("M", "Length in m that a path may be longer to fail never, not always.")
+    ] = 0.0,
     picture: Picture = None,
     dump: Annotated[
         Path | None, option("FILE", "Write the question for replay-plan, .npz.")
@@ -71,7 +77,9 @@ def plan(
     from rover_planner.planning.search.query import LatticeSettings, SearchQuery
     from rover_planner.planning.search.query_file import write_query
 
-    settings = LatticeSettings(budget=budget, cell=cell, frontier=frontier)
+    settings = LatticeSettings(
+        budget=budget, cell=cell, frontier=frontier, chance_weight=chance_weight
+    )
     question = SearchQuery(
         load_rover(rover),
         load_terrain(terrain, max_cells),

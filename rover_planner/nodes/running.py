@@ -21,7 +21,7 @@ from rclpy.signals import SignalHandlerOptions
 from rover_physics.errors import RoverError
 from rover_planner.nodes.programs import read_arguments
 from rover_planner.ros.guard import GuardedExecutor
-from rover_planner.ros.process import init_ros, warn_of_disk
+from rover_planner.ros.process import init_ros, take_priority, warn_of_disk
 from rover_planner.shell.run_program import EXIT_BAD_INPUT, EXIT_OK
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
@@ -55,6 +55,7 @@ def run_node(
         init_ros(argv, signal_handler_options=SignalHandlerOptions.NO)
         executor = GuardedExecutor()
         node = make(options)
+        _take_priority(node)
         stop.defer(executor.wake)
         warn_of_disk(node.get_logger())
         executor.add_node(node)
@@ -73,6 +74,14 @@ def run_node(
             node.destroy_node()
         rclpy.try_shutdown()
     return EXIT_OK
+
+
+def _take_priority(node: Node) -> None:
+    """Set the real-time priority of a node's parameter; log a warning if it is not granted."""
+    if node.has_parameter("realtime_priority"):
+        refusal = take_priority(node.get_parameter("realtime_priority").value)
+        if refusal:
+            node.get_logger().warning(refusal)
 
 
 class StopSignals:

@@ -31,7 +31,6 @@ from rover_planner.parameters.traction_controller import TractionControllerParam
 from rover_planner.ros.frames import NodeFrames
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.logs import TransitionLog
-from rover_planner.ros.process import take_priority
 from rover_planner.ros.qos import latched_qos, sensor_qos, topic_qos
 from rover_planner.shell.kernels import load_kernels
 from rover_planner.traction.clocks import ClockWatch
@@ -115,12 +114,6 @@ class TractionController(Node):
     def state(self) -> str:
         """The state as on ~/state, such as driving; empty before the first update."""
         return "" if self._command is None else self._command.state
-
-    def take_priority(self) -> None:
-        """Set the real-time priority of the parameter; log a warning if it is not granted."""
-        refusal = take_priority(self._values.realtime_priority)
-        if refusal:
-            self.get_logger().warning(refusal)
 
     def stop(self) -> None:
         """Send zero torques and the brake, wait until they have arrived, and stop updating."""
@@ -209,6 +202,7 @@ class TractionController(Node):
         )
         if not sent:
             command = self._supervisor.fail(LOOP_FAULT)
+            self._write(command)  # torques of a sending that hung are not the last ones
         self._topics.publish_forces(command.update)
         self.statistics.take(command.update, start, time.perf_counter())
         self._log_changes(command, now)
@@ -286,13 +280,7 @@ class TractionController(Node):
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the node until it is stopped; return 2 for a wrong argument or parameter, else 0."""
-
-    def make(_: Any) -> TractionController:
-        node = TractionController()
-        node.take_priority()
-        return node
-
-    return run_node(NODE_NAME, argv, make, SWITCH_INTERVAL)
+    return run_node(NODE_NAME, argv, lambda _: TractionController(), SWITCH_INTERVAL)
 
 
 if __name__ == "__main__":

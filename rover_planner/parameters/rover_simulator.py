@@ -65,6 +65,7 @@ class RoverSimulatorParameters(ParameterTable):
         0.5, "Age above which cmd_vel and torques are ignored.", unit="s", bounds=(0.01, 10.0)
     )
     stop_timeout: float = shared.STOP_TIMEOUT
+    realtime_priority: int = shared.REALTIME_PRIORITY
     rate: float = parameter(50.0, "Steps per second.", unit="1/s", bounds=(5.0, 500.0))
     map_rate: float = parameter(0.5, "Maps per second.", unit="1/s", bounds=(0.01, 20.0))
     sensor_range: float = parameter(

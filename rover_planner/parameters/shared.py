@@ -87,6 +87,12 @@ CELL_HEIGHT: str = parameter(
 
 
 MAX_MAP_CELLS: int = parameter(MAX_CELLS, "Largest terrain file.", unit="cells", bounds=(4, 10**9))
+REALTIME_PRIORITY: int = parameter(
+    0,
+    "Real-time priority of this process (SCHED_FIFO), if the system grants it; 0 for none.",
+    bounds=(0, 99),
+    read_only=True,
+)
 STOP = "traverse_server/stop"
 """Topic on which the watch of the accepted path says whether the rover is to stop."""
 

@@ -23,12 +23,7 @@ class TractionControllerParameters(ParameterTable):
     rate: float = parameter(
         50.0, "Updates per second.", unit="1/s", bounds=(10.0, 500.0), read_only=True
     )
-    realtime_priority: int = parameter(
-        0,
-        "Real-time priority of this process (SCHED_FIFO), if the system grants it; 0 for none.",
-        bounds=(0, 99),
-        read_only=True,
-    )
+    realtime_priority: int = shared.REALTIME_PRIORITY
     enabled_at_start: bool = parameter(
         False,
         "Whether the node drives without a call of ~/enable; for simulations.",

@@ -84,6 +84,13 @@ class TraverseServerParameters(ParameterTable):
     search_frontier: bool = parameter(
         False, "Whether a goal beyond the known ground is answered with a path to near it."
     )
+    chance_weight: float = parameter(
+        0.0,
+        "Length that a path of a search may be longer to fail never instead of always; 0 does not "
+        "weigh chances.",
+        unit="m",
+        bounds=(0.0, 1e6),
+    )
     plan_spacing: float = parameter(
         0.1,
         "Distance between poses of a plan, which also has those where the class changes; "

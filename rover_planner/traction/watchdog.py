@@ -46,12 +46,14 @@ class Watchdog:
             deadline: Monotonic time at which the watchdog acts [s].
 
         Returns:
-            Whether it was sent.
+            Whether it was sent in time. If not, it may have been sent while the watchdog acted:
+            then the watchdog goes on acting, and the caller does well to send zeros at once.
         """
         with self._lock:
+            if self._acted_at < started:
+                command()
             if self._acted_at >= started:
                 return False
-            command()
             self._deadline = deadline
         return True
 

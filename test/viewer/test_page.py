@@ -170,6 +170,10 @@ def test_a_dragged_number_is_judged_and_the_reason_of_a_refused_one_stays_on_the
         return float(visitor.box(FRICTION).input_value()) == session.wanted.rover.friction
 
     wait_until(is_in_the_box, "the box")
+    visitor.box(FRICTION).fill("0.001")
+    visitor.tab.keyboard.press("Enter")
+    wait_until(lambda: session.wanted.rover.friction > 0.001, "the end of the slider")
+    wait_until(is_in_the_box, "the end in the box that is still typed in")
     wait_for_rest(page)
     friction = session.wanted.rover.friction
     visitor.tab.locator("#sliders summary", has_text="Masses").click()

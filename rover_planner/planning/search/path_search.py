@@ -19,6 +19,7 @@ from rover_planner.planning.dubins import dubins_paths
 from rover_planner.planning.path_query import Candidate
 from rover_planner.planning.search.closed_area import ClosedArea, find_closed_area
 from rover_planner.planning.search.connections import (
+    FRONTIER_PRICE,
     connect_frontier,
     connect_goal,
     connect_start,
@@ -58,6 +59,8 @@ RADII = (2.0, 1.0)
 """Radii of the curves that are tried [tightest radii of the rover]."""
 GAIN = 1e-3
 """Share of its cost that a curve must save."""
+ASKED = 0.99
+"""Accepted chance from which the chance of a path is not asked for where it is weighed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,6 +116,7 @@ class SearchResult:
                 "energy": None if path is None else float(path.prediction.energy[-1]),
                 "time": None if path is None else float(path.prediction.time[-1]),
                 "risk": None if path is None else path.verdict.risk,
+                "failure_chance": None if path is None else path.verdict.failure_chance,
                 "cost": self.cost,
                 "expanded": self.expanded,
                 "edges_judged": self.edges_judged,
@@ -147,7 +151,47 @@ def find_path(
         PlanningError: Start or goal are not finite or not on the map.
         RoverError: The model refuses an option.
     """
-    return _PathFinder(query, settings or LatticeSettings(), memory, on_progress).answer()
+    settings = settings or LatticeSettings()
+    if settings.chance_weight > 0.0 and not settings.ends_at_first:
+        return _weigh_chances(query, settings, memory, on_progress)
+    return _PathFinder(query, settings, memory, on_progress).answer()
+
+
+def _weigh_chances(
+    query: SearchQuery,
+    settings: LatticeSettings,
+    memory: EdgeMemory | None,
+    on_progress: Callable[[SearchProgress], None] | None,
+) -> SearchResult:
+    """Return the path with the least cost + weight x chance of several.
+
+    The first is the cheapest one whose chance is accepted, each further one the cheapest with at
+    most half the chance of that before. What is uncertain is mostly common to a path, so that its
+    chance is that of its worst place and does not add up from edge to edge.
+    """
+    began, weight = time.perf_counter(), settings.chance_weight
+    accepted = min(query.options.accepted_chance, ASKED)
+    answers, totals = [], []
+    while True:
+        settings = replace(settings, budget=0.5 * settings.budget)
+        asked = replace(query, options=query.options.change(accepted_chance=accepted))
+        answers.append(_PathFinder(asked, settings, memory, on_progress).answer())
+        path, memory = answers[-1].path, None
+        if path is None:
+            break
+        missed = FRONTIER_PRICE * float(np.hypot(*(path.poses[-1] - query.goal)[:2]))
+        cost = cost_of_path(query.rover, Gear.FORWARD, path) + missed
+        accepted = 0.5 * path.verdict.failure_chance
+        totals.append(cost + weight * path.verdict.failure_chance)
+        if accepted == 0.0 or cost >= min(totals):
+            break
+    best = answers[int(np.argmin(totals)) if totals else 0]
+    return replace(
+        best,
+        seconds_first=answers[0].seconds_first,
+        seconds=time.perf_counter() - began,
+        repeatable=all(one.repeatable for one in answers),
+    )
 
 
 class _PathFinder:

@@ -53,12 +53,18 @@ class LatticeSettings:
     beyond it."""
     ends_at_first: bool = False
     """True if the first path is the answer; else better ones are searched for the whole budget."""
+    chance_weight: float = 0.0
+    """Cost of a path that fails for sure [m of level ground]; 0 does not weigh chances."""
 
     def __post_init__(self) -> None:
         for name in ("budget", "cell"):
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0.0):
                 raise PlanningError(f"{name} is {value}; it must be a finite number above 0")
+        if not (math.isfinite(self.chance_weight) and self.chance_weight >= 0.0):
+            raise PlanningError(
+                f"chance_weight is {self.chance_weight}; it must be a finite number of at least 0"
+            )
 
 
 def choose_window(query: SearchQuery, cell: float) -> tuple[Nodes, bool]:

@@ -3,7 +3,7 @@
 // A part is drawn anew when it comes; nothing here knows more than `state` has.
 
 const state = {};
-const chosen = { tab: "Drive", lane: "", link: "", program: "", dragged: null };
+const chosen = { tab: "Drive", lane: "", link: "", program: "", moved: null };
 const at = (id) => document.getElementById(id);
 const SVG = "http://www.w3.org/2000/svg";
 const COLOURS = { rear: "#0072b2", middle: "#d55e00", front: "#00795a" };
@@ -186,13 +186,16 @@ function drawSliders({ parts }) {
         if (event.target.value === "") return;
         ask({ ask: "value", label, value: Number(event.target.value) });
       };
-      const settle = () => setTimeout(() => drawValues(state.values), SETTLE);
-      const release = () => { chosen.dragged = null; settle(); };
+      const move = () => { chosen.moved = label; };
+      const settle = () => setTimeout(() => {
+        if (chosen.moved === label) chosen.moved = null;
+        drawValues(state.values);
+      }, SETTLE);
       const ends = { min: low, max: high, step: "any", "aria-label": label };
       return make("div", { class: "slider", "data-label": label },
         make("label", {}, label),
-        make("input", { type: "range", ...ends, step, oninput: (event) => { chosen.dragged = label; send(event); }, onchange: release }),
-        make("input", { type: "number", ...ends, onchange: (event) => { send(event); settle(); } }));
+        make("input", { type: "range", ...ends, step, oninput: (event) => { move(); send(event); }, onchange: settle }),
+        make("input", { type: "number", ...ends, oninput: move, onchange: (event) => { send(event); settle(); } }));
     }))));
   if (state.values) drawValues(state.values);
 }
@@ -201,10 +204,8 @@ function drawValues(values) {
   for (const row of at("sliders").querySelectorAll(".slider")) {
     const [now, loaded] = values[row.dataset.label] || [0, 0];
     row.toggleAttribute("data-changed", Math.abs(now - loaded) > 1e-9);
-    if (chosen.dragged === row.dataset.label) continue;
-    for (const input of row.querySelectorAll("input")) {
-      if (document.activeElement !== input || input.type === "range") input.value = String(Number(now.toPrecision(6)));
-    }
+    if (chosen.moved === row.dataset.label) continue;
+    for (const input of row.querySelectorAll("input")) input.value = String(Number(now.toPrecision(6)));
   }
 }
 
