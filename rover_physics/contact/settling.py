@@ -33,6 +33,9 @@ QUICK_ATTEMPTS = 5
 """Newton's method runs up to this often; after each time, all ground is looked at."""
 PROMISING = 2.0
 """Growth of the largest gap from one attempt to the next that ends the quick attempts."""
+RECOVERY_ATTEMPTS = 3
+"""Largest number of recoveries from the start: all wheels together, one after the other, and
+together from a wheel's radius higher."""
 RECOVERIES = 7
 """Times that the gaps are closed wheel by wheel, after the quick attempts have failed."""
 FINAL_ATTEMPTS = 3
@@ -54,8 +57,8 @@ def settle(model, work):
     """Settle the rover at `work.pose`: write `work.q`, its placement and its contacts.
 
     The search starts from q = 0, so the result depends on the pose alone. Where Newton's method
-    fails, the gaps are closed wheel by wheel: all wheels together, so that no side comes first,
-    then, if that fails, one after the other.
+    fails, the gaps are closed wheel by wheel: all wheels together, so that no side comes first;
+    if that fails, one after the other; and if that fails, too, together from higher up.
 
     Args:
         model: A record with `ground` GROUND, `linkage` LINKAGE and `samples` WHEEL_SAMPLES.
@@ -90,12 +93,15 @@ def settle(model, work):
     if status == ContactStatus.IN_CONTACT and worst > GAP_TOLERANCE:
         for i in range(6):
             work.unsettled[i] = work.q[i]
-        status, worst = _recover(model, work, True)
-        if status == ContactStatus.IN_CONTACT and not worst <= GAP_TOLERANCE:
-            for i in range(6):
-                work.q[i] = work.unsettled[i]
-            place(model.linkage, work.pose, work.q, work.placement)
-            status, worst = _recover(model, work, False)
+        for attempt in range(RECOVERY_ATTEMPTS):
+            if attempt > 0:
+                for i in range(6):
+                    work.q[i] = work.unsettled[i]
+                work.q[0] += model.samples.radius if attempt > 1 else 0.0
+                place(model.linkage, work.pose, work.q, work.placement)
+            status, worst = _recover(model, work, attempt != 1)
+            if status == ContactStatus.IN_CONTACT and worst <= GAP_TOLERANCE:
+                break
     if status != ContactStatus.IN_CONTACT:
         return _refuse(status)
     if not worst <= GAP_TOLERANCE or _has_turned_over(work.q):
