@@ -52,7 +52,8 @@ def look_everywhere(model, work, wheel, tops):
     if search.found:
         keep_contact(contacts, wheel)
         _take_peak(model.ground, search, contacts, wheel)
-    if search.rim != 0:
+    noticed = NOTICED * search.radius if search.found else 0.0
+    if search.rim != 0 and search.best_on_rim > search.best + noticed:
         keep_contact(contacts, wheel)
         _take_rim(model, work, wheel)
     return status

@@ -68,5 +68,5 @@ def take_point(search, s, t, base):
 @kernel
 def take_rim_point(search, rim, s, intrusion):
     """Keep a point of a rim, -1 right or 1 left, if it is the best of all so far."""
-    if intrusion > search.best_on_rim:
+    if intrusion > search.best_on_rim + ROUNDING:
         search.best_on_rim, search.rim_s, search.rim = intrusion, s, rim
