@@ -329,7 +329,7 @@ class GroundLearner:
             np.maximum(SLIP_SHARE * np.abs(window.rolling), CERTAIN * window.deviation),
             SLIP_SPEED * self._rover.nominal_speed,
         )
-        return np.asarray(window.slip_speed > least + window.scrub)
+        return np.asarray(window.slip_speed > least + window.scrub + window.uneven)
 
     def _learn_friction(
         self,
