@@ -31,7 +31,7 @@ from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from support.learning_drives import row_of_plant
 from support.reference_drives import drive_ground
 
-MUJOCO, QUASI_STATIC, SOIL = "MuJoCo", "quasi-static", "quasi-static, soil"
+MUJOCO, QUASI_STATIC, SOIL = "MuJoCo", "quasi-static", "soil"
 SOFT = "lunar_nominal"
 """Soil of drives over soil."""
 TURN, RADII = 0.1, (0.8, 3.0)
@@ -237,18 +237,20 @@ def rate(count: int, hours: float) -> str:
 def main(
     hours: Annotated[float, typer.Option(help="Hours in each simulator.")] = 1.0,
     seed: Annotated[int, typer.Option(help="Seed of the drives.")] = 1,
+    only: Annotated[str, typer.Option(help="One simulator: MuJoCo, quasi-static, soil.")] = "",
 ) -> None:
     """Drive, and print the alarms by simulator and ground."""
     mean = PARTS * (0.5 * sum(LASTS) * 5.0 + LASTS[0]) / 6.0
     count, names = round(3600.0 * hours / mean), list(grounds())
+    simulators = [only] if only else [QUASI_STATIC, SOIL, MUJOCO]
     outings = [
         Outing(simulator, names[k % len(names)], 1000 * seed + k)
-        for simulator in (QUASI_STATIC, SOIL, MUJOCO)
+        for simulator in simulators
         for k in range(count)
     ]
     heard = [one for one in run_in_processes(listen, [(o,) for o in outings], 2) if one]
     table = []
-    for simulator in (QUASI_STATIC, SOIL, MUJOCO):
+    for simulator in simulators:
         for name in (*names, "all"):
             own = [
                 one
