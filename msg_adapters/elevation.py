@@ -35,17 +35,25 @@ from rover_physics.numerics.plausible import MAX_RESOLUTION, MIN_RESOLUTION
 from rover_physics.numerics.quiet import quiet
 from rover_physics.terrain.grid import Terrain
 
-LAYERS = ("friction", "elevation_std")
-"""Fields of a cloud besides x, y and z that become layers of the terrain."""
+CLASS = "class"
+"""Field with classes of ground, of any datatype."""
+LAYERS = {"friction": "friction", "elevation_std": "elevation_std", CLASS: "ground_class"}
+"""Fields of a cloud besides x, y and z, and the layers of the terrain that they become."""
 
 MAX_POINT_STEP = 1_000_000
 """Largest size of a point [bytes]."""
 
 _FLOATS = {PointField.FLOAT32: "f4", PointField.FLOAT64: "f8"}
-_DATATYPE_NAMES = {
-    getattr(PointField, name): name
-    for name in ("INT8", "UINT8", "INT16", "UINT16", "INT32", "UINT32", "FLOAT32", "FLOAT64")
+_KINDS = {
+    "INT8": "i1",
+    "UINT8": "u1",
+    "INT16": "i2",
+    "UINT16": "u2",
+    "INT32": "i4",
+    "UINT32": "u4",
 }
+_NUMBERS = _FLOATS | {getattr(PointField, name): kind for name, kind in _KINDS.items()}
+_DATATYPE_NAMES = {getattr(PointField, n): n for n in (*_KINDS, "FLOAT32", "FLOAT64")}
 
 
 @dataclass(frozen=True)
@@ -58,6 +66,8 @@ class CloudPoints:
     """(n,) friction coefficient, where the cloud has such a field."""
     elevation_std: NDArray[np.float64] | None
     """(n,) standard deviation of z [m], where the cloud has such a field."""
+    ground_class: NDArray[np.float64] | None
+    """(n,) class of the ground, where the cloud has a field `class`."""
     precision: float
     """Rounding error of the x and y coordinates [m]."""
 
@@ -70,7 +80,8 @@ def read_points(cloud: PointCloud2, move: PointMove | None = None) -> CloudPoint
     """Read the points of a cloud of any layout, and move them.
 
     Honours height, width, row_step, point_step, field offsets, padding and is_bigendian; x, y, z
-    and the optional `friction` and `elevation_std` may be FLOAT32 or FLOAT64.
+    and the optional `friction` and `elevation_std` may be FLOAT32 or FLOAT64; the optional
+    `class` of any datatype.
 
     Raises:
         MessageError: No points, a field missing or of another datatype, or lengths that disagree.
@@ -82,7 +93,8 @@ def read_points(cloud: PointCloud2, move: PointMove | None = None) -> CloudPoint
     if move is not None:
         xyz = xyz @ move[0].T + move[1]  # NaN where a coordinate is
         precision = rounding_error(points["x"], points["y"], points["z"])
-    return CloudPoints(xyz, columns.get("friction"), columns.get("elevation_std"), precision)
+    layers = {layer: columns.get(name) for name, layer in LAYERS.items()}
+    return CloudPoints(xyz=xyz, precision=precision, **layers)
 
 
 @quiet
@@ -149,7 +161,9 @@ def _terrain_of_raster(points: NDArray[np.void], raster: Raster) -> Terrain:
     if "elevation_std" in (points.dtype.names or ()):
         std = raster.arrange(points["elevation_std"])
         std[unknown] = np.nan
-    return make_terrain(elevation, raster.grid.resolution, raster.grid.origin, friction, std)
+    classes = raster.arrange(points[CLASS]) if CLASS in (points.dtype.names or ()) else None
+    grid = raster.grid
+    return make_terrain(elevation, grid.resolution, grid.origin, friction, std, classes)
 
 
 def _terrain_of_scatter(points: CloudPoints, resolution: float, cell_height: str) -> Terrain:
@@ -182,7 +196,10 @@ def _terrain_of_scatter(points: CloudPoints, resolution: float, cell_height: str
     std = None
     if points.elevation_std is not None:
         std = combine(cells, points.elevation_std[known], grid, "max")
-    return make_terrain(elevation, grid.resolution, grid.origin, friction, std)
+    classes = None
+    if points.ground_class is not None:
+        classes = combine(cells, points.ground_class[known], grid, "most frequent")
+    return make_terrain(elevation, grid.resolution, grid.origin, friction, std, classes)
 
 
 def terrain_to_point_cloud(
@@ -202,7 +219,7 @@ def terrain_to_point_cloud(
         more: Further fields by name, (ny, nx) each.
     """
     rows, columns = terrain.elevation.shape
-    fields = {name: getattr(terrain, name) for name in LAYERS} | dict(more or {})
+    fields = {name: getattr(terrain, layer) for name, layer in LAYERS.items()} | dict(more or {})
     layers = [name for name in fields if fields[name] is not None]
     names = ["x", "y", "z", *layers]
     kind = np.dtype("<" + _FLOATS[datatype])
@@ -288,15 +305,15 @@ def _check_layout(cloud: PointCloud2) -> int:
 
 def _field_format(field: PointField, cloud: PointCloud2) -> str:
     """Return the numpy format of a field in its byte order."""
-    if field.datatype not in _FLOATS:
+    kinds, must = _FLOATS, "FLOAT32 or FLOAT64, in metres"
+    if field.name == CLASS:
+        kinds, must = _NUMBERS, f"one of {', '.join(_DATATYPE_NAMES.values())}"
+    if field.datatype not in kinds:
         datatype = _DATATYPE_NAMES.get(field.datatype, str(field.datatype))
-        raise MessageError(
-            f"cloud field {field.name} has datatype {datatype}; "
-            "it must be FLOAT32 or FLOAT64, in metres"
-        )
+        raise MessageError(f"cloud field {field.name} has datatype {datatype}; it must be {must}")
     if field.count > 1:
         raise MessageError(f"cloud field {field.name} has count {field.count}; it must be 1")
-    kind = _FLOATS[field.datatype]
+    kind = kinds[field.datatype]
     if field.offset + int(kind[1]) > cloud.point_step:
         raise MessageError(
             f"cloud field {field.name} at offset {field.offset} does not fit into "

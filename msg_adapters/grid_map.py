@@ -37,6 +37,8 @@ class GridMapLayers:
     """Variances of the heights [m^2]; a map without this layer has exact heights."""
     friction: str = "friction"
     """Coulomb friction coefficients; a map without this layer has the default."""
+    ground_class: str = "class"
+    """Classes of ground, whole numbers from 0; a map without this layer has none."""
 
 
 @quiet
@@ -107,7 +109,8 @@ def terrain_from_grid_map(message: Any, layers: GridMapLayers | None = None) -> 
         float(place.x) - 0.5 * (elevation.shape[1] - 1) * size,
         float(place.y) - 0.5 * (elevation.shape[0] - 1) * size,
     )
-    return make_terrain(elevation, float(size), origin, friction, std)
+    classes = read(layers.ground_class) if layers.ground_class in names else None
+    return make_terrain(elevation, float(size), origin, friction, std, classes)
 
 
 def _shape_of(info: Any) -> tuple[int, int]:

@@ -241,6 +241,8 @@ def combine(cells, values, grid: CloudGrid, how: str) -> NDArray[np.float64]:
         np.fmax.at(combined, cells, values)
     elif how == "median":
         combined = _medians(cells, values, size)
+    elif how == "most frequent":
+        combined = most_frequent(cells, values, size)
     else:
         counts = np.bincount(cells, minlength=size)
         sums = np.bincount(cells, weights=values, minlength=size)
@@ -259,6 +261,20 @@ def _medians(cells, values, size: int) -> NDArray[np.float64]:
     high = (ends - counts + counts // 2)[some]
     medians[some] = 0.5 * (ordered[low] + ordered[high])
     return medians
+
+
+def most_frequent(cells, values, size: int) -> NDArray[np.float64]:
+    """Return the most frequent of the values of each of `size` cells; NaN ones do not count.
+
+    Of values that are equally frequent it is the largest.
+    """
+    known = np.isfinite(values)
+    kinds, kind = np.unique(values[known], return_inverse=True)
+    pairs, counts = np.unique(cells[known] * len(kinds) + kind, return_counts=True)
+    pairs = pairs[np.argsort(counts, kind="stable")]
+    found = np.full(size, np.nan)
+    found[pairs // max(len(kinds), 1)] = kinds[pairs % max(len(kinds), 1)]
+    return found
 
 
 def typical_spacing(xy: NDArray[np.float64]) -> float:
@@ -282,7 +298,16 @@ def make_terrain(
     origin: tuple[float, float],
     friction: NDArray[np.float64] | None,
     std: NDArray[np.float64] | None,
+    ground_class: NDArray[np.float64] | None = None,
 ) -> Terrain:
-    """Make a terrain of new layers (ny, nx) without copying them; they become read-only."""
-    layers = [None if layer is None else seal_array(layer) for layer in (friction, std)]
-    return Terrain(seal_array(elevation), resolution, origin, layers[0], elevation_std=layers[1])
+    """Make a terrain of new layers (ny, nx) without copying them; they become read-only.
+
+    Classes that are not finite or below 0 are none.
+    """
+    if ground_class is not None:
+        ground_class[~np.isfinite(ground_class) | (ground_class < 0.0)] = np.nan
+    layers = {"friction": friction, "elevation_std": std, "ground_class": ground_class}
+    sealed: dict[str, Any] = {
+        name: seal_array(layer) for name, layer in layers.items() if layer is not None
+    }
+    return Terrain(seal_array(elevation), resolution, origin, **sealed)

@@ -63,17 +63,23 @@ def drive_over_soil(rover: Rover, ground: Terrain, soil: str, seconds: float) ->
     plant, period, rows = QuasiStaticPlant(rover, ground, (-1.5, 0.0, 0.0), soil=soil), 0.1, []
     for step in range(round(seconds / period)):
         plant.drive(rover.nominal_speed, 0.0, period)
-        state, pose, row = plant.state(), plant.pose(), np.full(WIDTH, np.nan)
-        if state.stopped:
+        if plant.state().stopped:
             break
-        R = matrix_from_xyzw(state.orientation)
-        row[[TIME, X, Y, YAW]] = (step + 1) * period, *pose
-        row[[ROLL, PITCH]] = np.arctan2(R[2, 1], R[2, 2]), np.arcsin(-R[2, 0])
-        row[SUSPENSION] = [state.joint_positions[name] for name in SUSPENSION_JOINTS]
-        row[RATES] = [state.joint_velocities[name] for name in WHEEL_JOINTS]
-        row[TORQUES], row[STEERING] = state.wheel_torques, 0.0
-        rows.append(row)
+        rows.append(row_of_plant(plant, (step + 1) * period))
     return np.array(rows).reshape(-1, WIDTH)
+
+
+def row_of_plant(plant: QuasiStaticPlant, time: float) -> Floats:
+    """Return what is measured of a quasi-static rover at a time [s]."""
+    state, row = plant.state(), np.full(WIDTH, np.nan)
+    R = matrix_from_xyzw(state.orientation)
+    row[[TIME, X, Y, YAW]] = time, *plant.pose()
+    row[[ROLL, PITCH]] = np.arctan2(R[2, 1], R[2, 2]), np.arcsin(-R[2, 0])
+    row[SUSPENSION] = [state.joint_positions[name] for name in SUSPENSION_JOINTS]
+    row[RATES] = [state.joint_velocities[name] for name in WHEEL_JOINTS]
+    row[STEERING] = [state.joint_positions.get(name, 0.0) for name in STEERING_JOINTS]
+    row[TORQUES] = state.wheel_torques
+    return row
 
 
 def ramp(slope: float) -> Terrain:

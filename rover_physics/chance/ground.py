@@ -27,7 +27,7 @@ def cut_around(terrain: Terrain, places: Floats, margin: float) -> Terrain:
     columns, rows = (slice(a, b + 2) for a, b in zip(first, last, strict=True))
     layers: dict[str, Any] = {
         name: None if layer is None else np.ascontiguousarray(layer[rows, columns])
-        for name in ("elevation", "friction", "soil", "elevation_std")
+        for name in ("elevation", "friction", "soil", "elevation_std", "ground_class")
         for layer in (getattr(terrain, name),)
     }
     x, y = np.asarray(terrain.origin) + terrain.resolution * first

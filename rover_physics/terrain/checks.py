@@ -19,6 +19,9 @@ from rover_physics.numerics.plausible import (
     MIN_RESOLUTION,
 )
 
+MAX_CLASS = 65535
+"""Largest class of ground."""
+
 
 def as_elevation(values: ArrayLike) -> NDArray[np.float64]:
     """Return heights (ny, nx) [m]; at least one must be known."""
@@ -38,6 +41,16 @@ def as_friction(values: ArrayLike, elevation: NDArray[np.float64]) -> NDArray[np
     must = f"above 0, at least {MIN_FRICTION:g}, or NaN for the default"
     _refuse_first(friction, friction < MIN_FRICTION, "friction", must)
     return friction
+
+
+def as_ground_class(values: ArrayLike, elevation: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return classes of ground (ny, nx), whole numbers from 0, NaN where there is none."""
+    classes = _as_grid("ground_class", values, MAX_CLASS)
+    _check_shape("ground_class", classes, elevation)
+    wrong = (classes < 0.0) | (classes > np.floor(classes))
+    must = f"a whole number from 0 to {MAX_CLASS}, or NaN for none"
+    _refuse_first(classes, wrong, "ground_class", must)
+    return classes
 
 
 def as_soil(

@@ -7,7 +7,7 @@ import numpy as np
 
 from rover_physics.terrain.grid import Terrain
 
-LAYERS = ("elevation", "friction", "elevation_std", "soil")
+LAYERS = ("elevation", "friction", "elevation_std", "soil", "ground_class")
 """Layers that count, in this order."""
 DIGITS = 16
 """Hexadecimal digits of a fingerprint."""

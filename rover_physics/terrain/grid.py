@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Terrain: an elevation grid with unknown cells and layers of friction, soil and uncertainty."""
+"""Terrain: an elevation grid with unknown cells and layers of friction, soil and more."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +16,7 @@ from rover_physics.terrain.checks import (
     as_elevation,
     as_elevation_std,
     as_friction,
+    as_ground_class,
     as_origin,
     as_resolution,
     as_soil,
@@ -60,6 +61,9 @@ class Terrain:
     elevation_std: NDArray[np.float64] | None = None
     """Standard deviation of the heights (ny, nx) in [m], at least 0, known where the height is
     known; None: the heights are exact."""
+    ground_class: NDArray[np.float64] | None = None
+    """Classes of ground (ny, nx) as a camera tells them apart, whole numbers from 0, NaN where
+    there is none; None: none anywhere. What is learned on a class holds for all its cells."""
 
     def __post_init__(self) -> None:
         elevation = as_elevation(self.elevation)
@@ -80,6 +84,8 @@ class Terrain:
             )
         if self.elevation_std is not None:
             checked["elevation_std"] = as_elevation_std(self.elevation_std, elevation)
+        if self.ground_class is not None:
+            checked["ground_class"] = as_ground_class(self.ground_class, elevation)
         for name, value in checked.items():
             frozen = freeze_array(value) if isinstance(value, np.ndarray) else value
             object.__setattr__(self, name, frozen)
@@ -176,8 +182,9 @@ def load_terrain(name_or_path: str | Path, max_cells: int = MAX_CELLS) -> Terrai
     Args:
         name_or_path: A preset's name such as ``"spirit"``, or the path of a file with
             ``elevation`` (ny, nx) [m], ``resolution`` [m], ``origin`` (x, y) [m] and
-            optionally layers (ny, nx): ``friction``, ``soil`` with ``soil_names``, and
-            ``elevation_std`` [m]. Other entries, such as ``source``, are ignored.
+            optionally layers (ny, nx): ``friction``, ``soil`` with ``soil_names``,
+            ``elevation_std`` [m], and ``ground_class``. Other entries, such as ``source``, are
+            ignored.
         max_cells: Largest number of cells; a larger terrain is refused before it is unpacked.
 
     Raises:
@@ -207,13 +214,13 @@ def read_terrain(file: BinaryIO, source: str | Path, max_cells: int = MAX_CELLS)
         raise TerrainError(f"{show_file(source)}: {error}") from None
 
 
-def save_terrain(path: str | Path, terrain: Terrain, **notes: str) -> None:
+def save_terrain(path: str | Path, terrain: Terrain, **notes: Any) -> None:
     """Save a terrain as an ``.npz`` file that `load_terrain` reads.
 
     Args:
         path: File to write, without a suffix added; an existing file is replaced.
         terrain: The terrain.
-        notes: Further texts to store in the file, e.g. ``source``.
+        notes: Further texts or arrays to store in the file, e.g. ``source``.
 
     Raises:
         TerrainError: The file cannot be written.
@@ -222,7 +229,7 @@ def save_terrain(path: str | Path, terrain: Terrain, **notes: str) -> None:
     entries["elevation"] = terrain.elevation
     entries["resolution"] = np.float64(terrain.resolution)
     entries["origin"] = np.asarray(terrain.origin)
-    for layer in ("friction", "soil", "elevation_std"):
+    for layer in ("friction", "soil", "elevation_std", "ground_class"):
         if getattr(terrain, layer) is not None:
             entries[layer] = getattr(terrain, layer)
     if terrain.soil_names:

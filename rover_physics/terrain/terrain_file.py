@@ -17,14 +17,15 @@ from rover_physics.numerics.read_only import seal_array
 
 MAX_CELLS = 25_000_000
 """Default of the largest terrain [cells]."""
-MAX_CELL_BYTES = 32
-"""Largest memory of a cell: elevation, friction, elevation_std and soil, 8 bytes each."""
+MAX_CELL_BYTES = 40
+"""Largest memory of a cell: elevation and four layers, 8 bytes each."""
 REQUIRED = ("elevation", "resolution", "origin")
 GRIDS: dict[str, type | None] = {
     "elevation": np.float64,
     "friction": np.float64,
     "soil": None,
     "elevation_std": np.float64,
+    "ground_class": np.float64,
 }
 """Entries with a value for each cell, and the types they are read as; None keeps that of the
 file."""

@@ -45,7 +45,8 @@ def advise(
     max_torque: MaxTorque = None,
     soil: SoilName = None,
     arm: Annotated[
-        list[str] | None, option("NAME=RAD", "Angle of a joint of the arm in rad; give all.")
+        list[str] | None,
+        option("NAME=RAD", "Angle of a joint of the arm in rad; give all; default: stowed."),
     ] = None,
     payload: Payload = None,
     sigmas: Sigmas = 3.0,

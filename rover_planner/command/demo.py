@@ -11,9 +11,9 @@ from rover_planner.command.options import MaxGap, OptionalMap, RoverOption
 
 def demo(
     map_name: OptionalMap = None,
-    out: Annotated[Path, typer.Option(help="Picture to write, .png.")] = Path(
-        "demo_output/demo.png"
-    ),
+    out: Annotated[
+        Path, typer.Option(help="Picture to write, .png; logs and a made terrain go beside it.")
+    ] = Path("demo_output/demo.png"),
     rover: RoverOption = "lsr1",
     seed: Annotated[int, typer.Option(help="Seed of the terrain and the goals.")] = 1,
     max_gap: MaxGap = 0.2,

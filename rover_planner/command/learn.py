@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command `rover_planner learn`: learns the ground from a recorded drive."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -39,7 +40,8 @@ def learn(
         float | None, option("MU", "Friction that is assumed at first; default: the rover's.")
     ] = None,
     soil: Annotated[
-        str | None, option("NAME", "Soil that is assumed at first, on ground that yields.")
+        str | None,
+        option("NAME", "Soil that is assumed at first, on ground that yields; it is learned."),
     ] = None,
     odometry_topic: Annotated[
         str, option("TOPIC", "Odometry of a bag that does not come from the wheels.")
@@ -84,18 +86,14 @@ def learn(
             "or too short"
         )
     write_learned(out, describe(learner.estimate, told))
-    layers = learner.ground.layers
+    layers = learner.layers
     if ground is not None:
-        from rover_physics.terrain.terrain_file import write_entries
+        from rover_physics.terrain.grid import save_terrain
 
-        entries = {
-            "elevation": map_.elevation,
-            "resolution": map_.resolution,
-            "origin": np.array(map_.origin),
-            "friction": layers.friction,
-            "friction_std": layers.friction_std,
-        }
-        write_entries(ground, entries)
+        known = layers.friction if map_.friction is None else map_.friction
+        friction_layer = np.where(np.isfinite(layers.friction), layers.friction, known)
+        learned_map = replace(map_, friction=friction_layer)
+        save_terrain(ground, learned_map, friction_std=layers.friction_std)
     if picture is not None:
         from rover_planner.figures.learning_picture import draw_learning
 

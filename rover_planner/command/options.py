@@ -38,13 +38,24 @@ RoverOption = Annotated[str, typer.Option(help=_ROVER)]
 TerrainName = Annotated[str, argument("TERRAIN", f"{_TERRAIN}.")]
 OptionalTerrain = Annotated[str | None, argument("TERRAIN", _OPTIONAL)]
 OptionalMap = Annotated[str | None, option("TERRAIN", _OPTIONAL, "--map")]
-Friction = Annotated[float | None, option("MU", "Coulomb friction everywhere.")]
-MaxTorque = Annotated[float | None, option("TAU", "Largest wheel torque in N m.")]
+Friction = Annotated[
+    float | None,
+    option("MU", "Coulomb friction where the map has no friction layer; default: the rover's."),
+]
+MaxTorque = Annotated[
+    float | None, option("TAU", "Largest wheel torque in N m; default: the rover's.")
+]
 Policy = Annotated[str, option("equal|servo|optimal", "How the wheels share the traction.")]
 SoilName = Annotated[
-    str | None, option("NAME", "Preset soil where the terrain names none (docs/soil.md).")
+    str | None,
+    option(
+        "NAME",
+        "Preset soil (docs/soil.md) where the terrain names none; default: Coulomb friction.",
+    ),
 ]
-Payload = Annotated[float | None, option("KG", "Mass at the arm's tip in kg.")]
+Payload = Annotated[
+    float | None, option("KG", "Mass at the arm's tip in kg; default: the rover's.")
+]
 Sigmas = Annotated[
     float,
     option("K", "Standard deviations to allow for where the map has elevation_std; 0: none."),

@@ -44,13 +44,16 @@ def plan(
     max_torque: MaxTorque = None,
     soil: SoilName = None,
     payload: Payload = None,
-    budget: Annotated[float, option("S", "Time for the search in s.")] = 2.0,
+    budget: Annotated[
+        float, option("S", "Time for the search in s; smoothing takes up to a fifth more.")
+    ] = 2.0,
     cell: Annotated[
         float | None,
-        option("M", "Distance of the lattice's nodes in m; a quarter of the wheelbase."),
+        option("M", "Distance of the lattice's nodes in m; default: a quarter of the wheelbase."),
     ] = None,
     frontier: Annotated[
-        bool, flag("--frontier", "Plan as near as possible to a goal on unknown ground.")
+        bool,
+        flag("--frontier", "Plan as near as possible to a goal on unknown ground or off the map."),
     ] = False,
     sigmas: Sigmas = 3.0,
     accepted_chance: AcceptedChance = ACCEPTED_CHANCE,

@@ -58,7 +58,8 @@ def predict(
     ] = 0.0,
     soil: SoilName = None,
     arm: Annotated[
-        list[str] | None, option("NAME=RAD", "Angle of a joint of the arm in rad; give all.")
+        list[str] | None,
+        option("NAME=RAD", "Angle of a joint of the arm in rad; give all; default: stowed."),
     ] = None,
     payload: Payload = None,
     tool_force: Annotated[
@@ -68,7 +69,11 @@ def predict(
         Vector | None, option("MX MY MZ", "Moment on the arm's tip in N m, body frame.")
     ] = None,
     backward: Annotated[
-        bool, flag("--backward", "The rover drives backwards along the poses.")
+        bool,
+        flag(
+            "--backward",
+            "The rover drives backwards where poses do not tell: single ones, long steps.",
+        ),
     ] = False,
     sigmas: Sigmas = 3.0,
     classes: Annotated[
@@ -107,11 +112,14 @@ def predict(
     gc.freeze()
     gc.enable()
     model = load_rover(rover)
-    if learned is not None:
-        from rover_planner.planning.learned_ground import rover_on_learned_ground
-
-        model = rover_on_learned_ground(model, learned)
     ground = load_terrain(terrain, max_cells)
+    if learned is not None:
+        from rover_planner.planning.learned_ground import lay_friction, read_learned
+
+        known = read_learned(learned)
+        told = model.friction if friction is None else friction
+        ground = lay_friction(ground, known.assume_classes(ground, told))
+        model = known.change(model)
     path = read_poses(poses)
     curvature = read_curvature(poses, len(path))
     options = SweepOptions(

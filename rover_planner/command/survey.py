@@ -35,7 +35,7 @@ def survey(
         str, argument("MAP", "Preset (spirit), elevation map, .npz, or GeoTIFF, .tif.")
     ],
     out: Annotated[Path, argument("OUT", "Zarr store; goes on with one of the same survey.")],
-    headings: Annotated[int, option("N", "Number of headings.")] = 16,
+    headings: Annotated[int, option("N", "Number of headings, 1 to 64.")] = 16,
     step: Annotated[int, option("CELLS", "Distance of surveyed cells in map cells.")] = 1,
     policy: Policy = "equal",
     friction: Friction = None,
@@ -50,11 +50,22 @@ def survey(
     scheduler: Annotated[
         str | None, option("ADDRESS", "Dask scheduler, tcp://...; default: this machine's cores.")
     ] = None,
-    workers: Annotated[int | None, option("N", "Worker processes on this machine.", min=1)] = None,
-    memory_limit: Annotated[
-        str | None, option("SIZE", "Memory of a worker, such as 1GiB.")
+    workers: Annotated[
+        int | None,
+        option(
+            "N",
+            "Worker processes on this machine, without --scheduler; default: one a processor.",
+            min=1,
+        ),
     ] = None,
-    chunk: Annotated[int | None, option("CELLS", "Side of a chunk in surveyed cells.")] = None,
+    memory_limit: Annotated[
+        str | None,
+        option("SIZE", "Memory of a worker, such as 1GiB; default: its share of the machine's."),
+    ] = None,
+    chunk: Annotated[
+        int | None,
+        option("CELLS", "Side of a chunk in surveyed cells; default: some seconds of work."),
+    ] = None,
     geotiff: Annotated[
         Path | None, option("FOLDER", "Write each layer as GeoTIFF (COG), too.")
     ] = None,

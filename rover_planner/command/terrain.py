@@ -12,10 +12,10 @@ from rover_planner.command.options import argument
 def terrain(
     out: Annotated[Path, argument("OUT", "Elevation map to write, .npz; is overwritten.")],
     seed: Annotated[int, typer.Option(help="Seed of all random numbers.")] = 1,
-    size: Annotated[float, typer.Option(help="Width and height in m.")] = 24.0,
+    size: Annotated[float, typer.Option(help="Width and height in m, above 0.5.")] = 24.0,
     resolution: Annotated[float, typer.Option(help="Cell size in m.")] = 0.05,
     roughness: Annotated[
-        float, typer.Option(help="RMS height difference of points 1 m apart in m.")
+        float, typer.Option(help="RMS height difference of points 1 m apart in m, at most 100.")
     ] = 0.04,
     rocks: Annotated[float, typer.Option(help="Fraction of the ground that rocks cover.")] = 0.03,
     craters: Annotated[

@@ -16,7 +16,12 @@ def urdf(
         Path | None, option("FILE", "Write the joint map that reads it back.", "--map")
     ] = None,
     hardware: Annotated[
-        str, option("PLUGIN", "Add <ros2_control> for a hardware plugin.", "--ros2-control")
+        str,
+        option(
+            "PLUGIN",
+            "Add <ros2_control> for a plugin, such as mock_components/GenericSystem.",
+            "--ros2-control",
+        ),
     ] = "",
 ) -> None:
     """Write a rover as URDF, with inertias, joint limits and collision cylinders."""

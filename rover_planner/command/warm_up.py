@@ -9,7 +9,11 @@ import typer
 
 def warm_up(
     processes: Annotated[
-        int, typer.Option(help="Largest number of processes; 0 for one for each processor.", min=0)
+        int,
+        typer.Option(
+            help="Largest number of processes of up to 1 GB each; 0 for one for each processor.",
+            min=0,
+        ),
     ] = 0,
 ) -> None:
     """Compile all kernels, so that the first start is as fast as others: in an image, a build."""

@@ -6,6 +6,7 @@ motion must be measured without the wheels: by visual odometry, or by a simulato
 """
 
 from collections import deque
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -27,7 +28,7 @@ from rover_planner.learning.drive_log import (
     Y,
 )
 from rover_planner.learning.friction_filter import FrictionEstimate, FrictionFilter
-from rover_planner.learning.ground_map import GroundMap
+from rover_planner.learning.ground_map import GroundLayers, GroundMap
 from rover_planner.learning.soil_fit import SoilEstimate, SoilFit
 from rover_planner.learning.stuck_watch import StuckWatch
 from rover_planner.learning.wheel_health import WheelHealth
@@ -86,6 +87,8 @@ class GroundEstimate:
     """Friction under all wheels."""
     sides: dict[str, FrictionEstimate]
     """Friction under the wheels of each side."""
+    classes: dict[int, FrictionEstimate]
+    """Friction of the classes of ground on which wheels have been, where the map has classes."""
     slip_time: float | None
     """First time a wheel was seen to slip [s]."""
     immobilised_time: float | None
@@ -157,9 +160,10 @@ class GroundLearner:
         self._sense = ContactSense(rover, terrain)
         self._windows = SlipWindows(wheel.radius, wheel.width)
         self._soil = None if soil is None else SoilFit(rover, self._sense.weight, soil)
-        told = rover.friction if told is None else told
+        self._told = told = rover.friction if told is None else told
         self._whole = FrictionFilter(told)
         self._sides = {side: FrictionFilter(told) for side in SIDES}
+        self._classes: dict[int, FrictionFilter] = {}
         self._stuck = StuckWatch(rover.nominal_speed, wheel.max_torque)
         self._health = WheelHealth(self._sense.weight, wheel.max_torque)
         self._block: _Block | None = None
@@ -257,13 +261,33 @@ class GroundLearner:
             return False
         elapsed = window.time - self.window.time if self.window else BLOCK
         self.window = window
-        self._learn(window, state, measured, min(elapsed, window.duration))
+        classes = self.ground.classes_at(window.places)
+        for number in np.unique(classes[np.isfinite(classes)]).astype(int).tolist():
+            self._classes.setdefault(number, FrictionFilter(self._told))
+        on_class = {number: classes == number for number in self._classes}
+        self._learn(window, state, measured, on_class, min(elapsed, window.duration))
         for one, wheels in zip(self._sides.values(), _SIDE_WHEELS, strict=True):
-            self.ground.visit(window.places[wheels], one.estimate)
+            self.ground.visit(window.places[wheels & np.isnan(classes)], one.estimate)
+        for number, wheels in on_class.items():
+            self.ground.visit(window.places[wheels], self._classes[number].estimate)
         return True
 
+    @property
+    def layers(self) -> GroundLayers:
+        """Friction on the map: where wheels have been, and by class elsewhere."""
+        return self.ground.spread(self._class_estimates)
+
+    @property
+    def _class_estimates(self) -> dict[int, FrictionEstimate]:
+        return {number: one.estimate for number, one in sorted(self._classes.items())}
+
     def _learn(
-        self, window: SlipWindow, state: WheelState, measured: Flags, elapsed: float
+        self,
+        window: SlipWindow,
+        state: WheelState,
+        measured: Flags,
+        on_class: Mapping[int, Flags],
+        elapsed: float,
     ) -> None:
         faults = self._health.faults
         good = measured & np.array([name not in faults for name in WHEELS])
@@ -287,7 +311,12 @@ class GroundLearner:
             self._soil.take(window, good & self._turns_freely(window), elapsed)
         if grips.all() and abs(float(window.rolling.mean())) > 3.0 * window.deviation:
             self._take_resistance(window, elapsed)
-        self._learn_friction(window, slips, grips & good, elapsed)
+        grounds = [
+            (self._whole, np.ones(WHEEL_COUNT, bool)),
+            *zip(self._sides.values(), _SIDE_WHEELS, strict=True),
+            *((self._classes[number], wheels) for number, wheels in on_class.items()),
+        ]
+        self._learn_friction(window, slips, grips & good, grounds, elapsed)
 
     def _turns_freely(self, window: SlipWindow) -> Flags:
         """Return (6,) whether motors are slow enough to give the torque they are asked for."""
@@ -303,9 +332,14 @@ class GroundLearner:
         return np.asarray(window.slip_speed > least + window.scrub)
 
     def _learn_friction(
-        self, window: SlipWindow, slips: Flags, grips: Flags, elapsed: float
+        self,
+        window: SlipWindow,
+        slips: Flags,
+        grips: Flags,
+        grounds: Sequence[tuple[FrictionFilter, Flags]],
+        elapsed: float,
     ) -> None:
-        """Take what the wheels of a window tell about the friction."""
+        """Take what the wheels of a window tell about the friction of the grounds below them."""
         unit = self._sense.weight / WHEEL_COUNT
         loads, tractions = window.loads, window.tractions
         tractions = tractions - self._resistance * loads * np.sign(window.rolling)
@@ -319,13 +353,9 @@ class GroundLearner:
         distance = abs(float(np.median(window.travel))) * elapsed
         weights = self._weigh(window, tells, elapsed)
         doubt = EXCESS_NOISE * window.excess / self._sense.weight
-        every = np.arange(WHEEL_COUNT)
-        filters = [
-            (self._whole, every >= 0),
-            *zip(self._sides.values(), _SIDE_WHEELS, strict=True),
-        ]
-        for one, own in filters:
-            one.drive(distance)
+        for one, own in grounds:
+            if own.any():
+                one.drive(distance)
             told = np.flatnonzero(tells & own)
             if len(told):
                 shear = float((np.abs(tractions) / along)[told].sum())
@@ -376,6 +406,7 @@ class GroundLearner:
             time=-np.inf if self._last is None else float(self._last[TIME]),
             friction=self._whole.estimate,
             sides={side: one.estimate for side, one in self._sides.items()},
+            classes=self._class_estimates,
             slip_time=self._slip_time,
             immobilised_time=self._immobilised_time,
             stuck=self._stuck.reason,

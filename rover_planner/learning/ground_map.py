@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Friction of the ground where wheels have been, as layers of a map."""
+"""Friction of the ground where wheels have been and of its classes, as layers of a map."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
@@ -12,7 +14,7 @@ from rover_planner.learning.friction_filter import FrictionEstimate
 
 @dataclass(frozen=True, eq=False)
 class GroundLayers:
-    """Layers (ny, nx) of a terrain; NaN where no wheel has been."""
+    """Layers (ny, nx) of a terrain; NaN where nothing was learned."""
 
     friction: Floats
     """Mean of the friction."""
@@ -25,19 +27,43 @@ class GroundMap:
 
     def __init__(self, terrain: Terrain, width: float):
         """Start with ground that no wheel of a width [m] has touched."""
+        self._classes = terrain.ground_class
         self._origin, self._resolution = np.array(terrain.origin), terrain.resolution
         shape = terrain.elevation.shape
-        self.layers = GroundLayers(np.full(shape, np.nan), np.full(shape, np.nan))
-        """The estimates; the last visit counts."""
+        self.visited = GroundLayers(np.full(shape, np.nan), np.full(shape, np.nan))
+        """The estimates where wheels have been; the last visit counts."""
         reach = max(round(0.5 * width / terrain.resolution), 0)
         steps = np.arange(-reach, reach + 1)
         self._around = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
 
     def visit(self, places: Floats, estimate: FrictionEstimate) -> None:
         """Take wheels at places (n, 2) [m] and what they tell."""
-        cells = np.rint((places - self._origin) / self._resolution).astype(int)
-        cells = (cells[:, None, :] + self._around).reshape(-1, 2)
-        rows, columns = self.layers.friction.shape
+        cells = (self._cells_at(places)[:, None, :] + self._around).reshape(-1, 2)
+        rows, columns = self.visited.friction.shape
         inside = ((cells >= 0) & (cells < [columns, rows])).all(axis=1)
         at = cells[inside, 1], cells[inside, 0]
-        self.layers.friction[at], self.layers.friction_std[at] = estimate.mean, estimate.std
+        self.visited.friction[at], self.visited.friction_std[at] = estimate.mean, estimate.std
+
+    def classes_at(self, places: Floats) -> Floats:
+        """Return the classes (n,) of the ground at places (n, 2) [m] on the map; NaN for none."""
+        if self._classes is None:
+            return np.full(len(places), np.nan)
+        most = np.array(self._classes.shape[::-1]) - 1
+        columns, rows = np.clip(self._cells_at(places), 0, most).T
+        return np.asarray(self._classes[rows, columns])
+
+    def spread(self, by_class: Mapping[int, FrictionEstimate]) -> GroundLayers:
+        """Return the estimates where wheels have been, and elsewhere those of its class.
+
+        A class on which no wheel slipped enough has none.
+        """
+        layers = GroundLayers(self.visited.friction.copy(), self.visited.friction_std.copy())
+        for number, estimate in by_class.items():
+            if estimate.high is not None and self._classes is not None:
+                cells = (self._classes == number) & np.isnan(self.visited.friction)
+                layers.friction[cells], layers.friction_std[cells] = estimate.mean, estimate.std
+        return layers
+
+    def _cells_at(self, places: Floats) -> NDArray[np.intp]:
+        """Return columns and rows (n, 2) of the cells at places (n, 2) [m]."""
+        return np.rint((places - self._origin) / self._resolution).astype(np.intp)

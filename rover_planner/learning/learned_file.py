@@ -29,6 +29,7 @@ def describe(estimate: GroundEstimate, told: float) -> dict[str, Any]:
         "slip_time": estimate.slip_time,
         "immobilised_time": estimate.immobilised_time,
         "sides": {side: asdict(one) for side, one in estimate.sides.items()},
+        "classes": {str(number): asdict(one) for number, one in estimate.classes.items()},
         "told_friction": told,
         "mean_is": "the told friction, given the bound"
         if estimate.friction.high is None

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 
 from rover_physics.terrain.grid import Terrain
 
-LAYERS = ("elevation", "friction", "soil", "elevation_std")
+LAYERS = ("elevation", "friction", "soil", "elevation_std", "ground_class")
 """Layers of a map that count."""
 Window = tuple[slice, slice]
 """Rows and columns of a map."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from msg_adapters.gridding import most_frequent
 from rover_physics.terrain.grid import Terrain
 from rover_planner.maps.cells import CellBox, CellGrid, grid_of
 from rover_planner.maps.changes import LAYERS
@@ -29,12 +30,15 @@ EMPTY = {
     "elevation_std": (np.float64, np.nan),
     "friction": (np.float64, np.nan),
     "soil": (np.int32, -1),
+    "ground_class": (np.float64, np.nan),
     "source": (np.uint8, UNKNOWN),
     "time": (np.float64, -np.inf),
 }
 """Type and empty value of each layer."""
 ALWAYS = ("elevation", "source", "time")
 """Layers that every window has."""
+LASTING = ("friction", "ground_class")
+"""Layers whose values stay where a newer map has none, and are never interpolated."""
 
 Layer = NDArray[Any]
 
@@ -88,7 +92,7 @@ class Patch:
     def written(self, patch: "Patch", take: Layer, source: int, time: float) -> "Patch":
         """Return a patch in which another one replaces some cells.
 
-        Friction and soil that the other one does not have stay.
+        Friction, soil and class that the other one does not have stay.
 
         Args:
             patch: The new values, of any box.
@@ -103,9 +107,10 @@ class Patch:
         layers = {name: layer.copy() for name, layer in old.layers.items()}
         values: dict[str, Any] = {"source": source, "time": time, "elevation_std": 0.0}
         values |= {name: patch.layers[name][own][take] for name in names}
-        if "friction" in names:
-            new, kept = values["friction"], layers["friction"][to][take]
-            values["friction"] = np.where(np.isfinite(new), new, kept)
+        for name in LASTING:
+            if name in names:
+                new, kept = values[name], layers[name][to][take]
+                values[name] = np.where(np.isfinite(new), new, kept)
         for name in values.keys() & layers.keys():
             layers[name][to][take] = values[name]
         return replace(old, layers=layers)
@@ -133,7 +138,7 @@ def lay_onto(terrain: Terrain, grid: CellGrid, within: CellBox | None = None) ->
     A map whose cells are those of the grid keeps its values to the bit. One with cells of about
     the same size or larger is interpolated bilinearly; a cell is then unknown if one of the four
     around it is. Of several finer cells in one cell, the highest height, the largest standard
-    deviation and the lowest friction count.
+    deviation, the lowest friction and the most frequent class count.
 
     Args:
         terrain: The map.
@@ -194,7 +199,7 @@ def _interpolate(terrain: Terrain, grid: CellGrid, box: CellBox) -> Patch:
         std = replace(terrain, elevation=terrain.elevation_std, elevation_std=None)
         layers["elevation_std"] = np.asarray(std.elevation_at(x, y))
     j, i = (np.rint(at).astype(np.intp) for at in grid_of(terrain).coordinates(x, y))
-    for name in ("friction", "soil"):
+    for name in (*LASTING, "soil"):
         layer = getattr(terrain, name)
         if layer is not None:
             layers[name] = layer[i, j]
@@ -205,10 +210,15 @@ def _combine(terrain: Terrain, grid: CellGrid, box: CellBox) -> Patch:
     rows, columns = _cells_of(terrain, grid)
     at = (rows - box.row)[:, None], (columns - box.column)[None, :]
     layers: dict[str, Layer] = {}
+    combined: Layer
     for name, layer in layers_of(terrain).items():
         if name == "soil":
             combined = np.full((box.rows, box.columns), -1, np.int32)
             np.maximum.at(combined, at, layer)
+        elif name == "ground_class":
+            cells = np.ravel_multi_index(np.broadcast_arrays(*at), (box.rows, box.columns))
+            combined = most_frequent(cells.ravel(), layer.ravel(), box.cells)
+            combined = combined.reshape(box.rows, box.columns)
         else:
             combined = np.full((box.rows, box.columns), np.nan)
             (np.fmin if name == "friction" else np.fmax).at(combined, at, layer)

@@ -19,6 +19,7 @@ from rover_planner.maps.layers import (
     CONTACT,
     FIRST_NAMES,
     FOOTPRINT,
+    LASTING,
     LOADED,
     UNKNOWN,
     CellSources,
@@ -220,6 +221,7 @@ class LivingMap:
                 layers.get("soil"),
                 soils if "soil" in layers else (),
                 layers.get("elevation_std"),
+                layers.get("ground_class"),
             )
         sources = CellSources(layers["source"], layers["time"], tuple(self._names))
         return MapSnapshot(self._whole, sources)
@@ -319,8 +321,8 @@ class LivingMap:
         empty = window.layers["source"][to] == UNKNOWN
         take = np.isfinite(patch.layers["elevation"][own]) & empty
         window = window.written(patch, take, LOADED, self._loaded_time)
-        # Friction and soil of a loaded map hold for cells whose heights it does not have, too.
-        for name in ("friction", "soil"):
+        # What a loaded map says of the ground holds for cells whose heights it does not have, too.
+        for name in (*LASTING, "soil"):
             if name in patch.layers:
                 window.layers[name][to][empty] = patch.layers[name][own][empty]
         return window

@@ -16,7 +16,7 @@ from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.errors import PlanningError
 from rover_planner.maps.cells import CellBox, CellGrid, grid_of
-from rover_planner.maps.layers import MAX_FINER, MAX_OFF_CENTRE, layers_of
+from rover_planner.maps.layers import LASTING, MAX_FINER, MAX_OFF_CENTRE, layers_of
 
 MAX_LEAN = 0.005
 """Largest lean of a map's frame [rad]. Heights follow it; what neglects it is that cells move
@@ -57,8 +57,8 @@ def move_map(
     """Move a map to another frame.
 
     A map that is shifted only keeps its cells and, if that is level, its heights to the bit. A
-    turned one is interpolated bilinearly, heights and deviations alike; friction is that of the
-    nearest cell.
+    turned one is interpolated bilinearly, heights and deviations alike; friction and class are
+    those of the nearest cell.
 
     Args:
         terrain: The map in its own frame.
@@ -123,7 +123,7 @@ def _lay_turned(
         rows = slice(first, min(first + band, box.rows))
         around = _find_around(terrain, middle, turn, grid, box, rows)
         for name, layer in layers.items():
-            laid[name][rows] = _sample(layer, *around, nearest=name == "friction")
+            laid[name][rows] = _sample(layer, *around, nearest=name in LASTING)
     if not np.isfinite(laid["elevation"]).any():
         raise PlanningError(
             "the map is turned against its cells, and none of them has four known ones around"

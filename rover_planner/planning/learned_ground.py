@@ -2,12 +2,18 @@
 """Friction that was learned of the ground, as `learn` writes it and questions assume it."""
 
 import json
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from rover_physics.files.validation import show_file
 from rover_physics.numerics.plausible import MAX_FRICTION, MIN_FRICTION
+from rover_physics.numerics.read_only import seal_array
 from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 
 MOST_SPREAD = 0.35
@@ -28,17 +34,48 @@ class LearnedGround:
     """True if wheels slipped, so that the mean was measured."""
     since: str = ""
     """Time of the estimate, "seconds.nanoseconds"; empty if it has none."""
+    classes: Mapping[int, "LearnedGround"] = field(default_factory=dict)
+    """The same by class of ground."""
+
+    def assume(self, told: float) -> float:
+        """Return the friction to assume where another one was told.
+
+        While nothing has slipped it is the told one, or what was proved if that is more.
+        """
+        return self.mean if self.is_bounded else max(told, self.low)
 
     def change(self, rover: Rover) -> Rover:
-        """Return a rover with this friction, and its uncertainty for chances.
+        """Return a rover with the friction to assume, and its uncertainty for chances.
 
-        While nothing has slipped, the rover keeps its friction, or takes what was proved if that
-        is more.
+        With classes of ground it is the largest uncertainty of what is assumed on any of them.
         """
-        mean = self.mean if self.is_bounded else max(rover.friction, self.low)
-        spread = min(self.std / self.mean, MOST_SPREAD)
-        uncertainty = replace(rover.uncertainty, friction=spread)
-        return replace(rover, friction=mean, uncertainty=uncertainty)
+        measured = [self, *(one for one in self.classes.values() if one.is_bounded)]
+        spread = max(one.std / one.mean for one in measured)
+        if self.classes:
+            spread = max(spread, rover.uncertainty.friction)
+        uncertainty = replace(rover.uncertainty, friction=min(spread, MOST_SPREAD))
+        return replace(rover, friction=self.assume(rover.friction), uncertainty=uncertainty)
+
+    def assume_classes(self, terrain: Terrain, told: float) -> dict[int, float]:
+        """Return the friction to assume on each class of a map; a class not met has the told."""
+        if terrain.ground_class is None:
+            return {}
+        numbers = np.unique(terrain.ground_class[np.isfinite(terrain.ground_class)])
+        return {
+            number: self.classes[number].assume(told) if number in self.classes else told
+            for number in numbers.astype(int).tolist()
+        }
+
+
+def lay_friction(terrain: Terrain, by_class: Mapping[int, float]) -> Terrain:
+    """Return a map with the friction of each class where it has none of its own."""
+    classes, friction = terrain.ground_class, terrain.friction
+    if classes is None or not by_class:
+        return terrain
+    laid = np.full(classes.shape, np.nan) if friction is None else friction.copy()
+    for number, value in by_class.items():
+        laid[(classes == number) & np.isnan(laid)] = value
+    return replace(terrain, friction=seal_array(laid))
 
 
 def parse_learned(text: str, source: str, since: str = "") -> LearnedGround:
@@ -48,23 +85,30 @@ def parse_learned(text: str, source: str, since: str = "") -> LearnedGround:
         PlanningError: It has no friction with mean, std, low and high, or values that cannot be.
     """
     try:
-        friction = json.loads(text)["friction"]
-        mean, std, low = (float(friction[name]) for name in ("mean", "std", "low"))
-        bounded = friction["high"] is not None
-    except (ValueError, KeyError, TypeError) as error:
+        found = json.loads(text)
+        classes = {
+            int(number): _read_friction(one, f"{source}: class {number}")
+            for number, one in found.get("classes", {}).items()
+        }
+        return replace(_read_friction(found["friction"], source), since=since, classes=classes)
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise PlanningError(
             f"{source}: has no friction with mean, std, low and high, as learn writes it: {error}"
         ) from None
+
+
+def _read_friction(friction: Mapping[str, Any], source: str) -> LearnedGround:
+    mean, std, low = (float(friction[name]) for name in ("mean", "std", "low"))
     if not (MIN_FRICTION <= mean <= MAX_FRICTION and 0.0 <= std <= MAX_FRICTION and low <= mean):
         raise PlanningError(
             f"{source}: friction has mean {mean:g}, std {std:g}, low {low:g}; mean must be above "
             "0, std at least 0, low at most the mean"
         )
-    return LearnedGround(mean, std, low, bounded, since)
+    return LearnedGround(mean, std, low, friction["high"] is not None)
 
 
-def rover_on_learned_ground(rover: Rover, path: Path) -> Rover:
-    """Return a rover with the friction of a file; see `LearnedGround.change`.
+def read_learned(path: Path) -> LearnedGround:
+    """Read a file of `learn`.
 
     Raises:
         PlanningError: The file cannot be read or is none of `learn`.
@@ -73,4 +117,4 @@ def rover_on_learned_ground(rover: Rover, path: Path) -> Rover:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeError) as error:
         raise PlanningError(f"{show_file(path)}: cannot be read: {error}") from None
-    return parse_learned(text, str(show_file(path))).change(rover)
+    return parse_learned(text, str(show_file(path)))

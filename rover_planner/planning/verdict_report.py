@@ -62,6 +62,9 @@ class IdentityReport:
     """Standard deviation of it."""
     ground_since: str = ""
     """Time of that estimate, "seconds.nanoseconds"."""
+    ground_classes: Mapping[str, float] = field(default_factory=dict)
+    """Friction that was assumed on each class of ground of the map, where it has none of its own;
+    empty unless a learned one is assumed and the map has classes."""
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from rover_planner.survey.layout import Box, Index
 MAP = "map"
 """Group of a store that holds the map, where it comes from an .npz file."""
 GRIDS = ("elevation", "friction", "soil", "elevation_std")
-"""Layers of a map, named as the fields of a Terrain."""
+"""Layers of a map that predictions use, named as the fields of a Terrain."""
 MAP_CHUNK = 512
 """Side of the chunks in which a map is kept [cells]."""
 

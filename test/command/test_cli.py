@@ -38,6 +38,13 @@ def test_help_is_exit_code_0(capfd):
         assert f"rover_planner {name}" in capfd.readouterr().out
 
 
+def test_the_help_of_a_command_tells_of_each_option():
+    for name, command in COMMANDS.items():
+        for parameter in command.params:
+            is_option = parameter.param_type_name == "option"
+            assert not is_option or parameter.help, f"{name} {parameter.name}"
+
+
 def params_of(name, *words):
     """Return what the parser of a command makes of words, without running the command."""
     return COMMANDS[name].make_context(name, list(words)).params

@@ -59,12 +59,33 @@ def test_wheels_that_roll_because_they_are_steered_do_not_slip():
 
 def test_ground_is_marked_where_wheels_have_been():
     learner = learn(climb(ROVER, SLOPE, 20.0))
-    known = np.isfinite(learner.ground.layers.friction)
+    known = np.isfinite(learner.layers.friction)
     x, y = ramp(SLOPE).origin
     rows, columns = np.nonzero(known)
     assert known.any() and np.abs(y + 0.04 * rows).min() > 0.2
     assert np.abs(x + 0.04 * columns).max() < 1.4
-    assert (learner.ground.layers.friction_std[known] > 0.0).all()
+    assert (learner.layers.friction_std[known] > 0.0).all()
+
+
+def test_wheels_that_slip_on_one_class_of_ground_tell_all_of_it_and_nothing_of_another():
+    ground = ramp(SLOPE)
+    x = ground.origin[0] + ground.resolution * np.arange(ground.elevation.shape[1])
+    y = ground.origin[1] + ground.resolution * np.arange(ground.elevation.shape[0])
+    classes = np.where(x > 0.0, 7.0, 4.0) + 0.0 * y[:, None]
+    classes[y > 1.0] = np.nan
+    rows = climb(ROVER, SLOPE, 40.0, speed=0.04)
+    rows[rows[:, X] > 0.4, RATES] *= 1.6
+    learner = learn(rows, replace(ground, ground_class=classes))
+    slick, other = learner.estimate.classes[7], learner.estimate.classes[4]
+    assert slick.high is not None and slick.low < SLOPE < slick.high
+    assert other.high is None and other.mean > 0.7
+    layers, been = learner.layers, np.isfinite(learner.ground.visited.friction)
+    far = (classes == 7.0) & ~been
+    assert been.any() and (layers.friction[far] == slick.mean).all()
+    assert (layers.friction_std[far] == slick.std).all()
+    assert np.isnan(layers.friction[(classes == 4.0) & ~been]).all()
+    assert np.isnan(layers.friction[y > 1.0]).all()
+    np.testing.assert_array_equal(layers.friction[been], learner.ground.visited.friction[been])
 
 
 def test_a_gap_and_a_jump_of_the_odometry_are_no_slip():

@@ -8,6 +8,7 @@ import pytest
 
 from rover_physics import Terrain
 from rover_planner.errors import PlanningError
+from rover_planner.maps.cells import CellGrid
 from rover_planner.maps.changes import find_changes, find_overlap, have_same_layers
 from rover_planner.maps.layers import LOADED, UNKNOWN, lay_onto
 from rover_planner.maps.living_map import SUREST, LivingMap, MapRules
@@ -201,6 +202,24 @@ def test_soil_and_friction_of_the_loaded_map_stay():
     terrain = living.snapshot().terrain
     assert terrain.soil_names == prior.soil_names and (terrain.soil == 1).all()
     np.testing.assert_array_equal(terrain.friction, 0.4)
+
+
+def test_classes_stay_where_a_newer_map_has_none_and_the_most_frequent_of_finer_cells_counts():
+    living = LivingMap()
+    shape = PRIOR.elevation.shape
+    living.load(replace(PRIOR, ground_class=np.full(shape, 2.0)), 0.0)
+    local = local_map((0.0, 0.0), 0.1)
+    classes = np.full(local.elevation.shape, np.nan)
+    classes[0, 0] = 5.0
+    living.merge(replace(local, ground_class=classes), TOPIC, 1.0)
+    living.merge(local, TOPIC, 2.0)
+    found = living.snapshot().terrain.ground_class
+    assert (found == 5.0).sum() == 1 and (found == 2.0).sum() == found.size - 1
+    fine = np.zeros((8, 8))
+    fine[:4, :2], fine[:4, 2:4], fine[0, 0] = 1.0, np.nan, 9.0
+    ground = Terrain(np.zeros((8, 8)), 0.25, (-0.375, -0.375), ground_class=fine)
+    laid = lay_onto(ground, CellGrid((0.0, 0.0), 1.0)).layers["ground_class"]
+    np.testing.assert_array_equal(laid, [[1.0, 0.0], [0.0, 0.0]])
 
 
 def test_a_local_map_of_tiny_cells_is_refused_and_leaves_all_as_it_was():

@@ -32,7 +32,8 @@ def rough_map(shape=(31, 40), origin=(3.0, -2.0)) -> Terrain:
     known = np.isfinite(z)
     std = np.where(known, RNG.uniform(0.01, 0.05, shape), np.nan)
     friction = np.where(known, RNG.uniform(0.4, 0.9, shape), np.nan)
-    return Terrain(z, CELL, origin, friction, elevation_std=std)
+    classes = RNG.integers(0, 3, shape).astype(float)
+    return Terrain(z, CELL, origin, friction, elevation_std=std, ground_class=classes)
 
 
 def test_a_shift_by_whole_cells_keeps_the_cells_of_the_grid_to_the_bit():
@@ -44,7 +45,7 @@ def test_a_shift_by_whole_cells_keeps_the_cells_of_the_grid_to_the_bit():
     moved = move_map(local, move_of(17 * CELL, -123 * CELL), grid)
     before, after = lay_onto(local, grid), lay_onto(moved, grid)
     assert (after.box.row, after.box.column) == (before.box.row - 123, before.box.column + 17)
-    assert before.layers.keys() == {"elevation", "elevation_std", "friction"}
+    assert before.layers.keys() == {"elevation", "elevation_std", "friction", "ground_class"}
     for name, layer in before.layers.items():
         assert after.layers[name].tobytes() == layer.tobytes()
 
@@ -55,7 +56,7 @@ def test_quarter_turns_only_rearrange_the_cells(quarters):
     x, y, _ = move_of(yaw=yaw).rotation @ (*local.origin, 0.0)
     off = [round(value / CELL) * CELL - value for value in (x, y)]  # cells meet cells then
     moved = move_map(local, move_of(*off, yaw=yaw))
-    for name in ("elevation", "elevation_std", "friction"):
+    for name in ("elevation", "elevation_std", "friction", "ground_class"):
         right = np.rot90(getattr(local, name), -quarters)  # rows of a map run up
         assert getattr(moved, name).tobytes() == np.ascontiguousarray(right).tobytes()
 
@@ -82,6 +83,7 @@ def test_a_cell_is_known_only_if_the_four_around_it_are():
             nearest = round(i), round(j)
             if max(abs(i - nearest[0]), abs(j - nearest[1])) < 0.49:
                 assert moved.friction[row, column] == local.friction[nearest]
+                assert moved.ground_class[row, column] == local.ground_class[nearest]
     assert known > 400
     np.testing.assert_array_equal(np.isnan(moved.elevation_std), np.isnan(moved.elevation))
 

@@ -22,6 +22,8 @@ from rover_physics.errors import TerrainError
 
 FLOAT32, FLOAT64 = PointField.FLOAT32, PointField.FLOAT64
 XYZ = ("x", "y", "z")
+KINDS = ("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8")
+"""Types of fields, in the order of their numbers from 1 on."""
 
 
 def rough_terrain(resolution=0.05, origin=(-1.2, 3.4)):
@@ -90,7 +92,8 @@ def refusal_of(cloud, resolution=0.0, **options):
 def test_a_terrain_comes_back_as_it_was_with_all_its_layers(datatype, shuffled):
     plain = rough_terrain()
     layer = np.linspace(0.0, 0.25, 77).astype(np.float32).astype(float).reshape(7, 11)
-    terrain = replace(plain, elevation_std=layer, friction=0.5 + layer)
+    classes = np.floor(20.0 * layer)
+    terrain = replace(plain, elevation_std=layer, friction=0.5 + layer, ground_class=classes)
     cloud = terrain_to_point_cloud(terrain, "map", None, datatype)
     if shuffled:
         points = np.frombuffer(cloud.data, np.uint8).reshape(-1, cloud.point_step)
@@ -100,6 +103,7 @@ def test_a_terrain_comes_back_as_it_was_with_all_its_layers(datatype, shuffled):
     known = np.isfinite(plain.elevation)
     np.testing.assert_array_equal(back.elevation_std[known], layer[known])
     np.testing.assert_allclose(back.friction[known], 0.5 + layer[known], rtol=1e-7)
+    np.testing.assert_array_equal(back.ground_class[known], classes[known])
 
 
 @settings(max_examples=20)
@@ -252,6 +256,41 @@ def twice(name):
     return cloud
 
 
+def test_the_class_of_most_points_of_a_cell_counts():
+    points = [
+        *([0.001 * k, 0.0, 1.0, number] for k, number in enumerate((1, 2, 2, 7, 7, 7))),
+        *([0.1 + 0.001 * k, 0.0, 1.0, number] for k, number in enumerate((np.nan, -1.0, 4, 4))),
+        [0.0, 0.1, 1.0, np.nan],
+        [0.1, 0.1, 1.0, 0.0],
+    ]
+    terrain = terrain_from_point_cloud(cloud_of(points, (*XYZ, "class")), 0.1)
+    np.testing.assert_array_equal(terrain.ground_class, [[7.0, 4.0], [np.nan, 0.0]])
+
+
+@pytest.mark.parametrize("shuffled", [False, True])
+@pytest.mark.parametrize("kind", KINDS)
+def test_classes_of_any_datatype_are_read_and_negative_ones_are_none(kind, shuffled):
+    numbers = np.array([[3, 0, 100], [1, 3, 2]])
+    x, y = np.meshgrid(np.arange(3.0), np.arange(2.0))
+    points = np.zeros(6, [("x", "f4"), ("y", "f4"), ("class", kind), ("z", "f4")])
+    points["x"], points["y"], points["class"] = x.ravel(), y.ravel(), numbers.ravel()
+    if kind[0] != "u":
+        points["class"][3] = -1
+    if shuffled:
+        points = np.random.default_rng(1).permutation(points)
+    cloud = PointCloud2(height=1, width=6, point_step=points.itemsize, row_step=points.nbytes)
+    datatypes = dict.fromkeys(XYZ, FLOAT32) | {"class": 1 + KINDS.index(kind)}
+    cloud.fields = [
+        PointField(name=name, offset=points.dtype.fields[name][1], count=1, datatype=datatype)
+        for name, datatype in datatypes.items()
+    ]
+    cloud.data = array.array("B", points.tobytes())
+    right = numbers.astype(float)
+    if kind[0] != "u":
+        right[1, 0] = np.nan
+    np.testing.assert_array_equal(terrain_from_point_cloud(cloud).ground_class, right)
+
+
 LINE = np.column_stack([np.arange(5) * 0.1, np.zeros(5), np.zeros(5)])
 STD_MISSING = [(x, y, 1.0, np.nan if x else 0.1) for x in (0.0, 0.1) for y in (0.0, 0.1)]
 REFUSED = [
@@ -275,6 +314,8 @@ REFUSED = [
     (cloud_of(grid() * 1e-8), "map_resolution"),
     (with_layer("friction", -0.1), "friction[0, 0] is -0.1"),
     (with_layer("elevation_std", np.inf), "elevation_std[0, 0] is inf"),
+    (with_layer("class", 2.5), "ground_class[0, 0] is 2.5; it must be a whole number"),
+    (with_layer("class", 1e30), "ground_class[0, 0] is 1"),
     (cloud_of(STD_MISSING, (*XYZ, "elevation_std")), "where the height is known"),
 ]
 

@@ -51,16 +51,20 @@ def test_a_moved_buffer_start_gives_the_same_terrain_to_the_bit(row, column, by_
     assert_same(terrain_from_grid_map(moved), terrain_from_grid_map(unmoved))
 
 
-def test_variance_becomes_a_standard_deviation_and_friction_stays():
+def test_variance_becomes_a_standard_deviation_and_friction_and_classes_stay():
     variance = np.full((7, 5), 0.0004, np.float32)
     friction = np.full((7, 5), 0.6, np.float32)
     friction[0, 0] = np.inf
-    message = grid_map_of({"h": HEIGHTS, "s2": variance, "mu": friction, "elevation": variance})
+    classes = np.full((7, 5), 2.0, np.float32)
+    classes[0, 0] = -1.0
+    layers = {"h": HEIGHTS, "s2": variance, "mu": friction, "elevation": variance}
+    message = grid_map_of(layers | {"class": classes})
     terrain = terrain_from_grid_map(message, GridMapLayers("h", "s2", "mu"))
     known = np.isfinite(HEIGHTS)
     np.testing.assert_allclose(terrain.elevation_std[known], 0.02, rtol=1e-6)
     assert np.isnan(terrain.elevation_std[~known]).all()
     assert np.isnan(terrain.friction[0, 0]) and terrain.friction[1, 1] == np.float32(0.6)
+    assert np.isnan(terrain.ground_class[0, 0]) and terrain.ground_class[1, 1] == 2.0
 
 
 def test_a_cell_that_a_basic_layer_or_the_variance_lacks_is_unknown():

@@ -107,13 +107,10 @@ def options_of_the_commands() -> dict[str, set[str]]:
     }
 
 
-def test_the_page_of_the_command_line_has_every_command_and_option():
+def test_the_page_of_the_command_line_has_every_command():
     text = read(Path("docs/command_line.md"))
-    for name, options in options_of_the_commands().items():
+    for name in options_of_the_commands():
         assert re.search(rf"^\| `{name}[ `]", text, re.MULTILINE), name
-        for option in options:
-            if option.startswith("--"):
-                assert f"`{option}" in text, f"{name} {option}"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=str)

@@ -61,7 +61,11 @@ def read_mission(
         str, typer.Option(metavar="FRAME", help="Frame of map and poses.")
     ] = "map",
     timeout: Annotated[
-        float, typer.Option(metavar="S", help="Longest wait for an answer in s.")
+        float,
+        typer.Option(
+            metavar="S",
+            help="Longest wait for an answer in s; a question without one is repeated each 10 s.",
+        ),
     ] = 60.0,
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a JSON object a line; goals count from 1.")

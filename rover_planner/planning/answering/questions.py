@@ -230,4 +230,5 @@ class Register:
             ground_friction=ground.mean,
             ground_friction_std=ground.std,
             ground_since=ground.since,
+            ground_classes={str(c): mu for c, mu in snapshot.class_friction.items()},
         )

@@ -33,6 +33,8 @@ class ServiceSettings:
     """Settings of searches around obstacles."""
     parameters: TraverseServerParameters
     """The parameters themselves."""
+    told: float | None = None
+    """Friction that was told, where a learned one is assumed; None: it is the rover's."""
 
     @property
     def largest_gap(self) -> float:
@@ -48,7 +50,7 @@ class ServiceSettings:
             self.rover.friction if self.query.model.friction is None else self.query.model.friction
         )
         rover = ground.change(replace(self.rover, friction=told))
-        return replace(self, rover=rover, query=self.query.change(friction=None))
+        return replace(self, rover=rover, query=self.query.change(friction=None), told=told)
 
     @property
     def manipulator_joints(self) -> tuple[str, ...]:

@@ -67,6 +67,8 @@ class Snapshot:
     """Reason why the map is too old to be used; empty if it is not."""
     ground: LearnedGround | None = None
     """The learned ground; the settings assume it if they are to."""
+    class_friction: Mapping[int, float] = field(default_factory=dict)
+    """Friction that is assumed on the classes of ground of the map, if the learned ground is."""
     marked: MarkedPlaces = NONE_MARKED
     """Places that are impassable."""
 

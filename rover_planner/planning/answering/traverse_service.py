@@ -23,7 +23,7 @@ from rover_planner.planning.answering.measurements import MAX_AGE, Measurements
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
 from rover_planner.planning.candidates import generate_candidates
-from rover_planner.planning.learned_ground import LearnedGround
+from rover_planner.planning.learned_ground import LearnedGround, lay_friction
 from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlace, MarkedPlaces
 from rover_planner.planning.search.edge_memory import EdgeMemory
 
@@ -47,6 +47,7 @@ class TraverseService:
         self._measurements = Measurements()
         self._edge_memory = EdgeMemory()
         self._ground: LearnedGround | None = None
+        self._laid: tuple[KnownMap, dict[int, float], KnownMap] | None = None
         # Compiles or loads the kernels, so that the first query is fast.
         generate_candidates((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
 
@@ -195,12 +196,28 @@ class TraverseService:
         if known is None:
             return replace(snapshot, known_map=None)
         steady = time.monotonic()
+        classes, laid = self._lay_friction(known, snapshot)
         return replace(
             snapshot,
-            known_map=known,
+            known_map=laid,
+            class_friction=classes,
             map_age=known.age(ros_time, steady),
             stale_map=known.describe_age(ros_time, steady, most) if most > 0.0 else "",
         )
+
+    def _lay_friction(
+        self, known: KnownMap, snapshot: Snapshot
+    ) -> tuple[dict[int, float], KnownMap]:
+        """Return what new questions assume on each class of a map, and the map with it."""
+        ground, told = snapshot.ground, snapshot.settings.told
+        if ground is None or told is None or known.terrain.ground_class is None:
+            return {}, known
+        classes = ground.assume_classes(known.terrain, told)
+        if self._laid is None or self._laid[:2] != (known, classes):
+            laid = replace(known, terrain=lay_friction(known.terrain, classes))
+            pack_ground(laid.terrain)
+            self._laid = known, classes, laid
+        return classes, self._laid[2]
 
     def answer(self, start: ArrayLike, goal: ArrayLike, tolerance: float = 0.0) -> PathJudgement:
         """Find a path from start to goal; see `Snapshot.answer`."""

@@ -4,6 +4,7 @@
 import gc
 import pickle
 import weakref
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from hypothesis import strategies as st
 from rover_physics import Terrain, load_rover, load_terrain, save_terrain
 from rover_physics.errors import TerrainError
 from rover_physics.prediction.packed_model import pack_model
+from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.ground import (
     BLOCK,
     SOIL_NUMBERS,
@@ -235,6 +237,19 @@ def test_an_unreadable_or_unwritable_file_is_refused(tmp_path):
         load_terrain(tmp_path)
     with pytest.raises(TerrainError, match="cannot be written: No such file"):
         save_terrain(tmp_path / "none" / "map.npz", plane())
+
+
+def test_classes_of_ground_are_kept_in_files_and_are_whole_numbers(tmp_path):
+    classes = np.where(np.arange(8) < 4, 3.0, np.nan) + 0.0 * plane().elevation
+    terrain = replace(plane(), ground_class=classes)
+    save_terrain(tmp_path / "a.npz", terrain)
+    np.testing.assert_array_equal(load_terrain(tmp_path / "a.npz").ground_class, classes)
+    assert fingerprint(terrain) != fingerprint(plane())
+    for value in (2.5, -1.0, 1e6):
+        with pytest.raises(TerrainError, match=r"ground_class\[0, 0\] is .* must be"):
+            replace(plane(), ground_class=np.full((6, 8), value))
+    with pytest.raises(TerrainError, match="ground_class has shape"):
+        replace(plane(), ground_class=classes[1:])
 
 
 def test_a_preset_is_found_by_its_name_from_any_folder_and_keeps_its_licence(

@@ -87,6 +87,35 @@ def test_a_learned_friction_changes_new_questions_only_if_it_is_to_be_used(
     assert report["ground_since"] == ("" if learn == "off" else "12.5")
 
 
+def test_what_was_learned_on_a_class_of_ground_holds_for_all_of_it():
+    flat = make_terrain(waves)
+    numbers = np.full(flat.elevation.shape, 2.0)
+    grip = LearnedGround(0.9, 0.2, 0.1, is_bounded=False)
+    classes = {1: LearnedGround(0.4, 0.02, 0.36, is_bounded=True), 2: grip}
+    ground = LearnedGround(0.5, 0.05, 0.4, True, "12.5", classes)
+
+    def used_on(number, **layers):
+        service = make_service(replace(flat, ground_class=number + 0.0 * numbers, **layers))
+        service.settings = load(learn="use")
+        service.take_ground(ground)
+        return service, friction_used(service)
+
+    told = friction_used(make_service(flat))
+    service, used = used_on(1)
+    assert used == pytest.approx(0.8 / 0.4 * told, rel=1e-6)
+    assert service.snapshot().known_map is service.snapshot().known_map  # packed once
+    assert asdict(Register().identify(1, "", "", service.snapshot()))["ground_classes"] == {
+        "1": 0.4
+    }
+    assert used_on(2)[1] == pytest.approx(told, rel=1e-6)  # nothing slipped there
+    assert used_on(3)[1] == pytest.approx(told, rel=1e-6)  # no wheel was there
+    assert used_on(np.nan)[1] == pytest.approx(0.8 / 0.5 * told, rel=1e-6)
+    own = np.full(flat.elevation.shape, 0.6)
+    assert used_on(1, friction=own)[1] == pytest.approx(0.8 / 0.6 * told, rel=1e-6)
+    service.settings = load()
+    assert friction_used(service) == pytest.approx(told, rel=1e-6)
+
+
 def test_soil_and_payload_of_the_settings_count():
     path = np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
     loads, sinkages = [], []
