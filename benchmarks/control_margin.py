@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Drives in MuJoCo over ground that the planner calls passable with traction control.
+"""Drives in MuJoCo with traction control, and which of them the planner promises.
 
-Run from the repository: python -m benchmarks.control_margin [--count N] [--seed S] [--least M]
+Run from the repository: python -m benchmarks.control_margin [--count N] [--seed S] [--source map]
 It needs the extra `bench`. Its results are in docs/validation.md.
 """
 
@@ -15,7 +15,7 @@ from benchmarks.drives import BY_MAP, BY_MOTION, Obstacle, drive, run_in_process
 from benchmarks.measure import print_table
 from rover_physics import SweepOptions, judge_path, load_rover
 from rover_physics.names import EQUAL, OPTIMAL
-from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from support.reference_drives import drive_path, unlimited
 
 SOURCES = {"map": BY_MAP, "motion": BY_MOTION}
@@ -36,8 +36,21 @@ FRICTIONS = 0.35, 1.0
 """Smallest and largest friction coefficient."""
 TORQUES = 0.3, 2.5
 """Smallest and largest torque limit [N m]; their logarithm is uniform."""
-MARGINS = (0.0, 0.04, 0.08, 0.1, 0.12, 0.16, 0.2, 0.24, 0.3)
+MARGINS = (0.0, 0.1, 0.2, 0.3)
 """Control margins that are tried."""
+KNOWN = {
+    "friction": 0.0,
+    "friction_per_wheel": 0.0,
+    "max_torque": 0.0,
+    "max_torque_per_wheel": 0.0,
+}
+"""Uncertainty of what the drives have as the planner is told it."""
+PROMISES = (
+    *(f"control margin {margin:g}" for margin in MARGINS),
+    f"chance up to {ACCEPTED_CHANCE:g}",
+    "the same, friction and torque known",
+)
+"""What a promise asks for."""
 BATCH = 40
 """Obstacles that are drawn at once."""
 
@@ -55,62 +68,64 @@ def draw_obstacle(rng: np.random.Generator) -> Obstacle:
     )
 
 
-def find_margin(obstacle: Obstacle) -> float:
-    """Return the largest of the MARGINS that a drive keeps.
+def find_promises(obstacle: Obstacle) -> tuple[bool, ...]:
+    """Return which of PROMISES are given; none if the obstacle does not need traction control.
 
-    NaN if it does not need traction control, negative if it is impassable with it, too. The
-    rover has only the limits that MuJoCo knows.
+    The rover has only the limits that MuJoCo knows.
     """
     rover, ground, path = unlimited(load_rover("lsr1")), obstacle.ground, drive_path()
-    options = SweepOptions(
-        friction=obstacle.friction, max_torque=obstacle.max_torque, policy=EQUAL
-    )
-    if judge_path(rover, ground, path, options)[1].traversable:
-        return float("nan")
+    asked = SweepOptions(friction=obstacle.friction, max_torque=obstacle.max_torque, policy=EQUAL)
+    if judge_path(rover, ground, path, asked)[1].traversable:
+        return (False,) * len(PROMISES)
+    asked = replace(asked, policy=OPTIMAL)
+    margins = [
+        judge_path(rover, ground, path, replace(asked, control_margin=margin))[1].traversable
+        for margin in MARGINS
+    ]
+    known = replace(rover, uncertainty=replace(rover.uncertainty, **KNOWN))
+    chances = [
+        judge_path(one, ground, path, asked, accepted_chance=ACCEPTED_CHANCE)[1].traversable
+        for one in (rover, known)
+    ]
+    return (*margins, *chances)
 
-    kept = -1.0
-    for margin in MARGINS:
-        asked = replace(options, policy=OPTIMAL, control_margin=margin)
-        if not judge_path(rover, ground, path, asked)[1].traversable:
-            break
-        kept = margin
-    return kept
 
-
-def draw_promised(count: int, seed: int, least: float, workers: int) -> dict[Obstacle, float]:
-    """Return obstacles that are passable with traction control by at least a margin."""
-    rng, margins = np.random.default_rng(seed), {}
+def draw_passable(count: int, seed: int, workers: int) -> dict[Obstacle, tuple[bool, ...]]:
+    """Return obstacles that are passable with traction control and not without, with PROMISES."""
+    rng, promised = np.random.default_rng(seed), {}
     while True:
         drawn = [draw_obstacle(rng) for _ in range(BATCH)]
-        found = run_in_processes(find_margin, [(obstacle,) for obstacle in drawn], workers)
-        for obstacle, margin in zip(drawn, found, strict=True):
-            if margin >= least:
-                margins[obstacle] = margin
-            if len(margins) == count:
-                return margins
+        found = run_in_processes(find_promises, [(obstacle,) for obstacle in drawn], workers)
+        for obstacle, promises in zip(drawn, found, strict=True):
+            if promises[0]:
+                promised[obstacle] = promises
+            if len(promised) == count:
+                return promised
 
 
 def main(
     count: Annotated[int, typer.Option(help="Number of obstacles.")] = 100,
     seed: Annotated[int, typer.Option(help="Seed of the obstacles.")] = 1,
-    least: Annotated[float, typer.Option(help="Least control margin.")] = 0.0,
+    source: Annotated[str, typer.Option(help="Contact angles from: map or motion.")] = "map",
     workers: Annotated[int, typer.Option(help="Number of processes.")] = 2,
 ) -> None:
-    """Draw, judge and drive; print how many drives pass, by the margin that they keep."""
-    margins = draw_promised(count, seed, least, workers)
-    jobs = [(o, name, TRIES, MOST_TIME) for o in margins for name in SOURCES.values()]
-    found = run_in_processes(drive, jobs, workers)
-    drives = {job[:2]: row for job, row in zip(jobs, found, strict=True)}
+    """Draw, judge and drive; print how many promises are kept, and what of the rest passes."""
+    promised = draw_passable(count, seed, workers)
+    jobs = [(obstacle, SOURCES[source], TRIES, MOST_TIME) for obstacle in promised]
+    drives = run_in_processes(drive, jobs, workers)
+    passed = np.array([one.passed for one in drives])
     rows = []
-    for margin in MARGINS:
-        kept = [obstacle for obstacle, left in margins.items() if left >= margin]
-        passed = [sum(drives[o, name].passed for o in kept) for name in SOURCES.values()]
-        shares = (f"{n} of {len(kept)} ({n / max(len(kept), 1):.1%})" for n in passed)
-        rows.append((f"{margin:.2f}", *shares))
-    names = (f"contact angles from {source}" for source in SOURCES)
-    default = TraverseServerParameters().control_margin
-    title = f"Passed, of drives that keep a control margin (default {default:g})"
-    print_table(title, ("control margin", *names), rows)
+    for name, given in zip(PROMISES, np.array(list(promised.values())).T, strict=True):
+        kept, all_kept = int((given & passed).sum()), int(given.sum())
+        rows.append(
+            (
+                name,
+                f"{kept} of {all_kept} ({kept / max(all_kept, 1):.1%})",
+                f"{kept} of {passed.sum()} ({kept / max(passed.sum(), 1):.1%})",
+            )
+        )
+    title = f"{count} obstacles that need traction control, contact angles from {source}"
+    print_table(title, ("promised by", "promises kept", "promised of what passes"), rows)
 
 
 if __name__ == "__main__":

@@ -60,7 +60,7 @@ class SearchCase:
     @cached_property
     def options(self) -> PathQueryOptions:
         """The options of `rover_planner plan`."""
-        return PathQueryOptions(accepted_chance=1.0).change(policy=self.policy, control_margin=0.0)
+        return PathQueryOptions(accepted_chance=1.0).change(policy=self.policy)
 
     @property
     def judge(self) -> PathJudge:

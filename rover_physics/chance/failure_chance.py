@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rover_physics.chance.ground import change_heights, cut_around
 from rover_physics.chance.samples import Sample, draw_samples, sort_by_strength, worst_of
+from rover_physics.names import OPTIMAL
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.read_only import freeze_fields
@@ -78,7 +79,10 @@ def find_failure_chance(
     records["settings"]["control_margin"] = 0.0
     model = replace(model, records=records)
     settled = rows.results["status"] == PoseStatus.SETTLED
-    samples = sort_by_strength(draw_samples(model.rover.uncertainty, SAMPLES))
+    samples = draw_samples(model.rover.uncertainty, SAMPLES)
+    if model.options.policy == OPTIMAL:
+        samples = tuple(one.weaken() for one in samples)
+    samples = sort_by_strength(samples)
     if enough < 0.5:
         samples = samples[::-1]  # those with the least friction and torque refuse first
     worst_two = worst_of(samples)

@@ -61,6 +61,14 @@ class Sample:
         linkage["body_com"] += self.com
         return replace(model, records=records)
 
+    def weaken(self) -> "Sample":
+        """Return the sample with all wheels as weak as the weakest one.
+
+        Optimal torques give way to a wheel that has less: others take what it cannot.
+        """
+        torque = self.torque * float(self.torques.min())
+        return replace(self, torque=torque, torques=np.ones(6))
+
     def move(self, poses: Floats) -> Floats:
         """Return poses (n, 3) with the shift."""
         c, s = np.cos(poses[:, 2]), np.sin(poses[:, 2])

@@ -29,13 +29,13 @@ OUTLIERS, OUTLIER_NOISE = 0.15, 0.25
 relative standard deviation."""
 WORTHLESS = 0.01
 """Share of measurements that tell nothing."""
-CHANGE = 0.02
+CHANGE = 0.05
 """Chance that the ground changes on a metre."""
 MEMORY = 3.0
 """Way after which a bound has lost a factor e [m]."""
 BOUNDED = 0.975
 """Chance of what is below the upper end of an interval; 1 minus this is below the lower end."""
-ENOUGH = 0.8
+ENOUGH = 1.6
 """Number of independent slips that bound the friction from above."""
 
 
@@ -44,7 +44,8 @@ class FrictionEstimate:
     """Friction of the ground with its uncertainty."""
 
     mean: float
-    """Mean: of the told friction given the bound while nothing has slipped."""
+    """Mean: of the told friction given the bound while nothing has slipped; else of what was
+    measured, whatever was told."""
     std: float
     """Standard deviation of the same."""
     low: float
@@ -81,11 +82,12 @@ class FrictionFilter:
             noise: Standard deviation of the use, relative.
             weight: Number of independent measurements that this one is.
         """
+        error = np.log(max(use, LEAST) / GRID)
         usual, rough = (
-            np.exp(-0.5 * ((use - GRID) / (spread * GRID)) ** 2) / (spread * GRID)
+            np.exp(-0.5 * (error / spread) ** 2) / spread
             for spread in (noise, np.hypot(OUTLIER_NOISE, noise))
         )
-        mixed = (1.0 - OUTLIERS - WORTHLESS) * usual + OUTLIERS * rough + WORTHLESS / GRID[-1]
+        mixed = (1.0 - OUTLIERS - WORTHLESS) * usual + OUTLIERS * rough + WORTHLESS
         self._update(weight * np.log(mixed))
         self.slips = min(self.slips + weight, 1e3)
 
@@ -102,13 +104,15 @@ class FrictionFilter:
     @property
     def estimate(self) -> FrictionEstimate:
         """Mean, standard deviation and interval."""
-        chances = self._chances
+        is_bounded = self.slips >= ENOUGH
+        chances = self._chances / self._prior if is_bounded else self._chances
+        chances = chances / chances.sum()
         mean = float(chances @ GRID)
         spread = np.hypot(np.sqrt(max(float(chances @ (GRID - mean) ** 2), 0.0)), COMMON * mean)
         below = _widening() @ chances
         low, high = (float(np.interp(p, below, GRID)) for p in (1.0 - BOUNDED, BOUNDED))
         proved = self._bound * (1.0 - 2.0 * BOUND_NOISE)
-        if self.slips < ENOUGH:
+        if not is_bounded:
             return FrictionEstimate(mean, float(spread), min(low, proved), None)
         return FrictionEstimate(mean, float(spread), low, high)
 

@@ -31,7 +31,7 @@ from rover_planner.learning.friction_filter import FrictionEstimate, FrictionFil
 from rover_planner.learning.ground_map import GroundLayers, GroundMap
 from rover_planner.learning.soil_fit import SoilEstimate, SoilFit
 from rover_planner.learning.stuck_watch import StuckWatch
-from rover_planner.learning.wheel_health import WheelHealth
+from rover_planner.learning.wheel_health import RATE, WheelHealth
 from rover_planner.learning.wheel_slip import BLOCK, LONGEST_GAP, WINDOW, SlipWindow, SlipWindows
 
 SLIP_SHARE = 0.15
@@ -294,10 +294,13 @@ class GroundLearner:
         slipping = self._find_slips(window)
         self._health.take_window(window, elapsed, not slipping.any())
         self._slipping = np.where(slipping, self._slipping + 1, 0)
-        good &= ~self._health.doubtful & ~self._health.rolls_backward(window)
-        slips, grips = (self._slipping >= LASTING) & good, ~slipping
-        if slips.any() and self._slip_time is None:
+        turning = ~self._health.doubtful & ~self._health.rolls_backward(window)
+        turning &= np.array([RATE not in faults.get(name, "") for name in WHEELS])
+        lasting = (self._slipping >= LASTING) & turning
+        if lasting.any() and self._slip_time is None:
             self._slip_time = window.time
+        good &= turning
+        slips, grips = lasting & good, ~slipping
         rows = [recent[2] for recent in self._recent]
         climb = _find_change(np.array([row[[PITCH, *_ANGLES]] for row in rows]))
         torques = np.mean([row[TORQUES] for row in rows], axis=0)
@@ -329,7 +332,7 @@ class GroundLearner:
             np.maximum(SLIP_SHARE * np.abs(window.rolling), CERTAIN * window.deviation),
             SLIP_SPEED * self._rover.nominal_speed,
         )
-        return np.asarray(window.slip_speed > least + window.scrub)
+        return np.asarray(window.slip_speed > least + window.scrub + window.uneven)
 
     def _learn_friction(
         self,

@@ -57,6 +57,7 @@ class StuckWatch:
         wanted = bool((np.abs(torques) >= self._most).sum() >= WHEEL_COUNT // 3)
         if commanded is not None:
             wanted = abs(commanded) > self._slowest
+        wanted = wanted and window.scrub.max() < self._slowest  # else it stands while it steers
         past = self._past
         if past and window.time - past[-1][0] > LONGEST_GAP:
             past.clear()

@@ -9,6 +9,8 @@ from rover_physics.numerics.arrays import Floats
 from rover_planner.learning.drive_log import RATES, TORQUES
 from rover_planner.learning.wheel_slip import SlipWindow
 
+RATE = "rate"
+"""Word of faults of a wheel's rate."""
 FROZEN_TIME = 1.0
 """Time without any change, while values of other wheels change, of a frozen value [s]."""
 DOUBTFUL_TIME = 0.25
@@ -90,11 +92,11 @@ class WheelHealth:
         torque, rate = slice(WHEEL_COUNT), slice(WHEEL_COUNT, None)
         for word, mask in (
             ("no torque", self._missing[torque] & frozen[torque]),
-            ("no rate", self._missing[rate] & frozen[rate]),
+            (f"no {RATE}", self._missing[rate] & frozen[rate]),
             ("torque is frozen", frozen[torque] & ~self._missing[torque]),
-            ("rate is frozen", frozen[rate] & ~self._missing[rate]),
+            (f"{RATE} is frozen", frozen[rate] & ~self._missing[rate]),
             ("torque has the wrong sign", signs),
-            ("rate has the wrong sign", self._backward > 0.6),
+            (f"{RATE} has the wrong sign", self._backward > 0.6),
         ):
             found |= {WHEELS[k]: word for k in np.flatnonzero(mask) if WHEELS[k] not in found}
         return found

@@ -46,6 +46,8 @@ class SlipWindow:
     scrub: Floats
     """(6,) speeds up to which treads may roll because the wheels are steered [m/s]: a wheel turns
     about the middle of its contact, which is somewhere along its width."""
+    uneven: Floats
+    """(6,) errors of the travel because the slopes of contacts change [m/s]."""
     places: Floats
     """(6, 2) mean positions of the wheels [m]."""
     loads: Floats
@@ -130,16 +132,18 @@ class SlipWindows:
         across = along[:, 0] * axles[:, 1] - along[:, 1] * axles[:, 0]
         angles = np.arcsin([state.along[:, 2] for state in states])
         steady = np.ptp(angles, axis=0) < MAX_TURN
+        travel = (speeds[:, 0] * axles[:, 1] - speeds[:, 1] * axles[:, 0]) / across
         halves = rolled.mean(axis=1)
         steps = np.diff(halves) / np.diff(times)
         return SlipWindow(
             time=float(times[-1]),
             duration=float(times[-1] - times[0]),
             rolling=slopes[:WHEEL_COUNT],
-            travel=(speeds[:, 0] * axles[:, 1] - speeds[:, 1] * axles[:, 0]) / across,
+            travel=travel,
             aside=(along[:, 0] * speeds[:, 1] - along[:, 1] * speeds[:, 0]) / across,
             deviation=scatter / np.sqrt(spread),
             scrub=self._half_width * np.ptp(steering, axis=0) / (times[-1] - times[0]),
+            uneven=np.abs(travel) * np.ptp(1.0 / np.cos(angles), axis=0),
             places=means[WHEEL_COUNT:].reshape(WHEEL_COUNT, 2),
             loads=np.mean([state.loads for state in states], axis=0),
             doubts=np.mean([state.doubts for state in states], axis=0),

@@ -13,8 +13,6 @@ EITHER, TRANSIENT_LOCAL, VOLATILE = "either", "transient_local", "volatile"
 MAP_DURABILITIES = (EITHER, TRANSIENT_LOCAL, VOLATILE)
 """Values of the parameter map_durability; `rover_planner.ros.qos` explains them."""
 
-CONTROL_MARGIN = 0.3
-"""Default of control_margin: drives that keep it pass in closed loop, see docs/validation.md."""
 RELIABLE, BEST_EFFORT = "reliable", "best_effort"
 RELIABILITIES = (RELIABLE, BEST_EFFORT)
 """Values of the parameter input_reliability."""

@@ -52,9 +52,9 @@ class TraverseServerParameters(ParameterTable):
         choices=TORQUE_POLICIES,
     )
     control_margin: float = parameter(
-        shared.CONTROL_MARGIN,
-        "Share of friction and torque that is left to a traction controller; 0 is the physical "
-        "limit.",
+        0.0,
+        "Share of friction and torque that optimal torques leave to a traction controller, beside "
+        "what accepted_chance does; 0 is the physical limit.",
         bounds=(0.0, 0.9),
     )
     candidate_count: int = parameter(

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rover_physics.bounds.path import SIGMAS
 from rover_physics.limits.table import CHANCE
-from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
@@ -18,15 +18,12 @@ from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path, judge_paths
 from rover_physics.traversability.verdict import Verdict
-from rover_planner.parameters.shared import CONTROL_MARGIN
 from rover_planner.planning.candidates import generate_candidates, path_length
 
 Pose = NDArray[np.float64]
 """(3,) x, y [m] and yaw [rad] of the body origin, map frame."""
 RISK_STEP = 0.05
 """Rounding step of risks [share of a limit]: paths of equal rounded risk differ by energy."""
-MODEL_OPTIONS = SweepOptions(control_margin=CONTROL_MARGIN)
-"""Default options of the model; traction control is planned with a margin."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +36,7 @@ class PathQueryOptions:
     """Lateral distance between neighbouring candidates half-way [m]."""
     waypoint_spacing: float = 0.02
     """Largest distance between waypoints along a path [m]."""
-    model: SweepOptions = MODEL_OPTIONS
+    model: SweepOptions = DEFAULT_OPTIONS
     """Torque policy, friction, torque, soil, payload and arm of the model."""
     map_sigmas: float = SIGMAS
     """Standard deviations to allow for on an uncertain map; 0 treats heights as exact."""

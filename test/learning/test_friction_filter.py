@@ -76,3 +76,21 @@ def test_ground_that_changes_is_learned_anew(frictions):
     ground.drive(2.0)
     slip_on(ground, after, 15)
     assert ground.estimate.mean == pytest.approx(after, rel=0.1)
+
+
+@pytest.mark.parametrize("friction", [0.3, 0.5, 1.2])
+def test_the_first_measurement_is_not_drawn_towards_what_was_told(friction):
+    ground = FrictionFilter(TOLD)
+    while ground.estimate.high is None:
+        ground.slip(friction, 0.22, 0.17)
+    assert ground.estimate.mean == pytest.approx(friction, rel=0.1)
+
+
+def test_a_lower_friction_is_believed_within_a_metre_after_a_line():
+    ground = FrictionFilter(TOLD)
+    slip_on(ground, 0.7, 10)
+    for _ in range(5):
+        ground.drive(0.2)
+        ground.slip(0.35, 0.22, 0.5)
+    estimate = ground.estimate
+    assert estimate.low < 0.35 and estimate.mean < 0.45

@@ -150,6 +150,15 @@ def test_a_bad_sensor_is_told_and_not_believed(spoil, word):
     assert estimate.friction.low < 1.2 * SLOPE
 
 
+def test_slip_is_seen_without_any_torque_and_measures_nothing():
+    rows = climb(ROVER, SLOPE, 20.0, speed=0.04)
+    rows[:, TORQUES] = np.nan
+    rows[rows[:, X] > 0.0, RATES] *= 1.6
+    estimate = learn(rows).estimate
+    assert estimate.slip_time == pytest.approx(10.5, abs=1.0)
+    assert estimate.friction.high is None and estimate.friction.low == 0.0
+
+
 def test_spikes_of_a_torque_are_not_believed():
     rows = climb(ROVER, SLOPE, 20.0)
     rows[::37, TORQUES.start + 2] = 1e6

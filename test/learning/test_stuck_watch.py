@@ -25,6 +25,7 @@ def window(
         aside=none,
         deviation=deviation,
         scrub=np.full(6, scrub),
+        uneven=none,
         places=np.tile([x, 0.0], (6, 1)),
         loads=none,
         doubts=none,
@@ -63,6 +64,14 @@ def test_a_rover_that_creeps_is_not_stuck_however_noisy_its_speed_is(speed, roll
 def test_a_rover_that_rests_or_climbs_is_not_stuck():
     assert first_notice(0.0, 0.0, 0.5) is None
     assert first_notice(0.0, SPEED, 1.0, climb=0.05) is None
+
+
+def test_a_rover_that_stands_while_its_wheels_are_steered_is_not_stuck():
+    watch = StuckWatch(SPEED, MAX_TORQUE)
+    for time in PERIOD * np.arange(1, 40):
+        one = window(float(time), 0.0, 0.0, deviation=0.02, scrub=0.014 if time < 2.6 else 0.0)
+        stuck = watch.update(one, np.ones(6), 0.0, commanded=SPEED)
+        assert stuck == (time > 3.75)
 
 
 def test_a_rover_that_turns_on_the_spot_or_steers_is_not_stuck():

@@ -32,9 +32,7 @@ def slippery():
 
 
 def options(accepted: float, count: int = 1) -> PathQueryOptions:
-    return PathQueryOptions(count=count, waypoint_spacing=0.05, accepted_chance=accepted).change(
-        control_margin=0.0
-    )
+    return PathQueryOptions(count=count, waypoint_spacing=0.05, accepted_chance=accepted)
 
 
 def test_a_path_is_refused_by_its_chance_alone(slippery):

@@ -21,7 +21,7 @@ from support.waiting import wait_until
 
 LSR1 = load_rover("lsr1")
 ENDS = (-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)
-OPTIONS = PathQueryOptions(count=1, waypoint_spacing=0.05).change(control_margin=0.0)
+OPTIONS = PathQueryOptions(count=1, waypoint_spacing=0.05)
 
 
 def rock(x, y):

@@ -19,7 +19,6 @@ from support.waiting import wait_until
 
 SERVER = {
     "policy": "optimal",
-    "control_margin": 0.0,
     "map_updates": "merge",
     "search_frontier": True,
     "search_budget": 8.0,
@@ -51,7 +50,7 @@ def without_gaps(terrain: Terrain) -> Terrain:
 def test_a_rover_drives_around_boulders_that_it_sees_on_the_way(ros, tmp_path, engine):
     terrain, start, goal, sensor_range = boulder_field()
     save_terrain(tmp_path / "ground.npz", terrain)
-    options = PathQueryOptions().change(policy="optimal", control_margin=0.0)
+    options = PathQueryOptions().change(policy="optimal")
     fan = answer_path_query(load_rover("lsr1"), terrain, start, goal, options)
     assert not fan.traversable
 

@@ -17,7 +17,7 @@ from rover_physics.limits.table import CHANCE
 from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 from rover_physics.rover.uncertainty import Uncertainty
 from support.chance_paths import HELD_OUT, find_chance, read_driven_paths
-from support.reference_drives import unlimited
+from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import plane
 
 EXACT = Uncertainty(**{one.name: 0.0 for one in fields(Uncertainty)})
@@ -78,6 +78,13 @@ def test_a_control_margin_is_not_asked_of_samples():
         for one in (options, replace(options, control_margin=0.1))
     )
     assert kept.traversable and 0.0 < kept.failure_chance == told.failure_chance < 0.5
+
+
+def test_optimal_torques_give_way_to_a_wheel_that_has_less():
+    told = SweepOptions("optimal", friction=0.97, max_torque=1.0)
+    ground, rover = drive_ground("step", 0.246), rover_with(max_torque_per_wheel=0.03)
+    found = judge_path(rover, ground, drive_path(0.05), told, accepted_chance=1.0)[1]
+    assert found.max_torque_saturation > 0.99 and found.failure_chance == 0.0
 
 
 @pytest.mark.parametrize("name", ["max_torque", "model"])

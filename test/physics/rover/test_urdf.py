@@ -13,10 +13,11 @@ import pytest
 from rover_physics import Rover, load_rover
 from rover_physics.errors import RoverFileError
 from rover_physics.rover.rover_file import preset_names, rover_to_dict, save_rover, save_yaml
-from rover_physics.rover.urdf.joint_map import map_of
+from rover_physics.rover.urdf.joint_map import load_joint_map, map_of
 from rover_physics.rover.urdf.read_rover import Levelling, rover_from_urdf
 from rover_physics.rover.urdf.robot import JointTree, parse_robot, read_robot
 from rover_physics.rover.urdf.write_urdf import write_urdf
+from support.project.checkout import TOP
 
 
 def numbers_of(contents: Any, key: str = "") -> dict[str, Any]:
@@ -381,6 +382,11 @@ def test_a_rover_of_three_bogies_is_refused_by_name(kind, tmp_path):
     text = insert_link(foreign_urdf(), "Root", "revolute", "1 0 0")
     with pytest.raises(RoverFileError, match="a rover of three bogies has neither"):
         read_foreign(tmp_path, text, **{kind: {"right": "ToRoot", "left": "ToRoot"}})
+
+
+def test_the_joint_map_of_perseverance_has_the_masses_of_the_preset():
+    found = load_joint_map(TOP / "examples" / "rover" / "perseverance_joints.yaml")
+    assert found.rover["masses"] == rover_to_dict(load_rover("m2020"))["masses"]
 
 
 def test_xacro_and_circles_are_refused():

@@ -21,7 +21,7 @@ from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from rover_planner.planning.search.unobserved_check import UnobservedCheck
 
 LSR1 = load_rover("lsr1")
-OPTIONS = PathQueryOptions(waypoint_spacing=0.04).change(control_margin=0.0)
+OPTIONS = PathQueryOptions(waypoint_spacing=0.04)
 LONG = LatticeSettings(budget=60.0)
 START, GOAL = (0.0, 0.0, 0.0), (3.0, 0.0, 0.0)
 

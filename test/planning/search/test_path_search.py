@@ -32,7 +32,7 @@ from support.grounds import long_wall, make_terrain, pen, waves
 from support.rough_grounds import rocky
 
 LSR1 = load_rover("lsr1")
-OPTIONS = PathQueryOptions(waypoint_spacing=0.04).change(control_margin=0.0)
+OPTIONS = PathQueryOptions(waypoint_spacing=0.04)
 LONG = LatticeSettings(budget=60.0)
 START, GOAL = (-2.5, 0.0, 0.0), (2.5, 0.0, 0.0)
 
