@@ -104,8 +104,10 @@ function drawErrors() {
   at("errors").replaceChildren(...lines.map((line) => make("div", {}, line)));
 }
 
+// Under another name of this machine the scene has a process of its own: its pictures delay no number.
+const ALIASES = { "127.0.0.1": "localhost", localhost: "127.0.0.1" };
 function drawScene(scene) {
-  const address = `http://${location.hostname}:${scene.port}`;
+  const address = `http://${ALIASES[location.hostname] || location.hostname}:${scene.port}`;
   if (!at("scene").srcdoc && at("scene").src !== `${address}/`) at("scene").src = address;
 }
 
