@@ -109,9 +109,8 @@ class Visitor:
         return [str(text) for text in self.tab.locator(selector).all_inner_texts()]
 
     def is_on_screen(self, selector: str) -> bool:
-        """Return whether all of an element is within the window, once it is drawn."""
-        drawn = self.tab.locator(selector).first
-        box = wait_until(drawn.bounding_box, selector)
+        """Return whether all of an element is within the window."""
+        box = self.tab.locator(selector).first.bounding_box()
         below, beside = box["y"] + box["height"], box["x"] + box["width"]
         return box["y"] >= 0.0 and below <= LAPTOP["height"] and beside <= LAPTOP["width"]
 
