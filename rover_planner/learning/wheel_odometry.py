@@ -36,10 +36,6 @@ class Regression:
         self._rest = np.diag(np.square(np.reciprocal(prior)))
         self._squares, self._products = np.zeros_like(self._rest), np.zeros(len(prior))
         self._count, self._sum = MISS_COUNT, MISS_COUNT * MISS**2
-        self.mean = np.zeros(len(prior))
-        """Means (n,) of the parameters."""
-        self.covariance = np.diag(np.square(prior))
-        """Covariance (n, n) of the parameters."""
 
     def add(self, inputs: Floats, value: float) -> None:
         """Take a value that is the inputs (n,) times the parameters, but for noise."""
@@ -48,16 +44,21 @@ class Regression:
         weight = 1.0 / (1.0 + (miss / (2.0 * MISS)) ** 2)  # a wheel that spins is no creep
         self._squares += weight * np.outer(inputs, inputs)
         self._products += weight * value * inputs
-        self._solve()
-
-    def _solve(self) -> None:
-        self.covariance = np.linalg.inv(self._squares / self.variance + self._rest)
-        self.mean = np.asarray(self.covariance @ self._products / self.variance)
 
     @property
     def variance(self) -> float:
         """Variance of the noise."""
         return self._sum / self._count
+
+    @property
+    def mean(self) -> Floats:
+        """Means (n,) of the parameters."""
+        return np.asarray(self.covariance @ self._products / self.variance)
+
+    @property
+    def covariance(self) -> Floats:
+        """Covariance (n, n) of the parameters."""
+        return np.linalg.inv(self._squares / self.variance + self._rest)
 
 
 @dataclass(frozen=True)

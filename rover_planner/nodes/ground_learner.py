@@ -52,8 +52,6 @@ MARK_PLACE = "traverse_server/mark_place"
 """Topic of places that are impassable."""
 PERIOD = 1.0
 """Time between two estimates [s]; that the rover is stuck is told at once."""
-ODOMETRY_PERIOD = 0.045
-"""Least time between two odometries from the wheels [s]."""
 COMMAND_AGE = 0.5
 """Age from which a command is none [s]."""
 
@@ -80,7 +78,7 @@ class GroundLearnerNode(Node):
         self._estimates = self.create_publisher(String, ESTIMATE, latched_qos())
         self._stops = self.create_publisher(Bool, EMERGENCY_STOP, latched_qos())
         self._marks = self.create_publisher(String, MARK_PLACE, latched_qos())
-        self._wheels, self._odometry_sent = WheelOdometry(self._rover), -1e9
+        self._wheels = WheelOdometry(self._rover)
         self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", sensor_qos())
         for kind, name, take in (
             (JointState, "joint_states", self._rows.take_joints),
@@ -143,9 +141,6 @@ class GroundLearnerNode(Node):
             return
         wheels = self._wheels
         wheels.take(motion)
-        if abs(motion.time - self._odometry_sent) < ODOMETRY_PERIOD:
-            return
-        self._odometry_sent = motion.time
         speed = wheels.speed, wheels.speed_deviation
         message = planar_odometry(
             wheels.pose,
