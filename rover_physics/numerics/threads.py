@@ -5,6 +5,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
+from contextvars import copy_context
 from functools import partial
 from typing import Any
 
@@ -49,7 +50,7 @@ def run_chunks(sweep: Callable[..., Any], inputs: tuple, chunks: int, threads: i
 
 
 def run_in_turn(calls: Iterable[Callable[[], object]], threads: int) -> None:
-    """Run calls on some threads; they begin in their order.
+    """Run calls on some threads, in the context of this one; they begin in their order.
 
     Args:
         calls: The calls, drawn one by one while earlier ones run. When call k begins, call
@@ -66,7 +67,7 @@ def run_in_turn(calls: Iterable[Callable[[], object]], threads: int) -> None:
         for call in calls:
             if len(waiting) == CALLS_IN_WORK * threads:
                 waiting.popleft().result()
-            waiting.append(pool.submit(call))
+            waiting.append(pool.submit(copy_context().run, call))
         for one in waiting:
             one.result()
     finally:

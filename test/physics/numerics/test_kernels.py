@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from rover_physics.numerics.kernel_cache import _only_load, loading_only
 from rover_physics.numerics.threads import CALLS_IN_WORK, run_in_turn
 
 REPOSITORY = Path(__file__).resolve().parents[3]
@@ -48,6 +49,14 @@ def test_calls_are_drawn_while_others_run_and_an_error_among_them_ends_the_work(
 
     with pytest.raises(ValueError, match="call"):
         run_in_turn(iter([fail] * 50), 3)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_calls_know_the_block_that_only_loads_kernels(threads):
+    known = []
+    with loading_only():
+        run_in_turn((lambda: known.append(_only_load.get()) for _ in range(9)), threads)
+    assert known == [True] * 9
 
 
 def test_kernels_are_not_made_by_functions():
