@@ -2,6 +2,7 @@
 """Terrain: an elevation grid with unknown cells and layers of friction, soil and more."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -89,6 +90,14 @@ class Terrain:
         for name, value in checked.items():
             frozen = freeze_array(value) if isinstance(value, np.ndarray) else value
             object.__setattr__(self, name, frozen)
+
+    @cached_property
+    def classes(self) -> tuple[int, ...]:
+        """The classes of ground that the map has, found once: a question asks for them."""
+        if self.ground_class is None:
+            return ()
+        known = self.ground_class[np.isfinite(self.ground_class)]
+        return tuple(np.unique(known).astype(int).tolist())
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:

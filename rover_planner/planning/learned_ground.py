@@ -58,12 +58,9 @@ class LearnedGround:
 
     def assume_classes(self, terrain: Terrain, told: float) -> dict[int, float]:
         """Return the friction to assume on each class of a map; a class not met has the told."""
-        if terrain.ground_class is None:
-            return {}
-        numbers = np.unique(terrain.ground_class[np.isfinite(terrain.ground_class)])
         return {
             number: self.classes[number].assume(told) if number in self.classes else told
-            for number in numbers.astype(int).tolist()
+            for number in terrain.classes
         }
 
 
