@@ -61,6 +61,12 @@ def find_refused(page: Page) -> int:
     return next(k for k, path in enumerate(paths) if not path.verdict.traversable)
 
 
+def wait_for_scene(page: Page):
+    """Return the newest scene that has connected: its frame loads beside the page, and later."""
+    wait_until(page.server.get_clients, "the scene to connect")
+    return max(page.server.get_clients().items())[1]
+
+
 def test_the_page_opens_with_verdict_board_and_limits_on_the_screen_of_a_laptop(visitor, page):
     assert visitor.text("#verdict .word") == "traversable"
     loads = [float(one.split()[0]) for one in visitor.texts(".tyre + small")]
@@ -140,6 +146,7 @@ def test_a_row_is_taken_by_click_and_key_and_a_slider_leaves_its_path_and_offers
 def test_a_refusal_leads_to_its_place_where_all_parts_show_one_number(visitor, page):
     ask(page, lambda: page.session.show_path(find_refused(page)))
     wait_for_rest(page)
+    camera = wait_for_scene(page).camera
     path = page.session.shown.path
     visitor.wait_for(path.failure.headline)
     visitor.press("Go to the failure")
@@ -149,7 +156,6 @@ def test_a_refusal_leads_to_its_place_where_all_parts_show_one_number(visitor, p
     lane = f'.lane[data-code="{path.failure.code}"][data-broken]'
     wait_until(lambda: visitor.tab.locator(lane).count() == 1, "the broken lane")
     assert use["worst"] in visitor.text(lane)
-    camera = max(page.server.get_clients().items())[1].camera
     wait_until(
         lambda: np.allclose(camera.look_at, path.failure.state.position, atol=1e-3),
         "the camera to look there",
@@ -215,7 +221,7 @@ def test_a_click_into_the_scene_sets_the_goal_and_one_into_the_sky_is_refused(vi
     visitor.tab.frame_locator("#scene").locator("canvas").first.wait_for()
     box = visitor.tab.locator("#scene").bounding_box()
     middle = box["x"] + 0.5 * box["width"], box["y"] + 0.7 * box["height"]
-    client = max(page.server.get_clients().items())[1]
+    client = wait_for_scene(page)
     ask(page, lambda: page._look(client, "Fit"))
     visitor.tab.wait_for_timeout(500)
     visitor.tab.mouse.click(*middle)
