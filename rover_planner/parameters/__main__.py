@@ -24,17 +24,12 @@ def parameters_document() -> str:
         [
             "# Parameters",
             "",
-            "Made from the tables in `rover_planner/parameters/` by",
-            "`python -m rover_planner.parameters > docs/parameters.md`; "
-            "a test holds them together.",
+            "Made by `python -m rover_planner.parameters > docs/parameters.md`. The default shows",
+            "the type; an empty one is a string. Parameters with \\* are set at start, the others",
+            "at any time (`ros2 param set /traverse_server friction 0.6`). A value that is not",
+            "allowed is refused with the reason.",
             "",
             *_sections(),
-            "The default shows the type; an empty one is a string. Parameters with \\* are set",
-            "at start (read-only), the others at any time "
-            "(`ros2 param set /traverse_server friction 0.6`).",
-            "A value of the wrong type, NaN, out of bounds or not among the choices "
-            "is refused with the reason.",
-            "",
         ]
     )
 
