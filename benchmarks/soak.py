@@ -29,6 +29,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from nav_msgs.srv import LoadMap
 from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64MultiArray, String
 
 from benchmarks.processes import (
@@ -44,7 +45,7 @@ from benchmarks.stepped_clock import SteppedClock
 from msg_adapters.odometry import odometry_to_pose
 from rover_physics import save_terrain
 from rover_planner.demo.child_process import ChildProcess
-from rover_planner.ros.qos import latched_qos, sensor_qos, topic_qos
+from rover_planner.ros.qos import sensor_qos, topic_qos
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.project.launch_files import simulation_commands
 from support.ros_fixtures import RosRun
@@ -54,6 +55,8 @@ START_TIME = 300.0
 """Longest wait for the start of all programs [s]."""
 FLIGHT = 0.1
 """Time for which a controller that comes to rest may still send torques [s]."""
+QUEUE = 1000
+"""States and torques that wait to be heard; a lost state would make torques count."""
 PATIENCE = 10.0
 """Longest wait for an answer [s]."""
 PRIORITY = 50
@@ -78,10 +81,12 @@ class Ear(Node):
         self.pose = np.full(3, np.nan)
         self.faults: Counter[str] = Counter()
         self.rest, self._fault = RestWatch(), ""
+        torques = QoSProfile(depth=QUEUE)
+        states = QoSProfile(depth=QUEUE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         for kind, topic, hear, qos in (
             (Odometry, "odometry", self._hear_odometry, sensor_qos()),
-            (String, "traction_controller/state", self._hear_state, latched_qos()),
-            (Float64MultiArray, "traction_controller/commands", self._hear_torques, topic_qos()),
+            (String, "traction_controller/state", self._hear_state, states),
+            (Float64MultiArray, "traction_controller/commands", self._hear_torques, torques),
             (DiagnosticArray, "/diagnostics", self._hear_diagnostics, topic_qos()),
         ):
             self.create_subscription(kind, topic, hear, qos)
@@ -90,10 +95,10 @@ class Ear(Node):
         self.pose = odometry_to_pose(odometry, "map")[0][[0, 1, 3]]
 
     def _hear_state(self, state: String, about: dict[str, int]) -> None:
-        self.rest.take(about["source_timestamp"] / 1e9, state=state.data)
+        self.rest.take(sent_at(about), state=state.data)
 
     def _hear_torques(self, message: Float64MultiArray, about: dict[str, int]) -> None:
-        self.rest.take(about["source_timestamp"] / 1e9, turns=any(message.data))
+        self.rest.take(sent_at(about), turns=any(message.data))
 
     def _hear_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -104,37 +109,36 @@ class Ear(Node):
 
 
 class RestWatch:
-    """Counts the torques that a controller sends while it is to rest, by its own stamps.
+    """Counts the torques that a controller sends while it is to rest.
 
     The first torques of a drive, which are sent before its state, are zero.
     """
 
     def __init__(self) -> None:
-        self._count, self._sent = 0, list[tuple[float, str, bool]]()
-        self._last, self._since = 0.0, np.inf
-
-    @property
-    def count(self) -> int:
-        """Torques until now."""
-        self._judge()
-        return self._count
+        self._sent = list[tuple[float, str, bool]]()
 
     def take(self, sent: float, state: str = "", turns: bool = False) -> None:
         """Take a state, or whether torques turn a wheel, sent at a time [s]."""
-        if abs(sent - self._last) > 0.5 * max(STEPS):  # the clock was stepped
-            self._judge()
-            self._since = -np.inf if np.isfinite(self._since) else self._since
-        self._last = sent
         self._sent.append((sent, state, turns))
 
-    def _judge(self) -> None:
-        """Count in the order of sending, which is not that of arrival."""
-        for at, state, turns in sorted(self._sent):
+    def find_torques(self) -> list[str]:
+        """Return the state of each torque until now, and for how long it had been so."""
+        found, since, rest = [], np.inf, ""
+        for at, state, turns in sorted(self._sent):  # messages come in another order
             if state:
-                self._since = np.inf if state == "driving" else at
-            else:
-                self._count += turns and at - self._since > FLIGHT
-        self._sent.clear()
+                since, rest = np.inf if state == "driving" else at, state
+            elif turns and at - since > FLIGHT:
+                found.append(f"{rest} for {at - since:.2f} s")
+        return found
+
+
+def sent_at(about: dict[str, int]) -> float:
+    """Return when a message was sent, on the clock of the machine [s].
+
+    What was sent after it was received is stamped by the clock that is ahead.
+    """
+    sent, received = about["source_timestamp"], about["received_timestamp"]
+    return sent / 1e9 - (max(STEPS) if sent > received else 0)
 
 
 def without_numbers(text: str) -> str:
@@ -271,7 +275,7 @@ class Soak:
             "drives": dict(self._drives),
             "disturbances": dict(self._events),
             "faults": {cause: count for cause, count in self._ear.faults.items() if count},
-            "torques at rest": self._ear.rest.count,
+            "torques at rest": self._ear.rest.find_torques(),
             "memory at start [MB]": memory,
             "memory at end [MB]": programs.memory(),
             "answer at start [ms]": latency,
