@@ -27,7 +27,7 @@ def parameters_document() -> str:
             "Made by `python -m rover_planner.parameters > docs/parameters.md`. The default shows",
             "the type; an empty one is a string. `--help` of a node has the bounds, too.",
             "Parameters with \\* are set at start, the others at any time (`ros2 param set",
-            "/traverse_server friction 0.6`). A value that is not allowed is refused with the reason.",
+            "/traverse_server friction 0.6`). What is not allowed is refused with the reason.",
             "",
             *_sections(),
         ]
