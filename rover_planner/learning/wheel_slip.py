@@ -42,7 +42,7 @@ class SlipWindow:
     aside: Floats
     """(6,) speeds of the wheel centres along their axles, to the left [m/s]."""
     deviation: float
-    """Standard deviation of the slips along the headings, of the wheel that is known worst [m/s]."""
+    """Standard deviation of the slips along the headings, of the wheel known worst [m/s]."""
     scrub: Floats
     """(6,) speeds up to which treads may roll because the wheels are steered [m/s]: a wheel turns
     about the middle of its contact, which is somewhere along its width."""
