@@ -222,7 +222,7 @@ def stuck_in_truth(told: GroundEstimate, rows: np.ndarray, rover: Rover) -> bool
         (times > told.immobilised_time - STAYED_FOR - 0.3) & (times <= told.immobilised_time)
     ]
     way = np.hypot(*(then[-1] - then[0])[[X, Y]]) + LEVER * abs(then[-1, YAW] - then[0, YAW])
-    rolled = rover.wheel.radius * np.abs(then[:, RATES]).mean()
+    rolled = rover.wheel.radius * np.abs(then[:, RATES].mean(axis=0)).mean()
     return bool(way < STAYS * rolled * (then[-1, TIME] - then[0, TIME]))
 
 

@@ -33,7 +33,7 @@ class StuckWatch:
         """
         self._slowest = SLOWEST * nominal_speed
         self._most = PUSHING * max_torque
-        self._past: deque[tuple[float, Floats, float, bool]] = deque()
+        self._past: deque[tuple[float, Floats, Floats, bool]] = deque()
         self.reason = ""
         """Reason why the rover is stuck; empty if it is not."""
 
@@ -53,7 +53,7 @@ class StuckWatch:
             commanded: Commanded speed [m/s], None if it is not known: then wheels that turn, or
                 push as hard as they can, tell that the rover is to move.
         """
-        speed = float(np.median(np.maximum(np.abs(window.rolling) - window.scrub, 0.0)))
+        free = np.maximum(np.abs(window.rolling) - window.scrub, 0.0)
         wanted = bool((np.abs(torques) >= self._most).sum() >= WHEEL_COUNT // 3)
         if commanded is not None:
             wanted = abs(commanded) > self._slowest
@@ -61,7 +61,7 @@ class StuckWatch:
         past = self._past
         if past and window.time - past[-1][0] > LONGEST_GAP:
             past.clear()
-        past.append((window.time, window.places, speed, wanted))
+        past.append((window.time, window.places, np.sign(window.rolling) * free, wanted))
         while len(past) > 1 and window.time - past[1][0] >= PATIENCE - 1e-6:
             past.popleft()
         times, places, speeds, wishes = zip(*past, strict=True)
@@ -70,8 +70,11 @@ class StuckWatch:
         if elapsed >= PATIENCE - 1e-6 and climb < CLIMBING:
             # On the spot the middle of the wheels stays, and each goes its way.
             moved = float(np.hypot(*(places[-1] - places[0]).T).mean()) / elapsed
-            if min(speeds) > self._slowest and moved < NO_PROGRESS * np.mean(speeds):
+            rolling = np.median(np.abs(speeds), axis=1)
+            # There and back a rover rolls and stays, too: what counts is where it rolls to.
+            rolled = float(np.median(np.abs(np.mean(speeds, axis=0))))
+            if rolling.min() > self._slowest and moved < NO_PROGRESS * rolled:
                 self.reason = "wheels turn and the rover stays"
-            elif all(wishes) and max(moved, *speeds) < self._slowest:
+            elif all(wishes) and max(moved, rolling.max()) < self._slowest:
                 self.reason = "wheels push and do not turn"
         return bool(self.reason)

@@ -21,6 +21,9 @@ SIGN_TIME = 2.0
 """Time constant of the search for wrong signs [s]."""
 SIGN_SHARE = 0.25
 """Share of a contradiction that is left when one sign is turned, if this sign is wrong."""
+LEAST_STRAIGHT = 0.75
+"""Slowest wheel over the fastest one from which a rover goes straight enough to look at signs: in
+tighter curves and on the spot, lateral forces whose shares are assumed hold it, too."""
 LEAST_EXCESS = 0.03
 """Contradiction of the tractions from which signs are looked at, over the weight."""
 TURNING_BACK = 0.3
@@ -64,7 +67,7 @@ class WheelHealth:
         """
         share = min(elapsed / SIGN_TIME, 1.0)
         self._backward += share * (self.rolls_backward(window) - self._backward)
-        if grips:
+        if grips and _goes_straight(window):
             self._excess += share * (abs(window.excess) - self._excess)
             turned = np.abs(window.excess - 2.0 * window.tractions)
             self._turned += share * (turned - self._turned)
@@ -100,3 +103,9 @@ class WheelHealth:
         ):
             found |= {WHEELS[k]: word for k in np.flatnonzero(mask) if WHEELS[k] not in found}
         return found
+
+
+def _goes_straight(window: SlipWindow) -> bool:
+    """Return whether all wheels roll the same way, at almost the same speed."""
+    slowest, fastest = sorted((window.rolling.min(), window.rolling.max()), key=abs)
+    return bool(slowest * fastest > LEAST_STRAIGHT * fastest**2)

@@ -42,7 +42,7 @@ class SlipWindow:
     aside: Floats
     """(6,) speeds of the wheel centres along their axles, to the left [m/s]."""
     deviation: float
-    """Standard deviation of the speeds [m/s]."""
+    """Standard deviation of the slips along the headings, of the wheel known worst [m/s]."""
     scrub: Floats
     """(6,) speeds up to which treads may roll because the wheels are steered [m/s]: a wheel turns
     about the middle of its contact, which is somewhere along its width."""
@@ -90,7 +90,7 @@ class SlipWindows:
     def __init__(self, radius: float, width: float):
         """Start for wheels of a radius and a width [m]."""
         self._radius, self._half_width = radius, 0.5 * width
-        self._scatter, self._scatter_known = 0.0, False
+        self._scatter: Floats | None = None
         self._blocks: deque[tuple[float, Floats, WheelState]] = deque(maxlen=WINDOW)
 
     def begin(self) -> None:
@@ -119,14 +119,15 @@ class SlipWindows:
         means = values.mean(axis=0)
         slopes = centred @ (values - means) / spread
         rest = values - means - centred[:, None] * slopes
-        # A curved course also leaves a rest; it is the same in all wheels and small.
-        squares = (rest**2).sum(axis=0) / (WINDOW - 2)
-        scatter = float(squares[:WHEEL_COUNT].mean() + 2.0 * squares[WHEEL_COUNT:].mean()) / 2.0
-        self._scatter += min(1.0 / SCATTER_MEMORY, 1.0) * (scatter - self._scatter)
-        if not self._scatter_known:
-            self._scatter, self._scatter_known = scatter, True
-        scatter = float(np.sqrt(max(scatter, self._scatter)))
         along = np.mean([state.along for state in states], axis=0)
+        # A curved course also leaves a rest; it is the same in all wheels and small.
+        ahead = (rest[:, WHEEL_COUNT:].reshape(WINDOW, WHEEL_COUNT, 2) * along[:, :2]).sum(axis=2)
+        squares = ((rest[:, :WHEEL_COUNT] - ahead) ** 2).sum(axis=0) / (WINDOW - 2)
+        if self._scatter is None:
+            self._scatter = squares
+        self._scatter = self._scatter + (squares - self._scatter) / SCATTER_MEMORY
+        # Errors of the heading move outer wheels most when the rover turns on the spot.
+        scatter = float(np.sqrt(max(squares.mean(), self._scatter.max())))
         axles = np.mean([state.axles for state in states], axis=0)
         speeds = slopes[WHEEL_COUNT:].reshape(WHEEL_COUNT, 2)
         across = along[:, 0] * axles[:, 1] - along[:, 1] * axles[:, 0]

@@ -24,17 +24,12 @@ def parameters_document() -> str:
         [
             "# Parameters",
             "",
-            "Made from the tables in `rover_planner/parameters/` by",
-            "`python -m rover_planner.parameters > docs/parameters.md`; "
-            "a test holds them together.",
+            "Made by `python -m rover_planner.parameters > docs/parameters.md`. The default shows",
+            "the type; an empty one is a string. `--help` of a node has the bounds, too.",
+            "Parameters with \\* are set at start, the others at any time (`ros2 param set",
+            "/traverse_server friction 0.6`). What is not allowed is refused with the reason.",
             "",
             *_sections(),
-            "The default shows the type; an empty one is a string. Parameters with \\* are set",
-            "at start (read-only), the others at any time "
-            "(`ros2 param set /traverse_server friction 0.6`).",
-            "A value of the wrong type, NaN, out of bounds or not among the choices "
-            "is refused with the reason.",
-            "",
         ]
     )
 
@@ -45,7 +40,7 @@ def _sections() -> Iterator[str]:
     for node, table in TABLES.items():
         rows = {spec.name: _row(spec) for spec in specs_of(table)}
         yield from (f"## {node}", "")
-        yield from ("| name | default | allowed | meaning |", "|---|---|---|---|")
+        yield from ("| name | default; other choices | meaning |", "|---|---|---|")
         yield from (row for row in rows.values() if row not in homes)
         yield ""
         for home in dict.fromkeys(homes.values()):
@@ -56,16 +51,15 @@ def _sections() -> Iterator[str]:
 
 
 def _row(spec: ParameterSpec) -> str:
-    default = f"`{spec.ros_default}`" if spec.default != "" else "empty"
     name = f"`{spec.name}`" + ("\\*" if spec.read_only else "")
-    return f"| {name} | {default} | {_allowed(spec)} | {spec.meaning} |"
+    return f"| {name} | {_values(spec)} | {spec.meaning} |"
 
 
-def _allowed(spec: ParameterSpec) -> str:
-    """Return the bounds with their unit, or the choices, as text."""
-    if spec.bounds is not None:
-        return f"{spec.bounds[0]:g} to {spec.bounds[1]:g} {spec.unit}".rstrip()
-    return ", ".join(f"`{choice}`" for choice in spec.choices)
+def _values(spec: ParameterSpec) -> str:
+    """Return the default with its unit, then the other choices, as text."""
+    default = f"`{spec.ros_default}` {spec.unit}".rstrip() if spec.default != "" else "empty"
+    others = [f"`{choice}`" for choice in spec.choices if choice != spec.default]
+    return "; ".join([default, ", ".join(others)]) if others else default
 
 
 if __name__ == "__main__":

@@ -11,9 +11,7 @@ from rover_planner.parameters.table import ParameterTable, parameter
 class GroundLearnerParameters(ParameterTable):
     """Parameters of `/ground_learner`; the fields document themselves."""
 
-    rover: str = parameter(
-        "lsr1", "Rover that drives: a preset's name or a rover file.", read_only=True
-    )
+    rover: str = parameter("lsr1", "Preset or rover file.", read_only=True)
     friction: float = parameter(
         0.0,
         "Friction that is assumed at first; 0 uses that of the rover file.",
@@ -22,19 +20,16 @@ class GroundLearnerParameters(ParameterTable):
     )
     soil: str = parameter(
         "",
-        "Soil of config/soils.yaml that is assumed at first, on ground that yields; its "
-        "parameters are learned.",
+        "Soil that is assumed at first, on ground that yields, and learned.",
         read_only=True,
     )
     stop_when_stuck: bool = parameter(
         False,
-        "Whether a rover that is stuck gets an emergency stop on "
-        "traction_controller/emergency_stop.",
+        "Whether a rover that is stuck gets an emergency stop.",
     )
     mark_when_stuck: bool = parameter(
         False,
-        "Whether the place ahead of a rover that is stuck is marked as impassable, on "
-        "traverse_server/mark_place.",
+        "Whether the place ahead of a rover that is stuck is marked as impassable.",
     )
     map_frame: str = parameter(
         "map", "Frame of map and odometry; others are refused.", read_only=True

@@ -20,32 +20,29 @@ class RoverSimulatorParameters(ParameterTable):
 
     all_read_only = True
 
-    rover: str = parameter("lsr1", "Rover that is simulated: a preset's name or a rover file.")
-    terrain_file: str = parameter(
-        "", "Terrain to drive on: a preset's name or a terrain file; empty makes one."
-    )
+    rover: str = parameter("lsr1", "Preset or rover file.")
+    terrain_file: str = parameter("", "Terrain: a preset or terrain file; empty makes one.")
     max_map_cells: int = shared.MAX_MAP_CELLS
     start_x: float = parameter(0.0, "Start of the rover, x.", unit="m", bounds=(-1e6, 1e6))
     start_y: float = parameter(0.0, "Start of the rover, y.", unit="m", bounds=(-1e6, 1e6))
     start_yaw: float = parameter(0.0, "Heading at the start.", unit="rad", bounds=(-6.3, 6.3))
     engine: str = parameter(
         QUASI_STATIC,
-        "Physics engine: the quasi-static model, or MuJoCo (extra bench).",
+        "Physics engine; mujoco needs the extra bench.",
         choices=ENGINES,
     )
     friction: float = parameter(
         0.0,
-        "Coulomb friction of the ground; 0 uses that of the terrain or the rover file.",
+        "Coulomb friction; 0 uses that of the terrain or the rover file.",
         bounds=(0.0, 10.0),
     )
     soil: str = parameter(
         "",
-        "Soil of config/soils.yaml where the terrain names none; empty is Coulomb friction. "
-        "Quasi-static engine only.",
+        "Soil where the terrain names none; empty is Coulomb friction. Quasi-static engine only.",
     )
     policy: str = parameter(
         EQUAL,
-        "How the rover's own servos share the traction. Quasi-static engine only, and not with "
+        "Torques of the rover's own servos. Quasi-static engine only, and not with "
         "follow_commands.",
         choices=CONTROL_POLICIES,
     )
@@ -58,9 +55,7 @@ class RoverSimulatorParameters(ParameterTable):
     follow_commands: bool = parameter(
         False, "Whether torques from traction_controller/commands drive the rover."
     )
-    joints: tuple[str, ...] = parameter(
-        WHEEL_JOINTS, "Wheel joints in the order of the values of the torques."
-    )
+    joints: tuple[str, ...] = parameter(WHEEL_JOINTS, "Wheel joints in the order of the commands.")
     timeout: float = parameter(
         0.5, "Age above which cmd_vel and torques are ignored.", unit="s", bounds=(0.01, 10.0)
     )
@@ -73,7 +68,7 @@ class RoverSimulatorParameters(ParameterTable):
     )
     sensor_noise: float = parameter(
         0.0,
-        "Standard deviation of the measured heights, published as elevation_std.",
+        "Standard deviation of the measured heights.",
         unit="m",
         bounds=(0.0, 1.0),
     )
@@ -88,7 +83,7 @@ class RoverSimulatorParameters(ParameterTable):
         bounds=(0.01, ALL_AROUND),
     )
     sensor_least_range: float = parameter(
-        0.0, "Distance of the nearest ground that the sensor sees.", unit="m", bounds=(0.0, 100.0)
+        0.0, "Nearest ground that the sensor sees.", unit="m", bounds=(0.0, 100.0)
     )
     seed: int = parameter(1, "Seed of noise and of a generated terrain.", bounds=(0, 2**31 - 1))
     steering_sign: str = shared.STEERING_SIGN

@@ -23,33 +23,33 @@ MAX_TORQUE: float = parameter(
 )
 STEERING_SIGN: str = parameter(
     LEFT,
-    "Side to which positive angles of steering joints turn in messages; left as in REP-103.",
+    "Side to which positive steering angles turn in messages.",
     choices=tuple(STEERING_SIGNS),
     read_only=True,
 )
 BASE_OFFSET: tuple[float, ...] = parameter(
     (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    "Pose of the model's body in the robot's frame: x, y, z in m, roll, pitch, yaw in rad; "
-    "starts, goals, paths, plans and odometry are of the robot's frame.",
+    "Pose of the model's body in the robot's frame, which starts, goals, paths, plans and "
+    "odometry are of: x, y, z in m, roll, pitch, yaw in rad.",
     bounds=(-100.0, 100.0),
     read_only=True,
 )
 JOINT_MAP: tuple[str, ...] = parameter(
     tuple(f"{name}:{name}" for name in SUSPENSION_JOINTS),
-    "Names of the robot's joints: model_joint:robot_joint, then :-1 if it turns the other "
-    "way, then :offset, the model's angle in rad where the robot's is 0.",
+    "Joints: model_joint:robot_joint, then :-1 if it turns the other way, then :offset, the "
+    "model's angle in rad where the robot's is 0.",
     read_only=True,
 )
 STEERING_LIMIT: float = parameter(
     0.0,
-    "Angle that the steering joints reach; a rover file that asks for more is refused. 0 takes "
-    "that of the rover file.",
+    "Angle that the steering joints reach, beyond which a rover file is refused; 0 takes that of "
+    "the rover file.",
     unit="rad",
     bounds=(0.0, 3.2),
 )
 PAYLOAD: float = parameter(
     OWN_PAYLOAD,
-    "Mass at the tip of the manipulator; -1 uses that of the rover file.",
+    "Mass at the arm's tip; -1 uses that of the rover file.",
     unit="kg",
     bounds=(OWN_PAYLOAD, 1e6),
 )
@@ -73,7 +73,7 @@ def payload_or_none(payload: float) -> float | None:
 
 MAP_RESOLUTION: float = parameter(
     0.0,
-    "Cell size for clouds; 0 uses the spacing of their points, which must be a regular grid.",
+    "Cell size for clouds; 0 needs points on a regular grid.",
     unit="m",
     bounds=(0.0, 10.0),
 )
@@ -87,7 +87,7 @@ CELL_HEIGHT: str = parameter(
 MAX_MAP_CELLS: int = parameter(MAX_CELLS, "Largest terrain file.", unit="cells", bounds=(4, 10**9))
 REALTIME_PRIORITY: int = parameter(
     0,
-    "Real-time priority of this process (SCHED_FIFO), if the system grants it; 0 for none.",
+    "Real-time priority (SCHED_FIFO), if the system grants it; 0 for none.",
     bounds=(0, 99),
     read_only=True,
 )
@@ -97,13 +97,13 @@ STOP = "traverse_server/stop"
 
 STOP_TIMEOUT: float = parameter(
     0.0,
-    "Time without a message of traverse_server/stop after which the rover stops; 0 expects "
-    "none, and only stops while it is true.",
+    "Time without traverse_server/stop after which the rover stops; 0 only stops while it is "
+    "true.",
     unit="s",
     bounds=(0.0, 10.0),
 )
 IMU_FRAME: str = parameter(
-    "", "Frame of the IMU; empty is that of the body. Another frame_id is refused.", read_only=True
+    "", "Frame of the IMU; empty is that of the body. Others are refused.", read_only=True
 )
 IMU_MOUNTING: tuple[float, ...] = parameter(
     (0.0, 0.0, 0.0),
@@ -114,14 +114,13 @@ IMU_MOUNTING: tuple[float, ...] = parameter(
 )
 MAP_DURABILITY: str = parameter(
     EITHER,
-    "Durability of the map publishers to subscribe to.",
+    "Durability of the maps' publishers.",
     choices=MAP_DURABILITIES,
     read_only=True,
 )
 INPUT_RELIABILITY: str = parameter(
     RELIABLE,
-    "Reliability of the subscriptions to maps, paths and tool targets; best_effort may lose "
-    "messages.",
+    "Reliability of subscriptions to maps, paths and tool targets.",
     choices=RELIABILITIES,
     read_only=True,
 )

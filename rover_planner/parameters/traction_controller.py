@@ -16,9 +16,9 @@ REST_POLICIES = (HOLD, BRAKE, COAST)
 class TractionControllerParameters(ParameterTable):
     """Parameters of `/traction_controller`; the fields document themselves."""
 
-    rover: str = parameter("lsr1", "Rover that is driven: a preset's name or a rover file.")
+    rover: str = parameter("lsr1", "Preset or rover file.")
     joints: tuple[str, ...] = parameter(
-        WHEEL_JOINTS, "Wheel joints in the order of the values of ~/commands.", read_only=True
+        WHEEL_JOINTS, "Wheel joints in the order of the commands.", read_only=True
     )
     rate: float = parameter(
         50.0, "Updates per second.", unit="1/s", bounds=(10.0, 500.0), read_only=True
@@ -26,7 +26,7 @@ class TractionControllerParameters(ParameterTable):
     realtime_priority: int = shared.REALTIME_PRIORITY
     enabled_at_start: bool = parameter(
         False,
-        "Whether the node drives without a call of ~/enable; for simulations.",
+        "Whether the node drives without ~/enable; for simulations.",
         read_only=True,
     )
     rest_policy: str = parameter(
@@ -34,21 +34,21 @@ class TractionControllerParameters(ParameterTable):
     )
     stall_time: float = parameter(
         10.0,
-        "Time without progress after which the node stops pushing and is stalled.",
+        "Time without progress after which the node stops pushing.",
         unit="s",
         bounds=(0.5, 3600.0),
     )
     joint_states_timeout: float = parameter(
         0.06,
-        "Age above which the value of a wheel or suspension joint is stale, a fault.",
+        "Age above which a wheel or suspension joint is a fault.",
         unit="s",
         bounds=(0.01, 1.0),
     )
     imu_timeout: float = parameter(
-        0.06, "Age above which the attitude is stale, a fault.", unit="s", bounds=(0.01, 1.0)
+        0.06, "Age above which the attitude is a fault.", unit="s", bounds=(0.01, 1.0)
     )
     cmd_vel_timeout: float = parameter(
-        0.5, "Age above which cmd_vel is stale, a fault.", unit="s", bounds=(0.01, 10.0)
+        0.5, "Age above which cmd_vel is a fault.", unit="s", bounds=(0.01, 10.0)
     )
     stop_timeout: float = shared.STOP_TIMEOUT
     odometry_timeout: float = parameter(
@@ -56,19 +56,19 @@ class TractionControllerParameters(ParameterTable):
     )
     clock_timeout: float = parameter(
         0.05,
-        "With use_sim_time: time for which /clock may stand still before that is a fault.",
+        "With use_sim_time: time for which /clock may stand still.",
         unit="s",
         bounds=(0.01, 10.0),
     )
     stamp_tolerance: float = parameter(
         0.05,
-        "Time that a stamp may be ahead of the node's clock; others are ignored.",
+        "Time that a stamp may be ahead of the clock.",
         unit="s",
         bounds=(0.0, 1.0),
     )
     watchdog_timeout: float = parameter(
         0.08,
-        "Time without an update until the watchdog sends zero torques; at least two periods.",
+        "Time without an update until the watchdog sends zeros; at least two periods.",
         unit="s",
         bounds=(0.01, 1.0),
     )
@@ -79,12 +79,12 @@ class TractionControllerParameters(ParameterTable):
     payload: float = shared.PAYLOAD
     policy: str = parameter(
         OPTIMAL,
-        "How the wheels share the traction: smallest peak friction utilisation, or equal torques.",
+        "Torques of smallest peak friction utilisation, or equal ones.",
         choices=CONTROL_POLICIES,
     )
     torque_rate: float = parameter(
         0.0,
-        "Largest change of a torque while driving; 0 is ten times the largest torque a second.",
+        "Largest change of a torque; 0 is ten times the largest torque a second.",
         unit="N m/s",
         bounds=(0.0, 1e6),
     )
@@ -108,12 +108,12 @@ class TractionControllerParameters(ParameterTable):
     joint_map: tuple[str, ...] = shared.JOINT_MAP
     map_frame: str = parameter(
         "map",
-        "Frame of the map; odometry in another frame needs a transform of /tf.",
+        "Frame of the map; odometry in another frame needs /tf.",
         read_only=True,
     )
     base_frame: str = parameter(
         "base_link",
-        "Frame of the body; odometry of another child frame is refused.",
+        "Frame of the body, and odometry's child frame.",
         read_only=True,
     )
     base_offset: tuple[float, ...] = shared.BASE_OFFSET
@@ -124,7 +124,7 @@ class TractionControllerParameters(ParameterTable):
     imu_mounting: tuple[float, ...] = shared.IMU_MOUNTING
     cmd_vel_stamped: bool = parameter(
         True,
-        "Whether cmd_vel is a geometry_msgs/TwistStamped; false for a geometry_msgs/Twist.",
+        "Whether cmd_vel is a TwistStamped; false for a Twist.",
         read_only=True,
     )
     map_resolution: float = shared.MAP_RESOLUTION

@@ -35,6 +35,9 @@ WAIT = 120.0
 SCALE = 0.1
 """Pixels of the screen for each of the page: without a graphics card rendering is slow."""
 
+MEASURE = "selector => document.querySelector(selector)?.getBoundingClientRect()?.toJSON()"
+"""JavaScript that finds and measures an element at one moment."""
+
 needs_browser = pytest.mark.skipif(
     PROGRAM is None, reason=f"no browser installed: none of {', '.join(NAMES)} is on the path"
 )
@@ -110,7 +113,7 @@ class Visitor:
 
     def is_on_screen(self, selector: str) -> bool:
         """Return whether all of an element is within the window."""
-        box = self.tab.locator(selector).first.bounding_box()
+        box = self._measure(selector)
         below, beside = box["y"] + box["height"], box["x"] + box["width"]
         return box["y"] >= 0.0 and below <= LAPTOP["height"] and beside <= LAPTOP["width"]
 
@@ -120,5 +123,10 @@ class Visitor:
 
     def click_share(self, selector: str, share: float) -> None:
         """Click at a share of the width of an element, in the middle of its height."""
-        box = self.tab.locator(selector).first.bounding_box()
+        box = self._measure(selector)
         self.tab.mouse.click(box["x"] + share * box["width"], box["y"] + 0.5 * box["height"])
+
+    def _measure(self, selector: str) -> dict[str, float]:
+        """Return place and size of an element [px], which may be drawn anew at any moment."""
+        found = self.tab.wait_for_function(MEASURE, arg=selector).json_value()
+        return {name: float(found[name]) for name in ("x", "y", "width", "height")}

@@ -8,6 +8,7 @@ import pytest
 
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.rover.steered_drive import SteeredDrive
 from rover_planner.learning.drive_log import (
     PITCH,
     RATES,
@@ -148,6 +149,15 @@ def test_a_bad_sensor_is_told_and_not_believed(spoil, word):
     assert estimate.faults == {"middle_left": word}
     assert estimate.friction.high is None
     assert estimate.friction.low < 1.2 * SLOPE
+
+
+def test_torques_that_wheels_apply_to_each_other_on_the_spot_are_no_wrong_signs():
+    rows = climb(ROVER, 0.0, 10.0, speed=0.0)
+    turn = SteeredDrive(ROVER).aim(0.0, 0.1)
+    rows[:, STEERING], rows[:, RATES] = turn.angles, turn.speeds / ROVER.wheel.radius
+    rows[:, YAW] += 0.1 * rows[:, TIME]
+    rows[:, TORQUES] = 0.1 * ROVER.weight * ROVER.wheel.radius * np.array([0, 0, -1, 1, 0, 0])
+    assert not learn(rows, ramp(0.0)).estimate.faults
 
 
 def test_slip_is_seen_without_any_torque_and_measures_nothing():

@@ -61,6 +61,15 @@ def test_a_rover_that_creeps_is_not_stuck_however_noisy_its_speed_is(speed, roll
     assert first_notice(speed, rolling, MAX_TORQUE) is None
 
 
+def test_a_rover_that_turns_back_is_not_stuck():
+    watch, turn, back = StuckWatch(SPEED, MAX_TORQUE), 3.05, 0.85
+    for time in PERIOD * np.arange(1, 60):
+        after = np.clip((time - turn) / (0.5 * DURATION), -1.0, 1.0)
+        share = back if after > 0.0 else 1.0
+        one = window(float(time), SPEED * share * abs(time - turn), SPEED * share * after, 0.02)
+        assert not watch.update(one, np.ones(6), 0.0)
+
+
 def test_a_rover_that_rests_or_climbs_is_not_stuck():
     assert first_notice(0.0, 0.0, 0.5) is None
     assert first_notice(0.0, SPEED, 1.0, climb=0.05) is None
