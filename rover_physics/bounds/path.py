@@ -16,6 +16,7 @@ from rover_physics.bounds.kernel import BOUNDS, NOMINAL, find_bounds
 from rover_physics.errors import ModelError
 from rover_physics.names import EQUAL, OPTIMAL, SERVO
 from rover_physics.numerics.arrays import Floats
+from rover_physics.numerics.read_only import seal_array
 from rover_physics.prediction.packed_model import forget_models, pack_model
 from rover_physics.prediction.sweep import check_poses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
@@ -104,7 +105,7 @@ def _pack_uncertain(terrain: Terrain, sigmas: float) -> tuple[Ground, Ground, Gr
     error = sigmas * terrain.elevation_std
     heights = (terrain.elevation - error, terrain.elevation + error, error)
     bare = replace(terrain, elevation_std=None)  # errors are not checked once more for each
-    low, high, wrong = (new_ground(replace(bare, elevation=one)) for one in heights)
+    low, high, wrong = (new_ground(replace(bare, elevation=seal_array(one))) for one in heights)
     return low, high, wrong
 
 

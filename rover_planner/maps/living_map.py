@@ -115,12 +115,13 @@ class LivingMap:
         self._whole = terrain if self._std_to_add() == 0.0 else None
 
     def replace(self, terrain: Terrain, source: str, time: float) -> None:
-        """Start over with a local map alone."""
+        """Start over with a local map alone, whose layers are not copied."""
         self._clear(terrain)
         patch = lay_onto(terrain, grid_of(terrain))
-        take = np.isfinite(terrain.elevation)
-        window = empty_patch(patch.box)
-        self._window = window.written(patch, take, self._index_of(source), time)
+        cells, known = empty_patch(patch.box, ("source", "time")), np.isfinite(terrain.elevation)
+        cells.layers["source"][known] = self._index_of(source)
+        cells.layers["time"][known] = time
+        self._window = Patch(patch.box, cells.layers | patch.layers)
         self._whole = terrain
 
     def merge(

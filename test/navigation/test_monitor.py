@@ -103,6 +103,12 @@ def test_what_is_near_is_judged_on_the_map_around_it_so_that_a_large_one_delays_
     assert found.judgement.judge.terrain.elevation.size < 0.2 * large.elevation.size
 
 
+def test_a_stop_does_not_wait_for_what_lies_beyond_its_reason(service):
+    found = watching(service).look(sight(service, STRAIGHT[0], 1.0, wall_at(0.5)))
+    assert found.state == STOPPED and not found.judgement.candidate.is_complete
+    assert found.judgement.complete().candidate.is_complete
+
+
 def test_the_rest_is_judged_once_for_each_map(service):
     monitor = watching(service)
     one = sight(service, STRAIGHT[10], 10.0)

@@ -156,8 +156,8 @@ class Snapshot:
         if self.watch is not None and self.known_map is not None:
             self.watch.look(self.known_map, progress)
 
-    def check_path(self) -> PathJudgement:
-        """Judge the last path.
+    def check_path(self, *, stop_at_failure: bool = False) -> PathJudgement:
+        """Judge the last path, if wanted only up to its first failure.
 
         Raises:
             PlanningError: The path is too long.
@@ -169,7 +169,7 @@ class Snapshot:
         assert self.path.poses is not None
         judge = self._judge()
         poses = densify(self.path.poses, self.settings.query.waypoint_spacing)
-        return self._describe(judge, judge.check(poses))
+        return self._describe(judge, judge.check(poses, stop_at_failure=stop_at_failure))
 
     def refuse_if_missing(self) -> PathJudgement | None:
         """Return a refusal if there is no path or no map to use, else None."""

@@ -285,7 +285,7 @@ def rehearse(settings: ServiceSettings) -> None:
 
 
 def _check(snapshot: Snapshot, poses: NDArray[np.float64]) -> PathJudgement:
-    return replace(snapshot, path=GivenPath(poses, "")).check_path()
+    return replace(snapshot, path=GivenPath(poses, "")).check_path(stop_at_failure=True)
 
 
 def _cut_map(snapshot: Snapshot, poses: NDArray[np.float64]) -> Snapshot:

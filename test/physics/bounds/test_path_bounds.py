@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bounds on uncertain maps hold the prediction and what maps drawn at random give."""
 
+import tracemalloc
 from dataclasses import replace
 from functools import partial
 from itertools import product
@@ -11,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rover_physics import Rover, SweepOptions, judge_path, load_rover
-from rover_physics.bounds.path import BOUNDED_VALUES, bound_path
+from rover_physics.bounds.path import BOUNDED_VALUES, bound_path, forget_terrains, prepare_bounds
 from rover_physics.errors import ModelError
 from rover_physics.status import BoundStatus
 from rover_physics.traversability.bounded_verdict import refuse_worst_case
@@ -269,3 +270,13 @@ def test_the_worst_friction_within_reach_counts():
     sure = bounds_on(LSR1, terrain)[1].friction_utilisation[..., 1]
     mixed = bounds_on(LSR1, replace(terrain, friction=patchy))[1].friction_utilisation[..., 1]
     np.testing.assert_allclose(mixed, 2.0 * sure, rtol=1e-6)
+
+
+def test_an_uncertain_map_is_packed_without_copies_of_its_ends():
+    ground = with_std(plane(0.2, 0.1, half=8.0), 0.01)
+    forget_terrains()
+    tracemalloc.start()
+    prepare_bounds(ground, 3.0)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 6.0 * ground.elevation.nbytes  # three of them are the ends and the errors
