@@ -107,7 +107,7 @@ class GroundLearnerNode(Node):
     def _apply(self, parameters: GroundLearnerParameters) -> None:
         self._values = parameters
 
-    def _guarded(self, name: str, take: Callable[[Any], None]) -> Callable[[Any], None]:
+    def _guarded(self, name: str, take: Callable[[Any], None]) -> Callable[..., None]:
         """Return a callback that refuses what cannot be used."""
 
         def receive(message: Any, _arrived: float = 0.0) -> None:
