@@ -21,7 +21,7 @@ def all_grounds() -> dict[str, Terrain]:
     grounds = {name: reference_ground(f"settled_a/{name}").terrain for name in names}
     grounds["Mars-like"] = make_mars_terrain(1)
     for name, terrain in list(real_maps().items())[:1]:
-        grounds[f"real map {name}"] = terrain
+        grounds[name] = terrain
     return grounds
 
 
