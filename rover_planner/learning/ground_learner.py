@@ -40,7 +40,7 @@ SLIP_SPEED = 0.08
 """Slip over the nominal speed above which a wheel slips."""
 LASTING = 3
 """Number of windows in a row in which a wheel that slips does."""
-CERTAIN = 4.0
+CERTAIN = 5.0
 """Standard deviations by which a slip must exceed zero."""
 ALONG = 0.75
 """Share of a slip along the heading above which the torque shows the shear."""

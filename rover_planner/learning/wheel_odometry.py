@@ -36,6 +36,7 @@ class Regression:
         self._rest = np.diag(np.square(np.reciprocal(prior)))
         self._squares, self._products = np.zeros_like(self._rest), np.zeros(len(prior))
         self._count, self._sum = MISS_COUNT, MISS_COUNT * MISS**2
+        self._solve()
 
     def add(self, inputs: Floats, value: float) -> None:
         """Take a value that is the inputs (n,) times the parameters, but for noise."""
@@ -44,21 +45,16 @@ class Regression:
         weight = 1.0 / (1.0 + (miss / (2.0 * MISS)) ** 2)  # a wheel that spins is no creep
         self._squares += weight * np.outer(inputs, inputs)
         self._products += weight * value * inputs
+        self._solve()
 
-    @property
-    def variance(self) -> float:
+    def _solve(self) -> None:
+        """Find the parameters from what was taken."""
+        self.variance = self._sum / self._count
         """Variance of the noise."""
-        return self._sum / self._count
-
-    @property
-    def mean(self) -> Floats:
-        """Means (n,) of the parameters."""
-        return np.asarray(self.covariance @ self._products / self.variance)
-
-    @property
-    def covariance(self) -> Floats:
+        self.covariance: Floats = np.linalg.inv(self._squares / self.variance + self._rest)
         """Covariance (n, n) of the parameters."""
-        return np.linalg.inv(self._squares / self.variance + self._rest)
+        self.mean: Floats = self.covariance @ self._products / self.variance
+        """Means (n,) of the parameters."""
 
 
 @dataclass(frozen=True)

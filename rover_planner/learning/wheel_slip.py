@@ -23,6 +23,8 @@ MAX_TURN = 0.15
 """Change of a contact's slope over a window up to which it is clear [rad]."""
 SCATTER_MEMORY = 50
 """Number of windows over which the scatter is averaged."""
+FEW = 30
+"""Number of windows up to which the scatter is hardly known, so that much of it proves nothing."""
 LONGEST_GAP = 0.5
 """Time without measurements after which a window begins anew [s]."""
 
@@ -91,6 +93,7 @@ class SlipWindows:
         """Start for wheels of a radius and a width [m]."""
         self._radius, self._half_width = radius, 0.5 * width
         self._scatter: Floats | None = None
+        self._seen = 0
         self._blocks: deque[tuple[float, Floats, WheelState]] = deque(maxlen=WINDOW)
 
     def begin(self) -> None:
@@ -126,8 +129,10 @@ class SlipWindows:
         if self._scatter is None:
             self._scatter = squares
         self._scatter = self._scatter + (squares - self._scatter) / SCATTER_MEMORY
+        self._seen += 1
         # Errors of the heading move outer wheels most when the rover turns on the spot.
-        scatter = float(np.sqrt(max(squares.mean(), self._scatter.max())))
+        known = max(squares.mean(), self._scatter.max())
+        scatter = float(np.sqrt((1.0 + FEW / self._seen) * known))
         axles = np.mean([state.axles for state in states], axis=0)
         speeds = slopes[WHEEL_COUNT:].reshape(WHEEL_COUNT, 2)
         across = along[:, 0] * axles[:, 1] - along[:, 1] * axles[:, 0]

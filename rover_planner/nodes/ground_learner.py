@@ -40,6 +40,7 @@ from rover_planner.parameters.declare import (
 from rover_planner.parameters.ground_learner import GroundLearnerParameters
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.map_intake import CLOUD
+from rover_planner.ros.polled_topics import PolledTopics
 from rover_planner.ros.qos import latched_qos, sensor_qos
 from rover_planner.ros.row_collector import RowCollector
 from rover_planner.ros.subscriptions import subscribe_to_map
@@ -50,6 +51,8 @@ ESTIMATE, EMERGENCY_STOP = "traverse_server/ground_estimate", "traction_controll
 """Topics of the estimate, and of the stop of a rover that is stuck."""
 MARK_PLACE = "traverse_server/mark_place"
 """Topic of places that are impassable."""
+POLLING = 0.02
+"""Time between two looks at the sensors [s]."""
 PERIOD = 1.0
 """Time between two estimates [s]; that the rover is stuck is told at once."""
 COMMAND_AGE = 0.5
@@ -80,13 +83,15 @@ class GroundLearnerNode(Node):
         self._marks = self.create_publisher(String, MARK_PLACE, latched_qos())
         self._wheels = WheelOdometry(self._rover)
         self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", sensor_qos())
+        self._heard = PolledTopics(self, self._guard)
         for kind, name, take in (
+            (TwistStamped, "cmd_vel", self._take_command),
             (JointState, "joint_states", self._rows.take_joints),
             (Imu, "imu", self._take_imu),
             (Odometry, "odometry", self._take_odometry),
-            (TwistStamped, "cmd_vel", self._take_command),
         ):
-            self.create_subscription(kind, name, self._guarded(name, take), sensor_qos())
+            self._heard.subscribe(kind, name, self._guarded(name, take), sensor_qos())
+        self.create_timer(POLLING, self._heard.poll)
         subscribe_to_map(
             self,
             PointCloud2,
@@ -102,10 +107,10 @@ class GroundLearnerNode(Node):
     def _apply(self, parameters: GroundLearnerParameters) -> None:
         self._values = parameters
 
-    def _guarded(self, name: str, take: Callable[[Any], None]) -> Callable[[Any], None]:
+    def _guarded(self, name: str, take: Callable[[Any], None]) -> Callable[..., None]:
         """Return a callback that refuses what cannot be used."""
 
-        def receive(message: Any) -> None:
+        def receive(message: Any, _arrived: float = 0.0) -> None:
             try:
                 take(message)
             except RoverError as error:
