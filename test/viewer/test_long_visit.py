@@ -61,7 +61,8 @@ def click_through(visitor: Visitor) -> None:
     change(visitor, friction="0.85")
     wait_for_rest(visitor)
     assert f"path {row + 1} of" in visitor.text("#verdict")  # whatever its verdict is now
-    assert tab.locator(".strip i.before").count() and "0.85" in visitor.text("#changes")
+    wait_until(lambda: "0.85" in visitor.text("#changes"), "the change")
+    wait_until(lambda: tab.locator(".strip i.before").count(), "the lanes before it")
     visitor.press("Keep as reference")
     wait_until(lambda: "nothing differs" in visitor.text("#changes"), "the reference")
     change(visitor, friction="0.3")
