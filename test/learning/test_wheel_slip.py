@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How well a slip is known: as well as that of the wheel that is known worst, and not at once."""
+
+import numpy as np
+
+from rover_planner.learning.contact_sense import WheelState
+from rover_planner.learning.wheel_slip import BLOCK, SlipWindow, SlipWindows
+
+RADIUS, RATE, NOISE = 0.1, 0.1, 0.002
+PLACES = np.array([(x, y, 0.0) for y in (-0.3, 0.3) for x in (-0.4, 0.0, 0.4)])
+"""Wheels about the middle of a turn on the spot [m]."""
+
+
+def turn_on_the_spot(blocks: int) -> list[SlipWindow]:
+    """Return the windows of a turn without slip, whose heading is measured with noise."""
+    rng, windows, none = np.random.default_rng(0), SlipWindows(RADIUS, 0.08), np.zeros(6)
+    found = []
+    for time in BLOCK * np.arange(blocks):
+        yaw = RATE * time + NOISE * rng.standard_normal()
+        centres = turned(PLACES, yaw)
+        along = turned(PLACES / np.linalg.norm(PLACES, axis=1, keepdims=True), yaw + 0.5 * np.pi)
+        state = WheelState(
+            centres=centres,
+            along=along,
+            axles=turned(along, 0.5 * np.pi),
+            loads=none,
+            doubts=none,
+            tractions=none,
+            lateral=none,
+            excess=0.0,
+            clear=none,
+            links=none,
+            steering=none,
+        )
+        rolled = RATE * time * np.hypot(*PLACES[:, :2].T) / RADIUS
+        found.append(windows.take(float(time), rolled, state))
+    return [window for window in found if window is not None]
+
+
+def turned(vectors: np.ndarray, angle: float) -> np.ndarray:
+    """Return vectors (n, 3) turned about z [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    return vectors @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def test_errors_of_the_heading_are_noise_of_the_slips_of_outer_wheels():
+    windows = turn_on_the_spot(600)[100:]
+    slips = np.array([window.slip for window in windows])
+    assert slips.std(axis=0).max() < 1.1 * np.mean([window.deviation for window in windows])
+
+
+def test_a_noise_that_was_just_met_counts_for_more():
+    windows = turn_on_the_spot(600)
+    known = np.mean([window.deviation for window in windows[-100:]])
+    first = [window.deviation for window in windows[:5]]
+    assert min(first) > 1.5 * known
