@@ -61,8 +61,9 @@ def take_advice(visitor: Visitor) -> None:
         remedies.first.hover()
         remedies.first.click()
         wait_for_rest(visitor)
+        assert visitor.text("#verdict .word") == "traversable"
         visitor.open_tab("Rover")
-        visitor.press("Reset")
+        visitor.press("Undo")
         wait_for_rest(visitor)
     elif stop.count():
         stop.click()

@@ -222,12 +222,12 @@ def test_the_ghost_of_a_failure_stays_for_the_next_one_and_hides_without(page):
         mark.show(LSR1, failure)
         ghosts.append(mark._ghost)
         np.testing.assert_allclose(
-            mark._ghost._root.position, page.scene.frame.to_scene(failure.state.position)
+            mark._ghost.root.position, page.scene.frame.to_scene(failure.state.position)
         )
     assert ghosts[0] is ghosts[1] and mark._root.visible
     assert mark._ghost._meshes[failure.link].color == REFUSED
-    assert mark.make_room(failure.state) == failure.link and not mark._ghost.visible
-    assert mark.make_room(None) == "" and mark._ghost.visible
+    assert mark.make_room(failure.state) == failure.link and not mark._ghost.root.visible
+    assert mark.make_room(None) == "" and mark._ghost.root.visible
     mark.show(LSR1, None)
     assert not mark._root.visible and mark.make_room(failure.state) == ""
 
@@ -244,7 +244,7 @@ def test_the_link_that_fails_has_the_colour_of_that_and_its_own_again_where_none
     for link, colour in before.items():
         assert link in WHEELS or visual._meshes[link].color == colour
         assert visual._meshes[link].opacity == 0.5
-    visual.remove()
+    visual.root.remove()
 
 
 def test_a_path_is_drawn_in_the_colour_of_its_verdict_up_to_where_it_is_refused(page):
@@ -383,7 +383,7 @@ def test_on_a_far_map_the_rover_is_where_it_is_on_a_near_one_and_a_click_lands_w
         page = Page(ViewSession(LSR1, ground, (x - 2.0, y, 0.0), (x + 1.0, y, 0.0)), port=0)
         try:
             wait_for_rest(page)
-            places[x] = np.array(page.scene._visual._root.position)
+            places[x] = np.array(page.scene._visual.root.position)
             aim = np.array([x + 1.5, y + 0.5])
             place = page.scene.frame.to_scene([*aim, float(ground.elevation_at(*aim))])
             away = np.array([-1.0, 0.0, 2.0])

@@ -88,9 +88,9 @@ class FailureMark:
     def _show_alone(self) -> None:
         """Show ghost and arrows, if they are known, while the played rover is elsewhere."""
         if self._failure is not None:
-            self._ghost.visible = self._is_alone
+            self._ghost.root.visible = self._is_alone
             shown = self._forces_shown and self._failure.is_settled
-            self._arrows.visible = shown and self._is_alone
+            self._arrows.root.visible = shown and self._is_alone
 
     def _draw_label(self, failure: Failure, radius: float) -> None:
         """Draw what is broken, with a line from a place above the rover to the wheel or body."""

@@ -54,7 +54,7 @@ class Scene:
         if self._visual is None or not look_alike(self._rover, rover):
             visual, self._visual = self._visual, None  # an error must not leave half a rover
             if visual is not None:
-                visual.remove()
+                visual.root.remove()
             self._visual = RoverVisual(self._scene, rover, self.frame)
             self._rover, self._arm = rover, {}
             self._forces = ForceArrows(self._scene, rover, self.frame)
@@ -69,7 +69,7 @@ class Scene:
 
     def show_forces(self, visible: bool) -> None:
         """Show or hide the arrows."""
-        self._forces_shown = self._forces.visible = visible
+        self._forces_shown = self._forces.root.visible = visible
         self.failure.show_forces(visible)
 
     def show(self, state: RoverState | None) -> None:
@@ -77,8 +77,8 @@ class Scene:
         self._state = state
         if self._visual is None:
             return
-        self._visual.visible = state is not None
-        self._forces.visible = self._forces_shown and state is not None
+        self._visual.root.visible = state is not None
+        self._forces.root.visible = self._forces_shown and state is not None
         failing = self.failure.make_room(state)
         if state is None:
             self._last_position = None
