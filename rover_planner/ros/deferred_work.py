@@ -6,8 +6,9 @@ import traceback
 from collections import deque
 from collections.abc import Callable
 
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+
+from rover_planner.ros.steady import create_steady_timer
 
 QUIET = 0.03
 """Time after the last answer before the work begins [s]: a client has time to read the answer
@@ -34,8 +35,7 @@ class DeferredWork:
     def __init__(self, node: Node):
         self._node = node
         self._answers: deque[deque[Work]] = deque()
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(QUIET, self._run_some, clock=steady, autostart=False)
+        self._timer = create_steady_timer(node, QUIET, self._run_some, starts=False)
         self._too_many = node.create_guard_condition(self._run_oldest)
 
     def do(self, *pieces: Work) -> None:
