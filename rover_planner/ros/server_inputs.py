@@ -23,7 +23,7 @@ from rover_planner.maps.living_map import MapSnapshot
 from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.maps.moved_map import MapMove
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.service_settings import load_service_settings, map_rules
+from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.transforms import Rigid
@@ -58,7 +58,7 @@ class ServerInputs:
         """Places of frames and sensors on the map."""
         self.service = TraverseService(load_service_settings(parameters), clock)
         """Knows map, path and measurements."""
-        self.keeper = MapKeeper(self.service.settings.rover, map_rules(parameters))
+        self.keeper = MapKeeper(self.service.settings.rover, parameters)
         """Makes one map of those that come."""
         self.joint_names = read_joint_map(parameters.joint_map, self.service.all_joint_names)
         """Names of the joints in messages."""

@@ -15,7 +15,6 @@ from rover_physics.files.validation import show_file
 from rover_planner.maps.map_file import MapFileError, MapLimits, open_map
 from rover_planner.maps.summary import describe_terrain
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.service_settings import map_rules
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.logs import RepeatLog
@@ -91,8 +90,8 @@ class MapTopics:
         Those of merging and filling count from the next map on.
         """
         before, self._values = self._values, self._node.values
-        rules, rover = map_rules(self._values), self._service.settings.rover
-        self._intake.do(lambda: self._inputs.keeper.apply(rover, rules))
+        values, rover = self._values, self._service.settings.rover
+        self._intake.do(lambda: self._inputs.keeper.apply(rover, values))
         names = ("map_resolution", "cell_height")
         is_new = any(getattr(before, name) != getattr(self._values, name) for name in names)
         if self._is_from_topic and is_new:
