@@ -64,7 +64,8 @@ class ResultTopics:
 
     def __init__(self, node: RoverNode[TraverseServerParameters], inputs: ServerInputs):
         """Create the topics; `inputs` know the rover, and joints and frame of messages."""
-        self._node, self._inputs, self._deferred_work = node, inputs, DeferredWork(node)
+        self._node, self._inputs = node, inputs
+        self._deferred_work = DeferredWork(node, node.guard)
         self._poses = PoseStock()
         self._points: list[JointTrajectoryPoint] = []
         self._stamp = 0
