@@ -146,7 +146,9 @@ def test_estimates_of_the_controller_take_precedence_over_predictions(listener, 
         return "controller" in received[-1].forces_from
 
     send_until(
-        lambda: talker.estimated.publish(labelled_array(loads, "wheel")), is_estimated, "the controller"
+        lambda: talker.estimated.publish(labelled_array(loads, "wheel")),
+        is_estimated,
+        "the controller",
     )
     np.testing.assert_allclose(received[-1].wheel_loads, loads)
 
