@@ -35,8 +35,6 @@ SMALL = {
     "traction": {"ALONE_TIME": 0.5, "TOGETHER_TIME": 1.0},
 }
 """Values of each topic's constants with which it takes seconds."""
-QUICK = ("poses", "rough")
-"""Topics that take a few seconds in the small size."""
 
 
 @pytest.fixture(autouse=True)
@@ -49,13 +47,8 @@ def threads():
     numba.set_num_threads(before)
 
 
-@pytest.mark.parametrize(
-    "topic",
-    [
-        pytest.param(topic, marks=() if topic in QUICK else (pytest.mark.slow, pytest.mark.long))
-        for topic in TOPICS
-    ],
-)
+@pytest.mark.long
+@pytest.mark.parametrize("topic", TOPICS)
 def test_every_topic_measures_in_a_small_size(topic, monkeypatch, tmp_path, capsys):
     if topic == "survey":
         pytest.importorskip("distributed", reason="install the extra survey")
@@ -80,7 +73,6 @@ def test_every_benchmark_can_be_imported(name):
     importlib.import_module(f"benchmarks.{name}")
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_paths_are_searched_in_a_small_size(capsys):
     from benchmarks.path_search import SearchCase, run_case, show
@@ -96,7 +88,6 @@ def test_paths_are_searched_in_a_small_size(capsys):
     assert "of all that any search finds" in capsys.readouterr().out
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_energy_is_compared_with_drives_in_mujoco(capsys):
     pytest.importorskip("mujoco", reason="install the extra bench")
@@ -104,7 +95,6 @@ def test_energy_is_compared_with_drives_in_mujoco(capsys):
     assert "median error" in capsys.readouterr().out
 
 
-@pytest.mark.slow
 @pytest.mark.long
 def test_controllers_are_compared_in_mujoco(tmp_path, monkeypatch, capsys):
     pytest.importorskip("mujoco", reason="install the extra bench")
