@@ -34,7 +34,7 @@ from rover_planner.nodes.warm_up import LEARNING
 from rover_planner.parameters.ground_learner import GroundLearnerParameters
 from rover_planner.ros.map_intake import CLOUD
 from rover_planner.ros.node import RoverNode
-from rover_planner.ros.qos import latched_qos, sensor_qos
+from rover_planner.ros.qos import latched_qos, polled_qos, sensor_qos
 from rover_planner.ros.row_collector import RowCollector
 from rover_planner.ros.subscriptions import subscribe_to_map
 from rover_planner.shell.kernels import load_kernels
@@ -44,8 +44,8 @@ ESTIMATE, EMERGENCY_STOP = "traverse_server/ground_estimate", "traction_controll
 """Topics of the estimate, and of the stop of a rover that is stuck."""
 MARK_PLACE = "traverse_server/mark_place"
 """Topic of places that are impassable."""
-POLLING = 0.02
-"""Time between two looks at the sensors [s]."""
+POLLING = 0.1
+"""Time between two looks at the sensors, as long as the learner takes to a block [s]."""
 PERIOD = 1.0
 """Time between two estimates [s]; that the rover is stuck is told at once."""
 COMMAND_AGE = 0.5
@@ -74,6 +74,7 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
         self._stops = self.create_publisher(Bool, EMERGENCY_STOP, latched_qos())
         self._marks = self.create_publisher(String, MARK_PLACE, latched_qos())
         self._wheels = WheelOdometry(self._rover)
+        self._imu: Imu | None = None  # the last one that the wheels' odometry went on by
         self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", sensor_qos())
         for kind, name, take in (
             (TwistStamped, "cmd_vel", self._take_command),
@@ -81,8 +82,8 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
             (Imu, "imu", self._take_imu),
             (Odometry, "odometry", self._take_odometry),
         ):
-            self.heard.subscribe(kind, name, self._refusing(name, take), sensor_qos())
-        self.create_timer(POLLING, self.heard.poll)
+            self.heard.subscribe(kind, name, self._refusing(name, take), polled_qos())
+        self.create_timer(POLLING, self._read_sensors)
         subscribe_to_map(self, PointCloud2, CLOUD, self._refusing(CLOUD, self._take_map))
         self.follow_changes(lambda _: None, lambda _: None)
         self.get_logger().info(f"ready for rover {self._rover.name}")
@@ -111,25 +112,31 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
     def _take_command(self, twist: TwistStamped) -> None:
         self._commanded, self._command_time = twist_to_speeds(twist)[0], self.seconds
 
-    def _take_imu(self, imu: Imu) -> None:
-        """Take attitude and yaw rate, and tell where the wheels say that the rover is."""
-        self._rows.take_imu(imu)
-        stamp = stamp_to_ns(imu.header.stamp)
-        motion = self._rows.motion(self.seconds if stamp is None else stamp / NANOSECONDS)
-        if motion is None:
+    def _read_sensors(self) -> None:
+        """Take what the sensors sent, and tell where the wheels say that the rover is."""
+        self.heard.poll()
+        imu, self._imu = self._imu, None
+        if imu is None:
             return
         wheels = self._wheels
-        wheels.take(motion)
-        speed = wheels.speed, wheels.speed_deviation
         message = planar_odometry(
             wheels.pose,
             wheels.covariance,
-            speed,
-            motion.yaw_rate,
+            (wheels.speed, wheels.speed_deviation),
+            self._rows.yaw_rate,
             self.values.odometry_frame,
             imu.header.stamp,
         )
         self._wheel_odometry.publish(message)
+
+    def _take_imu(self, imu: Imu) -> None:
+        """Take attitude and yaw rate, and go on by what the wheels turned."""
+        self._rows.take_imu(imu)
+        stamp = stamp_to_ns(imu.header.stamp)
+        motion = self._rows.motion(self.seconds if stamp is None else stamp / NANOSECONDS)
+        if motion is not None:
+            self._wheels.take(motion)
+            self._imu = imu
 
     def _take_odometry(self, odometry: Odometry) -> None:
         stamp = stamp_to_ns(odometry.header.stamp)
