@@ -3,7 +3,7 @@
 
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -34,7 +34,9 @@ class TraverseService:
     Maps may be taken in another thread than the rest.
     """
 
-    def __init__(self, settings: ServiceSettings):
+    def __init__(self, settings: ServiceSettings, clock: Callable[[], float] = time.monotonic):
+        """Begin without a map; `clock` returns the time [s] that measurements and maps age by."""
+        self._clock = clock
         self.settings = settings
         """The current settings; after a change of `largest_gap` call `refresh_map`."""
         self.known_map: KnownMap | None = None
@@ -94,7 +96,7 @@ class TraverseService:
             cells: Where its cells come from; None if that is `source` for all.
             frame: Frame of the map; empty if it has none.
         """
-        about = KnownMap(terrain, terrain, source, stamp, time.monotonic(), "", cells, frame)
+        about = KnownMap(terrain, terrain, source, stamp, self._clock(), "", cells, frame)
         return self._keep_map(about)
 
     def amend_map(self, terrain: Terrain, cells: CellSources) -> None:
@@ -107,7 +109,7 @@ class TraverseService:
         """Note that the present map has arrived once more."""
         known = self.known_map
         if known is not None:
-            self.known_map = replace(known, arrival=time.monotonic())
+            self.known_map = replace(known, arrival=self._clock())
 
     def refresh_map(self) -> None:
         """Interpolate the gaps of the received map again, with the present settings."""
@@ -137,7 +139,7 @@ class TraverseService:
 
     def take_joints(self, positions: Mapping[str, float]) -> None:
         """Keep measured joint angles [rad] by name; angles of other joints stay."""
-        self._measurements.take_joints(positions, time.monotonic())
+        self._measurements.take_joints(positions, self._clock())
 
     def take_pose(
         self, pose: NDArray[np.float64], body: tuple[float, float, float] | None = None
@@ -146,7 +148,7 @@ class TraverseService:
 
         `body` is its z [m], roll and pitch [rad]; None: not measured.
         """
-        self._measurements.take_pose(pose, time.monotonic(), body)
+        self._measurements.take_pose(pose, self._clock(), body)
 
     def take_ground(self, ground: LearnedGround) -> None:
         """Keep what was learned of the ground, for new questions."""
@@ -159,15 +161,15 @@ class TraverseService:
 
     def take_tilt(self, roll: float, pitch: float) -> None:
         """Keep roll and pitch [rad] of the body, measured by an IMU."""
-        self._measurements.take_tilt(roll, pitch, time.monotonic())
+        self._measurements.take_tilt(roll, pitch, self._clock())
 
     def standing(self) -> Standing | None:
         """Return pose and suspension of the rover if they were measured just now, else None."""
-        return self._measurements.standing(time.monotonic())
+        return self._measurements.standing(self._clock())
 
     def fresh_pose(self, max_age: float = MAX_AGE) -> NDArray[np.float64] | None:
         """Return the measured pose (3,) x, y [m], yaw [rad] if it is not older [s], else None."""
-        return self._measurements.fresh_pose(time.monotonic(), max_age)
+        return self._measurements.fresh_pose(self._clock(), max_age)
 
     def snapshot(self, ros_time: int | None = None) -> Snapshot:
         """Return all that is known now.
@@ -175,7 +177,7 @@ class TraverseService:
         Args:
             ros_time: Present ROS time [ns], for the age of the map; None is the system's time.
         """
-        now = time.monotonic()
+        now = self._clock()
         standing = self._measurements.pose_with_suspension(now)
         ground = None if self.settings.parameters.learn == OFF else self._ground
         known = Snapshot(
@@ -195,7 +197,7 @@ class TraverseService:
         known, most = self.known_map, snapshot.settings.parameters.max_map_age
         if known is None:
             return replace(snapshot, known_map=None)
-        steady = time.monotonic()
+        steady = self._clock()
         classes, laid = self._lay_friction(known, snapshot)
         return replace(
             snapshot,
