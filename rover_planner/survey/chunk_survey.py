@@ -15,12 +15,10 @@ from rover_physics.results.record import RESULT
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import BLOCK
 from rover_planner.errors import PlanningError
-from rover_planner.survey.geotiff import GeoTiffMap
 from rover_planner.survey.layers import types_of_layers
-from rover_planner.survey.layout import Box, Index, SurveyLayout
-from rover_planner.survey.map_source import StoredMap
+from rover_planner.survey.layout import Box, Index
 from rover_planner.survey.request import SurveyRequest
-from rover_planner.survey.store import SurveyStore, is_refusal
+from rover_planner.survey.store import StoreNotes, SurveyStore, is_refusal
 from rover_planner.survey.tile_survey import BATCH, survey_tile
 
 BYTES_OF_CELL = 60
@@ -35,14 +33,8 @@ class SurveyJob:
 
     request: SurveyRequest
     """The question."""
-    layout: SurveyLayout
-    """Cells and chunks."""
-    resolution: float
-    """Size of a map cell [m]."""
     store: Path
-    """Folder of the store, seen by all workers."""
-    map_file: str
-    """GeoTIFF file of the map, seen by all workers; empty if the map is kept in the store."""
+    """Folder of the store; all workers see it, and the map if that is a GeoTIFF."""
     version: str = rover_physics.__version__
     """Version of the model."""
     run: str = field(default_factory=lambda: uuid.uuid4().hex)
@@ -61,11 +53,6 @@ class ChunkReport:
     """Time that it took [s]."""
     refusal: str = ""
     """Reason of the system for not writing, empty if it has written."""
-
-
-def open_map(store: Path, map_file: str) -> GeoTiffMap | StoredMap:
-    """Return the map of a store: the GeoTIFF it names, or, if it names none, what it keeps."""
-    return GeoTiffMap(Path(map_file)) if map_file else StoredMap(store)
 
 
 def survey_chunk(job: SurveyJob, chunk: Index) -> ChunkReport:
@@ -111,8 +98,9 @@ def open_store(store: Path, run: str) -> SurveyStore:
 
 def compute_chunk(job: SurveyJob, chunk: Index) -> dict[str, np.ndarray]:
     """Return the layers of a chunk."""
-    layout, request, resolution = job.layout, job.request, job.resolution
-    source = open_map(job.store, job.map_file)
+    request, store = job.request, open_store(job.store, job.run)
+    layout, resolution = store.notes.layout, store.notes.frame.resolution
+    source = store.open_map()
     cells = layout.cells_of(chunk)
     window = layout.window_of(cells)
     grids, soils = source.read(window), source.soil_names
@@ -143,18 +131,17 @@ def compute_chunk(job: SurveyJob, chunk: Index) -> dict[str, np.ndarray]:
     return layers
 
 
-def estimate_memory(job: SurveyJob) -> int:
+def estimate_memory(notes: StoreNotes) -> int:
     """Return the memory [bytes] that a worker needs for the largest chunk with its halo."""
-    layout = job.layout
+    layout = notes.layout
     rows, columns = (min(layout.chunk, size) for size in layout.shape)
     sides = [
         min((side - 1) * layout.step + 1 + 2 * layout.halo + BLOCK, size)
         for side, size in zip((rows, columns), layout.map_shape, strict=True)
     ]
-    asked = job.request
-    kinds = types_of_layers(asked.headings, asked.turns, asked.chance).values()
+    kinds = types_of_layers(notes.headings, notes.turns, notes.chance).values()
     kept = 2 * rows * columns * sum(kind.itemsize for kind in kinds)
-    poses = 4 * max(BATCH, job.request.headings) * RESULT.itemsize
+    poses = 4 * max(BATCH, notes.headings) * RESULT.itemsize
     return BYTES_OF_PROCESS + BYTES_OF_CELL * sides[0] * sides[1] + kept + poses
 
 
