@@ -188,7 +188,7 @@ class Replay:
         self.frames.take_odometry(here)
         self._pose, now = pose[[0, 1, 3]], recorded.stamp / NANOSECONDS
         self._service.take_pose(self._pose)
-        self._measured.take_pose(self._pose, now, body)
+        self._measured.take_pose(self._pose, body, now)
         self._look_under_rover(now)
         if self._service.known_map is None:
             return  # what is driven before the first map cannot be judged
