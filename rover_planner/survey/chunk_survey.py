@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The survey of one chunk: the work of one task, in whatever process it runs."""
 
-import functools
 import time
-import uuid
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numba
@@ -37,8 +35,6 @@ class SurveyJob:
     """Folder of the store; all workers see it, and the map if that is a GeoTIFF."""
     version: str = rover_physics.__version__
     """Version of the model."""
-    run: str = field(default_factory=lambda: uuid.uuid4().hex)
-    """Name of this run of the command; a worker opens the store once in it."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +45,6 @@ class ChunkReport:
     """Row and column of the chunk."""
     poses: int = 0
     """Number of poses."""
-    seconds: float = 0.0
-    """Time that it took [s]."""
     refusal: str = ""
     """Reason of the system for not writing, empty if it has written."""
 
@@ -67,9 +61,9 @@ def survey_chunk(job: SurveyJob, chunk: Index) -> ChunkReport:
             f"the worker has version {rover_physics.__version__}, the survey {job.version}"
         )
     numba.set_num_threads(1)  # a worker is one core
-    began, wrong = time.perf_counter(), ""
+    began, store, wrong = time.perf_counter(), SurveyStore(job.store), ""
     try:
-        layers = compute_chunk(job, chunk)
+        layers = compute_chunk(job.request, store, chunk)
     except PlanningError as error:
         wrong = str(error)
     if wrong:  # without its causes, as GDAL's errors cannot be sent to the client
@@ -77,28 +71,18 @@ def survey_chunk(job: SurveyJob, chunk: Index) -> ChunkReport:
     poses = layers["worst_class"].size * job.request.headings
     seconds = time.perf_counter() - began
     try:
-        open_store(job.store, job.run).write(chunk, layers, seconds)
+        store.write(chunk, layers, seconds)
     except OSError as error:
         if not is_refusal(error):
             raise
         return ChunkReport(chunk, refusal=error.strerror or str(error))
-    return ChunkReport(chunk, poses, seconds)
+    return ChunkReport(chunk, poses)
 
 
-@functools.lru_cache(maxsize=1)
-def open_store(store: Path, run: str) -> SurveyStore:
-    """Open a store once for all chunks that a process surveys in a run of the command.
-
-    Args:
-        store: Its folder.
-        run: Name of the run.
-    """
-    return SurveyStore(store)
-
-
-def compute_chunk(job: SurveyJob, chunk: Index) -> dict[str, np.ndarray]:
+def compute_chunk(
+    request: SurveyRequest, store: SurveyStore, chunk: Index
+) -> dict[str, np.ndarray]:
     """Return the layers of a chunk."""
-    request, store = job.request, open_store(job.store, job.run)
     layout, resolution = store.notes.layout, store.notes.frame.resolution
     source = store.open_map()
     cells = layout.cells_of(chunk)

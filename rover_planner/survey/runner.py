@@ -40,8 +40,6 @@ class SurveyOutcome:
 
     poses: int = 0
     """Number of poses judged."""
-    seconds: float = 0.0
-    """Time of all chunks together [s]."""
     done: int = 0
     """Number of chunks finished."""
     failed: dict[Index, str] = field(default_factory=dict)
@@ -153,7 +151,6 @@ class _Run:
             )
         self._outcome.done += 1
         self._outcome.poses += report.poses
-        self._outcome.seconds += report.seconds
         self._on_chunk(report)
 
     def _give_up(self, chunk: Index, error: BaseException) -> None:

@@ -218,7 +218,8 @@ def test_a_damaged_file_is_one_line(finished, capfd, content):
 def test_files_are_on_the_disk_before_a_chunk_counts_as_finished(files, monkeypatch):
     prepared = prepare(files, chunk=64)
     chunk, path = prepared.chunks[0], prepared.store.path
-    layers, forced, fsync = compute_chunk(prepared.job, chunk), [], os.fsync
+    layers = compute_chunk(prepared.job.request, prepared.store, chunk)
+    forced, fsync = [], os.fsync
 
     def force(number):
         forced.append((Path(f"/proc/self/fd/{number}").readlink(), count_finished(path)))

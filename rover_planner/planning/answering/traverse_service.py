@@ -20,7 +20,6 @@ from rover_planner.planning.answering.judgement import PathJudgement
 from rover_planner.planning.answering.measurements import Measurements
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
-from rover_planner.planning.candidates import generate_candidates
 from rover_planner.planning.learned_ground import LearnedGround, lay_friction
 from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlace, MarkedPlaces
 from rover_planner.planning.search.edge_memory import EdgeMemory
@@ -46,8 +45,6 @@ class TraverseService(Measurements):
         self._edge_memory = EdgeMemory()
         self._ground: LearnedGround | None = None
         self._laid: tuple[KnownMap, dict[int, float], KnownMap] | None = None
-        # Compiles or loads the kernels, so that the first query is fast.
-        generate_candidates((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
 
     @property
     def terrain(self) -> Terrain | None:
