@@ -93,10 +93,6 @@ kernels: $(READY) ## compile the numba kernels into their cache
 bench: $(BENCH_READY) kernels ## measure times and memory, as a table and bench_output/results.json
 	@$(BIN)/python -m benchmarks.run
 
-.PHONY: fuzz
-fuzz: $(READY) kernels ## throw 6,000 malformed and hostile inputs at running nodes
-	@$(BIN)/python -m benchmarks.fuzz
-
 .PHONY: clean
 clean: ## remove the environment and everything that was made
 	rm -rf "$(VENV)" build dist install log demo_output bench_output *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

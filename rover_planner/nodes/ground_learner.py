@@ -41,7 +41,7 @@ from rover_planner.parameters.ground_learner import GroundLearnerParameters
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.map_intake import CLOUD
 from rover_planner.ros.polled_topics import PolledTopics
-from rover_planner.ros.qos import latched_qos, sensor_qos
+from rover_planner.ros.qos import latched_qos, polled_qos, sensor_qos
 from rover_planner.ros.row_collector import RowCollector
 from rover_planner.ros.subscriptions import subscribe_to_map
 from rover_planner.shell.kernels import load_kernels
@@ -51,8 +51,8 @@ ESTIMATE, EMERGENCY_STOP = "traverse_server/ground_estimate", "traction_controll
 """Topics of the estimate, and of the stop of a rover that is stuck."""
 MARK_PLACE = "traverse_server/mark_place"
 """Topic of places that are impassable."""
-POLLING = 0.02
-"""Time between two looks at the sensors [s]."""
+POLLING = 0.1
+"""Time between two looks at the sensors, as long as the learner takes to a block [s]."""
 PERIOD = 1.0
 """Time between two estimates [s]; that the rover is stuck is told at once."""
 COMMAND_AGE = 0.5
@@ -82,6 +82,7 @@ class GroundLearnerNode(Node):
         self._stops = self.create_publisher(Bool, EMERGENCY_STOP, latched_qos())
         self._marks = self.create_publisher(String, MARK_PLACE, latched_qos())
         self._wheels = WheelOdometry(self._rover)
+        self._imu: Imu | None = None  # the last one that the wheels' odometry went on by
         self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", sensor_qos())
         self._heard = PolledTopics(self, self._guard)
         for kind, name, take in (
@@ -90,8 +91,8 @@ class GroundLearnerNode(Node):
             (Imu, "imu", self._take_imu),
             (Odometry, "odometry", self._take_odometry),
         ):
-            self._heard.subscribe(kind, name, self._guarded(name, take), sensor_qos())
-        self.create_timer(POLLING, self._heard.poll)
+            self._heard.subscribe(kind, name, self._guarded(name, take), polled_qos())
+        self.create_timer(POLLING, self._read_sensors)
         subscribe_to_map(
             self,
             PointCloud2,
@@ -137,25 +138,31 @@ class GroundLearnerNode(Node):
     def _now(self) -> float:
         return float(self.get_clock().now().nanoseconds / NANOSECONDS)
 
-    def _take_imu(self, imu: Imu) -> None:
-        """Take attitude and yaw rate, and tell where the wheels say that the rover is."""
-        self._rows.take_imu(imu)
-        stamp = stamp_to_ns(imu.header.stamp)
-        motion = self._rows.motion(self._now if stamp is None else stamp / NANOSECONDS)
-        if motion is None:
+    def _read_sensors(self) -> None:
+        """Take what the sensors sent, and tell where the wheels say that the rover is."""
+        self._heard.poll()
+        imu, self._imu = self._imu, None
+        if imu is None:
             return
         wheels = self._wheels
-        wheels.take(motion)
-        speed = wheels.speed, wheels.speed_deviation
         message = planar_odometry(
             wheels.pose,
             wheels.covariance,
-            speed,
-            motion.yaw_rate,
+            (wheels.speed, wheels.speed_deviation),
+            self._rows.yaw_rate,
             self._values.odometry_frame,
             imu.header.stamp,
         )
         self._wheel_odometry.publish(message)
+
+    def _take_imu(self, imu: Imu) -> None:
+        """Take attitude and yaw rate, and go on by what the wheels turned."""
+        self._rows.take_imu(imu)
+        stamp = stamp_to_ns(imu.header.stamp)
+        motion = self._rows.motion(self._now if stamp is None else stamp / NANOSECONDS)
+        if motion is not None:
+            self._wheels.take(motion)
+            self._imu = imu
 
     def _take_odometry(self, odometry: Odometry) -> None:
         stamp = stamp_to_ns(odometry.header.stamp)

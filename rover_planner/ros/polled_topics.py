@@ -44,21 +44,27 @@ class PolledTopics:
         self._topics.append((topic, take, qos.depth))
 
     def poll(self) -> None:
-        """Read all that has come since the last time, topic by topic."""
+        """Read all that has come since the last time, in the order of its arrival."""
         before, self._polled = self._polled, time.monotonic()
+        arrived = []
         for topic, take, depth in self._topics:
             for _ in range(depth):
                 try:
                     with topic.handle:
                         found = topic.handle.take_message(topic.msg_type, False)
-                    if found is None:
-                        break
-                    # Since the last poll at most, whatever the system clock was set to meanwhile.
-                    age = (time.time_ns() - found[1]["received_timestamp"]) / NANOSECONDS
-                    now = time.monotonic()
-                    take(found[0], now - min(max(age, 0.0), now - before))
                 except Exception as error:
                     self._guard.report(f"reading of {topic.topic_name}", error)
+                    continue
+                if found is None:
+                    break
+                arrived.append((found[1]["received_timestamp"], topic.topic_name, take, found[0]))
+        for at, name, take, message in sorted(arrived, key=lambda one: one[0]):
+            # Since the last poll at most, whatever the system clock was set to meanwhile.
+            age, now = (time.time_ns() - at) / NANOSECONDS, time.monotonic()
+            try:
+                take(message, now - min(max(age, 0.0), now - before))
+            except Exception as error:
+                self._guard.report(f"reading of {name}", error)
 
 
 class _Apart(CallbackGroup):

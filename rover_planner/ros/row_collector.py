@@ -2,9 +2,12 @@
 """Merges joint states, attitude and odometry into the rows that the ground is learned from."""
 
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from msg_adapters.imu import imu_to_attitude
 from msg_adapters.joints import OWN_NAMES, JointNames
@@ -26,13 +29,23 @@ from rover_planner.learning.drive_log import (
 )
 from rover_planner.learning.wheel_odometry import WheelMotion
 
-ANGLES = {name: SUSPENSION.start + k for k, name in enumerate(SUSPENSION_JOINTS)} | {
-    name: STEERING.start + k for k, name in enumerate(STEERING_JOINTS)
-}
-"""Columns of the angles of joints."""
-WHEEL_RATES = {name: RATES.start + k for k, name in enumerate(WHEEL_JOINTS)}
-WHEEL_TORQUES = {name: TORQUES.start + k for k, name in enumerate(WHEEL_JOINTS)}
-"""Columns of rates and torques of the wheels."""
+_COLUMNS = (
+    dict(zip(SUSPENSION_JOINTS, range(WIDTH)[SUSPENSION], strict=True))
+    | dict(zip(STEERING_JOINTS, range(WIDTH)[STEERING], strict=True)),
+    dict(zip(WHEEL_JOINTS, range(WIDTH)[RATES], strict=True)),
+    dict(zip(WHEEL_JOINTS, range(WIDTH)[TORQUES], strict=True)),
+)
+"""Columns of positions, velocities and efforts by joint."""
+
+
+@dataclass(frozen=True)
+class _Selection:
+    """The values of a field of joint states that are measurements, and what becomes of them."""
+
+    places: NDArray[np.intp]
+    columns: NDArray[np.intp]
+    signs: Floats
+    offsets: Floats
 
 
 class RowCollector:
@@ -41,23 +54,34 @@ class RowCollector:
     def __init__(self, names: JointNames = OWN_NAMES) -> None:
         """Start without measurements; `names` are those of the joints in messages."""
         self._row, self._names, self._has_imu = np.full(WIDTH, np.nan), names, False
-        self._yaw_rate = math.nan
+        self._listed: tuple[str, ...] = ()
+        self._selections: list[_Selection] = []
+        self.yaw_rate = math.nan
+        """Rate of the yaw [rad/s]; NaN until an IMU told it."""
 
     def take_joints(self, message: Any) -> None:
         """Take joint states by name; a value that is missing or not finite was not measured."""
-        for values, places, has_offset in (
-            (message.position, ANGLES, True),
-            (message.velocity, WHEEL_RATES, False),
-            (message.effort, WHEEL_TORQUES, False),
-        ):
-            if len(values) != len(message.name):
-                continue
-            for name, value in zip(message.name, values, strict=True):
-                link = self._names.link(self._names.model_name(name))
-                if link.model in places:
-                    shift = link.offset if has_offset else 0.0
-                    finite = np.isfinite(value)
-                    self._row[places[link.model]] = link.sign * value + shift if finite else np.nan
+        listed = tuple(message.name)
+        if listed != self._listed:
+            self._listed = listed
+            self._selections = [self._select(listed, columns) for columns in _COLUMNS]
+        fields = message.position, message.velocity, message.effort
+        for values, chosen in zip(fields, self._selections, strict=False):
+            if len(values) == len(listed):
+                measured = chosen.signs * np.array(values)[chosen.places] + chosen.offsets
+                self._row[chosen.columns] = np.where(np.isfinite(measured), measured, np.nan)
+
+    def _select(self, listed: tuple[str, ...], columns: Mapping[str, int]) -> _Selection:
+        links = [self._names.link(self._names.model_name(name)) for name in listed]
+        places = [place for place, link in enumerate(links) if link.model in columns]
+        links = [links[place] for place in places]
+        has_offset = columns is _COLUMNS[0]
+        return _Selection(
+            np.array(places, dtype=int),
+            np.array([columns[link.model] for link in links], dtype=int),
+            np.array([link.sign for link in links]),
+            np.array([link.offset * has_offset for link in links]),
+        )
 
     def take_imu(self, message: Any) -> None:
         """Take roll and pitch.
@@ -71,17 +95,15 @@ class RowCollector:
         if attitude.rates is not None:
             _, q, r = attitude.rates.tolist()
             turn = q * math.sin(attitude.roll) + r * math.cos(attitude.roll)
-            self._yaw_rate = turn / math.cos(attitude.pitch)
+            self.yaw_rate = turn / math.cos(attitude.pitch)
 
     def motion(self, time: float) -> WheelMotion | None:
         """Return what wheels and IMU measure at a time [s]; None until both were heard."""
         row = self._row
-        if math.isnan(self._yaw_rate) or np.isnan(row[RATES]).all():
+        if math.isnan(self.yaw_rate) or np.isnan(row[RATES]).all():
             return None
         steering = np.nan_to_num(row[STEERING])
-        return WheelMotion(
-            time, row[RATES].copy(), steering, row[ROLL], row[PITCH], self._yaw_rate
-        )
+        return WheelMotion(time, row[RATES].copy(), steering, row[ROLL], row[PITCH], self.yaw_rate)
 
     def take_odometry(self, message: Any, time: float, frame: str = "") -> Floats:
         """Take a pose; return the row of its time [s].

@@ -38,6 +38,8 @@ from support.waiting import wait_until
 SLOPE = 0.3
 BEGIN = 1_700_000_000.0
 """Time of the first message [s]."""
+AT_ONCE = 10
+"""Rows that are sent at once; the node's queues hold more."""
 
 
 class Rover(Node):
@@ -92,11 +94,14 @@ class Rover(Node):
 
 
 def drive(node: GroundLearnerNode, rover: Rover, rows: np.ndarray) -> None:
-    """Send rows one after another; one that is lost on the way is sent again."""
-    for row in rows:
+    """Send rows; the last of each few is sent again if it is lost on the way."""
+    for begin in range(0, len(rows), AT_ONCE):
+        some = rows[begin : begin + AT_ONCE]
+        for row in some[:-1]:
+            rover.send(row)
         sent = 0.0
 
-        def arrives(row: np.ndarray = row) -> bool:
+        def arrives(row: np.ndarray = some[-1]) -> bool:
             nonlocal sent
             if node.heard_until > BEGIN + row[TIME] - 0.05:
                 return True

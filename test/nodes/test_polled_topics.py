@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Topics that are read when a node needs them."""
 
+import itertools
 import time
 
 from rclpy.node import Node
@@ -11,8 +12,10 @@ from rover_planner.ros.polled_topics import PolledTopics
 from rover_planner.ros.qos import topic_qos
 from support.waiting import wait_until
 
+NAMES, WORDS = ("questions", "answers"), ["bad", "good", "better", "best"]
 
-def test_messages_wait_until_they_are_polled_and_errors_end_nothing(ros):
+
+def test_messages_wait_until_polled_come_in_the_order_of_arrival_and_errors_end_nothing(ros):
     node = Node("hearer", context=ros.context)
     guard, heard = Guard(node.get_logger()), []
 
@@ -22,20 +25,21 @@ def test_messages_wait_until_they_are_polled_and_errors_end_nothing(ros):
             raise ValueError("bad")
 
     topics = PolledTopics(node, guard)
-    topics.subscribe(String, "words", take, topic_qos())
+    for name in NAMES:
+        topics.subscribe(String, name, take, topic_qos())
     ros.spin(node)
-    publisher = ros.spin(Node("speaker", context=ros.context)).create_publisher(
-        String, "words", topic_qos()
-    )
-    wait_until(lambda: publisher.get_subscription_count() == 1, "the subscription")
+    speaker = ros.spin(Node("speaker", context=ros.context))
+    publishers = [speaker.create_publisher(String, name, topic_qos()) for name in NAMES]
+    wait_until(lambda: all(p.get_subscription_count() for p in publishers), "the subscriptions")
     topics.poll()
     before = time.monotonic()
-    for word in ("bad", "good"):
+    for publisher, word in zip(itertools.cycle(publishers), WORDS, strict=False):
         publisher.publish(String(data=word))
+        time.sleep(0.02)
     time.sleep(0.5)
     assert not heard  # the node spins, and leaves them alone
     after = time.monotonic()
     topics.poll()
-    assert [word for word, _ in heard] == ["bad", "good"]
+    assert [word for word, _ in heard] == WORDS
     assert all(before - 0.01 <= arrival < after for _, arrival in heard)
     assert guard.total == 1

@@ -98,16 +98,6 @@ def test_paths_are_searched_in_a_small_size(capsys):
 
 @pytest.mark.slow
 @pytest.mark.long
-def test_hostile_inputs_over_dds_do_no_harm():
-    from benchmarks.fuzz import fuzz
-
-    fuzzer = fuzz(seed=7, count=150)
-    assert fuzzer.defects == []
-    assert fuzzer.counts.total() == 150 and fuzzer.commands > 0
-
-
-@pytest.mark.slow
-@pytest.mark.long
 def test_energy_is_compared_with_drives_in_mujoco(capsys):
     pytest.importorskip("mujoco", reason="install the extra bench")
     importlib.import_module("benchmarks.validate").print_energy(step=19)
