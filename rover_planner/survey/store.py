@@ -149,14 +149,6 @@ class KeptLayer:
         except UNREADABLE as error:
             raise _damaged(self._path, self._array.basename, error) from None
 
-    def __setitem__(self, key: Any, values: Any) -> None:
-        """Write a part.
-
-        Raises:
-            OSError: The system refuses.
-        """
-        self._array[key] = values
-
 
 class SurveyStore:
     """The store of one survey."""
