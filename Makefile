@@ -40,7 +40,7 @@ view: $(READY) kernels ## watch the rover on a terrain in a web page; MAP as for
 
 .PHONY: test
 test: $(READY) ## lint, type check and all tests
-	@$(MAKE) --no-print-directory --jobs 3 --output-sync lint kernels collect
+	@$(MAKE) --no-print-directory --jobs 2 --output-sync lint kernels
 	run() { # a second run of what fails tells whether it needs other tests to fail; it mends nothing
 	  echo "== $$1"; shift
 	  $(LIMIT) $(BIN)/python -m pytest $(END_HANGS) --durations 25 --durations-min 10 --cache-clear "$$@" && return
@@ -78,11 +78,6 @@ lint: $(READY) ## ruff, mypy, and oxlint for the page
 	$(BIN)/oxlint --deny-warnings rover_planner/viewer/front
 	echo "== mypy"
 	$(BIN)/python -m mypy
-
-.PHONY: collect
-collect: $(READY)
-	@echo "== reading the tests: once, and not by each worker"
-	$(BIN)/python -m pytest -q --collect-only -m long test | tail -1
 
 .PHONY: kernels
 kernels: $(READY) ## compile the numba kernels into their cache

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """A soak: all programs drive a rover to random goals, on a busy machine, and are disturbed.
 
-Run from the repository: python -m benchmarks.soak [--minutes 60] [--load 4] [--every 40]
+Run from the repository: python -m benchmarks.soak [--minutes 40] [--calm 20] [--load 2]
 
 Simulator, server and controller are those of simulation.launch.py, with a page and a mission
 planner beside them. Every so often, in turn, one of them is killed; the server gets another map
-and friction; and the system clock of all is stepped by 5 s, ahead or back. The report has the
-drives done, the faults by cause, memory and latency at start and end, the load of the machine, and
-the torques that were heard while the controller was to rest.
+and friction; and the system clock of all is stepped by 5 s, ahead or back. A calm time follows, in
+which nothing is disturbed. The report has the drives done, the faults by cause, memory and latency
+before, between and after, the load of the machine, and the torques that were heard while the
+controller was to rest.
 """
 
 import contextlib
@@ -212,8 +213,8 @@ class Programs:
         return {name: memory_of(child) for name, child in self._running.items() if child.running}
 
 
-def run_soak(minutes: float, load: int, every: float, seed: int) -> dict[str, object]:
-    """Run a soak; return its report."""
+def run_soak(minutes: float, calm: float, every: float, load: int, seed: int) -> dict[str, object]:
+    """Run a soak of some minutes, and calm ones after that; return its report."""
     with open_nodes() as nodes:
         for _ in range(load):
             nodes.start_module("timeit", "-n", str(10**12), "pass")
@@ -226,7 +227,11 @@ def run_soak(minutes: float, load: int, every: float, seed: int) -> dict[str, ob
         wait_until(lambda: np.isfinite(ear.pose).all(), "the simulator", START_TIME)
         client.connect()
         rng = np.random.default_rng(seed)
-        return Soak(programs, ear, client, maps, rng).run(60.0 * minutes, every)
+        soak = Soak(programs, ear, client, maps, rng)
+        report: dict[str, object] = {"at the start": soak.measure()}
+        report["disturbed"] = soak.run(minutes, every)
+        report["calm"] = soak.run(calm, np.inf)
+        return report | {"torques at rest": ear.rest.find_torques()}
 
 
 class Soak:
@@ -245,42 +250,38 @@ class Soak:
         self._load = client.node.create_client(LoadMap, "/traverse_server/load_map")
         self._drives, self._events = Counter[str](), Counter[str]()
         self._disturbances = itertools.cycle((self._kill, self._change_map, self._step_clock))
-
-    def run(self, seconds: float, every: float) -> dict[str, object]:
-        """Drive and disturb for some time, with a disturbance each so many seconds, or none for 0.
-
-        Returns:
-            The report.
-        """
-        programs, loads = self._programs, []
-        self._ear.faults.clear()
-        memory, latency = programs.memory(), self._find_latency()
-        begin = time.monotonic()
-        due = begin + (every or np.inf)
         self._start_mission()
-        while time.monotonic() < begin + seconds:
+
+    def run(self, minutes: float, every: float) -> dict[str, object]:
+        """Drive for some time, with a disturbance each so many seconds; return the report."""
+        for counter in (self._ear.faults, self._drives, self._events):
+            counter.clear()
+        programs, loads = self._programs, [os.getloadavg()[0]]
+        begin = time.monotonic()
+        end, due = begin + 60.0 * minutes, begin + every
+        while time.monotonic() < end:
             time.sleep(0.5)
             loads.append(os.getloadavg()[0])
             code = programs.exit_code(MISSION)
             if code is not None:
-                end = _ENDS.get(code) or without_numbers(programs.last_words(MISSION))
-                self._drives[end] += 1
+                how = _ENDS.get(code) or without_numbers(programs.last_words(MISSION))
+                self._drives[how] += 1
                 self._start_mission()
             if time.monotonic() > due:
                 due += every
                 next(self._disturbances)()
         return {
-            "minutes": round((time.monotonic() - begin) / 60.0, 1),
+            "minutes": minutes,
             "median and largest load of the machine": np.quantile(loads, (0.5, 1.0)).tolist(),
             "drives": dict(self._drives),
             "disturbances": dict(self._events),
             "faults": {cause: count for cause, count in self._ear.faults.items() if count},
-            "torques at rest": self._ear.rest.find_torques(),
-            "memory at start [MB]": memory,
-            "memory at end [MB]": programs.memory(),
-            "answer at start [ms]": latency,
-            "answer at end [ms]": self._find_latency(),
+            **self.measure(),
         }
+
+    def measure(self) -> dict[str, object]:
+        """Return memory and latency now."""
+        return {"memory [MB]": self._programs.memory(), "answer [ms]": self._find_latency()}
 
     def _kill(self) -> None:
         victim = next(self._victims)
@@ -331,14 +332,15 @@ _ENDS = {0: "arrived", 3: "not traversable", -9: "killed"}
 
 
 def main(
-    minutes: Annotated[float, typer.Option(help="Length in minutes.")] = 60.0,
-    load: Annotated[int, typer.Option(help="Processes that do nothing but compute.")] = 4,
-    every: Annotated[float, typer.Option(help="Time between disturbances in s; 0: none.")] = 40.0,
+    minutes: Annotated[float, typer.Option(help="Minutes with disturbances.")] = 40.0,
+    calm: Annotated[float, typer.Option(help="Minutes without, after that.")] = 20.0,
+    load: Annotated[int, typer.Option(help="Processes that do nothing but compute.")] = 2,
+    every: Annotated[float, typer.Option(help="Time between disturbances in s.")] = 40.0,
     seed: Annotated[int, typer.Option(help="Seed of ground and goals.")] = 1,
 ) -> None:
     """Run a soak and print its report as JSON."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # its programs end with it
-    print(json.dumps(run_soak(minutes, load, every, seed), indent=2))
+    print(json.dumps(run_soak(minutes, calm, every, load, seed), indent=2))
 
 
 if __name__ == "__main__":

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What all tests share: the real maps, and a ROS that stays on this machine."""
+"""What all tests share: a ROS that stays on this machine, a server and its client."""
 
 import contextlib
 import os
 import signal
 from functools import partial
-from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -33,26 +32,6 @@ def pytest_collection_modifyitems(items):
     last = len(LONGEST)
     rank = {name: number for number, name in enumerate(LONGEST)}
     items.sort(key=lambda item: rank.get(item.path.stem, last))
-
-
-@pytest.fixture(scope="session")
-def real_map():
-    """Return a function that loads a preset, or a real map that is not part of the package."""
-    from rover_physics.terrain.grid import load_terrain
-    from rover_physics.terrain.terrain_file import terrain_presets
-
-    beside = Path(__file__).resolve().parents[2] / "shared" / "terrain"
-    folder = Path(os.environ.get("ROVER_TERRAIN_DIR", beside))
-
-    def load(name: str):
-        if name in terrain_presets():
-            return load_terrain(name)
-        path = folder / f"{name}.npz"
-        if not path.is_file():
-            pytest.skip(f"no real map {path}; set ROVER_TERRAIN_DIR to its folder")
-        return load_terrain(path)
-
-    return load
 
 
 @pytest.fixture

@@ -8,7 +8,6 @@ import pytest
 
 from rover_physics import save_terrain
 from rover_planner.cli import main
-from support.command_line import assert_refused
 from support.grounds import make_terrain
 
 KEYS = {
@@ -69,8 +68,3 @@ def test_a_path_that_passes_and_one_without_time_are_answered(files, capsys):
     assert main(arguments(files, "--friction", "1.0")) == 0
     assert json.loads((files / "out.json").read_text())["traversable"] is True
     assert "traversable as it is" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize("word", ["budget", "policy", "accepted-chance"])
-def test_bad_input_is_refused_in_one_line(files, capfd, word):
-    assert_refused(capfd, main(arguments(files, f"--{word}", "-1")), word.partition("-")[0])

@@ -13,7 +13,6 @@ from rover_planner.cli import main
 from rover_planner.shell.run_program import EXIT_INTERRUPTED, MAX_LINE
 from support.command_line import REPOSITORY, write_ground_and_path
 
-LONG = "n" * 300
 DIGITS = "9" * 400
 
 
@@ -43,28 +42,16 @@ REFUSED = [
     (["predict"], "ROVER"),
     (predict("--colour", "red"), "--colour"),
     (predict("--friction", "high"), "friction"),
-    (predict(terrain="none.npz"), "none.npz"),
-    (predict(terrain="poses.npz"), "elevation"),
-    (predict(poses=LONG), "cannot be read: File name too long"),
-    (predict(out=LONG), "cannot be written: File name"),
-    (predict(out="/dev/full"), "No space left on device"),
-    (predict("--max-cells", "99"), "limit is"),
-    (predict("--policy", "lucky"), "policy"),
     (predict("--tool-force", "0", "1"), "tool-force"),
     (predict("--arm", "arm_yaw=nan"), "NAME=RAD"),
-    (predict("--arm", "arm_wrist=0.1"), "arm_elbow"),
     (predict("--arm", "arm_yaw=0.1"), "lacks arm_shoulder, arm_elbow"),
     (predict("--arm", "arm_yaw=0.1", "--arm", "arm_yaw=0.2"), "twice"),
-    (["terrain", "no/t.npz"], "t.npz"),
     (["reach", "lsr1", "terrain.npz", "here", "2", "0.5", "2.5", "2.3", "0.3"], "'X'"),
     (["plan", "lsr1", "terrain.npz", "o.npz", "--start=1,2", "--goal=1,0,0"], "'1,2' is no pose"),
-    (["urdf", "lsr1", "no/out.urdf"], "no/out.urdf: cannot be written"),
     (["rover", "out.yaml"], "--from-urdf"),
-    (["terrain", "t.npz", "--size", "1e308", "--resolution", "1e307"], "at most 1e+06 m"),
     (["terrain", "t.npz", "--seed", DIGITS * 20], "--seed"),
     (["study", "\x1b[2J\n\udcff"], "no study file \\x1b[2J\\n\\udcff"),
     (["figure4", "."], "must be a .png, .svg, .pdf file"),
-    (["figure4", "no/such/folder/a.png"], "no/such/folder"),
 ]  # fmt: skip
 
 

@@ -2,7 +2,6 @@
 """GridMaps, made and recorded, become terrains cell by cell, wherever their buffer starts."""
 
 import lzma
-import os
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -170,16 +169,6 @@ def test_hostile_grid_maps_are_refused_or_read_and_nothing_else(data, names):
 
 
 DATA = Path(__file__).resolve().parents[1] / "data"
-
-
-def bag(name: str) -> Path:
-    """Return the path of a recorded bag, which is no part of the package."""
-    pytest.importorskip("rosbags")
-    beside = Path(__file__).resolve().parents[3] / "shared" / "bags"
-    path = Path(os.environ.get("ROVER_BAG_DIR", beside)) / name
-    if not path.exists():
-        pytest.skip(f"no bag {path}; set ROVER_BAG_DIR to its folder")
-    return path
 
 
 @pytest.fixture(scope="module")

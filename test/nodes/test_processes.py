@@ -61,7 +61,7 @@ def end(process, how, count=1):
     return rest
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_server_says_what_it_does_answers_another_process_and_ends_cleanly(
     start_process, client, tmp_path
 ):

@@ -28,9 +28,6 @@ SERVERS = ("traverse_server", "traction_controller", "rover_simulator")
 LONGEST, GRACE = 300.0, 20.0
 """Longest time for a block, and for its processes to end after it [s]."""
 
-QUICK_PAGES = ("README.md", "docs/python.md", "docs/integration/robot.md")
-"""Pages whose blocks `make test` runs; those of the others take `make test-long`."""
-
 BLOCKS = [block for page in PAGES for block in read_blocks(page)]
 PAGES_TO_RUN = sorted({block.page for block in BLOCKS})
 
@@ -147,7 +144,7 @@ def reader(tmp_path, programs):
 @pytest.mark.parametrize(
     "page",
     [
-        pytest.param(page, marks=[] if page in QUICK_PAGES else [pytest.mark.long])
+        pytest.param(page, marks=[] if page == "README.md" else [pytest.mark.long])
         for page in PAGES_TO_RUN
     ],
 )

@@ -13,7 +13,6 @@ from support.project.checkout import TOP
 from support.ros_fixtures import domain_id
 
 FOLDER = TOP / "examples"
-LONG = pytest.mark.long
 SHOWN = {
     "01_judge_a_path": ("refused at waypoint 86", "front_left wheel slips"),
     "02_compare_policies": ("tallest step [cm]", "optimal "),
@@ -26,7 +25,6 @@ SHOWN = {
     "09_take_advice": ("rock: refused: belly clearance", "kg less at the arm's tip"),
 }
 """What each example prints, among other things."""
-QUICK = ("01_judge_a_path", "03_your_own_rover_from_a_urdf", "04_a_map_from_a_point_cloud")
 
 
 def test_every_example_is_tested_and_in_the_table_of_the_folder():
@@ -37,7 +35,8 @@ def test_every_example_is_tested_and_in_the_table_of_the_folder():
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=() if name in QUICK else LONG) for name in SHOWN]
+    "name",
+    [pytest.param(name, marks=pytest.mark.long if name > "02" else ()) for name in SHOWN],
 )
 def test_an_example_prints_and_draws_what_it_claims(name, tmp_path):
     from matplotlib.image import imread

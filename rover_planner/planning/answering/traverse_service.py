@@ -3,6 +3,7 @@
 
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -31,8 +32,9 @@ class TraverseService(Measurements):
     Maps may be taken in another thread than the rest.
     """
 
-    def __init__(self, settings: ServiceSettings):
-        super().__init__()
+    def __init__(self, settings: ServiceSettings, clock: Callable[[], float] = time.monotonic):
+        """Begin without a map; `clock` returns the time [s] that measurements and maps age by."""
+        super().__init__(clock)
         self.settings = settings
         """The current settings; after a change of `largest_gap` call `refresh_map`."""
         self.known_map: KnownMap | None = None
@@ -84,7 +86,7 @@ class TraverseService(Measurements):
             cells: Where its cells come from; None if that is `source` for all.
             frame: Frame of the map; empty if it has none.
         """
-        about = KnownMap(terrain, terrain, source, stamp, time.monotonic(), "", cells, frame)
+        about = KnownMap(terrain, terrain, source, stamp, self._clock(), "", cells, frame)
         return self._keep_map(about)
 
     def amend_map(self, terrain: Terrain, cells: CellSources) -> None:
@@ -97,7 +99,7 @@ class TraverseService(Measurements):
         """Note that the present map has arrived once more."""
         known = self.known_map
         if known is not None:
-            self.known_map = replace(known, arrival=time.monotonic())
+            self.known_map = replace(known, arrival=self._clock())
 
     def refresh_map(self) -> None:
         """Interpolate the gaps of the received map again, with the present settings."""
@@ -158,7 +160,7 @@ class TraverseService(Measurements):
         known, most = self.known_map, snapshot.settings.parameters.max_map_age
         if known is None:
             return replace(snapshot, known_map=None)
-        steady = time.monotonic()
+        steady = self._clock()
         classes, laid = self._lay_friction(known, snapshot)
         return replace(
             snapshot,

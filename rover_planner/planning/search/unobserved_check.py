@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 from rover_physics.rover.model import Rover
 from rover_physics.traversability.verdict import with_refusals
 from rover_planner.maps.unobserved_ground import (
-    ALLOW,
-    REFUSE,
     UNOBSERVED_CODE,
     ObservedGround,
     UnobservedShare,
 )
+from rover_planner.parameters.traverse_server import ALLOW, REFUSE
 from rover_planner.planning.marked_places import MARKED_CODE
 from rover_planner.planning.path_query import Candidate
 
@@ -29,7 +28,7 @@ class UnobservedCheck:
     seen: ObservedGround
     """The seen part of the map."""
     rule: str
-    """One of UNOBSERVED_GROUND."""
+    """A value of the parameter blind_ground."""
 
     def share(self, candidate: Candidate) -> UnobservedShare:
         """Return how much of the ground under the belly was never seen along a path."""

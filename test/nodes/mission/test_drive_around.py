@@ -4,11 +4,9 @@
 import numpy as np
 import pytest
 from rclpy.parameter import Parameter
-from scipy import ndimage
 
-from benchmarks.grounds import real_maps
-from rover_physics import Terrain, load_rover, save_terrain
-from rover_planner.nodes.mission.drive import DriveSettings, drive_to
+from rover_physics import load_rover, save_terrain
+from rover_planner.nodes.mission.drive import Drive, DriveSettings
 from rover_planner.nodes.mission_planner import MissionPlanner
 from rover_planner.nodes.rover_simulator import RoverSimulator
 from rover_planner.nodes.traction_controller import TractionController
@@ -27,28 +25,13 @@ SERVER = {
 SPEED = 0.1
 
 
-def boulder_field() -> tuple[Terrain, tuple, tuple, float]:
-    """Return a boulder field with start, goal and range of the sensor: Otira's or a made one."""
-    for name, terrain in real_maps().items():
-        if name.startswith("otira"):
-            return without_gaps(terrain), (25.402, 15.524, 0.297), (23.869, 14.883, -2.296), 2.0
-    made = make_mars_terrain(4, 8.0, rock_cover=0.25, crater_density=0.0)
-    return made, (-0.01, -0.45, 0.45), (2.8, -0.25, 2.02), 4.0
-
-
-def without_gaps(terrain: Terrain) -> Terrain:
-    """Return a ground whose unknown cells have the height of the nearest known one."""
-    unknown = np.isnan(terrain.elevation)
-    nearest = ndimage.distance_transform_edt(unknown, return_distances=False, return_indices=True)
-    return Terrain(terrain.elevation[tuple(nearest)], terrain.resolution, terrain.origin)
-
-
 @pytest.mark.long  # two to three minutes each
 @pytest.mark.slow
 @pytest.mark.timed
 @pytest.mark.parametrize("engine", ["quasi_static", "mujoco"])
 def test_a_rover_drives_around_boulders_that_it_sees_on_the_way(ros, tmp_path, engine):
-    terrain, start, goal, sensor_range = boulder_field()
+    terrain = make_mars_terrain(4, 8.0, rock_cover=0.25, crater_density=0.0)
+    start, goal = (-0.01, -0.45, 0.45), (2.8, -0.25, 2.02)
     save_terrain(tmp_path / "ground.npz", terrain)
     options = PathQueryOptions().change(policy="optimal")
     fan = answer_path_query(load_rover("lsr1"), terrain, start, goal, options)
@@ -60,7 +43,7 @@ def test_a_rover_drives_around_boulders_that_it_sees_on_the_way(ros, tmp_path, e
         "start_y": start[1],
         "start_yaw": start[2],
         "engine": engine,
-        "sensor_range": sensor_range,
+        "sensor_range": 4.0,
         "sensor_occlusion": False,
         "map_rate": 1.0,
         "follow_commands": True,
@@ -82,9 +65,8 @@ def test_a_rover_drives_around_boulders_that_it_sees_on_the_way(ros, tmp_path, e
     answer = planner.ask(simulator.simulation.plant.pose(), goal)
     assert answer["traversable"], answer["reason"]
     told = []
-    drive_to(
-        planner, goal, answer["poses"], DriveSettings(timeout=400.0, patience=5.0), told.append
-    )
+    settings = DriveSettings(timeout=400.0, patience=5.0)
+    Drive(planner, goal, settings, told.append).run(answer["poses"])
     place = simulator.simulation.plant.pose()
     assert np.hypot(*(place - goal)[:2]) < 0.25
     assert np.isfinite(server.service.terrain.elevation).sum() > known

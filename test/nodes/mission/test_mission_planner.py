@@ -113,9 +113,9 @@ def test_answers_drives_and_refusals_have_exit_codes_of_their_own(start_server, 
     assert [event["goal"] for event in answers] == [1, 2]
     for event in answers:
         assert f"chose {event['answer']['chosen_candidate']}:" in event["answer"]["explanation"]
-    code, out, err = run_planner(NEAR, "--drive", "--timeout=8")  # there is no rover
+    code, out, err = run_planner(NEAR, "--drive", "--timeout=4")  # there is no rover
     assert code == 1 and "goal 1: yes" in out
-    assert "mission_planner: waited 8 s in vain for a rover on the topic path\n" in err
+    assert "mission_planner: waited 4 s in vain for a rover on the topic path\n" in err
 
 
 def rock(x, y):

@@ -88,6 +88,7 @@ def wait_for_process(folder: Path) -> int:
     raise AssertionError("no process")
 
 
+@pytest.mark.long
 def test_a_process_compiles_what_is_missing_and_this_one_loads_it(folder):
     assert output_of(folder) == "first second True 2"
     assert output_of(folder) == "True 2"
@@ -111,6 +112,7 @@ def test_the_process_ends_with_its_parent_even_if_that_is_killed(folder):
     wait_until_gone(pid)
 
 
+@pytest.mark.long
 def test_groups_are_compiled_by_several_processes_and_errors_are_raised(folder):
     names = []
     steps = [CompilationStep(name, f"some_kernels:{name}") for name in ("first", "second")]

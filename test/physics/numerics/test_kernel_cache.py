@@ -12,6 +12,8 @@ import pytest
 import rover_physics.numerics
 from support.project.without_disk import drop_rights, read_only
 
+pytestmark = pytest.mark.long
+
 CALLEE = """
 from rover_physics.numerics.kernels import kernel
 
@@ -90,7 +92,6 @@ def test_kernels_compile_where_no_folder_can_be_written_and_the_note_says_so(pac
     assert note == f"Permission denied: {package.package / '__pycache__'}"
 
 
-@pytest.mark.long
 def test_a_damaged_file_is_compiled_again(package):
     package.run()
     for ending, left in (("nbi", 20), ("nbc", 0)):
@@ -100,7 +101,6 @@ def test_a_damaged_file_is_compiled_again(package):
     assert package.run() == (7.0, 1, "")
 
 
-@pytest.mark.long
 def test_kernels_in_the_folder_of_a_user_are_not_used_after_another_file_has_changed(package):
     with read_only(package.package):
         assert package.run(drop_rights) == (7.0, 0, "")

@@ -14,7 +14,7 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 
-from msg_adapters.commands import wheel_values
+from msg_adapters.commands import labelled_array
 from msg_adapters.results.predictions import waypoint_array
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.rover.rover_file import load_rover
@@ -146,7 +146,9 @@ def test_estimates_of_the_controller_take_precedence_over_predictions(listener, 
         return "controller" in received[-1].forces_from
 
     send_until(
-        lambda: talker.estimated.publish(wheel_values(loads)), is_estimated, "the controller"
+        lambda: talker.estimated.publish(labelled_array(loads, "wheel")),
+        is_estimated,
+        "the controller",
     )
     np.testing.assert_allclose(received[-1].wheel_loads, loads)
 
