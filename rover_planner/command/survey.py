@@ -144,7 +144,7 @@ def _run(prepared: "PreparedSurvey", settings: "ClusterSettings") -> "SurveyOutc
         progress("load the model (the first run compiles it)")
         warm_up_survey(job.request)
     total = 0
-    for rows, columns in map(job.layout.cells_of, prepared.chunks):
+    for rows, columns in map(prepared.store.notes.layout.cells_of, prepared.chunks):
         cells = (rows.stop - rows.start) * (columns.stop - columns.start)
         total += cells * job.request.headings
     with show_bar("survey", total, "poses") as advance:

@@ -9,9 +9,10 @@ from std_srvs.srv import Trigger
 from msg_adapters.errors import MessageError
 from msg_adapters.results.diagnostics import to_json
 from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
+from rover_physics.traversability.reach import ReachAnswer
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.questions import Answer, ArmJudgement, ReachCheck, ReachQuery
+from rover_planner.planning.answering.questions import Answer, ReachCheck, ReachQuery
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.subscriptions import subscribe_to_requests
@@ -60,7 +61,7 @@ class ArmTopics:
 
         self._desk.ask(ReachCheck("check_reach", "", self.query), send)
 
-    def _log(self, answer: ArmJudgement) -> None:
+    def _log(self, answer: ReachAnswer) -> None:
         logger = self._node.get_logger()
         if answer.possible:
             logger.info("check_reach: possible")

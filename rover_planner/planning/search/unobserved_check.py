@@ -18,8 +18,6 @@ from rover_planner.parameters.traverse_server import ALLOW, REFUSE
 from rover_planner.planning.marked_places import MARKED_CODE
 from rover_planner.planning.path_query import Candidate
 
-_REFUSED_COST = (float("inf"), float("inf"))
-
 
 @dataclass(frozen=True, eq=False)
 class UnobservedCheck:
@@ -45,14 +43,11 @@ class UnobservedCheck:
         if first < 0:
             return candidate
         counted = share.unobserved_share - (0.0 if self.rule == REFUSE else share.footprint_share)
-        codes, reasons = [""] * len(candidate.poses), [""] * len(candidate.poses)
-        codes[first] = UNOBSERVED_CODE
-        reasons[first] = (
+        reason = (
             f"ground under the belly that was never seen: {100.0 * counted:.1f} % of that along "
             f"the path {self._name_rule()}"
         )
-        verdict = with_refusals(candidate.verdict, codes, reasons)
-        return replace(candidate, verdict=verdict, cost=_REFUSED_COST)
+        return candidate.refuse_at(first, UNOBSERVED_CODE, reason)
 
     def refuses(self, pieces: Sequence[NDArray[np.float64]]) -> NDArray[np.bool_]:
         """Return (k,) whether the rule refuses pieces of path, each of poses (n, 3).

@@ -18,7 +18,6 @@ from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
-from rover_planner.survey.chunk_survey import open_map
 from rover_planner.survey.geotiff import GeoTiffMap
 from rover_planner.survey.layers import (
     CLASS_COLOURS,
@@ -157,10 +156,11 @@ def load_map(path: Path, max_cells: int) -> Terrain:
     Raises:
         PlanningError: It is no survey, its map is larger, or has changed since.
     """
-    notes = SurveyStore(path).notes
+    store = SurveyStore(path)
+    notes = store.notes
     if notes.map_file:
         need("rasterio", "a GeoTIFF")
-    source, (rows, columns) = open_map(path, notes.map_file), notes.layout.map_shape
+    source, (rows, columns) = store.open_map(), notes.layout.map_shape
     if rows * columns > max_cells:
         raise PlanningError(
             f"the map of {show_file(path)} has {rows} x {columns} cells; --max-cells is "
