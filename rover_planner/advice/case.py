@@ -161,4 +161,3 @@ class JudgedCase:
         """Return the load [N] of each axle at a waypoint by its name; NaN where unknown."""
         loads = self.prediction.wheel_loads[waypoint]
         return {name: float(loads[k] + loads[k + 3]) for k, name in enumerate(WHEEL_POSITIONS)}
-

@@ -29,6 +29,7 @@ ROUNDS = ((1, COARSE), (1, FINE), (2, (0.3, 0.6, 1.0)), (3, (0.5, 1.0)))
 MOST_PLACES = 8
 """Largest number of failures that are remembered."""
 
+
 @dataclass(frozen=True)
 class FailedPlace:
     """The waypoint at which a case failed."""
@@ -212,4 +213,3 @@ class _Seeker:
     def _remember(self, known: FailedPlace) -> None:
         others = [one for one in self._failed if one != known]
         self._failed = [known, *others][:MOST_PLACES]
-

@@ -87,7 +87,6 @@ class Candidate:
             return 1.0
         return failure / max(1, len(self.poses) - 1)
 
-
     def refuse_at(self, waypoint: int, code: str, reason: str) -> "Candidate":
         """Return the path, refused at a waypoint for what the model does not know."""
         codes, reasons = [""] * len(self.poses), [""] * len(self.poses)

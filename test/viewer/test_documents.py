@@ -162,6 +162,15 @@ def test_the_chance_of_failure_is_a_lane_of_its_own_with_its_main_cause():
     assert words == f"chance of failure {percent}, most often by friction"
 
 
+def test_the_chance_of_a_path_that_is_refused_is_that_up_to_its_failure():
+    session = ViewSession(LSR1, make_terrain(wall_at(0.5)), (-2.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    session.judge_again()
+    shown = session.shown
+    assert len(shown.chance.at) == shown.verdict.first_failure + 1 < len(shown.path.poses)
+    told = describe_uses(shown.path, np.inf, shown.chance)[-1]
+    assert told["value"] == f"up to the failure {100.0 * shown.chance.path:.0f} %"
+
+
 def test_a_use_without_bound_is_above_the_limit_in_its_curve():
     path = judged_on(gap)
     lane = path.limits.lane(path.failure.code)

@@ -79,4 +79,3 @@ class Measurements:
         if not times or self._clock() - min(*times, self._pose_time) > MAX_AGE:
             return None
         return self._pose
-

@@ -69,7 +69,8 @@ def describe_uses(
     lanes = list_lanes(path, chance)
     uses = [_describe_use(lane, limits, lane.worst_until(rows), here) for lane in lanes]
     if chance is not None:
-        uses[-1]["value"] = f"whole path {100.0 * chance.path:.0f} %"
+        of = "whole path" if failure is None or failure.code == CHANCE else "up to the failure"
+        uses[-1]["value"] = f"{of} {100.0 * chance.path:.0f} %"
     return uses
 
 

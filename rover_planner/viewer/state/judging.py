@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from rover_physics.chance.failure_chance import find_failure_chance
 from rover_physics.errors import RoverError
+from rover_physics.limits.table import CHANCE as CHANCE_CODE
 from rover_physics.names import TORQUE_POLICIES
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.packed_model import pack_model
@@ -181,10 +182,15 @@ def _add_policies(shown: Shown) -> Generator[Step, None, Shown]:
 
 
 def _add_chance(shown: Shown) -> Shown:
-    """Return what is shown with the chance that the path fails anywhere, if it ends or not."""
-    asked = shown.scenario
+    """Return what is shown with the chance that the path fails, up to where it is refused.
+
+    Beyond, a path that fails for sure takes minutes on rough ground, and tells nothing.
+    """
+    asked, verdict, poses = shown.scenario, shown.verdict, shown.path.poses
+    if not verdict.traversable and verdict.code != CHANCE_CODE:
+        poses = poses[: verdict.first_failure + 1]
     model = pack_model(asked.rover, asked.terrain, asked.asked_options.model)
-    (swept,) = predict_paths(model, [shown.path.poses], False)
+    (swept,) = predict_paths(model, [poses], False)
     return replace(shown, chance=find_failure_chance(model, swept))
 
 

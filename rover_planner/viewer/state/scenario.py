@@ -156,7 +156,8 @@ class Shown:
     by_policy: tuple[PolicyVerdict, ...] = ()
     """Its verdicts under all torque policies; empty for a replay, whose soil is not known."""
     chance: FailureChance | None = None
-    """The chance that the path fails, all of it; None while it is not known, or for a replay."""
+    """The chance that the path fails, up to where a limit is broken; None while it is not known,
+    or for a replay."""
     around: SearchResult | None = None
     """The finding of a search around obstacles for the scenario; None if none was made."""
 
