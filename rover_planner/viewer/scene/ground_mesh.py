@@ -35,7 +35,7 @@ def draw_picture(grid: GroundGrid, ground: ColouredGround) -> NDArray[np.uint8]:
     has thin lines every metre.
     """
     x, y = grid.pixels
-    factor = _light(*grid.slopes)
+    factor = grid.refine(_light(*grid.slopes))
     if ground.beyond is not None:
         period = max(MIN_PERIOD, round(HATCH_PERIOD / (x[1] - x[0])))
         row, column = np.ogrid[: len(y), : len(x)]

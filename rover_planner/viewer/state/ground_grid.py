@@ -3,8 +3,10 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import ndimage
 
 from rover_physics.numerics.arrays import Floats
@@ -43,18 +45,15 @@ class GroundGrid:
         return x, y
 
     @cached_property
-    def fine_heights(self) -> Floats:
-        """(my, mx) of the pixels [m], NaN next to unknown cells."""
-        return np.asarray(
-            ndimage.zoom(self.heights, self.factor, order=1, mode="nearest", grid_mode=True)
-        )
-
-    @cached_property
     def slopes(self) -> tuple[Floats, Floats]:
-        """Rises (my, mx) of the pixels along x and along y."""
-        x, y = self.pixels
-        heights = self.fine_heights
-        return np.gradient(heights, x, axis=1), np.gradient(heights, y, axis=0)
+        """Rises (ny, nx) of the cells along x and along y."""
+        heights = self.heights
+        return np.gradient(heights, self.x, axis=1), np.gradient(heights, self.y, axis=0)
+
+    def refine(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return values (ny, nx, ...) of the cells as those of the pixels (my, mx, ...)."""
+        factors = [self.factor] * 2 + [1] * (values.ndim - 2)
+        return np.asarray(ndimage.zoom(values, factors, order=1, mode="nearest", grid_mode=True))
 
 
 def make_grid(terrain: Terrain) -> GroundGrid:

@@ -86,7 +86,7 @@ def list_layers(terrain: Terrain) -> list[str]:
 
 def colour_ground(layer: str, terrain: Terrain, grid: GroundGrid) -> ColouredGround:
     """Return the colours of a layer of the ground alone."""
-    values = heights = grid.fine_heights
+    values = heights = grid.heights
     known = heights[np.isfinite(heights)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
     ends: tuple[str, ...] = f"{low:.2f} m", f"{high:.2f} m"
@@ -97,12 +97,12 @@ def colour_ground(layer: str, terrain: Terrain, grid: GroundGrid) -> ColouredGro
         columns, rows = (
             np.clip(np.rint((at - first) / terrain.resolution).astype(int), 0, count - 1)
             for at, first, count in zip(
-                grid.pixels, terrain.origin, terrain.friction.shape[::-1], strict=True
+                (grid.x, grid.y), terrain.origin, terrain.friction.shape[::-1], strict=True
             )
         )
         values, low, high = terrain.friction[np.ix_(rows, columns)], 0.0, 1.0
         ends = "0.00", "1.00"
-    return ColouredGround(map_colours(values, low, high), _grade(layer, ends))
+    return ColouredGround(grid.refine(map_colours(values, low, high)), _grade(layer, ends))
 
 
 def colour_limit(
