@@ -38,7 +38,7 @@ EXTRAS = {
     "survey": [
         "dask>=2024.8,<2027",
         "distributed>=2024.8,<2027",
-        "zarr>=3.0,<4",
+        "zarr>=3.1.3,<4",  # writes files whole
         "rasterio>=1.4,<2",
         "matplotlib>=3.6,<4",
     ],

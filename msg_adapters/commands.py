@@ -12,7 +12,7 @@ from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
 from msg_adapters.errors import MessageError
 from msg_adapters.joints import OWN_NAMES, JointNames
-from rover_physics.names import WHEEL_JOINTS, WHEELS
+from rover_physics.names import WHEEL_JOINTS
 
 
 def twist_to_speeds(twist: TwistStamped | Twist) -> tuple[float, float]:
@@ -52,13 +52,13 @@ def effort_commands(torques: NDArray[np.float64], order: NDArray[np.int64]) -> F
     return Float64MultiArray(data=doubles(torques[order]))
 
 
-def wheel_values(values: NDArray[np.float64], rows: str = "") -> Float64MultiArray:
-    """Convert values (6,), or (k, 6) with a label for rows, into an array with labelled dims."""
+def labelled_array(values: NDArray[np.float64], *labels: str) -> Float64MultiArray:
+    """Convert values into an array whose dimensions have labels."""
     message = Float64MultiArray(data=doubles(values))
-    dims = [MultiArrayDimension(label="wheel", size=len(WHEELS), stride=len(WHEELS))]
-    if rows:
-        dims.insert(0, MultiArrayDimension(label=rows, size=len(values), stride=values.size))
-    message.layout.dim = dims
+    message.layout.dim = [
+        MultiArrayDimension(label=label, size=size, stride=math.prod(values.shape[k:]))
+        for k, (label, size) in enumerate(zip(labels, values.shape, strict=True))
+    ]
     return message
 
 

@@ -9,7 +9,6 @@ read back unchanged.
 
 import array
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -39,6 +38,8 @@ CLASS = "class"
 """Field with classes of ground, of any datatype."""
 LAYERS = {"friction": "friction", "elevation_std": "elevation_std", CLASS: "ground_class"}
 """Fields of a cloud besides x, y and z, and the layers of the terrain that they become."""
+COMBINED = {"friction": "min", "elevation_std": "max", CLASS: "most frequent"}
+"""How the values of several points of a cell are combined."""
 
 MAX_POINT_STEP = 1_000_000
 """Largest size of a point [bytes]."""
@@ -56,45 +57,8 @@ _NUMBERS = _FLOATS | {getattr(PointField, name): kind for name, kind in _KINDS.i
 _DATATYPE_NAMES = {getattr(PointField, n): n for n in (*_KINDS, "FLOAT32", "FLOAT64")}
 
 
-@dataclass(frozen=True)
-class CloudPoints:
-    """The points of a cloud in the order of the message, invalid ones included."""
-
-    xyz: NDArray[np.float64]
-    """(n, 3) coordinates [m]; NaN where the message has NaN, in all three if they are moved."""
-    friction: NDArray[np.float64] | None
-    """(n,) friction coefficient, where the cloud has such a field."""
-    elevation_std: NDArray[np.float64] | None
-    """(n,) standard deviation of z [m], where the cloud has such a field."""
-    ground_class: NDArray[np.float64] | None
-    """(n,) class of the ground, where the cloud has a field `class`."""
-    precision: float
-    """Rounding error of the x and y coordinates [m]."""
-
-
 PointMove = tuple[NDArray[np.float64], NDArray[np.float64]]
 """R (3, 3) and t (3,) [m]: a point p of a sensor's frame is at R p + t in that of the map."""
-
-
-def read_points(cloud: PointCloud2, move: PointMove | None = None) -> CloudPoints:
-    """Read the points of a cloud of any layout, and move them.
-
-    Honours height, width, row_step, point_step, field offsets, padding and is_bigendian; x, y, z
-    and the optional `friction` and `elevation_std` may be FLOAT32 or FLOAT64; the optional
-    `class` of any datatype.
-
-    Raises:
-        MessageError: No points, a field missing or of another datatype, or lengths that disagree.
-    """
-    points = _view_points(cloud)
-    columns = {name: points[name].astype(np.float64).ravel() for name in points.dtype.names or ()}
-    xyz = np.column_stack([columns["x"], columns["y"], columns["z"]])
-    precision = rounding_error(points["x"], points["y"])
-    if move is not None:
-        xyz = xyz @ move[0].T + move[1]  # NaN where a coordinate is
-        precision = rounding_error(points["x"], points["y"], points["z"])
-    layers = {layer: columns.get(name) for name, layer in LAYERS.items()}
-    return CloudPoints(xyz=xyz, precision=precision, **layers)
 
 
 @quiet
@@ -132,13 +96,11 @@ def terrain_from_point_cloud(
             f"resolution is {resolution} m; it must be positive, or 0 to detect it, and from "
             f"{MIN_RESOLUTION:g} to {MAX_RESOLUTION:g}"
         )
-    if move is not None:
-        return _terrain_of_scatter(read_points(cloud, move), resolution, cell_height)
     points = _view_points(cloud)
-    raster = detect_raster(points["x"], points["y"])
+    raster = detect_raster(points["x"], points["y"]) if move is None else None
     if raster is not None and _is_wanted(raster.grid, resolution):
         return _terrain_of_raster(points, raster)
-    return _terrain_of_scatter(read_points(cloud), resolution, cell_height)
+    return _terrain_of_scatter(points, resolution, cell_height, move)
 
 
 def _is_wanted(grid: CloudGrid, resolution: float) -> bool:
@@ -149,57 +111,51 @@ def _is_wanted(grid: CloudGrid, resolution: float) -> bool:
 def _terrain_of_raster(points: NDArray[np.void], raster: Raster) -> Terrain:
     """Make a terrain whose cells are the points of a raster."""
     elevation = raster.arrange(points["z"])
-    unknown = ~np.isfinite(elevation)
-    if unknown.all():
-        raise MessageError(f"none of the cloud's {unknown.size} points has finite x, y and z")
-    elevation[unknown] = np.nan
-    friction = None
-    if "friction" in (points.dtype.names or ()):
-        friction = raster.arrange(points["friction"])
-        friction[unknown | ~np.isfinite(friction)] = np.nan
-    std = None
-    if "elevation_std" in (points.dtype.names or ()):
-        std = raster.arrange(points["elevation_std"])
-        std[unknown] = np.nan
-    classes = raster.arrange(points[CLASS]) if CLASS in (points.dtype.names or ()) else None
-    grid = raster.grid
-    return make_terrain(elevation, grid.resolution, grid.origin, friction, std, classes)
+    if not np.isfinite(elevation).any():
+        raise MessageError(f"none of the cloud's {elevation.size} points has finite x, y and z")
+    there = [name for name in LAYERS if name in (points.dtype.names or ())]
+    layers = {LAYERS[name]: raster.arrange(points[name]) for name in there}
+    return make_terrain(elevation, raster.grid.resolution, raster.grid.origin, layers)
 
 
-def _terrain_of_scatter(points: CloudPoints, resolution: float, cell_height: str) -> Terrain:
+def _terrain_of_scatter(
+    points: NDArray[np.void], resolution: float, cell_height: str, move: PointMove | None
+) -> Terrain:
     """Make a terrain of irregular points; each is assigned to the nearest cell centre."""
-    placed = np.isfinite(points.xyz[:, :2]).all(axis=1)
-    known = placed & np.isfinite(points.xyz[:, 2])
+    columns = {name: points[name].astype(np.float64).ravel() for name in points.dtype.names or ()}
+    xyz = np.column_stack([columns["x"], columns["y"], columns["z"]])
+    precision = rounding_error(points["x"], points["y"])
+    if move is not None:
+        xyz = xyz @ move[0].T + move[1]  # NaN where a coordinate is
+        precision = rounding_error(points["x"], points["y"], points["z"])
+    placed = np.isfinite(xyz[:, :2]).all(axis=1)
+    known = placed & np.isfinite(xyz[:, 2])
     if not known.any():
         raise MessageError(f"none of the cloud's {len(known)} points has finite x, y and z")
-    xy = points.xyz[placed, :2]
+    xy = xyz[placed, :2]
     check_extent(xy)
-    grid = detect_grid(xy, points.precision)
+    grid = detect_grid(xy, precision)
     if resolution > 0.0 and (grid is None or not _is_wanted(grid, resolution)):
-        check_precision(xy, points.precision, resolution)
+        check_precision(xy, precision, resolution)
         grid = lay_out_cells(xy, resolution)
     if grid is None:
         # A grid is found if its spacing is above 4 rounding errors.
-        check_precision(xy, 4.0 * points.precision, 0.5 * typical_spacing(xy))
+        check_precision(xy, 4.0 * precision, 0.5 * typical_spacing(xy))
         raise MessageError(
             "the cloud's points form no regular grid along x and y, so the cell size must be "
             f"given: set map_resolution, for these points about {typical_spacing(xy):.2g} m"
         )
-    columns, rows = grid.cells(points.xyz[known, :2])
-    cells = rows * grid.columns + columns
-    elevation = combine(cells, points.xyz[known, 2], grid, cell_height)
-    friction = None
-    if points.friction is not None:
-        # A cell takes its lowest finite friction coefficient.
-        values = np.where(np.isfinite(points.friction), points.friction, np.nan)[known]
-        friction = -combine(cells, -values, grid, "max")
-    std = None
-    if points.elevation_std is not None:
-        std = combine(cells, points.elevation_std[known], grid, "max")
-    classes = None
-    if points.ground_class is not None:
-        classes = combine(cells, points.ground_class[known], grid, "most frequent")
-    return make_terrain(elevation, grid.resolution, grid.origin, friction, std, classes)
+    at, rows = grid.cells(xyz[known, :2])
+    cells = rows * grid.columns + at
+    elevation = combine(cells, xyz[known, 2], grid, cell_height)
+    if "friction" in columns:
+        columns["friction"][~np.isfinite(columns["friction"])] = np.nan
+    layers = {
+        layer: combine(cells, columns[name][known], grid, COMBINED[name])
+        for name, layer in LAYERS.items()
+        if name in columns
+    }
+    return make_terrain(elevation, grid.resolution, grid.origin, layers)
 
 
 def terrain_to_point_cloud(

@@ -85,7 +85,7 @@ def terrain_from_grid_map(message: Any, layers: GridMapLayers | None = None) -> 
         if basic not in names:
             raise MessageError(f"grid map names the basic layer {basic!r}, which it does not have")
         unknown |= ~np.isfinite(read(basic))
-    std = None
+    found: dict[str, NDArray[np.float64]] = {}
     if layers.variance in names:
         variance = read(layers.variance)
         if (variance < 0.0).any():
@@ -95,22 +95,20 @@ def terrain_from_grid_map(message: Any, layers: GridMapLayers | None = None) -> 
                 "least 0, in m^2"
             )
         unknown |= ~np.isfinite(variance)
-        std = np.sqrt(variance)
-        std[unknown] = np.nan
+        found["elevation_std"] = np.sqrt(variance)
     if unknown.all():
         raise MessageError(f"none of the grid map's {unknown.size} cells has a known height")
     elevation[unknown] = np.nan
-    friction = None
     if layers.friction in names:
-        friction = read(layers.friction)
-        friction[unknown | ~np.isfinite(friction)] = np.nan
+        found["friction"] = read(layers.friction)
+    if layers.ground_class in names:
+        found["ground_class"] = read(layers.ground_class)
     place, size = message.info.pose.position, message.info.resolution
     origin = (
         float(place.x) - 0.5 * (elevation.shape[1] - 1) * size,
         float(place.y) - 0.5 * (elevation.shape[0] - 1) * size,
     )
-    classes = read(layers.ground_class) if layers.ground_class in names else None
-    return make_terrain(elevation, float(size), origin, friction, std, classes)
+    return make_terrain(elevation, float(size), origin, found)
 
 
 def _shape_of(info: Any) -> tuple[int, int]:

@@ -236,9 +236,9 @@ def check_precision(xy: NDArray[np.float64], precision: float, cell: float) -> N
 def combine(cells, values, grid: CloudGrid, how: str) -> NDArray[np.float64]:
     """Combine the values (n,) of each cell; NaN in cells without a value."""
     size = grid.rows * grid.columns
-    if how == "max":
+    if how in ("max", "min"):
         combined = np.full(size, np.nan)
-        np.fmax.at(combined, cells, values)
+        (np.fmax if how == "max" else np.fmin).at(combined, cells, values)
     elif how == "median":
         combined = _medians(cells, values, size)
     elif how == "most frequent":
@@ -296,18 +296,21 @@ def make_terrain(
     elevation: NDArray[np.float64],
     resolution: float,
     origin: tuple[float, float],
-    friction: NDArray[np.float64] | None,
-    std: NDArray[np.float64] | None,
-    ground_class: NDArray[np.float64] | None = None,
+    layers: dict[str, NDArray[np.float64]],
 ) -> Terrain:
     """Make a terrain of new layers (ny, nx) without copying them; they become read-only.
 
-    Classes that are not finite or below 0 are none.
+    Where the height is not finite, neither height nor friction nor deviation are known. Friction
+    that is not finite is none, nor are classes that are not finite or below 0.
     """
-    if ground_class is not None:
-        ground_class[~np.isfinite(ground_class) | (ground_class < 0.0)] = np.nan
-    layers = {"friction": friction, "elevation_std": std, "ground_class": ground_class}
-    sealed: dict[str, Any] = {
-        name: seal_array(layer) for name, layer in layers.items() if layer is not None
-    }
+    unknown = ~np.isfinite(elevation)
+    elevation[unknown] = np.nan
+    for name, layer in layers.items():
+        if name == "ground_class":
+            layer[~np.isfinite(layer) | (layer < 0.0)] = np.nan
+        else:
+            layer[unknown] = np.nan
+        if name == "friction":
+            layer[~np.isfinite(layer)] = np.nan
+    sealed: dict[str, Any] = {name: seal_array(layer) for name, layer in layers.items()}
     return Terrain(seal_array(elevation), resolution, origin, **sealed)

@@ -17,7 +17,8 @@ def sweep_path(
     rover: Rover, terrain: Terrain, poses: ArrayLike, options: SweepOptions = DEFAULT_OPTIONS
 ) -> PathPrediction:
     """Return the prediction of `judge_path` on an exact map."""
-    return sweep_paths(rover, terrain, [poses], options)[0]
+    _warn("sweep_path", "judge_path")
+    return _sweep(rover, terrain, [poses], options)[0]
 
 
 def sweep_paths(
@@ -27,9 +28,8 @@ def sweep_paths(
     options: SweepOptions = DEFAULT_OPTIONS,
 ) -> list[PathPrediction]:
     """Return the predictions of `judge_paths` on an exact map."""
-    _warn("sweep_path", "judge_path")
-    judged = judge_paths(rover, terrain, paths, options, sigmas=0, check_entrapment=False)
-    return [prediction for prediction, _ in judged]
+    _warn("sweep_paths", "judge_paths")
+    return _sweep(rover, terrain, paths, options)
 
 
 def sweep_poses(
@@ -42,6 +42,13 @@ def sweep_poses(
     """Return the prediction of `judge_poses` on an exact map."""
     _warn("sweep_poses", "judge_poses")
     return judge_poses(rover, terrain, poses, curvature, options, sigmas=0)[0]
+
+
+def _sweep(
+    rover: Rover, terrain: Terrain, paths: Sequence[ArrayLike], options: SweepOptions
+) -> list[PathPrediction]:
+    judged = judge_paths(rover, terrain, paths, options, sigmas=0, check_entrapment=False)
+    return [prediction for prediction, _ in judged]
 
 
 def _warn(old: str, new: str) -> None:

@@ -48,7 +48,8 @@ def prepare_here(
 def compute_here(prepared: PreparedSurvey) -> PreparedSurvey:
     """Survey the chunks that are left in this process, without a cluster."""
     for chunk in prepared.chunks:
-        prepared.store.write(chunk, compute_chunk(prepared.job, chunk), 1.0)
+        layers = compute_chunk(prepared.job.request, prepared.store, chunk)
+        prepared.store.write(chunk, layers, 1.0)
     return prepared
 
 

@@ -5,10 +5,10 @@ import array
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from std_msgs.msg import Float64MultiArray, MultiArrayDimension
+from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-from msg_adapters.commands import doubles
+from msg_adapters.commands import doubles, labelled_array
 from msg_adapters.errors import MessageError
 from msg_adapters.joints import OWN_NAMES, JointNames
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
@@ -34,15 +34,7 @@ def waypoint_array(values: ArrayLike, column_label: str = "wheel") -> Float64Mul
 
     The columns are wheels in wheel order, or the MEASURES. Poses that did not settle have NaN.
     """
-    values = np.ascontiguousarray(values, dtype=np.float64)
-    rows, columns = values.shape
-    message = Float64MultiArray()
-    message.layout.dim = [
-        MultiArrayDimension(label="waypoint", size=rows, stride=rows * columns),
-        MultiArrayDimension(label=column_label, size=columns, stride=columns),
-    ]
-    message.data = doubles(values)
-    return message
+    return labelled_array(np.asarray(values, dtype=np.float64), "waypoint", column_label)
 
 
 def array_values(message: Float64MultiArray) -> NDArray[np.float64]:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rover_physics.chance.ground import change_heights, cut_around
 from rover_physics.chance.samples import Sample, draw_samples, sort_by_strength, worst_of
+from rover_physics.errors import ModelError
 from rover_physics.names import OPTIMAL
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.interruption import check_interruption
@@ -58,6 +59,16 @@ class FailureChance:
 
     def __post_init__(self) -> None:
         freeze_fields(self)
+
+
+def check_accepted_chance(chance: float | None) -> None:
+    """Check the largest chance of failure that is accepted; None does not ask for it.
+
+    Raises:
+        ModelError: It is no chance.
+    """
+    if chance is not None and not 0.0 <= chance <= 1.0:
+        raise ModelError(f"accepted_chance is {chance}; it must be a chance, 0 to 1")
 
 
 def find_failure_chance(

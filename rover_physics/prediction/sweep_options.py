@@ -49,8 +49,8 @@ class SweepOptions:
     soil: str | None = None
     """Preset soil where the terrain names none (default: Coulomb friction; docs/soil.md)."""
     joint_angles: Mapping[str, float] | JointAngles | None = None
-    """Arm angles [rad] by joint name, stored as pairs. Joints left out are stowed; None stows
-    all."""
+    """Arm angles [rad] by joint name, stored as pairs. Joints left out are stowed, other names
+    ignored; None stows all."""
     payload: float | None = None
     """Mass at the arm's tip [kg] (default: that of the rover file)."""
     tool_force: Any = None

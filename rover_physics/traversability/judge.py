@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rover_physics.bounds.path import SIGMAS, bound_path, check_sigmas
-from rover_physics.chance.failure_chance import find_failure_chance
+from rover_physics.chance.failure_chance import check_accepted_chance, find_failure_chance
 from rover_physics.names import EQUAL
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.quiet import quiet
@@ -71,7 +71,8 @@ def judge_path(
 
     Raises:
         PoseError: Poses of wrong shape, or not finite.
-        ModelError: An option that this rover cannot have, or `sigmas` below 0.
+        ModelError: An option that this rover cannot have, `sigmas` below 0, or `accepted_chance`
+            outside 0 to 1.
         SoilError: A soil that is not a preset.
     """
     return judge_paths(
@@ -103,6 +104,7 @@ def judge_paths(
     and the whole of it later.
     """
     check_sigmas(sigmas)
+    check_accepted_chance(accepted_chance)
     model = pack_model(rover, terrain, options)
     checked = [check_poses(poses) for poses in paths]
     judged = []
@@ -151,6 +153,7 @@ def judge_poses(
         ModelError, SoilError: As `judge_path`.
     """
     check_sigmas(sigmas)
+    check_accepted_chance(accepted_chance)
     model, places = pack_model(rover, terrain, options), check_poses(poses)
     bends = np.zeros(len(places)) if curvature is None else curvature
     prediction, verdict = _judge_in_motion(model, places, motions_of(model, places, bends), sigmas)

@@ -10,12 +10,13 @@ import numpy as np
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.rover.model import Rover
-from rover_planner.advice.case import Case, JudgedCase, distance_along
+from rover_planner.advice.case import Case, JudgedCase
 from rover_planner.advice.refusal import Refusal
 from rover_planner.advice.remedy import Remedy
 from rover_planner.advice.seek import seek_remedies
 from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.candidates import generate_candidates
+from rover_planner.planning.path_geometry import distance_along
 
 MOST_REMEDIES = 5
 """Largest number of remedies that are told."""
@@ -80,9 +81,9 @@ def grow_advice(case: Case) -> Iterator[Advice]:
     advice = Advice(judged)
     if not judged.passes:
         yield advice
-        for trial in seek_remedies(Refusal(judged)):
-            found = advice.found if trial.remedy is None else (*advice.found, trial.remedy)
-            tried = tuple(lever.name for lever in trial.levers)
+        for levers, remedy in seek_remedies(Refusal(judged)):
+            found = advice.found if remedy is None else (*advice.found, remedy)
+            tried = tuple(lever.name for lever in levers)
             advice = replace(advice, found=tuple(sorted(found, key=_rank)), tried=tried)
             yield advice
     yield replace(advice, complete=True)

@@ -22,6 +22,7 @@ from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path, judge_paths
 from rover_physics.traversability.verdict import Verdict
+from rover_planner.planning.path_geometry import distance_along
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,8 +162,3 @@ class JudgedCase:
         loads = self.prediction.wheel_loads[waypoint]
         return {name: float(loads[k] + loads[k + 3]) for k, name in enumerate(WHEEL_POSITIONS)}
 
-
-def distance_along(poses: Floats) -> Floats:
-    """Return the distance (n,) [m] along a path (n, 3)."""
-    steps = np.diff(poses[:, :2], axis=0)
-    return np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])

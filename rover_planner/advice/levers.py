@@ -4,7 +4,7 @@
 A new lever is one row of LEVERS: what it may be set to, how it changes a case, and its words.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,7 +14,7 @@ from rover_physics.limits.table import LIMITS, Limit, Sense
 from rover_physics.names import OPTIMAL, SERVO
 from rover_physics.rover.manipulator import arm_angles, link_points
 from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius
-from rover_planner.advice.case import Case, distance_along
+from rover_planner.advice.case import Case
 from rover_planner.advice.path_changes import (
     bend_path,
     is_driven_ahead,
@@ -24,6 +24,7 @@ from rover_planner.advice.path_changes import (
     turn_path,
 )
 from rover_planner.advice.refusal import MOST_FRICTION, Refusal
+from rover_planner.planning.path_geometry import distance_along
 
 ASIDE = 2.0
 """Largest shift of a path [wheelbases]."""
@@ -53,6 +54,16 @@ class Span:
     ends: tuple[float, ...]
     """The values farthest from it, on one side or both."""
 
+    def shares(self, steps: Sequence[float]) -> list[float]:
+        """Return steps [share of the range] to the ends, negative to the first one of two."""
+        signs = (-1.0, 1.0) if len(self.ends) == 2 else (1.0,)
+        return [sign * step for step in steps for sign in signs]
+
+    def value_at(self, share: float) -> float:
+        """Return the value at a share of the range."""
+        end = self.ends[0 if share < 0.0 else -1]
+        return self.now + abs(share) * (end - self.now)
+
 
 @dataclass(frozen=True)
 class Choice:
@@ -62,6 +73,14 @@ class Choice:
     """The value of the refused case."""
     values: tuple[Any, ...]
     """The others, nearest first."""
+
+    def shares(self, _steps: Sequence[float]) -> list[float]:
+        """Return 1, 2, ... for the values, whatever the steps."""
+        return [float(k + 1) for k in range(len(self.values))]
+
+    def value_at(self, share: float) -> Any:
+        """Return the value of a number from 1 on."""
+        return self.values[int(share) - 1]
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ waypoint of one is the shifted waypoint of the other.
 import numpy as np
 
 from rover_physics.numerics.arrays import Floats
-from rover_planner.advice.case import distance_along
 from rover_planner.planning.angles import wrap
 from rover_planner.planning.candidates import turn_and_drive, turn_on_the_spot
+from rover_planner.planning.path_geometry import distance_along
 
 RAMP = 3.0
 """Length over which a path leaves the old one [wheelbases], where there is that much of it."""

@@ -29,20 +29,6 @@ ROUNDS = ((1, COARSE), (1, FINE), (2, (0.3, 0.6, 1.0)), (3, (0.5, 1.0)))
 MOST_PLACES = 8
 """Largest number of failures that are remembered."""
 
-Values = tuple[Any, ...]
-"""A value for each of a few levers."""
-
-
-@dataclass(frozen=True)
-class LeverTrial:
-    """A trial of a few levers, and the remedy if there is one."""
-
-    levers: tuple[Lever, ...]
-    """The levers."""
-    remedy: Remedy | None
-    """Their least setting that passes."""
-
-
 @dataclass(frozen=True)
 class FailedPlace:
     """The waypoint at which a case failed."""
@@ -55,22 +41,55 @@ class FailedPlace:
     """True if it may be the path before it that decides."""
 
 
-def seek_remedies(refusal: Refusal) -> Iterator[LeverTrial]:
+@dataclass(frozen=True)
+class Combination:
+    """A few levers of a refused path, and their ranges."""
+
+    refusal: Refusal
+    """The refused path."""
+    levers: tuple[Lever, ...]
+    """The levers."""
+    ranges: tuple[Span | Choice, ...]
+    """What each may be set to."""
+
+    @property
+    def keeps_rows(self) -> bool:
+        """True if all levers keep the rows of the path."""
+        return all(lever.keeps_rows for lever in self.levers)
+
+    def values(self, shares: Sequence[float]) -> tuple[Any, ...]:
+        """Return the values of the levers at shares of their ranges."""
+        return tuple(one.value_at(share) for one, share in zip(self.ranges, shares, strict=True))
+
+    def set_levers(self, shares: Sequence[float]) -> Case | None:
+        """Return the case with the levers set, None where there is no room for it."""
+        case: Case | None = self.refusal.case
+        try:
+            for lever, value in zip(self.levers, self.values(shares), strict=True):
+                case = None if case is None else lever.apply(case, self.refusal, value)
+        except RoverError:
+            return None
+        return case
+
+
+def seek_remedies(refusal: Refusal) -> Iterator[tuple[tuple[Lever, ...], Remedy | None]]:
     """Yield all trials: one lever after the other, and several of them if none helps alone.
 
-    Only what the rover does by itself is tried in fine steps and combined.
+    Each is a few levers, and the remedy of their least setting that passes, if there is one. Only
+    what the rover does by itself is tried in fine steps and combined.
     """
     seeker, helped = _Seeker(refusal), False
     own = [lever for lever in LEVERS if not lever.needs_others]
     for count, steps in ROUNDS:
         for levers in combinations(LEVERS if steps is COARSE else own, count):
             settings = [lever.settings(refusal) for lever in levers]
-            if not can_combine(levers) or None in settings:
+            ranges = tuple(one for one in settings if one is not None)
+            if not can_combine(levers) or len(ranges) < count:
                 continue
-            if steps is FINE and isinstance(settings[0], Choice):
+            if steps is FINE and isinstance(ranges[0], Choice):
                 continue
-            remedy = seeker.seek(levers, steps)
-            yield LeverTrial(levers, remedy)
+            remedy = seeker.seek(Combination(refusal, levers, ranges), steps)
+            yield levers, remedy
             helped = helped or (remedy is not None and not remedy.needs_others)
         if helped:
             return
@@ -95,63 +114,50 @@ class _Seeker:
         """Places where cases failed, the last first."""
         self._note(refusal.judged)
 
-    def seek(self, levers: Sequence[Lever], steps: Sequence[float]) -> Remedy | None:
+    def seek(self, asked: Combination, steps: Sequence[float]) -> Remedy | None:
         """Return the remedy of levers in steps [share of the range], None if there is none."""
-        ranges = [_range_of(lever, self._refusal) for lever in levers]
-        shares = [_shares(one, steps) for one in ranges]
+        shares = [one.shares(steps) for one in asked.ranges]
         # The nearest come first.
         for chosen in sorted(product(*shares), key=lambda some: sum(map(abs, some))):
-            values = _values(ranges, chosen)
-            if self._fails_where_known(levers, values):
+            if self._fails_where_known(asked, chosen):
                 continue
-            judged = self._judge(levers, values)
+            judged = self._judge(asked, chosen)
             if judged is not None:
-                step = steps[0] if len(levers) == 1 else 1.0
-                least, judged = self._shrink(levers, ranges, list(chosen), judged, step)
-                told = zip(levers, _values(ranges, least), ranges, strict=True)
+                step = steps[0] if len(asked.levers) == 1 else 1.0
+                least, judged = self._shrink(asked, list(chosen), judged, step)
+                told = zip(asked.levers, asked.values(least), asked.ranges, strict=True)
                 set_levers = tuple(SetLever(lever, value, one.now) for lever, value, one in told)
                 return Remedy(self._refusal, set_levers, judged)
         return None
 
     def _shrink(
-        self,
-        levers: Sequence[Lever],
-        ranges: Sequence[Span | Choice],
-        shares: list[float],
-        judged: JudgedCase,
-        step: float,
+        self, asked: Combination, shares: list[float], judged: JudgedCase, step: float
     ) -> tuple[list[float], JudgedCase]:
         """Return the least shares of the ranges that pass, one lever after the other, as judged.
 
         The given ones pass; less by `step` may fail.
         """
-        keeps_rows = all(lever.keeps_rows for lever in levers)
-        for k, one in enumerate(ranges):
+        for k, one in enumerate(asked.ranges):
             if isinstance(one, Choice):
                 continue
-            passes, hopes = shares[k], keeps_rows
+            passes, hopes = shares[k], asked.keeps_rows
             fails = float(np.sign(passes)) * max(0.0, abs(passes) - step)
             while abs(passes - fails) > TOLERANCE:
                 low, shares[k] = fails, 0.5 * (passes + fails)
                 if hopes:
-                    low, shares[k] = self._narrow(levers, ranges, shares, k, (fails, passes))
+                    low, shares[k] = self._narrow(asked, shares, k, (fails, passes))
                     if shares[k] == passes:
                         break
-                found = self._judge(levers, _values(ranges, shares))
+                found = self._judge(asked, shares)
                 if found is None:
-                    fails, hopes = shares[k], keeps_rows and not hopes
+                    fails, hopes = shares[k], asked.keeps_rows and not hopes
                 else:
                     fails, passes, judged = low, shares[k], found
             shares[k] = passes
         return shares, judged
 
     def _narrow(
-        self,
-        levers: Sequence[Lever],
-        ranges: Sequence[Span | Choice],
-        shares: Sequence[float],
-        k: int,
-        ends: tuple[float, float],
+        self, asked: Combination, shares: Sequence[float], k: int, ends: tuple[float, float]
     ) -> tuple[float, float]:
         """Return the ends of share k, narrowed down by the failures that are remembered alone.
 
@@ -160,30 +166,29 @@ class _Seeker:
         fails, passes = ends
         while abs(passes - fails) > TOLERANCE:
             middle = 0.5 * (passes + fails)
-            values = _values(ranges, [*shares[:k], middle, *shares[k + 1 :]])
-            if self._fails_where_known(levers, values):
+            if self._fails_where_known(asked, [*shares[:k], middle, *shares[k + 1 :]]):
                 fails = middle
             else:
                 passes = middle
         return fails, passes
 
-    def _judge(self, levers: Sequence[Lever], values: Values) -> JudgedCase | None:
+    def _judge(self, asked: Combination, shares: Sequence[float]) -> JudgedCase | None:
         """Return the case with levers set if it passes, else None."""
-        case = self._set(levers, values)
+        case = asked.set_levers(shares)
         try:
             judged = None if case is None else case.judge()
         except RoverError:
             return None  # the rover cannot do that
         if judged is None or judged.passes:
             return judged
-        if all(lever.keeps_rows for lever in levers):
+        if asked.keeps_rows:
             self._note(judged)
         return None
 
-    def _fails_where_known(self, levers: Sequence[Lever], values: Values) -> bool:
+    def _fails_where_known(self, asked: Combination, shares: Sequence[float]) -> bool:
         """Return whether the case with levers set fails where others have failed."""
-        case = self._set(levers, values)
-        if case is None or not all(lever.keeps_rows for lever in levers):
+        case = asked.set_levers(shares)
+        if case is None or not asked.keeps_rows:
             return case is None
         for known in self._failed:
             by_sum = known.by_sum and case.options.policy == SERVO
@@ -197,16 +202,6 @@ class _Seeker:
                 return True
         return False
 
-    def _set(self, levers: Sequence[Lever], values: Values) -> Case | None:
-        """Return the case with levers set, None where there is no room for it."""
-        case: Case | None = self._refusal.case
-        try:
-            for lever, value in zip(levers, values, strict=True):
-                case = None if case is None else lever.apply(case, self._refusal, value)
-        except RoverError:
-            return None
-        return case
-
     def _note(self, judged: JudgedCase) -> None:
         """Remember where a case failed."""
         verdict = judged.verdict
@@ -218,31 +213,3 @@ class _Seeker:
         others = [one for one in self._failed if one != known]
         self._failed = [known, *others][:MOST_PLACES]
 
-
-def _range_of(lever: Lever, refusal: Refusal) -> Span | Choice:
-    found = lever.settings(refusal)
-    assert found is not None
-    return found
-
-
-def _shares(settings: Span | Choice, steps: Sequence[float]) -> list[float]:
-    """Return what to try of a lever: steps to its ends, negative to the first one of two.
-
-    The values of a choice are 1, 2, ...
-    """
-    if isinstance(settings, Choice):
-        return [float(k + 1) for k in range(len(settings.values))]
-    signs = (-1.0, 1.0) if len(settings.ends) == 2 else (1.0,)
-    return [sign * step for step in steps for sign in signs]
-
-
-def _values(ranges: Sequence[Span | Choice], shares: Sequence[float]) -> Values:
-    """Return the values of levers at shares of their ranges."""
-    values: list[Any] = []
-    for settings, share in zip(ranges, shares, strict=True):
-        if isinstance(settings, Choice):
-            values.append(settings.values[int(share) - 1])
-        else:
-            end = settings.ends[0 if share < 0.0 else -1]
-            values.append(settings.now + abs(share) * (end - settings.now))
-    return tuple(values)

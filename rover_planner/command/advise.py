@@ -8,22 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
-from rover_planner.command.options import (
-    MAX_CELLS,
-    AcceptedChance,
-    Friction,
-    MaxCells,
-    MaxTorque,
-    Payload,
-    Policy,
-    RoverName,
-    Sigmas,
-    SoilName,
-    TerrainName,
-    argument,
-    option,
-    read_arm_angles,
-)
+from rover_planner.command import shared
+from rover_planner.command.shared import argument, option, read_arm_angles
 
 if TYPE_CHECKING:
     from rover_planner.advice.advise import Advice
@@ -33,29 +19,29 @@ SPACING = 0.02
 
 
 def advise(
-    rover: RoverName,
-    terrain: TerrainName,
+    rover: shared.RoverName,
+    terrain: shared.TerrainName,
     poses: Annotated[
         Path,
         argument("POSES", "A refused path: poses x, y, yaw, .npz; two far apart: start and goal."),
     ],
     out: Annotated[Path, argument("OUT", "The remedies, .json; is overwritten.")],
-    policy: Policy = "equal",
-    friction: Friction = None,
-    max_torque: MaxTorque = None,
-    soil: SoilName = None,
+    policy: shared.Policy = "equal",
+    friction: shared.Friction = None,
+    max_torque: shared.MaxTorque = None,
+    soil: shared.SoilName = None,
     arm: Annotated[
         list[str] | None,
         option("NAME=RAD", "Angle of a joint of the arm in rad; give all; default: stowed."),
     ] = None,
-    payload: Payload = None,
-    sigmas: Sigmas = 3.0,
-    accepted_chance: AcceptedChance = ACCEPTED_CHANCE,
+    payload: shared.Payload = None,
+    sigmas: shared.Sigmas = 3.0,
+    accepted_chance: shared.AcceptedChance = ACCEPTED_CHANCE,
     budget: Annotated[float, option("S", "Time for the advice in s.", min=0.01)] = 10.0,
     picture: Annotated[
         Path | None, option("FILE", "Draw the remedies on the map (.png, .svg).")
     ] = None,
-    max_cells: MaxCells = MAX_CELLS,
+    max_cells: shared.MaxCells = shared.MAX_CELLS,
 ) -> None:
     """Find the smallest changes that make a refused path pass; write them as JSON.
 

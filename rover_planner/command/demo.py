@@ -6,17 +6,17 @@ from typing import Annotated
 
 import typer
 
-from rover_planner.command.options import MaxGap, OptionalMap, RoverOption
+from rover_planner.command import shared
 
 
 def demo(
-    map_name: OptionalMap = None,
+    map_name: shared.OptionalMap = None,
     out: Annotated[
         Path, typer.Option(help="Picture to write, .png; logs and a made terrain go beside it.")
     ] = Path("demo_output/demo.png"),
-    rover: RoverOption = "lsr1",
+    rover: shared.RoverOption = "lsr1",
     seed: Annotated[int, typer.Option(help="Seed of the terrain and the goals.")] = 1,
-    max_gap: MaxGap = 0.2,
+    max_gap: shared.MaxGap = 0.2,
 ) -> None:
     """Query a traverse_server over ROS 2 for several goals and draw its answers.
 

@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from rover_planner.command.options import RoverOption, argument
+from rover_planner.command import shared
+from rover_planner.command.shared import argument
 from rover_planner.shell.extras import need
 
 
@@ -14,7 +15,7 @@ def figure4(
     out: Annotated[Path, argument("OUT", "Picture to write, .png; is overwritten.")] = Path(
         "figure4.png"
     ),
-    rover: RoverOption = "lsr1",
+    rover: shared.RoverOption = "lsr1",
 ) -> None:
     """Draw Figure 4 of the paper: how the torque of one wheel changes the loads of all."""
     need("matplotlib", "the picture")

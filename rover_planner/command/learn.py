@@ -7,14 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rover_planner.command.options import (
-    MAX_CELLS,
-    MaxCells,
-    RoverName,
-    TerrainName,
-    argument,
-    option,
-)
+from rover_planner.command import shared
+from rover_planner.command.shared import argument, option
 from rover_planner.shell.extras import need
 
 if TYPE_CHECKING:
@@ -26,8 +20,8 @@ CSV = ".csv"
 
 
 def learn(
-    rover: RoverName,
-    terrain: TerrainName,
+    rover: shared.RoverName,
+    terrain: shared.TerrainName,
     log: Annotated[Path, argument("LOG", "The drive: a CSV file, or a bag.")],
     out: Annotated[Path, argument("OUT", "What was learned, .json; is overwritten.")],
     picture: Annotated[
@@ -46,7 +40,7 @@ def learn(
     odometry_topic: Annotated[
         str, option("TOPIC", "Odometry of a bag that does not come from the wheels.")
     ] = "",
-    max_cells: MaxCells = MAX_CELLS,
+    max_cells: shared.MaxCells = shared.MAX_CELLS,
 ) -> None:
     """Learn friction, slip and sticking from a recorded drive, and write them to a file.
 

@@ -8,22 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
-from rover_planner.command.options import (
-    MAX_CELLS,
-    AcceptedChance,
-    Friction,
-    MaxCells,
-    MaxTorque,
-    Payload,
-    Policy,
-    RoverName,
-    Sigmas,
-    SoilName,
-    TerrainName,
-    argument,
-    flag,
-    option,
-)
+from rover_planner.command import shared
+from rover_planner.command.shared import argument, flag, option
 from rover_planner.shell.poses import GOAL, START, Pose
 
 if TYPE_CHECKING:
@@ -34,16 +20,16 @@ Picture = Annotated[Path | None, option("FILE", "Draw the answer on the map (.pn
 
 
 def plan(
-    rover: RoverName,
-    terrain: TerrainName,
+    rover: shared.RoverName,
+    terrain: shared.TerrainName,
     out: Out,
     start: Annotated[Pose, START],
     goal: Annotated[Pose, GOAL],
-    policy: Policy = "equal",
-    friction: Friction = None,
-    max_torque: MaxTorque = None,
-    soil: SoilName = None,
-    payload: Payload = None,
+    policy: shared.Policy = "equal",
+    friction: shared.Friction = None,
+    max_torque: shared.MaxTorque = None,
+    soil: shared.SoilName = None,
+    payload: shared.Payload = None,
     budget: Annotated[
         float, option("S", "Time for the search in s; smoothing takes up to a fifth more.")
     ] = 2.0,
@@ -55,8 +41,8 @@ def plan(
         bool,
         flag("--frontier", "Plan as near as possible to a goal on unknown ground or off the map."),
     ] = False,
-    sigmas: Sigmas = 3.0,
-    accepted_chance: AcceptedChance = ACCEPTED_CHANCE,
+    sigmas: shared.Sigmas = 3.0,
+    accepted_chance: shared.AcceptedChance = ACCEPTED_CHANCE,
     chance_weight: Annotated[
         float, option("M", "Length in m that a path may be longer to fail never, not always.")
     ] = 0.0,
@@ -64,7 +50,7 @@ def plan(
     dump: Annotated[
         Path | None, option("FILE", "Write the question for replay-plan, .npz.")
     ] = None,
-    max_cells: MaxCells = MAX_CELLS,
+    max_cells: shared.MaxCells = shared.MAX_CELLS,
 ) -> None:
     """Search a path around obstacles; write it with its predictions, and print a report as JSON.
 
@@ -102,7 +88,7 @@ def replay_plan(
     question: Annotated[Path, argument("QUESTION", "Question that plan --dump has written.")],
     out: Out,
     picture: Picture = None,
-    max_cells: MaxCells = MAX_CELLS,
+    max_cells: shared.MaxCells = shared.MAX_CELLS,
 ) -> None:
     """Search the path of a question again that `plan --dump` has written."""
     from rover_planner.planning.search.query_file import read_query

@@ -9,24 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
-from rover_planner.command.options import (
-    MAX_CELLS,
-    AcceptedChance,
-    Friction,
-    MaxCells,
-    MaxTorque,
-    Payload,
-    Policy,
-    RoverName,
-    Sigmas,
-    SoilName,
-    TerrainName,
-    Vector,
-    argument,
-    flag,
-    option,
-    read_arm_angles,
-)
+from rover_planner.command import shared
+from rover_planner.command.shared import argument, flag, option, read_arm_angles
 
 MAX_IN_MEMORY = 20_000
 """Largest number of poses whose prediction is kept in memory; longer paths are written in parts,
@@ -38,8 +22,8 @@ if TYPE_CHECKING:
 
 
 def predict(
-    rover: RoverName,
-    terrain: TerrainName,
+    rover: shared.RoverName,
+    terrain: shared.TerrainName,
     poses: Annotated[
         Path,
         argument(
@@ -47,26 +31,26 @@ def predict(
         ),
     ],
     out: Annotated[Path, argument("OUT", "Predictions, .npz; is overwritten.")],
-    friction: Friction = None,
-    max_torque: MaxTorque = None,
-    policy: Policy = "equal",
+    friction: shared.Friction = None,
+    max_torque: shared.MaxTorque = None,
+    policy: shared.Policy = "equal",
     control_margin: Annotated[
         float,
         option(
             "SHARE", "Share of friction and torque that policy optimal leaves to the controller."
         ),
     ] = 0.0,
-    soil: SoilName = None,
+    soil: shared.SoilName = None,
     arm: Annotated[
         list[str] | None,
         option("NAME=RAD", "Angle of a joint of the arm in rad; give all; default: stowed."),
     ] = None,
-    payload: Payload = None,
+    payload: shared.Payload = None,
     tool_force: Annotated[
-        Vector | None, option("FX FY FZ", "Force on the arm's tip in N, body frame.")
+        shared.Vector | None, option("FX FY FZ", "Force on the arm's tip in N, body frame.")
     ] = None,
     tool_moment: Annotated[
-        Vector | None, option("MX MY MZ", "Moment on the arm's tip in N m, body frame.")
+        shared.Vector | None, option("MX MY MZ", "Moment on the arm's tip in N m, body frame.")
     ] = None,
     backward: Annotated[
         bool,
@@ -75,7 +59,7 @@ def predict(
             "The rover drives backwards where poses do not tell: single ones, long steps.",
         ),
     ] = False,
-    sigmas: Sigmas = 3.0,
+    sigmas: shared.Sigmas = 3.0,
     classes: Annotated[
         bool, flag("--classes", "Add the class of each waypoint, by all torque policies.")
     ] = False,
@@ -85,11 +69,11 @@ def predict(
     chance: Annotated[
         bool, flag("--chance", "Add the chance that the path fails, and that each waypoint does.")
     ] = False,
-    accepted_chance: AcceptedChance = ACCEPTED_CHANCE,
+    accepted_chance: shared.AcceptedChance = ACCEPTED_CHANCE,
     learned: Annotated[
         Path | None, option("FILE", "Friction and its uncertainty as learned, .json of learn.")
     ] = None,
-    max_cells: MaxCells = MAX_CELLS,
+    max_cells: shared.MaxCells = shared.MAX_CELLS,
 ) -> None:
     """Predict loads, slip and margins along a path, or at single poses, and write them to a file.
 

@@ -6,25 +6,13 @@ from typing import Annotated
 
 import typer
 
-from rover_planner.command.options import (
-    MAX_CELLS,
-    Friction,
-    MaxCells,
-    MaxTorque,
-    Payload,
-    Policy,
-    RoverName,
-    SoilName,
-    TerrainName,
-    Vector,
-    argument,
-    option,
-)
+from rover_planner.command import shared
+from rover_planner.command.shared import argument, option
 
 
 def reach(
-    rover: RoverName,
-    terrain: TerrainName,
+    rover: shared.RoverName,
+    terrain: shared.TerrainName,
     x: Annotated[float, argument("X", "Position of the body in m, map frame.")],
     y: Annotated[float, argument("Y")],
     yaw: Annotated[float, argument("YAW", "Heading of the body in rad.")],
@@ -32,17 +20,17 @@ def reach(
     ty: Annotated[float, argument("TY")],
     tz: Annotated[float, argument("TZ")],
     force: Annotated[
-        Vector | None, option("FX FY FZ", "Force on the tip there in N, map frame.")
+        shared.Vector | None, option("FX FY FZ", "Force on the tip there in N, map frame.")
     ] = None,
     moment: Annotated[
-        Vector | None, option("MX MY MZ", "Moment on the tip there in N m, map frame.")
+        shared.Vector | None, option("MX MY MZ", "Moment on the tip there in N m, map frame.")
     ] = None,
-    payload: Payload = None,
-    friction: Friction = None,
-    max_torque: MaxTorque = None,
-    policy: Policy = "equal",
-    soil: SoilName = None,
-    max_cells: MaxCells = MAX_CELLS,
+    payload: shared.Payload = None,
+    friction: shared.Friction = None,
+    max_torque: shared.MaxTorque = None,
+    policy: shared.Policy = "equal",
+    soil: shared.SoilName = None,
+    max_cells: shared.MaxCells = shared.MAX_CELLS,
 ) -> None:
     """Print as JSON whether the rover at rest can reach a point with its arm and push there.
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from rover_planner.command.options import argument, option
+from rover_planner.command.shared import argument, option
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
 from rover_planner.shell.poses import read_numbers

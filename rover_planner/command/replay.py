@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from rover_planner.command.options import argument, option
+from rover_planner.command.shared import argument, option
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
 from rover_planner.shell.poses import Pose, pose_option
@@ -176,23 +176,16 @@ class _Results:
 
     def _write_messages(self, answer: "ReplayAnswer") -> None:
         """Write the messages that a server would publish, under its topics."""
-        from msg_adapters.paths import PoseStock
         from msg_adapters.stamps import ns_to_stamp
         from rover_planner.nodes.result_topics import RESULT_KINDS, ResultMessages
 
-        values = self._parameters
         messages = ResultMessages(
-            judgement=answer.judgement,
-            identity=answer.identity,
-            rover=self._rover,
-            plan_spacing=values.plan_spacing,
-            frame=values.map_frame,
-            stamp=ns_to_stamp(answer.stamp),
-            poses=PoseStock(),
-            points=[],
-            positive_steering=values.steering_sign,
-            joint_names=self._work.joint_names,
-            to_base=self._work.frames.to_base,
+            answer.judgement,
+            answer.identity,
+            ns_to_stamp(answer.stamp),
+            self._rover,
+            self._parameters,
+            self._work.inputs,
         )
         for topic in RESULT_KINDS:
             self._bag.write(f"/traverse_server/{topic}", messages.message(topic), answer.stamp)

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from rover_physics.files.validation import show_file
-from rover_planner.command.options import argument
+from rover_planner.command.shared import argument
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
 

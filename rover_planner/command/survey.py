@@ -8,18 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rover_planner.command.options import (
-    MAX_CELLS,
-    Friction,
-    MaxCells,
-    MaxGap,
-    Policy,
-    RoverName,
-    Sigmas,
-    argument,
-    flag,
-    option,
-)
+from rover_planner.command import shared
+from rover_planner.command.shared import argument, flag, option
 from rover_planner.shell.extras import need
 from rover_planner.shell.run_program import EXIT_FAILED, EXIT_OK, end_as_by_ctrl_c, end_with
 
@@ -30,23 +20,23 @@ if TYPE_CHECKING:
 
 
 def survey(
-    rover: RoverName,
+    rover: shared.RoverName,
     map_name: Annotated[
         str, argument("MAP", "Preset (spirit), elevation map, .npz, or GeoTIFF, .tif.")
     ],
     out: Annotated[Path, argument("OUT", "Zarr store; goes on with one of the same survey.")],
     headings: Annotated[int, option("N", "Number of headings, 1 to 64.")] = 16,
     step: Annotated[int, option("CELLS", "Distance of surveyed cells in map cells.")] = 1,
-    policy: Policy = "equal",
-    friction: Friction = None,
+    policy: shared.Policy = "equal",
+    friction: shared.Friction = None,
     turns: Annotated[
         bool, flag("--turns", "Judge turns on the spot, too; takes up to 3 x.")
     ] = False,
     chance: Annotated[
         bool, flag("--chance", "Find the chances of failure, too; takes up to 30 x.")
     ] = False,
-    sigmas: Sigmas = 3.0,
-    max_gap: MaxGap = 0.0,
+    sigmas: shared.Sigmas = 3.0,
+    max_gap: shared.MaxGap = 0.0,
     scheduler: Annotated[
         str | None, option("ADDRESS", "Dask scheduler, tcp://...; default: this machine's cores.")
     ] = None,
@@ -70,7 +60,7 @@ def survey(
         Path | None, option("FOLDER", "Write each layer as GeoTIFF (COG), too.")
     ] = None,
     picture: Annotated[Path | None, option("FILE", "Draw the classes on the map, .png.")] = None,
-    max_cells: MaxCells = MAX_CELLS,
+    max_cells: shared.MaxCells = shared.MAX_CELLS,
 ) -> int:
     """Judge a rover at all cells of a map and all headings; write the results to a Zarr store.
 
@@ -154,7 +144,7 @@ def _run(prepared: "PreparedSurvey", settings: "ClusterSettings") -> "SurveyOutc
         progress("load the model (the first run compiles it)")
         warm_up_survey(job.request)
     total = 0
-    for rows, columns in map(job.layout.cells_of, prepared.chunks):
+    for rows, columns in map(prepared.store.notes.layout.cells_of, prepared.chunks):
         cells = (rows.stop - rows.start) * (columns.stop - columns.start)
         total += cells * job.request.headings
     with show_bar("survey", total, "poses") as advance:

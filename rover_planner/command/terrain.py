@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from rover_planner.command.options import argument
+from rover_planner.command.shared import argument
 
 
 def terrain(

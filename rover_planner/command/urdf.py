@@ -6,11 +6,12 @@ from typing import Annotated
 
 import typer
 
-from rover_planner.command.options import RoverName, argument, option
+from rover_planner.command import shared
+from rover_planner.command.shared import argument, option
 
 
 def urdf(
-    rover: RoverName,
+    rover: shared.RoverName,
     out: Annotated[Path, argument("OUT", "URDF to write; is overwritten.")],
     joint_map: Annotated[
         Path | None, option("FILE", "Write the joint map that reads it back.", "--map")

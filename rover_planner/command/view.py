@@ -10,15 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from rover_planner.command.options import (
-    MAX_CELLS,
-    MaxCells,
-    MaxGap,
-    OptionalTerrain,
-    RoverName,
-    flag,
-    option,
-)
+from rover_planner.command import shared
+from rover_planner.command.shared import flag, option
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
 from rover_planner.shell.poses import GOAL, START, Pose
@@ -43,12 +36,12 @@ End = tuple[float, float, float]
 
 
 def view(
-    rover: RoverName = "lsr1",
-    terrain: OptionalTerrain = None,
+    rover: shared.RoverName = "lsr1",
+    terrain: shared.OptionalTerrain = None,
     start: Annotated[Pose | None, START] = None,
     goal: Annotated[Pose | None, GOAL] = None,
-    max_gap: MaxGap = 0.2,
-    max_cells: MaxCells = MAX_CELLS,
+    max_gap: shared.MaxGap = 0.2,
+    max_cells: shared.MaxCells = shared.MAX_CELLS,
     prediction: Annotated[
         Path | None, option("OUT", "Replay a file of `predict` instead of planning.")
     ] = None,

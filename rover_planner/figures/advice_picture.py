@@ -9,7 +9,7 @@ from matplotlib.patheffects import withStroke
 
 from rover_planner.advice.advise import Advice
 from rover_planner.advice.case import JudgedCase
-from rover_planner.figures.pictures import REFUSED, draw_ground, drawing, find_extent
+from rover_planner.figures.pictures import REFUSED, draw_terrain, drawing
 
 COLOURS = ("#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 """Colours of the remedies."""
@@ -33,9 +33,7 @@ def draw_advice(path: Path, advice: Advice, map_name: str) -> None:
     case, terrain = advice.judged.case, advice.judged.case.terrain
     with drawing(path, (9.0, 10.0)) as figure:
         axes, below = figure.subplots(2, height_ratios=(2.2, 1.0))
-        elevation = np.asarray(terrain.elevation)
-        extent = find_extent(terrain.origin, elevation.shape, terrain.resolution)
-        draw_ground(axes, elevation, terrain.resolution, extent)
+        draw_terrain(axes, terrain)
         for colour, remedy in zip(COLOURS, advice.remedies, strict=False):
             _draw_case(axes, below, remedy.judged, colour, remedy.describe())
         _draw_case(axes, below, advice.judged, REFUSED, f"refused: {advice.judged.verdict.reason}")

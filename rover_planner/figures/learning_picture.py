@@ -13,9 +13,8 @@ from rover_planner.figures.pictures import (
     INK,
     PASSABLE,
     REFUSED,
-    draw_ground,
+    draw_terrain,
     drawing,
-    find_extent,
 )
 from rover_planner.learning.ground_learner import GroundEstimate
 
@@ -44,9 +43,7 @@ def draw_learning(
     """
     with drawing(path, (8.5, 8.0)) as figure:
         axes, below, lowest = figure.subplots(3, height_ratios=(2.0, 1.0, 0.8))
-        elevation = np.asarray(terrain.elevation)
-        extent = find_extent(terrain.origin, elevation.shape, terrain.resolution)
-        draw_ground(axes, elevation, terrain.resolution, extent)
+        extent = draw_terrain(axes, terrain)
         image = axes.imshow(
             friction, origin="lower", extent=extent, vmin=0.0, vmax=1.2, cmap="cividis", alpha=0.8
         )

@@ -14,7 +14,7 @@ from rover_planner.figures.pictures import (
     INK,
     PASSABLE,
     REFUSED,
-    draw_ground,
+    draw_terrain,
     drawing,
     find_extent,
 )
@@ -42,15 +42,13 @@ def draw_path(path: Path, question: SearchQuery, answer: SearchResult, map_name:
         PlanningError: The file cannot be written.
     """
     terrain = question.terrain
-    elevation = np.asarray(terrain.elevation)
     with drawing(path, (8.5, 7.0 if answer.path is None else 9.5)) as figure:
         if answer.path is None:
             axes = figure.subplots()
         else:
             axes, below = figure.subplots(2, height_ratios=(2.4, 1.0))
             _draw_uses(below, question.rover, answer.path)
-        extent = find_extent(terrain.origin, elevation.shape, terrain.resolution)
-        draw_ground(axes, elevation, terrain.resolution, extent)
+        draw_terrain(axes, terrain)
         if answer.closed is not None:
             _draw_area(axes, answer)
         if answer.path is not None:

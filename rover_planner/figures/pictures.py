@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from rover_physics.files.user_file import write_file
 from rover_physics.files.validation import errors_of, show_file
+from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 
 SUFFIXES = (".png", ".svg", ".pdf")
@@ -118,3 +119,10 @@ def draw_ground(
     if min(elevation.shape) >= 2:
         shade = hill_shade(elevation, resolution)
         axes.imshow(shade, origin="lower", extent=extent, cmap="gray", vmin=0.0, vmax=BRIGHTEST)
+
+
+def draw_terrain(axes: Axes, terrain: Terrain) -> Extent:
+    """Prepare axes for a terrain, draw its shaded ground, and return its edges."""
+    extent = find_extent(terrain.origin, terrain.elevation.shape, terrain.resolution)
+    draw_ground(axes, np.asarray(terrain.elevation), terrain.resolution, extent)
+    return extent

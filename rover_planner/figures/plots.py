@@ -28,6 +28,7 @@ from rover_planner.figures.pictures import (
     find_extent,
     hill_shade,
 )
+from rover_planner.planning.path_geometry import distance_along
 from rover_planner.planning.path_query import Candidate, PathAnswer
 
 CHOSEN = "#F0E442"
@@ -269,7 +270,7 @@ def _panel_title(labelled: LabelledAnswer) -> str:
 def _draw_quantity(axes: Axes, candidate: Candidate, name: str) -> None:
     """Draw one predicted quantity along a path: six wheels, or one value."""
     values = np.asarray(getattr(candidate.prediction, name))
-    whole = _measure_distance(candidate)
+    whole = distance_along(candidate.poses)
     distance, columns = whole[: len(values)], values.reshape(len(values), -1)
     if np.allclose(columns, columns[:, :1], equal_nan=True):
         axes.plot(distance, columns[:, 0], color=INK, lw=1.3)
@@ -285,15 +286,9 @@ def _draw_quantity(axes: Axes, candidate: Candidate, name: str) -> None:
     axes.set_xlim(0, max(whole[-1], 1e-3))
 
 
-def _measure_distance(candidate: Candidate) -> NDArray[np.float64]:
-    """Return the distance of each waypoint along the path (n,) [m]."""
-    steps = np.hypot(*np.diff(candidate.poses[:, :2], axis=0).T)
-    return np.concatenate([[0.0], np.cumsum(steps)])
-
-
 def _shade_edges(axes: Axes, candidate: Candidate) -> None:
     """Shade where a wheel rolls off an edge: the verdict does not ask for forces there."""
-    distance, prediction = _measure_distance(candidate), candidate.prediction
+    distance, prediction = distance_along(candidate.poses), candidate.prediction
     parts = filter(None, (prediction, prediction.between))
     off_edge = [part.waypoint[part.falling.any(axis=1)] for part in parts]
     for waypoint in np.unique(np.concatenate(off_edge)):

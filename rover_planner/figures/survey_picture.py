@@ -19,7 +19,6 @@ from rover_planner.figures.pictures import (
     drawing,
     find_extent,
 )
-from rover_planner.survey.chunk_survey import open_map
 from rover_planner.survey.layers import (
     CLASS_COLOURS,
     CLASS_LABELS,
@@ -97,8 +96,7 @@ def _draw(path, store, shown, scale, labels, title, start=None) -> None:
     frame, (rows, columns) = notes.frame, notes.layout.map_shape
     extent = find_extent(frame.origin, (rows, columns), frame.resolution)
     every = max(1, -(-max(rows, columns) // _MAX_CELLS))
-    source = open_map(store.path, notes.map_file)
-    heights = source.read((slice(0, rows), slice(0, columns)), every)["elevation"]
+    heights = store.open_map().read((slice(0, rows), slice(0, columns)), every)["elevation"]
     cell = notes.cell * _thinning(store)
     with drawing(path, (8.5, 7.5)) as figure:
         axes = figure.subplots()

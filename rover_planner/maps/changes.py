@@ -5,6 +5,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.terrain.grid import Terrain
+from rover_planner.maps.cells import CellBox
 
 LAYERS = ("elevation", "friction", "soil", "elevation_std", "ground_class")
 """Layers of a map that count."""
@@ -23,14 +24,9 @@ def have_same_layers(old: Terrain, new: Terrain) -> bool:
 
 def find_overlap(old: Terrain, new: Terrain, shift: Shift) -> tuple[Window, Window]:
     """Return the cells that two maps have in common, as those of the old and of the new map."""
-    windows = [
-        (
-            slice(max(0, by), max(0, by, min(m, n + by))),
-            slice(max(0, -by), max(0, -by, min(n, m - by))),
-        )
-        for m, n, by in zip(old.elevation.shape, new.elevation.shape, shift, strict=True)
-    ]
-    return (windows[0][0], windows[1][0]), (windows[0][1], windows[1][1])
+    before = CellBox(0, 0, *old.elevation.shape)
+    now = CellBox(*shift, *new.elevation.shape)
+    return now.within(before), before.within(now)
 
 
 def find_changes(old: Terrain, new: Terrain, shift: Shift = (0, 0)) -> NDArray[np.bool_]:

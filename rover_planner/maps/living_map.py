@@ -12,7 +12,6 @@ import numpy as np
 
 from rover_physics.numerics.read_only import seal_array
 from rover_physics.terrain.grid import Terrain
-from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.errors import PlanningError
 from rover_planner.maps.cells import CellBox, CellGrid, grid_of
 from rover_planner.maps.layers import (
@@ -29,14 +28,8 @@ from rover_planner.maps.layers import (
     empty_patch,
     lay_onto,
 )
+from rover_planner.parameters.traverse_server import NEWEST, TraverseServerParameters
 
-NEWEST, SUREST = "newest", "surest"
-MERGE_RULES = (NEWEST, SUREST)
-"""Which of two heights of a cell counts: the newer one, or the one with the smaller deviation."""
-AUTO, MERGE, REPLACE = "auto", "merge", "replace"
-MAP_UPDATES = (AUTO, MERGE, REPLACE)
-"""Effects of a local map: it merges if there is a loaded map and else replaces the last one; it
-always merges; or it always replaces."""
 GROWTH = 32
 """Cells by which a window grows at least, so that it does not grow with each map."""
 ROLL = 8
@@ -45,30 +38,6 @@ NEAR = 8
 """A rover is far from a map if a window around both has more than NEAR times their cells."""
 FINER = 0.75
 """Relative cell size from which a first local map replaces the cells of a loaded map."""
-
-
-@dataclass(frozen=True)
-class MapRules:
-    """Rules by which maps are kept, merge and are filled under the rover."""
-
-    rule: str = NEWEST
-    """One of MERGE_RULES."""
-    ageing: float = 0.0
-    """Growth of a height's standard deviation with its age [m/s]; for SUREST."""
-    loaded_std: float = 0.0
-    """Standard deviation of the heights of a loaded map that has none [m]; 0 is exact."""
-    window: float = 0.0
-    """Side of the window around the rover [m]; 0 covers the loaded map and all local ones."""
-    max_cells: int = MAX_CELLS
-    """Largest window [cells]."""
-    updates: str = AUTO
-    """One of MAP_UPDATES."""
-    fills: bool = True
-    """True if unknown cells under the standing rover are filled."""
-    fill_margin: float = 0.0
-    """Width around the wheels' outline that is filled where the rover started [m]."""
-    fill_std: float = 0.02
-    """Standard deviation of filled heights on a map that has deviations [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,9 +53,9 @@ class MapSnapshot:
 class LivingMap:
     """Merges maps; each change makes new arrays, so earlier snapshots stay as they are."""
 
-    def __init__(self, rules: MapRules | None = None):
-        self.rules = rules or MapRules()
-        """Rules by which maps merge from now on."""
+    def __init__(self, values: TraverseServerParameters | None = None):
+        self.values = values or TraverseServerParameters()
+        """Parameters by which maps merge from now on."""
         self._names = list(FIRST_NAMES)
         self._last: dict[str, float] = {}
         self._rolls = False
@@ -157,7 +126,7 @@ class LivingMap:
         """Return a window with room for a local map, and the map on its cells."""
         self._choose_grid(terrain)
         assert self._grid is not None
-        self._rolls = self.rules.window > 0.0
+        self._rolls = self.values.map_window > 0.0
         if centre is None:
             x0, x1, y0, y1 = terrain.bounds
             centre = 0.5 * (x0 + x1), 0.5 * (y0 + y1)
@@ -240,7 +209,7 @@ class LivingMap:
 
     def _std_to_add(self) -> float:
         has_std = self._loaded is None or self._loaded.elevation_std is not None
-        return 0.0 if has_std else self.rules.loaded_std
+        return 0.0 if has_std else self.values.loaded_std
 
     def grid_for(self, terrain: Terrain) -> CellGrid | None:
         """Return the cells onto which a local map merges; None if it sets them.
@@ -263,13 +232,15 @@ class LivingMap:
         """Return the window with room for a box, or around a place of the rover [m]."""
         old = self._window
         wanted = self._wanted_box(box, centre)
-        if wanted.cells > self.rules.max_cells:
-            most = self.rules.max_cells
+        if wanted.cells > self.values.max_map_cells:
+            most = self.values.max_map_cells
             advice = "set map_window to the side of a window around the rover"
             if self._rolls:
                 assert self._grid is not None
                 side = math.isqrt(most) * self._grid.resolution
-                advice = f"map_window is {self.rules.window:g} m, set it to at most {side:.4g} m"
+                advice = (
+                    f"map_window is {self.values.map_window:g} m, set it to at most {side:.4g} m"
+                )
             raise PlanningError(
                 f"the map would have {wanted.rows} x {wanted.columns} cells; max_map_cells is "
                 f"{most}: {advice}"
@@ -283,7 +254,7 @@ class LivingMap:
         assert self._grid is not None
         old = None if self._window is None else self._window.box
         if self._rolls:
-            n = max(2, round(self.rules.window / self._grid.resolution))
+            n = max(2, round(self.values.map_window / self._grid.resolution))
             column, row = (round(value) - n // 2 for value in self._grid.coordinates(*centre))
             is_kept = (
                 old is not None
@@ -334,7 +305,7 @@ class LivingMap:
         known = np.isfinite(patch.layers["elevation"][own])
         source, since = window.layers["source"][to], window.layers["time"][to]
         is_given = (source == UNKNOWN) | (source == CONTACT) | (source == FOOTPRINT)
-        if self.rules.rule == NEWEST:
+        if self.values.map_merge == NEWEST:
             return known & (is_given | (source == LOADED) | (since <= time))
         old = window.layers.get("elevation_std")
         old = np.zeros(known.shape) if old is None else old[to]
@@ -342,7 +313,7 @@ class LivingMap:
         new = np.zeros(known.shape) if new is None else new[own]
         age = np.where(np.isfinite(since), np.maximum(time - since, 0.0), 0.0)
         with np.errstate(invalid="ignore"):
-            surer = new <= np.hypot(old, self.rules.ageing * age)
+            surer = new <= np.hypot(old, self.values.map_ageing * age)
         return known & (is_given | surer)
 
     def _is_near(self, box: CellBox) -> bool:
@@ -352,7 +323,7 @@ class LivingMap:
         old = self._window.box
         grown = self._wanted_box(box, self._centre_of(box)).cells
         most = NEAR * (old.cells + box.cells) + GROWTH**2
-        return grown <= (old.cells if grown == old.cells else min(most, self.rules.max_cells))
+        return grown <= (old.cells if grown == old.cells else min(most, self.values.max_map_cells))
 
     def _centre_of(self, box: CellBox) -> tuple[float, float]:
         assert self._grid is not None

@@ -4,25 +4,26 @@
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.maps.ground_beneath import GroundBeneath, Standing, find_ground_beneath
-from rover_planner.maps.living_map import AUTO, MERGE, LivingMap, MapRules, MapSnapshot
+from rover_planner.maps.living_map import LivingMap, MapSnapshot
 from rover_planner.maps.moved_map import MapMove, move_map
+from rover_planner.parameters.traverse_server import AUTO, MERGE, TraverseServerParameters
 
 
 class MapKeeper:
     """Makes one map of all that a server hears; without ROS."""
 
-    def __init__(self, rover: Rover, rules: MapRules | None = None):
-        self._rover, self._living = rover, LivingMap(rules)
+    def __init__(self, rover: Rover, values: TraverseServerParameters):
+        self._rover, self._living = rover, LivingMap(values)
         self._start: GroundBeneath | None = None
 
-    def apply(self, rover: Rover, rules: MapRules) -> None:
-        """Use another rover and other rules from now on; the map stays."""
-        self._rover, self._living.rules = rover, rules
+    def apply(self, rover: Rover, values: TraverseServerParameters) -> None:
+        """Use another rover and other parameters from now on; the map stays."""
+        self._rover, self._living.values = rover, values
 
     @property
     def merges(self) -> bool:
         """True if the next local map merges."""
-        updates = self._living.rules.updates
+        updates = self._living.values.map_updates
         return updates == MERGE or (updates == AUTO and self._living.has_loaded)
 
     def load(self, terrain: Terrain, time: float, standing: Standing | None) -> MapSnapshot:
@@ -44,7 +45,7 @@ class MapKeeper:
             PlanningError: As `move_map`.
         """
         grid = self._living.grid_for(terrain) if self.merges else None
-        return move_map(terrain, move, grid, self._living.rules.max_cells)
+        return move_map(terrain, move, grid, self._living.values.max_map_cells)
 
     def take(
         self, terrain: Terrain, source: str, time: float, standing: Standing | None
@@ -74,12 +75,12 @@ class MapKeeper:
         Raises:
             PlanningError: The window would be too large.
         """
-        if not (self._living.rules.fills and self._living.has_cells):
+        if not (self._living.values.fill_under_rover and self._living.has_cells):
             return None
         return self._living.snapshot() if self._fill(standing, time) else None
 
     def _filled(self, standing: Standing | None, time: float) -> MapSnapshot:
-        if self._living.rules.fills:
+        if self._living.values.fill_under_rover:
             self._fill(standing, time)
         snapshot = self._living.snapshot()
         assert snapshot is not None
@@ -96,11 +97,11 @@ class MapKeeper:
             changed |= self._fill_with(now, 0.0, time)
             self._start = self._start or now
         if self._start is not None:
-            changed |= self._fill_with(self._start, self._living.rules.fill_margin, time)
+            changed |= self._fill_with(self._start, self._living.values.footprint_margin, time)
         return changed
 
     def _fill_with(self, ground: GroundBeneath, margin: float, time: float) -> bool:
         grid = self._living.grid
         assert grid is not None
-        patch, is_contact = ground.patch(grid, margin, self._living.rules.fill_std)
+        patch, is_contact = ground.patch(grid, margin, self._living.values.footprint_std)
         return self._living.fill(patch, is_contact, time)

@@ -11,11 +11,8 @@ from numpy.typing import NDArray
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.maps.layers import FOOTPRINT, CellSources
+from rover_planner.parameters.traverse_server import ALLOW, ALLOW_FOOTPRINT, REFUSE
 
-ALLOW, ALLOW_FOOTPRINT, REFUSE = "allow", "allow_footprint", "refuse"
-UNOBSERVED_GROUND = (ALLOW, ALLOW_FOOTPRINT, REFUSE)
-"""Values of the parameter blind_ground: paths whose belly passes over ground that was never seen
-are allowed, allowed over the start footprint only, or refused."""
 UNOBSERVED_CODE = "blind_ground"
 """Code of the refusal."""
 SEEN, ASSUMED, UNSEEN = range(3)
@@ -40,7 +37,7 @@ class UnobservedShare:
     """The same without the start footprint."""
 
     def first_refused(self, rule: str) -> int:
-        """Return the first waypoint that a rule of UNOBSERVED_GROUND refuses, -1 if none."""
+        """Return the first waypoint that a value of blind_ground refuses, -1 if none."""
         if rule == ALLOW:
             return -1
         return self.first if rule == REFUSE else self.first_beyond_footprint
@@ -83,7 +80,7 @@ class ObservedGround:
     def refused_below(
         self, rover: Rover, poses: NDArray[np.float64], rule: str
     ) -> NDArray[np.bool_]:
-        """Return (n,) whether a rule of UNOBSERVED_GROUND refuses the ground under the belly.
+        """Return (n,) whether a value of blind_ground refuses the ground under the belly.
 
         Ground off the map counts as never seen, as in `share`.
         """

@@ -5,7 +5,6 @@ import time
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 
-from rclpy.node import Node
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
@@ -15,11 +14,11 @@ from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.advice.advise import Advice, grow_within
 from rover_planner.advice.case import Case
 from rover_planner.nodes.question_desk import QuestionDesk
+from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.budget import BUSY, CANCELLED, Budget, QuestionStoppedError
 from rover_planner.planning.answering.judgement import PathJudgement
-from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.ros.deferred_service import Reply, serve_later
-from rover_planner.ros.guard import Guard, Handover
+from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import latched_qos
 
 NOTHING_REFUSED = "no path was refused yet; ask ~/can_traverse or ~/check_path first"
@@ -28,9 +27,8 @@ NOTHING_REFUSED = "no path was refused yet; ask ~/can_traverse or ~/check_path f
 class AdviceTopics:
     """Seeks advice on the path that was refused last, in a thread that gives way to questions."""
 
-    def __init__(self, node: Node, service: TraverseService, desk: QuestionDesk, guard: Guard):
-        self._node, self._service, self._desk, self._guard = node, service, desk, guard
-        self._handover = Handover(node, guard)
+    def __init__(self, node: RoverNode[TraverseServerParameters], desk: QuestionDesk):
+        self._node, self._desk = node, desk
         self._refused: PathJudgement | None = None
         self._pool, self._budget = ThreadPoolExecutor(1, "advice"), Budget(0.0)
         self._in_work: Future[None] | None = None
@@ -61,7 +59,7 @@ class AdviceTopics:
         elif self._in_work is not None and not self._in_work.done():
             self._refuse(BUSY, "other advice is in work; ask again later", response, reply)
         else:
-            self._budget = Budget(self._service.settings.parameters.advice_time)
+            self._budget = Budget(self._node.values.advice_time)
             work = partial(self._work, _case_of(judgement), self._budget, response, reply)
             self._in_work = self._pool.submit(work)
 
@@ -71,16 +69,16 @@ class AdviceTopics:
             told = None
             for advice in grow_within(case, partial(self._give_way, budget)):
                 if told is None or len(advice.found) > len(told.found):
-                    self._handover.call(partial(self._publish, advice))
+                    self._node.handover.call(partial(self._publish, advice))
                 told = advice
             assert told is not None
-            self._handover.call(partial(self._answer, told, response, reply))
+            self._node.handover.call(partial(self._answer, told, response, reply))
         except QuestionStoppedError as error:
             self._hand_refusal(error.code, str(error), response, reply)
         except RoverError as error:
             self._hand_refusal("bad_request", str(error), response, reply)
         except Exception as error:
-            self._guard.report("advise", error)
+            self._node.guard.report("advise", error)
             self._hand_refusal("internal_error", str(error), response, reply)
 
     def _give_way(self, budget: Budget) -> None:
@@ -103,7 +101,7 @@ class AdviceTopics:
     def _hand_refusal(
         self, code: str, reason: str, response: Trigger.Response, reply: Reply
     ) -> None:
-        self._handover.call(partial(self._refuse, code, reason, response, reply))
+        self._node.handover.call(partial(self._refuse, code, reason, response, reply))
 
     def _refuse(self, code: str, reason: str, response: Trigger.Response, reply: Reply) -> None:
         nothing = {"code": code, "reason": reason, "remedies": [], "others": [], "complete": False}

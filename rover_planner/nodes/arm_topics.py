@@ -4,30 +4,32 @@
 from dataclasses import replace
 
 from geometry_msgs.msg import PoseStamped, WrenchStamped
-from rclpy.node import Node
 from std_srvs.srv import Trigger
 
 from msg_adapters.errors import MessageError
 from msg_adapters.results.diagnostics import to_json
 from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
+from rover_physics.traversability.reach import ReachAnswer
 from rover_planner.nodes.question_desk import QuestionDesk
-from rover_planner.planning.answering.questions import Answer, ArmJudgement, ReachCheck, ReachQuery
+from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.answering.questions import Answer, ReachCheck, ReachQuery
 from rover_planner.ros.deferred_service import Reply, serve_later
+from rover_planner.ros.node import RoverNode
 from rover_planner.ros.subscriptions import subscribe_to_requests
 
 
 class ArmTopics:
     """Connects a ReachQuery to the topics and the service of a node."""
 
-    def __init__(self, node: Node, desk: QuestionDesk, map_frame: str, reliability: str):
-        self._node, self._desk, self._map_frame = node, desk, map_frame
+    def __init__(self, node: RoverNode[TraverseServerParameters], desk: QuestionDesk):
+        self._node, self._desk, self._map_frame = node, desk, node.values.map_frame
         self.query = ReachQuery()
         """The query, with the last target and wrench."""
         for kind, name, take in (
             (PoseStamped, "~/tool_target", self._take_target),
             (WrenchStamped, "~/tool_wrench", self._take_wrench),
         ):
-            subscribe_to_requests(node, kind, name, take, reliability)
+            subscribe_to_requests(node, kind, name, take, node.values.input_reliability)
         serve_later(node, Trigger, "~/check_reach", self._check_reach)
 
     def _take_target(self, message: PoseStamped) -> None:
@@ -59,7 +61,7 @@ class ArmTopics:
 
         self._desk.ask(ReachCheck("check_reach", "", self.query), send)
 
-    def _log(self, answer: ArmJudgement) -> None:
+    def _log(self, answer: ReachAnswer) -> None:
         logger = self._node.get_logger()
         if answer.possible:
             logger.info("check_reach: possible")

@@ -9,7 +9,6 @@ from typing import Any
 
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
-from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Bool, String
@@ -32,15 +31,9 @@ from rover_planner.learning.stuck_place import find_place_ahead
 from rover_planner.learning.wheel_odometry import WheelOdometry
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.warm_up import LEARNING
-from rover_planner.parameters.declare import (
-    declare_parameters,
-    follow_changes,
-    warn_of_unknown_parameters,
-)
 from rover_planner.parameters.ground_learner import GroundLearnerParameters
-from rover_planner.ros.guard import Guard
 from rover_planner.ros.map_intake import CLOUD
-from rover_planner.ros.polled_topics import PolledTopics
+from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import latched_qos, polled_qos, sensor_qos
 from rover_planner.ros.row_collector import RowCollector
 from rover_planner.ros.subscriptions import subscribe_to_map
@@ -59,12 +52,12 @@ COMMAND_AGE = 0.5
 """Age from which a command is none [s]."""
 
 
-class GroundLearnerNode(Node):
+class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
     """Connects a GroundLearner to ROS; nothing that arrives ends the node."""
 
     def __init__(self, **node_arguments: Any):
-        super().__init__(NODE_NAME, **node_arguments)
-        self._values = values = declare_parameters(self, GroundLearnerParameters)
+        super().__init__(NODE_NAME, GroundLearnerParameters, **node_arguments)
+        values = self.values
         load_kernels(LEARNING, (), self.get_logger().info)
         self._rover = load_rover(values.rover)
         if values.soil:
@@ -76,7 +69,6 @@ class GroundLearnerNode(Node):
         """The estimator; None before the first map."""
         self.heard_until = 0.0
         """Time of the last odometry [s]."""
-        self._guard = Guard(self.get_logger())
         self._commanded, self._command_time, self._sent, self._stuck = 0.0, -1e9, -1e9, ""
         self._estimates = self.create_publisher(String, ESTIMATE, latched_qos())
         self._stops = self.create_publisher(Bool, EMERGENCY_STOP, latched_qos())
@@ -84,31 +76,19 @@ class GroundLearnerNode(Node):
         self._wheels = WheelOdometry(self._rover)
         self._imu: Imu | None = None  # the last one that the wheels' odometry went on by
         self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", sensor_qos())
-        self._heard = PolledTopics(self, self._guard)
         for kind, name, take in (
             (TwistStamped, "cmd_vel", self._take_command),
             (JointState, "joint_states", self._rows.take_joints),
             (Imu, "imu", self._take_imu),
             (Odometry, "odometry", self._take_odometry),
         ):
-            self._heard.subscribe(kind, name, self._guarded(name, take), polled_qos())
+            self.heard.subscribe(kind, name, self._refusing(name, take), polled_qos())
         self.create_timer(POLLING, self._read_sensors)
-        subscribe_to_map(
-            self,
-            PointCloud2,
-            CLOUD,
-            self._guarded(CLOUD, self._take_map),
-            values.map_durability,
-            values.input_reliability,
-        )
-        follow_changes(self, lambda: self._values, lambda values: values, self._apply)
-        warn_of_unknown_parameters(self, GroundLearnerParameters)
+        subscribe_to_map(self, PointCloud2, CLOUD, self._refusing(CLOUD, self._take_map))
+        self.follow_changes(lambda _: None, lambda _: None)
         self.get_logger().info(f"ready for rover {self._rover.name}")
 
-    def _apply(self, parameters: GroundLearnerParameters) -> None:
-        self._values = parameters
-
-    def _guarded(self, name: str, take: Callable[[Any], None]) -> Callable[..., None]:
+    def _refusing(self, name: str, take: Callable[[Any], None]) -> Callable[..., None]:
         """Return a callback that refuses what cannot be used."""
 
         def receive(message: Any, _arrived: float = 0.0) -> None:
@@ -116,13 +96,11 @@ class GroundLearnerNode(Node):
                 take(message)
             except RoverError as error:
                 self.get_logger().warning(f"{name} not used: {error}", throttle_duration_sec=5.0)
-            except Exception as error:
-                self._guard.report(name, error)
 
         return receive
 
     def _take_map(self, data: bytes) -> None:
-        values, cloud = self._values, deserialize_message(data, PointCloud2)
+        values, cloud = self.values, deserialize_message(data, PointCloud2)
         check_frame(cloud.header.frame_id, values.map_frame, CLOUD)
         terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height)
         if self.learner is None:
@@ -132,15 +110,11 @@ class GroundLearnerNode(Node):
             self.learner.change_map(terrain)
 
     def _take_command(self, twist: TwistStamped) -> None:
-        self._commanded, self._command_time = twist_to_speeds(twist)[0], self._now
-
-    @property
-    def _now(self) -> float:
-        return float(self.get_clock().now().nanoseconds / NANOSECONDS)
+        self._commanded, self._command_time = twist_to_speeds(twist)[0], self.seconds
 
     def _read_sensors(self) -> None:
         """Take what the sensors sent, and tell where the wheels say that the rover is."""
-        self._heard.poll()
+        self.heard.poll()
         imu, self._imu = self._imu, None
         if imu is None:
             return
@@ -150,7 +124,7 @@ class GroundLearnerNode(Node):
             wheels.covariance,
             (wheels.speed, wheels.speed_deviation),
             self._rows.yaw_rate,
-            self._values.odometry_frame,
+            self.values.odometry_frame,
             imu.header.stamp,
         )
         self._wheel_odometry.publish(message)
@@ -159,21 +133,21 @@ class GroundLearnerNode(Node):
         """Take attitude and yaw rate, and go on by what the wheels turned."""
         self._rows.take_imu(imu)
         stamp = stamp_to_ns(imu.header.stamp)
-        motion = self._rows.motion(self._now if stamp is None else stamp / NANOSECONDS)
+        motion = self._rows.motion(self.seconds if stamp is None else stamp / NANOSECONDS)
         if motion is not None:
             self._wheels.take(motion)
             self._imu = imu
 
     def _take_odometry(self, odometry: Odometry) -> None:
         stamp = stamp_to_ns(odometry.header.stamp)
-        now = self._now if stamp is None else stamp / NANOSECONDS
-        row = self._rows.take_odometry(odometry, now, self._values.map_frame)
+        now = self.seconds if stamp is None else stamp / NANOSECONDS
+        row = self._rows.take_odometry(odometry, now, self.values.map_frame)
         self.heard_until = now
         self._wheels.learn(row[[X, Y, YAW]])
         learner = self.learner
         if learner is None:
             return
-        is_fresh = self._now - self._command_time < COMMAND_AGE
+        is_fresh = self.seconds - self._command_time < COMMAND_AGE
         learner.commanded = self._commanded if is_fresh else None
         if learner.take(row):
             self._tell(learner, row, now)
@@ -184,9 +158,9 @@ class GroundLearnerNode(Node):
         self._stuck = stuck
         if stuck and not before:
             self.get_logger().warning(f"the rover is stuck: {stuck}")
-            if self._values.stop_when_stuck:
+            if self.values.stop_when_stuck:
                 self._stops.publish(Bool(data=True))
-            if self._values.mark_when_stuck:
+            if self.values.mark_when_stuck:
                 rolling = 0.0 if learner.window is None else learner.window.rolling.mean()
                 place = find_place_ahead(self._rover, row, rolling, stuck)
                 self._marks.publish(String(data=json.dumps(asdict(place))))

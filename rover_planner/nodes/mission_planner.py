@@ -38,7 +38,7 @@ from msg_adapters.paths import path_to_poses, poses_path, stamped_pose
 from msg_adapters.results.predictions import array_values
 from rover_physics.errors import RoverError
 from rover_physics.terrain.grid import Terrain, load_terrain
-from rover_planner.nodes.mission.drive import DriveFailedError, DriveSettings, drive_to
+from rover_planner.nodes.mission.drive import Drive, DriveFailedError, DriveSettings
 from rover_planner.nodes.mission.options import MissionOptions
 from rover_planner.nodes.programs import read_arguments
 from rover_planner.planning.answering.budget import STOPPING
@@ -422,7 +422,7 @@ def _carry_out(node: MissionPlanner, terrain: Terrain | None, options: MissionOp
             tell("driving")
             try:
                 settings = DriveSettings(options.position_tolerance, options.heading_tolerance)
-                drive_to(node, goal, answer["poses"], settings, tell)
+                Drive(node, goal, settings, tell).run(answer["poses"])
             except NoAnswerError as error:
                 raise DriveFailedError(str(error)) from error
             tell("arrived")

@@ -16,11 +16,7 @@ from numpy.typing import NDArray
 from rclpy.duration import Duration
 from rclpy.node import Node
 
-from msg_adapters.identity import path_hash
-from msg_adapters.paths import path_to_poses
-from msg_adapters.stamps import stamp_to_ns
 from rover_physics.errors import RoverError
-from rover_planner.maps.known_map import stamp_text
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.planning.answering.budget import CANCELLED, STOPPING
 from rover_planner.planning.answering.judgement import PathJudgement
@@ -30,37 +26,32 @@ from rover_planner.planning.path_geometry import next_given_poses
 from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.optional_types import find_type
+from rover_planner.ros.server_inputs import describe_path
 
 Publish = Callable[[PathJudgement, IdentityReport], Any]
+ReadPath = Callable[[Path], GivenPath]
 ReadQuestion = Callable[[str, PoseStamped, PoseStamped], Question]
 
 
 class PathValidity:
     """Answers requests of IsPathValid."""
 
-    def __init__(
-        self,
-        desk: QuestionDesk,
-        map_frame: str,
-        publish: Publish,
-        localise: Callable[[Path], Path],
-    ):
+    def __init__(self, desk: QuestionDesk, read: ReadPath, publish: Publish):
         """Keep what is needed for answers.
 
         Args:
             desk: Answers the questions.
-            map_frame: Frame of the map.
+            read: Returns a path of the robot as one of the body; refuses one that is too long.
             publish: Publishes the results of a judgement.
-            localise: Returns a path in the map frame; refuses one that is too long.
         """
-        self._desk, self._frame, self._publish = desk, map_frame, publish
-        self._localise = localise
+        self._desk, self._read, self._publish = desk, read, publish
 
-    def serve(self, node: Node) -> None:
+    @staticmethod
+    def serve(node: Node, desk: QuestionDesk, read: ReadPath, publish: Publish) -> None:
         """Create the service, where its type is installed."""
         kind = find_type("nav2_msgs.srv:IsPathValid")
         if kind is not None:
-            serve_later(node, kind, "~/is_path_valid", self.take)
+            serve_later(node, kind, "~/is_path_valid", PathValidity(desk, read, publish).take)
 
     def take(self, request: Any, response: Any, reply: Reply) -> None:
         """Take a request; the reply has `is_valid` and `invalid_pose_indices`.
@@ -69,14 +60,13 @@ class PathValidity:
         path that is refused before it is judged, such as without a map, has all of them.
         """
         path: Path = request.path
-        service, about = "is_path_valid", path_hash(path)
-        stamp = stamp_text(stamp_to_ns(path.header.stamp))
+        about, stamp = describe_path(path)
         question: Question
         try:
-            poses = path_to_poses(self._localise(path), self._frame)
-            question = PathCheck(service, about, GivenPath(poses, "", about, stamp))
+            given = self._read(path)
+            question = PathCheck("is_path_valid", about, given)
         except RoverError as error:
-            question = BadQuestion(service, about, str(error))
+            question = BadQuestion("is_path_valid", about, str(error))
 
         def send(answer: Answer) -> None:
             judged = answer.judgement
@@ -84,9 +74,9 @@ class PathValidity:
             response.invalid_pose_indices = list(range(len(path.poses)))
             if judged.candidate is not None:
                 spacing = answer.snapshot.settings.query.waypoint_spacing
-                given = next_given_poses(poses, spacing)
+                assert given.poses is not None
                 response.invalid_pose_indices = find_invalid_poses(
-                    judged.candidate.verdict.codes, given
+                    judged.candidate.verdict.codes, next_given_poses(given.poses, spacing)
                 )
             self._publish(judged, replace(answer.identity, path_hash=about, path_stamp=stamp))
             reply(response)

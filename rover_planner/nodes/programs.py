@@ -28,6 +28,10 @@ PLACE_IN_SOURCE = re.compile(r",? at /\S+:\d+")
 """Place of an error in the sources of ROS, which helps nobody."""
 
 
+def read_nothing() -> None:
+    """Take no options."""
+
+
 @dataclass(frozen=True)
 class Program:
     """One of the node programs."""
@@ -36,17 +40,12 @@ class Program:
     """Its purpose, in one sentence."""
     topics: str
     """Its subscriptions, services and publishers, in one sentence."""
-    read: Callable[..., Any]
-    """Function whose arguments are the options, as typer expects; returns the options' values."""
     parameters: tuple[ParameterSpec, ...] = ()
     """Its table of parameters."""
+    read: Callable[..., Any] = read_nothing
+    """Function whose arguments are the options, as typer expects; returns the options' values."""
     exit_codes: str = _EXIT_CODES
     """Meaning of its exit codes."""
-
-
-def read_nothing() -> dict[str, Any]:
-    """Return the parameters set by a program without options: none."""
-    return {}
 
 
 def read_engine(
@@ -73,7 +72,6 @@ PROGRAMS = {
         "~/predicted_joints, ~/wheel_loads, ~/slip_ratios, ~/friction_utilisation, "
         "~/torque_saturation, ~/tip_over_margin, ~/closed_area, ~/search_progress, "
         "~/map, ~/markers",
-        read_nothing,
         specs_of(TraverseServerParameters),
     ),
     "traction_controller": Program(
@@ -82,7 +80,6 @@ PROGRAMS = {
         "traverse_server/stop; serves ~/enable; publishes ~/commands, ~/velocity_commands, "
         "~/steering_commands, ~/brake, ~/state, ~/wheel_loads, ~/friction_utilisation, "
         "~/contact_angles, diagnostics",
-        read_nothing,
         specs_of(TractionControllerParameters),
     ),
     "rover_simulator": Program(
@@ -91,15 +88,14 @@ PROGRAMS = {
         "traverse_server/stop; "
         "publishes joint_states, odometry, imu, elevation_cloud, cmd_vel, path_driven, "
         "diagnostics",
-        read_engine,
         specs_of(RoverSimulatorParameters),
+        read_engine,
     ),
     "ground_learner": Program(
         "Learn friction, slip and sticking while a rover drives.",
         "subscribes joint_states, imu, odometry, cmd_vel, elevation_cloud; publishes ~/odometry, "
         "traverse_server/ground_estimate, traverse_server/mark_place, "
         "traction_controller/emergency_stop",
-        read_nothing,
         specs_of(GroundLearnerParameters),
     ),
     "mission_planner": Program(
@@ -108,7 +104,7 @@ PROGRAMS = {
         "subscribes traverse_server/verdict, traverse_server/wheel_loads, "
         "traverse_server/slip_ratios, odometry, path_driven; publishes "
         "elevation_cloud, path, traverse_server/path",
-        read_mission,
+        read=read_mission,
         exit_codes="Exit code 0: every goal is traversable, and with --drive was reached. 1: a "
         "question was refused before any path was judged, or the rover did not get there. 2: bad "
         "input, or a missing library. 3: a goal is not traversable. 4: no server, or no answer in "

@@ -14,8 +14,6 @@ from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 
 from msg_adapters.results.diagnostics import search_diagnostics
 from rover_planner.nodes.maps.map_topics import MapTopics
@@ -27,9 +25,11 @@ from rover_planner.planning.answering.server_health import ServerHealth
 from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.verdict_report import IdentityReport
-from rover_planner.ros.guard import Guard, Handover, refuse_error
+from rover_planner.ros.guard import refuse_error
+from rover_planner.ros.node import RoverNode
 from rover_planner.ros.paced_sender import PacedSender
 from rover_planner.ros.qos import topic_qos
+from rover_planner.ros.steady import create_steady_timer
 
 LEAVE_TIME = 0.1
 """Time in which the last answers leave before the node is destroyed [s]."""
@@ -64,29 +64,18 @@ class Inquiry(Asked):
 class QuestionDesk:
     """Numbers questions, queues them, and delivers each answer once."""
 
-    def __init__(
-        self,
-        node: Node,
-        service: TraverseService,
-        maps: MapTopics,
-        guard: Guard,
-        listen: Callable[[], None],
-    ):
-        """Begin; `listen` reads what was measured until now."""
-        self._node, self._service, self._maps, self._guard = node, service, maps, guard
-        self._sender, self._listen = PacedSender(node, guard), listen
+    def __init__(self, node: RoverNode[Any], service: TraverseService, maps: MapTopics):
+        """Begin without questions."""
+        self._node, self._service, self._maps = node, service, maps
+        self._sender = PacedSender(node, node.guard)
         self._register = Register()
         self.health = ServerHealth()
         """Counts of answers and faults."""
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._handover = Handover(node, guard)
         self._queue = QuestionQueue(
-            0, self._judge, lambda: self._handover.call(self._send_finished)
+            0, self._judge, lambda: node.handover.call(self._send_finished)
         )
         self._progress = node.create_publisher(DiagnosticArray, "~/search_progress", topic_qos())
-        self._patrol = node.create_timer(
-            PATROL, self._refuse_overdue, clock=steady, autostart=False
-        )
+        self._patrol = create_steady_timer(node, PATROL, self._refuse_overdue, starts=False)
 
     @property
     def open_count(self) -> int:
@@ -95,7 +84,7 @@ class QuestionDesk:
 
     def ask(self, question: Question, reply: Reply) -> None:
         """Take a question; its answer follows within its budget and GRACE."""
-        self._listen()
+        self._node.heard.poll()
         now = self._node.get_clock().now().nanoseconds
         values = self._service.settings.parameters
         self._queue.max_waiting = values.max_waiting
@@ -125,7 +114,7 @@ class QuestionDesk:
         except QuestionStoppedError:
             raise
         except Exception as error:
-            return refuse_error(self._guard, question.service, error, question.refuse)
+            return refuse_error(self._node.guard, question.service, error, question.refuse)
 
     def _send(self, answered: list[Answered]) -> None:
         """Send the answers to questions."""
@@ -147,7 +136,7 @@ class QuestionDesk:
         patience = self._service.settings.lattice.budget
 
         def send_report(report: dict[str, Any]) -> None:
-            self._handover.call(lambda: self._publish_progress(report))
+            self._node.handover.call(lambda: self._publish_progress(report))
 
         return SearchWatch(lambda: self._service.known_map, send_report, patience)
 

@@ -2,7 +2,7 @@
 """Publishes the results of a traverse server: all results of a judged path have one stamp."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -10,13 +10,10 @@ from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import OccupancyGrid, Path
 from numpy.typing import NDArray
-from rclpy.node import Node
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from visualization_msgs.msg import MarkerArray
 
-from msg_adapters.identity import path_hash
-from msg_adapters.joints import JointNames
 from msg_adapters.paths import PoseStock, decimate, empty_path, settled_path
 from msg_adapters.results.diagnostics import verdict_to_diagnostics
 from msg_adapters.results.grids import area_to_grid, empty_grid
@@ -28,14 +25,16 @@ from msg_adapters.results.predictions import (
     tip_over_array,
     waypoint_array,
 )
-from msg_adapters.stamps import ns_to_stamp, stamp_to_ns
+from msg_adapters.stamps import ns_to_stamp
 from rover_physics.names import WHEELS
 from rover_physics.rover.model import Rover
-from rover_planner.maps.known_map import stamp_text
+from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.judgement import PathJudgement
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
 from rover_planner.ros.deferred_work import DeferredWork
 from rover_planner.ros.lazy_publisher import LazyPublisher
+from rover_planner.ros.node import RoverNode
+from rover_planner.ros.server_inputs import ServerInputs, describe_path
 
 WHEEL_TOPICS = {
     "wheel_loads": "wheel_loads",
@@ -63,28 +62,10 @@ RESULT_KINDS = {
 class ResultTopics:
     """Makes the plan of a judgement at once and publishes all results after the answer is sent."""
 
-    def __init__(
-        self,
-        node: Node,
-        deferred_work: DeferredWork,
-        map_frame: str,
-        positive_steering: str,
-        joint_names: JointNames,
-        to_base: Callable[[Path], Path],
-    ):
-        """Create the topics.
-
-        Args:
-            node: The node.
-            deferred_work: Publishes after answers.
-            map_frame: Frame of the map.
-            positive_steering: One of STEERING_SIGNS: where positive angles of messages turn.
-            joint_names: Names of the joints in messages.
-            to_base: Turns a plan of the body into one of the robot's frame, in place.
-        """
-        self._to_base = to_base
-        self._positive_steering, self._joint_names = positive_steering, joint_names
-        self._node, self._deferred_work, self._frame = node, deferred_work, map_frame
+    def __init__(self, node: RoverNode[TraverseServerParameters], inputs: ServerInputs):
+        """Create the topics; `inputs` know the rover, and joints and frame of messages."""
+        self._node, self._inputs = node, inputs
+        self._deferred_work = DeferredWork(node, node.guard)
         self._poses = PoseStock()
         self._points: list[JointTrajectoryPoint] = []
         self._stamp = 0
@@ -93,40 +74,26 @@ class ResultTopics:
         }
 
     def take(
-        self,
-        judgement: PathJudgement,
-        identity: IdentityReport,
-        rover: Rover,
-        plan_spacing: float,
+        self, judgement: PathJudgement, identity: IdentityReport
     ) -> tuple[Path, Callable[[], VerdictReport]]:
         """Return plan and report of a judgement; publish all results after the answer is sent.
 
         Args:
             judgement: The answer.
             identity: What it is about; without a path, that of the plan is added.
-            rover: The rover of the query.
-            plan_spacing: Distance between poses of the plan [m]; 0 keeps all waypoints.
 
         Returns:
             The plan, whose poses are valid until the next plan is made, and a function that
             returns the report.
         """
-        results = ResultMessages(
-            judgement,
-            identity,
-            rover,
-            plan_spacing,
-            self._frame,
-            ns_to_stamp(self._next_stamp()),
-            self._poses,
-            self._points,
-            self._positive_steering,
-            self._joint_names,
-            self._to_base,
-        )
+        stamp, rover = ns_to_stamp(self._next_stamp()), self._inputs.service.settings.rover
+        kept = self._inputs, self._poses, self._points
+        results = ResultMessages(judgement, identity, stamp, rover, self._node.values, *kept)
         plan = results.plan()
         if judgement.traversable and not identity.path_hash:
-            results = replace(results, identity=_add_plan(identity, plan))
+            path_hash, path_stamp = describe_path(plan)
+            identity = replace(identity, path_hash=path_hash, path_stamp=path_stamp)
+            results = replace(results, identity=identity)
         publications = [
             partial(topic.publish, partial(results.message, name))
             for name, topic in self._topics.items()
@@ -165,27 +132,31 @@ class ResultTopics:
             self._deferred_work.do(*(topic.catch_up for topic in awaited))
 
 
-def _add_plan(identity: IdentityReport, plan: Path) -> IdentityReport:
-    """Return an identity with hash and stamp of a plan."""
-    stamp = stamp_text(stamp_to_ns(plan.header.stamp))
-    return replace(identity, path_hash=path_hash(plan), path_stamp=stamp)
-
-
 @dataclass(frozen=True)
 class ResultMessages:
     """The messages of one judgement; each is made on demand."""
 
     judgement: PathJudgement
+    """The judgement."""
     identity: IdentityReport
-    rover: Rover
-    plan_spacing: float
-    frame: str
+    """What it is about."""
     stamp: Time
-    poses: PoseStock
-    points: list[JointTrajectoryPoint]
-    positive_steering: str
-    joint_names: JointNames
-    to_base: Callable[[Path], Path]
+    """Stamp of all messages."""
+    rover: Rover
+    """The rover of the question."""
+    values: TraverseServerParameters
+    """Parameters of the messages."""
+    inputs: ServerInputs
+    """Know joints and frames of messages."""
+    poses: PoseStock = field(default_factory=PoseStock)
+    """Poses to reuse."""
+    points: list[JointTrajectoryPoint] = field(default_factory=list)
+    """Points to reuse."""
+
+    @property
+    def frame(self) -> str:
+        """Frame of the map."""
+        return self.values.map_frame
 
     @cached_property
     def report(self) -> VerdictReport:
@@ -209,7 +180,7 @@ class ResultMessages:
         candidate = self.judgement.candidate
         if candidate is None or not self.judgement.traversable:
             return empty_path(self.frame, self.stamp)
-        return self.to_base(
+        return self.inputs.frames.to_base(
             settled_path(
                 candidate.prediction, self._rows_to_show(), self.frame, self.stamp, self.poses
             )
@@ -235,10 +206,10 @@ class ResultMessages:
     def _joints(self) -> JointTrajectory:
         candidate = self.judgement.candidate
         if candidate is None:
-            return empty_trajectory(self.rover, self.frame, self.stamp, self.joint_names)
+            return empty_trajectory(self.rover, self.frame, self.stamp, self.inputs.joint_names)
         return joint_trajectory(
             candidate.prediction, self.rover, self.frame, self.stamp, self.points,
-            positive_steering=self.positive_steering, names=self.joint_names,
+            positive_steering=self.values.steering_sign, names=self.inputs.joint_names,
         )  # fmt: skip
 
     def _markers(self) -> MarkerArray:
@@ -266,4 +237,6 @@ class ResultMessages:
         """Return indices of waypoints about `plan_spacing` apart and where the class changes."""
         candidate = self.judgement.candidate
         assert candidate is not None
-        return decimate(candidate.prediction.poses, self.plan_spacing, self.judgement.changes())
+        return decimate(
+            candidate.prediction.poses, self.values.plan_spacing, self.judgement.changes()
+        )

@@ -14,8 +14,6 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TransformStamped, TwistStamped
 from nav_msgs.msg import Odometry, Path
-from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock as ClockMessage
@@ -36,13 +34,12 @@ from rover_physics.numerics.arrays import Floats
 from rover_planner.maps.summary import describe_terrain
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.warm_up import SIMULATION
-from rover_planner.parameters.declare import declare_parameters, warn_of_unknown_parameters
 from rover_planner.parameters.rover_simulator import QUASI_STATIC, RoverSimulatorParameters
 from rover_planner.parameters.shared import STOP
-from rover_planner.ros.guard import Guard
+from rover_planner.ros.node import RoverNode
 from rover_planner.ros.optional_types import find_type
-from rover_planner.ros.polled_topics import PolledTopics
 from rover_planner.ros.qos import latched_qos, map_qos, sensor_qos, topic_qos
+from rover_planner.ros.steady import create_steady_timer
 from rover_planner.shell.kernels import load_kernels
 from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.simulation import Simulation, load_simulation_settings
@@ -61,7 +58,7 @@ DIAGNOSTICS_PERIOD = 1.0
 """Time between two diagnostic messages [s]."""
 
 
-class RoverSimulator(Node):
+class RoverSimulator(RoverNode[RoverSimulatorParameters]):
     """Connects a Simulation to ROS topics.
 
     With use_sim_time it is the source of /clock: its time goes on by a period with each step, so
@@ -69,8 +66,8 @@ class RoverSimulator(Node):
     """
 
     def __init__(self, **node_arguments: Any):
-        super().__init__(NODE_NAME, **node_arguments)
-        parameters = declare_parameters(self, RoverSimulatorParameters)
+        super().__init__(NODE_NAME, RoverSimulatorParameters, **node_arguments)
+        parameters = self.values
         self._frame, self._steering_sign = parameters.map_frame, parameters.steering_sign
         self._order = joint_order(parameters.joints)
         self._settings = load_simulation_settings(parameters)
@@ -82,20 +79,17 @@ class RoverSimulator(Node):
         self._standing_steps = max(1, round(STANDING_PERIOD * parameters.rate))
         self._stopped, self._path_hash, self._steps = "", "", 0
         self._own_stamps: deque[tuple[int, int]] = deque(maxlen=64)
-        self._guard = Guard(self.get_logger())
-        self._heard = PolledTopics(self, self._guard)
         self._create_publishers()
         self._create_subscriptions()
         self._state: PlantState = self.simulation.plant.state()
-        self._start, steady = time.time_ns(), Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(self._period, self._advance, clock=steady)
+        self._start = time.time_ns()
+        create_steady_timer(self, self._period, self._advance)
         # A map takes longer than a step: other threads must not make the rover's sensors late.
         self._maps, self._map_in_work = ThreadPoolExecutor(1, "maps"), Future[None]()
         self._map_in_work.set_result(None)
-        self.create_timer(1.0 / parameters.map_rate, self._begin_map, clock=steady)
-        self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics, clock=steady)
+        create_steady_timer(self, 1.0 / parameters.map_rate, self._begin_map)
+        create_steady_timer(self, DIAGNOSTICS_PERIOD, self._publish_diagnostics)
         self._begin_map()
-        warn_of_unknown_parameters(self, RoverSimulatorParameters)
         self.get_logger().info(
             f"ready: rover {self._settings.rover.name} on {parameters.engine}, starts at "
             f"{', '.join(f'{value:.2f}' for value in self._settings.start)}, terrain "
@@ -120,7 +114,7 @@ class RoverSimulator(Node):
         self._transforms = None if broadcaster is None else broadcaster(self)
 
     def _create_subscriptions(self) -> None:
-        qos, hear = topic_qos(), self._heard.subscribe
+        qos, hear = topic_qos(), self.heard.subscribe
         hear(Bool, STOP, self._take_stop, qos)
         hear(Path, "path", self._take_path, qos)
         hear(TwistStamped, "cmd_vel", self._take_speeds, sensor_qos())
@@ -162,7 +156,7 @@ class RoverSimulator(Node):
         self.simulation.take_stop(message.data, arrival)
 
     def _advance(self) -> None:
-        self._heard.poll()
+        self.heard.poll()
         self._state = state = self.simulation.advance(time.monotonic(), self._period)
         self._steps += 1
         stamp = self._stamp
@@ -245,7 +239,7 @@ class RoverSimulator(Node):
             here = self._state.position, float(self.simulation.plant.pose()[2])
             stamp = self._stamp
             make = partial(self._publish_map, *here, stamp)
-            self._map_in_work = self._maps.submit(self._guard.call, make)
+            self._map_in_work = self._maps.submit(self.guard.call, make)
 
     def _publish_map(self, position: Floats, yaw: float, stamp: Any) -> None:
         seen = self.simulation.look(position, yaw)

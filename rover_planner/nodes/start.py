@@ -4,6 +4,7 @@
 import importlib
 import signal
 import sys
+from functools import partial
 
 from rover_planner.errors import PlanningError
 from rover_planner.nodes.programs import HELP_WORDS, print_help
@@ -11,32 +12,8 @@ from rover_planner.shell.extras import explain_import, need
 from rover_planner.shell.run_program import EXIT_BAD_INPUT, EXIT_OK, end_with
 
 
-def start_traverse_server() -> int:
-    """Run the program traverse_server and return its exit code."""
-    return _start("traverse_server")
-
-
-def start_traction_controller() -> int:
-    """Run the program traction_controller and return its exit code."""
-    return _start("traction_controller")
-
-
-def start_rover_simulator() -> int:
-    """Run the program rover_simulator and return its exit code."""
-    return _start("rover_simulator")
-
-
-def start_ground_learner() -> int:
-    """Run the program ground_learner and return its exit code."""
-    return _start("ground_learner")
-
-
-def start_mission_planner() -> int:
-    """Run the program mission_planner and return its exit code."""
-    return _start("mission_planner")
-
-
 def _start(name: str) -> int:
+    """Run a node program and return its exit code."""
     if not set(HELP_WORDS).isdisjoint(sys.argv[1:]):
         print_help(name)
         return EXIT_OK
@@ -52,3 +29,11 @@ def _start(name: str) -> int:
     except KeyboardInterrupt:  # told to stop before it began
         return EXIT_OK
     return module.main()
+
+
+start_traverse_server = partial(_start, "traverse_server")
+start_traction_controller = partial(_start, "traction_controller")
+start_rover_simulator = partial(_start, "rover_simulator")
+start_ground_learner = partial(_start, "ground_learner")
+start_mission_planner = partial(_start, "mission_planner")
+"""The entry points of the programs."""

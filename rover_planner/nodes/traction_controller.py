@@ -7,10 +7,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.node import Node
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
@@ -22,16 +20,12 @@ from rover_planner.nodes.traction.inputs import TractionInputs
 from rover_planner.nodes.traction.maps import TractionMaps
 from rover_planner.nodes.traction.topics import TractionTopics
 from rover_planner.nodes.warm_up import TRACTION, update_traction
-from rover_planner.parameters.declare import (
-    declare_parameters,
-    follow_changes,
-    warn_of_unknown_parameters,
-)
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.ros.frames import NodeFrames
-from rover_planner.ros.guard import Guard
 from rover_planner.ros.logs import TransitionLog
+from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import latched_qos, sensor_qos, topic_qos
+from rover_planner.ros.steady import create_steady_timer
 from rover_planner.shell.kernels import load_kernels
 from rover_planner.traction.clocks import ClockWatch
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
@@ -62,47 +56,37 @@ ARRIVAL_TIME = Duration(seconds=0.2)
 LOOP_FAULT = "updates came too late; the watchdog sent zero torques"
 
 
-class TractionController(Node):
+class TractionController(RoverNode[TractionControllerParameters]):
     """Connects a TractionSupervisor to ROS; any fault takes the driving torques away in time."""
 
     def __init__(self, **node_arguments: Any):
-        super().__init__(NODE_NAME, **node_arguments)
-        self._values = declare_parameters(self, TractionControllerParameters)
-        self._accepted = self._values, load_traction_settings(self._values)
+        super().__init__(NODE_NAME, TractionControllerParameters, **node_arguments)
+        values, settings = self.values, load_traction_settings(self.values)
         load_kernels(TRACTION, (), self.get_logger().info)
-        update_traction(self._accepted[1])  # so that the first update is as fast as others
-        self._supervisor = TractionSupervisor(self._accepted[1], self._values.enabled_at_start)
-        self.statistics = TractionStatistics(1.0 / self._values.rate)
+        update_traction(settings)  # so that the first update is as fast as others
+        self._supervisor = TractionSupervisor(settings, values.enabled_at_start)
+        self.statistics = TractionStatistics(1.0 / values.rate)
         """Update times, counts and the last update."""
         self._command: TractionCommand | None = None
         self._log = TransitionLog(self.get_logger())
         self._warning = ""
         self._trips = 0
-        self.guard = Guard(self.get_logger())
-        """Counts unexpected errors."""
-        self._clock_watch = ClockWatch(self._values.clock_timeout)
-        self.frames = NodeFrames(self, self._values)
+        self._clock_watch = ClockWatch(values.clock_timeout)
+        self.frames = NodeFrames(self, values)
         """Knows where the frames of messages are on the map."""
-        self._maps = TractionMaps(
-            self,
-            self._values,
-            lambda: self.service.settings.rover,
-            self.frames,
-        )
-        self._inputs = TractionInputs(
-            self, self._values, self.service, self._maps, self.frames, self.guard
-        )
+        self._maps = TractionMaps(self, lambda: self.service.settings.rover, self.frames)
+        self._inputs = TractionInputs(self, self.service, self._maps, self.frames)
         names = self._inputs.joint_names
-        order = joint_order(self._values.joints, names)
+        order = joint_order(values.joints, names)
         self._topics = TractionTopics(self, order, names.signs(WHEEL_JOINTS))
         self._create_switches()
         self._watchdog = Watchdog(self._send_watchdog_command)
-        follow_changes(self, lambda: self._values, self._load, self._apply_parameters)
-        self._create_timers()
-        warn_of_unknown_parameters(self, TractionControllerParameters)
+        self.follow_changes(self._load, self._apply_settings)
+        self._timer = create_steady_timer(self, 1.0 / values.rate, self.update)
+        create_steady_timer(self, DIAGNOSTICS_PERIOD, self._publish_diagnostics)
         self.get_logger().info(
             f"ready for rover {self.service.settings.rover.name}, "
-            f"{'enabled' if self._values.enabled_at_start else 'disabled: call ~/enable to drive'}"
+            f"{'enabled' if values.enabled_at_start else 'disabled: call ~/enable to drive'}"
         )
 
     @property
@@ -143,26 +127,16 @@ class TractionController(Node):
                 Bool, "~/emergency_stop", self._take_emergency_stop, qos, event_callbacks=silent
             )
 
-    def _create_timers(self) -> None:
-        # Neither a step of the system clock nor a stopped /clock delays a steady clock.
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = self.create_timer(1.0 / self._values.rate, self.update, clock=steady)
-        self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics, clock=steady)
-
     def _load(self, parameters: TractionControllerParameters) -> TractionSettings:
-        """Return the settings of parameters; keep them for `_apply_parameters`."""
-        if self._accepted[0] != parameters:
-            settings = load_traction_settings(parameters, self.service.settings)
-            self._accepted = parameters, settings
-        return self._accepted[1]
+        return load_traction_settings(parameters, self.service.settings)
 
-    def _apply_parameters(self, parameters: TractionControllerParameters) -> None:
-        self._supervisor.configure(self._load(parameters))
-        self._clock_watch.timeout = parameters.clock_timeout
-        self._inputs.stamps.tolerance = parameters.stamp_tolerance
-        self.frames.apply_timeout(parameters.transform_timeout)
-        self._values = parameters
-        self._maps.apply(parameters)
+    def _apply_settings(self, settings: TractionSettings) -> None:
+        values = self.values
+        self._supervisor.configure(settings)
+        self._clock_watch.timeout = values.clock_timeout
+        self._inputs.stamps.tolerance = values.stamp_tolerance
+        self.frames.apply_timeout(values.transform_timeout)
+        self._maps.apply()
 
     def _enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         before = self._supervisor.permission.enabled
@@ -186,7 +160,7 @@ class TractionController(Node):
     def update(self) -> None:
         """Estimate, build, solve and publish; called by the timer."""
         start = time.perf_counter()
-        self._inputs.poll()
+        self.heard.poll()
         now = time.monotonic()
         try:
             command = self._find_command(now)
@@ -237,8 +211,8 @@ class TractionController(Node):
 
     def _find_deadline(self, now: float, command: TractionCommand) -> float:
         """Return the time at which the watchdog acts unless another command comes [s]."""
-        period = 1.0 / self._values.rate
-        next_update = now + max(self._values.watchdog_timeout, MIN_WATCHDOG_PERIODS * period)
+        period = 1.0 / self.values.rate
+        next_update = now + max(self.values.watchdog_timeout, MIN_WATCHDOG_PERIODS * period)
         return min(next_update, max(command.expiry, now) + STALE_PERIODS * period)
 
     def _send_watchdog_command(self) -> None:
@@ -248,7 +222,7 @@ class TractionController(Node):
     def _log_changes(self, command: TractionCommand, now: float) -> None:
         """Log the begin and the end of faults and stalls; show a new state in the diagnostics."""
         last, self._command = self._command, command
-        update, policy = command.update, self._values.rest_policy
+        update, policy = command.update, self.values.rest_policy
         fault = f"fault, rest by {policy}: {update.fault}" if update.fault else ""
         self._log.update(FAULT, fault, "all inputs are right", now)
         stalled = "stalled: no progress, stopped pushing" if command.state == STALLED else ""

@@ -11,17 +11,13 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry, Path
 from nav_msgs.srv import GetPlan
-from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash, plan_request_hash
-from msg_adapters.joints import read_joint_map
-from msg_adapters.odometry import odometry_to_pose, odometry_to_tilt
-from msg_adapters.paths import count_poses, path_to_poses, stamped_pose_to_array
+from msg_adapters.paths import count_poses, stamped_pose_to_array
 from msg_adapters.results.diagnostics import (
     HEALTH,
     MONITOR,
@@ -29,7 +25,6 @@ from msg_adapters.results.diagnostics import (
     make_status,
     to_json,
 )
-from msg_adapters.stamps import stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.numerics.kernel_cache import kernel_cache_note
 from rover_physics.warm_up import EXACT, UNCERTAIN
@@ -46,11 +41,6 @@ from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.nodes.result_topics import ResultTopics
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.warm_up import HAZARDS, PATH_SEARCH
-from rover_planner.parameters.declare import (
-    declare_parameters,
-    follow_changes,
-    warn_of_unknown_parameters,
-)
 from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
 from rover_planner.planning.answering.budget import CANCELLED
 from rover_planner.planning.answering.judgement import PathJudgement
@@ -62,21 +52,23 @@ from rover_planner.planning.answering.questions import (
     Question,
 )
 from rover_planner.planning.answering.server_health import MEMORY
-from rover_planner.planning.answering.service_settings import load_service_settings
-from rover_planner.planning.answering.snapshot import Snapshot
-from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.answering.service_settings import (
+    ServiceSettings,
+    load_service_settings,
+)
+from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.planning.marked_places import NONE_MARKED, parse_place
 from rover_planner.planning.navigation.sensor_mounts import sensor_poses
 from rover_planner.planning.path_query import Pose
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
 from rover_planner.ros.deferred_service import Reply, serve_later
-from rover_planner.ros.deferred_work import DeferredWork
 from rover_planner.ros.frames import NodeFrames, is_empty
-from rover_planner.ros.guard import Guard
 from rover_planner.ros.map_intake import read_message
-from rover_planner.ros.polled_topics import PolledTopics
+from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import polled_qos, replace_reliability, topic_qos
+from rover_planner.ros.server_inputs import ServerInputs, describe_path
+from rover_planner.ros.steady import create_steady_timer
 from rover_planner.ros.subscriptions import subscribe_to_requests
 from rover_planner.shell.kernels import load_kernels
 
@@ -88,7 +80,7 @@ DIAGNOSTICS_PERIOD = 1.0
 """Time between two diagnostic messages [s]."""
 
 
-class TraverseServer(Node):
+class TraverseServer(RoverNode[TraverseServerParameters]):
     """Connects a TraverseService to ROS; nothing that arrives ends the node.
 
     Questions are answered in a thread and maps are prepared in another one, so that all other
@@ -96,65 +88,39 @@ class TraverseServer(Node):
     """
 
     def __init__(self, **node_arguments: Any):
-        super().__init__(NODE_NAME, **node_arguments)
-        self._values = declare_parameters(self, TraverseServerParameters)
-        behind = UNCERTAIN if self._values.planner == FAN else (*UNCERTAIN, *PATH_SEARCH)
-        behind = (*behind, *HAZARDS) if self._values.hazard_map else behind
+        super().__init__(NODE_NAME, TraverseServerParameters, **node_arguments)
+        behind = UNCERTAIN if self.values.planner == FAN else (*UNCERTAIN, *PATH_SEARCH)
+        behind = (*behind, *HAZARDS) if self.values.hazard_map else behind
         # Other nodes discover this one meanwhile, which may take DDS three seconds.
         self._behind = load_kernels(EXACT, behind, self.get_logger().info)
-        self.service = TraverseService(load_service_settings(self._values))
-        """The service with the last map, path and joint angles."""
-        self.guard = Guard(self.get_logger())
-        """Takes unexpected errors."""
-        frame, reliability = self._values.map_frame, self._values.input_reliability
-        self._joint_names = read_joint_map(self._values.joint_map, self.service.all_joint_names)
-        self.frames = NodeFrames(self, self._values, sensor_poses(self._values))
+        self.frames = NodeFrames(self, self.values, sensor_poses(self.values))
         """Transforms poses to the map frame."""
         self.frames.listen()
-        self._heard = PolledTopics(self, self.guard)
-        self._results = ResultTopics(
-            self,
-            DeferredWork(self),
-            frame,
-            self._values.steering_sign,
-            self._joint_names,
-            self.frames.to_base,
-        )
-        self._maps = MapTopics(
-            self,
-            self.service,
-            self._values,
-            self._hear_of_map,
-            self.frames,
-            self.guard,
-            self._heard,
-        )
-        self.desk = QuestionDesk(self, self.service, self._maps, self.guard, self._heard.poll)
+        self._inputs = ServerInputs(self.values, self.frames)
+        self.service = self._inputs.service
+        """The service with the last map, path and joint angles."""
+        self._results = ResultTopics(self, self._inputs)
+        self._maps = MapTopics(self, self._inputs, self._hear_of_map)
+        self.desk = QuestionDesk(self, self.service, self._maps)
         """Takes the questions of all services."""
-        self._create_subscriptions(reliability)
+        self._create_subscriptions()
         serve_later(self, GetPlan, "~/can_traverse", self._can_traverse)
         serve_later(self, Trigger, "~/check_path", self._check_path)
-        PathValidity(self.desk, frame, self.publish, self.localise_path).serve(self)
+        PathValidity.serve(self, self.desk, self.read_path, self.publish)
         PathComputation.serve(self, self.desk, self.read_question, self.publish)
-        self._advice = AdviceTopics(self, self.service, self.desk, self.guard)
+        self._advice = AdviceTopics(self, self.desk)
         self.create_service(Trigger, "~/cancel", self._cancel)
         self.create_service(Trigger, "~/clear_places", self._clear_marks)
-        self.arm = ArmTopics(self, self.desk, frame, reliability)
+        self.arm = ArmTopics(self, self.desk)
         """The topics and the service of the arm."""
-        self._map_cloud = MapCloud(self, self.service, frame)
-        self.watch = PathWatch(
-            self, self.service, self._values, self.guard, self._find_watched, self._publish_stop
-        )
+        self._map_cloud = MapCloud(self, self.service)
+        self.watch = PathWatch(self, self.service, self._find_watched, self._publish_stop)
         """Watches the accepted path."""
-        self._hazards = HazardTopics(
-            self, self.service, self._values, self.guard, lambda: self.desk.open_count > 0
-        )
+        self._hazards = HazardTopics(self, self.service, lambda: self.desk.open_count > 0)
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(DIAGNOSTICS_PERIOD, self._publish_diagnostics, clock=steady)
-        self.create_timer(PERIOD, self._beat, clock=steady)
-        follow_changes(self, lambda: self._values, load_service_settings, self._apply_parameters)
-        warn_of_unknown_parameters(self, TraverseServerParameters)
+        create_steady_timer(self, DIAGNOSTICS_PERIOD, self._publish_diagnostics)
+        create_steady_timer(self, PERIOD, self._beat)
+        self.follow_changes(load_service_settings, self._apply_settings)
         self._log_ready()
 
     def destroy_node(self) -> None:
@@ -168,12 +134,12 @@ class TraverseServer(Node):
         self._behind.close()
         super().destroy_node()
 
-    def _create_subscriptions(self, reliability: str) -> None:
-        for kind, name, take in (
-            (JointState, "joint_states", self._take_joints),
-            (Odometry, "odometry", self._take_odometry),
-        ):
-            self._heard.subscribe(kind, name, take, polled_qos())
+    def _create_subscriptions(self) -> None:
+        self.heard.subscribe(JointState, "joint_states", self._take_joints, polled_qos())
+        self.heard.subscribe(Odometry, "odometry", self._take_odometry, polled_qos())
+        if self.values.imu_attitude:
+            self.heard.subscribe(Imu, "imu", self._take_imu, polled_qos())
+        reliability = self.values.input_reliability
         subscribe_to_requests(self, Path, "~/path", self._take_path, reliability, raw=True)
         qos = replace_reliability(topic_qos(), reliability)
         self.create_subscription(String, "~/ground_estimate", self._take_ground, qos)
@@ -186,17 +152,16 @@ class TraverseServer(Node):
             there = f"map {known.source}: {describe_terrain(known.terrain)}"
         self.get_logger().info(f"ready for rover {name}, {there}")
 
-    def _apply_parameters(self, parameters: TraverseServerParameters) -> None:
-        self._values = parameters
-        self.service.settings = load_service_settings(parameters)
-        self._maps.apply(parameters)
-        self.watch.apply(parameters)
-        self.frames.apply_timeout(parameters.transform_timeout)
-        self._hazards.apply(parameters)
+    def _apply_settings(self, settings: ServiceSettings) -> None:
+        self._inputs.values, self.service.settings = self.values, settings
+        self._maps.apply()
+        self.watch.apply()
+        self.frames.apply_timeout(self.values.transform_timeout)
+        self._hazards.apply()
 
     def _beat(self) -> None:
         """Do all that is done ten times a second; each timer of its own would cost a wake-up."""
-        self._heard.poll()
+        self.heard.poll()
         self.watch.beat()
         self._results.serve_late_comers()
         self._hazards.catch_up()
@@ -209,7 +174,7 @@ class TraverseServer(Node):
 
     def _take_joints(self, state: JointState, _arrival: float) -> None:
         try:
-            self.service.take_joints(self._joint_names.positions(state, self.service.joint_names))
+            self._inputs.take_joints(state)
         except MessageError as error:
             self.get_logger().warning(
                 f"{error}; the angles known before stay", throttle_duration_sec=5.0
@@ -217,16 +182,18 @@ class TraverseServer(Node):
 
     def _take_odometry(self, odometry: Odometry, _arrival: float) -> None:
         try:
-            here = self.frames.localise_odometry(odometry)
-            pose, _ = odometry_to_pose(here, self._values.map_frame)
-            body = float(pose[2]), *odometry_to_tilt(here)
-            self.frames.take_odometry(here)
-            self.service.take_pose(pose[[0, 1, 3]], body)
+            self._inputs.take_odometry(odometry)
             self._maps.look_under_rover()
         except RoverError as error:
             self.get_logger().warning(
                 f"odometry not used, the suspension is not compared: {error}", once=True
             )
+
+    def _take_imu(self, imu: Imu, _arrival: float) -> None:
+        try:
+            self._inputs.take_imu(imu)
+        except MessageError as error:
+            self.get_logger().warning(f"imu not used: {error}", throttle_duration_sec=10.0)
 
     def _take_ground(self, message: String) -> None:
         """Take what was learned of the ground: JSON as the command learn writes it."""
@@ -262,26 +229,29 @@ class TraverseServer(Node):
         try:
             self._check_length(count_poses(message))
             path = read_message(message, Path)
-            about = path_hash(path), stamp_text(stamp_to_ns(path.header.stamp))
-            there = self.frames.localise_path(path)
-            self.service.take_path(path_to_poses(there, self._values.map_frame), *about)
+            about = describe_path(path)
+            self.service.given_path = self._inputs.read_path(path)
         except RoverError as error:
             self.service.refuse_path(str(error), *about)
             self.get_logger().error(f"~/path refused: {error}")
 
     def _check_length(self, poses: int) -> None:
         """Raise MessageError if a path has too many poses."""
-        most = self._values.max_path_poses
+        most = self.values.max_path_poses
         if poses > most:
             raise MessageError(
                 f"path has {poses} poses; it may have {most}: leave some out, or set the "
                 "parameter max_path_poses"
             )
 
-    def localise_path(self, path: Path) -> Path:
-        """Return a path in the map frame unless it is too long."""
+    def read_path(self, path: Path) -> GivenPath:
+        """Return a path of the robot as one of the body in the map frame.
+
+        Raises:
+            RoverError: It is too long, a value is wrong, or a frame is not known.
+        """
         self._check_length(len(path.poses))
-        return self.frames.localise_path(path)
+        return self._inputs.read_path(path)
 
     def _can_traverse(
         self, request: GetPlan.Request, response: GetPlan.Response, reply: Reply
@@ -315,7 +285,7 @@ class TraverseServer(Node):
 
     def _read_ends(self, begin: PoseStamped, end: PoseStamped) -> tuple[Pose, Pose]:
         """Return start and goal (3,) of the body in the map frame; an empty start is here."""
-        frame, frames = self._values.map_frame, self.frames
+        frame, frames = self.values.map_frame, self.frames
         if is_empty(begin):
             start = self._find_here()
         else:
@@ -334,14 +304,14 @@ class TraverseServer(Node):
 
     def _find_here(self) -> Pose:
         """Return the pose (3,) of the body by /tf, else by odometry."""
-        self._heard.poll()
+        self.heard.poll()
         here = self.frames.find_here()
         if here is None:
             here = self.service.fresh_pose()
         if here is None:
             raise MessageError(
                 "start is empty, which means where the rover is, but neither /tf nor odometry of "
-                f"the last second says so; give a start in {self._values.map_frame!r}"
+                f"the last second says so; give a start in {self.values.map_frame!r}"
             )
         return here
 
@@ -363,8 +333,7 @@ class TraverseServer(Node):
         self, judgement: PathJudgement, identity: IdentityReport
     ) -> tuple[Path, Callable[[], VerdictReport]]:
         """Return plan and report of a judgement; its results are published after the answer."""
-        rover, spacing = self.service.settings.rover, self._values.plan_spacing
-        plan, report = self._results.take(judgement, identity, rover, spacing)
+        plan, report = self._results.take(judgement, identity)
         self._advice.take(judgement)
         if judgement.traversable and judgement.candidate is not None:
             poses = judgement.candidate.poses

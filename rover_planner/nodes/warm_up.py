@@ -14,7 +14,6 @@ from rover_planner.learning.contact_sense import ContactSense
 from rover_planner.learning.drive_log import FORCES, WIDTH
 from rover_planner.learning.soil_fit import SoilFit
 from rover_planner.parameters.traction_controller import TractionControllerParameters
-from rover_planner.planning.candidates import generate_candidates
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.path_search import find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
@@ -22,8 +21,6 @@ from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
 from rover_planner.traction.traction_service import TractionService
 
-CANDIDATES = (CompilationStep("candidate paths", "rover_planner.nodes.warm_up:plan_candidates"),)
-"""All that candidates of a question need."""
 PATH_SEARCH = (CompilationStep("path search", "rover_planner.nodes.warm_up:search_paths"),)
 """All that searches around obstacles need."""
 HAZARDS = (CompilationStep("classes of poses", "rover_planner.nodes.warm_up:classify_pose"),)
@@ -38,17 +35,12 @@ SIMULATION = (CompilationStep("simulator", "rover_planner.nodes.warm_up:simulate
 """All that the quasi-static simulator needs."""
 GROUPS = (
     (*EXACT, *SCORES, *SINGLE, *HAZARDS, *PATH_SEARCH, *SIMULATION),
-    (*UNCERTAIN, *TRACTION, *LEARNING, *CANDIDATES),
+    (*UNCERTAIN, *TRACTION, *LEARNING),
 )
 """All kernels in two groups that take about the same time to compile: the first compiles the model
 of a pose once for all that use it."""
 
 JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS, *STEERING_JOINTS)
-
-
-def plan_candidates() -> None:
-    """Generate the candidates of a question."""
-    generate_candidates((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
 
 
 def search_paths() -> None:

@@ -1,26 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Declares a node's parameters from their table, checks changes and passes them to the node."""
+"""Declares a node's parameters from their table."""
 
 import difflib
-import traceback
 from array import array
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any, TypeVar
 
-from rcl_interfaces.msg import (
-    FloatingPointRange,
-    IntegerRange,
-    ParameterDescriptor,
-    SetParametersResult,
-)
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from rover_physics.errors import RoverError
 from rover_planner.parameters.table import ParameterError, ParameterSpec, ParameterTable, specs_of
-from rover_planner.shell.run_program import one_line
 
 ROS_OWN = ("qos_overrides.",)
 """Begins of names of parameters that ROS declares by itself."""
@@ -30,6 +22,8 @@ Table = TypeVar("Table", bound=ParameterTable)
 
 def declare_parameters(node: Node, table: type[Table]) -> Table:
     """Declare the parameters of a table with their descriptors; return a table of their values.
+
+    Parameters that were set and do not exist get a warning in the log.
 
     Raises:
         ParameterError: An override is not allowed by the table.
@@ -43,78 +37,18 @@ def declare_parameters(node: Node, table: type[Table]) -> Table:
             _explain_override(node, table, spec)
             raise ParameterError(f"parameter {spec.name}: {error}") from error
         found.append(node.get_parameter(spec.name))
-    return replace(table(), **_changes(table, found))
+    _warn_of_unknown_parameters(node, [spec.name for spec in specs_of(table)])
+    return replace(table(), **values_in(table, found))
 
 
-def follow_changes(
-    node: Node,
-    current: Callable[[], Table],
-    accept: Callable[[Table], object],
-    apply: Callable[[Table], None],
-) -> None:
-    """Check changes of a node's parameters: refuse bad ones with a reason, apply the others.
-
-    Args:
-        node: A node that has declared the table.
-        current: Returns the current values.
-        accept: Called with all values before a change; raises if the combination is invalid.
-        apply: Called with all values after a change.
-
-    Parameters that are not in the table, such as use_sim_time, are accepted without a check and
-    call neither function.
-    """
-
-    def check(parameters: list[Parameter]) -> SetParametersResult:
-        values = current()
-        try:
-            if any(not parameter.name for parameter in parameters):
-                names = ", ".join(spec.name for spec in specs_of(type(values)))
-                raise ParameterError(f"a parameter has no name; it must be one of {names}")
-            changes = _changes(type(values), parameters)
-            if changes:
-                accept(replace(values, **changes))
-        except RoverError as error:
-            return SetParametersResult(successful=False, reason=one_line(str(error)))
-        except Exception as error:
-            # An internal error must not end the node.
-            node.get_logger().error(f"set_parameters: {traceback.format_exc()}")
-            reason = f"internal error: {type(error).__name__}: {error}"
-            return SetParametersResult(successful=False, reason=one_line(reason))
-        return SetParametersResult(successful=True)
-
-    def pass_on(parameters: list[Parameter]) -> None:
-        changes = _changes(type(current()), parameters)
-        if not changes:
-            return
-        try:
-            apply(replace(current(), **changes))
-        except Exception:
-            # A file that was good in the check may be gone by now; the node goes on as before.
-            node.get_logger().error(f"parameters not applied: {traceback.format_exc()}")
-
-    node.add_on_set_parameters_callback(check)
-    node.add_post_set_parameters_callback(pass_on)
-
-
-def warn_of_unknown_parameters(node: Node, table: type[ParameterTable]) -> None:
-    """Log a warning for each parameter that was set at start and is not declared.
-
-    Args:
-        node: The node; all its parameters are declared.
-        table: Its table of parameters.
-    """
-    names = [spec.name for spec in specs_of(table)]
+def _warn_of_unknown_parameters(node: Node, names: list[str]) -> None:
+    """Log a warning for each parameter that was set at start and is not declared."""
     given = node._parameter_overrides  # rclpy has no public access to them
     for name in sorted(given):
         if not node.has_parameter(name) and not name.startswith(ROS_OWN):
-            node.get_logger().warning(_describe_unknown(name, names))
-
-
-def _describe_unknown(name: str, names: list[str]) -> str:
-    """Return a warning that a parameter does not exist, with the nearest existing name."""
-    nearest = difflib.get_close_matches(name, names, n=1)
-    hint = f"the nearest is {nearest[0]}" if nearest else "--help lists those there are"
-    return f"parameter {name} does not exist and is ignored; {hint}"
+            nearest = difflib.get_close_matches(name, names, n=1)
+            hint = f"the nearest is {nearest[0]}" if nearest else "--help lists those there are"
+            node.get_logger().warning(f"parameter {name} does not exist and is ignored; {hint}")
 
 
 def _refuse_empty_list(node: Node, table: type[ParameterTable], spec: ParameterSpec) -> None:
@@ -133,10 +67,10 @@ def _explain_override(node: Node, table: type[ParameterTable], spec: ParameterSp
     """Raise ParameterError in the words of the table if an override breaks its rules."""
     given = node._parameter_overrides.get(spec.name)
     if given is not None:
-        replace(table(), **_changes(table, [given]))
+        replace(table(), **values_in(table, [given]))
 
 
-def _changes(table: type[ParameterTable], parameters: Iterable[Parameter]) -> dict[str, Any]:
+def values_in(table: type[ParameterTable], parameters: Iterable[Parameter]) -> dict[str, Any]:
     """Return the values of the parameters in a table by name; lists become tuples."""
     names = {spec.name for spec in specs_of(table)}
     return {

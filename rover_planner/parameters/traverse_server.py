@@ -6,9 +6,6 @@ from dataclasses import dataclass
 from rover_physics.bounds.path import SIGMAS
 from rover_physics.names import EQUAL, TORQUE_POLICIES
 from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
-from rover_planner.maps.living_map import AUTO as AUTO_UPDATES
-from rover_planner.maps.living_map import MAP_UPDATES, MERGE_RULES, NEWEST
-from rover_planner.maps.unobserved_ground import ALLOW, UNOBSERVED_GROUND
 from rover_planner.parameters import shared
 from rover_planner.parameters.table import ParameterError, ParameterTable, parameter
 
@@ -16,6 +13,15 @@ MIN_PLAN_SPACING = 0.001
 """Smallest plan_spacing other than 0 [m]."""
 REFUSE, INTERPOLATE = "refuse", "interpolate"
 """Values of the parameter unknown_cells."""
+ALLOW, ALLOW_FOOTPRINT = "allow", "allow_footprint"
+"""Values of the parameter blind_ground beside REFUSE: paths whose belly passes over ground that
+was never seen are allowed, or allowed over the start footprint only."""
+NEWEST, SUREST = "newest", "surest"
+"""Values of the parameter map_merge: which of two heights of a cell counts, the newer one or the
+one with the smaller deviation."""
+MERGE, REPLACE = "merge", "replace"
+"""Values of the parameter map_updates beside AUTO: a local map always merges, or always replaces
+the last one; AUTO merges if there is a loaded map."""
 NO_MOUNTS = ("base_link:0:0:0:0:0:0",)
 """Default of the parameter sensor_mounts, which shows its form and adds no sensor."""
 FAN, LATTICE, AUTO = "fan", "lattice", "auto"
@@ -131,14 +137,14 @@ class TraverseServerParameters(ParameterTable):
         read_only=True,
     )
     map_updates: str = parameter(
-        AUTO_UPDATES,
+        AUTO,
         "What a received map does; auto merges if a map was loaded.",
-        choices=MAP_UPDATES,
+        choices=(AUTO, MERGE, REPLACE),
     )
     map_merge: str = parameter(
         NEWEST,
         "Which of two heights of a cell counts: the newer, or that of smaller deviation.",
-        choices=MERGE_RULES,
+        choices=(NEWEST, SUREST),
     )
     map_ageing: float = parameter(
         0.0,
@@ -183,7 +189,7 @@ class TraverseServerParameters(ParameterTable):
     blind_ground: str = parameter(
         ALLOW,
         "Unseen ground below the belly: allow, only if filled (allow_footprint), or refuse.",
-        choices=UNOBSERVED_GROUND,
+        choices=(ALLOW, ALLOW_FOOTPRINT, REFUSE),
     )
     unknown_cells: str = parameter(
         REFUSE,

@@ -16,9 +16,12 @@ class AskedPoses:
     """The poses of a path at which the model was asked, m of them, in the order of the path."""
 
     prediction: PathPrediction
-    """Of all of them; its `waypoint` is the next one for a pose in between."""
+    """Of all of them; its `waypoint` is the next one for a pose in between, its energy what was
+    spent up to there."""
     is_between: NDArray[np.bool_]
     """(m,) True for poses between waypoints."""
+    place: Floats
+    """(m,) places along the path: 2.5 is half-way from waypoint 2 to 3."""
     distance: Floats
     """(m,) horizontal distance since the start [m]."""
     time: Floats
@@ -35,6 +38,10 @@ def merge_poses(prediction: PathPrediction) -> AskedPoses:
         place = np.concatenate([place, _places(prediction.poses, between)])
     order = np.argsort(place, kind="stable")
     along = place[order]
+    driven = {
+        name: np.interp(along, np.arange(n), _hold_known(getattr(prediction, name)))
+        for name in ("distance", "time", "energy")
+    }
     merged = replace(
         prediction,
         poses=np.concatenate([part.poses for part in parts])[order],
@@ -43,17 +50,13 @@ def merge_poses(prediction: PathPrediction) -> AskedPoses:
         between=None,
         bounds=None,
     )
-    return AskedPoses(
-        merged,
-        order >= n,
-        np.interp(along, np.arange(n), prediction.distance),
-        np.interp(along, np.arange(n), _hold_known(prediction.time)),
-    )
+    known = merged.change(**driven)
+    return AskedPoses(known, order >= n, along, driven["distance"], driven["time"])
 
 
-def _hold_known(times: Floats) -> Floats:
-    """Return times (n,) [s], ascending, with the last known one, or 0, in place of each NaN."""
-    return np.maximum.accumulate(np.where(np.isnan(times), 0.0, times))
+def _hold_known(values: Floats) -> Floats:
+    """Return values (n,), ascending, with the last known one, or 0, in place of each NaN."""
+    return np.maximum.accumulate(np.where(np.isnan(values), 0.0, values))
 
 
 def _places(poses: Floats, between: PathPrediction) -> Floats:

@@ -68,14 +68,10 @@ class Assumptions:
 
 def assume(rover: Rover, options: SweepOptions, map_sigmas: float = SIGMAS) -> Assumptions:
     """Return the assumptions of a prediction."""
+    told = ("policy", "control_margin", "friction", "max_torque", "soil", "payload")
     return Assumptions(
         rover=rover.name,
-        policy=options.policy,
-        control_margin=options.control_margin,
-        friction=options.friction,
-        max_torque=options.max_torque,
-        soil=options.soil,
-        payload=options.payload,
+        **{name: getattr(options, name) for name in told},
         joint_angles=options.arm_angles,
         has_tool_load=options.tool_force is not None or options.tool_moment is not None,
         map_sigmas=map_sigmas,

@@ -16,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 
 from rover_physics.numerics.interruption import check_interruption
-from rover_physics.numerics.kernels import exact_kernel
 from rover_planner.errors import PlanningError
 from rover_planner.planning.angles import wrap
 from rover_planner.planning.dubins import dubins_paths
@@ -189,10 +188,13 @@ def _is_drivable(slope: np.ndarray, speed: np.ndarray, min_radius: float) -> boo
         speed: (n,) the size of the derivative.
         min_radius: Smallest radius [m].
     """
-    ends = speed[::2]
+    (x, y), ends = slope[:, ::2], speed[::2]
     if ends.min() <= 1e-6 * ends.max():
         return False
-    return bool(turns_within(slope, speed, float(min_radius)))
+    across, along = x[:-1] * y[1:] - y[:-1] * x[1:], x[:-1] * x[1:] + y[:-1] * y[1:]
+    driven = 0.5 * (ends[1:] + ends[:-1]) / len(across)
+    turned = np.abs(np.arctan2(across, along))
+    return bool((turned * min_radius <= driven * (1 + 1e-9)).all())
 
 
 def _sample(curve: BumpedCurve, speed: np.ndarray, waypoint_spacing: float) -> np.ndarray:
@@ -203,11 +205,33 @@ def _sample(curve: BumpedCurve, speed: np.ndarray, waypoint_spacing: float) -> n
     driven = np.concatenate([[0.0], np.cumsum(pieces)])
     steps = max(1, int(np.ceil(driven[-1] / waypoint_spacing - 1e-9)))
     marks = np.linspace(0.0, driven[-1], steps + 1)
-    t, poses, slope = np.empty(steps + 1), np.empty((steps + 1, 3)), np.empty((2, steps + 1))
-    interpolate(marks, driven, _FINE[::2], 1 / ends, t)
-    follow_curve(t, curve, poses, slope)
-    poses[:, 2] = np.arctan2(slope[1], slope[0])
-    return poses
+    return _follow(curve, _interpolate(marks, driven, _FINE[::2], 1 / ends))
+
+
+def _interpolate(at: np.ndarray, x: np.ndarray, y: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    """Return the cubic Hermite spline through (x, y) with given slopes at places (n,).
+
+    scipy has this spline, but importing scipy.interpolate takes a tenth of the start time of a
+    server.
+    """
+    i = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(x) - 2)
+    width, rise = x[i + 1] - x[i], y[i + 1] - y[i]
+    s = (at - x[i]) / width
+    first, last = slopes[i] * width - rise, rise - slopes[i + 1] * width
+    return np.asarray(y[i] + s * rise + s * (1 - s) * ((1 - s) * first + s * last))
+
+
+def _follow(curve: BumpedCurve, t: np.ndarray) -> np.ndarray:
+    """Return the poses (n, 3) of a curve at parameters (n,)."""
+    u, rest = t[:, None], 1 - t[:, None]
+    sine, cosine = np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)
+    places = curve.start + u * u * (3 - 2 * u) * curve.chord
+    places = places + u * (rest * rest) * curve.m0 - u * u * rest * curve.m1
+    places = places + 0.5 * curve.offset * (1 - cosine) * curve.left
+    slope = 6 * u * rest * curve.chord
+    slope = slope + rest * (1 - 3 * u) * curve.m0 + u * (3 * u - 2) * curve.m1
+    slope = slope + np.pi * curve.offset * sine * curve.left
+    return np.column_stack([places, np.arctan2(slope[:, 1], slope[:, 0])])
 
 
 def _build_arcs(start, goal, count, waypoint_spacing, min_radius) -> list[np.ndarray]:
@@ -240,59 +264,6 @@ def check_pose(name: str, pose) -> np.ndarray:
         raise PlanningError(f"{name} is {given}; it must be three finite numbers x, y, yaw")
     values[2] = wrap(values[2])
     return values
-
-
-@exact_kernel
-def interpolate(at, x, y, slopes, values):
-    """Evaluate the cubic Hermite spline through (x, y) with given slopes at ascending `at`.
-
-    The result is written into `values`. scipy has this spline, but importing scipy.interpolate
-    takes a tenth of the start time of a server.
-    """
-    i = 0
-    for k in range(at.size):
-        while i < x.size - 2 and x[i + 1] <= at[k]:
-            i += 1
-        width, rise = x[i + 1] - x[i], y[i + 1] - y[i]
-        s = (at[k] - x[i]) / width
-        first, last = slopes[i] * width - rise, rise - slopes[i + 1] * width
-        values[k] = y[i] + s * rise + s * (1 - s) * ((1 - s) * first + s * last)
-
-
-@exact_kernel
-def turns_within(slopes, speeds, min_radius):
-    """Return whether no radius of a curve is smaller than `min_radius` [m].
-
-    Args:
-        slopes: (2, 2 n - 1) first derivatives at n samples and half-way between them [m].
-        speeds: (2 n - 1,) norms of the derivatives [m].
-        min_radius: Smallest radius [m].
-    """
-    pieces = speeds.size // 2
-    for k in range(0, 2 * pieces, 2):
-        across = slopes[0, k] * slopes[1, k + 2] - slopes[1, k] * slopes[0, k + 2]
-        along = slopes[0, k] * slopes[0, k + 2] + slopes[1, k] * slopes[1, k + 2]
-        driven = 0.5 * (speeds[k + 2] + speeds[k]) / pieces
-        if not abs(np.arctan2(across, along)) * min_radius <= driven * (1 + 1e-9):
-            return False
-    return True
-
-
-@exact_kernel
-def follow_curve(t, curve, poses, slopes):
-    """Write positions [m] into poses (n, 3) and first derivatives (2, n) at parameters t (n,)."""
-    start, chord, m0, m1 = curve.start, curve.chord, curve.m0, curve.m1
-    left, offset = curve.left, curve.offset
-    for k in range(t.size):
-        u, rest = t[k], 1 - t[k]
-        sine, cosine = np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)
-        for i in range(2):
-            place = start[i] + u * u * (3 - 2 * u) * chord[i]
-            place = place + u * (rest * rest) * m0[i] - u * u * rest * m1[i]
-            poses[k, i] = place + 0.5 * offset * (1 - cosine) * left[i]
-            slope = 6 * u * rest * chord[i]
-            slope = slope + rest * (1 - 3 * u) * m0[i] + u * (3 * u - 2) * m1[i]
-            slopes[i, k] = slope + np.pi * offset * sine * left[i]
 
 
 def turn_and_drive(

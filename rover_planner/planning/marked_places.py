@@ -8,12 +8,11 @@ may leave it, so that one that stands at its rim gets away.
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.traversability.verdict import with_refusals
 from rover_planner.errors import PlanningError
 from rover_planner.planning.path_query import Candidate
 
@@ -63,10 +62,7 @@ class MarkedPlaces:
         found = self._find(candidate.poses) if candidate.verdict.traversable else None
         if found is None:
             return candidate
-        codes, reasons = [""] * len(candidate.poses), [""] * len(candidate.poses)
-        codes[found[0]], reasons[found[0]] = MARKED_CODE, found[1].describe()
-        verdict = with_refusals(candidate.verdict, codes, reasons)
-        return replace(candidate, verdict=verdict, cost=(math.inf, math.inf))
+        return candidate.refuse_at(found[0], MARKED_CODE, found[1].describe())
 
     def _find(self, poses: NDArray[np.float64]) -> tuple[int, MarkedPlace] | None:
         """Return the first pose that comes nearer to a centre within a disc, and its place."""

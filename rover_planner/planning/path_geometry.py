@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Geometry of paths: waypoints between given poses, and rings of goals around a goal."""
+"""Geometry of paths: distances, waypoints between given poses, rings of goals around a goal."""
 
 import math
 from collections.abc import Iterator
@@ -16,6 +16,12 @@ _MAX_RINGS = 4
 """Largest number of rings: each goal costs an evaluation."""
 _RING_GOALS = 8
 """Goals on each ring: every 45 degrees."""
+
+
+def distance_along(poses: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the distance (n,) [m] of each pose of a path (n, 3) from its start, along it."""
+    steps = np.diff(poses[:, :2], axis=0)
+    return np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
 
 
 def densify(poses: NDArray[np.float64], spacing: float) -> NDArray[np.float64]:

@@ -17,7 +17,7 @@ from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radi
 from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path, judge_paths
-from rover_physics.traversability.verdict import Verdict
+from rover_physics.traversability.verdict import Verdict, with_refusals
 from rover_planner.planning.candidates import generate_candidates, path_length
 
 Pose = NDArray[np.float64]
@@ -86,6 +86,14 @@ class Candidate:
         if failure < 0:
             return 1.0
         return failure / max(1, len(self.poses) - 1)
+
+
+    def refuse_at(self, waypoint: int, code: str, reason: str) -> "Candidate":
+        """Return the path, refused at a waypoint for what the model does not know."""
+        codes, reasons = [""] * len(self.poses), [""] * len(self.poses)
+        codes[waypoint], reasons[waypoint] = code, reason
+        verdict = with_refusals(self.verdict, codes, reasons)
+        return replace(self, verdict=verdict, cost=(math.inf, math.inf))
 
 
 @dataclass(frozen=True)

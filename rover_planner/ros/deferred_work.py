@@ -2,12 +2,13 @@
 """Work that a node does after it has answered a request, so that answers are not delayed."""
 
 import time
-import traceback
 from collections import deque
 from collections.abc import Callable
 
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+
+from rover_planner.ros.guard import Guard
+from rover_planner.ros.steady import create_steady_timer
 
 QUIET = 0.03
 """Time after the last answer before the work begins [s]: a client has time to read the answer
@@ -31,15 +32,14 @@ class DeferredWork:
     next request. No work is skipped and the order is kept.
     """
 
-    def __init__(self, node: Node):
-        self._node = node
+    def __init__(self, node: Node, guard: Guard):
+        self._guard = guard
         self._answers: deque[deque[Work]] = deque()
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(QUIET, self._run_some, clock=steady, autostart=False)
+        self._timer = create_steady_timer(node, QUIET, self._run_some, starts=False)
         self._too_many = node.create_guard_condition(self._run_oldest)
 
     def do(self, *pieces: Work) -> None:
-        """Defer the work of one answer; errors of its pieces are logged."""
+        """Defer the work of one answer; `guard` takes errors of its pieces."""
         self._answers.append(deque(pieces))
         self._wait(QUIET)
         if len(self._answers) > MAX_WAITING:
@@ -67,11 +67,7 @@ class DeferredWork:
     def _run_next(self) -> None:
         """Run the next piece of the oldest answer."""
         pieces = self._answers[0]
-        try:
-            if pieces:
-                pieces.popleft()()
-        except Exception:
-            # An internal error must not end the node.
-            self._node.get_logger().error(traceback.format_exc())
+        if pieces:
+            self._guard.call(pieces.popleft())
         if not pieces:
             self._answers.popleft()

@@ -59,7 +59,9 @@ class Frames:
             sensors: The mounts; None knows where sensors are by transforms alone.
         """
         self._map, self._base = parameters.map_frame, parameters.base_frame
-        self._now, self._sensors = now, sensors
+        self.now = now
+        """Returns the present time [ns]."""
+        self._sensors = sensors
         self._tree = TransformTree(parameters.transform_timeout)
         offset = parameters.base_offset
         self._offset = Rigid.from_rpy(*offset) if any(offset) else None
@@ -85,7 +87,7 @@ class Frames:
         stamp, robot = stamp_to_ns(odometry.header.stamp), read_pose(odometry.pose.pose)
         if self._offset is not None:
             robot = robot.then(self._offset.inverse())
-        self._sensors.take(robot, self._now() if stamp is None else stamp)
+        self._sensors.take(robot, self.now() if stamp is None else stamp)
 
     def find(self, frame: str, stamp: int | None) -> Rigid:
         """Return where a frame is in the map frame at a time [ns]; None is the newest.
@@ -95,8 +97,8 @@ class Frames:
         """
         try:
             if self._sensors is not None:
-                return self._sensors.find(frame, stamp, self._now(), self._tree)
-            return self._tree.find(self._map, frame, stamp, self._now())
+                return self._sensors.find(frame, stamp, self.now(), self._tree)
+            return self._tree.find(self._map, frame, stamp, self.now())
         except TransformError as error:
             raise TransformError(f"{error}{self.silence}") from None
 
@@ -120,7 +122,7 @@ class Frames:
         """
         if not self._tree.has_parent(self._base):
             return None
-        robot = self._tree.find(self._map, self._base, None, self._now())
+        robot = self._tree.find(self._map, self._base, None, self.now())
         return self._to_body(robot).xyyaw
 
     def place_level(self, pose: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -148,7 +150,7 @@ class Frames:
         rigid = read_pose(stamped.pose)
         if not is_here:
             stamp = stamp_to_ns(stamped.header.stamp)
-            rigid = self._tree.find(self._map, frame, stamp, self._now()).then(rigid)
+            rigid = self._tree.find(self._map, frame, stamp, self.now()).then(rigid)
         moved = PoseStamped(pose=Pose())
         write_pose(self._to_body(rigid), moved.pose)
         moved.header.stamp = stamped.header.stamp

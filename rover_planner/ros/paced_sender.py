@@ -5,10 +5,10 @@ import time
 from collections import deque
 from collections.abc import Callable
 
-from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from rover_planner.ros.guard import Guard
+from rover_planner.ros.steady import create_steady_timer
 
 AT_ONCE = 5
 """Largest number of responses in a group."""
@@ -27,8 +27,7 @@ class PacedSender:
         self._guard = guard
         self._waiting: deque[Callable[[], None]] = deque()
         self._begin, self._count = 0.0, 0
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(PAUSE, self._send_group, clock=steady, autostart=False)
+        self._timer = create_steady_timer(node, PAUSE, self._send_group, starts=False)
 
     def send(self, function: Callable[[], None]) -> None:
         """Call a function that sends a response, now or soon."""

@@ -4,17 +4,18 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSPolicyKind, QoSProfile
 
+from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import (
     HEAR_BEST_EFFORT,
     map_subscriptions,
     replace_reliability,
     topic_qos,
 )
+from rover_planner.ros.steady import create_steady_timer
 
 PERIOD = 5.0
 """Time between two looks at the types of publishers [s]; one takes a millisecond per topic."""
@@ -44,18 +45,14 @@ def subscribe_to_requests(
 
 
 def subscribe_to_map(
-    node: Node,
-    kind: type,
-    name: str,
-    take: Callable[[bytes], object],
-    durability: str,
-    reliability: str,
+    node: RoverNode[Any], kind: type, name: str, take: Callable[[bytes], object]
 ) -> None:
     """Subscribe to a topic of maps, whose messages `take` gets as bytes, perhaps twice.
 
-    The rest is as for `subscribe_to_requests`; `durability` is one of `MAP_DURABILITIES`.
+    The rest is as for `subscribe_to_requests`.
     """
-    for qos, mends in map_subscriptions(durability, reliability):
+    values = node.values
+    for qos, mends in map_subscriptions(values.map_durability, values.input_reliability):
         _subscribe(node, kind, name, take, qos, mends, raw=True)
 
 
@@ -98,7 +95,7 @@ class PublisherCheck:
         self._logged: set[str] = set()
         self.problems: tuple[str, ...] = ()
         """The problems found last."""
-        node.create_timer(PERIOD, self._check, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        create_steady_timer(node, PERIOD, self._check)
 
     def _check(self) -> None:
         self.problems = tuple(

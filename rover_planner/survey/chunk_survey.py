@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The survey of one chunk: the work of one task, in whatever process it runs."""
 
-import functools
 import time
-import uuid
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numba
@@ -15,12 +13,10 @@ from rover_physics.results.record import RESULT
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import BLOCK
 from rover_planner.errors import PlanningError
-from rover_planner.survey.geotiff import GeoTiffMap
 from rover_planner.survey.layers import types_of_layers
-from rover_planner.survey.layout import Box, Index, SurveyLayout
-from rover_planner.survey.map_source import StoredMap
+from rover_planner.survey.layout import Box, Index
 from rover_planner.survey.request import SurveyRequest
-from rover_planner.survey.store import SurveyStore, is_refusal
+from rover_planner.survey.store import StoreNotes, SurveyStore, is_refusal
 from rover_planner.survey.tile_survey import BATCH, survey_tile
 
 BYTES_OF_CELL = 60
@@ -35,18 +31,10 @@ class SurveyJob:
 
     request: SurveyRequest
     """The question."""
-    layout: SurveyLayout
-    """Cells and chunks."""
-    resolution: float
-    """Size of a map cell [m]."""
     store: Path
-    """Folder of the store, seen by all workers."""
-    map_file: str
-    """GeoTIFF file of the map, seen by all workers; empty if the map is kept in the store."""
+    """Folder of the store; all workers see it, and the map if that is a GeoTIFF."""
     version: str = rover_physics.__version__
     """Version of the model."""
-    run: str = field(default_factory=lambda: uuid.uuid4().hex)
-    """Name of this run of the command; a worker opens the store once in it."""
 
 
 @dataclass(frozen=True)
@@ -57,15 +45,8 @@ class ChunkReport:
     """Row and column of the chunk."""
     poses: int = 0
     """Number of poses."""
-    seconds: float = 0.0
-    """Time that it took [s]."""
     refusal: str = ""
     """Reason of the system for not writing, empty if it has written."""
-
-
-def open_map(store: Path, map_file: str) -> GeoTiffMap | StoredMap:
-    """Return the map of a store: the GeoTIFF it names, or, if it names none, what it keeps."""
-    return GeoTiffMap(Path(map_file)) if map_file else StoredMap(store)
 
 
 def survey_chunk(job: SurveyJob, chunk: Index) -> ChunkReport:
@@ -80,9 +61,9 @@ def survey_chunk(job: SurveyJob, chunk: Index) -> ChunkReport:
             f"the worker has version {rover_physics.__version__}, the survey {job.version}"
         )
     numba.set_num_threads(1)  # a worker is one core
-    began, wrong = time.perf_counter(), ""
+    began, store, wrong = time.perf_counter(), SurveyStore(job.store), ""
     try:
-        layers = compute_chunk(job, chunk)
+        layers = compute_chunk(job.request, store, chunk)
     except PlanningError as error:
         wrong = str(error)
     if wrong:  # without its causes, as GDAL's errors cannot be sent to the client
@@ -90,29 +71,20 @@ def survey_chunk(job: SurveyJob, chunk: Index) -> ChunkReport:
     poses = layers["worst_class"].size * job.request.headings
     seconds = time.perf_counter() - began
     try:
-        open_store(job.store, job.run).write(chunk, layers, seconds)
+        store.write(chunk, layers, seconds)
     except OSError as error:
         if not is_refusal(error):
             raise
         return ChunkReport(chunk, refusal=error.strerror or str(error))
-    return ChunkReport(chunk, poses, seconds)
+    return ChunkReport(chunk, poses)
 
 
-@functools.lru_cache(maxsize=1)
-def open_store(store: Path, run: str) -> SurveyStore:
-    """Open a store once for all chunks that a process surveys in a run of the command.
-
-    Args:
-        store: Its folder.
-        run: Name of the run.
-    """
-    return SurveyStore(store)
-
-
-def compute_chunk(job: SurveyJob, chunk: Index) -> dict[str, np.ndarray]:
+def compute_chunk(
+    request: SurveyRequest, store: SurveyStore, chunk: Index
+) -> dict[str, np.ndarray]:
     """Return the layers of a chunk."""
-    layout, request, resolution = job.layout, job.request, job.resolution
-    source = open_map(job.store, job.map_file)
+    layout, resolution = store.notes.layout, store.notes.frame.resolution
+    source = store.open_map()
     cells = layout.cells_of(chunk)
     window = layout.window_of(cells)
     grids, soils = source.read(window), source.soil_names
@@ -143,18 +115,17 @@ def compute_chunk(job: SurveyJob, chunk: Index) -> dict[str, np.ndarray]:
     return layers
 
 
-def estimate_memory(job: SurveyJob) -> int:
+def estimate_memory(notes: StoreNotes) -> int:
     """Return the memory [bytes] that a worker needs for the largest chunk with its halo."""
-    layout = job.layout
+    layout = notes.layout
     rows, columns = (min(layout.chunk, size) for size in layout.shape)
     sides = [
         min((side - 1) * layout.step + 1 + 2 * layout.halo + BLOCK, size)
         for side, size in zip((rows, columns), layout.map_shape, strict=True)
     ]
-    asked = job.request
-    kinds = types_of_layers(asked.headings, asked.turns, asked.chance).values()
+    kinds = types_of_layers(notes.headings, notes.turns, notes.chance).values()
     kept = 2 * rows * columns * sum(kind.itemsize for kind in kinds)
-    poses = 4 * max(BATCH, job.request.headings) * RESULT.itemsize
+    poses = 4 * max(BATCH, notes.headings) * RESULT.itemsize
     return BYTES_OF_PROCESS + BYTES_OF_CELL * sides[0] * sides[1] + kept + poses
 
 

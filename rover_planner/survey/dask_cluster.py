@@ -9,6 +9,7 @@ from typing import Any
 
 from rover_planner.errors import PlanningError
 from rover_planner.survey.chunk_survey import SurveyJob, estimate_memory
+from rover_planner.survey.store import StoreNotes
 
 ATTEMPTS = 3
 """Number of times that a chunk is tried."""
@@ -132,7 +133,7 @@ def _silent_logs() -> Iterator[None]:
             logging.getLogger(name).setLevel(level)
 
 
-def check_machine(job: SurveyJob, settings: ClusterSettings) -> None:
+def check_machine(notes: StoreNotes, settings: ClusterSettings) -> None:
     """Check that workers have the memory for the largest chunk, before a store is made for it.
 
     Those of a scheduler are asked if there are some by now.
@@ -145,11 +146,11 @@ def check_machine(job: SurveyJob, settings: ClusterSettings) -> None:
 
     if settings.scheduler is not None:
         with open_client(settings) as client:
-            _check_memory(job, client)
+            check_memory(notes, client)
         return
     share = MEMORY_LIMIT // CPU_COUNT  # of a worker, by Dask's default
-    _compare(job, settings.memory_size or share)
-    workers, needed = settings.workers or CPU_COUNT, estimate_memory(job)
+    _compare(notes, settings.memory_size or share)
+    workers, needed = settings.workers or CPU_COUNT, estimate_memory(notes)
     if workers * needed > MEMORY_LIMIT:
         raise PlanningError(
             f"{workers} workers need {workers * needed / 1e6:.0f} MB; this machine has "
@@ -173,7 +174,7 @@ def wait_for_workers(client: Any) -> None:
 
 
 def check_workers(job: SurveyJob, client: Any, workers: Sequence[str]) -> None:
-    """Check that workers, by address, have this version, see the store and have enough memory.
+    """Check that workers, by address, have this version and see the store.
 
     A worker that cannot import a task would never answer.
 
@@ -199,21 +200,25 @@ def check_workers(job: SurveyJob, client: Any, workers: Sequence[str]) -> None:
     for worker, fault in answers.items():
         if fault and not isinstance(fault, OSError):  # that of one which went away
             raise PlanningError(f"worker {worker} {fault}")
-    _check_memory(job, client)
 
 
-def _check_memory(job: SurveyJob, client: Any) -> None:
-    """Check that the largest chunk fits into the memory of each worker there is."""
+def check_memory(notes: StoreNotes, client: Any) -> None:
+    """Check that the largest chunk fits into the memory of each worker there is.
+
+    Raises:
+        PlanningError: It does not.
+    """
     workers = client.scheduler_info(n_workers=-1)["workers"].values()
     limits = [worker["memory_limit"] // worker["nthreads"] for worker in workers]
-    _compare(job, min((limit for limit in limits if limit), default=0))
+    _compare(notes, min((limit for limit in limits if limit), default=0))
 
 
-def _compare(job: SurveyJob, least: int) -> None:
+def _compare(notes: StoreNotes, least: int) -> None:
     """Compare the memory of the largest chunk with that of a worker [bytes], 0: no limit."""
-    needed = estimate_memory(job)
+    needed = estimate_memory(notes)
     if least and needed > least:
+        side = notes.layout.chunk
         raise PlanningError(
-            f"a chunk of {job.layout.chunk} x {job.layout.chunk} cells needs {needed / 1e6:.0f} MB"
-            f"; a worker has {least / 1e6:.0f} MB: give a smaller --chunk or more memory"
+            f"a chunk of {side} x {side} cells needs {needed / 1e6:.0f} MB; a worker has "
+            f"{least / 1e6:.0f} MB: give a smaller --chunk or more memory"
         )

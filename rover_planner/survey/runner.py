@@ -13,6 +13,7 @@ from rover_planner.survey.dask_cluster import (
     ATTEMPTS,
     ClusterSettings,
     check_machine,
+    check_memory,
     check_workers,
     open_client,
     wait_for_workers,
@@ -39,8 +40,6 @@ class SurveyOutcome:
 
     poses: int = 0
     """Number of poses judged."""
-    seconds: float = 0.0
-    """Time of all chunks together [s]."""
     done: int = 0
     """Number of chunks finished."""
     failed: dict[Index, str] = field(default_factory=dict)
@@ -71,11 +70,12 @@ def run_survey(
     """
     from distributed.comm import CommClosedError
 
-    check_machine(job, settings)
+    store = SurveyStore(job.store)
+    check_machine(store.notes, settings)
     try:
         with open_client(settings) as client:
             wait_for_workers(client)
-            return _Run(job, client, iter(chunks), on_chunk, task).run()
+            return _Run(job, store, client, iter(chunks), on_chunk, task).run()
     except CommClosedError:
         raise PlanningError(GONE) from None
 
@@ -83,8 +83,9 @@ def run_survey(
 class _Run:
     """The chunks of a run: those to come, those under way, and what became of the others."""
 
-    def __init__(self, job, client, chunks, on_chunk, task):
-        self._job, self._client, self._chunks = job, client, chunks
+    def __init__(self, job, store, client, chunks, on_chunk, task):
+        self._job, self._store = job, store
+        self._client, self._chunks = client, chunks
         self._on_chunk, self._task = on_chunk, task
         self._outcome = SurveyOutcome()
         self._chunk_of: dict[str, Index] = {}
@@ -127,6 +128,7 @@ class _Run:
             new, self._workers = threads.keys() - self._workers, frozenset(threads)
             if new:
                 check_workers(self._job, self._client, sorted(new))
+                check_memory(self._store.notes, self._client)
             self._count_again = time.monotonic() + COUNT_PERIOD
         free = max(AHEAD * self._threads - len(self._chunk_of), 0)
         for chunk in itertools.islice(self._chunks, free):
@@ -149,7 +151,6 @@ class _Run:
             )
         self._outcome.done += 1
         self._outcome.poses += report.poses
-        self._outcome.seconds += report.seconds
         self._on_chunk(report)
 
     def _give_up(self, chunk: Index, error: BaseException) -> None:
@@ -158,7 +159,7 @@ class _Run:
         self._outcome.failed[chunk] = (
             f"its worker died {ATTEMPTS} times" if _is_killed(error) else why
         )
-        SurveyStore(self._job.store).mark_failed(chunk)
+        self._store.mark_failed(chunk)
 
 
 def _is_killed(error: BaseException) -> bool:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rover_physics.files.validation import show_file
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
+from rover_planner.survey.geotiff import GeoTiffMap
 from rover_planner.survey.layers import (
     CLASS_NUMBERS,
     NOT_SURVEYED,
@@ -25,7 +26,7 @@ from rover_planner.survey.layers import (
     types_of_layers,
 )
 from rover_planner.survey.layout import Index, SurveyLayout
-from rover_planner.survey.map_source import MapFrame, keep_map
+from rover_planner.survey.map_source import MapFrame, StoredMap, keep_map
 from rover_planner.survey.request import hash_of
 
 FORMAT = 2
@@ -132,10 +133,10 @@ class KeptLayer:
         """Type of the values."""
         return np.dtype(self._array.dtype)
 
-    def has_chunk(self, chunk: tuple[int, int]) -> bool:
-        """Return whether the file of a chunk (row, column) is there."""
+    def file_of(self, chunk: Index) -> Path:
+        """Return the file of a chunk."""
         key = self._array.metadata.encode_chunk_key(chunk)
-        return (self._path / self._array.basename / key).is_file()
+        return Path(self._path, self._array.basename, key)
 
     def __getitem__(self, key: Any) -> NDArray[Any]:
         """Read a part.
@@ -147,14 +148,6 @@ class KeptLayer:
             return np.asarray(self._array[key])
         except UNREADABLE as error:
             raise _damaged(self._path, self._array.basename, error) from None
-
-    def __setitem__(self, key: Any, values: Any) -> None:
-        """Write a part.
-
-        Raises:
-            OSError: The system refuses.
-        """
-        self._array[key] = values
 
 
 class SurveyStore:
@@ -169,13 +162,11 @@ class SurveyStore:
         """
         import zarr
 
-        from rover_planner.survey.durable_store import DurableStore
-
         self.path = path
         if not path.exists():
             raise PlanningError(f"no survey {show_file(path)}")
         try:
-            self._group: Any = zarr.open_group(DurableStore(path), mode="r+")
+            self._group: Any = zarr.open_group(path, mode="r+")
             notes = self._group.attrs[NOTES]
             if notes["format"] != FORMAT:
                 raise PlanningError(
@@ -233,14 +224,14 @@ class SurveyStore:
         return {
             chunk
             for chunk in zip(rows.tolist(), columns.tolist(), strict=True)
-            if all(layer.has_chunk(chunk) for layer in layers)
+            if all(layer.file_of(chunk).is_file() for layer in layers)
         }
 
     def write(self, chunk: Index, layers: Mapping[str, np.ndarray], seconds: float) -> None:
         """Write the layers of a chunk, then that it is finished.
 
-        Each file is written aside, forced to the disk and renamed when it is whole, so that a
-        chunk that is marked as finished is there after a power failure.
+        Layers are forced to the disk before, so that a chunk that is marked as finished is there
+        after a power failure.
 
         Raises:
             OSError: The system refuses.
@@ -253,15 +244,22 @@ class SurveyStore:
 
         def put(name: str) -> None:
             arrays[name][rows, columns] = layers[name]
+            force_to_disk(self.layer(name).file_of(chunk), self.path)
 
         with ThreadPoolExecutor(WRITERS) as writers:  # the disk takes many files at a time
             for _ in writers.map(put, layers):
                 pass
         self._group[SECONDS][chunk] = max(seconds, 0.0)
+        force_to_disk(self.layer(SECONDS).file_of(chunk), self.path)
 
     def mark_failed(self, chunk: Index) -> None:
         """Write that a chunk failed."""
         self._group[SECONDS][chunk] = FAILED
+
+    def open_map(self) -> GeoTiffMap | StoredMap:
+        """Return the map: the GeoTIFF that the notes name, or, if they name none, the kept one."""
+        file = self.notes.map_file
+        return GeoTiffMap(Path(file)) if file else StoredMap(self.path)
 
     def layer_names(self) -> list[str]:
         """Return the names of the layers."""
@@ -311,12 +309,10 @@ def create_store(path: Path, notes: StoreNotes, terrain: Terrain | None) -> None
     """
     import zarr
 
-    from rover_planner.survey.durable_store import DurableStore, force_folders
-
     aside = path.with_name(f"{path.name}.{os.getpid()}.new")
     layout = notes.layout
     try:
-        group: Any = zarr.open_group(DurableStore(aside), mode="w")
+        group: Any = zarr.open_group(aside, mode="w")
         side = min(layout.chunk, max(layout.shape))
         for name, kind in types_of_layers(notes.headings, notes.turns, notes.chance).items():
             group.create_array(
@@ -332,16 +328,29 @@ def create_store(path: Path, notes: StoreNotes, terrain: Terrain | None) -> None
         if terrain is not None:
             keep_map(group, terrain)
         group.attrs[NOTES] = notes.to_dict()
+        os.sync()
         try:
             aside.rename(path)
         except OSError as error:
             if error.errno not in (errno.EEXIST, errno.ENOTEMPTY):
                 raise
-        force_folders(path.parent, path.parent)
+        force_to_disk(path.parent, path.parent)
     except OSError as error:
         raise PlanningError(f"{show_file(path)}: cannot be written: {error.strerror}") from None
     finally:  # also after Ctrl-C
         shutil.rmtree(aside, ignore_errors=True)
+
+
+def force_to_disk(path: Path, root: Path) -> None:
+    """Force a file or folder, and the folders above it up to `root`, to the disk."""
+    for one in (path, *path.parents):
+        number = os.open(one, os.O_RDONLY)
+        try:
+            os.fsync(number)
+        finally:
+            os.close(number)
+        if one == root:
+            return
 
 
 def is_refusal(error: OSError) -> bool:

@@ -39,7 +39,7 @@ class PreparedSurvey:
     @property
     def finished(self) -> int:
         """Number of chunks that were finished before."""
-        rows, columns = self.job.layout.chunks
+        rows, columns = self.store.notes.layout.chunks
         return rows * columns - len(self.chunks)
 
 
@@ -80,20 +80,15 @@ def prepare_survey(
         terrain = load_terrain(map_name, max_cells).fill_gaps(max_gap)
         frame, map_file, content = frame_of(terrain), "", fingerprint(terrain)
     notes = _make_notes(request, frame, map_file, content, chunk)
-
-    def make_job(layout: SurveyLayout) -> SurveyJob:
-        return SurveyJob(request, layout, frame.resolution, out.absolute(), map_file)
-
     if not out.exists():
         if settings is not None:
-            check_machine(make_job(notes.layout), settings)
+            check_machine(notes, settings)
         create_store(out, notes, terrain)
     store = SurveyStore(out)
     store.check(notes.description, None if chunk is None else notes.layout.chunk)
-    job, finished = make_job(store.notes.layout), store.find_finished()
-    return PreparedSurvey(
-        job, store, [one for one in job.layout.all_chunks if one not in finished]
-    )
+    finished = store.find_finished()
+    left = [one for one in store.notes.layout.all_chunks if one not in finished]
+    return PreparedSurvey(SurveyJob(request, out.absolute()), store, left)
 
 
 def summarise(store: SurveyStore) -> dict[str, Any]:

@@ -10,12 +10,11 @@ from rover_physics import Terrain
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.numerics.quaternions import rpy_from_xyzw
 from rover_planner.maps.ground_beneath import Standing
-from rover_planner.maps.map_keeper import MERGE, MapKeeper
+from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
-from rover_planner.parameters.traverse_server import FAN, TraverseServerParameters
+from rover_planner.parameters.traverse_server import FAN, MERGE, TraverseServerParameters
 from rover_planner.planning.answering.service_settings import (
     load_service_settings,
-    map_rules,
 )
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.simulator.simulation import Simulation, load_simulation_settings
@@ -44,7 +43,7 @@ class Drive:
         self.simulation = Simulation(settings)
         asked = TraverseServerParameters(map_updates=MERGE, planner=FAN, **parameters)
         self.service = TraverseService(load_service_settings(asked))
-        self.keeper = MapKeeper(settings.rover, map_rules(asked))
+        self.keeper = MapKeeper(settings.rover, asked)
         self.time = 0.0
 
     def look(self) -> None:

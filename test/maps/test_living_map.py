@@ -12,7 +12,8 @@ from rover_planner.errors import PlanningError
 from rover_planner.maps.cells import CellGrid
 from rover_planner.maps.changes import find_changes, find_overlap, have_same_layers
 from rover_planner.maps.layers import LOADED, UNKNOWN, lay_onto
-from rover_planner.maps.living_map import SUREST, LivingMap, MapRules
+from rover_planner.maps.living_map import LivingMap
+from rover_planner.parameters.traverse_server import SUREST, TraverseServerParameters
 from support.grounds import make_terrain, waves
 
 TOPIC = "elevation_cloud"
@@ -91,7 +92,7 @@ def test_a_source_whose_clock_goes_back_is_still_heard():
 
 
 def test_the_surer_height_wins_until_it_has_aged():
-    living = LivingMap(MapRules(SUREST, ageing=0.001))
+    living = LivingMap(TraverseServerParameters(map_merge=SUREST, map_ageing=0.001))
     living.merge(local_map((0.0, 0.0), 0.1, std=0.01), TOPIC, 0.0)
     living.merge(local_map((0.0, 0.0), 0.2, std=0.03), TOPIC, 10.0)
     assert cell(living, 0.5, 0.5)[0] == 0.1
@@ -103,7 +104,11 @@ def test_the_surer_height_wins_until_it_has_aged():
 
 
 @pytest.mark.parametrize(
-    ("rules", "std"), [(MapRules(SUREST, loaded_std=0.5), 0.5), (MapRules(), 0.0)]
+    ("rules", "std"),
+    [
+        (TraverseServerParameters(map_merge=SUREST, loaded_std=0.5), 0.5),
+        (TraverseServerParameters(), 0.0),
+    ],
 )
 def test_a_loaded_map_without_deviations_gets_those_of_the_rules_or_stays_exact(rules, std):
     living = LivingMap(rules)
@@ -142,7 +147,7 @@ def test_a_map_grows_with_what_is_seen_and_keeps_its_cells():
 
 
 def test_a_window_rolls_with_the_rover_and_takes_the_loaded_map_anew():
-    living = LivingMap(MapRules(window=2.0))
+    living = LivingMap(TraverseServerParameters(map_window=2.0))
     living.load(PRIOR, 0.0)
     for k in range(40):
         place = -2.0 + 0.1 * k, 0.0
@@ -160,7 +165,7 @@ def test_a_window_rolls_with_the_rover_and_takes_the_loaded_map_anew():
 
 
 def test_a_loaded_map_stays_whole_until_the_first_local_map():
-    living = LivingMap(MapRules(window=2.0))
+    living = LivingMap(TraverseServerParameters(map_window=2.0))
     living.load(PRIOR, 0.0)
     patch = lay_onto(local_map((-4.5, 0.0), 0.1), living.grid)
     assert living.fill(patch, np.zeros((20, 20), bool), 1.0)
@@ -233,7 +238,7 @@ def test_classes_stay_where_a_newer_map_has_none_and_the_most_frequent_of_finer_
 
 
 def test_a_local_map_of_tiny_cells_is_refused_and_leaves_all_as_it_was():
-    living = LivingMap(MapRules(max_cells=1_000_000))
+    living = LivingMap(TraverseServerParameters(max_map_cells=1_000_000))
     living.load(PRIOR, 0.0)
     with pytest.raises(PlanningError, match="max_map_cells is 1000000"):
         living.merge(local_map((0.0, 0.0), resolution=1e-5), TOPIC, 1.0)
@@ -245,7 +250,7 @@ def test_a_local_map_of_tiny_cells_is_refused_and_leaves_all_as_it_was():
 
 def test_a_coarse_map_is_laid_only_onto_the_cells_of_a_window():
     orbital = Terrain(np.add.outer(np.arange(1000.0), np.arange(1000.0)), 1.0, (-500.0, -500.0))
-    living = LivingMap(MapRules(window=4.0))
+    living = LivingMap(TraverseServerParameters(map_window=4.0))
     living.load(orbital, 0.0)  # on cells of 1 cm it would have 1e10
     living.merge(local_map((0.0, 0.0), height=1.0, resolution=0.01), TOPIC, 1.0, (0.0, 0.0))
     assert living.snapshot().terrain.elevation.shape == (400, 400)
@@ -258,11 +263,11 @@ def test_a_coarse_map_is_laid_only_onto_the_cells_of_a_window():
 
 
 def test_a_window_of_too_many_cells_is_refused_with_one_that_fits():
-    living = LivingMap(MapRules(window=100.0, max_cells=10_000))
+    living = LivingMap(TraverseServerParameters(map_window=100.0, max_map_cells=10_000))
     with pytest.raises(PlanningError, match=r"map_window is 100 m, set it to at most 5 m"):
         living.merge(local_map((0.0, 0.0)), TOPIC, 1.0)
     assert not living.has_cells
-    living.rules = MapRules(window=5.0, max_cells=10_000)
+    living.values = TraverseServerParameters(map_window=5.0, max_map_cells=10_000)
     living.merge(local_map((0.0, 0.0)), TOPIC, 2.0)
     assert living.snapshot().terrain.elevation.shape == (100, 100)
 

@@ -10,9 +10,9 @@ from rover_physics import Terrain, load_rover
 from rover_planner.errors import PlanningError
 from rover_planner.maps.cells import CellGrid
 from rover_planner.maps.layers import lay_onto
-from rover_planner.maps.living_map import MERGE, MapRules
 from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.maps.moved_map import MAX_LEAN, MapMove, move_map
+from rover_planner.parameters.traverse_server import MERGE, TraverseServerParameters
 from rover_planner.planning.navigation.transforms import Rigid
 from support.grounds import make_terrain, waves
 
@@ -102,7 +102,7 @@ def test_a_turned_map_that_is_too_large_or_has_no_known_cell_is_refused():
 
 def test_a_turned_map_is_laid_onto_the_cells_of_the_map_that_it_merges_into():
     prior = make_terrain(lambda x, y: 0.0 * x)
-    keeper = MapKeeper(LSR1, MapRules(updates=MERGE, fills=False))
+    keeper = MapKeeper(LSR1, TraverseServerParameters(map_updates=MERGE, fill_under_rover=False))
     keeper.load(prior, 0.0, None)
     local = make_terrain(lambda x, y: 0.02 * np.sin(x) + 0.02 * np.cos(y), half=1.0)
     here = Rigid.from_rpy(0.513, -0.237, 0.1, 0.0, 0.0, 1.234)
@@ -129,7 +129,7 @@ def test_a_turned_map_is_laid_onto_the_cells_of_the_map_that_it_merges_into():
 
 def test_peaks_of_much_finer_cells_are_kept_where_they_merge():
     prior = make_terrain(lambda x, y: 0.0 * x, half=2.0)
-    keeper = MapKeeper(LSR1, MapRules(updates=MERGE, fills=False))
+    keeper = MapKeeper(LSR1, TraverseServerParameters(map_updates=MERGE, fill_under_rover=False))
     keeper.load(prior, 0.0, None)
     keeper.take(make_terrain(waves, half=0.5), "first", 1.0, None)  # sets no cells of its own
     fine = np.zeros((101, 101))

@@ -9,14 +9,12 @@ import pytest
 from rover_physics import Terrain, load_rover
 from rover_planner.maps.layers import FOOTPRINT, CellSources
 from rover_planner.maps.unobserved_ground import (
-    ALLOW,
-    ALLOW_FOOTPRINT,
-    REFUSE,
     SEEN,
     UNSEEN,
     ObservedGround,
     observed_ground,
 )
+from rover_planner.parameters.traverse_server import ALLOW, ALLOW_FOOTPRINT, REFUSE
 
 LSR1 = load_rover("lsr1")  # its belly is 0.6 m x 0.4 m
 PATH = np.column_stack([np.arange(0.0, 2.0, 0.02), np.zeros(100), np.zeros(100)])

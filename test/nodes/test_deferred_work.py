@@ -40,7 +40,7 @@ def serve(ros, client, busy):
 
 
 def test_a_request_goes_before_what_is_left_of_the_work(busy, serve):
-    deferred_work, told, pieces = DeferredWork(busy), [], 2000
+    deferred_work, told, pieces = DeferredWork(busy, Guard(busy.get_logger())), [], 2000
 
     def work(k):
         if "second" not in told:  # so that work is left however late the request comes
@@ -66,7 +66,7 @@ def test_a_request_goes_before_what_is_left_of_the_work(busy, serve):
 
 def test_requests_without_a_pause_leave_no_more_than_so_many_waiting(busy, serve, monkeypatch):
     monkeypatch.setattr(rover_planner.ros.deferred_work, "QUIET", 1e3)  # no pause is long enough
-    deferred_work, done, asked = DeferredWork(busy), [], 3 * MAX_WAITING
+    deferred_work, done, asked = DeferredWork(busy, Guard(busy.get_logger())), [], 3 * MAX_WAITING
     numbers = iter(range(asked))
 
     def answer(_request, response):
@@ -84,7 +84,7 @@ def test_requests_without_a_pause_leave_no_more_than_so_many_waiting(busy, serve
 
 
 def test_a_fault_leaves_the_rest_and_the_node(ros, client, busy):
-    deferred_work, done = DeferredWork(busy), []
+    deferred_work, done = DeferredWork(busy, Guard(busy.get_logger())), []
     deferred_work.do(lambda: 1 / 0, lambda: done.append("the rest"))
     deferred_work.do(lambda: 1 / 0)
     deferred_work.do(lambda: done.append("the next"))

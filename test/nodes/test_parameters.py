@@ -12,19 +12,20 @@ from rclpy.parameter import Parameter
 
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.__main__ import TABLES, parameters_document
-from rover_planner.parameters.declare import declare_parameters, follow_changes
+from rover_planner.parameters.declare import declare_parameters
 from rover_planner.parameters.table import ParameterError, specs_of
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.ros.node import RoverNode
 
 
 @pytest.fixture
 def make_node(ros):
     nodes = []
 
-    def make(*words, **overrides):
+    def make(*words, kind=Node, **overrides):
         parameters = [Parameter(name, value=value) for name, value in overrides.items()]
-        node = Node(
+        node = kind(
             "parameter_test",
             context=ros.context,
             cli_args=["--ros-args", *words],
@@ -38,17 +39,14 @@ def make_node(ros):
         node.destroy_node()
 
 
-class Values:
-    """The values in force, as a node holds them."""
+def make_server(name, **arguments):
+    return RoverNode(name, TraverseServerParameters, **arguments)
 
-    def __init__(self, node, accept=lambda values: None, apply=lambda values: None):
-        self.value = declare_parameters(node, TraverseServerParameters)
-        self.apply = apply
-        follow_changes(node, lambda: self.value, accept, self.take)
 
-    def take(self, values):
-        self.apply(values)
-        self.value = values
+def follow(node, load=lambda values: None, apply=lambda made: None):
+    """Let a node follow changes; return it, which has the values in force."""
+    node.follow_changes(load, apply)
+    return node
 
 
 def change(node, name, value):
@@ -127,9 +125,9 @@ def test_a_bad_override_is_refused_at_the_start_in_the_words_of_the_table(make_n
 
 
 def test_a_bad_change_leaves_the_value_and_says_why(make_node):
-    node, seen = make_node(), []
-    values = Values(node, seen.append)
-    before = values.value
+    seen = []
+    node = follow(make_node(kind=make_server), seen.append)
+    before = node.values
     for name, value, text in [
         ("friction", math.nan, "value: nan"),
         ("friction", "rough", "Wrong parameter type"),
@@ -140,9 +138,9 @@ def test_a_bad_change_leaves_the_value_and_says_why(make_node):
         result = change(node, name, value)
         assert not result.successful and text in result.reason
         assert node.get_parameter(name).value == getattr(before, name)
-    assert seen == [] and values.value is before
+    assert seen == [] and node.values is before
     assert change(node, "friction", 0.5).successful
-    assert seen == [values.value] and values.value == replace(before, friction=0.5)
+    assert seen == [node.values] and node.values == replace(before, friction=0.5)
 
 
 def test_changes_made_at_once_are_judged_together(make_node):
@@ -150,26 +148,23 @@ def test_changes_made_at_once_are_judged_together(make_node):
         if values.friction < values.max_torque:
             raise PlanningError("friction is below max_torque")
 
-    node = make_node()
-    values = Values(node, accept)
+    node = follow(make_node(kind=make_server), accept)
     changes = [Parameter("friction", value=2.0), Parameter("max_torque", value=1.0)]
     refused = node.set_parameters(changes[1:])[0]
     assert not refused.successful and refused.reason == "friction is below max_torque"
     assert change(node, "use_sim_time", False).successful  # is none of the table
     assert node.set_parameters_atomically(changes).successful
-    assert values.value == TraverseServerParameters(friction=2.0, max_torque=1.0)
+    assert node.values == TraverseServerParameters(friction=2.0, max_torque=1.0)
 
 
 def test_an_unexpected_error_in_a_check_is_a_refusal_and_one_in_a_change_is_not_the_end(make_node):
     def fail(_values):
         raise ZeroDivisionError("a fault" * 100)
 
-    node = make_node()
-    values = Values(node, fail)
+    node = follow(make_node(kind=make_server), fail)
     result = change(node, "friction", 0.5)
     assert not result.successful and len(result.reason) == 300
     assert result.reason.startswith("internal error: ZeroDivisionError: a fault")
-    assert values.value.friction == 0.0
-    other = make_node()
-    Values(other, apply=fail)
+    assert node.values.friction == 0.0
+    other = follow(make_node(kind=make_server), apply=fail)
     assert change(other, "max_gap", 0.5).successful

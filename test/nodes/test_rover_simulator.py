@@ -19,7 +19,7 @@ from rover_physics.errors import SoilError
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.rover.steering_joints import steering_joints
 from rover_planner.errors import PlanningError
-from rover_planner.nodes.mission.drive import DriveSettings, drive_to
+from rover_planner.nodes.mission.drive import Drive, DriveSettings
 from rover_planner.nodes.mission_planner import MissionPlanner
 from rover_planner.nodes.rover_simulator import RoverSimulator, main
 from rover_planner.nodes.traction_controller import TractionController
@@ -161,7 +161,7 @@ def test_simulator_server_controller_and_planner_drive_together_to_a_goal(
     answer = planner.ask(place, goal)
     assert answer["traversable"], answer["reason"]
     settings = DriveSettings(position_tolerance=0.1, timeout=200.0)
-    drive_to(planner, goal, answer["poses"], settings, lambda told: None)
+    Drive(planner, goal, settings, lambda told: None).run(answer["poses"])
     assert np.hypot(*(simulator.simulation.plant.pose() - goal)[:2]) < 0.1
     assert controller.statistics.updates > 20
     assert controller.statistics.fallbacks == 0

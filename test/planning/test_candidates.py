@@ -92,11 +92,6 @@ def test_awkward_goals_get_arcs_of_the_smallest_radius(goal):
     assert lengths[0] < np.hypot(goal[0], goal[1]) + 4 * np.pi * 0.8
 
 
-def test_a_u_turn_swings_out_instead_of_turning_on_the_spot():
-    path = generate_candidates((0, 0, 0), (0, 4, np.pi))[0]
-    assert path[:, 0].max() > 0.5 and path[:, 0].min() > -1e-9
-
-
 @pytest.mark.parametrize(
     ("change", "names"),
     [

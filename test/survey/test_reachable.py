@@ -102,24 +102,6 @@ def test_areas_of_any_map_are_those_of_scipy(shape, headings, seed, share, chunk
     compare_with_scipy(open_at, turns_at, numbers, distance)
 
 
-def test_a_long_way_back_is_found():
-    # A ring that is driven one way round.
-    open_at = np.zeros((9, 9, 4), bool)
-    open_at[0, :, 0] = open_at[:, 8, 1] = open_at[8, :, 2] = open_at[:, 0, 3] = True
-    turns_at = np.zeros_like(open_at)
-    for corner in ((0, 8), (8, 8), (8, 0), (0, 0)):
-        turns_at[corner] = open_at[corner]
-    open_at[4, 4] = True
-    open_at[4, 5:8, 0] = open_at[4, 8, 0] = turns_at[4, 8, :2] = True
-    numbers, distance = search(open_at, turns_at, 2)
-    compare_with_scipy(open_at, turns_at, numbers, distance)
-    assert numbers.reached > 30 and numbers.cells == 1
-    open_at[0:5, 4, 1] = turns_at[0, 4, :2] = True  # from the ring back to the middle
-    numbers, distance = search(open_at, turns_at, 2)
-    compare_with_scipy(open_at, turns_at, numbers, distance)
-    assert numbers.cells > 30 and numbers.longest > 8.0
-
-
 def test_the_area_is_kept_in_the_store_until_more_is_surveyed(tmp_path):
     request = make_request(headings=8)
     prepared = survey_here(tmp_path, Terrain(np.zeros((50, 70)), 0.1), request, chunk=64)

@@ -14,8 +14,7 @@ pytest.importorskip("zarr", reason="install the extra survey")
 from rover_physics import load_rover, save_terrain
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
-from rover_planner.survey.chunk_survey import compute_chunk, open_map
-from rover_planner.survey.durable_store import write_durably
+from rover_planner.survey.chunk_survey import compute_chunk
 from rover_planner.survey.store import NOTES, SurveyStore
 from rover_planner.survey.survey import prepare_survey
 from support.survey_maps import (
@@ -66,10 +65,10 @@ def test_finished_chunks_are_not_done_again_and_half_written_ones_are(surveyed, 
     prepared = prepare(tmp_path, request, chunk=16)
     assert len(prepared.chunks) == 9 and prepared.finished == 0
     compute_here(replace(prepared, chunks=prepared.chunks[:4]))
-    rows, columns = prepared.job.layout.cells_of(prepared.chunks[4])
-    prepared.store.layer("worst_tilt")[rows, columns] = 7.0  # it was stopped after this layer
+    rows, columns = prepared.store.notes.layout.cells_of(prepared.chunks[4])
+    prepared.store._group["worst_tilt"][rows, columns] = 7.0  # it was stopped after this layer
     prepared.store.mark_failed(prepared.chunks[5])
-    left = prepared.job.layout.cells_of(prepared.chunks[6])
+    left = prepared.store.notes.layout.cells_of(prepared.chunks[6])
     assert (prepared.store.layer("best_class")[left] == 255).all()
     assert np.isnan(prepared.store.layer("worst_tilt")[left]).all()
     again = prepare(tmp_path, request)
@@ -115,7 +114,7 @@ def test_other_chunks_are_refused_only_where_they_are_asked_for(files):
     prepare(files, chunk=64)
     with pytest.raises(PlanningError, match="has chunks of 64 cells, not 128"):
         prepare(files, chunk=128)
-    assert prepare(files, chunk=50).job.layout.chunk == 64
+    assert prepare(files, chunk=50).store.notes.layout.chunk == 64
     with pytest.raises(PlanningError, match="chunk is 0; it must be 1 or more"):
         prepare(files, chunk=0)
 
@@ -163,9 +162,9 @@ def test_impossible_numbers_are_refused(changes, said):
 
 
 def test_filled_gaps_are_another_map(files):
-    job = prepare(files, max_gap=0.3).job
+    store = prepare(files, max_gap=0.3).store
     box = slice(0, 70), slice(0, 70)
-    assert not np.isnan(open_map(job.store, job.map_file).read(box)["elevation"]).any()
+    assert not np.isnan(store.open_map().read(box)["elevation"]).any()
     with pytest.raises(PlanningError, match="another map"):
         prepare(files)
 
@@ -218,36 +217,29 @@ def test_a_damaged_file_is_one_line(finished, capfd, content):
 
 def test_files_are_on_the_disk_before_a_chunk_counts_as_finished(files, monkeypatch):
     prepared = prepare(files, chunk=64)
-    chunk = prepared.chunks[0]
-    layers = compute_chunk(prepared.job, chunk)
-    done, fsync, replace_file = [], os.fsync, Path.replace
+    chunk, path = prepared.chunks[0], prepared.store.path
+    layers = compute_chunk(prepared.job.request, prepared.store, chunk)
+    forced, fsync = [], os.fsync
 
     def force(number):
-        done.append(("forced", Path(f"/proc/self/fd/{number}").readlink()))
+        forced.append((Path(f"/proc/self/fd/{number}").readlink(), count_finished(path)))
         fsync(number)
 
-    def rename(path, target):
-        done.append(("renamed", path, target))
-        return replace_file(path, target)
-
     monkeypatch.setattr(os, "fsync", force)
-    monkeypatch.setattr(Path, "replace", rename)
     prepared.store.write(chunk, layers, 1.0)
-    renamed = [(k, event) for k, event in enumerate(done) if event[0] == "renamed"]
-    assert len(renamed) == len(layers) + 1
-    for k, (_, aside, target) in renamed:
-        assert ("forced", aside) in done[:k]
-        folders = [target.parent, *target.parent.parents]
-        for folder in folders[: folders.index(prepared.store.path) + 1]:
-            assert ("forced", folder) in done[k:]
-    k, (_, _, last) = renamed[-1]
-    assert last.relative_to(prepared.store.path).parts[0] == "seconds"
-    assert done[k - 2][0] == "forced" and done[k - 2][1] == prepared.store.path
+    before = {one for one, finished in forced if not finished}
+    for name in layers:
+        file = prepared.store.layer(name).file_of(chunk)
+        assert {file, *file.parents[: len(file.relative_to(path).parts)]} <= before
+    mark = prepared.store.layer("seconds").file_of(chunk)
+    assert (mark, 1) in forced and (path, 1) in forced
+
+
+def count_finished(path: Path) -> int:
+    return sum(file.is_file() for file in (path / "seconds" / "c").rglob("*"))
 
 
 def test_a_file_that_was_not_renamed_is_not_seen(finished):
     folder = finished / "out" / "seconds" / "c" / "0"
     (folder / "1").rename(folder / ".1.0123.partial")
     assert prepare(finished, make_request(step=4)).chunks == [(0, 1)]
-    with pytest.raises(OSError, match="No such file"):
-        write_durably(Path("/proc/no/such"), b"", Path("/proc"))

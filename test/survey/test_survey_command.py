@@ -112,7 +112,7 @@ def test_a_chunk_that_fails_is_named_and_the_rest_stands(tmp_path, scheduler):
     assert outcome.done == 3
     again = prepare_survey(make_request(step=4), str(tmp_path / "map.npz"), tmp_path / "out")
     assert again.chunks == [(0, 1)]
-    cells = again.job.layout.cells_of((0, 1))
+    cells = again.store.notes.layout.cells_of((0, 1))
     assert (again.store.layer("best_class")[cells] == 255).all()
     assert (again.store.layer("best_class")[:] == 255).sum() == 16 * 14
     with pytest.raises(PlanningError, match="cannot be written: No room; finished chunks are ke"):

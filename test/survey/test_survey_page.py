@@ -2,6 +2,7 @@
 """A survey as layers of the page: its colours, its legend, and what is refused or said."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,12 +11,13 @@ pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 pytest.importorskip("zarr", reason="install the extra survey")
 
 from rover_physics import SweepOptions, Terrain, load_rover
+from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.survey.layers import CLASS_COLOURS, CLASS_NUMBERS
-from rover_planner.viewer.documents.legend import describe_survey
-from rover_planner.viewer.scene.ground_mesh import build_survey_mesh
+from rover_planner.viewer.scene.ground_mesh import draw_picture
 from rover_planner.viewer.state.colours import UNKNOWN, from_css
+from rover_planner.viewer.state.ground_grid import make_grid
 from rover_planner.viewer.state.survey_layers import CLASS, LIMIT, load_map, open_survey
 from support.survey_maps import make_request, survey_here
 
@@ -40,8 +42,13 @@ def shown(surveyed):
     return open_survey(surveyed, LSR1, load_map(surveyed, 10_000))
 
 
+def colour(shown, name, x, y):
+    return shown.colour(name, LSR1, DEFAULT_OPTIONS, SimpleNamespace(pixels=(x, y)))
+
+
 def colour_at(shown, name, place):
-    found = shown.colour(name, np.array([place[0]]), np.array([place[1]]))
+    x, y = place
+    found = colour(shown, name, np.array([x]), np.array([y]))
     return tuple(found.colours[0, 0].tolist())
 
 
@@ -51,25 +58,24 @@ def test_classes_have_the_colours_of_the_picture_and_a_legend_of_those_that_are_
     assert colour_at(shown, CLASS, WALL) == impassable
     assert colour_at(shown, CLASS, HOLE) == UNKNOWN
     assert colour_at(shown, CLASS, (-3.0, 1.0)) == UNKNOWN
-    found = shown.colour(CLASS, np.array([1.0]), np.array([1.0]))
-    legend = str(describe_survey(CLASS, shown.describe(CLASS), found, ()))
+    legend = str(colour(shown, CLASS, np.array([1.0]), np.array([1.0])).legend)
     assert "impassable" in legend and "traction control" not in legend
     assert "8 headings" in legend and "not as on the page" not in legend
 
 
 def test_the_first_limit_has_a_colour_and_a_meaning_for_each_that_fails_somewhere(shown):
     at = np.linspace(0.0, 5.9, 60)
-    found = shown.colour(LIMIT, at, at)
+    found = colour(shown, LIMIT, at, at)
     assert found.colours.shape == (60, 60, 3)
     assert colour_at(shown, LIMIT, PASSABLE) != colour_at(shown, LIMIT, WALL)
-    labels = [text for _, text in found.keys]
+    labels = [text for _, text in found.legend.keys]
     assert "none: all headings pass" in labels and any("off map" in text for text in labels)
 
 
 def test_a_pixel_of_the_ground_is_that_of_its_cell(shown, surveyed):
     terrain = load_map(surveyed, 10_000)
-    drawn, _ = build_survey_mesh(terrain, shown, CLASS)
-    picture = drawn.picture
+    grid = make_grid(terrain)
+    picture = draw_picture(grid, shown.colour(CLASS, LSR1, DEFAULT_OPTIONS, grid))
     factor = picture.shape[0] // 60
     assert factor == 8
     row, column = (int((at / 0.1 + 0.5) * factor) for at in PASSABLE[::-1])

@@ -12,8 +12,9 @@ from rover_physics.rover.rover_file import load_rover
 from rover_planner.advice.advise import grow_advice
 from rover_planner.advice.case import Case
 from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.viewer.documents.advice import PROMISED, describe_advice, list_remedies
 from rover_planner.viewer.pages.page import Page
-from rover_planner.viewer.state.path_advice import apply_remedy
+from rover_planner.viewer.state.path_advice import Advised, apply_remedy, seek_advice
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain
 from support.viewer.sessions import wait_for_rest
@@ -64,17 +65,41 @@ def page():
 
 
 def test_advice_is_sought_when_it_is_asked_for_shown_as_a_ghost_and_taken(page):
-    assert page.channel.parts["advice"]["asked"] is False
+    assert page.channel.parts["advice"]["can_ask"]
     page.hear({"ask": "advise"}, None)
 
     def rows():
-        return [row for row in page.channel.parts["advice"]["rows"] if row["index"] is not None]
+        return [row["words"] for row in page.channel.parts["advice"]["rows"] if row["taken"]]
 
-    wait_until(lambda: rows() and not page.channel.parts["advice"]["busy"], "remedies", 60.0)
-    place = next(row["index"] for row in rows() if row["words"].startswith("Drive "))
-    page.hear({"ask": "ghost", "index": place}, None)
-    wait_until(lambda: page.scene.paths._ghost.strands, "the ghost")
-    page.hear({"ask": "remedy", "index": place}, None)
+    wait_until(lambda: rows() and not page.channel.parts["advice"]["seeking"], "remedies", 60.0)
+    place = next(words for words in rows() if words.startswith("Drive "))
+    page.hear({"ask": "ghost", "words": place}, None)
+    wait_until(lambda: page.scene.paths.lines.get("ghost"), "the ghost")
+    page.hear({"ask": "remedy", "words": place}, None)
     wait_until(lambda: page.channel.parts["verdict"]["passes"], "the verdict with the remedy")
-    assert not page.scene.paths._ghost.strands
+    assert not page.scene.paths.lines["ghost"]
     assert page.errors.messages == {}
+
+
+def test_a_search_tells_what_was_found_by_a_promised_time_and_that_it_goes_on():
+    session = ViewSession(LSR1, make_terrain(rock), *ENDS, OPTIONS)
+    path, since = session.shown.path, 1000.0
+    first, *_, last = (Advised(path, since, one) for one in seek_advice(path))
+    told = describe_advice(first, True, since + 0.5 * PROMISED)
+    assert told["words"] == "tried: nothing yet" and not told["can_ask"]
+    for advised, found in ((first, "nothing"), (last, str(len(list_remedies(last))))):
+        words = describe_advice(advised, True, since + PROMISED)["words"]
+        assert words.startswith(f"{found} found in {PROMISED:.0f} s; the search goes on, tried: ")
+    stopped, ended = (describe_advice(one, False, since) for one in (first, last))
+    assert stopped["can_ask"] and stopped["words"] == "the search was stopped"
+    assert not ended["can_ask"] and ended["words"] == "" and ended["rows"]
+
+
+def test_a_search_ends_when_nobody_looks_at_its_path_any_more(page):
+    page.hear({"ask": "advise"}, None)
+    wait_until(lambda: page._advice.progress, "the search")
+    page.hear({"ask": "value", "label": "friction [-]", "value": 0.7}, None)
+    wait_until(lambda: page.session.shown.scenario.rover.friction == 0.7, "the verdict")
+    wait_until(lambda: page._advice.progress is None, "the end of the search")
+    wait_until(lambda: page.channel.parts["advice"]["can_ask"], "the question")
+    assert page._advised is None and not page.channel.parts["advice"]["rows"]

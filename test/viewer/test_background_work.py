@@ -11,7 +11,6 @@ import pytest
 
 from rover_physics.names import TORQUE_POLICIES
 from rover_physics.terrain.grid import load_terrain
-from rover_physics.traversability.judge import judge_path
 from rover_planner.command.view import choose_ends
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query, check_path
 from rover_planner.viewer.state.background_work import BackgroundWork, Progress
@@ -183,18 +182,6 @@ def session():
 def finish(session: ViewSession) -> None:
     wait_for_idle(session)
     session.take_finished()
-
-
-def test_a_session_wants_at_once_and_shows_what_is_finished(session):
-    shown = session.shown
-    session.change_rover([("friction",)], 0.4)
-    assert session.wanted.rover.friction == 0.4 and session.is_outdated
-    assert session.shown is shown
-    finish(session)
-    assert session.is_complete and session.shown.scenario.rover.friction == 0.4
-    asked = session.shown.scenario
-    _, verdict = judge_path(asked.rover, asked.terrain, shown.path.poses)
-    assert session.shown.verdict.reason == verdict.reason != ""
 
 
 def test_changes_add_up_although_the_judgements_between_are_dropped(session):

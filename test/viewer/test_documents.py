@@ -14,7 +14,6 @@ from rover_planner.viewer.documents.board import describe_board
 from rover_planner.viewer.documents.limits import (
     MAX_POINTS,
     choose_rows,
-    describe_curves,
     describe_limits,
     describe_uses,
 )
@@ -94,8 +93,9 @@ def test_board_lanes_curves_and_verdict_show_one_number_for_the_wheel_that_fails
     used = describe_uses(path, end)[codes.index("friction")]
     assert used["now"] == used["worst"] == write_use(failure.use) and used["broken"]
     assert used["wheel"] == failure.link.replace("_", " ") and used["wheel"] in failure.headline
-    curve = describe_curves(path, None)["friction"]
-    assert max(curve["y"][wheel]) == pytest.approx(failure.use, abs=1e-3)
+    lane = describe_limits(path, None)["lanes"][codes.index("friction")]
+    assert max(lane["wheels"]["y"][wheel]) == pytest.approx(failure.use, abs=1e-3)
+    assert max(lane["now"]["y"][0]) == pytest.approx(failure.use, abs=1e-3)
     assert list_paths_of(path)["use"] == write_use(failure.use)
 
 
@@ -123,14 +123,14 @@ def test_a_path_that_fails_at_its_first_pose_has_a_lane_and_a_use_for_each_limit
     assert path.verdict.first_failure == 0
     told = describe_limits(path, None)
     assert told["fails"] == told["end"] == 0.0
-    assert all(len(lane["pieces"]) == 1 for lane in told["lanes"])
+    assert all(len(lane["now"]["x"]) == 1 for lane in told["lanes"])
     uses = {
         lane["code"]: one
         for lane, one in zip(told["lanes"], describe_uses(path, 0.0), strict=True)
     }
     assert uses["torque"]["broken"] and uses["tilt"]["now"].endswith("%")
     assert len(told["loads"]["x"]) == 1
-    json.dumps([told, describe_curves(path, None)], allow_nan=False)
+    json.dumps(told, allow_nan=False)
 
 
 def test_the_lanes_of_the_reference_stand_below_those_of_now():
@@ -139,12 +139,8 @@ def test_the_lanes_of_the_reference_stand_below_those_of_now():
     shown = session.shown
     told = describe_limits(shown.path, shown.reference)
     assert told["compared"] and told["end"] == pytest.approx(shown.reference.limits.end, abs=1e-4)
-    now, before = (
-        {piece[2] for lane in told["lanes"] for piece in lane[name]}
-        for name in ("pieces", "before")
-    )
-    assert "broken" in now and "broken" not in before
-    assert describe_curves(shown.path, shown.reference)["friction"]["old"]["y"]
+    [friction] = (lane for lane in told["lanes"] if lane["code"] == "friction")
+    assert max(friction["now"]["y"][0]) > 1.0 > max(friction["before"]["y"][0]) > 0.0
 
 
 def test_the_chance_of_failure_is_a_lane_of_its_own_with_its_main_cause():
@@ -157,7 +153,7 @@ def test_the_chance_of_failure_is_a_lane_of_its_own_with_its_main_cause():
     assert shown.chance.path == verdict.failure_chance
     told = describe_limits(shown.path, None, shown.chance)["lanes"]
     assert [lane["code"] for lane in told].index("chance") == len(shown.path.limits.lanes)
-    curve = describe_curves(shown.path, None, shown.chance)["chance"]["y"][0]
+    curve = told[-1]["now"]["y"][0]
     assert max(curve) == pytest.approx(max(verdict.failure_chance_at), abs=1e-3)
     use = describe_uses(shown.path, np.inf, shown.chance)[-1]
     percent = f"{100.0 * verdict.failure_chance:.0f} %"
@@ -170,7 +166,10 @@ def test_a_use_without_bound_is_above_the_limit_in_its_curve():
     path = judged_on(gap)
     lane = path.limits.lane(path.failure.code)
     assert np.isinf(lane.used).any()
-    assert describe_curves(path, None)[lane.limit.code]["y"][0][-1] > 1.0
+    [told] = (
+        one for one in describe_limits(path, None)["lanes"] if one["code"] == lane.limit.code
+    )
+    assert told["now"]["y"][0][-1] > 1.0
 
 
 def test_a_peak_between_points_of_a_curve_is_kept():
@@ -226,7 +225,9 @@ def test_a_failure_between_waypoints_has_the_pose_at_which_the_model_was_asked()
     first = path.verdict.first_failure
     before, after = prediction.distance[first - 1 : first + 1]
     assert before < failure.distance < after
-    assert failure.state.energy == prediction.energy[first - 1] > 0.0
+    assert 0.0 < prediction.energy[first - 1] < failure.state.energy
+    there = path.trajectory.state_at(failure.time)
+    np.testing.assert_allclose(there.wheel_loads, failure.state.wheel_loads)
     places = prediction.between.position[prediction.between.waypoint == first]
     assert np.isclose(places, failure.state.position).all(axis=1).any()
 

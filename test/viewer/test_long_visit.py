@@ -50,6 +50,26 @@ def change(visitor: Visitor, **values: str) -> None:
         visitor.type_number(names[name], value)
 
 
+def take_advice(visitor: Visitor) -> None:
+    """Wait for what is found by the time that the page promises, and take the first of it."""
+    tab, remedies = visitor.tab, visitor.tab.locator("#advice li[tabindex]")
+    stop = tab.locator("#advice").get_by_role("button", name="Stop")
+    wait_until(
+        lambda: not stop.count() or "the search goes on" in visitor.text("#advice"), "the advice"
+    )
+    if remedies.count():
+        remedies.first.hover()
+        remedies.first.click()
+        wait_for_rest(visitor)
+        assert visitor.text("#verdict .word") == "traversable"
+        visitor.open_tab("Rover")
+        visitor.press("Undo")
+        wait_for_rest(visitor)
+    elif stop.count():
+        stop.click()
+        wait_until(lambda: not stop.count(), "the end of the search")
+
+
 def click_through(visitor: Visitor) -> None:
     """Do once what the page is for, and hold what it shows against what it must."""
     tab = visitor.tab
@@ -79,14 +99,7 @@ def click_through(visitor: Visitor) -> None:
         visitor.press("Go to the failure")
         wait_until(lambda: tab.locator(".lane[data-broken]").count(), "the broken limit")
         visitor.press("What would help?")
-        wait_until(lambda: "tried:" not in visitor.text("#advice"), "the advice")
-        if tab.locator("#advice li[tabindex]").count():
-            tab.locator("#advice li[tabindex]").first.hover()
-            tab.locator("#advice li[tabindex]").first.click()
-            wait_for_rest(visitor)
-            visitor.open_tab("Rover")
-            visitor.press("Reset")
-            wait_for_rest(visitor)
+        take_advice(visitor)
     visitor.press("To the start")
     visitor.press("Play")
     tab.wait_for_timeout(2000)

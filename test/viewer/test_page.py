@@ -94,16 +94,16 @@ def test_buttons_keys_and_clicks_on_lanes_and_curves_move_the_drive(visitor, pag
     visitor.press("Play")
     wait_until(lambda: page.playback.time > 2.0, "the rover to drive")
     visitor.press("Pause")
-    wait_until(lambda: page.playback.rate == 0.0, "the rover to stand")
+    wait_until(lambda: not page.playback.is_playing, "the rover to stand")
     visitor.press("To the start")
     wait_for_time(0.0, "the start")
     for key, row in (("ArrowRight", 1), ("ArrowRight", 2), ("ArrowLeft", 1)):
         keyboard.press(key)
         wait_for_time(trajectory.times[row], key)
     keyboard.press("Space")  # it is the drive's, although a button was pressed before
-    wait_until(lambda: page.playback.rate == 1.0, "it to play")
+    wait_until(lambda: page.playback.is_playing, "it to play")
     keyboard.press("Space")
-    wait_until(lambda: page.playback.rate == 0.0, "it to pause")
+    wait_until(lambda: not page.playback.is_playing, "it to pause")
     for curves, share in ((".strip", 0.5), (".plot", 0.25)):
         visitor.click_share(curves, share)
         there = np.interp(share * trajectory.distance[-1], trajectory.distance, trajectory.times)
@@ -199,7 +199,7 @@ def test_a_dragged_number_is_judged_and_the_reason_of_a_refused_one_stays_on_the
 def test_a_button_that_is_pressed_while_what_it_stands_on_is_told_anew_takes_the_click(
     visitor, page
 ):
-    visitor.press("Rewind")
+    visitor.press("To the start")
     visitor.tab.wait_for_timeout(4000)  # the longest press is 5 s: this one must not end the next
     with held(page.session._background):
         page.hear({"ask": "value", "label": FRICTION, "value": 0.75}, None)

@@ -34,9 +34,8 @@ from support.waiting import wait_until as wait
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
 from rover_planner.viewer.pages import page as page_module
-from rover_planner.viewer.pages.drawings import Drawings
 from rover_planner.viewer.pages.page import Page
-from rover_planner.viewer.scene.ribbons import Ribbon, Strand
+from rover_planner.viewer.scene.nodes import Nodes, Strand
 from rover_planner.viewer.scene.rover_visual import RoverVisual
 from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN
 from rover_planner.viewer.state.judging import POLICY
@@ -223,12 +222,12 @@ def test_the_ghost_of_a_failure_stays_for_the_next_one_and_hides_without(page):
         mark.show(LSR1, failure)
         ghosts.append(mark._ghost)
         np.testing.assert_allclose(
-            mark._ghost._root.position, page.scene.frame.to_scene(failure.state.position)
+            mark._ghost.root.position, page.scene.frame.to_scene(failure.state.position)
         )
     assert ghosts[0] is ghosts[1] and mark._root.visible
     assert mark._ghost._meshes[failure.link].color == REFUSED
-    assert mark.make_room(failure.state) == failure.link and not mark._ghost.visible
-    assert mark.make_room(None) == "" and mark._ghost.visible
+    assert mark.make_room(failure.state) == failure.link and not mark._ghost.root.visible
+    assert mark.make_room(None) == "" and mark._ghost.root.visible
     mark.show(LSR1, None)
     assert not mark._root.visible and mark.make_room(failure.state) == ""
 
@@ -245,7 +244,7 @@ def test_the_link_that_fails_has_the_colour_of_that_and_its_own_again_where_none
     for link, colour in before.items():
         assert link in WHEELS or visual._meshes[link].color == colour
         assert visual._meshes[link].opacity == 0.5
-    visual.remove()
+    visual.root.remove()
 
 
 def test_a_path_is_drawn_in_the_colour_of_its_verdict_up_to_where_it_is_refused(page):
@@ -255,7 +254,7 @@ def test_a_path_is_drawn_in_the_colour_of_its_verdict_up_to_where_it_is_refused(
     candidates = [path.candidate for path in shown.paths]
     ground = session.wanted.terrain
     ask(page, lambda: overlay.show(LSR1, ground, candidates, shown.index))
-    driven, beyond, *cross = overlay.ribbons[shown.index].strands
+    driven, beyond, *cross = overlay.paths[shown.index]
     assert driven.colour == REFUSED
     np.testing.assert_array_equal(driven.line[-1], beyond.line[0])
     assert beyond.colour != REFUSED and len(cross) == 2
@@ -268,22 +267,22 @@ def to_screen(light) -> np.ndarray:
     return 255.0 * np.where(share <= 0.0031308, 12.92 * share, bright)
 
 
-def test_a_ribbon_has_the_colours_of_its_strands_and_is_not_sent_again_if_it_looks_the_same(page):
+def test_lines_have_the_colours_of_their_strands_and_what_looks_the_same_is_not_sent_again(page):
     line = np.column_stack([np.linspace(0.0, 1.0, 5), np.zeros(5), np.zeros(5)])
     strands = [Strand(line, PASSABLE), Strand(line + 1.0, REFUSED)]
-    ribbon = Ribbon(page.server.scene, "/test/ribbon")
-    ribbon.show(strands, 4.0)
-    node = ribbon._node
+    nodes = Nodes(page.server.scene)
+    nodes.show_lines("/test/lines", strands, 4.0)
+    node, _ = nodes._shown["/test/lines"]
     sent = node.points
-    ribbon.show([replace(one, line=one.line.copy()) for one in strands], 4.0)
-    assert ribbon._node is node and node.points is sent
-    ribbon.paint(UNKNOWN)
-    np.testing.assert_allclose(to_screen(node.colors[[0, -1], 0]), [UNKNOWN] * 2, atol=6.0)
-    ribbon.paint(None)
-    np.testing.assert_allclose(to_screen(node.colors[[0, -1], 0]), [PASSABLE, REFUSED], atol=6.0)
-    ribbon.show([replace(strands[0], line=line[:3])], 4.0)
-    assert ribbon._node is node and len(node.points) == 2
-    ribbon.remove()
+    for paint, colours in ((UNKNOWN, [UNKNOWN] * 2), (None, [PASSABLE, REFUSED])):
+        again = [replace(one, line=one.line.copy()) for one in strands]
+        nodes.show_lines("/test/lines", again, 4.0, paint)
+        np.testing.assert_allclose(to_screen(node.colors[[0, -1], 0]), colours, atol=6.0)
+        assert node.points is sent
+    nodes.show_lines("/test/lines", [replace(strands[0], line=line[:3])], 4.0)
+    assert nodes._shown["/test/lines"][0] is node and len(node.points) == 2
+    nodes.remove("/test")
+    assert nodes._shown == {}
 
 
 def test_a_trail_has_a_colour_from_blue_to_yellow_at_each_place(page):
@@ -291,8 +290,8 @@ def test_a_trail_has_a_colour_from_blue_to_yellow_at_each_place(page):
     trail = np.array([[0.0, 0.0, 0.5], [0.1, 0.0, 0.0], [0.2, 0.0, 1.0]])
     for known, count in ((None, 0), (trail[:1], 0), (trail, 2)):
         overlay.show_trail(LSR1, ground, known)
-        assert len(overlay._trail.strands) == count
-    low, high = (one.colour for one in overlay._trail.strands)
+        assert len(overlay.lines["trail"]) == count
+    low, high = (one.colour for one in overlay.lines["trail"])
     assert low[2] > low[0] and high[0] > high[2]
     overlay.show_trail(LSR1, ground, None)
 
@@ -301,14 +300,17 @@ def test_a_trail_has_a_colour_from_blue_to_yellow_at_each_place(page):
 
 
 def test_a_drawing_that_is_asked_for_again_is_done_once_and_one_that_fails_stops_no_other(page):
-    drawings, done = Drawings(page.errors, page.server.atomic), []
-    drawings.ask("the paths", lambda: done.append("old paths"))
-    drawings.ask("the plots", lambda: 1 / 0)
-    drawings.ask("the paths", lambda: done.append("new paths"))
-    drawings.ask("the rover", lambda: done.append("rover"))
-    for _ in range(3):
-        drawings.draw_next()
-    assert done == ["new paths", "rover"] and not drawings.waiting
+    done = []
+
+    def ask_for_four() -> None:
+        page.draw_made("the paths", [object()], lambda: done.append("old paths"))
+        page.draw_made("the plots", [object()], lambda: 1 / 0)
+        page.draw_made("the paths", [object()], lambda: done.append("new paths"))
+        page.draw_made("the rover", [object()], lambda: done.append("rover"))
+
+    ask(page, ask_for_four)
+    wait_until(lambda: not page.is_drawing, "the drawings")
+    assert done == ["new paths", "rover"]
     assert "ZeroDivisionError" in page.errors.messages.pop("the plots")
 
 
@@ -335,19 +337,10 @@ def test_a_failed_picture_is_not_drawn_again_at_once(page, monkeypatch):
         stopped_at = page.playback.time
         time.sleep(0.5)  # a dozen pictures
         assert len(tried) == 1 and page.playback.time == stopped_at
-    ask(page, page.playback.play)
+    ask(page, lambda: None)
     wait_until(lambda: page.playback.time > stopped_at, "the rover to drive on")
     wait_until(lambda: not told(page, "errors"), "the notice to go")
-    ask(page, page.playback.pause)
-
-
-def test_a_refused_value_is_told_and_put_back(page):
-    before = told(page, "values")
-    page.hear({"ask": "value", "label": "middle wheel x [m]", "value": 0.6}, None)
-    wait_until(lambda: "suspension.wheels.front" in told(page, "verdict")["refusal"], "the reason")
-    assert told(page, "values") == before
-    ask(page, lambda: page.session.judge_again())
-    wait_until(lambda: not told(page, "verdict")["refusal"], "no reason")
+    ask(page, page.playback.toggle)
 
 
 def test_a_closed_page_leaves_no_thread_behind():
@@ -390,7 +383,7 @@ def test_on_a_far_map_the_rover_is_where_it_is_on_a_near_one_and_a_click_lands_w
         page = Page(ViewSession(LSR1, ground, (x - 2.0, y, 0.0), (x + 1.0, y, 0.0)), port=0)
         try:
             wait_for_rest(page)
-            places[x] = np.array(page.scene._visual._root.position)
+            places[x] = np.array(page.scene._visual.root.position)
             aim = np.array([x + 1.5, y + 0.5])
             place = page.scene.frame.to_scene([*aim, float(ground.elevation_at(*aim))])
             away = np.array([-1.0, 0.0, 2.0])

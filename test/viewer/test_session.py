@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from rover_physics.errors import RoverFileError
-from rover_physics.names import WHEELS
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, load_terrain
@@ -26,7 +25,6 @@ from rover_planner.viewer.documents.paths import list_paths
 from rover_planner.viewer.documents.rover import describe_changes
 from rover_planner.viewer.documents.verdict import Work, describe_verdict
 from rover_planner.viewer.state.session import ViewSession
-from rover_planner.viewer.state.trajectory import Trajectory
 from support.grounds import make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, blocked_session, ramp, session_on, straight
 from support.waiting import wait_until
@@ -86,14 +84,14 @@ def test_before_and_after_stay_while_something_differs_from_the_loaded_rover():
 def test_a_kept_reference_takes_the_place_of_the_loaded_rover_also_for_another_policy():
     session = session_on(ramp)
     session.change_rover(FRICTION, 0.7)
-    session.keep_reference()
+    session.keep_reference(session.wanted)
     assert session.shown.reference is None
     session.change_options(policy="servo")
     session.show_path(2)
     reference = session.shown.reference
     assert reference.verdict.policy == "equal" and reference.scenario.rover.friction == 0.7
     np.testing.assert_array_equal(reference.poses, session.shown.path.poses)
-    session.drop_reference()
+    session.keep_reference(None)
     assert session.shown.reference.scenario.rover == LSR1
 
 
@@ -172,17 +170,6 @@ def test_a_path_is_judged_under_all_policies_and_one_that_cannot_judge_says_so()
     assert judged["servo"].traversable is None and "no bounds" in judged["servo"].reason
 
 
-def test_an_arm_with_a_payload_loads_the_wheels_below_it():
-    session = session_on(lambda x, y: 0.0 * x)
-    session.change_rover([("manipulator", "payload")], 2.0)
-    session.change_arm("arm_yaw", 0.0)
-    ahead = session.shown.path.candidate.prediction.wheel_loads[0]
-    session.change_arm("arm_yaw", 3.14159)
-    behind = session.shown.path.candidate.prediction.wheel_loads[0]
-    front, rear = [WHEELS.index(f"{end}_left") for end in ("front", "rear")]
-    assert ahead[front] > behind[front] and ahead[rear] < behind[rear]
-
-
 def recorded(folder, poses):
     terrain = make_terrain(wall_at(0.5))
     prediction, verdict = judge_path(LSR1, terrain, poses)
@@ -198,10 +185,9 @@ def test_a_recorded_prediction_is_shown_as_it_was_recorded(tmp_path):
     assert shown.verdict.reason == verdict.reason != ""
     assert shown.verdict.first_failure == verdict.first_failure
     state = shown.path.trajectory.state_at(10.0)
-    expected = Trajectory(LSR1, prediction, verdict).state_at(10.0)
-    assert state is not None and expected is not None
-    np.testing.assert_allclose(state.wheel_loads, expected.wheel_loads)
-    np.testing.assert_allclose(state.contact_points, expected.contact_points)
+    row = int(np.searchsorted(prediction.time, 10.0))
+    low, high = np.sort(prediction.wheel_loads[row - 1 : row + 1], axis=0)
+    assert ((state.wheel_loads >= low - 1e-6) & (state.wheel_loads <= high + 1e-6)).all()
 
 
 def test_a_recorded_reason_takes_precedence_over_the_model(tmp_path):

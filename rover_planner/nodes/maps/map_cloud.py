@@ -6,14 +6,14 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
 from rclpy.exceptions import InvalidHandle
-from rclpy.node import Node
 from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.elevation import terrain_to_point_cloud
-from msg_adapters.stamps import NANOSECONDS
 from rover_planner.maps.known_map import KnownMap
+from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.ros.lazy_publisher import LazyPublisher
+from rover_planner.ros.node import RoverNode
 
 TOPIC = "~/map"
 
@@ -21,9 +21,9 @@ TOPIC = "~/map"
 class MapCloud:
     """Publishes the map of a service while someone subscribes; clouds are made in a thread."""
 
-    def __init__(self, node: Node, service: TraverseService, frame: str):
-        """Create the publisher; `frame` is that of maps without one."""
-        self._node, self._service, self._frame = node, service, frame
+    def __init__(self, node: RoverNode[TraverseServerParameters], service: TraverseService):
+        """Create the publisher."""
+        self._node, self._service = node, service
         self._publisher = LazyPublisher(node, PointCloud2, TOPIC)
         self._shown: KnownMap | None = None
         self._pool = ThreadPoolExecutor(1, "map_cloud")
@@ -49,15 +49,14 @@ class MapCloud:
         self._pool.shutdown(cancel_futures=True)
 
     def _publish(self, known: KnownMap) -> None:
-        now = self._node.get_clock().now()
         more: dict[str, np.ndarray] = {}
         if known.cells is not None:
-            age = now.nanoseconds / NANOSECONDS - known.cells.time
+            age = self._node.seconds - known.cells.time
             more = {
                 "source": known.cells.source,
                 "age": np.where(np.isfinite(known.received.elevation), age, np.nan),
             }
-        frame = known.frame or self._frame
-        cloud = terrain_to_point_cloud(known.received, frame, now.to_msg(), more=more)
+        frame, stamp = known.frame or self._node.values.map_frame, self._node.get_clock().now()
+        cloud = terrain_to_point_cloud(known.received, frame, stamp.to_msg(), more=more)
         with contextlib.suppress(InvalidHandle):  # the node has ended meanwhile
             self._publisher.send(cloud)

@@ -7,34 +7,21 @@ from functools import partial
 from typing import Any
 
 from nav_msgs.srv import LoadMap
-from rclpy.node import Node
-from sensor_msgs.msg import Imu, PointCloud2
+from sensor_msgs.msg import PointCloud2
 
-from msg_adapters.errors import MessageError
-from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.results.grids import terrain_to_occupancy_grid
-from msg_adapters.sensing import BASE_FRAME
-from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.files.validation import show_file
-from rover_physics.terrain.grid import load_terrain
-from rover_planner.maps.living_map import MapSnapshot
 from rover_planner.maps.map_file import MapFileError, MapLimits, open_map
-from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.maps.summary import describe_terrain
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.service_settings import map_rules
-from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.deferred_service import Reply, serve_later
-from rover_planner.ros.frames import Frames
-from rover_planner.ros.guard import Guard, Handover
 from rover_planner.ros.logs import RepeatLog
 from rover_planner.ros.map_intake import CLOUD, GRID_MAP, MapIntake
-from rover_planner.ros.map_messages import LOOK_PERIOD, read_map
+from rover_planner.ros.node import RoverNode
 from rover_planner.ros.optional_types import find_type
-from rover_planner.ros.polled_topics import PolledTopics
-from rover_planner.ros.qos import polled_qos
+from rover_planner.ros.server_inputs import ServerInputs
 from rover_planner.ros.subscriptions import subscribe_to_map
 
 LOG_PERIOD = 10.0
@@ -51,73 +38,39 @@ class MapTopics:
 
     def __init__(
         self,
-        node: Node,
-        service: TraverseService,
-        parameters: TraverseServerParameters,
+        node: RoverNode[TraverseServerParameters],
+        inputs: ServerInputs,
         report: Callable[[str], None],
-        frames: Frames,
-        guard: Guard,
-        heard: PolledTopics,
     ):
-        """Subscribe to the maps, serve ~/load_map and load the first one.
+        """Subscribe to the maps and serve ~/load_map.
 
         Args:
             node: The node.
-            service: Takes the maps.
-            parameters: The parameters of the node.
+            inputs: Takes the maps, in the thread.
             report: Called in the thread after each map: with the reason if it was refused, else
                 with an empty text.
-            frames: Knows where the frames of messages are on the map; asked in the thread.
-            guard: Takes unexpected errors.
-            heard: Topics with odometry, which is read before a map.
-
-        Raises:
-            TerrainError: The file of the parameter terrain_file cannot be loaded.
         """
-        self._node, self._service, self._report = node, service, report
-        self._guard, self._handover, self._heard = guard, Handover(node, guard), heard
-        self._values = parameters
-        self._keeper = MapKeeper(service.settings.rover, map_rules(parameters))
+        self._node, self._inputs, self._report = node, inputs, report
+        self._service, self._values = inputs.service, node.values
         self._is_from_topic = False
-        self._looked = -float("inf")
         self._logged_at, self._logged_kind = -float("inf"), ("", False)
         self._map_count, self._refusals = 0, RepeatLog()
-        if parameters.terrain_file:
-            terrain = load_terrain(parameters.terrain_file, parameters.max_map_cells)
-            self._keep(self._keeper.load(terrain, self._now(), None), parameters.terrain_file)
-        self._intake: MapIntake[None] = MapIntake(self._take_message, self._refuse, frames)
+        self._intake: MapIntake[None] = MapIntake(self._take_message, self._refuse, inputs.frames)
         self.retry = self._intake.retry
         """Takes the last message if its transform has come meanwhile; to be called each second."""
-        self._subscribe(CLOUD, PointCloud2, parameters)
-        if parameters.imu_attitude:
-            self._subscribe_to_imu(parameters)
+        self._subscribe(CLOUD, PointCloud2)
         serve_later(node, LoadMap, "~/load_map", self._load_map)
         grid_map = find_type("grid_map_msgs.msg:GridMap")
         if grid_map is not None:
-            self._subscribe(GRID_MAP, grid_map, parameters)
+            self._subscribe(GRID_MAP, grid_map)
 
-    def _subscribe(self, topic: str, kind: type, parameters: TraverseServerParameters) -> None:
+    def _subscribe(self, topic: str, kind: type) -> None:
         def offer(message: bytes) -> None:
-            self._heard.poll()
+            self._node.heard.poll()
             if not self._intake.offer(message, kind):
                 self._intake.do(self._renew)
 
-        durability, reliability = parameters.map_durability, parameters.input_reliability
-        subscribe_to_map(self._node, kind, topic, offer, durability, reliability)
-
-    def _subscribe_to_imu(self, parameters: TraverseServerParameters) -> None:
-        mounting = ImuMounting(parameters.imu_frame or BASE_FRAME, parameters.imu_mounting)
-
-        def take(imu: Imu, _arrival: float) -> None:
-            try:
-                attitude = imu_to_attitude(imu, mounting)
-            except MessageError as error:
-                logger = self._node.get_logger()
-                logger.warning(f"imu not used: {error}", throttle_duration_sec=LOG_PERIOD)
-                return
-            self._service.take_tilt(attitude.roll, attitude.pitch)
-
-        self._heard.subscribe(Imu, "imu", take, polled_qos())
+        subscribe_to_map(self._node, kind, topic, offer)
 
     def ticket(self) -> int:
         """Return a number for `wait`: all maps that have come until now."""
@@ -128,19 +81,19 @@ class MapTopics:
 
         Where maps merge, the wait is no longer than MERGE_WAIT, as there is a good map.
         """
-        merges = self._keeper.merges and self._service.known_map is not None
+        merges = self._inputs.keeper.merges and self._service.known_map is not None
         self._intake.wait(ticket, check, MERGE_WAIT if merges else float("inf"))
 
-    def apply(self, parameters: TraverseServerParameters) -> None:
+    def apply(self) -> None:
         """Make the present map anew if a parameter of messages has changed.
 
         Those of merging and filling count from the next map on.
         """
-        before, self._values = self._values, parameters
-        rules, rover = map_rules(parameters), self._service.settings.rover
-        self._intake.do(lambda: self._keeper.apply(rover, rules))
+        before, self._values = self._values, self._node.values
+        values, rover = self._values, self._service.settings.rover
+        self._intake.do(lambda: self._inputs.keeper.apply(rover, values))
         names = ("map_resolution", "cell_height")
-        is_new = any(getattr(before, name) != getattr(parameters, name) for name in names)
+        is_new = any(getattr(before, name) != getattr(self._values, name) for name in names)
         if self._is_from_topic and is_new:
             self._intake.repeat()
         else:
@@ -155,9 +108,9 @@ class MapTopics:
             try:
                 self._load(request.map_url, response)
             except Exception as error:
-                self._guard.report("load_map", error)
+                self._node.guard.report("load_map", error)
                 response.result = LoadMap.Response.RESULT_INVALID_MAP_DATA
-            self._handover.call(partial(reply, response))
+            self._node.handover.call(partial(reply, response))
 
         self._intake.do(load)
 
@@ -167,7 +120,8 @@ class MapTopics:
             values = self._values
             limits = MapLimits(values.map_folder, values.max_map_bytes, values.max_map_cells)
             terrain = open_map(url, limits)
-            snapshot = self._keeper.load(terrain, self._now(), self._service.standing())
+            standing, now = self._service.standing(), self._node.seconds
+            snapshot = self._inputs.keeper.load(terrain, now, standing)
         except RoverError as error:
             self._node.get_logger().error(f"load_map: {error}")
             missing = isinstance(error, MapFileError)
@@ -179,17 +133,15 @@ class MapTopics:
             return
         self._intake.forget()
         self._is_from_topic = False
-        self._take(snapshot, show_file(url), None)
+        source = show_file(url)
+        self._note(source, self._inputs.keep(snapshot, source))
         stamp = self._node.get_clock().now().to_msg()
         response.map = terrain_to_occupancy_grid(terrain, self._values.map_frame, stamp)
         response.result = LoadMap.Response.RESULT_SUCCESS
 
     def look_under_rover(self) -> None:
-        """Have unknown ground under the rover filled, at most every LOOK_PERIOD."""
-        now = time.monotonic()
-        is_due = self._values.fill_under_rover and now - self._looked >= LOOK_PERIOD
-        if is_due and self._service.standing() is not None:
-            self._looked = now
+        """Have unknown ground under the rover filled, if that is due."""
+        if self._inputs.may_fill_under_rover():
             self._intake.do(self._fill_under_rover)
 
     def close(self) -> None:
@@ -202,47 +154,30 @@ class MapTopics:
             self._service.renew_map()
 
     def _take_message(self, message: Any, source: Rigid | None) -> None:
-        terrain = read_map(message, self._values, source, self._keeper)
-        topic, stamp = self._intake.topic, stamp_to_ns(message.header.stamp)
-        since = self._now() if stamp is None else stamp / NANOSECONDS
-        kept = self._keeper.take(terrain, topic, since, self._service.standing())
-        self._take(kept, topic, stamp)
+        topic = self._intake.topic
+        self._note(topic, self._inputs.take_map(message, source, topic))
         self._is_from_topic = True
 
     def _fill_under_rover(self) -> None:
-        standing = self._service.standing()
-        if standing is None or self._service.known_map is None:
-            return
-        filled = self._keeper.fill(standing, self._now())
+        filled = self._inputs.fill_under_rover()
         if filled is not None:
-            self._service.amend_map(filled.terrain, filled.sources)
             self._node.get_logger().info(
                 f"ground under the rover filled: {filled.sources.count()} cells by source"
             )
 
-    def _take(self, snapshot: MapSnapshot, source: str, stamp: int | None) -> None:
-        is_new = self._keep(snapshot, source, stamp)
+    def _note(self, source: str, is_new: bool) -> None:
+        """Report that a map was taken, prepare it for questions, and log one that is new."""
         self._report("")
         self._service.prepare()
         if is_new:
             taken, now = self._service.terrain, time.monotonic()
             assert taken is not None
-            kind = source, self._keeper.merges
+            kind = source, self._inputs.keeper.merges
             self._map_count += not kind[1]
             is_due = now - self._logged_at >= LOG_PERIOD or kind != self._logged_kind
             if is_due or (not kind[1] and self._map_count <= FIRST_MAPS):
                 self._logged_at, self._logged_kind = now, kind
                 self._node.get_logger().info(f"map from {source}: {describe_terrain(taken)}")
-
-    def _keep(self, snapshot: MapSnapshot, source: str, stamp: int | None = None) -> bool:
-        return self._service.take_terrain(
-            snapshot.terrain, source, stamp, snapshot.sources, self._values.map_frame
-        )
-
-    def _now(self) -> float:
-        """Return the ROS time [s]."""
-        now: float = self._node.get_clock().now().nanoseconds / NANOSECONDS
-        return now
 
     def _refuse(self, error: str) -> None:
         there = self._service.known_map is not None

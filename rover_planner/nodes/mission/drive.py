@@ -83,35 +83,13 @@ class Stretch(NamedTuple):
     """(n, 3) waypoints of the plan up to there."""
 
 
-def drive_to(
-    client: RoverClient,
-    goal: Sequence[float],
-    plan: Sequence[Sequence[float]],
-    settings: DriveSettings,
-    report: Callable[[str], object],
-) -> None:
-    """Drive a plan, and ask for another one where it cannot be driven to the goal.
+class Drive:
+    """A drive along a plan, and along another one where it cannot be driven to the goal.
 
     That is where the newest map refuses the rest of it, where the rover stands although it is to
     drive, and where the plan ends before the goal. Where no path begins, and where the rover stops
     again, it first drives back along its plan; and where a place ahead was marked as impassable.
-
-    Args:
-        client: Server and rover.
-        goal: Where to, x, y [m] and yaw [rad].
-        plan: Poses of the first plan.
-        settings: How it is watched.
-        report: Takes events in words.
-
-    Raises:
-        DriveFailedError: There is no path from where the rover is, it does not get on, or it takes
-            too long.
     """
-    _Drive(client, goal, settings, report).run(np.array(plan))
-
-
-class _Drive:
-    """A drive to one goal."""
 
     def __init__(
         self,
@@ -120,20 +98,39 @@ class _Drive:
         settings: DriveSettings,
         report: Callable[[str], object],
     ):
-        """Begin; arguments as for `drive_to`."""
+        """Begin.
+
+        Args:
+            client: Server and rover.
+            goal: Where to, x, y [m] and yaw [rad].
+            settings: How it is watched.
+            report: Takes events in words.
+        """
         self._client, self._goal, self._settings, self._report = client, goal, settings, report
         self._deadline = time.monotonic() + settings.timeout
-        self._stops = Stops()
+        self._stopped_at, self._stops = np.full(3, np.inf), 0
         self._trail: Poses = np.zeros((0, 3))
 
-    def run(self, plan: Poses) -> None:
-        """Drive a plan (n, 3) and those that follow it."""
+    def run(self, poses: Sequence[Sequence[float]]) -> None:
+        """Drive a plan and those that follow it.
+
+        Raises:
+            DriveFailedError: There is no path from where the rover is, it does not get on, or it
+                takes too long.
+        """
+        plan: Poses = np.array(poses)
         for _ in range(MAX_PLANS):
             stretch = self._follow(plan)
             if not stretch.hindrance and not self._describe_miss(plan[-1], self._goal):
                 return
             plan = self._find_plan(stretch)
         raise DriveFailedError(f"the goal is not reached after {MAX_PLANS} plans")
+
+    def _count_stops(self, pose: Poses) -> int:
+        """Return how often in turn the rover (3,) has stopped where it stops now."""
+        is_same = math.dist(pose[:2], self._stopped_at[:2]) < SAME_PLACE
+        self._stopped_at, self._stops = pose, self._stops + 1 if is_same else 1
+        return self._stops
 
     def _find_plan(self, stretch: Stretch) -> Poses:
         """Return the plan (n, 3) on which the rover goes on after a stretch."""
@@ -142,7 +139,7 @@ class _Drive:
         pose, stops = self._stand(stretch.pose), 0
         if stretch.hindrance:
             self._report(stretch.hindrance)
-            stops = self._stops.count(pose)
+            stops = self._count_stops(pose)
         if stops > MAX_STOPS:
             raise DriveFailedError(
                 f"{MAX_STOPS} other paths led nowhere from {_describe(pose)}: {stretch.hindrance}"
@@ -257,22 +254,6 @@ class Standstill:
         if self._pose is None or _is_away(pose, self._pose):
             self._pose, self._since = pose, now
         return now - self._since > self._patience
-
-
-class Stops:
-    """Counts the stops at one place."""
-
-    def __init__(self) -> None:
-        """Begin without a stop."""
-        self._place: Poses | None = None
-        self._count = 0
-
-    def count(self, pose: Poses) -> int:
-        """Return how often in turn the rover (3,) has stopped where it stops now."""
-        is_same = self._place is not None and math.dist(pose[:2], self._place[:2]) < SAME_PLACE
-        self._count = self._count + 1 if is_same else 1
-        self._place = pose
-        return self._count
 
 
 def _is_away(pose: Poses, other: Poses) -> bool:

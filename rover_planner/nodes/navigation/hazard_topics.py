@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap
-from rclpy.node import Node
 
 from msg_adapters.results.grids import classes_to_grid
 from rover_physics.errors import RoverError
@@ -23,9 +22,9 @@ from rover_planner.planning.answering.budget import STOPPING, QuestionStoppedErr
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.hazard_map import HazardMap, HazardView
-from rover_planner.ros.guard import Guard, Handover
 from rover_planner.ros.lazy_publisher import LazyPublisher
 from rover_planner.ros.logs import TransitionLog
+from rover_planner.ros.node import RoverNode
 
 PERIOD = 0.5
 """Time between two looks for a new map [s]; comparing two large maps takes a tenth of it."""
@@ -44,10 +43,8 @@ class HazardTopics:
 
     def __init__(
         self,
-        node: Node,
+        node: RoverNode[TraverseServerParameters],
         service: TraverseService,
-        parameters: TraverseServerParameters,
-        guard: Guard,
         is_busy: Callable[[], bool],
     ):
         """Create topics, service and thread.
@@ -55,14 +52,10 @@ class HazardTopics:
         Args:
             node: The node.
             service: Knows map, settings and pose.
-            parameters: The parameters of the node.
-            guard: Takes unexpected errors.
             is_busy: Returns whether questions are open, which come first; called in the thread.
         """
-        self._node, self._service, self._guard, self._is_busy = node, service, guard, is_busy
-        self._frame, self._headings = parameters.map_frame, parameters.hazard_headings
+        self._node, self._service, self._is_busy = node, service, is_busy
         self._log = TransitionLog(node.get_logger())
-        self._handover = Handover(node, guard)
         self._shown: _Shown | None = None
         self._done: tuple[Terrain, ServiceSettings] | None = None
         self._topics: dict[str, LazyPublisher] = {}
@@ -71,13 +64,13 @@ class HazardTopics:
         self._enabled = threading.Event()
         self._ending = threading.Event()
         self._patience = 0.0
-        self.apply(parameters)
+        self.apply()
         self._thread = threading.Thread(target=self._run, name="hazards", daemon=True)
         self._thread.start()
 
-    def apply(self, parameters: TraverseServerParameters) -> None:
-        """Take new parameters."""
-        if not parameters.hazard_map:
+    def apply(self) -> None:
+        """Follow the parameter `hazard_map`."""
+        if not self._node.values.hazard_map:
             self._enabled.clear()
             self._withdraw()
             return
@@ -97,7 +90,8 @@ class HazardTopics:
 
     def _create_topics(self) -> None:
         """Create the topics, which a node without a hazard map does not have."""
-        for name in ("worst", "best", *(f"heading_{k}" for k in range(self._headings))):
+        headings = (f"heading_{k}" for k in range(self._node.values.hazard_headings))
+        for name in ("worst", "best", *headings):
             self._topics[name] = LazyPublisher(self._node, OccupancyGrid, f"~/hazard_map/{name}")
 
     def close(self) -> None:
@@ -133,7 +127,7 @@ class HazardTopics:
             topic.catch_up()
 
     def _run(self) -> None:
-        hazards = HazardMap(self._headings)
+        hazards = HazardMap(self._node.values.hazard_headings)
         while not self._ending.is_set():
             self._enabled.wait()
             try:
@@ -144,8 +138,8 @@ class HazardTopics:
             except RoverError as error:  # such as a soil of the map that is not known
                 self._log.update("hazards", f"no hazard map: {error}", "", time.monotonic())
             except Exception as error:
-                self._guard.report("hazard map", error)
-                hazards, self._done = HazardMap(self._headings), None
+                self._node.guard.report("hazard map", error)
+                hazards, self._done = HazardMap(self._node.values.hazard_headings), None
             self._ending.wait(PERIOD)
 
     def _check_end(self) -> None:
@@ -188,8 +182,8 @@ class HazardTopics:
         if view is None:
             return
         stamp = self._node.get_clock().now().to_msg()
-        shown = _Shown(view, map_hash, hazards.stale_count, self._frame, stamp)
-        self._handover.call(partial(self._publish, shown, withdrawals))
+        shown = _Shown(view, map_hash, hazards.stale_count, self._node.values.map_frame, stamp)
+        self._node.handover.call(partial(self._publish, shown, withdrawals))
 
     def _publish(self, shown: "_Shown", withdrawals: int) -> None:
         """Publish a view, but none of before a withdrawal; called in the executor's thread."""

@@ -10,7 +10,6 @@ from dataclasses import replace
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from numpy.typing import NDArray
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
@@ -34,7 +33,7 @@ from rover_planner.planning.navigation.monitor import (
     rehearse,
 )
 from rover_planner.planning.navigation.watched_path import WatchedPath
-from rover_planner.ros.guard import Guard, Handover
+from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import latched_qos
 
 PERIOD = 0.1
@@ -61,24 +60,20 @@ class PathWatch:
 
     def __init__(
         self,
-        node: Node,
+        node: RoverNode[TraverseServerParameters],
         service: TraverseService,
-        parameters: TraverseServerParameters,
-        guard: Guard,
         find_pose: FindPose,
         report_stop: ReportStop,
     ):
         """Create topic, service and thread.
 
         Args:
-            node: The node; it has the parameter `monitor`.
+            node: The node.
             service: Knows map, pose and joints.
-            parameters: The parameters of the node.
-            guard: Takes unexpected errors.
             find_pose: Returns where the body is; None if it is not known.
             report_stop: Called in the executor's thread when the rover is to stop.
         """
-        self._node, self._service, self._guard = node, service, guard
+        self._node, self._service = node, service
         self._find_pose, self._report_stop = find_pose, report_stop
         self._monitor = PathMonitor()
         self.finding = self._monitor.finding
@@ -91,7 +86,6 @@ class PathWatch:
         self._state = node.create_publisher(DiagnosticStatus, "~/watch", latched_qos())
         self._map_age = math.nan
         self._looked, self._idle_until = time.monotonic(), 0.0
-        self._handover = Handover(node, guard)
         self._changed = threading.Condition()
         self._new_path: WatchedPath | None = None
         self._sight: Sight | None = None
@@ -99,17 +93,13 @@ class PathWatch:
         self._thread = threading.Thread(target=self._run, name="monitor", daemon=True)
         self._thread.start()
         node.create_service(SetBool, "~/monitor", self._switch)
-        self.apply(parameters)
+        self.apply()
 
-    def apply(self, parameters: TraverseServerParameters) -> None:
-        """Take new parameters."""
-        if parameters.monitor == self.enabled:
-            return
-        self.enabled = parameters.monitor
-        if self.enabled:
-            self._set_path(self._last_path)
-        else:
-            self._set_path(NO_PATH)
+    def apply(self) -> None:
+        """Follow the parameter `monitor`."""
+        if self._node.values.monitor != self.enabled:
+            self.enabled = self._node.values.monitor
+            self._set_path(self._last_path if self.enabled else NO_PATH)
 
     def accept(self, poses: NDArray[np.float64], about: str) -> None:
         """Watch a path that was judged traversable, from the next look on.
@@ -135,7 +125,7 @@ class PathWatch:
 
     def look(self) -> None:
         """Have a look taken at once, from any thread: there is a new map."""
-        self._handover.call(self.beat)
+        self._node.handover.call(self.beat)
 
     def beat(self) -> None:
         """Have a look taken if one is due, and publish `~/stop`; to be called each PERIOD."""
@@ -193,7 +183,7 @@ class PathWatch:
         except (KernelMissingError, QuestionStoppedError):
             return
         except Exception as error:
-            self._guard.report("monitor", error)
+            self._node.guard.report("monitor", error)
 
     def _run(self) -> None:
         self._rehearse()
@@ -228,19 +218,21 @@ class PathWatch:
 
     def _fail(self, error: Exception) -> Finding:
         """Return that the rover is to stop because the rest of its path could not be judged."""
-        text = self._guard.report("monitor", error)
+        text = self._node.guard.report("monitor", error)
         return self._monitor.stop(refusal("internal_error", f"internal error: {text}"))
 
     def _hand_over(self, finding: Finding, sight: Sight) -> None:
         """Publish a finding at once; classes of a stop's waypoints take longer and follow."""
-        self._handover.call(lambda: self._take(finding))
+        self._node.handover.call(lambda: self._take(finding))
         judgement = finding.judgement
         if finding.state != STOPPED or judgement is None or judgement is self._reported:
             return
         self._reported = judgement
         with interruptible(self._check_end):
             complete = judgement.complete()
-        self._handover.call(lambda: self._report_stop(complete, finding.path_hash, sight.snapshot))
+        self._node.handover.call(
+            lambda: self._report_stop(complete, finding.path_hash, sight.snapshot)
+        )
 
     def _take(self, finding: Finding) -> None:
         """Publish ~/stop at once where it has changed; called in the executor's thread."""

@@ -7,7 +7,6 @@ from typing import Any
 
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
-from rclpy.node import Node
 from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Bool
 
@@ -22,10 +21,9 @@ from rover_physics.rover.steering_joints import STEERING_SIGNS, steering_joints
 from rover_planner.parameters.shared import STOP
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.ros.frames import NodeFrames
-from rover_planner.ros.guard import Guard
 from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.map_intake import CLOUD, MapIntake
-from rover_planner.ros.polled_topics import PolledTopics
+from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import sensor_qos, topic_qos
 from rover_planner.ros.subscriptions import PublisherCheck, subscribe_to_map
 from rover_planner.traction.clocks import NANOSECONDS, StampCheck, StampError
@@ -48,21 +46,13 @@ class TractionInputs:
 
     def __init__(
         self,
-        node: Node,
-        parameters: TractionControllerParameters,
+        node: RoverNode[TractionControllerParameters],
         service: TractionService,
-        maps: MapIntake,
+        maps: MapIntake[Any],
         frames: NodeFrames,
-        guard: Guard,
     ):
-        """Subscribe to all inputs of a node; `guard` counts unexpected errors.
-
-        `frames` brings odometry of other frames to that of the map.
-        """
-        self._node, self._service, self._maps, self._frames = node, service, maps, frames
-        self._errors, self._topics = guard, PolledTopics(node, guard)
-        self.poll = self._topics.poll
-        """Reads what has come; to be called before each update."""
+        """Subscribe to all inputs of a node; `frames` brings odometry to the frame of the map."""
+        self._node, self._service, self._frames, parameters = node, service, frames, node.values
         self._steering_sign = parameters.steering_sign
         arm = service.settings.rover.manipulator
         known = (*JOINTS, *STEERING_JOINTS, *(() if arm is None else arm.joints))
@@ -77,6 +67,7 @@ class TractionInputs:
         self.stamps = StampCheck(parameters.stamp_tolerance)
         """Judges the header stamps."""
         self._subscribe(parameters)
+        subscribe_to_map(node, PointCloud2, CLOUD, maps.offer)
         self.publishers = self._check_publishers(parameters)
         """Looks for publishers that are not heard."""
 
@@ -95,10 +86,8 @@ class TractionInputs:
             (twist, CMD_VEL, self._take_command),
             (Odometry, ODOMETRY, self._take_odometry),
         ):
-            self._topics.subscribe(kind, name, self._guard(name, take), sensor_qos())
-        self._topics.subscribe(Bool, STOP, self._guard(STOP, self._take_stop), topic_qos())
-        durability, reliability = parameters.map_durability, parameters.input_reliability
-        subscribe_to_map(self._node, PointCloud2, CLOUD, self._maps.offer, durability, reliability)
+            self._node.heard.subscribe(kind, name, self._guard(name, take), sensor_qos())
+        self._node.heard.subscribe(Bool, STOP, self._guard(STOP, self._take_stop), topic_qos())
 
     def _check_publishers(self, parameters: TractionControllerParameters) -> PublisherCheck:
         types = {
@@ -127,7 +116,7 @@ class TractionInputs:
             except RoverError as error:
                 self._refuse(name, str(error), now)
             except Exception as error:
-                self._refuse(name, f"internal error: {self._errors.report(name, error)}", now)
+                self._refuse(name, f"internal error: {self._node.guard.report(name, error)}", now)
 
         return receive
 

@@ -4,7 +4,6 @@
 import time
 from collections.abc import Callable
 
-from rclpy.node import Node
 from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.elevation import terrain_from_point_cloud
@@ -15,6 +14,7 @@ from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.frames import NodeFrames
 from rover_planner.ros.logs import RepeatLog
 from rover_planner.ros.map_intake import CLOUD, MapIntake
+from rover_planner.ros.node import RoverNode
 
 
 class TractionMaps(MapIntake[MapContactFinder]):
@@ -22,8 +22,7 @@ class TractionMaps(MapIntake[MapContactFinder]):
 
     def __init__(
         self,
-        node: Node,
-        parameters: TractionControllerParameters,
+        node: RoverNode[TractionControllerParameters],
         rover: Callable[[], Rover],
         frames: NodeFrames,
     ):
@@ -31,20 +30,19 @@ class TractionMaps(MapIntake[MapContactFinder]):
 
         Args:
             node: The node.
-            parameters: Its parameters.
             rover: Returns the rover for which maps are prepared.
             frames: Knows where the frames of clouds are on the map.
         """
         self._node, self._rover, self._listen = node, rover, frames.listen
-        self._parameters = parameters
+        self._values = node.values
         self._refusals = RepeatLog()
         super().__init__(self._make, self._log_refusal, frames)
 
-    def apply(self, parameters: TractionControllerParameters) -> None:
+    def apply(self) -> None:
         """Prepare the last map again if a parameter of it has changed."""
-        before, self._parameters = self._parameters, parameters
+        before, self._values = self._values, self._node.values
         names = ("map_resolution", "cell_height")
-        if any(getattr(before, name) != getattr(parameters, name) for name in names):
+        if any(getattr(before, name) != getattr(self._values, name) for name in names):
             self.repeat()
 
     def look_for_frame(self) -> None:
@@ -55,7 +53,7 @@ class TractionMaps(MapIntake[MapContactFinder]):
 
     def _make(self, cloud: PointCloud2, source: Rigid | None) -> MapContactFinder:
         """Prepare a map from a cloud; called in the thread."""
-        values, move = self._parameters, None if source is None else source.matrix
+        values, move = self._values, None if source is None else source.matrix
         terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height, move)
         return MapContactFinder(self._rover(), terrain)
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from rclpy.node import Node
 from std_msgs.msg import Bool, Float64MultiArray, String
 
-from msg_adapters.commands import effort_commands, set_values, wheel_values
+from msg_adapters.commands import effort_commands, labelled_array, set_values
 from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
 from rover_planner.ros.qos import latched_qos, topic_qos
@@ -43,8 +43,8 @@ class TractionTopics:
         # Messages are reused, which is safe because publishing copies them.
         zeros = np.zeros(WHEEL_COUNT)
         self._contacts = np.zeros((2, WHEEL_COUNT))
-        self._of_wheels = wheel_values(zeros)
-        self._of_contacts = wheel_values(self._contacts, "angle, deviation")
+        self._of_wheels = labelled_array(zeros, "wheel")
+        self._of_contacts = labelled_array(self._contacts, "angle, deviation", "wheel")
         self.writer = CommandWriter(self, order, signs)
         """For the thread of the updates."""
         self.watchdog_writer = CommandWriter(self, order, signs)

@@ -1,25 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """The answer to one request: the verdict at once, its report on demand."""
 
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.names import EQUAL
-from rover_physics.traversability.classification import ClassifiedWaypoint
+from rover_physics.traversability.classification import ClassifiedWaypoint, deciding_waypoint
+from rover_physics.traversability.verdict import BOUNDS, EXTREMES
 from rover_planner.maps.unobserved_ground import UnobservedShare
 from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.path_query import Candidate, PathSearch
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import SearchResult
-from rover_planner.planning.verdict_report import (
-    SuspensionReport,
-    VerdictReport,
-    report_path,
-    report_refusal,
-)
+from rover_planner.planning.verdict_report import SuspensionReport, VerdictReport
+
+REPORTED = (*EXTREMES, "risk", "map_sigmas", *BOUNDS, "failure_chance")
+"""Fields of a verdict that a report has."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,11 +90,34 @@ class PathJudgement:
     @cached_property
     def report(self) -> VerdictReport:
         """The full report of the request. Computed on first use, with the classes and the rest."""
-        whole, why = self._with_rest(), (self.code, self.reason)
-        if whole.candidate is None:
-            return report_refusal(*why)
-        details = whole.classes, whole.suspension, whole.ground, whole.search
-        return report_path(whole.candidate, why, *details)
+        whole = self._with_rest()
+        entries = {"traversable": self.traversable, "code": self.code, "reason": self.reason}
+        candidate, classes, ground = whole.candidate, whole.classes, whole.ground
+        if candidate is None:
+            return VerdictReport({**entries, "first_failure": -1})
+        entries |= _report_drive(candidate)
+        if classes:
+            entries |= _report_class(classes)
+        if self.suspension is not None:
+            entries |= asdict(self.suspension)
+        if ground is not None:
+            entries["blind_share"] = ground.unobserved_share
+            entries["footprint_share"] = ground.footprint_share
+        if self.search is not None:
+            entries |= _report_search(self.search)
+        verdict = candidate.verdict
+        return VerdictReport(
+            entries,
+            {
+                "codes": verdict.codes,
+                "reasons": verdict.reasons,
+                "failure_chance_at": verdict.failure_chance_at or [math.nan] * len(verdict.codes),
+                "traversability_classes": [one.traversability_class for one in classes],
+                "class_constraints": [one.constraint for one in classes],
+                "class_wheels": [one.wheel for one in classes],
+                "class_margins": [one.margin for one in classes],
+            },
+        )
 
     @cached_property
     def ground(self) -> UnobservedShare | None:
@@ -122,3 +147,51 @@ class PathJudgement:
 def refusal(code: str, reason: str) -> PathJudgement:
     """Return the refusal of a request without a judged path."""
     return PathJudgement(code, reason)
+
+
+def _report_drive(candidate: Candidate) -> dict[str, Any]:
+    """Return the first failure of a path, its extremes, length, time [s] and energy [J]."""
+    verdict, prediction = candidate.verdict, candidate.prediction
+    failure = verdict.first_failure
+    entries: dict[str, Any] = {"first_failure": failure}
+    if failure >= 0:
+        entries["failure_pose"] = prediction.poses[failure]
+        entries["failure_distance"] = candidate.passable_share * candidate.length
+    return {
+        **entries,
+        "policy": verdict.policy,
+        **{name: getattr(verdict, name) for name in REPORTED},
+        "waypoints": len(candidate.poses),
+        "predicted_waypoints": len(prediction.poses),
+        "length": candidate.length,
+        "time": prediction.time[-1] if candidate.is_complete else math.nan,
+        "energy": prediction.energy[-1] if candidate.is_complete else math.nan,
+    }
+
+
+def _report_class(classes: Sequence[ClassifiedWaypoint]) -> dict[str, Any]:
+    """Return the class of a path and the waypoint that decides it."""
+    waypoint = deciding_waypoint(classes)
+    worst = classes[waypoint]
+    return {
+        "traversability_class": worst.traversability_class,
+        "class_waypoint": waypoint,
+        "class_constraint": worst.constraint,
+        "class_wheel": worst.wheel,
+        "class_margin": worst.margin,
+        "class_reason": worst.reason,
+    }
+
+
+def _report_search(search: PathSearch) -> dict[str, Any]:
+    """Return what was tried to find a path to a goal."""
+    candidates = search.answer.candidates
+    return {
+        "goal": search.goal,
+        "goal_offset": search.goal_offset,
+        "alternative_goals_tried": search.alternatives_tried,
+        "candidates": len(candidates),
+        "traversable_candidates": sum(one.verdict.traversable for one in candidates),
+        "chosen_candidate": search.answer.number,
+        "explanation": search.answer.explain(),
+    }

@@ -19,25 +19,16 @@ from rover_planner.planning.path_query import Pose
 from rover_planner.planning.verdict_report import LEARNED, TOLD, IdentityReport
 
 
-@dataclass(frozen=True, eq=False)
-class ArmJudgement:
-    """The answer of the model, or a refusal before the model was used."""
+class ReachRefusal(ReachAnswer):
+    """The refusal of a reach query before the model was used."""
 
-    possible: bool
-    """True if the tip reaches the target and the rover holds still within all its limits."""
-    code: str
-    """Code of the reason why not, as in a `ReachAnswer` or a refusal; empty if possible."""
-    reason: str
-    """Reason why not, in words; empty if possible."""
-    answer: ReachAnswer | None = None
-    """The answer of the model; None after a refusal."""
+    def __init__(self, code: str, reason: str):
+        super().__init__(False, False, code, reason)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the answer in JSON types; unknown values are None or left out."""
-        if self.answer is not None:
-            return self.answer.to_dict()
-        said = {"code": self.code, "reason": self.reason}
-        return {"possible": self.possible, "reachable": False, **said}
+        """Return the refusal in JSON types."""
+        names = ("possible", "reachable", "code", "reason")
+        return {name: getattr(self, name) for name in names}
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +46,7 @@ class ReachQuery:
     wrench_refusal: str = ""
     """Reason why the last wrench was refused; queries are refused until a valid one arrives."""
 
-    def ask(self, snapshot: Snapshot) -> ArmJudgement:
+    def ask(self, snapshot: Snapshot) -> ReachAnswer:
         """Judge the rover at the last pose of the last path with its tool at the target.
 
         Args:
@@ -66,11 +57,11 @@ class ReachQuery:
         """
         missing = snapshot.refuse_if_missing()
         if missing is not None:
-            return refuse_reach(missing.code, missing.reason)
+            return ReachRefusal(missing.code, missing.reason)
         if self.target is None:
-            return refuse_reach("no_target", self.target_refusal)
+            return ReachRefusal("no_target", self.target_refusal)
         if self.wrench_refusal:
-            return refuse_reach("no_wrench", self.wrench_refusal)
+            return ReachRefusal("no_wrench", self.wrench_refusal)
         settings = snapshot.settings
         arm = settings.rover.manipulator
         if arm is None:
@@ -78,10 +69,10 @@ class ReachQuery:
         unknown = [name for name in arm.joints if name not in snapshot.joints]
         if 0 < len(unknown) < len(arm.joints):
             text = f"joint_states has never had {', '.join(unknown)}, but other joints of the arm"
-            return refuse_reach("missing_joints", f"{text}; it must have all of them, or none")
+            return ReachRefusal("missing_joints", f"{text}; it must have all of them, or none")
         assert snapshot.path.poses is not None
         assert snapshot.terrain is not None
-        answer = judge_reach(
+        return judge_reach(
             settings.rover,
             snapshot.terrain,
             snapshot.path.poses[-1],
@@ -90,12 +81,6 @@ class ReachQuery:
             force=self.force,
             moment=self.moment,
         )
-        return ArmJudgement(answer.possible, answer.code, answer.reason, answer)
-
-
-def refuse_reach(code: str, reason: str) -> ArmJudgement:
-    """Return the refusal of a query without using the model."""
-    return ArmJudgement(False, code, reason)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +148,7 @@ class ReachCheck(Question):
 
     def refuse(self, code: str, reason: str) -> Any:
         """Return a judgement that refuses the question."""
-        return refuse_reach(code, reason)
+        return ReachRefusal(code, reason)
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,7 +168,7 @@ class Answer:
     """The answer to a question."""
 
     judgement: Any
-    """A `PathJudgement` or `ArmJudgement`."""
+    """A `PathJudgement` or `ReachAnswer`."""
     snapshot: Snapshot
     """Map, settings, path and measurements that it was judged by."""
     identity: IdentityReport

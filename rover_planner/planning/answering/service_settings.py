@@ -9,7 +9,6 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steering_joints import check_joint_limit
 from rover_physics.terrain.soil_file import soil_named
-from rover_planner.maps.living_map import MapRules
 from rover_planner.parameters.shared import payload_or_none
 from rover_planner.parameters.traverse_server import (
     INTERPOLATE,
@@ -57,21 +56,6 @@ class ServiceSettings:
         """Names of the manipulator's joints, () if the rover has no manipulator."""
         manipulator = self.rover.manipulator
         return tuple(manipulator.joints) if manipulator is not None else ()
-
-
-def map_rules(parameters: TraverseServerParameters) -> MapRules:
-    """Return how maps are kept and merged."""
-    return MapRules(
-        parameters.map_merge,
-        parameters.map_ageing,
-        parameters.loaded_std,
-        parameters.map_window,
-        parameters.max_map_cells,
-        parameters.map_updates,
-        parameters.fill_under_rover,
-        parameters.footprint_margin,
-        parameters.footprint_std,
-    )
 
 
 def load_service_settings(parameters: TraverseServerParameters) -> ServiceSettings:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.judge import judge_poses
 from rover_planner.errors import PlanningError
 from rover_planner.maps.known_map import KnownMap
 from rover_planner.maps.unobserved_ground import UNOBSERVED_CODE
@@ -220,7 +221,8 @@ class Snapshot:
         """
         if self.measured_pose is None:
             return None
-        prediction = judge.predict_standing(self.measured_pose)
+        pose, options = self.measured_pose[None, :], judge.options.model
+        prediction, _ = judge_poses(judge.rover, judge.terrain, pose, None, options, sigmas=0)
         predicted = (*prediction.rocker_angle[0].tolist(), *prediction.bogie_angle[0].tolist())
         mismatch = {
             name: self.joints[name] - angle

@@ -3,7 +3,7 @@
 
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -14,27 +14,27 @@ from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import pack_ground
-from rover_planner.maps.ground_beneath import Standing
 from rover_planner.maps.known_map import KnownMap
 from rover_planner.maps.layers import CellSources
 from rover_planner.parameters.traverse_server import OFF
 from rover_planner.planning.answering.judgement import PathJudgement
-from rover_planner.planning.answering.measurements import MAX_AGE, Measurements
+from rover_planner.planning.answering.measurements import Measurements
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
-from rover_planner.planning.candidates import generate_candidates
 from rover_planner.planning.learned_ground import LearnedGround, lay_friction
 from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlace, MarkedPlaces
 from rover_planner.planning.search.edge_memory import EdgeMemory
 
 
-class TraverseService:
+class TraverseService(Measurements):
     """Keeps the last valid map, path and measurements, and answers queries about them.
 
     Maps may be taken in another thread than the rest.
     """
 
-    def __init__(self, settings: ServiceSettings):
+    def __init__(self, settings: ServiceSettings, clock: Callable[[], float] = time.monotonic):
+        """Begin without a map; `clock` returns the time [s] that measurements and maps age by."""
+        super().__init__(clock)
         self.settings = settings
         """The current settings; after a change of `largest_gap` call `refresh_map`."""
         self.known_map: KnownMap | None = None
@@ -44,12 +44,9 @@ class TraverseService:
         self.marked = NONE_MARKED
         """Places that are impassable, for new questions."""
         self._map_lock = threading.Lock()
-        self._measurements = Measurements()
         self._edge_memory = EdgeMemory()
         self._ground: LearnedGround | None = None
         self._laid: tuple[KnownMap, dict[int, float], KnownMap] | None = None
-        # Compiles or loads the kernels, so that the first query is fast.
-        generate_candidates((0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
 
     @property
     def terrain(self) -> Terrain | None:
@@ -60,11 +57,6 @@ class TraverseService:
     def path(self) -> NDArray[np.float64] | None:
         """Poses (n, 3) of the last path; None if there is none or it was refused."""
         return self.given_path.poses
-
-    @property
-    def joints(self) -> dict[str, float]:
-        """Measured joint angles [rad] by name."""
-        return self._measurements.joints
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -94,7 +86,7 @@ class TraverseService:
             cells: Where its cells come from; None if that is `source` for all.
             frame: Frame of the map; empty if it has none.
         """
-        about = KnownMap(terrain, terrain, source, stamp, time.monotonic(), "", cells, frame)
+        about = KnownMap(terrain, terrain, source, stamp, self._clock(), "", cells, frame)
         return self._keep_map(about)
 
     def amend_map(self, terrain: Terrain, cells: CellSources) -> None:
@@ -107,7 +99,7 @@ class TraverseService:
         """Note that the present map has arrived once more."""
         known = self.known_map
         if known is not None:
-            self.known_map = replace(known, arrival=time.monotonic())
+            self.known_map = replace(known, arrival=self._clock())
 
     def refresh_map(self) -> None:
         """Interpolate the gaps of the received map again, with the present settings."""
@@ -135,19 +127,6 @@ class TraverseService:
         """Discard the path and keep the reason; later queries must not use an outdated one."""
         self.given_path = GivenPath(None, f"the last path was refused: {reason}", path_hash, stamp)
 
-    def take_joints(self, positions: Mapping[str, float]) -> None:
-        """Keep measured joint angles [rad] by name; angles of other joints stay."""
-        self._measurements.take_joints(positions, time.monotonic())
-
-    def take_pose(
-        self, pose: NDArray[np.float64], body: tuple[float, float, float] | None = None
-    ) -> None:
-        """Keep the measured pose (3,) x, y [m], yaw [rad] of the body, map frame.
-
-        `body` is its z [m], roll and pitch [rad]; None: not measured.
-        """
-        self._measurements.take_pose(pose, time.monotonic(), body)
-
     def take_ground(self, ground: LearnedGround) -> None:
         """Keep what was learned of the ground, for new questions."""
         self._ground = ground
@@ -157,32 +136,18 @@ class TraverseService:
         if place not in self.marked.places:
             self.marked = MarkedPlaces((*self.marked.places, place))
 
-    def take_tilt(self, roll: float, pitch: float) -> None:
-        """Keep roll and pitch [rad] of the body, measured by an IMU."""
-        self._measurements.take_tilt(roll, pitch, time.monotonic())
-
-    def standing(self) -> Standing | None:
-        """Return pose and suspension of the rover if they were measured just now, else None."""
-        return self._measurements.standing(time.monotonic())
-
-    def fresh_pose(self, max_age: float = MAX_AGE) -> NDArray[np.float64] | None:
-        """Return the measured pose (3,) x, y [m], yaw [rad] if it is not older [s], else None."""
-        return self._measurements.fresh_pose(time.monotonic(), max_age)
-
     def snapshot(self, ros_time: int | None = None) -> Snapshot:
         """Return all that is known now.
 
         Args:
             ros_time: Present ROS time [ns], for the age of the map; None is the system's time.
         """
-        now = time.monotonic()
-        standing = self._measurements.pose_with_suspension(now)
         ground = None if self.settings.parameters.learn == OFF else self._ground
         known = Snapshot(
             self.settings.on_ground(ground),
             self.given_path,
-            self._measurements.joints,
-            measured_pose=standing,
+            self.joints,
+            measured_pose=self.pose_with_suspension(),
             edge_memory=self._edge_memory,
             ground=ground,
             marked=self.marked,
@@ -195,7 +160,7 @@ class TraverseService:
         known, most = self.known_map, snapshot.settings.parameters.max_map_age
         if known is None:
             return replace(snapshot, known_map=None)
-        steady = time.monotonic()
+        steady = self._clock()
         classes, laid = self._lay_friction(known, snapshot)
         return replace(
             snapshot,

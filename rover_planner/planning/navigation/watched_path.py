@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_planner.planning.angles import wrap
+from rover_planner.planning.path_geometry import distance_along
 
 LOOK_AHEAD = 2.0
 """Distance along the path beyond the last place in which the next one is looked for [m]."""
@@ -47,8 +48,7 @@ class WatchedPath:
     @cached_property
     def distances(self) -> NDArray[np.float64]:
         """Distance (n,) of each waypoint from the start, along the path [m]."""
-        steps = np.hypot(*np.diff(self.poses[:, :2], axis=0).T)
-        return np.concatenate([[0.0], np.cumsum(steps)])
+        return distance_along(self.poses)
 
     def find_place(self, pose: NDArray[np.float64], last: int | None = None) -> Place:
         """Return the waypoint that is nearest to a pose.

@@ -36,9 +36,6 @@ FRONTIER_PRICE = 10.0
 FRONTIER_BATCH = 1000
 """Number of poses at the frontier that the model is asked about at once."""
 
-Ends = Callable[[Pose], tuple[Pose, Pose]]
-"""Function of the poses of nodes that returns the first and the last poses of pieces of path."""
-
 
 @dataclass(frozen=True, eq=False)
 class Connection:
@@ -67,65 +64,68 @@ class Connection:
         return self.make()
 
 
-def connect_start(
-    rover: Rover, nodes: Nodes, start: Pose, waypoint_spacing: float
+def connect_end(
+    rover: Rover, nodes: Nodes, end: Pose, waypoint_spacing: float, *, is_goal: bool
 ) -> list[Connection]:
-    """Return connections from a start pose (3,) to nodes, at most `waypoint_spacing` [m] apart."""
-    maker = _Maker(rover, nodes, waypoint_spacing)
-    found = maker.curves(start, 1.0, Gear.FORWARD, lambda node: (start, node))
-    found += maker.curves(start, -1.0, Gear.BACKWARD, lambda node: (_about(start), _about(node)))
-    return found + maker.turns(start, 1.0, lambda node: (start, node))
+    """Return connections of the start or the goal, a pose (3,), with nodes.
+
+    Waypoints are at most `waypoint_spacing` [m] apart.
+    """
+    connector = _Connector(rover, nodes, end, waypoint_spacing, is_goal)
+    curves = [connector.curves(gear) for gear in (Gear.FORWARD, Gear.BACKWARD)]
+    return [*curves[0], *curves[1], *connector.turns()]
 
 
-def connect_goal(
-    rover: Rover, nodes: Nodes, goal: Pose, waypoint_spacing: float
-) -> list[Connection]:
-    """Return connections from nodes to a goal pose (3,), at most `waypoint_spacing` [m] apart."""
-    maker = _Maker(rover, nodes, waypoint_spacing)
-    found = maker.curves(goal, -1.0, Gear.FORWARD, lambda node: (node, goal))
-    found += maker.curves(goal, 1.0, Gear.BACKWARD, lambda node: (_about(node), _about(goal)))
-    return found + maker.turns(goal, -1.0, lambda node: (node, goal))
-
-
-@dataclass(frozen=True)
-class _Maker:
-    """Makes the connections of one rover and lattice."""
+@dataclass(frozen=True, eq=False)
+class _Connector:
+    """Connects one end of a path with nodes."""
 
     rover: Rover
     nodes: Nodes
+    end: Pose
     waypoint_spacing: float
+    is_goal: bool
 
-    def curves(self, pose: Pose, side: float, gear: Gear, ends: Ends) -> list[Connection]:
-        """Return the shortest curves between a pose and the nodes ahead (side 1) or behind (-1).
+    def curves(self, gear: Gear) -> list[Connection]:
+        """Return the shortest curves between the end and the nodes ahead or behind.
 
-        `ends` gives first and last pose of the curve to or from a node, as if driven forwards.
+        Those of the backward gear are driven as if forwards, with all headings turned round.
         """
-        nodes, there = _nodes_beside(self.nodes, pose, side)
-        lengths = dubins_lengths(*ends(there), tightest_radius(self.rover))
-        fits = lengths <= DETOUR * np.hypot(*(there - pose)[:, :2].T) + 1e-9
+        is_behind = self.is_goal != (gear == Gear.BACKWARD)
+        nodes, there = _nodes_beside(self.nodes, self.end, -1.0 if is_behind else 1.0)
+        lengths = dubins_lengths(*self._order(there, gear), tightest_radius(self.rover))
+        fits = lengths <= DETOUR * np.hypot(*(there - self.end)[:, :2].T) + 1e-9
         nodes, there, costs = nodes[fits], there[fits], PRICES[gear] * lengths[fits]
         return [
-            Connection(
-                int(nodes[k]), gear, float(costs[k]), partial(self._drive, *ends(there[k]), gear)
-            )
+            Connection(int(nodes[k]), gear, float(costs[k]), partial(self._drive, there[k], gear))
             for k in np.lexsort((nodes, costs))[:MOST_CURVES].tolist()
         ]
 
-    def _drive(self, here: Pose, there: Pose, gear: Gear) -> np.ndarray:
-        """Return the waypoints (n, 3) of the shortest Dubins path between two poses."""
+    def _order(self, there: Pose, gear: Gear) -> tuple[Pose, Pose]:
+        """Return first and last pose of the drive between the end and a node, or nodes (n, 3)."""
+        end = self.end
+        if gear == Gear.BACKWARD:
+            end, there = _about(end), _about(there)
+        return (there, end) if self.is_goal else (end, there)
+
+    def _drive(self, there: Pose, gear: Gear) -> np.ndarray:
+        """Return the waypoints (n, 3) of the shortest Dubins path between the end and a node."""
+        first, last = self._order(there, gear)
         radius = tightest_radius(self.rover)
-        poses = np.column_stack(dubins_paths(here, there, radius, self.waypoint_spacing, 1)[0])
-        poses[0], poses[-1, :2] = here, there[:2]
+        poses = np.column_stack(dubins_paths(first, last, radius, self.waypoint_spacing, 1)[0])
+        poses[0], poses[-1, :2] = first, last[:2]
         return poses - (0.0, 0.0, np.pi if gear == Gear.BACKWARD else 0.0)
 
-    def turns(self, pose: Pose, side: float, ends: Ends) -> list[Connection]:
+    def turns(self) -> list[Connection]:
         """Return paths that turn, drive straight and turn, if the rover turns on the spot."""
         if not can_turn_on_the_spot(self.rover):
             return []
         swing, found = swing_radius(self.rover), []
-        for node, there in _turned_nodes(self.nodes, pose, side):
-            poses, length = turn_and_drive(*ends(there), swing, self.waypoint_spacing)
-            gear, make = Gear.ON_THE_SPOT, partial(np.asarray, poses)
+        for node, there in _turned_nodes(self.nodes, self.end, -1.0 if self.is_goal else 1.0):
+            gear = Gear.ON_THE_SPOT
+            ends = self._order(there, gear)
+            poses, length = turn_and_drive(*ends, swing, self.waypoint_spacing)
+            make = partial(np.asarray, poses)
             found.append(Connection(node, gear, PRICES[gear] * length, make))
         return found
 

@@ -18,6 +18,7 @@ from scipy import ndimage
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
+from rover_planner.planning.search.ground_estimate import wheel_places
 from rover_planner.planning.search.nodes import HEADINGS, YAWS, Nodes
 from rover_planner.planning.search.primitives import Primitive
 
@@ -37,11 +38,12 @@ NOT_LOOKED = 255
 """Difficulty of an edge that was not looked at."""
 
 
-class Slopes(NamedTuple):
-    """Slopes of the ground as wheels feel it, and where the wheels are, as kernels read them."""
+class Difficulty(NamedTuple):
+    """The estimate for all edges of a window, as kernels read it; found where it is asked for."""
 
     along_x: np.ndarray
-    """(ny, nx) float32 slope along x of the steepest cell around each place."""
+    """(ny, nx) float32 slope of the ground as wheels feel it, along x, of the steepest cell around
+    each place."""
     along_y: np.ndarray
     """(ny, nx) as `along_x`, along y."""
     shifts: np.ndarray
@@ -50,13 +52,6 @@ class Slopes(NamedTuple):
     """(HEADINGS, 2) unit vectors along the headings."""
     climb: float
     """Slope at which a climb ends [rise over run]."""
-
-
-class Difficulty(NamedTuple):
-    """The estimate for all edges of a window, as kernels read it; found where it is asked for."""
-
-    slopes: Slopes
-    """What it is made of."""
     steps: np.ndarray
     """(HEADINGS, ny, nx) uint8 difficulty with the body origin at a place, in steps; at most 254
     of them, which is far beyond what any path takes; NOT_LOOKED until it is asked for."""
@@ -95,15 +90,15 @@ def estimate_difficulty(
         _felt_surface(terrain, rover.wheel.radius), terrain.resolution, stride
     )
     spacing = stride * terrain.resolution
-    own = np.array([place[:2] for place in rover.suspension.wheels.values()])
-    wheels = np.concatenate([own, own * (1.0, -1.0)])
-    ahead = np.column_stack([np.cos(YAWS), np.sin(YAWS)])
-    turns = np.stack([ahead, ahead[:, ::-1] * (-1.0, 1.0)], axis=1)
-    shifts = np.rint(wheels @ turns / spacing).astype(np.int64)
+    shifts = np.rint(wheel_places(rover) / spacing).astype(np.int64)
     first = np.asarray(terrain.origin) - nodes.cell * np.array(nodes.first)
     first += 0.5 * (stride - 1) * terrain.resolution
     return Difficulty(
-        Slopes(along_x, along_y, shifts, ahead, climb),
+        along_x,
+        along_y,
+        shifts,
+        np.column_stack([np.cos(YAWS), np.sin(YAWS)]),
+        climb,
         np.full((HEADINGS, *along_x.shape), NOT_LOOKED, np.uint8),
         first,
         spacing,
@@ -228,21 +223,21 @@ def _look_along(difficulty, columns, node, k):
         j = min(max(int((y + sample[1]) / difficulty.spacing + 0.5), 0), ny - 1)
         steps = difficulty.steps[int(sample[2])]
         if steps[j, i] == NOT_LOOKED:
-            steps[j, i] = _look_at(difficulty.slopes, int(sample[2]), j, i)
+            steps[j, i] = _look_at(difficulty, int(sample[2]), j, i)
         largest = max(largest, steps[j, i])
     return largest
 
 
 @exact_kernel
-def _look_at(slopes, heading, j, i):
+def _look_at(difficulty, heading, j, i):
     """Return the difficulty in steps with the body origin at place j, i, with a heading."""
-    ny, nx = slopes.along_x.shape
+    ny, nx = difficulty.along_x.shape
     steepness, most = 0.0, 0.0
     for wheel in range(6):
-        column = min(max(i + slopes.shifts[heading, wheel, 0], 0), nx - 1)
-        row = min(max(j + slopes.shifts[heading, wheel, 1], 0), ny - 1)
-        x, y = slopes.along_x[row, column], slopes.along_y[row, column]
+        column = min(max(i + difficulty.shifts[heading, wheel, 0], 0), nx - 1)
+        row = min(max(j + difficulty.shifts[heading, wheel, 1], 0), ny - 1)
+        x, y = difficulty.along_x[row, column], difficulty.along_y[row, column]
         steepness += math.hypot(x, y)
-        most = max(most, abs(slopes.ahead[heading, 0] * x + slopes.ahead[heading, 1] * y))
-    logit = LEVEL + (ALL_WHEELS * steepness / 6.0 + ONE_WHEEL * most) / slopes.climb
+        most = max(most, abs(difficulty.ahead[heading, 0] * x + difficulty.ahead[heading, 1] * y))
+    logit = LEVEL + (ALL_WHEELS * steepness / 6.0 + ONE_WHEEL * most) / difficulty.climb
     return np.uint8(min(STEPS_PER_UNIT * math.log1p(math.exp(min(logit, 8.0))), 254.0))

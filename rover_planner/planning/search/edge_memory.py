@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rover_physics.rover.steering_joints import swing_radius
 from rover_planner.maps.changes import find_changes, have_same_layers
-from rover_planner.maps.unobserved_ground import ALLOW
+from rover_planner.parameters.traverse_server import ALLOW
 from rover_planner.planning.search.cell_counts import CellCounts
 from rover_planner.planning.search.edges import Edges
 from rover_planner.planning.search.nodes import HEADINGS, Nodes
@@ -86,7 +86,7 @@ def _is_alike(asked: SearchQuery, query: SearchQuery) -> bool:
 
 
 def _rule_of(query: SearchQuery) -> str:
-    """Return the rule of UNOBSERVED_GROUND of a query."""
+    """Return the value of blind_ground of a query."""
     return ALLOW if query.unobserved_check is None else query.unobserved_check.rule
 
 

@@ -35,8 +35,8 @@ class GroundEstimate(NamedTuple):
     """(nodes,) doubt that the rover can be there, 0 or FULL_DOUBT."""
 
 
-class _Map(NamedTuple):
-    """A map as the kernel reads it."""
+class _Question(NamedTuple):
+    """A map, and where the wheels of a rover at a node are, as the kernel reads it."""
 
     elevation: np.ndarray
     """(ny, nx) heights [m]."""
@@ -46,11 +46,6 @@ class _Map(NamedTuple):
     """(ny, nx) distance to the next known cell [m]."""
     resolution: float
     """Cell size [m]."""
-
-
-class _Wheels(NamedTuple):
-    """Where the wheels of a rover at a node are."""
-
     offsets: np.ndarray
     """(HEADINGS, 6, 2) wheel centres at a node at the map frame's origin, from the centre of the
     map's first cell [m]."""
@@ -66,28 +61,34 @@ def estimate_ground(rover: Rover, terrain: Terrain, nodes: Nodes) -> GroundEstim
         terrain: The ground.
         nodes: The nodes.
     """
-    own = np.array([place[:2] for place in rover.suspension.wheels.values()])
-    places = np.concatenate([own, own * (1.0, -1.0)])
-    c, s = np.cos(YAWS)[:, None], np.sin(YAWS)[:, None]
-    x, y = c * places[:, 0] - s * places[:, 1], s * places[:, 0] + c * places[:, 1]
-    offsets = np.stack([x, y], axis=-1) - terrain.origin
-    wheels = _Wheels(offsets, largest_wheel_shift(rover))
+    wheels = wheel_places(rover)
     elevation = np.asarray(terrain.elevation)
     known = ~np.isnan(elevation)
-    ground = _Map(
+    question = _Question(
         elevation,
         known[:-1, :-1] & known[:-1, 1:] & known[1:, :-1] & known[1:, 1:],
         _distance_to_known(elevation, terrain.resolution),
         terrain.resolution,
+        wheels - terrain.origin,
+        largest_wheel_shift(rover),
     )
     found = GroundEstimate(np.zeros(nodes.count, bool), np.zeros(nodes.count, np.float32))
     at = nodes.poses(np.arange(0, nodes.count, HEADINGS))[:, :2]
-    reach = float(np.hypot(*places.T).max())
+    reach = float(np.hypot(*wheels[0].T).max())
     low, high = np.reshape(terrain.bounds, (2, 2)).T
     doubtful = ((at - reach < low) | (at + reach > high)).any(axis=1)
     doubtful |= CellCounts(terrain, ~known).are_near(at, reach)
-    estimate_nodes(ground, wheels, at, np.flatnonzero(doubtful), found)
+    estimate_nodes(question, at, np.flatnonzero(doubtful), found)
     return found
+
+
+def wheel_places(rover: Rover) -> NDArray[np.float64]:
+    """Return (HEADINGS, 6, 2) x, y [m] of the wheel centres at a node at the origin, level."""
+    own = np.array([place[:2] for place in rover.suspension.wheels.values()])
+    places = np.concatenate([own, own * (1.0, -1.0)])
+    c, s = np.cos(YAWS)[:, None], np.sin(YAWS)[:, None]
+    x, y = c * places[:, 0] - s * places[:, 1], s * places[:, 0] + c * places[:, 1]
+    return np.stack([x, y], axis=-1)
 
 
 def largest_wheel_shift(rover: Rover) -> float:
@@ -130,57 +131,49 @@ def _distance_to_known(elevation: NDArray[np.float64], resolution: float) -> NDA
 
 
 @exact_kernel
-def estimate_nodes(ground, wheels, at, chosen, found):
+def estimate_nodes(question, at, chosen, found):
     """Write the estimates of the nodes at some places.
 
     Args:
-        ground: _Map.
-        wheels: _Wheels.
+        question: _Question.
         at: (n, 2) x and y of all places [m].
         chosen: (k,) the places to look at.
         found: GroundEstimate of zeros, written where it differs.
     """
     for place in chosen:
         for heading in range(HEADINGS):
-            pose = at[place, 0], at[place, 1], heading
-            _estimate_node(ground, wheels, pose, place * HEADINGS + heading, found)
+            node = place * HEADINGS + heading
+            for wheel in range(6):
+                u = (at[place, 0] + question.offsets[heading, wheel, 0]) / question.resolution
+                v = (at[place, 1] + question.offsets[heading, wheel, 1]) / question.resolution
+                if not _is_known(question, u, v):
+                    found.doubt[node] = FULL_DOUBT
+                    if _distance(question, u, v) > question.shift:
+                        found.groundless[node] = True
+                        break
 
 
 @exact_kernel
-def _estimate_node(ground, wheels, pose, node, found):
-    """Write the estimate of a node, of which `pose` has x, y [m] and heading."""
-    x, y, heading = pose
-    for wheel in range(6):
-        u = (x + wheels.offsets[heading, wheel, 0]) / ground.resolution
-        v = (y + wheels.offsets[heading, wheel, 1]) / ground.resolution
-        if not _is_known(ground, u, v):
-            found.doubt[node] = FULL_DOUBT
-            if _distance(ground, u, v) > wheels.shift:
-                found.groundless[node] = True
-                return
-
-
-@exact_kernel
-def _distance(ground, u, v):
+def _distance(question, u, v):
     """Return a bound from below on the distance from a place [cells] to known ground [m]."""
-    ny, nx = ground.away.shape
+    ny, nx = question.away.shape
     i, j = min(max(int(u + 0.5), 0), nx - 1), min(max(int(v + 0.5), 0), ny - 1)
-    beyond = ground.resolution * np.hypot(u - i, v - j)
-    return max(beyond, ground.away[j, i] - beyond) - ground.resolution
+    beyond = question.resolution * np.hypot(u - i, v - j)
+    return max(beyond, question.away[j, i] - beyond) - question.resolution
 
 
 @exact_kernel
-def _is_known(ground, u, v):
+def _is_known(question, u, v):
     """Return whether a place [cells] is on the map, and known: all corners around it are.
 
     Within rounding of a line between cells, the corners on one side of it suffice.
     """
-    elevation = ground.elevation
+    elevation = question.elevation
     ny, nx = elevation.shape
     if not (-_ROUNDING <= u <= nx - 1 + _ROUNDING and -_ROUNDING <= v <= ny - 1 + _ROUNDING):
         return False
     i, j = min(int(u), nx - 2), min(int(v), ny - 2)
-    if ground.whole[j, i]:
+    if question.whole[j, i]:
         return True
     a, b = u - i, v - j
     known = True

@@ -25,7 +25,6 @@ from numpy.typing import NDArray
 
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.uses import find_codes
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
@@ -178,15 +177,6 @@ class PathJudge:
             self.options.model,
             sigmas=self.options.map_sigmas,
         )
-
-    def predict_standing(self, pose: Pose) -> PathPrediction:
-        """Predict the rover standing at a pose.
-
-        Raises:
-            RoverError: The model refuses an option or the pose.
-        """
-        poses, options = pose[None, :], self.options.model
-        return judge_poses(self.rover, self.terrain, poses, None, options, sigmas=0)[0]
 
     @cached_property
     def _cautious(self) -> tuple[Terrain, SweepOptions]:

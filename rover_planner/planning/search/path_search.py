@@ -20,9 +20,8 @@ from rover_planner.planning.path_query import Candidate
 from rover_planner.planning.search.closed_area import ClosedArea, find_closed_area
 from rover_planner.planning.search.connections import (
     FRONTIER_PRICE,
+    connect_end,
     connect_frontier,
-    connect_goal,
-    connect_start,
 )
 from rover_planner.planning.search.difficulty import estimate_difficulty, steepest_climb
 from rover_planner.planning.search.edge_memory import EdgeMemory
@@ -326,10 +325,10 @@ class _PathFinder:
         return LatticeSearch(
             self._judge,
             edges,
-            connect_start(rover, nodes, self._start, spacing),
+            connect_end(rover, nodes, self._start, spacing, is_goal=False),
             connect_frontier(self._judge, nodes, self._goal)
             if self._to_frontier
-            else connect_goal(rover, nodes, self._goal, spacing),
+            else connect_end(rover, nodes, self._goal, spacing, is_goal=True),
             ground.doubt,
             estimate_difficulty(rover, terrain, nodes, climb, edges.samples),
             self._progress,

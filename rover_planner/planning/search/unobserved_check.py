@@ -10,16 +10,13 @@ from numpy.typing import NDArray
 from rover_physics.rover.model import Rover
 from rover_physics.traversability.verdict import with_refusals
 from rover_planner.maps.unobserved_ground import (
-    ALLOW,
-    REFUSE,
     UNOBSERVED_CODE,
     ObservedGround,
     UnobservedShare,
 )
+from rover_planner.parameters.traverse_server import ALLOW, REFUSE
 from rover_planner.planning.marked_places import MARKED_CODE
 from rover_planner.planning.path_query import Candidate
-
-_REFUSED_COST = (float("inf"), float("inf"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +28,7 @@ class UnobservedCheck:
     seen: ObservedGround
     """The seen part of the map."""
     rule: str
-    """One of UNOBSERVED_GROUND."""
+    """A value of the parameter blind_ground."""
 
     def share(self, candidate: Candidate) -> UnobservedShare:
         """Return how much of the ground under the belly was never seen along a path."""
@@ -46,14 +43,11 @@ class UnobservedCheck:
         if first < 0:
             return candidate
         counted = share.unobserved_share - (0.0 if self.rule == REFUSE else share.footprint_share)
-        codes, reasons = [""] * len(candidate.poses), [""] * len(candidate.poses)
-        codes[first] = UNOBSERVED_CODE
-        reasons[first] = (
+        reason = (
             f"ground under the belly that was never seen: {100.0 * counted:.1f} % of that along "
             f"the path {self._name_rule()}"
         )
-        verdict = with_refusals(candidate.verdict, codes, reasons)
-        return replace(candidate, verdict=verdict, cost=_REFUSED_COST)
+        return candidate.refuse_at(first, UNOBSERVED_CODE, reason)
 
     def refuses(self, pieces: Sequence[NDArray[np.float64]]) -> NDArray[np.bool_]:
         """Return (k,) whether the rule refuses pieces of path, each of poses (n, 3).

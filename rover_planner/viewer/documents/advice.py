@@ -3,33 +3,58 @@
 
 from typing import Any
 
-from rover_planner.advice.advise import Advice
 from rover_planner.advice.remedy import Remedy
+from rover_planner.viewer.state.path_advice import Advised
+
+PROMISED = 20.0
+"""Time after which the page tells what was found so far, and that the search goes on [s]."""
 
 
-def describe_advice(advice: Advice | None, is_asked: bool, is_busy: bool) -> dict[str, Any]:
-    """Return what a person may ask, what is tried, and the remedies; `index` where one is taken.
+def describe_advice(advised: Advised | None, is_seeking: bool, now: float) -> dict[str, Any]:
+    """Return what is tried, and the remedies found so far, by their words: more are found.
 
-    A change of the ground is no value of the page: such remedies are only told.
+    A change of the ground is no value of the page: such remedies are told, and not taken.
+
+    Args:
+        advised: The advice on the path that is looked at; None if it was not asked for.
+        is_seeking: True if levers are still tried.
+        now: The monotonic clock [s].
     """
-    if not is_asked:
-        return {"asked": False, "busy": "", "words": "", "rows": []}
-    tried = " and ".join(advice.tried).replace("_", " ") if advice is not None else ""
-    rows = list_remedies(advice) if advice is not None else []
+    rows = list_remedies(advised)
     return {
-        "asked": True,
-        "busy": f"tried: {tried or 'nothing yet'}" if is_busy else "",
-        "words": "" if is_busy or rows or advice is None else advice.describe(),
-        "rows": [_describe(index, remedy) for index, remedy in enumerate(rows)],
+        "can_ask": not is_seeking and not _is_complete(advised),
+        "seeking": is_seeking,
+        "words": "" if advised is None else _write_progress(advised, is_seeking, now),
+        "rows": [_describe(remedy) for remedy in rows],
     }
 
 
-def list_remedies(advice: Advice) -> list[Remedy]:
+def _is_complete(advised: Advised | None) -> bool:
+    return advised is not None and advised.advice is not None and advised.advice.complete
+
+
+def list_remedies(advised: Advised | None) -> list[Remedy]:
     """Return the remedies in the order of the list."""
-    return [*advice.remedies, *advice.others]
+    advice = None if advised is None else advised.advice
+    return [] if advice is None else [*advice.remedies, *advice.others]
 
 
-def _describe(index: int, remedy: Remedy) -> dict[str, Any]:
+def _write_progress(advised: Advised, is_seeking: bool, now: float) -> str:
+    """Return how far the search is: what is tried, or what was found at its end."""
+    advice = advised.advice
+    if not is_seeking:
+        if advice is None or not advice.complete:
+            return "the search was stopped"
+        return "" if advice.found else advice.describe()
+    tried = " and ".join(advice.tried).replace("_", " ") if advice is not None else ""
+    if now - advised.since < PROMISED:
+        return f"tried: {tried or 'nothing yet'}"
+    found = len(list_remedies(advised)) or "nothing"
+    return (
+        f"{found} found in {PROMISED:.0f} s; the search goes on, tried: {tried or 'nothing yet'}"
+    )
+
+
+def _describe(remedy: Remedy) -> dict[str, Any]:
     can_take = all(one.lever.name != "ground" for one in remedy.levers)
-    costs = remedy.describe_costs()
-    return {"index": index if can_take else None, "words": remedy.describe(), "costs": costs}
+    return {"taken": can_take, "words": remedy.describe(), "costs": remedy.describe_costs()}

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The limits along a path, as lanes and curves of their uses, beside those of the reference."""
+"""The limits along a path as curves of their uses, beside those of the reference."""
 
 import itertools
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -19,25 +18,26 @@ from rover_planner.viewer.state.scenario import Judged
 
 MAX_POINTS = 240
 """Most points of a curve."""
-HALF, MUCH = 0.5, 0.8
-"""Uses at which the colour changes."""
-CLASSES = ("little", "half", "near", "broken", "unasked")
-"""Classes of colours: up to HALF, up to MUCH, up to the limit, beyond it, not asked."""
-BROKEN, NOT_ASKED = 3, 4
 
 
 def describe_limits(
     path: Judged, reference: Judged | None, chance: FailureChance | None = None
 ) -> dict[str, Any]:
-    """Return the lanes of a path, those of the same path for the reference, and of its chance."""
+    """Return the curves of a path's lanes, those of the reference, of its chance, and the loads.
+
+    A lane has the use now and before, and six curves where wheels have it.
+    """
     failure, before = path.failure, None if reference is None else reference.limits
     end = max(path.limits.end, 0.0 if before is None else before.end)
     lanes = [
         {
             "code": lane.limit.code,
             "title": lane.limit.title,
-            "pieces": list(_list_pieces(lane, path.limits)),
-            "before": _list_before(lane, before),
+            "now": _pick_points(path.limits.rows.distance, lane.used[:, None]),
+            "wheels": None
+            if lane.wheels is None
+            else _pick_points(path.limits.rows.distance, lane.wheels),
+            "before": _find_before(lane, before),
         }
         for lane in list_lanes(path, chance)
     ]
@@ -55,22 +55,6 @@ def list_lanes(path: Judged, chance: FailureChance | None) -> list[Lane]:
     """Return the lanes of the limits, and the one of the chance of failure if it is known."""
     lanes = list(path.limits.lanes)
     return lanes if chance is None else [*lanes, make_chance_lane(path.limits, chance)]
-
-
-def describe_curves(
-    path: Judged, reference: Judged | None, chance: FailureChance | None = None
-) -> dict[str, Any]:
-    """Return the uses of each limit along a path, by code; six curves where wheels have it."""
-    curves = {}
-    for lane in list_lanes(path, chance):
-        values = lane.used[:, None] if lane.wheels is None else lane.wheels
-        curve = _pick_points(path.limits.rows.distance, values)
-        old = None
-        if reference is not None and lane.limit.code != CHANCE:
-            limits = reference.limits
-            old = _pick_points(limits.rows.distance, limits.lane(lane.limit.code).used[:, None])
-        curves[lane.limit.code] = {**curve, "old": old}
-    return curves
 
 
 def describe_uses(
@@ -118,43 +102,11 @@ def _describe_loads(path: Judged) -> dict[str, Any]:
     return _pick_points(rows.distance[stands], rows.prediction.wheel_loads[stands], 1)
 
 
-def classify(used: Floats) -> NDArray[np.intp]:
-    """Return the index (m,) in CLASSES of each use (m,)."""
-    shares = np.select([used <= HALF, used <= MUCH], [0, 1], 2)
-    return np.select([used > 1.0, np.isnan(used)], [BROKEN, NOT_ASKED], shares)
-
-
-def _list_runs(lane: Lane, limits: PathLimits) -> Iterator[tuple[int, int, float, float, int]]:
-    """Yield first row, end, begin and end [m], and class of each stretch of one class."""
-    distance = limits.rows.distance
-    edges = np.concatenate([[0.0], 0.5 * (distance[1:] + distance[:-1]), distance[-1:]])
-    first = 0
-    for kind, run in itertools.groupby(classify(lane.used).tolist()):
-        end = first + len(list(run))
-        yield first, end, float(edges[first]), float(edges[end]), kind
-        first = end
-
-
-def _list_pieces(lane: Lane, limits: PathLimits) -> Iterator[list[Any]]:
-    """Yield begin and end [m], class and words of each stretch, broken ones last, on top."""
-    for first, end, left, right, kind in sorted(
-        _list_runs(lane, limits), key=lambda run: run[4] == BROKEN
-    ):
-        words = f"{lane.limit.title}: does not count or is not known"
-        if kind != NOT_ASKED:
-            at = first + int(np.argmax(np.nan_to_num(lane.used[first:end], nan=-1.0, posinf=1e9)))
-            wheel = int(lane.wheel[at])
-            named = f", {WHEELS[wheel].replace('_', ' ')}" if wheel >= 0 else ""
-            words = f"{lane.limit.title} {write_use(float(lane.used[at]))}{named}"
-        yield [round(left, 4), round(right, 4), CLASSES[kind], f"{words}; at {left:.2f} m"]
-
-
-def _list_before(lane: Lane, before: PathLimits | None) -> list[list[Any]]:
-    """Return begin, end [m] and class of each stretch of a lane of the reference."""
+def _find_before(lane: Lane, before: PathLimits | None) -> dict[str, Any] | None:
+    """Return the curve of a lane of the reference; None without one."""
     if before is None or lane.limit.code == CHANCE:
-        return []
-    runs = _list_runs(before.lane(lane.limit.code), before)
-    return [[round(left, 4), round(right, 4), CLASSES[kind]] for _, _, left, right, kind in runs]
+        return None
+    return _pick_points(before.rows.distance, before.lane(lane.limit.code).used[:, None])
 
 
 def _pick_points(distance: Floats, values: Floats, digits: int = 3) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from rover_physics.numerics.arrays import Floats
 from rover_planner.viewer.documents.verdict import describe_answer
-from rover_planner.viewer.live.live_state import Click, LearnedTrail, LiveVerdict, TopicAge
+from rover_planner.viewer.live.live_state import LearnedTrail, LiveData, TopicAge
 
 PATIENCE = 2.0
 """Time after which a click without an answer says so [s]."""
@@ -28,24 +28,15 @@ class LiveAnswer:
         return bool(self.document["old"])
 
 
-def choose_answer(
-    newest: LiveVerdict | None,
-    plan: Floats | None,
-    click: Click | None,
-    server: TopicAge,
-    now: float,
-    refusal: str = "",
-) -> LiveAnswer:
+def choose_answer(data: LiveData, now: float, refusal: str = "") -> LiveAnswer:
     """Return the answer to the last click, or without one the server's newest.
 
     Args:
-        newest: The server's newest verdict, whoever asked.
-        plan: Its plan.
-        click: The last click of a visitor; None before, and once the newest was asked for.
-        server: The age of the server's last sign of life.
+        data: The latest data.
         now: The monotonic clock [s].
         refusal: Why a visitor's last request was refused; empty if it was not.
     """
+    newest, click, server = data.verdict, data.click, data.server
     verdict, offers = (newest if click is None else click.verdict), []
     if verdict is not None:
         whose = "your click" if click is not None else verdict.question
@@ -66,7 +57,7 @@ def choose_answer(
     old = ""
     if verdict is not None and server.age is not None and server.is_stale:
         old = f"the server is silent for {server.age:.0f} s"
-    shown = plan if click is None else click.plan
+    shown = data.plan if click is None else click.plan
     document = {**answer, "headline": headline, "old": old, "refusal": refusal, "offers": offers}
     return LiveAnswer(document, shown)
 

@@ -46,7 +46,6 @@ class Channel:
         self._hear = hear
         self._lock = threading.Lock()
         self._parts: dict[str, Part] = {"program": uuid4().hex}
-        self._made_of: dict[str, tuple[Any, ...]] = {}
         self._mailboxes: set[Mailbox] = set()
         self._server = serve(
             self._serve, host, port, process_request=_answer, max_size=MAX_MESSAGE
@@ -75,13 +74,6 @@ class Channel:
             self._parts = {**self._parts, name: part}
             for mailbox in self._mailboxes:
                 mailbox.put(part, name)
-
-    def tell_made(self, name: str, made_of: tuple[Any, ...], make: Callable[[], Part]) -> None:
-        """Show a part that is made anew only if one of the objects has changed of which it is."""
-        before = self._made_of.get(name)
-        if before is None or any(a is not b for a, b in zip(before, made_of, strict=True)):
-            self._made_of[name] = made_of
-            self.tell(name, make())
 
     def close(self) -> None:
         """End it."""

@@ -10,8 +10,10 @@ const COLOURS = { rear: "#0072b2", middle: "#d55e00", front: "#00795a" };
 const PRESS = 5000; // [ms] for which a press lasts at most
 const ROOMY = 900; // [px] of height from which the board begins with all its numbers
 const SETTLE = 500; // [ms] after which a box shows the program's value, also if its own was refused
-const CLASSES = [["little", "to 50 %"], ["half", "to 80 %"], ["near", "to 100 %"],
-  ["broken", "broken"], ["unasked", "not asked"]];
+const CLASSES = [[0.5, "little", "to 50 %"], [0.8, "half", "to 80 %"], [1, "near", "to 100 %"],
+  [Infinity, "broken", "broken"], [null, "unasked", "not asked"]];
+const kindOf = (use) => CLASSES.find(([most]) => (use === null ? most === null : use <= most))[1];
+const percent = (use) => (use < 99 ? `${Math.round(100 * use)} %` : "fails");
 
 // An element with its attributes and children; what begins with "on" listens.
 function make(tag, attributes = {}, ...children) {
@@ -86,7 +88,7 @@ function greet(program) {
 const DRAW = {
   subject: drawSubject, errors: drawErrors, scene: drawScene, verdict: drawVerdict, advice: drawAdvice,
   paths: drawPaths, sliders: drawSliders, values: drawValues, changes: drawChanges,
-  limits: drawLimits, curves: drawCurves, uses: drawUses, board: drawBoard, drive: drawDrive,
+  limits: drawLimits, uses: drawUses, board: drawBoard, drive: drawDrive,
   legend: drawLegend, chosen: drawChosen, offers: drawChosen, topics: drawTopics, learned: drawLearned,
   file: saveFile, link: drawShare, current: (link) => { chosen.link = link; }, written: drawShare,
 };
@@ -139,15 +141,15 @@ function drawVerdict(one) {
 }
 
 // What would make the path pass: pointed at, a remedy shows its path; clicked, it is judged.
-function drawAdvice({ asked, busy, words, rows }) {
+function drawAdvice({ can_ask: canAsk, seeking, words, rows }) {
   const refused = state.verdict && state.verdict.passes === false;
-  const point = (index) => () => ask({ ask: "ghost", index });
-  at("advice").replaceChildren(...(!refused ? [] : !asked
-    ? [button("What would help?", { ask: "advise" })]
-    : [busy ? make("small", {}, busy) : "", words,
-      make("ol", {}, ...rows.map((row) => make("li", row.index === null ? { class: "quiet" } : {
-        tabindex: 0, onpointerenter: point(row.index), onpointerleave: point(null),
-        onclick: () => ask({ ask: "remedy", index: row.index }),
+  const point = (words) => () => ask({ ask: "ghost", words });
+  at("advice").replaceChildren(...(!refused ? []
+    : [make("small", {}, `${words} `), seeking ? button("Stop", { ask: "cancel" }) : "",
+      canAsk ? button("What would help?", { ask: "advise" }) : "",
+      make("ol", {}, ...rows.map((row) => make("li", !row.taken ? { class: "quiet" } : {
+        tabindex: 0, onpointerenter: point(row.words), onpointerleave: point(null),
+        onclick: () => ask({ ask: "remedy", words: row.words }),
         onkeydown: (event) => { if (event.key === "Enter") event.currentTarget.click(); },
       }, row.words, make("small", {}, ` (${row.costs})`))))].filter((child) => child !== "")));
 }
@@ -273,20 +275,31 @@ function goTo(event) {
 
 function drawLimits({ end, lanes, code, compared }) {
   if (!lanes.some((lane) => lane.code === chosen.lane) || code) chosen.lane = code || "friction";
-  const piece = ([left, right, kind, words], extra = "") => make("i", {
-    class: `${kind} ${extra}`, title: words || "reference",
+  const strip = (curve, title, extra = "") => [...listRuns(curve)].map(([left, right, kind, most]) => make("i", {
+    class: `${kind} ${extra}`, title: `${title} ${most === null ? "does not count or is not known" : percent(most)}; at ${left.toFixed(2)} m`,
     style: end ? `left:${share(left)};width:calc(${share(right)} - ${share(left)})` : "left:0;width:100%",
-  });
+  }));
   const rows = lanes.map((lane) => make("div", { class: "lane", "data-code": lane.code, onclick: () => { chosen.lane = lane.code; drawCurves(); drawUses(); } },
     make("div", {}, lane.title),
     make("div", { class: `strip ${compared ? "compared" : ""}`, onclick: goTo },
-      ...lane.pieces.map((one) => piece(one)), ...lane.before.map((one) => piece(one, "before")), make("div", { class: "cursor" })),
+      ...strip(lane.now, lane.title), ...(lane.before ? strip(lane.before, `reference: ${lane.title}`, "before") : []), make("div", { class: "cursor" })),
     make("div", {}), make("div", { class: "worst" })));
   at("limits").replaceChildren(
     make("h2", {}, "Use of the limits ", make("small", {}, end ? `over ${end.toFixed(2)} m${compared ? "; below: the reference" : ""}` : "at the first pose")),
-    ...rows, make("div", {}, ...CLASSES.map(([kind, words]) => make("span", { class: "key" }, make("i", { class: kind }), words))));
+    ...rows, make("div", {}, ...CLASSES.map(([, kind, words]) => make("span", { class: "key" }, make("i", { class: kind }), words))));
   drawUses();
-  moveCursor();
+  drawCurves();
+}
+
+// The stretches of a curve of one class: begin, end, class and largest use.
+function* listRuns({ x, y: [y] }) {
+  for (let first = 0, k = 1; k <= x.length; k += 1) {
+    const kind = kindOf(y[first]);
+    if (k < x.length && kindOf(y[k]) === kind) continue;
+    const [left, right] = [first, k].map((at) => (at === 0 ? x[0] : at === x.length ? x.at(-1) : (x[at - 1] + x[at]) / 2));
+    yield [left, right, kind, kind === "unasked" ? null : Math.max(...y.slice(first, k))];
+    first = k;
+  }
 }
 
 function drawUses() {
@@ -302,11 +315,10 @@ function drawUses() {
 }
 
 function drawCurves() {
-  const curve = (state.curves || {})[chosen.lane];
-  if (!curve || !state.limits) return;
-  const title = state.limits.lanes.find((lane) => lane.code === chosen.lane)?.title;
+  const lane = state.limits?.lanes.find((one) => one.code === chosen.lane);
+  if (!lane) return;
   at("curves").replaceChildren(
-    make("h2", {}, chosen.lane === "chance" ? "chance of failure" : `${title}, use of the limit`), plot(curve, (value) => `${Math.round(100 * value)} %`, 1.0, curve.old),
+    make("h2", {}, lane.code === "chance" ? "chance of failure" : `${lane.title}, use of the limit`), plot(lane.wheels || lane.now, percent, 1.0, lane.before),
     make("h2", {}, "wheel loads"), plot(state.limits.loads, (value) => `${value.toFixed(0)} N`, null, null),
     make("div", {}, ...Object.entries(COLOURS).map(([name, colour]) => make("span", { class: "key" }, make("i", { style: `background:${colour}` }), name)),
       make("small", {}, "right: line, left: dashes")));
@@ -358,7 +370,7 @@ function drawBoard(board) {
   }
   const bar = ([title, use, words]) => make("div", {}, make("small", {}, `${title} `), make("b", {}, words),
     make("span", { class: "use" },
-      make("i", { class: use === null ? "unasked" : use > 1 ? "broken" : use > 0.8 ? "near" : "half", style: `width:${100 * Math.min((use ?? 1.5) / 1.5, 1)}%` }),
+      make("i", { class: kindOf(use), style: `width:${100 * Math.min((use ?? 1.5) / 1.5, 1)}%` }),
       make("i", { class: "limit" })));
   const wheels = [5, 2, 4, 1, 3, 0].map((k) => board.wheels[k]).map((wheel) =>
     make("div", { class: "wheel", "data-wheel": wheel.name, "data-fails": wheel.fails },
@@ -383,7 +395,7 @@ function drawDrive(drive) {
     const hold = (is) => () => { chosen.scrubs = is; };
     box.replaceChildren(
       make("div", { class: "track" }, make("input", { type: "range", min: 0, step: 0.1, "aria-label": "Time [s]", oninput: time, onpointerdown: hold(true), onpointerup: hold(false) }), make("i", { class: "mark", title: "fails" })),
-      button("To the start", { ask: "seek", time: 0 }), button("Rewind", { ask: "rewind" }),
+      button("To the start", { ask: "seek", time: 0 }),
       button("Play", { ask: "toggle" }, { id: "play", class: "main" }),
       button("Step back", { ask: "step", by: -1 }), button("Step", { ask: "step", by: 1 }),
       make("span", { id: "speed" }), make("span", { id: "plays" }));
@@ -394,7 +406,7 @@ function drawDrive(drive) {
   const mark = box.querySelector(".mark");
   mark.hidden = drive.fails === null;
   mark.style.left = `${100 * (drive.fails || 0) / (drive.duration || 1)}%`;
-  at("play").textContent = drive.rate === 0 ? "Play" : "Pause";
+  at("play").textContent = drive.plays ? "Pause" : "Play";
   at("plays").textContent = `${drive.time.toFixed(1)} s, ${drive.words}`;
   const speed = String(state.chosen?.speed ?? 10);
   if (at("speed").dataset.now !== speed && state.offers?.speeds) {

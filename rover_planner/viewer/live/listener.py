@@ -6,7 +6,7 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -31,7 +31,6 @@ from msg_adapters.results.predictions import array_values
 from rover_physics.errors import RoverError
 from rover_physics.names import WHEEL_JOINTS
 from rover_physics.numerics.quaternions import rpy_from_xyzw
-from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.ros.qos import (
     latched_qos,
@@ -42,74 +41,29 @@ from rover_planner.ros.qos import (
     topic_qos,
 )
 from rover_planner.viewer.live.live_state import (
+    ODOMETRY,
+    SIGN_OF_LIFE,
     Click,
     LearnedTrail,
-    LiveValues,
+    LiveData,
     LiveVerdict,
     TopicAge,
 )
 
 SERVER, CONTROLLER = "/traverse_server", "/traction_controller"
-ODOMETRY, SIGN_OF_LIFE = "odometry", "traverse_server"
 PREDICTED_FIELDS = {
     "wheel_loads": "wheel_loads",
     "friction_utilisation": "friction_utilisation",
     "slip_ratios": "slip_ratio",
     "tip_over_margin": "tip_over_ratio",
 }
-"""Topics of the server with a row for each waypoint, and the field of LiveValues each fills."""
+"""Topics of the server with a row for each waypoint, and the quantity each fills."""
 ESTIMATED_FIELDS = {
     "wheel_loads": "wheel_loads",
     "friction_utilisation": "friction_utilisation",
     "contact_angles": "contact_angles",
 }
 """Topics of the controller and the fields they fill, in place of predictions."""
-
-
-@dataclass(frozen=True, eq=False)
-class LiveData:
-    """The latest data; None for what has not come."""
-
-    values: LiveValues
-    """Of the rover."""
-    terrain: Terrain | None = None
-    """The map."""
-    plan: np.ndarray | None = None
-    """(n, 3) poses of the plan, x, y [m], yaw [rad]."""
-    verdict: LiveVerdict | None = None
-    """The newest verdict of the server, whoever asked."""
-    click: Click | None = None
-    """The last question of a visitor; None without one."""
-    learned: LearnedTrail | None = None
-    """What was learned of the ground."""
-    ages: tuple[TopicAge, ...] = ()
-    """The ages of all topics."""
-
-    @property
-    def odometry(self) -> TopicAge:
-        """The age of the odometry, without which nothing here is live."""
-        return self._age_of(ODOMETRY)
-
-    @property
-    def server(self) -> TopicAge:
-        """The age of the server's last sign of life."""
-        return self._age_of(SIGN_OF_LIFE)
-
-    @property
-    def freshness(self) -> str:
-        """Whether rover and server are live, in words."""
-        odometry, server = self.odometry, self.server
-        if odometry.age is None:
-            return "waiting for odometry"
-        if odometry.is_stale:
-            return f"not live: odometry is {odometry.age:.0f} s old"
-        if server.age is not None and server.is_stale:
-            return f"the rover is live; the server is silent for {server.age:.0f} s"
-        return "live"
-
-    def _age_of(self, topic: str) -> TopicAge:
-        known = {one.topic: one for one in self.ages}
-        return known.get(topic, TopicAge(topic, None, True))
 
 
 Take = Callable[[Any], None]
@@ -127,8 +81,8 @@ class LiveListener(Node):
         """Subscribe to the topics of a rover, a traverse_server and a traction_controller."""
         super().__init__("rover_view", **node_arguments)
         self._frame = map_frame
-        self._data = LiveData(LiveValues())
-        """Without the ages, and with the values that the rover itself tells."""
+        self._data = LiveData()
+        """Without the ages, and without the forces."""
         self._forces: Mapping[str, Any] = {}
         """Forces by their field, as the server has predicted them at the rover's place."""
         self._predicted: Mapping[str, np.ndarray] = {}
@@ -176,8 +130,8 @@ class LiveListener(Node):
     def latest(self) -> LiveData:
         """Return the latest data."""
         data = self._data
-        if data.plan is not None and data.values.position is not None:
-            self._forces = _read_nearest(self._predicted, data.plan, data.values.position)
+        if data.plan is not None and data.position is not None:
+            self._forces = _read_nearest(self._predicted, data.plan, data.position)
         estimated = {
             field: self._estimated[field]
             for topic, field in ESTIMATED_FIELDS.items()
@@ -186,9 +140,8 @@ class LiveListener(Node):
         is_estimated = not estimated.keys().isdisjoint(PREDICTED_FIELDS.values())
         source = "forces predicted by the server" if self._forces else ""
         source = "forces estimated by the traction controller" if is_estimated else source
-        forces: dict[str, Any] = {**self._forces, **estimated, "forces_from": source}
-        values, ages = replace(data.values, **forces), tuple(self._ages.values())
-        return replace(data, values=values, ages=ages, click=self._click)
+        forces, ages = {**self._forces, **estimated}, tuple(self._ages.values())
+        return replace(data, forces=forces, forces_from=source, ages=ages, click=self._click)
 
     def request_plan(self, goal: np.ndarray) -> str:
         """Ask the server for a plan from the rover's pose to a goal (2,) [m].
@@ -196,13 +149,13 @@ class LiveListener(Node):
         Returns:
             Why that is not possible, empty if it is; plan and verdict come on their topics.
         """
-        values = self._data.values
-        if values.position is None:
+        data = self._data
+        if data.position is None:
             return "no odometry yet, so the start is not known"
         if not self._planner.service_is_ready():
             return f"no service {SERVER}/can_traverse"
-        yaw = float(np.arctan2(*(np.asarray(goal) - values.position[:2])[::-1]))
-        start = (*values.position[:2], values.attitude[2])
+        yaw = float(np.arctan2(*(np.asarray(goal) - data.position[:2])[::-1]))
+        start = (*data.position[:2], data.attitude[2])
         request = GetPlan.Request(
             start=stamped_pose(start, self._frame), goal=stamped_pose((*goal, yaw), self._frame)
         )
@@ -231,18 +184,18 @@ class LiveListener(Node):
             self._ages[SIGN_OF_LIFE] = TopicAge(SIGN_OF_LIFE, time.monotonic(), True)
 
     def _on_joint_states(self, state: JointState) -> None:
-        known = self._data.values
+        known = self._data
         joints, efforts = (
             {**was, **_name_finite(state.name, values)}
             for was, values in ((known.joints, state.position), (known.efforts, state.effort))
         )
-        self._note(joints=joints, efforts=efforts)
+        self._data = replace(known, joints=joints, efforts=efforts)
         if len(state.velocity) == len(state.name):
             self._add_work(dict(zip(state.name, state.velocity, strict=True)), state)
 
     def _add_work(self, rates: dict[str, float], state: JointState) -> None:
         """Add the work of the wheel motors since the last message, rates [rad/s] by joint name."""
-        known = self._data.values
+        known = self._data
         now = state.header.stamp.sec + 1e-9 * state.header.stamp.nanosec
         self._first_time = now if self._first_time is None else self._first_time
         passed = now - self._first_time - known.time
@@ -251,11 +204,8 @@ class LiveListener(Node):
                 max(known.efforts.get(name, 0.0) * rates.get(name, 0.0), 0.0)
                 for name in WHEEL_JOINTS
             )
-            self._note(energy=known.energy + power * passed, time=known.time + passed)
-
-    def _note(self, **values: Any) -> None:
-        """Take values of the rover."""
-        self._data = replace(self._data, values=replace(self._data.values, **values))
+            energy, time_passed = known.energy + power * passed, known.time + passed
+            self._data = replace(known, energy=energy, time=time_passed)
 
     def _on_odometry(self, odometry: Odometry) -> None:
         point, q = odometry.pose.pose.position, odometry.pose.pose.orientation
@@ -264,13 +214,14 @@ class LiveListener(Node):
         except MessageError:
             return
         roll, pitch, _ = rpy_from_xyzw((q.x, q.y, q.z, q.w))
-        position, known = np.array([point.x, point.y, point.z]), self._data.values
+        position, known = np.array([point.x, point.y, point.z]), self._data
         if not np.isfinite(position).all():
             return
         moved = 0.0
         if known.position is not None:
             moved = float(np.hypot(*(position - known.position)[:2]))
-        self._note(
+        self._data = replace(
+            known,
             position=position,
             attitude=np.array([roll, pitch, yaw]),
             speed=float(odometry.twist.twist.linear.x),
@@ -284,7 +235,7 @@ class LiveListener(Node):
     def _on_ground(self, message: String) -> None:
         with self._skipping("ground_estimate"):
             ground, known = parse_learned(message.data, "ground_estimate"), self._data
-            at = None if known.values.position is None else known.values.position[:2]
+            at = None if known.position is None else known.position[:2]
             trail = known.learned or LearnedTrail(ground)
             self._data = replace(known, learned=trail.add(ground, at))
 

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """A live rover: the latest values of its topics, their ages, and the state made of them."""
 
-import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.viewer.state.rover_state import RoverState, place_state
 
@@ -18,10 +19,8 @@ MAX_AGE = 2.0
 """Age from which a topic that is published all the time is stale [s]."""
 TRAIL_STEP, MAX_TRAIL = 0.1, 1000
 """Distance of two places of a trail [m], and their largest number."""
-
-
-def _unknown() -> Floats:
-    return np.full(6, np.nan)
+ODOMETRY, SIGN_OF_LIFE = "odometry", "traverse_server"
+"""Topics without which a rover, or its server, is not live."""
 
 
 @dataclass(frozen=True)
@@ -103,11 +102,11 @@ class LearnedTrail:
 
 
 @dataclass(frozen=True, eq=False)
-class LiveValues:
-    """The latest values of the topics; NaN for values that did not come."""
+class LiveData:
+    """The latest data of a rover and its server; None for what has not come."""
 
     position: Floats | None = None
-    """(3,) body origin [m], map frame; None before the first odometry."""
+    """(3,) body origin [m], map frame."""
     attitude: Floats = field(default_factory=lambda: np.zeros(3))
     """(3,) roll, pitch, yaw [rad]."""
     speed: float = 0.0
@@ -116,16 +115,8 @@ class LiveValues:
     """Angles [rad] by joint name."""
     efforts: Mapping[str, float] = field(default_factory=dict)
     """Torques [N m] by joint name."""
-    wheel_loads: Floats = field(default_factory=_unknown)
-    """(6,) [N]"""
-    friction_utilisation: Floats = field(default_factory=_unknown)
-    """(6,)"""
-    slip_ratio: Floats = field(default_factory=_unknown)
-    """(6,)"""
-    contact_angles: Floats = field(default_factory=lambda: np.zeros(6))
-    """(6,) angles of the contacts from the wheels' lowest points [rad]; 0 where not known."""
-    tip_over_ratio: float = math.nan
-    """Stability margin: tip-over angle now / on flat ground."""
+    forces: Mapping[str, Any] = field(default_factory=dict)
+    """Quantities of a prediction that are known, and `contact_angles`."""
     forces_from: str = ""
     """Source of the forces, empty if there is none."""
     time: float = 0.0
@@ -134,29 +125,63 @@ class LiveValues:
     """Distance driven since then [m]."""
     energy: float = 0.0
     """Work of the wheel motors since then [J]."""
+    terrain: Terrain | None = None
+    """The map."""
+    plan: Floats | None = None
+    """(n, 3) poses of the plan, x, y [m], yaw [rad]."""
+    verdict: LiveVerdict | None = None
+    """The newest verdict of the server, whoever asked."""
+    click: Click | None = None
+    """The last question of a visitor; None without one."""
+    learned: LearnedTrail | None = None
+    """What was learned of the ground."""
+    ages: tuple[TopicAge, ...] = ()
+    """The ages of all topics."""
+
+    @property
+    def odometry(self) -> TopicAge:
+        """The age of the odometry, without which nothing here is live."""
+        return self._age_of(ODOMETRY)
+
+    @property
+    def server(self) -> TopicAge:
+        """The age of the server's last sign of life."""
+        return self._age_of(SIGN_OF_LIFE)
+
+    @property
+    def freshness(self) -> str:
+        """Whether rover and server are live, in words."""
+        odometry, server = self.odometry, self.server
+        if odometry.age is None:
+            return "waiting for odometry"
+        if odometry.is_stale:
+            return f"not live: odometry is {odometry.age:.0f} s old"
+        if server.age is not None and server.is_stale:
+            return f"the rover is live; the server is silent for {server.age:.0f} s"
+        return "live"
+
+    def _age_of(self, topic: str) -> TopicAge:
+        known = {one.topic: one for one in self.ages}
+        return known.get(topic, TopicAge(topic, None, True))
 
 
-def read_state(rover: Rover, values: LiveValues) -> RoverState | None:
+def read_state(rover: Rover, data: LiveData) -> RoverState | None:
     """Return the state of a rover; None before the first odometry."""
-    if values.position is None:
+    if data.position is None:
         return None
-    torques = np.array([values.efforts.get(name, np.nan) for name in WHEEL_JOINTS])
+    torques = np.array([data.efforts.get(name, np.nan) for name in WHEEL_JOINTS])
     return place_state(
         rover,
-        values.position,
-        values.attitude,
-        np.array([values.joints.get(name, 0.0) for name in SUSPENSION_JOINTS]),
-        values.contact_angles,
-        spin=[values.joints.get(name, 0.0) for name in WHEEL_JOINTS],
-        time=values.time,
-        distance=values.distance,
-        energy=values.energy,
-        motion=[values.speed, 0.0, 0.0],
-        wheel_loads=values.wheel_loads,
+        data.position,
+        data.attitude,
+        np.array([data.joints.get(name, 0.0) for name in SUSPENSION_JOINTS]),
+        spin=[data.joints.get(name, 0.0) for name in WHEEL_JOINTS],
+        time=data.time,
+        distance=data.distance,
+        energy=data.energy,
+        motion=[data.speed, 0.0, 0.0],
         tangential=torques / rover.wheel.radius,
         lateral=np.zeros(6),
-        friction_utilisation=values.friction_utilisation,
         torque_saturation=np.abs(torques) / rover.wheel.max_torque,
-        slip_ratio=values.slip_ratio,
-        tip_over_ratio=values.tip_over_ratio,
+        **data.forces,
     )

@@ -18,14 +18,14 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.viewer.front.channel import Channel, Mailbox, Part
-from rover_planner.viewer.pages.drawings import Action, Drawings, Errors
-from rover_planner.viewer.pages.ground_painter import PaintedGround, PaintRequest, paint
+from rover_planner.viewer.pages.errors import Action, Errors
+from rover_planner.viewer.pages.ground_painter import PaintRequest, paint
 from rover_planner.viewer.scene.cameras import START, VIEWS
 from rover_planner.viewer.scene.ground_mesh import intersect_ground
 from rover_planner.viewer.scene.scene import Scene
 from rover_planner.viewer.state.background_work import BackgroundWork
 from rover_planner.viewer.state.inbox import Inbox
-from rover_planner.viewer.state.layers import PREDICTED, Colouring
+from rover_planner.viewer.state.layers import PREDICTED, Colouring, Legend
 from rover_planner.viewer.state.session import REFUSALS
 
 PERIOD = 0.04
@@ -89,12 +89,14 @@ class PageBase(ABC):
         scene_port = self.channel.port + 1 if port and self.channel.port < MAX_PORT else 0
         self.server = viser.ViserServer(host, scene_port, label="camera", verbose=False)
         self.errors = Errors(lambda messages: self.channel.tell("errors", messages))
-        self.drawings = Drawings(self.errors, self.server.atomic)
+        self._made_of: dict[str, tuple[Any, ...]] = {}
+        self._drawings: dict[str, Action] = {}
+        """What is still to be drawn, by what is told if that fails."""
         self.scene = Scene(self.server)
         self.scene.frame.move_to(terrain)
         self.scene.draw_rover(rover, {})
         self._add_camera()
-        self.painter: BackgroundWork[PaintRequest, PaintedGround] = BackgroundWork(
+        self.painter: BackgroundWork[PaintRequest, tuple[bytes, Legend]] = BackgroundWork(
             paint, lambda: self.requests.put(self._take_ground, "painted"), "ground"
         )
         self.channel.tell("scene", {"port": self.server.get_port()})
@@ -124,7 +126,7 @@ class PageBase(ABC):
     @property
     def is_drawing(self) -> bool:
         """True if the page acts on requests, or has still to draw what they have changed."""
-        return self._fulfils or self.drawings.waiting
+        return self._fulfils or bool(self._drawings)
 
     def start(self) -> None:
         """Start the thread that changes the page."""
@@ -216,8 +218,9 @@ class PageBase(ABC):
         for one in self.painter.take():
             if one.error is not None or one.result is None:
                 raise one.error or ValueError("nothing was painted")
-            self.scene.draw_ground(one.result.glb)
-            self.channel.tell("legend", one.result.legend)
+            file, legend = one.result
+            self.scene.draw_ground(file)
+            self.channel.tell("legend", asdict(legend))
 
     def _colour(self, words: Words) -> None:
         if words["layer"] not in self.layers:
@@ -273,19 +276,50 @@ class PageBase(ABC):
 
         Without anything to draw, a picture follows the requests at once.
         """
-        self.requests.wait(0.0 if self.drawings.waiting else self._due - time.monotonic())
+        self.requests.wait(0.0 if self._drawings else self._due - time.monotonic())
         self._fulfils = True
         for action in self.requests.take().values():
             self._fulfil(action)
         self._fulfils = False
         self.errors.run("what is shown is old", self.tell)
-        self.drawings.draw_next()
+        self._draw_next()
         now = time.monotonic()
-        if self.drawings.waiting and now < self._due:
+        if self._drawings and now < self._due:
             return
         passed, self._last, self._due = now - self._last, now, now + PERIOD
         if self._stopped_at is None or now - self._stopped_at > RETRY:
             self._draw_picture(passed)
+
+    def has_changed(self, name: str, *made_of: Any) -> bool:
+        """Return whether something is made of other objects than when this was asked last."""
+        before, self._made_of[name] = self._made_of.get(name), made_of
+        same = before is not None and len(before) == len(made_of)
+        return not same or any(a is not b for a, b in zip(before or (), made_of, strict=True))
+
+    def tell_made(self, name: str, made_of: Sequence[Any], make: Callable[[], Part]) -> None:
+        """Tell a part that is made anew only if one of the objects has changed of which it is."""
+        if self.has_changed(name, *made_of):
+            self.channel.tell(name, make())
+
+    def draw_made(self, failure: str, made_of: Sequence[Any], draw: Action) -> None:
+        """Draw something soon if one of the objects has changed of which it is made.
+
+        What is asked for again while it waits is drawn once, at its old place.
+
+        Args:
+            failure: What is told of an error, such as "the paths are not drawn".
+            made_of: The objects.
+            draw: Draws it as it is by then.
+        """
+        if self.has_changed(failure, *made_of):
+            self._drawings[failure] = draw
+
+    def _draw_next(self) -> None:
+        """Draw what has waited longest, if there is anything."""
+        for failure, draw in [*self._drawings.items()][:1]:
+            with self.server.atomic():
+                self.errors.run(failure, draw)
+            del self._drawings[failure]
 
     def _fulfil(self, request: Action) -> None:
         """Act on a request, or say why not; the pictures go on if an error had stopped them."""
@@ -318,11 +352,9 @@ def check_address(host: str, port: int) -> None:
     """
     if not 0 <= port <= MAX_PORT:
         raise PlanningError(f"port is {describe(port)}; it must be 0 to {MAX_PORT}")
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
-        found = socket.getaddrinfo(host, 0, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
-        family, kind, protocol, _, address = found[0]
-        with socket.socket(family, kind, protocol) as probe:
-            probe.bind(address)
+        socket.create_server((host, 0), family=family).close()
     except (OSError, UnicodeError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise PlanningError(

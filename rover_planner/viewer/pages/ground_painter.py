@@ -3,19 +3,15 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.viewer.documents.legend import describe_scale, describe_survey
-from rover_planner.viewer.scene.glb import write_glb
-from rover_planner.viewer.scene.ground_mesh import build_ground_mesh, build_survey_mesh
+from rover_planner.viewer.scene.ground_mesh import write_ground
 from rover_planner.viewer.state.background_work import Progress
-from rover_planner.viewer.state.layers import Colouring
+from rover_planner.viewer.state.ground_grid import make_grid
+from rover_planner.viewer.state.layers import Colouring, Legend, colour_ground, colour_limit
 from rover_planner.viewer.state.survey_layers import ShownSurvey
 
 
@@ -39,28 +35,17 @@ class PaintRequest:
     """The survey; None if there is none."""
 
 
-@dataclass(frozen=True, eq=False)
-class PaintedGround:
-    """The ground, ready to be sent."""
-
-    glb: bytes
-    """The ground as a file for the scene."""
-    legend: dict[str, Any]
-    """What its colours mean."""
-
-
-def paint(request: PaintRequest) -> Iterator[Progress | PaintedGround]:
-    """Yield what is begun, and the painted ground."""
+def paint(request: PaintRequest) -> Iterator[Progress | tuple[bytes, Legend]]:
+    """Yield what is begun, and the painted ground as a file for the scene, with its legend."""
     yield Progress("ground")
-    how, survey, options = request.colouring, request.survey, request.options
-    if survey is not None and how.layer in survey.names:
-        mesh, meaning = build_survey_mesh(request.terrain, survey, how.layer)
-        differences = survey.find_differences(request.rover, options)
-        words = survey.describe(how.layer)
-        legend = describe_survey(how.layer, words, meaning, differences)
+    how, rover, terrain, options = (
+        request.colouring, request.rover, request.terrain, request.options
+    )  # fmt: skip
+    grid = make_grid(terrain)
+    if request.survey is not None and how.layer in request.survey.names:
+        ground = request.survey.colour(how.layer, rover, options, grid)
+    elif how.is_predicted:
+        ground = colour_limit(how, rover, terrain, request.path, options, grid)
     else:
-        along = request.path if how.along else None
-        heading = float(np.radians(how.heading)) if along is None else along
-        drawn = build_ground_mesh(request.rover, request.terrain, how.layer, heading, options)
-        mesh, legend = drawn.mesh, describe_scale(how, drawn.scale)
-    yield PaintedGround(write_glb(mesh, request.origin), legend)
+        ground = colour_ground(how.layer, terrain, grid)
+    yield write_ground(grid, ground, request.origin), ground.legend

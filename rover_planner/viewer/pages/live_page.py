@@ -12,8 +12,8 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.viewer.documents.board import describe_board
 from rover_planner.viewer.documents.live import choose_answer, describe_learned, list_topics
-from rover_planner.viewer.live.listener import LiveData, LiveListener
-from rover_planner.viewer.live.live_state import read_state
+from rover_planner.viewer.live.listener import LiveListener
+from rover_planner.viewer.live.live_state import LiveData, read_state
 from rover_planner.viewer.pages.base import Answer, PageBase
 from rover_planner.viewer.pages.ground_painter import PaintRequest
 from rover_planner.viewer.state.layers import list_layers
@@ -67,9 +67,6 @@ class LivePage(PageBase):
         self._data: LiveData = listener.latest()
         self._first: Floats | None = None
         """Where the rover was first seen (2,) [m]."""
-        self._drawn_plan: tuple[Floats | None, bool] | None = None
-        """The plan that is drawn, and whether it is grey; None to draw it again."""
-        self._drawn_trail: Floats | None = None
         self._told_at = self._ground_at = 0.0
         super().__init__(rover, terrain, host, port)
         self.channel.tell("offers", self.list_layers())
@@ -118,9 +115,7 @@ class LivePage(PageBase):
     def tell(self) -> None:
         """Tell whose answer is shown and how old it is; the plan has the same age."""
         data, now, tell = self._data, time.monotonic(), self.channel.tell
-        answer = choose_answer(
-            data.verdict, data.plan, data.click, data.server, now, self._refusal
-        )
+        answer = choose_answer(data, now, self._refusal)
         tell("verdict", answer.document)
         soil = ", ".join(self._terrain.soil_names)
         ground = self._ground_name or "not known yet"
@@ -129,26 +124,24 @@ class LivePage(PageBase):
         tell("chosen", self.list_chosen())
         tell("learned", describe_learned(data.learned))
         trail = None if data.learned is None else data.learned.places
-        if trail is not self._drawn_trail:
-            self._drawn_trail = trail
-            self.errors.run(
-                "the trail is not drawn",
-                lambda: self.scene.paths.show_trail(self._rover, self._terrain, trail),
-            )
-        shown, drawn = (answer.plan, answer.is_old), self._drawn_plan
-        if drawn is None or shown[0] is not drawn[0] or shown[1] != drawn[1]:
-            self._drawn_plan = shown
-            self.errors.run(
-                "the plan is not drawn",
-                lambda: self.scene.paths.show_plan(self._rover, self._terrain, *shown),
-            )
+        shown, paths, terrain = (answer.plan, answer.is_old), self.scene.paths, self._terrain
+        self.draw_made(
+            "the trail is not drawn",
+            (trail, terrain),
+            lambda: paths.show_trail(self._rover, terrain, trail),
+        )
+        self.draw_made(
+            "the plan is not drawn",
+            (*shown, terrain),
+            lambda: paths.show_plan(self._rover, terrain, *shown),
+        )
 
     def advance(self, seconds: float) -> None:
         """Show the latest data."""
         data = self._data = self._listener.latest()
         now = time.monotonic()
         self._take_terrain(data, now)
-        state = read_state(self._rover, data.values)
+        state = read_state(self._rover, data)
         if state is not None and data.odometry.is_stale:
             state = state.change(**{name: np.nan * getattr(state, name) for name in FORCES})
         self.scene.show(state)
@@ -165,7 +158,7 @@ class LivePage(PageBase):
     def _tell_board(self, state: RoverState | None, data: LiveData) -> None:
         slips = state is not None and bool(np.nan_to_num(state.slip_ratio).any())
         self.channel.tell("board", describe_board(state, has_slip=slips))
-        words = f"{data.freshness}; {data.values.forces_from or 'forces not known'}"
+        words = f"{data.freshness}; {data.forces_from or 'forces not known'}"
         self.channel.tell("drive", {"duration": None, "words": words})
         self.channel.tell("topics", list_topics(data.ages))
 
@@ -178,14 +171,13 @@ class LivePage(PageBase):
         self._terrain, self._ground_name, self._ground_at = terrain, "elevation_cloud", now
         if self.scene.frame.move_to(terrain):
             self._first = None
-        self._drawn_plan = self._drawn_trail = None
         self.channel.tell("offers", self.list_layers())
         self.paint()
 
     def _turn_arm(self, data: LiveData) -> None:
         arm = self._rover.manipulator
         if arm is not None:
-            joints = data.values.joints
+            joints = data.joints
             known = {name: joints[name] for name in arm.joints if name in joints}
             steps = {name: ARM_STEP * round(angle / ARM_STEP) for name, angle in known.items()}
             self.scene.turn_arm(steps)

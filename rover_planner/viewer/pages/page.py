@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any
 
 from rover_physics.numerics.arrays import Floats
-from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover, preset_names
 from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.grid import Terrain
@@ -20,7 +19,6 @@ from rover_planner.viewer.documents.advice import describe_advice, list_remedies
 from rover_planner.viewer.documents.board import describe_board
 from rover_planner.viewer.documents.header import POLICY_TITLES, describe_subject, name_ground
 from rover_planner.viewer.documents.limits import (
-    describe_curves,
     describe_limits,
     describe_uses,
 )
@@ -36,13 +34,13 @@ from rover_planner.viewer.documents.verdict import Work, describe_verdict
 from rover_planner.viewer.pages.base import Answer, PageBase, Words
 from rover_planner.viewer.pages.ground_painter import PaintRequest
 from rover_planner.viewer.pages.sharing import make_link, read_scenario, write_file
-from rover_planner.viewer.scene.cameras import find_radius
+from rover_planner.viewer.state.background_work import BackgroundWork
 from rover_planner.viewer.state.layers import Colouring, list_layers
 from rover_planner.viewer.state.link import PageLink, read_link, write_link
-from rover_planner.viewer.state.path_advice import PathAdvice, apply_remedy
+from rover_planner.viewer.state.path_advice import Advised, apply_remedy, seek_advice
 from rover_planner.viewer.state.playback import SPEEDS, Playback
 from rover_planner.viewer.state.rover_state import RoverState
-from rover_planner.viewer.state.scenario import Scenario, Shown
+from rover_planner.viewer.state.scenario import Scenario
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.survey_layers import ShownSurvey
 
@@ -52,10 +50,6 @@ NOTICE_DELAY = 0.2
 """Time without a result after which the page tells what it judges, and greys what is old [s]."""
 BOARD_PERIOD = 0.1
 """Time between two updates of board and lanes while it plays [s]."""
-AT_FAILURE = 0.06
-"""Time from a failure within which the rover is shown as it fails [s]."""
-MUCH_LARGER = 1.5
-"""Ratio of the sizes of two rovers above which the cameras find a new place."""
 
 
 class Page(PageBase):
@@ -85,18 +79,20 @@ class Page(PageBase):
         self._ground_name = ground_name or name_ground(session.wanted.terrain)
         self._survey = survey
         self._click_sets = "goal"
-        self._drawn: Shown | None = None
-        """What the scene shows, or will when its drawings are done."""
-        self._greyed: frozenset[int] = frozenset()
         self._opening: tuple[PageLink, Scenario] | None = None
         """The link whose path and time are not shown yet, and what it asks for."""
         self._told_at = 0.0
         super().__init__(session.wanted.rover, session.wanted.terrain, host, port)
         self.colouring = Colouring(self.layers[0])
-        self._advice = PathAdvice(lambda: self.requests.put(self._take_advice, "advice"))
+        self._advice = BackgroundWork(
+            seek_advice, lambda: self.requests.put(self._take_advice, "advice"), "advice"
+        )
+        self._advised: Advised | None = None
+        """The path for which advice was asked last, and what was found."""
         self.channel.tell("offers", self._list_offers())
         session.judge_in_background(self._show_and_wait)
-        self._show(session.shown)
+        self.has_changed("the cameras are not moved", session.wanted.loaded)  # START is theirs
+        self._show()
         self.paint()
         self.start()
 
@@ -113,9 +109,8 @@ class Page(PageBase):
     @property
     def is_busy(self) -> bool:
         """True if something is judged, or judged and not shown yet."""
-        works = self.session, self.painter
+        works = self.session, self.painter, self._advice
         is_judged = any(work.progress is not None or work.has_news for work in works)
-        is_judged = is_judged or self._advice.is_busy
         return is_judged or self.is_drawing  # in this order: what was taken is drawn
 
     def close(self) -> None:
@@ -159,8 +154,8 @@ class Page(PageBase):
             "options": lambda words: session.change_options(**_read_options(words)),
             "undo": lambda _words: session.undo(),
             "reset": lambda _words: session.reset(),
-            "keep": lambda _words: session.keep_reference(),
-            "drop": lambda _words: session.drop_reference(),
+            "keep": lambda _words: session.keep_reference(session.wanted),
+            "drop": lambda _words: session.keep_reference(None),
             "cancel": lambda _words: self._cancel(),
             "judge": lambda _words: session.judge_again(),
             "preset": lambda words: session.take_rover(load_rover(words["name"])),
@@ -168,15 +163,14 @@ class Page(PageBase):
             "open": lambda words: self._open(read_link(words["query"])),
             "click": lambda words: setattr(self, "_click_sets", words["sets"]),
             "toggle": lambda _words: playback.toggle(),
-            "rewind": lambda _words: playback.rewind(),
-            "step": lambda words: playback.step(session.shown.path.trajectory.times, words["by"]),
+            "step": lambda words: playback.step(words["by"]),
             "seek": lambda words: playback.go_to(float(words["time"])),
             "place": lambda words: self._go_to_place(float(words["distance"])),
             "speed": lambda words: setattr(playback, "speed", float(words["times"])),
             "failure": lambda _words: self._go_to_failure(),
-            "advise": lambda _words: self._advice.ask(session.shown.path),
-            "ghost": lambda words: self._show_ghost(words["index"]),
-            "remedy": lambda words: self._take_remedy(int(words["index"])),
+            "advise": lambda _words: self._advise(),
+            "ghost": lambda words: self._show_ghost(words["words"]),
+            "remedy": lambda words: self._take_remedy(words["words"]),
             "save rover": lambda _words: self._save_rover(),
             "save page": lambda words: self._save_page(str(words.get("base", ""))),
             "link": lambda _words: {"link": write_link(self._link())},
@@ -210,7 +204,7 @@ class Page(PageBase):
 
     def _cancel(self) -> None:
         self.session.cancel()
-        self._advice.stop()
+        self._advice.cancel()
         self.painter.cancel()
 
     def _go_to_place(self, distance: float) -> None:
@@ -224,23 +218,40 @@ class Page(PageBase):
 
     # Advice.
 
-    def _find_remedy(self, index: int) -> Remedy:
-        advice = self._advice.about(self.session.shown.path)
-        remedies = [] if advice is None else list_remedies(advice)
-        if not 0 <= index < len(remedies):
-            raise PlanningError(f"there is no remedy {index + 1}; there are {len(remedies)}")
-        return remedies[index]
+    def _advise(self) -> None:
+        """Seek advice on the path that is looked at."""
+        path = self.session.shown.path
+        self._advised = Advised(path, time.monotonic())
+        self._advice.ask(path)
 
-    def _show_ghost(self, index: int | None) -> None:
-        """Show where the path of a remedy leads while a person points at it."""
-        path = None if index is None else self._find_remedy(int(index)).judged.case.poses
+    def _take_advice(self) -> None:
+        for one in self._advice.take():
+            if one.error is not None:
+                raise PlanningError(f"no advice: {one.error}")
+            if self._advised is not None and one.request is self._advised.path:
+                self._advised = replace(self._advised, advice=one.result)
+
+    @property
+    def _advice_here(self) -> Advised | None:
+        """The advice on the path that is looked at; None if it was not asked for."""
+        here = self._advised is not None and self._advised.path is self.session.shown.path
+        return self._advised if here else None
+
+    def _find_remedy(self, words: str) -> Remedy:
+        for remedy in list_remedies(self._advice_here):
+            if remedy.describe() == words:
+                return remedy
+        raise PlanningError(f"{words!r} is no remedy of the path that is shown")
+
+    def _show_ghost(self, words: str | None) -> None:
+        """Show where the path of a remedy leads while a person points at it; None ends that."""
+        path = None if words is None else self._find_remedy(words).judged.case.poses
         self.scene.paths.show_ghost(self.session.shown.scenario.rover, self.ground, path)
 
-    def _take_remedy(self, index: int) -> None:
+    def _take_remedy(self, words: str) -> None:
         """Judge the path with the levers of a remedy set."""
-        remedy = self._find_remedy(index)
+        remedy = self._find_remedy(words)
         self._show_ghost(None)
-        self._advice.stop()
         self.session.take_change(apply_remedy(self.session.wanted, remedy))
 
     # Files and links.
@@ -327,28 +338,28 @@ class Page(PageBase):
     def _take_judged(self) -> None:
         if self.session.has_news:
             self.errors.run("not judged", self.session.take_finished)
-            self._show(self.session.shown)
+            self._show()
             self._go_on_opening()
 
-    def _show(self, now: Shown) -> None:
-        """Show a state: the drive at once, and what takes longer soon, as far as it differs."""
-        before, self._drawn = self._drawn, now
-        asked = now.scenario
-        was = None if before is None else before.scenario
-        if was is None or (asked.start, asked.goal) != (was.start, was.goal):
+    def _show(self) -> None:
+        """Show what was judged: the drive at once, and soon what takes longer to draw."""
+        shown = self.session.shown
+        asked, path = shown.scenario, shown.path
+        if self._advised is not None and self._advice_here is None:
+            self._advice.cancel()  # nobody looks at its path any more
+            self._advised = None
+            self._show_ghost(None)
+        if self.has_changed("ends", asked.start, asked.goal):
             self.playback.go_to(0.0)
-        if before is None or now.path is not before.path:
-            trajectory = now.path.trajectory
-            self.playback.set_drive(trajectory.times, trajectory.distance)
-            self.drawings.ask("the failure is not shown", self._draw_failure)
-        if was is None or asked is not was:
-            self.drawings.ask("the rover is not drawn", self._draw_rover)
-            if was is not None and _differ_in_size(asked.rover, was.rover):
-                self.drawings.ask("the cameras are not moved", self._fit_cameras)
-        if before is None or now.paths != before.paths or now.index != before.index:
-            self.drawings.ask("the paths are not drawn", self._draw_paths)
+        if self.has_changed("drive", path):
+            self.playback.set_drive(path.trajectory.times, path.trajectory.places)
+        self.draw_made("the failure is not shown", [path], self._draw_failure)
+        look = asked.rover, asked.arm_angles
+        self.draw_made("the rover is not drawn", look, self._draw_rover)
+        self.draw_made("the cameras are not moved", [asked.loaded], self._fit_cameras)
+        self.draw_made("the paths are not drawn", [*shown.paths, shown.index], self._draw_paths)
         depends = self.colouring.is_predicted or self._survey is not None
-        if was is not None and depends and asked is not was:
+        if self.has_changed("ground", asked) and depends:
             self.paint()
         self.moved = True
 
@@ -362,18 +373,11 @@ class Page(PageBase):
     def _draw_paths(self) -> None:
         shown = self.session.shown
         candidates = [one.candidate for one in shown.paths]
-        self.scene.paths.show(
-            shown.scenario.rover, self.ground, candidates, shown.index, self._greyed
-        )
+        self.scene.paths.show(shown.scenario.rover, self.ground, candidates, shown.index)
 
     def _draw_failure(self) -> None:
         shown = self.session.shown
         self.scene.failure.show(shown.scenario.rover, shown.path.failure)
-
-    def _take_advice(self) -> None:
-        self._advice.take()
-        if self._advice.failure:
-            raise PlanningError(f"no advice: {self._advice.failure}")
 
     # What is told.
 
@@ -392,13 +396,13 @@ class Page(PageBase):
 
     def tell(self) -> None:
         """Tell all that is shown, as far as it has changed."""
-        session, tell, made = self.session, self.channel.tell, self.channel.tell_made
+        session, tell, made = self.session, self.channel.tell, self.tell_made
         shown, wanted, work = session.shown, session.wanted, self._find_work()
         path, reference = shown.path, shown.reference
         every = frozenset(range(len(shown.paths)))
         waits = session.is_outdated or bool(work.old)
         is_slow = bool(work.judging) or work.is_stopped
-        self._grey(every if work.old else shown.old if is_slow else frozenset())
+        self.scene.paths.mark_old(every if work.old else shown.old if is_slow else frozenset())
         name = self._ground_name
         made("subject", (shown.scenario,), lambda: describe_subject(shown.scenario, name))
         tell("verdict", describe_verdict(shown, work))
@@ -411,8 +415,8 @@ class Page(PageBase):
                 "shown": shown.index,
             },
         )
-        advice, asked = self._advice.about(path), self._advice.is_asked(path)
-        tell("advice", describe_advice(advice, asked, asked and self._advice.is_busy))
+        is_seeking = self._advice.progress is not None or self._advice.has_news
+        tell("advice", describe_advice(self._advice_here, is_seeking, time.monotonic()))
         made("current", (shown, self.colouring), self._write_current)
         made("sliders", (wanted.loaded,), lambda: describe_sliders(wanted.loaded))
         made("values", (wanted, session.refusal), lambda: describe_values(wanted))
@@ -424,18 +428,11 @@ class Page(PageBase):
         )
         along = path, reference, shown.chance
         made("limits", along, lambda: describe_limits(*along))
-        made("curves", along, lambda: describe_curves(*along))
         model = wanted.options.model
         tell("chosen", {
             **self.list_chosen(), "policy": model.policy, "soil": model.soil or "",
             "sets": self._click_sets, "speed": self.playback.speed, "preset": wanted.loaded.name,
         })  # fmt: skip
-
-    def _grey(self, old: frozenset[int]) -> None:
-        """Grey the paths whose verdicts are of old values."""
-        if old != self._greyed:
-            self._greyed = old
-            self.scene.paths.mark_old(old)
 
     def advance(self, seconds: float) -> None:
         """Play on by a time of the visitor [s], and show what has changed."""
@@ -443,11 +440,11 @@ class Page(PageBase):
         self.moved = playback.advance(seconds) or self.moved
         if not self.moved:
             return
-        state = self._find_state()
+        state = self.session.shown.path.trajectory.state_at(playback.time)
         self.scene.show(state)
         self.moved = False
         now = time.monotonic()
-        if now - self._told_at < BOARD_PERIOD and playback.rate != 0.0:
+        if now - self._told_at < BOARD_PERIOD and playback.is_playing:
             self.moved = True
             return
         self._told_at = now
@@ -459,7 +456,7 @@ class Page(PageBase):
         self.channel.tell("drive", {
             "time": round(playback.time, 2), "duration": round(playback.duration, 2),
             "distance": 0.0 if state is None else round(state.distance, 4),
-            "rate": playback.rate, "words": playback.describe(),
+            "plays": playback.is_playing, "words": playback.describe(),
             "fails": None if failure is None else round(failure.time, 2),
         })  # fmt: skip
         link = "" if failure is None else failure.link
@@ -468,25 +465,6 @@ class Page(PageBase):
         self.channel.tell("board", board)
         uses = describe_uses(path, playback.time, self.session.shown.chance)
         self.channel.tell("uses", uses)
-
-    def _find_state(self) -> RoverState | None:
-        """Return the state at the time of the playback; at a failure that at which it fails.
-
-        The model may have been asked there between waypoints.
-        """
-        path, at = self.session.shown.path, self.playback.time
-        state, failure = path.trajectory.state_at(at), path.failure
-        if state is None or failure is None or not failure.is_settled:
-            return state
-        if abs(at - failure.time) > AT_FAILURE:
-            return state
-        return replace(failure.state, spin=state.spin)
-
-
-def _differ_in_size(one: Rover, other: Rover) -> bool:
-    """Return whether a camera that shows one rover may stand inside the other."""
-    small, large = sorted((find_radius(one), find_radius(other)))
-    return large > MUCH_LARGER * small
 
 
 def _read_options(words: Words) -> dict[str, Any]:

@@ -7,7 +7,7 @@ import json
 import platform
 from collections.abc import Mapping
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from typing import Any
 
 import rover_physics
@@ -123,10 +123,6 @@ def write_file(
 
 
 def _versions() -> str:
-    found = {"rover_planner": rover_physics.__version__, "python": platform.python_version()}
-    for name in PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
+    own = {"rover_planner": rover_physics.__version__, "python": platform.python_version()}
+    found = own | {name: version(name) for name in PACKAGES}
     return ", ".join(f"{name} {text}" for name, text in found.items())

@@ -8,14 +8,14 @@ import numpy as np
 from rover_physics.names import WHEELS
 from rover_physics.rover.model import Rover
 from rover_planner.viewer.scene.force_arrows import ForceArrows
-from rover_planner.viewer.scene.labels import Label, Labels
 from rover_planner.viewer.scene.local_frame import LocalFrame
+from rover_planner.viewer.scene.nodes import Nodes, Strand
 from rover_planner.viewer.scene.rover_visual import RoverVisual, look_alike
 from rover_planner.viewer.state.colours import CASING
 from rover_planner.viewer.state.failure import Failure
 from rover_planner.viewer.state.rover_state import RoverState
 
-NAME, LABELS = "/failure", "/reasons"
+NAME, REASON = "/failure", "/reason"
 OPACITY = 0.55
 """Opacity of the ghost."""
 NEAR = 0.5
@@ -27,9 +27,9 @@ LABEL_HEIGHT = 4.5
 class FailureMark:
     """A ghost of the whole rover where the shown path is refused, until another one is shown."""
 
-    def __init__(self, scene: Any, labels: Labels, frame: LocalFrame):
+    def __init__(self, scene: Any, nodes: Nodes, frame: LocalFrame):
         """Draw nothing yet."""
-        self._scene, self._labels, self._frame = scene, labels, frame
+        self._scene, self._nodes, self._frame = scene, nodes, frame
         self._rover: Rover | None = None
         """The rover of the ghost, which stays for the next failure; None if there is none."""
         self._failure: Failure | None = None
@@ -44,7 +44,7 @@ class FailureMark:
         """Draw a failure instead of what was drawn before; None draws nothing."""
         self._failure, self._is_alone = failure, True
         if failure is None:
-            self._labels.show(LABELS, {})
+            self._nodes.remove(REASON)
             if self._root is not None:
                 self._root.visible = False
             return
@@ -88,9 +88,9 @@ class FailureMark:
     def _show_alone(self) -> None:
         """Show ghost and arrows, if they are known, while the played rover is elsewhere."""
         if self._failure is not None:
-            self._ghost.visible = self._is_alone
+            self._ghost.root.visible = self._is_alone
             shown = self._forces_shown and self._failure.is_settled
-            self._arrows.visible = shown and self._is_alone
+            self._arrows.root.visible = shown and self._is_alone
 
     def _draw_label(self, failure: Failure, radius: float) -> None:
         """Draw what is broken, with a line from a place above the rover to the wheel or body."""
@@ -102,8 +102,6 @@ class FailureMark:
         if failure.link in WHEELS:
             place = state.wheel_centres[WHEELS.index(failure.link)]
         top = self._frame.to_scene(state.position) + np.array([0.0, 0.0, LABEL_HEIGHT * radius])
-        self._scene.add_line_segments(
-            f"{NAME}/leader", np.array([[top, self._frame.to_scene(place)]]), CASING,
-            thickness=2.0, thickness_units="screen",
-        )  # fmt: skip
-        self._labels.show(LABELS, {"reason": Label(f"{words}\n{where}", top)})
+        leader = Strand(np.array([top, self._frame.to_scene(place)]), CASING)
+        self._nodes.show_lines(f"{REASON}/leader", [leader], 2.0)
+        self._nodes.show_label(f"{REASON}/words", f"{words}\n{where}", top)

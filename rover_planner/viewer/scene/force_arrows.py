@@ -20,6 +20,8 @@ class ForceArrows:
     def __init__(self, scene: Any, rover: Rover, frame: LocalFrame, name: str = "/forces"):
         """Add arrows of no length to the scene, below a node `name`."""
         self._frame = frame
+        self.root = scene.add_frame(name, show_axes=False)
+        """The node of which all others are parts."""
         self._scale = WEIGHT_LENGTH * rover.wheel.radius / (rover.weight / 6.0)
         radius = rover.wheel.radius
         no_arrows = np.zeros((6, 2, 3))
@@ -44,12 +46,3 @@ class ForceArrows:
         )
         self._normal.points = np.stack([points, points + N * normal], axis=1)
         self._along.points = np.stack([points, points + (T * along + S * axis)], axis=1)
-
-    @property
-    def visible(self) -> bool:
-        """True if the arrows are shown."""
-        return bool(self._normal.visible)
-
-    @visible.setter
-    def visible(self, value: bool) -> None:
-        self._normal.visible = self._along.visible = value

@@ -9,14 +9,12 @@ from numpy.typing import ArrayLike
 from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
 
-MAX_PLAIN = 1000.0
-"""Largest coordinate of the middle of the ground that is drawn as it is [m].
+STEP = 1000.0
+"""Distance of the origins to choose from, the first of which is that of the map frame [m].
 
-A browser draws with 32-bit floats: beyond this they are coarser than 0.06 mm, and at the
-coordinates of a UTM map than 0.25 m.
+A browser draws with 32-bit floats: at 1 km they are coarser than 0.06 mm, and at the coordinates
+of a UTM map than 0.25 m.
 """
-MAX_AWAY = 1000.0
-"""Distance of the middle of another ground from the origin from which it gets its own [m]."""
 
 
 @dataclass
@@ -39,20 +37,13 @@ class LocalFrame:
         return np.asarray(points, dtype=float) + self.origin
 
     def move_to(self, terrain: Terrain) -> bool:
-        """Move the origin near a ground that is far from it; return whether it has moved.
+        """Move the origin near a ground and its median height; return whether it has moved.
 
         What was drawn before must then be drawn again.
         """
-        middle = _find_middle(terrain)
-        if np.abs(middle - self.origin).max() <= MAX_AWAY:
-            return False
-        self.origin = np.where(np.abs(middle) > MAX_PLAIN, np.round(middle), 0.0)
-        return True
-
-
-def _find_middle(terrain: Terrain) -> Floats:
-    """Return the middle of a ground and its median height (3,) [m]."""
-    x_low, x_high, y_low, y_high = terrain.bounds
-    known = terrain.elevation[np.isfinite(terrain.elevation)]
-    height = float(np.median(known)) if known.size else 0.0
-    return np.array([0.5 * (x_low + x_high), 0.5 * (y_low + y_high), height])
+        x_low, x_high, y_low, y_high = terrain.bounds
+        known = terrain.elevation[np.isfinite(terrain.elevation)]
+        height = float(np.median(known)) if known.size else 0.0
+        middle = np.array([0.5 * (x_low + x_high), 0.5 * (y_low + y_high), height])
+        before, self.origin = self.origin, STEP * np.round(middle / STEP)
+        return not np.array_equal(self.origin, before)

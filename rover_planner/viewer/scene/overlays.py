@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drawings over the ground: candidate paths with their numbers, refused places, start, goal."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +10,8 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.path_query import Candidate
-from rover_planner.viewer.scene.labels import Label, Labels
 from rover_planner.viewer.scene.local_frame import LocalFrame
-from rover_planner.viewer.scene.ribbons import Ribbon, Strand
+from rover_planner.viewer.scene.nodes import Nodes, Strand
 from rover_planner.viewer.state.colours import (
     PASSABLE,
     REFUSED,
@@ -38,8 +36,8 @@ WIDE, NARROW = 6.0, 3.5
 """Widths of the shown path and of the others [px]."""
 NUMBER_SHARES = (0.35, 0.65)
 """Shares of a path at which the numbers of the first and the last one stand."""
-NUMBER_LABELS, FLAGS = "/numbers", "/flags"
-"""Groups of labels."""
+PATHS, NUMBERS, FLAGS = "/paths", "/numbers", "/flags"
+"""Groups of nodes."""
 NUMBER_HEIGHT = 1.5
 """Height of a path's number above the ground [wheel radii]."""
 NUMBER_ANGLE = 0.018
@@ -51,27 +49,21 @@ SHOWN_SIZE = 1.6
 class PathOverlay:
     """Candidate paths in the colours of their verdicts, with their numbers."""
 
-    def __init__(self, scene: Any, labels: Labels, frame: LocalFrame):
+    def __init__(self, nodes: Nodes, frame: LocalFrame):
         """Draw nothing yet."""
-        self._scene, self._labels, self._frame = scene, labels, frame
-        self.ribbons: dict[int, Ribbon] = {}
-        """The drawn paths by their index."""
-        self._plan = Ribbon(scene, "/paths/plan")
-        self._ghost = Ribbon(scene, "/paths/ghost")
-        self._trail = Ribbon(scene, "/paths/trail")
-        self._poles = Ribbon(scene, "/paths/poles")
-        self._old: set[int] = set()
+        self._nodes, self._frame = nodes, frame
+        self.paths: list[Sequence[Strand]] = []
+        """The candidate paths as they are drawn."""
+        self.lines: dict[str, Sequence[Strand]] = {}
+        """What else is drawn, by name: a plan, a ghost, a trail."""
+        self._shown = 0
+        self._old: frozenset[int] = frozenset()
         """Indices of the paths that are greyed."""
         self._numbers: dict[int, Floats] = {}
         """Places of the numbers in the scene by the index of their path [m]."""
 
     def show(
-        self,
-        rover: Rover,
-        terrain: Terrain,
-        candidates: Sequence[Candidate],
-        shown: int,
-        old: Iterable[int] = (),
+        self, rover: Rover, terrain: Terrain, candidates: Sequence[Candidate], shown: int
     ) -> None:
         """Draw candidate paths instead of what was drawn before.
 
@@ -80,15 +72,12 @@ class PathOverlay:
             terrain: The ground.
             candidates: The paths.
             shown: Index of the path that is played; it is drawn wider than the others.
-            old: Indices of paths whose verdicts are of old values; they are grey.
         """
-        radius, self._old = rover.wheel.radius, set(old)
-        for index in [index for index in self.ribbons if index >= len(candidates)]:
-            self.ribbons.pop(index).remove()
-        for index, candidate in enumerate(candidates):
-            ribbon = self.ribbons.setdefault(index, Ribbon(self._scene, f"/paths/{index}"))
-            strands = self._find_strands(terrain, candidate, radius)
-            ribbon.show(strands, WIDE if index == shown else NARROW, self._paint_of(index))
+        radius = rover.wheel.radius
+        self.paths = [self._find_strands(terrain, one, radius) for one in candidates]
+        self._shown = shown
+        self._nodes.remove(PATHS, [f"{PATHS}/{index}" for index in range(len(candidates))])
+        self._draw_paths()
         poses = candidates[shown].poses
         self._draw_numbers(terrain, candidates, radius, shown)
         self._draw_flags(terrain, {"start": poses[0], "goal": poses[-1]}, radius)
@@ -100,22 +89,16 @@ class PathOverlay:
 
         An old one is grey.
         """
-        self.clear()
-        if plan is not None:
-            height = CLEARANCE * rover.wheel.radius
-            colour = UNKNOWN if is_old else PASSABLE
-            self._plan.show(self._find_strand(terrain, plan[:, :2], colour, height), WIDE)
-            self._draw_flags(terrain, {"goal": plan[-1]}, rover.wheel.radius)
-        else:
-            self._labels.show(FLAGS, {})
-        self._labels.show(NUMBER_LABELS, {})
+        radius, colour = rover.wheel.radius, UNKNOWN if is_old else PASSABLE
+        points = np.empty((0, 2)) if plan is None else plan[:, :2]
+        self._draw("plan", self._find_strand(terrain, points, colour, CLEARANCE * radius))
+        self._draw_flags(terrain, {} if plan is None else {"goal": plan[-1]}, radius)
 
     def show_ghost(self, rover: Rover, terrain: Terrain, path: Floats | None) -> None:
         """Draw a path (n, 3) that a person points at, or none."""
+        points = np.empty((0, 2)) if path is None else path[:, :2]
         height = CLEARANCE * rover.wheel.radius
-        points = None if path is None else path[:, :2]
-        strands = [] if points is None else self._find_strand(terrain, points, GHOST, height)
-        self._ghost.show(strands, WIDE)
+        self._draw("ghost", self._find_strand(terrain, points, GHOST, height))
 
     def show_trail(self, rover: Rover, terrain: Terrain, trail: Floats | None) -> None:
         """Draw where (n, 3) something was learned: x, y [m] and a number from 0 to 1."""
@@ -128,7 +111,7 @@ class PathOverlay:
                 terrain, known[k : k + 2, :2], (red, green, blue), height
             )
         ]
-        self._trail.show(strands, WIDE)
+        self._draw("trail", strands)
 
     def find_number(self, origin: Floats, direction: Floats) -> int | None:
         """Return the index of the path whose number a ray (3,) of the scene hits; None for none.
@@ -144,22 +127,23 @@ class PathOverlay:
                 return index
         return None
 
-    def clear(self) -> None:
-        """Remove all that was drawn but the labels, which are moved to other places."""
-        for node in (*self.ribbons.values(), self._plan, self._ghost, self._poles):
-            node.remove()
-        self.ribbons.clear()
-        self._numbers.clear()
-        self._old.clear()
-
-    def mark_old(self, indices: Iterable[int]) -> None:
+    def mark_old(self, indices: frozenset[int]) -> None:
         """Grey the lines of paths whose verdicts are of old values, and colour all others."""
-        self._old = set(indices)
-        for index, ribbon in self.ribbons.items():
-            ribbon.paint(self._paint_of(index))
+        if indices == self._old:
+            return
+        self._old = indices
+        self._draw_paths()
 
-    def _paint_of(self, index: int) -> Colour | None:
-        return UNKNOWN if index in self._old else None
+    def _draw_paths(self) -> None:
+        for index, strands in enumerate(self.paths):
+            width = WIDE if index == self._shown else NARROW
+            paint = UNKNOWN if index in self._old else None
+            self._nodes.show_lines(f"{PATHS}/{index}", strands, width, paint)
+
+    def _draw(self, name: str, strands: Sequence[Strand]) -> None:
+        """Draw some lines instead of those that had the name."""
+        self.lines[name] = strands
+        self._nodes.show_lines(f"/lines/{name}", strands, WIDE)
 
     def _find_strands(self, terrain: Terrain, candidate: Candidate, radius: float) -> list[Strand]:
         """Return a path in the colour of its verdict, faded from where it is refused."""
@@ -202,24 +186,24 @@ class PathOverlay:
             x, y, _ = candidate.poses[round(shares[index] * (len(candidate.poses) - 1))]
             height = _ground_height(terrain, x, y) + NUMBER_HEIGHT * radius
             self._numbers[index] = self._frame.to_scene(np.array([x, y, height]))
-        labels = {
-            str(index): Label(
-                str(index + 1), place, SHOWN_SIZE if index == shown else 1.0, stands=False
-            )
-            for index, place in self._numbers.items()
-        }
-        self._labels.show(NUMBER_LABELS, labels)
+        self._nodes.remove(NUMBERS, [f"{NUMBERS}/{index}" for index in self._numbers])
+        for index, place in self._numbers.items():
+            size = SHOWN_SIZE if index == shown else 1.0
+            self._nodes.show_label(
+                f"{NUMBERS}/{index}", str(index + 1), place, font_screen_scale=size,
+                anchor="center-center",
+            )  # fmt: skip
 
     def _draw_flags(self, terrain: Terrain, flags: Mapping[str, Floats], radius: float) -> None:
         """Draw poles of six wheel radii [m] with names at poses (3,)."""
-        labels, poles = {}, []
+        self._nodes.remove(FLAGS, [f"{FLAGS}/{name}" for name in flags])
+        poles = []
         for name, (x, y, *_) in flags.items():
             foot = self._frame.to_scene([x, y, _ground_height(terrain, x, y)])
             top = foot + np.array([0.0, 0.0, 6.0 * radius])
             poles.append(Strand(np.array([foot, top]), UNKNOWN))
-            labels[name] = Label(name, top)
-        self._poles.show(poles, NARROW)
-        self._labels.show(FLAGS, labels)
+            self._nodes.show_label(f"{FLAGS}/{name}", name, top)
+        self._nodes.show_lines("/poles", poles, NARROW)
 
 
 def _thin(count: int) -> NDArray[np.intp]:

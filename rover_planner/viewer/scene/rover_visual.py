@@ -36,7 +36,8 @@ class RoverVisual:
         """Add the nodes below a node `name`; without an opacity it is opaque."""
         self._scene, self._frame = scene, frame
         self._name, self._opacity = name, opacity
-        self._root = scene.add_frame(name, show_axes=False)
+        self.root = scene.add_frame(name, show_axes=False)
+        """The node of which all others are parts."""
         self._joints: dict[str, Any] = {}
         self._meshes: dict[str, Any] = {}
         """By the name of the link; that of a wheel is its tyre."""
@@ -102,8 +103,8 @@ class RoverVisual:
             failing: A link that fails there and has the colour of that: a name of WHEELS, body,
                 or rocker or bogie with its side, such as bogie_left; empty for none.
         """
-        self._root.position = self._frame.to_scene(state.position)
-        self._root.wxyz = wxyz_from_rpy(*state.attitude)
+        self.root.position = self._frame.to_scene(state.position)
+        self.root.wxyz = wxyz_from_rpy(*state.attitude)
         for k, side in enumerate(SIDES):
             self._joints[f"rocker_{side}"].wxyz = wxyz_about_y(float(state.rocker_angle[k]))
             self._joints[f"bogie_{side}"].wxyz = wxyz_about_y(float(state.bogie_angle[k]))
@@ -117,19 +118,6 @@ class RoverVisual:
             self._meshes[link].color = REFUSED if link == failing else colour
             self._meshes[link].opacity = self._opacity if link != failing else 1.0
         self._failing = failing
-
-    def remove(self) -> None:
-        """Remove all nodes."""
-        self._root.remove()
-
-    @property
-    def visible(self) -> bool:
-        """True if the rover is shown."""
-        return bool(self._root.visible)
-
-    @visible.setter
-    def visible(self, value: bool) -> None:
-        self._root.visible = value
 
 
 def look_alike(one: Rover, other: Rover) -> bool:

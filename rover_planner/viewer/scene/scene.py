@@ -12,8 +12,8 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.viewer.scene.cameras import FIT, Cameras
 from rover_planner.viewer.scene.failure_mark import FailureMark
 from rover_planner.viewer.scene.force_arrows import ForceArrows
-from rover_planner.viewer.scene.labels import Labels
 from rover_planner.viewer.scene.local_frame import LocalFrame
+from rover_planner.viewer.scene.nodes import Nodes
 from rover_planner.viewer.scene.overlays import PathOverlay
 from rover_planner.viewer.scene.rover_visual import RoverVisual, look_alike
 from rover_planner.viewer.state.rover_state import RoverState
@@ -32,9 +32,9 @@ class Scene:
         """The frame of the scene; all that is drawn goes through it."""
         self.cameras = Cameras(server, self.frame)
         """The visitors' cameras."""
-        labels = Labels(self._scene)
-        self.paths = PathOverlay(self._scene, labels, self.frame)
-        self.failure = FailureMark(self._scene, labels, self.frame)
+        nodes = Nodes(self._scene)
+        self.paths = PathOverlay(nodes, self.frame)
+        self.failure = FailureMark(self._scene, nodes, self.frame)
         self._rover: Rover
         self._visual: RoverVisual | None = None
         self._forces_shown = True
@@ -43,7 +43,7 @@ class Scene:
         self._last_position: np.ndarray | None = None
 
     def draw_ground(self, glb: bytes) -> None:
-        """Show another ground, as `write_glb` returns it, or the same in other colours."""
+        """Show another ground, as `write_ground` returns it, or the same in other colours."""
         self._scene.add_glb("/ground", glb, cast_shadow=False, receive_shadow=False)
 
     def draw_rover(self, rover: Rover, arm_angles: Mapping[str, float]) -> None:
@@ -54,7 +54,7 @@ class Scene:
         if self._visual is None or not look_alike(self._rover, rover):
             visual, self._visual = self._visual, None  # an error must not leave half a rover
             if visual is not None:
-                visual.remove()
+                visual.root.remove()
             self._visual = RoverVisual(self._scene, rover, self.frame)
             self._rover, self._arm = rover, {}
             self._forces = ForceArrows(self._scene, rover, self.frame)
@@ -69,7 +69,7 @@ class Scene:
 
     def show_forces(self, visible: bool) -> None:
         """Show or hide the arrows."""
-        self._forces_shown = self._forces.visible = visible
+        self._forces_shown = self._forces.root.visible = visible
         self.failure.show_forces(visible)
 
     def show(self, state: RoverState | None) -> None:
@@ -77,8 +77,8 @@ class Scene:
         self._state = state
         if self._visual is None:
             return
-        self._visual.visible = state is not None
-        self._forces.visible = self._forces_shown and state is not None
+        self._visual.root.visible = state is not None
+        self._forces.root.visible = self._forces_shown and state is not None
         failing = self.failure.make_room(state)
         if state is None:
             self._last_position = None

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Colours that people with any kind of colour vision tell apart (Okabe and Ito, 2008; cividis)."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,30 +15,12 @@ LOAD = (86, 180, 233)
 """Sky blue: normal forces, torque saturation."""
 TRACTION = (230, 159, 0)
 """Orange: tangential forces, slip."""
-FAILED = (176, 0, 32)
-"""Red, with white letters: a part of the page has failed."""
 MIDDLE = (240, 228, 66)
 """Yellow: half-way from blue to vermillion."""
 METAL, DARK, BODY = (150, 155, 160), (50, 52, 56), (225, 220, 205)
-BEYOND = REFUSED
-"""Vermillion, hatched: ground where a limit is broken."""
 UNKNOWN = (110, 110, 110)
 CASING = (16, 16, 16)
 """The line from a label to what it is about."""
-
-
-@dataclass(frozen=True)
-class ColourScale:
-    """The meaning of the colours of a layer."""
-
-    low: float
-    """Value of the first colour."""
-    high: float
-    """Value of the last colour."""
-    unit: str
-    """Unit of both, empty for none."""
-    digits: int = 2
-    """Digits behind the point of both."""
 
 
 def map_colours(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.uint8]:
@@ -54,8 +34,9 @@ def map_colours(values: NDArray[np.float64], low: float, high: float) -> NDArray
     from matplotlib import colormaps
 
     span = high - low if high > low else 1.0
+    table = colormaps["cividis"](np.arange(256), bytes=True)[:, :3]
     share = np.clip((np.nan_to_num(values) - low) / span, 0.0, 1.0)
-    colours = (255 * colormaps["cividis"](share)[..., :3]).astype(np.uint8)
+    colours = np.asarray(table[(255.0 * share).astype(np.uint8)])
     colours[~np.isfinite(values)] = UNKNOWN
     return colours
 

@@ -94,13 +94,14 @@ def find_failure(
     if verdict.first_failure < 0:
         return None
     lane, rows = limits.lane(verdict.code), limits.rows
-    here = rows.prediction.waypoint == verdict.first_failure
-    broken = np.flatnonzero(here & (lane.used > 1.0))
+    is_there = rows.prediction.waypoint == verdict.first_failure
+    broken = np.flatnonzero(is_there & (lane.used > 1.0))
     if not broken.size:  # a recorded refusal that this rover does not explain
-        broken = np.flatnonzero(here & ~rows.is_between)
+        broken = np.flatnonzero(is_there & ~rows.is_between)
     at = int(broken[np.argmin(rows.is_between[broken])])
-    settled, value = bool(rows.prediction.settled[at]), float(lane.values[at])
-    limit = lane.limit.keep(float(rows.prediction.results["kept_share"][at]))
+    here, value = rows.prediction.select([at]), float(lane.values[at])
+    settled = bool(here.settled[0])
+    limit = lane.limit.keep(float(here.results["kept_share"][0]))
     explains = limit.is_broken_by(value)
     return Failure(
         code=verdict.code,
@@ -115,19 +116,10 @@ def find_failure(
         is_between=bool(rows.is_between[at]),
         row=at,
         is_settled=settled,
-        state=_state_at(rover, rows, at) if settled else level_state(rover, terrain, rows, at),
+        state=RoverState(rover, here, np.zeros(6))
+        if settled
+        else level_state(rover, terrain, rows, at),
     )
-
-
-def _state_at(rover: Rover, rows: AskedPoses, at: int) -> RoverState:
-    """Return the state at a row at which the rover settles, with unturned wheels.
-
-    Between waypoints it has the energy of the last one.
-    """
-    here, spent = rows.prediction.select([at]), rows.prediction.energy[: at + 1]
-    spent = spent[~rows.is_between[: at + 1]]
-    driven = {"distance": rows.distance[at], "time": rows.time[at], "energy": spent[-1]}
-    return RoverState(rover, here, np.zeros(6)).change(**driven)
 
 
 def level_state(rover: Rover, terrain: Terrain, rows: AskedPoses, at: int) -> RoverState:

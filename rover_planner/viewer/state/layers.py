@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Layers that colour the ground: its shape, its friction, and the uses of the rover's limits."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rover_physics.limits.table import LIMITS
 from rover_physics.numerics.arrays import Floats
@@ -14,9 +15,15 @@ from rover_physics.results.record import QUANTITIES
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
+from rover_planner.viewer.state.colours import REFUSED, UNKNOWN, map_colours, to_css
+from rover_planner.viewer.state.ground_grid import GroundGrid
 
 STEEP = 35.0
 """Slope of the last colour [deg]."""
+MAX_PREDICTED = 100
+"""Most points along a side of the ground at which the model predicts a layer."""
+STOPS = np.linspace(0.0, 1.0, 9)
+"""Places of the colours from which a gradient is made."""
 HEIGHT, SLOPE, FRICTION = "height", "slope", "friction of the ground"
 """Layers of the ground alone."""
 _OF_PATHS = [one.name for one in QUANTITIES if one.of_path]
@@ -42,12 +49,33 @@ class Colouring:
         """True if the layer is predicted for the rover."""
         return self.layer in PREDICTED
 
-    def describe(self) -> str:
-        """Return what the colours are of, in words."""
-        if not self.is_predicted:
-            return self.layer
-        at = "along the path" if self.along else f"at heading {self.heading:g} deg"
-        return f"{self.layer} {at}"
+
+@dataclass(frozen=True)
+class Legend:
+    """What the colours of a layer mean."""
+
+    title: str
+    """The layer."""
+    keys: tuple[tuple[str, str], ...]
+    """Colours as CSS writes them, or "hatched", with what they mean."""
+    gradient: tuple[str, ...] = ()
+    """Colours from the smallest to the largest value; none for classes."""
+    ends: tuple[str, ...] = ()
+    """Both values with their unit."""
+    notes: tuple[str, ...] = ()
+    """More about it."""
+
+
+@dataclass(frozen=True, eq=False)
+class ColouredGround:
+    """The colours of a layer, and what they mean."""
+
+    colours: NDArray[np.uint8]
+    """(ny, nx, 3), grey where nothing is known."""
+    legend: Legend
+    """Their meaning."""
+    beyond: NDArray[np.bool_] | None = None
+    """(ny, nx) True where a limit is broken; None without one."""
 
 
 def list_layers(terrain: Terrain) -> list[str]:
@@ -56,10 +84,72 @@ def list_layers(terrain: Terrain) -> list[str]:
     return [HEIGHT, SLOPE, *friction, *PREDICTED]
 
 
-def compute_slope(x: Floats, y: Floats, heights: Floats) -> Floats:
-    """Return the slope (ny, nx) [deg] of heights (ny, nx) [m] at x (nx,) and y (ny,) [m]."""
-    along_y, along_x = np.gradient(heights, y, x)
-    return np.asarray(np.degrees(np.arctan(np.hypot(along_x, along_y))))
+def colour_ground(layer: str, terrain: Terrain, grid: GroundGrid) -> ColouredGround:
+    """Return the colours of a layer of the ground alone."""
+    values = heights = grid.fine_heights
+    known = heights[np.isfinite(heights)]
+    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+    ends: tuple[str, ...] = f"{low:.2f} m", f"{high:.2f} m"
+    if layer == SLOPE:
+        values = np.degrees(np.arctan(np.hypot(*grid.slopes)))
+        low, high, ends = 0.0, STEEP, ("0 deg", f"{STEEP:.0f} deg")
+    elif layer == FRICTION and terrain.friction is not None:
+        columns, rows = (
+            np.clip(np.rint((at - first) / terrain.resolution).astype(int), 0, count - 1)
+            for at, first, count in zip(
+                grid.pixels, terrain.origin, terrain.friction.shape[::-1], strict=True
+            )
+        )
+        values, low, high = terrain.friction[np.ix_(rows, columns)], 0.0, 1.0
+        ends = "0.00", "1.00"
+    return ColouredGround(map_colours(values, low, high), _grade(layer, ends))
+
+
+def colour_limit(
+    how: Colouring,
+    rover: Rover,
+    terrain: Terrain,
+    path: Floats | None,
+    options: SweepOptions,
+    grid: GroundGrid,
+) -> ColouredGround:
+    """Return the colours of the use of a limit with the rover at each place.
+
+    The model is asked at MAX_PREDICTED places along a side; all others are as the nearest.
+
+    Args:
+        how: The layer, and the heading of the rover.
+        rover: The rover.
+        terrain: The ground.
+        path: (n, 3) poses whose yaw at the nearest one the rover has, if `how` says so.
+        options: Options of the model.
+        grid: The places.
+
+    Raises:
+        RoverError: The model refuses an option.
+    """
+    asked = [np.linspace(one[0], one[-1], min(len(one), MAX_PREDICTED)) for one in grid.pixels]
+    heading = path if how.along and path is not None else np.radians(how.heading)
+    used = predict_use(PREDICTED[how.layer], rover, terrain, heading, asked, options)
+    columns, rows = (
+        np.rint(np.linspace(0, len(few) - 1, len(many))).astype(int)
+        for few, many in zip(asked, grid.pixels, strict=True)
+    )
+    used = used[np.ix_(rows, columns)]
+    colours, beyond = map_colours(used, 0.0, 1.0), used > 1.0
+    colours[beyond] = REFUSED
+    words = "along the path" if how.along else f"at heading {how.heading:g} deg"
+    hatched = ("hatched", "beyond the limit")
+    return ColouredGround(
+        colours, _grade(f"{how.layer} {words}", ("0 %", "100 %"), hatched), beyond
+    )
+
+
+def _grade(title: str, ends: tuple[str, ...], *keys: tuple[str, str]) -> Legend:
+    """Return the legend of values from one end to the other."""
+    gradient = tuple(to_css((r, g, b)) for r, g, b in map_colours(STOPS, 0.0, 1.0).tolist())
+    unknown = to_css(UNKNOWN), "unknown, or the rover cannot stand"
+    return Legend(title, (*keys, unknown), gradient, ends)
 
 
 def predict_use(
@@ -67,7 +157,7 @@ def predict_use(
     rover: Rover,
     terrain: Terrain,
     heading: float | Floats,
-    at: tuple[Floats, Floats],
+    at: Sequence[Floats],
     options: SweepOptions,
 ) -> Floats:
     """Return the use of a limit with the rover at each point.
@@ -87,18 +177,16 @@ def predict_use(
         RoverError: The model refuses an option.
     """
     x, y = np.meshgrid(*at)
-    poses = np.stack([x, y, _headings(x, y, heading)], axis=-1)
-    scores = score_poses(rover, terrain, poses, options)
+    yaw = np.full_like(x, heading) if np.ndim(heading) == 0 else _follow(np.asarray(heading), x, y)
+    scores = score_poses(rover, terrain, np.stack([x, y, yaw], axis=-1), options)
     of_limit = [code in ("", row.code) for row in scores.limits.rows]
     used = np.fmax.reduce(scores.uses[..., of_limit], axis=-1, initial=np.nan)
     return np.where(scores.status == PoseStatus.SETTLED, used, np.nan)
 
 
-def _headings(x: Floats, y: Floats, heading: float | Floats) -> Floats:
-    """Return the yaw (ny, nx) of the body at places."""
-    if isinstance(heading, float):
-        return np.full_like(x, heading)
+def _follow(path: Floats, x: Floats, y: Floats) -> Floats:
+    """Return the yaw (ny, nx) of a path (n, 3) at its waypoints nearest to places."""
     from scipy.spatial import cKDTree
 
-    _, nearest = cKDTree(heading[:, :2]).query(np.stack([x, y], axis=-1))
-    return np.asarray(heading[nearest, 2])
+    _, nearest = cKDTree(path[:, :2]).query(np.stack([x, y], axis=-1))
+    return np.asarray(path[nearest, 2])

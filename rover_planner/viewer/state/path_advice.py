@@ -1,60 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Advice on the path that is looked at, sought in a thread when a visitor asks for it."""
+"""Advice on the path that is looked at, and a scenario with a remedy."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.advice.advise import Advice, grow_advice
 from rover_planner.advice.case import Case
 from rover_planner.advice.remedy import Remedy
-from rover_planner.viewer.state.background_work import BackgroundWork
 from rover_planner.viewer.state.scenario import Judged, Scenario
 
 
-class PathAdvice:
-    """The advice that was asked for last. All methods belong to the page's thread."""
+@dataclass(frozen=True, eq=False)
+class Advised:
+    """A path and the advice on it."""
 
-    def __init__(self, wake: Callable[[], object]):
-        """Start the thread; `wake` is called in it when there is something to `take`."""
-        self._work = BackgroundWork(_seek, wake, "advice")
-        self._about: Judged | None = None
-        self._advice: Advice | None = None
-        self.failure = ""
-        """Why it could not be sought; empty if it could."""
-
-    @property
-    def is_busy(self) -> bool:
-        """True if levers are tried, or what was found is not taken yet."""
-        return self._work.progress is not None or self._work.has_news
-
-    def ask(self, path: Judged) -> None:
-        """Seek advice on a path."""
-        self._about, self._advice, self.failure = path, None, ""
-        self._work.ask(path)
-
-    def take(self) -> None:
-        """Take what was found."""
-        for one in self._work.take():
-            if one.request is self._about:
-                self._advice = self._advice if one.result is None else one.result
-                self.failure = "" if one.error is None else str(one.error)
-
-    def about(self, path: Judged) -> Advice | None:
-        """Return the advice on a path, None if it was not asked or nothing is known yet."""
-        return self._advice if path is self._about else None
-
-    def is_asked(self, path: Judged) -> bool:
-        """Return whether advice on a path was asked for."""
-        return path is self._about
-
-    def stop(self) -> None:
-        """Stop to seek."""
-        self._work.cancel()
-
-    def close(self) -> None:
-        """End the thread."""
-        self._work.close()
+    path: Judged
+    """The path."""
+    since: float
+    """When a visitor asked for advice, on the monotonic clock [s]."""
+    advice: Advice | None = None
+    """What was found so far; None while the first lever is tried."""
 
 
 def apply_remedy(scenario: Scenario, remedy: Remedy) -> Scenario:
@@ -81,7 +47,7 @@ def apply_remedy(scenario: Scenario, remedy: Remedy) -> Scenario:
     )
 
 
-def _seek(path: Judged) -> Iterator[Advice]:
+def seek_advice(path: Judged) -> Iterator[Advice]:
     """Yield advice on a path that grows."""
     asked = path.scenario
     options = asked.asked_options

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The clock of the page: play, pause, step and rewind at a chosen speed."""
+"""The clock of the page: play, pause and step at a chosen speed."""
 
 from dataclasses import dataclass, field
 
@@ -9,112 +9,81 @@ from rover_physics.numerics.arrays import Floats
 
 SPEEDS = (1, 2, 5, 10, 20, 50, 100)
 """Speeds to choose from, in seconds of the drive per second of the visitor."""
-FAST = 4.0
-"""Rate of rewind, backwards."""
 
 
 @dataclass
 class Playback:
     """The time of a drive that is shown, and how it moves on."""
 
-    duration: float = 0.0
-    """Duration of the drive [s]."""
+    times: Floats = field(default_factory=lambda: np.zeros(1))
+    """(n,) times of the poses of the drive [s]."""
+    places: Floats = field(default_factory=lambda: np.zeros(1))
+    """(n,) their places along the path, whole numbers at waypoints."""
     time: float = 0.0
     """Time that is shown [s]."""
     speed: float = 10.0
     """Chosen speed, one of SPEEDS."""
-    rate: float = 0.0
-    """Factor on the speed: 0 paused, 1 playing, -FAST rewinding."""
+    is_playing: bool = False
+    """True if the time moves on."""
+    _place: float | None = None
+    """Where the rover is by `set_drive` until the time is moved; None if the time tells."""
 
-    _times: Floats = field(default_factory=lambda: np.zeros(1))
-    _distance: Floats = field(default_factory=lambda: np.zeros(1))
-    _kept: tuple[float, float] | None = None
-    """Where the rover is by `set_drive` until the time is moved: distance [m], and the time it
-    has turned there [s]; None if the time tells."""
+    @property
+    def duration(self) -> float:
+        """Duration of the drive [s]."""
+        return float(self.times[-1])
 
     def toggle(self) -> None:
-        """Play if it is paused, else pause."""
-        if self.rate == 0.0:
-            self.play()
-        else:
-            self.pause()
-
-    def play(self) -> None:
-        """Play from the shown time, or from the start if that is the end."""
-        if self.time >= self.duration:
+        """Pause if it plays; else play, from the start if the shown time is the end."""
+        self.is_playing = not self.is_playing
+        if self.is_playing and self.time >= self.duration:
             self.seek(0.0)
-        self.rate = 1.0
-
-    def pause(self) -> None:
-        """Stop at the shown time."""
-        self.rate = 0.0
-
-    def rewind(self) -> None:
-        """Play backwards, faster."""
-        self.rate = -FAST
 
     def seek(self, time: float) -> None:
         """Go to a time [s], limited to the drive."""
         self.time = float(np.clip(time, 0.0, self.duration))
-        self._kept = None
+        self._place = None
 
     def go_to(self, time: float) -> None:
         """Pause, and go to a time [s], limited to the drive."""
-        self.pause()
+        self.is_playing = False
         self.seek(time)
 
-    def step(self, times: np.ndarray, by: int = 1) -> None:
-        """Pause, and go to the next of `times` (n,) [s], or to the previous one if `by` is -1."""
-        self.pause()
+    def step(self, by: int = 1) -> None:
+        """Pause, and go to the next pose, or to the previous one if `by` is -1."""
         if by > 0:
-            index = int(np.searchsorted(times, self.time + 1e-9, side="right"))
+            index = int(np.searchsorted(self.times, self.time + 1e-9, side="right"))
         else:
-            index = int(np.searchsorted(times, self.time - 1e-9, side="left")) - 1
-        self.seek(float(times[np.clip(index, 0, len(times) - 1)]))
+            index = int(np.searchsorted(self.times, self.time - 1e-9, side="left")) - 1
+        self.go_to(float(self.times[np.clip(index, 0, len(self.times) - 1)]))
 
     def advance(self, seconds: float) -> bool:
         """Move on by the visitor's time [s]; return whether the shown time may have changed."""
-        if self.rate == 0.0:
+        if not self.is_playing:
             return False
-        self.seek(self.time + self.rate * self.speed * seconds)
-        if self.time == (self.duration if self.rate > 0.0 else 0.0):
-            self.pause()
+        self.seek(self.time + self.speed * seconds)
+        self.is_playing = self.time < self.duration
         return True
 
     def describe(self) -> str:
         """Return how it moves, in words."""
-        if self.rate == 0.0:
-            return "paused"
-        word = "playing" if self.rate > 0.0 else "rewinding"
-        return f"{word}, {abs(self.rate) * self.speed:g} times as fast as the rover"
+        return (
+            f"playing, {self.speed:g} times as fast as the rover" if self.is_playing else "paused"
+        )
 
-    def set_drive(self, times: Floats, distance: Floats) -> None:
-        """Take another drive and go to the place where the rover is: the same distance driven.
+    def set_drive(self, times: Floats, places: Floats) -> None:
+        """Take another drive, and go to the place where the rover is.
 
         A drive that ends before that place is shown at its end, and the place is kept for the
         next one until the time is moved.
 
         Args:
-            times: (n,) times of its waypoints [s], ascending, n >= 1.
-            distance: (n,) distances driven there [m], ascending.
+            times: (n,) times of its poses [s], ascending, n >= 1.
+            places: (n,) their places along the path, ascending.
         """
-        if self._kept is not None:
-            driven, turning = self._kept
-        else:
-            driven = float(np.interp(self.time, self._times, self._distance))
-            turning = max(self.time - _first_time_at(self._times, self._distance, driven), 0.0)
-        self._times, self._distance = times, distance
-        self.duration = float(times[-1])
-        arrival = _first_time_at(times, distance, driven)
-        departure = float(times[np.searchsorted(distance, driven, side="right") - 1])
-        self.seek(min(arrival + turning, max(arrival, departure)))
-        self._kept = driven, turning
-
-
-def _first_time_at(times: Floats, distance: Floats, driven: float) -> float:
-    """Return the first time at which a distance was driven, at most the last time [s]."""
-    after = min(int(np.searchsorted(distance, driven, side="left")), len(times) - 1)
-    if after == 0:
-        return float(times[0])
-    pair = slice(after - 1, after + 1)
-    return float(np.interp(driven, distance[pair], times[pair]))
+        place = self._place
+        if place is None:
+            place = float(np.interp(self.time, self.times, self.places))
+        self.times, self.places = times, places
+        self.seek(float(np.interp(place, places, times)))
+        self._place = place

@@ -105,7 +105,7 @@ class Judged:
     @cached_property
     def trajectory(self) -> Trajectory:
         """The drive, up to the first failure."""
-        return Trajectory(self.scenario.rover, self.candidate.prediction, self.verdict)
+        return Trajectory(self.scenario.rover, self.limits.rows)
 
     @cached_property
     def limits(self) -> PathLimits:

@@ -152,14 +152,9 @@ class ViewSession:
             raise PlanningError("there is no change of this rover to undo")
         self._ask(self.wanted.take_values(self._undo.pop()))
 
-    def keep_reference(self) -> None:
-        """Compare with the values of now from now on."""
-        self.kept = self.wanted
-        self._ask(self.wanted)
-
-    def drop_reference(self) -> None:
-        """Compare with the rover as it was loaded again."""
-        self.kept = None
+    def keep_reference(self, values: Scenario | None) -> None:
+        """Compare with some values from now on; None: with the rover as it was loaded."""
+        self.kept = values
         self._ask(self.wanted)
 
     def take_rover(self, rover: Rover) -> None:

@@ -2,7 +2,7 @@
 """A survey whose layers colour the ground: opened, compared with what is shown, and read."""
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,6 @@ from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
-from rover_planner.survey.chunk_survey import open_map
 from rover_planner.survey.geotiff import GeoTiffMap
 from rover_planner.survey.layers import (
     CLASS_COLOURS,
@@ -29,7 +28,9 @@ from rover_planner.survey.layers import (
     read_drawn_classes,
 )
 from rover_planner.survey.store import SurveyStore
-from rover_planner.viewer.state.colours import UNKNOWN, Colour, from_css
+from rover_planner.viewer.state.colours import UNKNOWN, Colour, from_css, to_css
+from rover_planner.viewer.state.ground_grid import GroundGrid
+from rover_planner.viewer.state.layers import ColouredGround, Legend
 
 MAX_READ = 1200
 """Most cells along a side that are read of a layer; of more, every second, third, ..."""
@@ -37,19 +38,6 @@ CLASS, LIMIT = "survey: class", "survey: first limit"
 """Layers to choose from."""
 OPTION_NAMES = {"policy": "torque policy", "max_torque": "largest torque"}
 """Names of options that are not those of the fields."""
-
-Key = tuple[Colour, str]
-"""Entry of a legend: a colour and what it means."""
-
-
-@dataclass(frozen=True, eq=False)
-class ColouredGround:
-    """The colours of a layer, and what they mean."""
-
-    colours: NDArray[np.uint8]
-    """(ny, nx, 3), grey where nothing is known."""
-    keys: tuple[Key, ...]
-    """The legend of the classes or limits that there are."""
 
 
 class ShownSurvey:
@@ -62,27 +50,30 @@ class ShownSurvey:
         """Show a survey; `open_survey` also compares it with rover and map."""
         self._store = store
 
-    def colour(self, name: str, x: Floats, y: Floats) -> ColouredGround:
-        """Return the colours of a layer at x (nx,) and y (ny,) [m], map frame.
+    def colour(
+        self, name: str, rover: Rover, options: SweepOptions, grid: GroundGrid
+    ) -> ColouredGround:
+        """Return the colours of a layer, and in what it differs from the page's rover and options.
 
-        Each is that of the nearest surveyed cell that is read.
+        Each pixel has the colour of the nearest surveyed cell that is read.
         """
         if name == CLASS:
             numbers = read_drawn_classes(self._store, self._every)
-            colours: tuple[Colour, ...] = tuple(map(from_css, CLASS_COLOURS))
-            labels: tuple[str, ...] = CLASS_LABELS
+            colours, labels = [from_css(one) for one in CLASS_COLOURS], [*CLASS_LABELS]
         else:
-            names = {number: code.replace("_", " ") for code, number in number_limits().items()}
-            labels = tuple(names[k] or "none: all headings pass" for k in sorted(names))
-            every, colours = self._every, list_limit_colours()
-            numbers = np.asarray(self._store.layer("first_limit")[::every, ::every])
+            numbers = np.asarray(self._store.layer("first_limit")[:: self._every, :: self._every])
+            colours = list_limit_colours()
+            labels = [c.replace("_", " ") or "none: all headings pass" for c in number_limits()]
         table = np.full((256, 3), UNKNOWN, np.uint8)
         table[: len(colours)] = colours
         found = np.unique(numbers)
-        keys = [(colours[k], labels[k]) for k in found if k < len(labels)]
+        keys = [(to_css(colours[k]), labels[k]) for k in found if k < len(labels)]
         if (found >= len(labels)).any():
-            keys.append((UNKNOWN, UNKNOWN_LABEL))
-        return ColouredGround(self._place(table[numbers], x, y), tuple(keys))
+            keys.append((to_css(UNKNOWN), UNKNOWN_LABEL))
+        differences = self.find_differences(rover, options)
+        changed = [f"not as on the page: {'; '.join(differences)}"] if differences else []
+        legend = Legend(name, tuple(keys), notes=(self._describe(name), *changed))
+        return ColouredGround(self._place(table[numbers], *grid.pixels), legend)
 
     def find_differences(self, rover: Rover, options: SweepOptions) -> tuple[str, ...]:
         """Return in what the survey differs from a rover and options that are shown."""
@@ -103,7 +94,7 @@ class ShownSurvey:
                 )
         return tuple(found)
 
-    def describe(self, name: str) -> str:
+    def _describe(self, name: str) -> str:
         """Return in words what a layer is about."""
         notes = self._store.notes
         rover, options = notes.description["rover"]["name"], notes.description["options"]
@@ -165,10 +156,11 @@ def load_map(path: Path, max_cells: int) -> Terrain:
     Raises:
         PlanningError: It is no survey, its map is larger, or has changed since.
     """
-    notes = SurveyStore(path).notes
+    store = SurveyStore(path)
+    notes = store.notes
     if notes.map_file:
         need("rasterio", "a GeoTIFF")
-    source, (rows, columns) = open_map(path, notes.map_file), notes.layout.map_shape
+    source, (rows, columns) = store.open_map(), notes.layout.map_shape
     if rows * columns > max_cells:
         raise PlanningError(
             f"the map of {show_file(path)} has {rows} x {columns} cells; --max-cells is "
@@ -185,16 +177,12 @@ def load_map(path: Path, max_cells: int) -> Terrain:
     )
 
 
-def list_limit_colours() -> tuple[Colour, ...]:
+def list_limit_colours() -> list[Colour]:
     """Return the colours of the limits by number, the first of which is no limit."""
     from matplotlib import colormaps
 
-    palette = np.round(255.0 * colormaps["tab20"](np.arange(20))[:, :3]).astype(int).tolist()
-    colours = [from_css(CLASS_COLOURS[0])]
-    for k in range(len(number_limits()) - 1):
-        red, green, blue = palette[k % len(palette)]
-        colours.append((red, green, blue))
-    return tuple(colours)
+    palette = colormaps["tab20"](np.arange(len(number_limits()) - 1) % 20, bytes=True)
+    return [from_css(CLASS_COLOURS[0]), *((r, g, b) for r, g, b, _ in palette.tolist())]
 
 
 def _as_json(value: Any) -> Any:

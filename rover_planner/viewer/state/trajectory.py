@@ -11,7 +11,7 @@ from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.record import RESULT, numbers_of
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
-from rover_physics.traversability.verdict import Verdict
+from rover_planner.planning.asked_poses import AskedPoses
 from rover_planner.viewer.state.rover_state import RoverState
 
 MAX_SLIP = 0.95
@@ -21,18 +21,21 @@ MAX_VALUE = 1e9
 
 
 class Trajectory:
-    """The states along a prediction, up to the first failure."""
+    """The drive along a path: the poses at which the model was asked, up to the first failure."""
 
-    def __init__(self, rover: Rover, prediction: PathPrediction, verdict: Verdict):
-        """Take the waypoints that settle, up to and including the first failure."""
-        self._rover, self.prediction = rover, prediction
-        unsettled = np.flatnonzero(~prediction.settled)
-        end = int(unsettled[0]) if unsettled.size else len(prediction.poses)
-        if verdict.first_failure >= 0:
-            end = min(end, verdict.first_failure + 1)
+    def __init__(self, rover: Rover, rows: AskedPoses):
+        """Take the poses that settle, of those up to and including the first failure."""
+        unsettled = np.flatnonzero(~rows.prediction.settled)
+        end = int(unsettled[0]) if unsettled.size else len(rows.place)
         self.length = end
-        """Number of waypoints; 0 where the rover does not settle at the start."""
-        self._driven = prediction.select(slice(end))
+        """Number of poses; 0 where the rover does not settle at the start."""
+        shown = slice(max(end, 1))
+        self.places, self.distance, self.times = (
+            rows.place[shown], rows.distance[shown], rows.time[shown]
+        )  # fmt: skip
+        """Places as in `AskedPoses`, distances [m] and times [s] of the poses; without poses those
+        of the start."""
+        self._rover, self._driven = rover, rows.prediction.select(slice(end))
         self._yaw = np.unwrap(self._driven.poses[:, 2])
         self._numbers = np.clip(numbers_of(self._driven.results), -MAX_VALUE, MAX_VALUE)
         self._spin = _roll_wheels(rover, self._driven) if end else np.zeros((0, 6))
@@ -40,18 +43,8 @@ class Trajectory:
     @property
     def has_slip(self) -> bool:
         """True if slip is predicted: on yielding soil, or with speed servos."""
-        prediction = self.prediction
-        return prediction.policy == SERVO or bool(np.any(prediction.sinkage > 0.0))
-
-    @property
-    def times(self) -> Floats:
-        """(length,) times of the waypoints [s]; the start alone without waypoints."""
-        return np.asarray(self._driven.time) if self.length else np.zeros(1)
-
-    @property
-    def distance(self) -> Floats:
-        """(length,) distances driven at the waypoints [m]; as many as times."""
-        return np.asarray(self._driven.distance) if self.length else np.zeros(1)
+        driven = self._driven
+        return driven.policy == SERVO or bool(np.any(driven.sinkage > 0.0))
 
     @property
     def energy(self) -> float:
@@ -60,11 +53,11 @@ class Trajectory:
 
     @property
     def duration(self) -> float:
-        """Time from the first waypoint to the last [s]."""
+        """Time from the first pose to the last [s]."""
         return float(self.times[-1])
 
     def state_at(self, time: float) -> RoverState | None:
-        """Return the state at a time [s], linear between waypoints; None without waypoints."""
+        """Return the state at a time [s], linear between poses; None without poses."""
         if not self.length:
             return None
         place = float(np.interp(time, self.times, np.arange(self.length)))

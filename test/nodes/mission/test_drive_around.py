@@ -6,7 +6,7 @@ import pytest
 from rclpy.parameter import Parameter
 
 from rover_physics import load_rover, save_terrain
-from rover_planner.nodes.mission.drive import DriveSettings, drive_to
+from rover_planner.nodes.mission.drive import Drive, DriveSettings
 from rover_planner.nodes.mission_planner import MissionPlanner
 from rover_planner.nodes.rover_simulator import RoverSimulator
 from rover_planner.nodes.traction_controller import TractionController
@@ -65,9 +65,8 @@ def test_a_rover_drives_around_boulders_that_it_sees_on_the_way(ros, tmp_path, e
     answer = planner.ask(simulator.simulation.plant.pose(), goal)
     assert answer["traversable"], answer["reason"]
     told = []
-    drive_to(
-        planner, goal, answer["poses"], DriveSettings(timeout=400.0, patience=5.0), told.append
-    )
+    settings = DriveSettings(timeout=400.0, patience=5.0)
+    Drive(planner, goal, settings, told.append).run(answer["poses"])
     place = simulator.simulation.plant.pose()
     assert np.hypot(*(place - goal)[:2]) < 0.25
     assert np.isfinite(server.service.terrain.elevation).sum() > known

@@ -61,7 +61,7 @@ def test_a_path_on_the_map_is_judged_in_odom(in_odom, client):
     wait_until(lambda: in_odom.service.path is not None, "the path")
     np.testing.assert_allclose(in_odom.service.path, poses, atol=1e-9)
     replies = []
-    validity = PathValidity(in_odom.desk, "odom", in_odom.publish, in_odom.localise_path)
+    validity = PathValidity(in_odom.desk, in_odom.read_path, in_odom.publish)
     validity.take(SimpleNamespace(path=path), SimpleNamespace(), replies.append)
     wait_until(lambda: replies, "the reply")
     assert replies[0].is_valid

@@ -16,7 +16,7 @@ from support.waiting import wait_until
 def ask(server, poses, publish=None):
     """Put a request to the handler of the service, as rclpy would; nav2_msgs is not on PyPI."""
     replies = []
-    validity = PathValidity(server.desk, "map", publish or server.publish, server.localise_path)
+    validity = PathValidity(server.desk, server.read_path, publish or server.publish)
     request, response = SimpleNamespace(path=poses_path(poses, "map")), SimpleNamespace()
     validity.take(request, response, replies.append)
     wait_until(lambda: replies, "the reply")

@@ -12,7 +12,7 @@ import pytest
 from rover_physics import SweepOptions, Terrain, judge_path, judge_poses, load_rover
 from rover_physics.chance.failure_chance import SAMPLES
 from rover_physics.chance.samples import DEVIATES
-from rover_physics.errors import RoverFileError
+from rover_physics.errors import ModelError, RoverFileError
 from rover_physics.limits.table import CHANCE
 from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 from rover_physics.rover.uncertainty import Uncertainty
@@ -169,6 +169,9 @@ def test_an_accepted_chance_decides():
     refused = judge(0.05)
     assert (refused.traversable, refused.code) == (False, CHANCE)
     assert "accepted 0.05" in refused.reason and "friction" in refused.reason
+    for wrong in (-1.0, 2.0, np.nan):
+        with pytest.raises(ModelError, match="accepted_chance is .*0 to 1"):
+            judge(wrong)
     plain = judge(None)
     assert plain.traversable and np.isnan(plain.failure_chance) and plain.failure_chance_at == ()
 

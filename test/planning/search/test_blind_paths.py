@@ -4,14 +4,13 @@
 import numpy as np
 
 from rover_physics import Terrain, load_rover
-from rover_planner.maps.unobserved_ground import (
+from rover_planner.maps.unobserved_ground import ASSUMED, ObservedGround, observed_ground
+from rover_planner.parameters.traverse_server import (
     ALLOW_FOOTPRINT,
-    ASSUMED,
+    LATTICE,
     REFUSE,
-    ObservedGround,
-    observed_ground,
+    TraverseServerParameters,
 )
-from rover_planner.parameters.traverse_server import LATTICE, TraverseServerParameters
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.path_query import PathQueryOptions

@@ -6,7 +6,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 
 from rover_physics import load_rover
-from rover_planner.planning.search.difficulty import NOT_LOOKED, Difficulty, Slopes
+from rover_planner.planning.search.difficulty import NOT_LOOKED, Difficulty
 from rover_planner.planning.search.edges import FAILS, PASSES, Edges
 from rover_planner.planning.search.graph import Seeds, ShortestPaths, edge_cost
 from rover_planner.planning.search.nodes import nodes_within
@@ -32,9 +32,9 @@ def random_knowledge(seed):
 def hardness(rng):
     """Return ground with random difficulties."""
     steps = rng.integers(0, 255, (16, 5, 6), np.uint8)
-    level = Slopes(*np.zeros((2, 5, 6)), np.zeros((16, 6, 2), np.int64), np.zeros((16, 2)), 1.0)
+    level = (*np.zeros((2, 5, 6)), np.zeros((16, 6, 2), np.int64), np.zeros((16, 2)), 1.0)
     unseen = np.full(EDGES.state.shape, NOT_LOOKED, np.uint8)
-    return Difficulty(level, steps, np.zeros(2), 0.5, EDGES.nodes.cell, EDGES.samples, unseen)
+    return Difficulty(*level, steps, np.zeros(2), 0.5, EDGES.nodes.cell, EDGES.samples, unseen)
 
 
 def explicit_costs(known, graph):

@@ -14,7 +14,7 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 
-from msg_adapters.commands import wheel_values
+from msg_adapters.commands import labelled_array
 from msg_adapters.results.predictions import waypoint_array
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.rover.rover_file import load_rover
@@ -37,6 +37,7 @@ from rover_planner.viewer.live.live_state import (
     TRAIL_STEP,
     Click,
     LearnedTrail,
+    LiveData,
     LiveVerdict,
     TopicAge,
     read_state,
@@ -102,10 +103,10 @@ def test_the_state_has_the_measured_joints(listener, talker):
     state.position = [*angles.values(), *np.arange(6.0).tolist()]
     send_until(
         lambda: (talker.joints.publish(state), talker.odometry.publish(odometry())),
-        lambda: len(listener.latest().values.joints) == 10 and listener.latest().values.speed,
+        lambda: len(listener.latest().joints) == 10 and listener.latest().speed,
         "joints and odometry",
     )
-    state = read_state(LSR1, listener.latest().values)
+    state = read_state(LSR1, listener.latest())
     assert state is not None
     np.testing.assert_allclose(state.position, [1.0, 2.0, 0.3])
     np.testing.assert_allclose(state.rocker_angle, [0.1, -0.1])
@@ -124,15 +125,15 @@ def test_the_energy_is_torque_times_rate_times_time(listener, talker):
 
     send_until(
         lambda: talker.joints.publish(state(10)),
-        lambda: listener.latest().values.efforts,
+        lambda: listener.latest().efforts,
         "the first state",
     )
     send_until(
         lambda: talker.joints.publish(state(12)),
-        lambda: listener.latest().values.time == 2.0,
+        lambda: listener.latest().time == 2.0,
         "two seconds",
     )
-    assert listener.latest().values.energy == pytest.approx(6 * 0.5 * 1.0 * 2.0)
+    assert listener.latest().energy == pytest.approx(6 * 0.5 * 1.0 * 2.0)
 
 
 def test_estimates_of_the_controller_take_precedence_over_predictions(listener, talker):
@@ -142,17 +143,19 @@ def test_estimates_of_the_controller_take_precedence_over_predictions(listener, 
     received = []
 
     def is_estimated() -> bool:
-        received.append(listener.latest().values)
+        received.append(listener.latest())
         return "controller" in received[-1].forces_from
 
     send_until(
-        lambda: talker.estimated.publish(wheel_values(loads)), is_estimated, "the controller"
+        lambda: talker.estimated.publish(labelled_array(loads, "wheel")),
+        is_estimated,
+        "the controller",
     )
-    np.testing.assert_allclose(received[-1].wheel_loads, loads)
+    np.testing.assert_allclose(received[-1].forces["wheel_loads"], loads)
 
 
 def test_invalid_messages_are_skipped_and_values_without_a_topic_are_nan(ros, listener, talker):
-    assert read_state(LSR1, listener.latest().values) is None
+    assert read_state(LSR1, listener.latest()) is None
     assert listener.latest().terrain is None and listener.latest().verdict is None
     broken = JointState(name=["rocker_right"], position=[float("nan")])
     talker.joints.publish(broken)
@@ -160,16 +163,16 @@ def test_invalid_messages_are_skipped_and_values_without_a_topic_are_nan(ros, li
     talker.estimated.publish(Float64MultiArray(data=[1.0]))
     send_until(
         lambda: talker.odometry.publish(odometry()),
-        lambda: listener.latest().values.position is not None,
+        lambda: listener.latest().position is not None,
         "good odometry",
     )
     assert ros.is_alive(listener)
-    assert "rocker_right" not in listener.latest().values.joints
-    state = read_state(LSR1, listener.latest().values)
+    assert "rocker_right" not in listener.latest().joints
+    state = read_state(LSR1, listener.latest())
     assert state is not None and np.isnan(state.tip_over_ratio)
     for values in (state.wheel_loads, state.friction_use, state.torque_use):
         assert np.isnan(values).all()
-    assert listener.latest().values.forces_from == ""
+    assert listener.latest().forces_from == ""
 
 
 def test_what_was_learned_of_the_ground_is_told_with_the_places_where_it_was(listener, talker):
@@ -177,7 +180,7 @@ def test_what_was_learned_of_the_ground_is_told_with_the_places_where_it_was(lis
     learned = lambda: listener.latest().learned  # noqa: E731
 
     def is_at(x: float) -> bool:
-        position = listener.latest().values.position
+        position = listener.latest().position
         return position is not None and position[0] == x
 
     friction = {"mean": 0.8, "std": 0.1, "low": 0.35, "high": None}
@@ -210,7 +213,7 @@ def test_a_plan_needs_odometry_and_a_server(listener, talker):
     assert "odometry" in listener.request_plan(np.zeros(2))
     send_until(
         lambda: talker.odometry.publish(odometry()),
-        lambda: listener.latest().values.position is not None,
+        lambda: listener.latest().position is not None,
         "odometry",
     )
     assert "can_traverse" in listener.request_plan(np.zeros(2))
@@ -234,17 +237,19 @@ def test_a_rover_its_map_and_the_answers_of_its_server_are_followed(ros, listene
     simulator = ros.spin(RoverSimulator(context=ros.context, parameter_overrides=parameters))
     server = ros.spin(TraverseServer(context=ros.context))
     wait_until(lambda: server.service.terrain is not None, "the map")
-    wait_until(lambda: listener.latest().values.position is not None, "odometry")
+    wait_until(lambda: listener.latest().position is not None, "odometry")
     wait_until(lambda: listener.request_plan(np.array([0.5, 0.2])) == "", "the server")
     wait_until(lambda: listener.latest().plan is not None, "the plan")
     np.testing.assert_allclose(listener.latest().plan[-1, :2], [0.5, 0.2], atol=1e-6)
-    wait_until(lambda: np.isfinite(listener.latest().values.wheel_loads).all(), "the loads")
+    wait_until(
+        lambda: np.isfinite(listener.latest().forces.get("wheel_loads", np.nan)).all(), "the loads"
+    )
     wait_until(lambda: listener.latest().verdict is not None, "the verdict")
     joints = set(SUSPENSION_JOINTS)
-    wait_until(lambda: joints <= set(listener.latest().values.joints), "the joints")
+    wait_until(lambda: joints <= set(listener.latest().joints), "the joints")
     data = listener.latest()
     assert data.verdict.traversable
-    state = read_state(LSR1, data.values)
+    state = read_state(LSR1, data)
     assert state is not None
     plant = simulator.simulation.plant
     assert state.position == pytest.approx(plant.state().position, abs=1e-6)
@@ -289,22 +294,26 @@ def verdict_on(question_hash: str, passes: bool, age: float) -> LiveVerdict:
     return LiveVerdict(passes, reason, f"question {question_hash}", question_hash, NOW - age)
 
 
+def data_of(verdict, plan, click=None, server=ALIVE) -> LiveData:
+    return LiveData(verdict=verdict, plan=plan, click=click, ages=(server,))
+
+
 def test_an_answer_to_a_click_belongs_to_the_click_and_the_newest_is_one_click_away():
     refusal, mission = verdict_on("1", False, 5.0), verdict_on("2", True, 3.0)
     clicked, planned = np.zeros((2, 3)), np.ones((3, 3))
     click = Click("1", NOW - 6.0, refusal)
-    shown = choose_answer(mission, planned, click, ALIVE, NOW)
+    shown = choose_answer(data_of(mission, planned, click), NOW)
     told = shown.document
     assert told["passes"] is False and told["headline"] == "a wheel slips"
     assert told["about"] == "your click, 5 s ago" and shown.plan is None
     [offer] = told["offers"]
     assert offer["words"] == "question 2: traversable, 3 s ago"
     assert offer["ask"] == {"ask": "newest"}
-    newest = choose_answer(mission, planned, None, ALIVE, NOW)
+    newest = choose_answer(data_of(mission, planned), NOW)
     assert newest.document["passes"] and newest.document["about"] == "question 2, 3 s ago"
     assert newest.plan is planned and not newest.is_old
     again = Click("2", NOW - 4.0, mission, clicked)
-    assert choose_answer(mission, planned, again, ALIVE, NOW).plan is clicked
+    assert choose_answer(data_of(mission, planned, again), NOW).plan is clicked
 
 
 def test_a_click_without_an_answer_says_so_in_2_s_and_shows_no_older_verdict():
@@ -313,12 +322,14 @@ def test_a_click_without_an_answer_says_so_in_2_s_and_shows_no_older_verdict():
         (PATIENCE + 1.0, "no answer from the server"),
     ):
         click = Click("1", NOW - waited)
-        told = choose_answer(verdict_on("2", True, 9.0), None, click, ALIVE, NOW).document
+        told = choose_answer(data_of(verdict_on("2", True, 9.0), None, click), NOW).document
         assert told["passes"] is None and told["headline"].startswith(words)
 
 
 def test_a_verdict_of_a_server_that_fell_silent_is_old_in_words_and_in_the_scene():
     silent = TopicAge("traverse_server", time.monotonic() - 20.0, True)
-    shown = choose_answer(verdict_on("1", True, 25.0), np.zeros((2, 3)), None, silent, NOW)
+    shown = choose_answer(
+        data_of(verdict_on("1", True, 25.0), np.zeros((2, 3)), None, silent), NOW
+    )
     assert shown.is_old and shown.document["old"] == "the server is silent for 20 s"
     assert shown.document["about"] == "question 1, 25 s ago"

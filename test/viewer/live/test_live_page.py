@@ -82,13 +82,13 @@ def test_a_live_page_shows_a_rover_and_the_plan_and_forces_of_its_server_until_t
     loads = [float(wheel["load"].split()[0]) for wheel in told("board")["wheels"]]
     assert sum(loads) == pytest.approx(LSR1.weight, rel=0.05)
     assert not topic("odometry")["stale"] and words().startswith("live")
-    wait_until(lambda: page.scene.paths._plan.strands, "the plan")
+    wait_until(lambda: page.scene.paths.lines["plan"], "the plan")
 
     for timer in server.timers:  # the server falls silent, as if it was killed
         timer.cancel()
     wait_until(lambda: told("verdict")["old"].startswith("the server is silent"), "its silence")
     assert "the server is silent" in told("subject")["mode"]
-    strands = lambda: {one.colour for one in page.scene.paths._plan.strands}  # noqa: E731
+    strands = lambda: {one.colour for one in page.scene.paths.lines["plan"]}  # noqa: E731
     wait_until(lambda: strands() == {UNKNOWN}, "the grey plan")
     for timer in simulator.timers:
         timer.cancel()

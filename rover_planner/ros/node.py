@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The node that each node program is: its parameters, what it hears, and what keeps it alive."""
+
+import traceback
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any, Generic, TypeVar
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from msg_adapters.stamps import NANOSECONDS
+from rover_physics.errors import RoverError
+from rover_planner.parameters.declare import declare_parameters, values_in
+from rover_planner.parameters.table import ParameterError, ParameterTable, specs_of
+from rover_planner.ros.guard import Guard, Handover
+from rover_planner.ros.polled_topics import PolledTopics
+from rover_planner.shell.run_program import one_line
+
+Table = TypeVar("Table", bound=ParameterTable)
+
+
+class RoverNode(Node, Generic[Table]):
+    """A node with the parameters of a table."""
+
+    def __init__(self, name: str, table: type[Table], **node_arguments: Any):
+        """Declare the parameters; the rest is for `rclpy.node.Node`.
+
+        Raises:
+            ParameterError: An override is not allowed by the table.
+        """
+        super().__init__(name, **node_arguments)
+        self.values = declare_parameters(self, table)
+        """The parameters in force."""
+        self.guard = Guard(self.get_logger())
+        """Takes unexpected errors."""
+        self.handover = Handover(self, self.guard)
+        """Calls functions of other threads in the executor's."""
+        self.heard = PolledTopics(self, self.guard)
+        """Topics that are read when the node needs what they say."""
+
+    @property
+    def seconds(self) -> float:
+        """The present ROS time [s]."""
+        return float(self.get_clock().now().nanoseconds / NANOSECONDS)
+
+    def follow_changes(self, load: Callable[[Table], Any], apply: Callable[[Any], object]) -> None:
+        """Refuse bad changes of the parameters with a reason, and apply the others.
+
+        Parameters that are not in the table, such as use_sim_time, are accepted without a check.
+
+        Args:
+            load: Returns what the node makes of values; called before a change; raises if they
+                cannot be combined.
+            apply: Takes that after the change, when `values` has it.
+        """
+        accepted: tuple[Table, Any] | None = None
+
+        def check(parameters: list[Parameter]) -> SetParametersResult:
+            nonlocal accepted
+            accepted = None
+            try:
+                if any(not parameter.name for parameter in parameters):
+                    names = ", ".join(spec.name for spec in specs_of(type(self.values)))
+                    raise ParameterError(f"a parameter has no name; it must be one of {names}")
+                changes = values_in(type(self.values), parameters)
+                if changes:
+                    values = replace(self.values, **changes)
+                    accepted = values, load(values)
+            except RoverError as error:
+                return SetParametersResult(successful=False, reason=one_line(str(error)))
+            except Exception as error:
+                # An internal error must not end the node.
+                self.get_logger().error(f"set_parameters: {traceback.format_exc()}")
+                reason = f"internal error: {type(error).__name__}: {error}"
+                return SetParametersResult(successful=False, reason=one_line(reason))
+            return SetParametersResult(successful=True)
+
+        def pass_on(_parameters: list[Parameter]) -> None:
+            if accepted is None:
+                return
+            self.values, made = accepted
+            try:
+                apply(made)
+            except Exception:
+                self.get_logger().error(f"parameters not applied: {traceback.format_exc()}")
+
+        self.add_on_set_parameters_callback(check)
+        self.add_post_set_parameters_callback(pass_on)
