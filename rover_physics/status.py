@@ -16,7 +16,7 @@ class ContactStatus(IntEnum):
 
 
 class PoseStatus(IntEnum):
-    """Result of evaluating a pose."""
+    """How far a pose could be evaluated, and what stopped it."""
 
     SETTLED = 0
     """All six wheels touch the ground, and the forces balance."""

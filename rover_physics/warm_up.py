@@ -73,7 +73,7 @@ def bound_poses() -> None:
 
 
 def score_map() -> None:
-    """Score a pose."""
+    """Score a pose, as hazard maps and searches do for many."""
     score_poses(*_rover_and_step(), np.zeros((1, 3)))
 
 

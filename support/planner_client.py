@@ -140,7 +140,8 @@ class PlannerClient(Node):
         for messages in self.heard.values():
             messages.clear()
         answer = ask()
-        wait_until(self._has_all, "all results")
+        # A response that was lost is asked for again: the results of the first one may come late.
+        wait_until(lambda: self._has_all() and all(self.heard.values()), "all results")
         return answer, {topic: messages[-1] for topic, messages in self.heard.items()}
 
     def _hear(self, topic: str, message) -> None:

@@ -16,7 +16,10 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell's background job ignores it, and so would every child that a test interrupts.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-LONGEST = ("test_docs_blocks", "test_survey_command", "test_demo", "test_processes")
+LONGEST = (
+    "test_docs_blocks", "test_served_page", "test_advice", "test_path_search", "test_ways",
+    "test_survey_command", "test_demo", "test_session", "test_graph", "test_ground_learner",
+)  # fmt: skip
 """Files that take longest. They begin first, so that none is left alone on one core at the end."""
 
 

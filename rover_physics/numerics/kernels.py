@@ -75,14 +75,14 @@ class Kernel:
 
     @cached_property
     def whole(self) -> CPUDispatcher:
-        """What Python calls, kept on disk: numba.njit(cache=True) raises where it cannot write."""
+        """The function for Python, kept on disk; njit(cache=True) raises where it cannot write."""
         whole = CPUDispatcher(self.py_func, {}, self._options, _WholeCompiler)
         whole._cache = KernelCache(self.py_func)
         return whole
 
     @cached_property
     def _part(self) -> CPUDispatcher:
-        """What other kernels call: no machine code is made of it alone."""
+        """The function for other kernels; no machine code is made of it alone."""
         return CPUDispatcher(self.py_func, {}, self._options, _PartCompiler)
 
     @property

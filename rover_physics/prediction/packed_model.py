@@ -78,7 +78,7 @@ class PackedModel:
 
     @cached_property
     def settings(self) -> Any:
-        """SETTINGS of the MODEL."""
+        """Friction, torque limit, policy and the other options in force, as SETTINGS."""
         return self.record.settings
 
     @cached_property

@@ -213,7 +213,10 @@ class Manipulator:
 
 @dataclass(frozen=True)
 class Rover:
-    """A rocker-bogie rover with six wheels and a differential."""
+    """A rocker-bogie rover: geometry [m], masses [kg], wheels, limits, arm and uncertainty.
+
+    `load_rover` reads one from a rover file and checks it (docs/conventions.md has its frames).
+    """
 
     name: Text
     """Name of the rover."""
@@ -238,7 +241,7 @@ class Rover:
     steering: Steering | None = None
     """The wheels that steer; None if all are fixed, and the rover skids in curves."""
     uncertainty: Uncertainty = field(default_factory=Uncertainty)
-    """How well all this is known, for chances of failure."""
+    """Standard deviations of friction, torques, masses and pose, for chances of failure."""
 
     @property
     def total_mass(self) -> float:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What of a rover, its pose and its ground is known only within a standard deviation."""
+"""Standard deviations of what is not known exactly of a rover, its pose and its ground."""
 
 from dataclasses import dataclass
 from typing import Annotated

@@ -70,7 +70,7 @@ class MapContactFinder:
         deviation: float,
         directions: np.ndarray | float = 1.0,
     ) -> ContactEstimate:
-        """Find the contact angles.
+        """Return the contact angles, on the map, of the wheels of a measured rover.
 
         Args:
             state: Attitude, suspension and steering; its contact angles are not used.

@@ -98,10 +98,24 @@ def judge_paths(
     check_entrapment: bool = True,
     accepted_chance: float | None = None,
 ) -> list[tuple[PathPrediction, Verdict]]:
-    """Judge several paths at once, faster than one by one; see `judge_path`.
+    """Judge several paths at once, faster than one by one.
 
-    Without `check_entrapment`, entrapment is not looked for: pieces of a longer path are judged,
-    and the whole of it later.
+    Args:
+        rover: The rover.
+        terrain: The ground.
+        paths: Poses of each path, (n, 3) x, y [m] and yaw [rad], map frame.
+        options: As for `judge_path`.
+        sigmas: As for `judge_path`.
+        stop_at_failure: As for `judge_path`.
+        check_entrapment: False where pieces of a longer path are judged, and the whole of it
+            later.
+        accepted_chance: As for `judge_path`.
+
+    Returns:
+        Prediction and verdict of each path, as of `judge_path`.
+
+    Raises:
+        PoseError, ModelError, SoilError: As `judge_path`.
     """
     check_sigmas(sigmas)
     check_accepted_chance(accepted_chance)
@@ -147,6 +161,9 @@ def judge_poses(
         options: As for `judge_path`.
         sigmas: As for `judge_path`.
         accepted_chance: As for `judge_path`; the chance that any of the poses fails.
+
+    Returns:
+        The prediction, and the verdict on all poses.
 
     Raises:
         PoseError: Poses or curvatures of wrong shape, or not numbers.

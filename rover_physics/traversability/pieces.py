@@ -75,6 +75,9 @@ def judge_pieces(
         options: As for `judge_paths`.
         sigmas: As for `judge_paths`.
 
+    Returns:
+        The verdict on each piece, in the order of `pieces`.
+
     Raises:
         PoseError, ModelError, SoilError: As `judge_paths`.
     """

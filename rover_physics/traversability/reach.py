@@ -100,6 +100,9 @@ def judge_reach(
             that presses on the ground is pushed up.
         moment: (3,) moment of the surroundings on the tip [N m], map frame (default: none).
 
+    Returns:
+        Whether it can, the code and reason if not, and angles, loads and margins if it reaches.
+
     Raises:
         PoseError: A pose of wrong shape, or not finite.
         ModelError: A rover without an arm, or an option that this rover cannot have.

@@ -87,6 +87,9 @@ def find_torque_ranges(
         options: As for `judge_path`; its policy and control margin are ignored.
         curvature: As for `judge_poses`, if the poses form no path.
 
+    Returns:
+        The range of each wheel [N m] at each pose; NaN where no torques keep all constraints.
+
     Raises:
         PoseError: Poses of wrong shape, or not finite; or such curvatures.
         ModelError: An option that this rover cannot have.

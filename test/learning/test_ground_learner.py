@@ -195,6 +195,7 @@ def drive_up(friction: float, degrees: float, seconds: float) -> np.ndarray:
     return np.array(rows)
 
 
+@pytest.mark.long
 def test_friction_and_sticking_are_learned_on_a_slope_that_is_too_steep():
     friction = 0.4
     rows = drive_up(friction, 24.0, 26.0)

@@ -1,51 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Equations (1) to (15) of the paper hold on settled poses and the forces found there.
+"""Equations (1) and (3) to (7) of the paper hold on settled poses, to rounding error.
 
 The paper: Hacot, Dubowsky and Bidaud, "Analysis and Simulation of a Rocker-Bogie Exploration
-Rover". Misprints are mended as docs/physics.md lists them. (1) and (3) to (7) are tested in
-3-D, to rounding error, on rough ground; (2), a wheel on the ground, in test_rough_poses.py. (8) to
-(15) are tested as the paper has them, with weightless links, for small roll; in 3-D, with all
-weights, they are the nine sums of test_equilibrium.py.
+Rover". Misprints are mended as docs/physics.md lists them. (2), a wheel on the ground, is in
+test_rough_poses.py; (8) to (15), in 3-D and with all weights, are the nine sums of
+test_equilibrium.py.
 """
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-import pytest
 
-from rover_physics import PathPrediction, Rover, Terrain, judge_path, load_rover
-from rover_physics.rover.model import Part
-from support.grounds import make_terrain
+from rover_physics import PathPrediction, Rover, judge_path, load_rover
 from support.rough_grounds import fractal, random_poses, rocky, smooth
-from support.rover_geometry import UP, attitude_of, place_rover
+from support.rover_geometry import attitude_of
 
 LSR1 = load_rover("lsr1")
-
-
-def waves_and_side_slope(roll: float) -> Terrain:
-    """Return waves along x on a slope along y: it rolls the rover everywhere by about `roll`."""
-    return make_terrain(lambda x, y: 0.06 * np.sin(2.0 * x) + np.tan(roll) * y, 0.02, 2.0)
-
-
-ALONG_WAVES = np.column_stack([np.linspace(-1.0, 1.0, 41), np.zeros(41), np.zeros(41)])
-
-
-def weightless_links(rover: Rover) -> Rover:
-    """Return `rover` with all its mass in the body, at the origin between the rocker pivots."""
-    tiny = 1e-12
-    masses = rover.masses
-    body = Part(rover.total_mass, (0.0, 0.0, 0.0))
-    links = {name: replace(getattr(masses, name), mass=tiny) for name in ("rocker", "bogie")}
-    return replace(
-        rover,
-        wheel=replace(rover.wheel, mass=tiny),
-        masses=replace(masses, body=body, **links),
-        manipulator=None,
-    )
-
-
-# Kinematics: eqs (1) to (7)
 
 
 class Links(NamedTuple):
@@ -109,68 +79,3 @@ def test_eqs_1_and_3_to_7_hold_in_3d_wherever_the_rover_settles():
     for prediction in [judge_path(LSR1, ground, poses)[0] for ground in grounds]:
         for i in np.flatnonzero(prediction.settled):
             assert max(map(abs, closure(LSR1, prediction, i).values())) <= 1e-12
-
-
-# Forces: eqs (8) to (15)
-
-
-def frame_of(prediction: PathPrediction, i: int) -> np.ndarray:
-    """Return rows x ahead and level, y along the wheels' axis, z up in the wheels' plane."""
-    axis = attitude_of(prediction, i)[:, 1]
-    ahead = np.cross(axis, UP) / np.linalg.norm(np.cross(axis, UP))
-    return np.array([ahead, axis, np.cross(ahead, axis)])
-
-
-def planar_sides(rover: Rover, prediction: PathPrediction, i: int) -> tuple[np.ndarray, ...]:
-    """Cut both rockers off the body: (12) to (15) in the plane, links without weight or width.
-
-    Return what the sides, right first, do to the body at the rocker pivots, forces (2, 3) [N] and
-    moments (2, 3) [N m], and the moments (2,) about the bogie pivots of what hangs on the bogies.
-    """
-    placed, frame = place_rover(rover, prediction, i), frame_of(prediction, i)
-    angle, N, T, S = (
-        getattr(prediction, name)[i]
-        for name in ("contact_angle", "wheel_loads", "tangential", "lateral")
-    )
-    fx, fz = T * np.cos(angle) - N * np.sin(angle), T * np.sin(angle) + N * np.cos(angle)
-    points = prediction.contact_points[i]
-    force, moment, bogie = np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(2)
-    for k in range(6):
-        side = k // 3
-        x, _, z = frame @ (points[k] - placed.rocker_pivots[side])
-        force[side] += fx[k], S[k], fz[k]
-        moment[side] += -z * S[k], z * fx[k] - x * fz[k], x * S[k]
-        if placed.on_bogie[k]:
-            x, _, z = frame @ (points[k] - placed.bogie_pivots[side])
-            bogie[side] += z * fx[k] - x * fz[k]
-    return force, moment, bogie
-
-
-@pytest.mark.parametrize("roll", [0.03, -0.1])
-def test_eqs_8_to_15_hold_for_small_roll_as_the_paper_has_them(roll):
-    """What the paper leaves out explains all that is left.
-
-    It takes W for W cos(roll) in (10): an error of roll^2 / 2. It neglects the width of the side
-    assemblies in (9) and (11): forces times the distance of the contacts from the middle of the
-    wheels, which is under 4 mm on this ground. The links of this rover weigh nothing.
-    """
-    rover = weightless_links(LSR1)
-    prediction = judge_path(rover, waves_and_side_slope(roll), ALONG_WAVES)[0]
-    assert prediction.settled.all()
-    w, W = 2.0 * rover.suspension.rocker_pivot[1], rover.weight
-    for i in range(len(ALONG_WAVES)):
-        (right, left), (m_right, m_left), bogie = planar_sides(rover, prediction, i)
-        tolerance = 1e-6 * W
-        frame, centres = frame_of(prediction, i), prediction.wheel_centres[i]
-        aside = np.abs((prediction.contact_points[i] - centres) @ frame[1])
-        assert aside.max() <= 4e-3
-        turning = np.hypot(prediction.tangential[i], prediction.wheel_loads[i]) @ aside
-        assert right[0] + left[0] == pytest.approx(0.0, abs=tolerance), "(8)"
-        turn = (right[0] - left[0]) * w / 2 + m_right[2] + m_left[2]
-        assert abs(turn) <= turning + tolerance, "(9)"
-        assert abs(right[2] + left[2] - W) <= W * prediction.roll[i] ** 2 / 2 + tolerance, "(10)"
-        tip = (left[2] - right[2]) * w / 2 + m_right[0] + m_left[0]
-        assert abs(tip) <= turning + tolerance, "(11)"
-        assert m_right[1] == pytest.approx(m_left[1], abs=tolerance), "(14)"
-        assert m_right[1] + m_left[1] == pytest.approx(0.0, abs=tolerance), "(14)"
-        assert np.abs(bogie).max() <= tolerance, "(15)"

@@ -15,10 +15,12 @@ from rover_physics.forces.soil import (
     contact_length,
     coulomb_slip,
     effective_friction,
+    find_sinkage,
+    mobilised_share,
     pack_soils,
+    shear_strength,
     solve_wheel,
 )
-from support.soil_thrust import thrust_at_slip
 
 MU = 0.8
 RIGID = ("lunar_nominal", "mars_simulant", "dry_sand", "lete_sand")
@@ -73,6 +75,16 @@ def test_the_model_gives_the_values_worked_by_hand(name, r, b, N, z0, R, pull, t
     assert result.drawbar_pull == pytest.approx(largest, rel=5e-6)
     assert result.utilisation == pytest.approx(pull / largest, rel=5e-6)
     assert friction_of(packed(name), r, b, N) == pytest.approx(largest / N, rel=5e-6)
+
+
+def thrust_at_slip(soil, radius, width, N, slip) -> float:
+    """Return the thrust [N] at a slip ratio: (A c + N tan(phi)) (1 - K/il (1 - exp(-il/K)))."""
+    sinkage = find_sinkage(soil, radius, width, N)
+    if sinkage >= radius:
+        return 0.0
+    length = contact_length(radius, sinkage)
+    share = mobilised_share(abs(slip) * length / soil[SHEAR_MODULUS])
+    return float(np.copysign(share * shear_strength(soil, width * length, N), slip))
 
 
 loads = st.floats(0.5, 2000.0)

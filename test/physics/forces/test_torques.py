@@ -25,10 +25,10 @@ few = settings(max_examples=20)
 @pytest.mark.parametrize(
     ("ground", "poses"),
     [
-        (smooth(6), random_poses(6, 8, 0.6)),
-        (fractal(6), random_poses(6, 8, 0.6)),
-        (rocky(6), random_poses(6, 8, 0.6)),
-        (STEP.terrain, STEP.poses),
+        (smooth(6), random_poses(6, 4, 0.6)),
+        (fractal(6), random_poses(6, 4, 0.6)),
+        (rocky(6), random_poses(6, 4, 0.6)),
+        (STEP.terrain, STEP.poses[::2]),
     ],
     ids=["smooth", "fractal", "rocky", "step"],
 )
@@ -44,7 +44,7 @@ def test_no_torques_within_the_limit_need_less_friction(ground, poses, max_torqu
         assert can_stand(LSR1, prediction, i, used * (1.0 + 1e-6), max_torque)
         assert not can_stand(LSR1, prediction, i, (used - 1e-4) / 1.005, max_torque)
         assert prediction.torque_saturation[i].max() <= 1.0 + 1e-9
-    assert compared >= 4
+    assert compared >= 2
 
 
 @few
