@@ -56,6 +56,8 @@ class FailureChance:
     """(n,) that it fails at a waypoint or on the way there from the one before."""
     limit: str
     """Title of the limit that breaks most often where it fails most often; empty for none."""
+    is_whole: bool = True
+    """False if not all samples were asked: the chances may be larger."""
 
     def __post_init__(self) -> None:
         freeze_fields(self)
@@ -111,7 +113,7 @@ def find_failure_chance(
         on_path &= summed
     failed = np.zeros((SAMPLES if near.any() else 1, n), bool)
     failed[:, rows.waypoint[~settled]] = True
-    counts = np.zeros((n, len(model.limits)), np.int64)
+    counts, is_whole = np.zeros((n, len(model.limits)), np.int64), True
     part = model.terrain if is_exact else _cut_around(model, rows.poses)
     for k, sample in enumerate(samples if near.any() else ()):
         check_interruption()
@@ -124,12 +126,13 @@ def find_failure_chance(
         failed[k, waypoints] = True
         np.add.at(counts, waypoints, broken[fails])
         if failed.any(axis=1).sum() > enough * SAMPLES:
+            is_whole = k == SAMPLES - 1
             break
     at = failed.mean(axis=0)
     place = int(at.argmax())
     most = int(counts[place].argmax())
     limit = model.limits.rows[most].title if counts[place, most] else ""
-    return FailureChance(float(failed.any(axis=1).mean()), at, limit)
+    return FailureChance(float(failed.any(axis=1).mean()), at, limit, is_whole)
 
 
 def _differ(results: np.ndarray, others: np.ndarray) -> NDArray[np.bool_]:

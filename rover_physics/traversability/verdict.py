@@ -203,10 +203,11 @@ def refuse_chance(verdict: Verdict, chance: FailureChance, accepted: float) -> V
     if not verdict.traversable or path <= accepted:
         return known
     worst, codes, reasons = int(at.argmax()), list(verdict.codes), list(verdict.reasons)
-    codes[worst] = CHANCE
+    codes[worst], least = CHANCE, "" if chance.is_whole else "at least "
     reasons[worst] = (
-        f"the path passes as told, but fails with a chance of {path:.2f} by what is uncertain, "
-        f"accepted {accepted:g}: most often here, {at[worst]:.2f}, by the limit of {chance.limit}"
+        f"the path passes as told, but fails with a chance of {least}{path:.2f} by what is "
+        f"uncertain, accepted {accepted:g}: most often here, {at[worst]:.2f}, by the limit of "
+        f"{chance.limit}"
     )
     return with_refusals(known, codes, reasons)
 

@@ -162,13 +162,17 @@ def test_an_accepted_chance_decides():
     rover, ground = rover_with(friction=0.1), uphill(0.3)
     options = SweepOptions(friction=FRICTION)
 
-    def judge(accepted: float | None):
-        return judge_path(rover, ground, straight(5), options, accepted_chance=accepted)[1]
+    def judge(accepted: float | None, **others: bool):
+        poses, told = straight(5), {"accepted_chance": accepted, **others}
+        return judge_path(rover, ground, poses, options, **told)[1]
 
     assert judge(0.3).traversable and not judge(0.3).code
     refused = judge(0.05)
     assert (refused.traversable, refused.code) == (False, CHANCE)
     assert "accepted 0.05" in refused.reason and "friction" in refused.reason
+    early = judge(0.05, stop_at_failure=True)
+    assert f"chance of at least {early.failure_chance:.2f}" in early.reason
+    assert 0.05 < early.failure_chance < refused.failure_chance
     for wrong in (-1.0, 2.0, np.nan):
         with pytest.raises(ModelError, match="accepted_chance is .*0 to 1"):
             judge(wrong)
