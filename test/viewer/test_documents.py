@@ -73,8 +73,8 @@ def test_a_limit_is_broken_on_a_lane_exactly_where_the_verdict_refuses_the_path(
     limits, failure, verdict = path.limits, path.failure, path.verdict
     broken = np.any([lane.used > 1.0 for lane in limits.lanes], axis=0)
     refused = set(np.unique(limits.rows.prediction.waypoint[broken]).tolist())
-    first = verdict.first_failure
-    assert refused == ({first} if first >= 0 else set())
+    first, by_limit = verdict.first_failure, verdict.code not in ("", "chance")
+    assert refused == ({first} if by_limit else set())
     assert (failure is None) == verdict.traversable
     if failure is not None:
         assert failure.code == verdict.code and failure.headline
@@ -158,8 +158,12 @@ def test_the_chance_of_failure_is_a_lane_of_its_own_with_its_main_cause():
     use = describe_uses(shown.path, np.inf, shown.chance)[-1]
     percent = f"{100.0 * verdict.failure_chance:.0f} %"
     assert use["value"] == f"whole path {percent}"
-    words = describe_verdict(shown, Work())["chance"]
-    assert words == f"chance of failure {percent}, most often by friction"
+    words = describe_verdict(shown, Work())
+    assert words["chance"] == f"chance of failure {percent}, most often by friction"
+    assert words["headline"] == "chance of failure above what is accepted"
+    assert describe_limits(shown.path, None, shown.chance)["code"] == "chance"
+    ground = shown.path.limits.lane("ground")
+    assert not ground.used.any()
 
 
 def test_the_chance_of_a_path_that_is_refused_is_that_up_to_its_failure():

@@ -44,11 +44,17 @@ def describe_limits(
     return {
         "end": round(end, 4),
         "fails": None if failure is None else round(failure.distance, 4),
-        "code": "" if failure is None else path.limits.lane(failure.code).limit.code,
+        "code": "" if failure is None else _find_lane(path.limits, failure.code, chance),
         "compared": reference is not None,
         "lanes": lanes,
         "loads": _describe_loads(path),
     }
+
+
+def _find_lane(limits: PathLimits, code: str, chance: FailureChance | None) -> str:
+    """Return the code of the lane that shows a failure."""
+    shows_chance = code == CHANCE and chance is not None
+    return CHANCE if shows_chance else limits.lane(code).limit.code
 
 
 def list_lanes(path: Judged, chance: FailureChance | None) -> list[Lane]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rover_physics.limits.table import CHANCE
 from rover_physics.names import SIDES, WHEEL_POSITIONS, WHEELS
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
@@ -26,6 +27,7 @@ TITLES = {
     "no_equilibrium": "no equilibrium",
     "not_computable": "not computable",
     "trapped": "trapped",
+    CHANCE: "chance of failure above what is accepted",
 }
 """Short names of the codes of a verdict that have no number."""
 ON_THE_WAY = "on the way here: "

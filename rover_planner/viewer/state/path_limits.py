@@ -136,10 +136,13 @@ def make_chance_lane(limits: PathLimits, chance: FailureChance) -> Lane:
 
 
 def _add_refusals(limits: PathLimits, verdict: Verdict) -> None:
-    """Mark refusals of the verdict that no lane shows at their waypoints."""
+    """Mark refusals of the verdict that no lane shows at their waypoints.
+
+    A chance of failure has a lane of its own, as soon as it is known.
+    """
     rows = limits.rows
     for waypoint in np.unique(rows.prediction.waypoint).tolist():
         code = verdict.codes[waypoint]
         lane, here = limits.lane(code), rows.prediction.waypoint == waypoint
-        if code and not np.any(lane.used[here] > 1.0):
+        if code not in ("", CHANCE) and not np.any(lane.used[here] > 1.0):
             lane.used[here & ~rows.is_between] = ABOVE
