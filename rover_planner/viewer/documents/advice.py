@@ -50,9 +50,7 @@ def _write_progress(advised: Advised, is_seeking: bool, now: float) -> str:
     if now - advised.since < PROMISED:
         return f"tried: {tried or 'nothing yet'}"
     found = len(list_remedies(advised)) or "nothing"
-    return (
-        f"{found} found in {PROMISED:.0f} s; the search goes on, tried: {tried or 'nothing yet'}"
-    )
+    return f"{found} found so far; the search goes on, tried: {tried or 'nothing yet'}"
 
 
 def _describe(remedy: Remedy) -> dict[str, Any]:
