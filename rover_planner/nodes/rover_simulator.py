@@ -24,7 +24,7 @@ from msg_adapters.commands import joint_order, twist_to_speeds
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash
-from msg_adapters.joints import convert_steering
+from msg_adapters.joints import JointNames
 from msg_adapters.paths import path_to_poses
 from msg_adapters.results.diagnostics import SIMULATOR, diagnostics, make_status
 from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_message
@@ -68,7 +68,8 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
     def __init__(self, **node_arguments: Any):
         super().__init__(NODE_NAME, RoverSimulatorParameters, **node_arguments)
         parameters = self.values
-        self._frame, self._steering_sign = parameters.map_frame, parameters.steering_sign
+        self._frame = parameters.map_frame
+        self._names = JointNames(steering=parameters.steering_sign)
         self._order = joint_order(parameters.joints)
         self._settings = load_simulation_settings(parameters)
         if parameters.engine == QUASI_STATIC:
@@ -164,7 +165,7 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
             self._clock_publisher.publish(ClockMessage(clock=stamp))
         efforts = dict(zip(WHEEL_JOINTS, state.wheel_torques.tolist(), strict=True))
         positions, velocities = (
-            convert_steering(values, self._steering_sign)
+            self._names.turn(values)
             for values in (state.joint_positions | self._arm_angles(), state.joint_velocities)
         )
         self._joints.publish(joint_state(positions, velocities, efforts, stamp))
