@@ -18,7 +18,7 @@ from rover_physics.names import WHEELS
 from rover_physics.rover.rover_file import preset_names, rover_to_dict, save_rover, save_yaml
 from rover_physics.rover.urdf.joint_map import load_joint_map, map_of
 from rover_physics.rover.urdf.read_rover import Levelling, rover_from_urdf
-from rover_physics.rover.urdf.robot import JointTree, parse_robot
+from rover_physics.rover.urdf.robot import parse_robot
 from rover_physics.rover.urdf.write_urdf import write_urdf
 from support.project.checkout import TOP
 from support.rover_geometry import place_rover, wheel_axes
@@ -352,9 +352,8 @@ def test_xacro_and_circles_are_refused():
         for ends in ((b"x", b"a", b"b"), (b"y", b"b", b"a"))
     )
     links = b'<link name="a"/><link name="b"/><link name="c"/>'
-    robot = parse_robot(b"<robot>" + links + circle + b"</robot>")
     with pytest.raises(RoverFileError, match="hangs on itself"):
-        JointTree(robot, {}, np.eye(4))
+        parse_robot(b"<robot>" + links + circle + b"</robot>")
 
 
 def test_a_file_of_many_links_is_refused_at_once():
@@ -370,9 +369,9 @@ def test_limits_that_no_joint_reaches_count_as_none():
         '<limit lower="-1.79769e+308" upper="1.79769e+308" effort="0" velocity="1e+300"/>'
         "</joint></robot>"
     )
-    limit = parse_robot(text.encode()).joints["j"].limit
-    assert (limit.lower, limit.upper) == (-math.inf, math.inf)
-    assert (limit.effort, limit.velocity) == (math.inf, math.inf)
+    joint = parse_robot(text.encode()).joints["j"]
+    assert (joint.lower, joint.upper) == (-math.inf, math.inf)
+    assert (joint.effort, joint.velocity) == (math.inf, math.inf)
 
 
 @pytest.mark.parametrize("name", ["front_left", "arm_tip"])
