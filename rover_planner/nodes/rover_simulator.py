@@ -51,6 +51,7 @@ STANDING_PERIOD = 0.1
 """Time between two commands of a rover that is to stand [s]."""
 DEVIATIONS = (0.01, 0.005)
 """Standard deviations in odometry: positions [m] and angles [rad]."""
+COVARIANCE = np.diag(np.repeat(np.square(DEVIATIONS), 3))
 SWITCH_INTERVAL = 5e-4
 """Longest time for which the thread that makes maps may delay a step whenever that needs Python's
 lock [s]; Python's thread switch interval."""
@@ -172,7 +173,7 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
         self._odometry.publish(
             odometry_message(
                 state.position, state.orientation, state.velocity, state.body_rates,
-                DEVIATIONS, self._frame, stamp,
+                (COVARIANCE, COVARIANCE), self._frame, stamp,
             )
         )  # fmt: skip
         gravity = self._settings.rover.gravity
