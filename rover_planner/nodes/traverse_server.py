@@ -116,6 +116,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self._map_cloud = MapCloud(self, self.service)
         self.watch = PathWatch(self, self.service, self._find_watched, self._publish_stop)
         """Watches the accepted path."""
+        self.urgent_threads = (self.watch.heartbeat_thread,)
         self._hazards = HazardTopics(self, self.service, lambda: self.desk.open_count > 0)
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
         create_steady_timer(self, DIAGNOSTICS_PERIOD, self._publish_diagnostics)

@@ -39,6 +39,8 @@ class RoverNode(Node, Generic[Table]):
         """Calls functions of other threads in the executor's."""
         self.heard = PolledTopics(self, self.guard)
         """Topics that are read when the node needs what they say."""
+        self.urgent_threads: tuple[int, ...] = ()
+        """Ids of the threads that take the real-time priority; empty for all of the process."""
 
     @property
     def seconds(self) -> float:
