@@ -146,6 +146,30 @@ def test_locked_wheels_slide_as_far_as_their_friction_lets_them():
     assert not any(plant.state().joint_velocities[name] for name in WHEEL_JOINTS)
 
 
+@pytest.mark.parametrize("name", ["lsr1", "m2020"])
+def test_a_rover_that_stands_is_not_computed_again_and_nothing_else_changes(name, monkeypatch):
+    rover = load_rover(name)
+    most, ground = rover.wheel.max_torque, plane(0.2, 0.0, half=8.0)
+    plant, full = (QuasiStaticPlant(rover, ground, (0.0, 0.0, 0.3)) for _ in range(2))
+    monkeypatch.setattr(full, "_repeats", lambda *step: False)
+    rng, same = np.random.default_rng(1), 0
+    for _ in range(40):
+        torques, command = rng.choice([0.0, 0.6 * most, most], 6), (rng.choice([0.0, 0.03]), 0.0)
+        step = rng.choice(["drive", "pull", "brake"], p=[0.3, 0.5, 0.2])
+        given = {"drive": command, "pull": (torques, command), "brake": ()}[step]
+        for _ in range(rng.choice([1, 4, 150])):
+            before = plant.state()
+            for one in (plant, full):
+                getattr(one, step)(*given, 0.02)
+            full._measured = None
+            same += plant.state() is before
+            assert all(
+                np.array_equal(value, getattr(full.state(), field))
+                for field, value in vars(plant.state()).items()
+            )
+    assert same > 500
+
+
 def test_drives_without_commands_are_braked():
     given = RoverSimulatorParameters(follow_commands=True, start_x=-1.0)
     slope = plane(-np.tan(np.radians(3.0)), 0.0, half=3.0)
