@@ -66,7 +66,7 @@ from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.frames import NodeFrames, is_empty
 from rover_planner.ros.map_intake import read_message
 from rover_planner.ros.node import RoverNode
-from rover_planner.ros.qos import polled_qos, replace_reliability, topic_qos
+from rover_planner.ros.qos import newest_qos, polled_qos, replace_reliability, topic_qos
 from rover_planner.ros.server_inputs import ServerInputs, describe_path
 from rover_planner.ros.steady import create_steady_timer
 from rover_planner.ros.subscriptions import subscribe_to_requests
@@ -137,7 +137,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
 
     def _create_subscriptions(self) -> None:
         self.heard.subscribe(JointState, "joint_states", self._take_joints, polled_qos())
-        self.heard.subscribe(Odometry, "odometry", self._take_odometry, polled_qos())
+        self.heard.subscribe(Odometry, "odometry", self._take_odometry, newest_qos())
         if self.values.imu_attitude:
             self.heard.subscribe(Imu, "imu", self._take_imu, polled_qos())
         reliability = self.values.input_reliability
