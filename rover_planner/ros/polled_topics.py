@@ -25,6 +25,7 @@ class _Topic:
     """A topic that is polled."""
 
     subscription: Subscription
+    name: str
     take: Callable[[Any, float], None]
     depth: int
     is_due: Callable[[], bool]
@@ -58,7 +59,7 @@ class PolledTopics:
         """
         group = self._group
         topic = self._node.create_subscription(kind, name, take, qos, callback_group=group)
-        self._topics.append(_Topic(topic, take, qos.depth, is_due))
+        self._topics.append(_Topic(topic, topic.topic_name, take, qos.depth, is_due))
 
     def poll(self) -> None:
         """Read all that has come since the last time, in the order of its arrival."""
@@ -78,18 +79,17 @@ class PolledTopics:
 
     def _read(self, topic: _Topic) -> list[tuple[int, str, Callable[[Any, float], None], Any]]:
         """Return what has come with its time [ns], the name of the topic and who takes it."""
-        subscription, name = topic.subscription, topic.subscription.topic_name
-        arrived = []
+        handle, arrived = topic.subscription.handle, []
         for _ in range(topic.depth):
             try:
-                with subscription.handle:
-                    found = subscription.handle.take_message(subscription.msg_type, False)
+                with handle:
+                    found = handle.take_message(topic.subscription.msg_type, False)
             except Exception as error:
-                self._guard.report(f"reading of {name}", error)
+                self._guard.report(f"reading of {topic.name}", error)
                 continue
             if found is None:
                 break
-            arrived.append((found[1]["received_timestamp"], name, topic.take, found[0]))
+            arrived.append((found[1]["received_timestamp"], topic.name, topic.take, found[0]))
         return arrived
 
 
