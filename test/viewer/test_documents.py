@@ -87,6 +87,9 @@ def test_board_lanes_curves_and_verdict_show_one_number_for_the_wheel_that_fails
     path = judged_on(ramp, friction=0.3, policy=policy)
     failure, end = path.failure, path.trajectory.duration
     assert failure.code == "friction" and failure.link in WHEELS
+    assert failure.link in path.verdict.reason
+    assert f"{failure.value:.2f}, limit 1.00" in path.verdict.reason
+    assert failure.headline == f"friction {failure.value:.2f} of 1.00, {failure.where}"
     wheel, codes = WHEELS.index(failure.link), [lane.limit.code for lane in path.limits.lanes]
     board = describe_board(failure.state, failure.link)["wheels"][wheel]
     assert board["fails"] and board["bars"][0][2] == write_use(failure.use)
@@ -218,17 +221,6 @@ def test_with_speed_servos_friction_is_no_number_that_a_passing_path_may_cross()
 
 
 # The failure.
-
-
-def test_the_failure_names_value_limit_and_wheel_as_the_verdict_does():
-    path = judged_on(ramp, friction=0.3)
-    failure, verdict = path.failure, path.verdict
-    assert failure is not None and failure.code == verdict.code == "friction"
-    assert failure.link in WHEELS and failure.link in verdict.reason
-    assert f"{failure.value:.2f}, limit 1.00" in verdict.reason
-    assert failure.headline == f"friction {failure.value:.2f} of 1.00, {failure.where}"
-    row = verdict.first_failure
-    assert failure.distance == pytest.approx(path.candidate.prediction.distance[row], abs=0.021)
 
 
 def test_a_failure_between_waypoints_has_the_pose_at_which_the_model_was_asked():
