@@ -22,6 +22,8 @@ LSR1 = load_rover("lsr1")
 START, GOAL = (-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)
 FAR = (500_000.0, 4_000_000.0)
 """Place of a map in a UTM zone: easting and northing [m]."""
+SURE = PathQueryOptions(accepted_chance=1.0)
+"""Options without chances of failure, which take most of the time of a verdict."""
 PATIENCE = 120.0
 """Longest wait for a page [s]; drawing and judging take seconds on a busy machine."""
 
@@ -39,7 +41,7 @@ def ramp(x, y):
 
 def session_on(height, start=(-2.0, 0.0, 0.0), goal=(1.0, 0.0, 0.0)) -> ViewSession:
     """Return a session of the LSR-1 on a ground with heights height(x, y) [m]."""
-    return ViewSession(LSR1, make_terrain(height), start, goal)
+    return ViewSession(LSR1, make_terrain(height), start, goal, SURE)
 
 
 def blocked(x, y):
@@ -110,7 +112,7 @@ def walled_session(
     """Return a session on 5 m x 5 m with a wall at x = 0; a search for the best may take long."""
     search = LatticeSettings(budget=60.0, ends_at_first=ends_at_first)
     ground = make_terrain(height, half=2.5)
-    return ViewSession(rover, ground, (-1.6, 0.0, 0.0), goal, search=search)
+    return ViewSession(rover, ground, (-1.6, 0.0, 0.0), goal, SURE, search=search)
 
 
 @contextmanager

@@ -25,7 +25,7 @@ from rover_planner.viewer.state.limits import ShownLimit, write_use
 from rover_planner.viewer.state.scenario import Judged
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import gap, make_terrain, wall_at, waves
-from support.viewer.sessions import LSR1, ramp, session_on
+from support.viewer.sessions import LSR1, SURE, ramp, session_on
 
 
 def stepped(x, y):
@@ -35,7 +35,7 @@ def stepped(x, y):
 
 def judged_on(height, start=-1.0, **options) -> Judged:
     """Return a straight path to x = 1 m over a ground, judged."""
-    options = PathQueryOptions(count=1).change(**options)
+    options = SURE.change(count=1, **options)
     ends = (start, 0.0, 0.0), (start + 2.0, 0.0, 0.0)
     return ViewSession(LSR1, make_terrain(height), *ends, options).shown.path
 

@@ -22,6 +22,7 @@ from support.viewer.sessions import (
     FAR,
     LSR1,
     PATIENCE,
+    SURE,
     ask,
     held,
     ramp,
@@ -362,7 +363,8 @@ def test_on_a_far_map_the_rover_is_where_it_is_on_a_near_one_and_a_click_lands_w
     places = {}
     for x, y in ((0.0, 0.0), FAR):
         ground = shift(make_terrain(waves), (x, y))
-        page = Page(ViewSession(LSR1, ground, (x - 2.0, y, 0.0), (x + 1.0, y, 0.0)), port=0)
+        ends = (x - 2.0, y, 0.0), (x + 1.0, y, 0.0)
+        page = Page(ViewSession(LSR1, ground, *ends, SURE), port=0)
         try:
             wait_for_rest(page)
             places[x] = np.array(page.scene._visual.root.position)
