@@ -87,9 +87,10 @@ def test_board_lanes_curves_and_verdict_show_one_number_for_the_wheel_that_fails
     path = judged_on(ramp, friction=0.3, policy=policy)
     failure, end = path.failure, path.trajectory.duration
     assert failure.code == "friction" and failure.link in WHEELS
-    assert failure.link in path.verdict.reason
-    assert f"{failure.value:.2f}, limit 1.00" in path.verdict.reason
-    assert failure.headline == f"friction {failure.value:.2f} of 1.00, {failure.where}"
+    words = ShownLimit("friction", "friction", 1.0).compare(failure.value)
+    assert failure.headline == f"{words}, {failure.where}"
+    told = words.replace("friction", "utilisation").replace(" of ", ", limit ")
+    assert failure.link in path.verdict.reason and told in path.verdict.reason
     wheel, codes = WHEELS.index(failure.link), [lane.limit.code for lane in path.limits.lanes]
     board = describe_board(failure.state, failure.link)["wheels"][wheel]
     assert board["fails"] and board["bars"][0][2] == write_use(failure.use)
