@@ -89,9 +89,9 @@ def measure_on(name: str, *terrain: str) -> Iterator[Figure]:
 
 
 @contextmanager
-def open_view(*arguments: str) -> Iterator[tuple[subprocess.Popen, str]]:
+def open_view(*arguments: str, port: int = 0) -> Iterator[tuple[subprocess.Popen, str]]:
     """Run `rover_planner view` and yield its process and address."""
-    command = [sys.executable, "-m", "rover_planner", "view", *arguments, "--port", "0"]
+    command = [sys.executable, "-m", "rover_planner", "view", *arguments, "--port", str(port)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None

@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A visit of ten minutes to the program itself, on three grounds, as a demanding person clicks."""
+
+import time
+
+import pytest
+
+from benchmarks.bench_page import MOST_MEMORY, open_view
+from benchmarks.grounds import made_reef
+from benchmarks.processes import memory_of
+from rover_physics.terrain.grid import save_terrain
+from support.viewer.browser import Visitor, needs_browser, open_browser, wait_until
+
+pytestmark = [needs_browser, pytest.mark.long]
+
+MINUTES, ROUNDS = 10.0, 4
+"""Time of all visits, and the least number of rounds of each: in the first, memory grows."""
+STEADY = 1.06
+"""Largest memory at the end over that after a third of a visit."""
+FRICTION, RADIUS, HEIGHT = "friction [-]", "radius [m]", "wheels z [m]"
+
+
+def wait_for_rest(visitor: Visitor) -> None:
+    """Wait until nothing is judged and nothing is old."""
+    tab = visitor.tab
+    tab.wait_for_timeout(300)
+    wait_until(
+        lambda: (
+            not tab.locator("#judging, #old").count()
+            and not tab.locator("#paths tbody[data-old]:not([data-old=false])").count()
+        ),
+        "all paths to be judged",
+    )
+
+
+def find_row(visitor: Visitor, word: str) -> int | None:
+    """Return the index of the first path whose verdict has a word; None without one."""
+    visitor.open_tab("Paths")
+    rows = visitor.texts("#paths tr[tabindex]")
+    return next((k for k, row in enumerate(rows) if word in row), None)
+
+
+def change(visitor: Visitor, **values: str) -> None:
+    """Type values beside sliders, one soon after another."""
+    visitor.open_tab("Rover")
+    for closed in visitor.tab.locator("#sliders details:not([open]) summary").all()[::-1]:
+        closed.click()
+    names = {"friction": FRICTION, "radius": RADIUS, "height": HEIGHT}
+    for name, value in values.items():
+        visitor.type_number(names[name], value)
+
+
+def take_advice(visitor: Visitor) -> None:
+    """Wait for what is found by the time that the page promises, and take the first of it."""
+    tab, remedies = visitor.tab, visitor.tab.locator("#advice li[tabindex]")
+    stop = tab.locator("#advice").get_by_role("button", name="Stop")
+    wait_until(
+        lambda: not stop.count() or "the search goes on" in visitor.text("#advice"), "the advice"
+    )
+    if remedies.count():
+        remedies.first.hover()
+        remedies.first.click()
+        wait_for_rest(visitor)
+        assert visitor.text("#verdict .word") == "traversable"
+        visitor.open_tab("Rover")
+        visitor.press("Undo")
+        wait_for_rest(visitor)
+    elif stop.count():
+        stop.click()
+        wait_until(lambda: not stop.count(), "the end of the search")
+
+
+def click_through(visitor: Visitor) -> None:
+    """Do once what the page is for, and hold what it shows against what it must."""
+    tab = visitor.tab
+    refused = find_row(visitor, "refused")
+    row = 0 if refused is None else refused
+    tab.locator("#paths tr[tabindex]").nth(row).click()
+    wait_until(lambda: f"path {row + 1} of" in visitor.text("#verdict"), "the path")
+    wait_for_rest(visitor)
+    change(visitor, friction="0.85")
+    wait_for_rest(visitor)
+    assert f"path {row + 1} of" in visitor.text("#verdict")  # whatever its verdict is now
+    wait_until(lambda: "0.85" in visitor.text("#changes"), "the change")
+    wait_until(lambda: tab.locator(".strip i.before").count(), "the lanes before it")
+    visitor.press("Keep as reference")
+    wait_until(lambda: "nothing differs" in visitor.text("#changes"), "the reference")
+    change(visitor, friction="0.3")
+    wait_for_rest(visitor)
+    assert f"path {row + 1} of" in visitor.text("#verdict")
+    visitor.press("Compare with loaded")
+    change(visitor, height="-0.15", radius="0.02")  # the second is refused: no candidate stays old
+    wait_for_rest(visitor)
+    assert visitor.is_on_screen("#verdict .word")
+    visitor.press("Reset")
+    wait_until(lambda: "(changed)" not in visitor.text("#subject"), "the loaded rover")
+    wait_for_rest(visitor)
+    if tab.get_by_role("button", name="Go to the failure").count():
+        visitor.press("Go to the failure")
+        wait_until(lambda: tab.locator(".lane[data-broken]").count(), "the broken limit")
+        visitor.press("What would help?")
+        take_advice(visitor)
+    visitor.press("To the start")
+    visitor.press("Play")
+    tab.wait_for_timeout(2000)
+    if tab.get_by_role("button", name="Pause").count():  # a path that fails at once is over
+        visitor.press("Pause")
+    visitor.open_tab("Ground")
+    for layer in ("use of all limits", "slope", "height"):
+        visitor.choose("Colour by", layer)
+        wait_until(lambda layer=layer: layer in visitor.text("#legend"), layer)
+    assert visitor.text("#errors") == "" and visitor.page_errors == []
+
+
+@pytest.fixture(scope="module")
+def browser():
+    with open_browser() as chromium:
+        yield chromium
+
+
+@pytest.mark.parametrize("ground", ["made", "spirit", "reef"])
+def test_a_long_visit_keeps_path_comparison_and_memory(ground, browser, tmp_path):
+    arguments = ["lsr1", *([] if ground == "made" else [ground])]
+    if ground == "reef":
+        save_terrain(tmp_path / "reef.npz", made_reef())
+        arguments = ["lsr1", str(tmp_path / "reef.npz")]
+    with open_view(*arguments) as (process, url):
+        visitor, begin, memory = Visitor(browser, url), time.monotonic(), []
+        while time.monotonic() - begin < 20.0 * MINUTES or len(memory) < ROUNDS:
+            click_through(visitor)
+            memory.append(memory_of(process))
+        change(visitor, friction="0.7")
+        wait_for_rest(visitor)
+    assert max(memory) < MOST_MEMORY, memory
+    assert memory[-1] < STEADY * memory[len(memory) // 3], memory
+    visitor.wait_for("No connection to the program")
+    with open_view(*arguments, port=int(url.rsplit(":", 1)[1])):
+        visitor.wait_for("The program was started again; what you had changed is taken up.")
+        wait_until(lambda: "friction 0.7" in visitor.text("#subject"), "the changed rover")
+    visitor.tab.close()
