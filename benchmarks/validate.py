@@ -172,8 +172,8 @@ def load_bands(balance, friction: float) -> list[tuple[float, float]]:
     return [(low, high) for low, high in ends]
 
 
-def print_energy(step: int = 1) -> None:
-    """Drive over every `step`-th obstacle with speed servos, and print the energy with ours.
+def print_energy() -> None:
+    """Drive over the obstacles with speed servos, and print the energy with ours.
 
     MuJoCo's time step is 2 ms: with the usual 4 ms its wheels chatter on their contacts.
     """
@@ -181,9 +181,8 @@ def print_energy(step: int = 1) -> None:
 
     x = np.linspace(START, END, round((END - START) / 0.01) + 1)
     path, rows, errors = np.column_stack([x, 0.0 * x, 0.0 * x]), [], []
-    obstacles = OBSTACLES[::step]
-    jobs = [(obstacle, DROOP, 1, 2.0, 0.002) for obstacle in obstacles]
-    for obstacle, row in zip(obstacles, run_in_processes(drive, jobs, None), strict=True):
+    jobs = [(obstacle, DROOP, 1, 2.0, 0.002) for obstacle in OBSTACLES]
+    for obstacle, row in zip(OBSTACLES, run_in_processes(drive, jobs, None), strict=True):
         if row.passed:
             options = SweepOptions(policy="servo", friction=obstacle.friction)
             rover, ground = unlimited(obstacle.rover), obstacle.ground
