@@ -91,7 +91,10 @@ class JointNames:
 
     def link(self, model: str) -> JointLink:
         """Return the link of a joint of the model."""
-        return self._of_model.get(model) or JointLink(model, model)
+        known = self._of_model.get(model)
+        if known is None:
+            known = self._of_model[model] = JointLink(model, model)
+        return known
 
     def model_name(self, robot: str) -> str:
         """Return the name in the model of a joint of messages; the model's own name stays."""

@@ -78,12 +78,13 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
         self._period = 1.0 / parameters.rate
         self._standing_steps = max(1, round(STANDING_PERIOD * parameters.rate))
         self._stopped, self._path_hash, self._steps = "", "", 0
+        self._measured: tuple[Any, ...] = ()
         self._own_stamps: deque[tuple[int, int]] = deque(maxlen=64)
         self._create_publishers()
         self._create_subscriptions()
         self._state: PlantState = self.simulation.plant.state()
         self._start = time.time_ns()
-        create_steady_timer(self, self._period, self._advance)
+        self.loop = create_steady_timer(self, self._period, self._advance)
         # A map takes longer than a step: other threads must not make the rover's sensors late.
         self._maps, self._map_in_work = ThreadPoolExecutor(1, "maps"), Future[None]()
         self._map_in_work.set_result(None)
@@ -98,9 +99,8 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
 
     def _create_publishers(self) -> None:
         qos = QoSProfile(depth=5)  # reliable, so that every subscriber hears it
-        self._joints = self.create_publisher(JointState, "joint_states", qos)
-        self._odometry = self.create_publisher(Odometry, "odometry", qos)
-        self._imu = self.create_publisher(Imu, "imu", qos)
+        kinds = {"joint_states": JointState, "odometry": Odometry, "imu": Imu}
+        self._sensors = [self.create_publisher(kind, name, qos) for name, kind in kinds.items()]
         self._driven = self.create_publisher(String, "path_driven", latched_qos())
         self._cloud = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
@@ -157,27 +157,16 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
 
     def _advance(self) -> None:
         self.heard.poll()
-        self._state = state = self.simulation.advance(time.monotonic(), self._period)
+        before, self._state = self._state, self.simulation.advance(time.monotonic(), self._period)
         self._steps += 1
-        stamp = self._stamp
+        state, stamp = self._state, self._stamp
         if self._clock_publisher is not None:
             self._clock_publisher.publish(ClockMessage(clock=stamp))
-        efforts = dict(zip(WHEEL_JOINTS, state.wheel_torques.tolist(), strict=True))
-        positions, velocities = (
-            convert_steering(values, self._steering_sign)
-            for values in (state.joint_positions | self._arm_angles(), state.joint_velocities)
-        )
-        self._joints.publish(joint_state(positions, velocities, efforts, stamp))
-        self._odometry.publish(
-            odometry_message(
-                state.position, state.orientation, state.velocity, state.body_rates,
-                DEVIATIONS, self._frame, stamp,
-            )
-        )  # fmt: skip
-        gravity = self._settings.rover.gravity
-        self._imu.publish(
-            imu_message(state.orientation, state.body_rates, gravity, DEVIATIONS[1], stamp)
-        )
+        if state is not before or not self._measured:
+            self._measured = self._write_sensors(state, stamp)
+        for publisher, message in zip(self._sensors, self._measured, strict=True):
+            message.header.stamp = stamp
+            publisher.publish(message)
         is_due = any(self.simulation.steering) or self._steps % self._standing_steps == 0
         own = not self.simulation.has_speeds(time.monotonic())
         if self._commands is not None and is_due and own:
@@ -190,6 +179,21 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
         if self._path_hash and self.simulation.at_end:
             self._driven.publish(String(data=self._path_hash))
             self._path_hash = ""
+
+    def _write_sensors(self, state: PlantState, stamp: Any) -> tuple[JointState, Odometry, Imu]:
+        """Return what the sensors measure."""
+        efforts = dict(zip(WHEEL_JOINTS, state.wheel_torques.tolist(), strict=True))
+        positions, velocities = (
+            convert_steering(values, self._steering_sign)
+            for values in (state.joint_positions | self._arm_angles(), state.joint_velocities)
+        )
+        odometry = odometry_message(
+            state.position, state.orientation, state.velocity, state.body_rates,
+            DEVIATIONS, self._frame, stamp,
+        )  # fmt: skip
+        gravity = self._settings.rover.gravity
+        imu = imu_message(state.orientation, state.body_rates, gravity, DEVIATIONS[1], stamp)
+        return joint_state(positions, velocities, efforts, stamp), odometry, imu
 
     @property
     def _stamp(self) -> Any:

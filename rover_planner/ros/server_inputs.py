@@ -67,6 +67,7 @@ class ServerInputs:
         if parameters.terrain_file:
             terrain = load_terrain(parameters.terrain_file, parameters.max_map_cells)
             self.keep(self.keeper.load(terrain, self.seconds, None), parameters.terrain_file)
+            self.service.prepare()
 
     @property
     def seconds(self) -> float:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The subscriptions of the traction controller: checks messages and passes them to its service."""
 
+import math
 import time
 from collections.abc import Callable
 from typing import Any
@@ -24,7 +25,7 @@ from rover_planner.ros.frames import NodeFrames
 from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.map_intake import CLOUD, MapIntake
 from rover_planner.ros.node import RoverNode
-from rover_planner.ros.qos import sensor_qos, topic_qos
+from rover_planner.ros.qos import newest_qos, sensor_qos, topic_qos
 from rover_planner.ros.subscriptions import PublisherCheck, subscribe_to_map
 from rover_planner.traction.clocks import NANOSECONDS, StampCheck, StampError
 from rover_planner.traction.traction_service import (
@@ -38,6 +39,8 @@ from rover_planner.traction.traction_service import (
 JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
 ANGLES = (*SUSPENSION_JOINTS, *STEERING_JOINTS)
 """Joints whose positions are read; a rover has the steering joints of its steered wheels."""
+REST_PERIOD = 0.1
+"""Time between two readings of odometry by a rover at rest [s]."""
 TWIST, TWIST_STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
 
 
@@ -63,6 +66,7 @@ class TractionInputs:
         self._mounting = ImuMounting(
             parameters.imu_frame or parameters.base_frame, parameters.imu_mounting
         )
+        self._odometry_read = -math.inf
         self._log = TransitionLog(node.get_logger())
         self.stamps = StampCheck(parameters.stamp_tolerance)
         """Judges the header stamps."""
@@ -80,14 +84,24 @@ class TractionInputs:
 
     def _subscribe(self, parameters: TractionControllerParameters) -> None:
         twist = TwistStamped if parameters.cmd_vel_stamped else Twist
+        hear = self._node.heard.subscribe
         for kind, name, take in (
             (JointState, JOINT_STATES, self._take_joints),
             (Imu, IMU, self._take_imu),
             (twist, CMD_VEL, self._take_command),
-            (Odometry, ODOMETRY, self._take_odometry),
         ):
-            self._node.heard.subscribe(kind, name, self._guard(name, take), sensor_qos())
-        self._node.heard.subscribe(Bool, STOP, self._guard(STOP, self._take_stop), topic_qos())
+            hear(kind, name, self._guard(name, take), sensor_qos())
+        take_odometry = self._guard(ODOMETRY, self._take_odometry)
+        hear(Odometry, ODOMETRY, take_odometry, newest_qos(), self._needs_odometry)
+        hear(Bool, STOP, self._guard(STOP, self._take_stop), topic_qos())
+
+    def _needs_odometry(self) -> bool:
+        """Return whether odometry is to be read: it takes longest, and at rest nothing uses it."""
+        now = time.monotonic()
+        if not self._service.drives and now - self._odometry_read < REST_PERIOD:
+            return False
+        self._odometry_read = now
+        return True
 
     def _check_publishers(self, parameters: TractionControllerParameters) -> PublisherCheck:
         types = {

@@ -111,6 +111,29 @@ def test_a_brake_stops_the_rover_and_holds_it_on_a_slope(engine):
     assert plant.state().velocity[0] > 0.01
 
 
+def test_a_rover_that_stands_is_not_computed_again_and_nothing_else_changes(monkeypatch):
+    rover = load_rover("m2020")
+    most, ground = rover.wheel.max_torque, plane(0.2, 0.0, half=8.0)
+    plant, full = (QuasiStaticPlant(rover, ground, (0.0, 0.0, 0.3)) for _ in range(2))
+    monkeypatch.setattr(full, "_repeats", lambda *step: False)
+    rng, same = np.random.default_rng(1), 0
+    for _ in range(30):
+        torques, command = rng.choice([0.0, 0.6 * most, most], 6), (rng.choice([0.0, 0.03]), 0.0)
+        step = rng.choice(["drive", "pull", "brake"], p=[0.3, 0.5, 0.2])
+        given = {"drive": command, "pull": (torques, command), "brake": ()}[step]
+        for _ in range(rng.choice([1, 4, 40])):
+            before = plant.state()
+            for one in (plant, full):
+                getattr(one, step)(*given, 0.02)
+            full._measured = None
+            same += plant.state() is before
+            assert all(
+                np.array_equal(value, getattr(full.state(), field))
+                for field, value in vars(plant.state()).items()
+            )
+    assert same > 100
+
+
 def test_drives_without_commands_are_braked():
     given = RoverSimulatorParameters(follow_commands=True, start_x=-1.0)
     slope = plane(-np.tan(np.radians(3.0)), 0.0, half=3.0)
