@@ -55,7 +55,7 @@ def bound_contacts(uncertain, work, nominal):
     Args:
         uncertain: UNCERTAIN; the elevation of its `error` bounds the error of each height [m].
         work: BOUNDS_WORK; `spread.shift` is the motion of the wheels forward or back.
-        nominal: NOMINAL contacts.
+        nominal: RESULT on the nominal ground.
     """
     placement, contact_bounds = work.rover.placement, work.contact_bounds
     angles, points, shift = nominal.contact_angle, nominal.contact_points, work.spread.shift

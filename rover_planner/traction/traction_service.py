@@ -155,11 +155,6 @@ class TractionService:
         return float(self._writer.weight)
 
     @property
-    def terrain(self) -> Terrain | None:
-        """The map; None before the first one."""
-        return None if self._finder is None else self._finder.terrain
-
-    @property
     def climbs(self) -> bool:
         """True if the suspension shows that the rover climbs, at the last update."""
         return self._slip.detector.climbs

@@ -11,10 +11,9 @@ from rover_physics.errors import ModelError
 from rover_physics.traction.balance import BalanceWriter, MeasuredState
 from rover_physics.traction.contact_ekf import Motion, MotionContactEstimator
 from rover_physics.traction.layout import LOADS, TRACTIONS
-from rover_physics.traction.line_search import measure_peak
 from rover_physics.traction.map_contacts import MapContactFinder
 from rover_physics.traction.program import ProgramInputs
-from rover_physics.traction.solver import TractionWorkspace, solve_traction
+from rover_physics.traction.solver import TractionWorkspace, measure_peak, solve_traction
 from support.best_torques import can_stand
 from support.rough_grounds import fractal, plane, random_poses
 from support.rover_geometry import balance_matrix, free_balance_matrix, place_rover
@@ -111,7 +110,7 @@ def test_the_peak_never_rises_from_one_program_to_the_next():
     writer, workspace = BalanceWriter(LSR1), TractionWorkspace()
     for prediction, i in rough_states(LSR1, 20):
         rows = writer.write(state_of(LSR1, prediction, i), 0.0)
-        last, peak = None, measure_peak(rows, INPUTS, rows.complete(np.zeros(6)))
+        last, peak = None, measure_peak(rows, FRICTION, rows.complete(np.zeros(6)))
         for _ in range(6):
             answer = solve_traction(workspace, rows, INPUTS, last=last, max_programs=1)
             assert not answer.fallback

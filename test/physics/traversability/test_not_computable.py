@@ -27,8 +27,7 @@ from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.sweep import predict_poses
 from rover_physics.results.record import QUANTITIES
-from rover_physics.traversability.bounded_verdict import refuse_worst_case
-from rover_physics.traversability.verdict import hold_against_limits
+from rover_physics.traversability.verdict import hold_against_limits, refuse_worst_case
 from rover_planner.planning.path_query import path_cost
 from support.rough_grounds import plane
 
