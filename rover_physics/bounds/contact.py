@@ -182,11 +182,6 @@ def _weight(gx, gy, row, column):
 
 
 @kernel
-def _angle_of_row(samples, k):
-    return np.pi * (k / (samples.rows - 1) - 0.5)
-
-
-@kernel
 def _widen(uncertain, work, wheel):
     """Widen the contact of a wheel to all points of its rim that may touch."""
     samples, contact_bounds = uncertain.nominal.samples, work.contact_bounds
@@ -263,7 +258,7 @@ def _find_farthest(uncertain, work, wheel, m, side):
     outside = nearest
     for step in range(samples.rows):
         k = step if side == 0 else samples.rows - 1 - step
-        angle = _angle_of_row(samples, k)
+        angle = np.pi * (k / (samples.rows - 1) - 0.5)
         if away * (angle - nearest) <= 0.0:
             break
         outside = angle

@@ -37,7 +37,7 @@ from rover_physics.prediction.evaluation import CHUNK, MAX_CHUNKS, MODEL, WORK, 
 from rover_physics.prediction.packed_model import PackedModel, forget_models, pack_model
 from rover_physics.prediction.sweep import check_poses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
-from rover_physics.results.path_bounds import PathBounds
+from rover_physics.results.path_bounds import BOUNDED_VALUES, BOUNDS, PathBounds
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.linkage import place
 from rover_physics.rover.model import Rover
@@ -49,21 +49,6 @@ SIGMAS = 3.0
 """Default number of standard deviations by which the map's heights may be wrong."""
 BOUNDS_EFFORT = 50
 """Time to bound a pose over the time to predict it with equal torques."""
-
-BOUNDS = record_type(
-    ("status", np.int8),
-    ("roll", float, (2,)),
-    ("pitch", float, (2,)),
-    ("rocker_angle", float, (2, 2)),
-    ("bogie_angle", float, (2, 2)),
-    ("belly_clearance", float, (2,)),
-    ("tip_over_ratio", float, (2,)),
-    ("wheel_loads", float, (6, 2)),
-    ("friction_utilisation", float, (6, 2)),
-    ("torque_saturation", float, (6, 2)),
-    ("sinkage", float, (6, 2)),
-)
-"""Smallest and largest values at one pose, with quantities and units as in `PathBounds`."""
 
 UNCERTAIN = record_type(
     ("nominal", MODEL),  # the model on the nominal ground
@@ -80,8 +65,6 @@ BOUNDS_WORK = record_type(
     ("box", BOX),  # bounds on the forces
 )
 """Work space of one thread."""
-BOUNDED_VALUES = tuple(name for name in BOUNDS.names or () if name != "status")
-"""Names of the bounded values in `PathPrediction` and `PathBounds`."""
 
 
 def check_sigmas(sigmas: float | None) -> float:
@@ -140,11 +123,10 @@ def bound_path(
         )
     model, results = pack_model(rover, terrain, options), prediction.results
     found = find_bounds(model, _pack_grounds(terrain, allowed), prediction.poses, results)
-    values = {}
     for name in BOUNDED_VALUES:
         value, (low, high) = getattr(prediction, name), np.moveaxis(found[name], -1, 0)
-        values[name] = np.stack([np.minimum(low, value), np.maximum(high, value)], axis=-1)
-    return PathBounds(sigmas=allowed, status=found.status.copy(), **values)
+        low[:], high[:] = np.minimum(low, value), np.maximum(high, value)
+    return PathBounds(allowed, found)
 
 
 @lru_cache(maxsize=2)

@@ -262,8 +262,8 @@ class PartwiseJudge:
         self._model, self._sigmas = pack_model(rover, terrain, options), sigmas
         self._poses = check_poses(poses)
         self._bends = None if curvature is None else check_curvature(curvature, len(self._poses))
-        self._courses: list[Course] = []
-        """Of each part."""
+        self._courses: list[tuple[np.ndarray, ...]] = []
+        """Of each part `distance`, `irreversible` and `drop` of its Course."""
         self._codes: list[str] = []
         self._reasons: list[str] = []
         self._failure = (-1, "", "")
@@ -289,13 +289,7 @@ class PartwiseJudge:
         waypoint, code, reason = self._failure
         if self._bends is not None or code == "wheel_drop":
             return verdict
-        course = Course(
-            self._poses,
-            np.concatenate([one.distance for one in self._courses]),
-            np.concatenate([one.irreversible for one in self._courses]),
-            np.concatenate([one.drop for one in self._courses]),
-            None,
-        )
+        course = Course(self._poses, *map(np.concatenate, zip(*self._courses, strict=True)), None)
         nominal = replace(verdict, first_failure=waypoint, code=code, reason=reason)
         asked = refuse_if_trapped(self._model, course, nominal)
         return verdict if asked is nominal else asked
@@ -311,9 +305,7 @@ class PartwiseJudge:
             new = slice(part.context, None)
             prediction = part.prediction.select(new)
             drop = prediction.wheel_drop.max(axis=1)
-            self._courses.append(
-                Course(prediction.poses, prediction.distance.copy(), irreversible[new], drop, None)
-            )
+            self._courses.append((prediction.distance.copy(), irreversible[new], drop))
             verdict = with_refusals(verdict, verdict.codes[new], verdict.reasons[new])
             yield add_bounds(model, prediction, verdict, self._sigmas)
 

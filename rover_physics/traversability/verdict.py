@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.bounds.path import BOUNDED_VALUES
 from rover_physics.chance.failure_chance import FailureChance
 from rover_physics.limits import table
 from rover_physics.limits.table import CHANCE, DEGREES, NOT_COMPUTABLE, TRAPPED, Sense
@@ -15,7 +14,7 @@ from rover_physics.names import WHEEL_POSITIONS, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.plain_values import to_plain
-from rover_physics.results.path_bounds import PathBounds
+from rover_physics.results.path_bounds import BOUNDED_VALUES, PathBounds
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.record import find_column, numbers_of
 from rover_physics.results.uses import Uses, find_uses, limits_of

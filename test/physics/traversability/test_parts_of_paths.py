@@ -19,9 +19,9 @@ from rover_physics import (
     judge_pieces,
     load_rover,
 )
-from rover_physics.bounds.path import BOUNDED_VALUES
 from rover_physics.prediction import sweep
 from rover_physics.prediction.packed_model import PackedModel, pack_model
+from rover_physics.results.path_bounds import BOUNDED_VALUES
 from rover_physics.results.record import QUANTITIES
 from rover_physics.traversability.judge import PartwiseJudge
 from rover_physics.traversability.pieces import SAFE, find_exposure
