@@ -289,7 +289,8 @@ class PartwiseJudge:
         waypoint, code, reason = self._failure
         if self._bends is not None or code == "wheel_drop":
             return verdict
-        course = Course(self._poses, *map(np.concatenate, zip(*self._courses, strict=True)), None)
+        distance, irreversible, drop = map(np.concatenate, zip(*self._courses, strict=True))
+        course = Course(self._poses, distance, irreversible, drop, None)
         nominal = replace(verdict, first_failure=waypoint, code=code, reason=reason)
         asked = refuse_if_trapped(self._model, course, nominal)
         return verdict if asked is nominal else asked
