@@ -15,8 +15,8 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.manipulator import link_points
 from rover_physics.rover.model import Manipulator, Rover
 from rover_physics.rover.rover_file import rover_from_dict
-from rover_physics.rover.urdf.joint_map import ArmMap, UrdfJointMap, load_joint_map
-from rover_physics.rover.urdf.robot import Joint, JointTree, Lump, Robot, Solid, read_robot
+from rover_physics.rover.urdf.joint_map import UrdfJointMap, load_joint_map
+from rover_physics.rover.urdf.robot import Joint, Posture, Robot, Solid, read_robot
 
 MAX_TILT = 0.02
 """Largest angle between a pivot or axle and the body's y axis [rad]."""
@@ -48,9 +48,6 @@ class Levelling:
     """Angle of both bogies about y, beyond that of the map [rad]."""
 
 
-NOT_LEVELLED = Levelling()
-
-
 @dataclass(frozen=True)
 class ReadRover:
     """A rover that was read from a URDF."""
@@ -78,10 +75,12 @@ def rover_from_urdf(urdf: Path, joint_map: Path) -> ReadRover:
     """
     robot, joints = read_robot(urdf), load_joint_map(joint_map)
     with errors_of(joint_map):
-        _Reading(robot, joints).check()
-        levelling = level_wheels(robot, joints)
-        reading = _Reading(robot, joints, levelling)
+        reading = _Reading(robot, joints)
         reading.check()
+        levelling = level_wheels(reading)
+        if levelling != Levelling():
+            reading = reading.turn(levelling)
+            reading.check()
         contents = _merge(_rounded(reading.contents()), joints.rover)
     try:
         rover = rover_from_dict(contents, str(urdf))
@@ -97,52 +96,65 @@ def rover_from_urdf(urdf: Path, joint_map: Path) -> ReadRover:
 class _Reading:
     """A URDF with its links placed in the body frame."""
 
-    def __init__(self, robot: Robot, joints: UrdfJointMap, levelling: Levelling = NOT_LEVELLED):
-        stowed = (
-            {}
-            if joints.arm is None
-            else dict(zip(joints.arm.joints, joints.arm.stowed, strict=True))
-        )
+    def __init__(
+        self,
+        robot: Robot,
+        joints: UrdfJointMap,
+        angles: dict[str, float] | None = None,
+        rotation: Floats | None = None,
+    ):
+        """Place the links at the angles of the map, or others, and turned by it, or otherwise."""
+        arm = joints.arm
+        stowed = dict(zip(arm.joints, arm.stowed, strict=True)) if arm is not None else {}
         self._robot, self._joints = robot, joints
-        self._angles = joints.angles | stowed
-        self._frame = joints.axes.rotation()
-        if levelling != NOT_LEVELLED:
-            self._level(levelling)
-        self._tree = JointTree(robot, self._angles, self._find_body_frame())
+        self._angles = joints.angles | stowed if angles is None else angles
+        self._rotation = joints.axes.rotation() if rotation is None else rotation
+        for name in self._angles:
+            robot.joint(name)
+        self._rockers = {side: robot.joint(joints.rocker[side]) for side in SIDES}
+        self._bogies = {side: robot.joint(joints.bogie[side]) for side in SIDES}
+        self._wheels = {wheel: robot.joint(joints.wheels[wheel]) for wheel in WHEELS}
+        self._steering = {name: robot.joint(joint) for name, joint in joints.steering.items()}
+        self._fixed = [robot.joint(joint) for joint in joints.fixed]
+        self._on_rocker = {side: self._find_rocker(side) for side in SIDES}
+        self._on_bogie = {side: robot.links_on(self._bogies[side]) for side in SIDES}
         self.asymmetry = 0.0
         """Largest distance found so far between both sides [m]."""
-        tree = self._tree
-        self._rockers = {side: tree.joint(joints.rocker[side]) for side in SIDES}
-        self._bogies = {side: tree.joint(joints.bogie[side]) for side in SIDES}
-        self._wheels = {wheel: tree.joint(joints.wheels[wheel]) for wheel in WHEELS}
-        self._steering = {name: tree.joint(joint) for name, joint in joints.steering.items()}
-        self._fixed = [tree.joint(joint) for joint in joints.fixed]
-        self._on_rocker = {side: self._find_rocker(side) for side in SIDES}
+        self._posture = Posture(robot, self._angles, self._rotation)
+        points = [self._point_of(side, self._rockers[side]) for side in SIDES]
+        self._posture.move(-0.5 * (points[0] + points[1]))
+
+    def turn(self, levelling: Levelling) -> "_Reading":
+        """Return the reading with the body frame and the bogies turned."""
+        angles = dict(self._angles)
+        for joint in self._bogies.values():
+            turn = levelling.bogie if self._posture.axis(joint)[1] > 0.0 else -levelling.bogie
+            angles[joint.name] = angles.get(joint.name, 0.0) + turn
+        pitched = Rotation.from_euler("y", levelling.pitch).as_matrix() @ self._rotation
+        return _Reading(self._robot, self._joints, angles, pitched)
 
     def _find_rocker(self, side: str) -> set[str]:
         """Return the links that hang on a rocker, of which some parts may hang on the body."""
-        rocker, found = self._rockers[side], self._tree.links_on(self._rockers[side])
+        rocker, found = self._rockers[side], self._robot.links_on(self._rockers[side])
         wheels = {self._wheels[f"{position}_{side}"].child for position in WHEEL_POSITIONS}
         for joint in self._fixed:
-            links = self._tree.links_on(joint)
+            links = self._robot.links_on(joint)
             if joint.parent == rocker.parent and links & wheels:
                 found |= links
         return found
 
     def contents(self) -> dict[str, Any]:
         """Return the keys of a rover file that the URDF gives; the others are left out."""
-        found: dict[str, Any] = {"name": self._robot.name}
-        found["wheel"] = self._wheel()
-        found["suspension"] = self._suspension()
-        found["masses"] = self._masses()
-        belly = self._belly()
-        if belly:
-            found["belly"] = belly
-        if self._steering:
-            found["steering"] = self._steered()
-        if self._joints.arm is not None:
-            found["manipulator"] = _read_arm(self._tree, self._joints.arm)
-        return found
+        found: dict[str, Any] = {
+            "name": self._robot.name,
+            "wheel": self._wheel(),
+            "suspension": self._suspension(),
+            "masses": self._masses(),
+            "belly": self._belly(),
+            "steering": self._steered(),
+            "manipulator": self._arm(),
+        }
+        return {key: value for key, value in found.items() if value}
 
     def wheel_heights(self) -> list[float]:
         """Return the heights of rear, middle and front wheels, means of both sides [m]."""
@@ -151,33 +163,14 @@ class _Reading:
             for position in WHEEL_POSITIONS
         ]
 
-    def _level(self, levelling: Levelling) -> None:
-        """Turn the body frame and the bogies."""
-        tree = JointTree(self._robot, self._angles, _pose(self._frame))
-        for name in self._joints.bogie.values():
-            axis = tree.axis(tree.joint(name))
-            turn = levelling.bogie if axis[1] > 0.0 else -levelling.bogie
-            self._angles[name] = self._angles.get(name, 0.0) + turn
-        self._frame = Rotation.from_euler("y", levelling.pitch).as_matrix() @ self._frame
-
-    def _find_body_frame(self) -> Floats:
-        """Return the pose (4, 4) of the root link in the body frame."""
-        frame = _pose(self._frame)
-        tree = JointTree(self._robot, self._angles, frame)
-        points = [
-            self._point_of(tree, side, tree.joint(self._joints.rocker[side])) for side in SIDES
-        ]
-        frame[:3, 3] = -0.5 * (points[0] + points[1])
-        return frame
-
-    def _point_of(self, tree: JointTree, side: str, joint: Joint) -> Floats:
+    def _point_of(self, side: str, joint: Joint) -> Floats:
         """Return the point (3,) of a joint's axis amid the wheels of a side [m].
 
         An origin may lie anywhere along its axis; the wheels turn about this point.
         """
-        wheels = [self._joints.wheels[f"{position}_{side}"] for position in WHEEL_POSITIONS]
-        y = np.mean([tree.origin(tree.joint(wheel))[1] for wheel in wheels])
-        point, axis = tree.origin(joint).copy(), tree.axis(joint)
+        wheels = [self._wheels[f"{position}_{side}"] for position in WHEEL_POSITIONS]
+        y = np.mean([self._posture.point(wheel.child)[1] for wheel in wheels])
+        point, axis = self._posture.point(joint.child).copy(), self._posture.axis(joint)
         if abs(axis[1]) > 0.5 and joint.kind != "fixed":
             point += (y - point[1]) / axis[1] * axis
         point[1] = y
@@ -185,8 +178,13 @@ class _Reading:
 
     def tilt(self) -> float:
         """Return the largest angle between the pivot of a rocker and y [rad]."""
-        axes = [self._tree.axis(one) for one in self._rockers.values() if one.kind != "fixed"]
-        return max((_angle_to_y(axis) for axis in axes), default=0.0)
+        turning = [one for one in self._rockers.values() if one.kind != "fixed"]
+        return max((self._angle_to_y(one) for one in turning), default=0.0)
+
+    def _angle_to_y(self, joint: Joint) -> float:
+        """Return the angle between the axis of a joint and y, in either direction [rad]."""
+        axis = self._posture.axis(joint)
+        return float(np.arctan2(np.hypot(axis[0], axis[2]), abs(axis[1])))
 
     def check(self) -> None:
         """Check that joints turn about y and hang on each other as those of a rover do.
@@ -199,47 +197,29 @@ class _Reading:
         for kind, joints in (("rocker", self._rockers), ("bogie", self._bogies),
                              ("wheels", self._wheels)):  # fmt: skip
             for part, joint in joints.items():
-                key, name = f"{kind}.{part}", getattr(self._joints, kind)[part]
-                axis = self._tree.axis(joint)
-                if kind == "rocker" and joint.kind == "fixed":
-                    continue
-                if joint.kind not in ("revolute", "continuous"):
-                    raise RoverFileError(f"{key}: joint {name} is {joint.kind}; it must turn")
-                if kind != "wheels" and abs(axis[0]) > np.cos(MAX_TILT) and self._rolls():
-                    raise RoverFileError(
-                        f"{key}: joint {name} turns about x: a rover of three bogies has neither "
-                        "rockers nor a differential; only rocker-bogies are read"
-                    )
-                rises = kind == "rocker" and abs(axis[0]) < np.sin(MAX_TILT)
-                if _angle_to_y(axis) > (MAX_ROCKER_TILT if rises else MAX_TILT):
-                    raise RoverFileError(
-                        f"{key}: joint {name} turns about {np.round(axis, 3).tolist()}; it must "
-                        "turn about y of the body frame (axes and angles of the map)"
-                    )
+                if kind != "rocker" or joint.kind != "fixed":
+                    self._check_turns(kind, part, joint)
         self._check_names()
         for side in SIDES:
-            rocker, on_rocker = self._rockers[side], self._on_rocker[side]
-            self._check_below(f"bogie.{side}", self._bogies[side], rocker, on_rocker)
-            for position in WHEEL_POSITIONS:
-                wheel = f"{position}_{side}"
-                self._check_below(f"wheels.{wheel}", self._wheels[wheel], rocker, on_rocker)
-                if wheel in self._steering:
-                    steering = self._steering[wheel]
-                    links = self._tree.links_on(steering)
-                    self._check_below(f"wheels.{wheel}", self._wheels[wheel], steering, links)
-                self._check_carriers(wheel, side)
-            y = np.mean([self._wheel_centre(f"{one}_{side}")[1] for one in WHEEL_POSITIONS])
-            if (y > 0.0) != (side == "left"):
-                raise RoverFileError(
-                    f"rocker.{side}: y is {y:.4g} m in the body frame, on the other side; sides "
-                    "are exchanged, or axes.forward or axes.up is wrong"
-                )
+            self._check_side(side)
 
-    def _rolls(self) -> bool:
-        """Return whether all wheels turn about y."""
-        return all(
-            _angle_to_y(self._tree.axis(wheel)) <= MAX_TILT for wheel in self._wheels.values()
-        )
+    def _check_turns(self, kind: str, part: str, joint: Joint) -> None:
+        """Check that a joint turns about y."""
+        key, axis = f"{kind}.{part}", self._posture.axis(joint)
+        if joint.kind not in ("revolute", "continuous"):
+            raise RoverFileError(f"{key}: joint {joint.name} is {joint.kind}; it must turn")
+        rolls = all(self._angle_to_y(wheel) <= MAX_TILT for wheel in self._wheels.values())
+        if kind != "wheels" and abs(axis[0]) > np.cos(MAX_TILT) and rolls:
+            raise RoverFileError(
+                f"{key}: joint {joint.name} turns about x: a rover of three bogies has neither "
+                "rockers nor a differential; only rocker-bogies are read"
+            )
+        rises = kind == "rocker" and abs(axis[0]) < np.sin(MAX_TILT)
+        if self._angle_to_y(joint) > (MAX_ROCKER_TILT if rises else MAX_TILT):
+            raise RoverFileError(
+                f"{key}: joint {joint.name} turns about {np.round(axis, 3).tolist()}; it must "
+                "turn about y of the body frame (axes and angles of the map)"
+            )
 
     def _check_names(self) -> None:
         """Check that each joint is named once."""
@@ -257,31 +237,35 @@ class _Reading:
                 )
             found[name] = key
 
-    def _check_below(self, key: str, joint: Joint, above: Joint, links: set[str]) -> None:
-        """Check that a joint hangs on another one, on which `links` do."""
-        if joint.child == above.child or joint.child not in links:
+    def _check_side(self, side: str) -> None:
+        """Check what the joints of a side hang on, and that nothing else moves in between."""
+        rocker, bogie, on_rocker = self._rockers[side], self._bogies[side], self._on_rocker[side]
+        _check_below(f"bogie.{side}", bogie, rocker, on_rocker)
+        for position in WHEEL_POSITIONS:
+            wheel, key = f"{position}_{side}", f"wheels.{position}_{side}"
+            joint, steering = self._wheels[wheel], self._steering.get(wheel)
+            _check_below(key, joint, rocker, on_rocker)
+            if steering is not None:
+                _check_below(key, joint, steering, self._robot.links_on(steering))
+            known = (rocker, bogie, joint, steering, *self._fixed)
+            for other in self._robot.joints_between(joint.child, rocker.parent):
+                if other.kind != "fixed" and other not in known:
+                    raise RoverFileError(
+                        f"{key}: it hangs on joint {other.name}, which is {other.kind} and has no "
+                        "part in the map: name it under steering, or under fixed if it does not "
+                        "move"
+                    )
+        y = np.mean([self._wheel_centre(f"{one}_{side}")[1] for one in WHEEL_POSITIONS])
+        if (y > 0.0) != (side == "left"):
             raise RoverFileError(
-                f"{key}: its link {joint.child} does not hang on {above.child} in the URDF; where "
-                "the parts of a rocker have joints of their own, name those under fixed"
+                f"rocker.{side}: y is {y:.4g} m in the body frame, on the other side; sides "
+                "are exchanged, or axes.forward or axes.up is wrong"
             )
-
-    def _check_carriers(self, wheel: str, side: str) -> None:
-        """Check that nothing moves between rocker and wheel but bogie, steering and wheel."""
-        moving = {self._joints.rocker[side], self._joints.bogie[side], self._joints.wheels[wheel]}
-        moving |= {self._joints.steering.get(wheel, ""), *self._joints.fixed}
-        chain = self._tree.joints_between(self._wheels[wheel].child, self._rockers[side].parent)
-        for name in chain:
-            kind = self._robot.joints[name].kind
-            if kind != "fixed" and name not in moving:
-                raise RoverFileError(
-                    f"wheels.{wheel}: it hangs on joint {name}, which is {kind} and has no part "
-                    "in the map: name it under steering, or under fixed if it does not move"
-                )
 
     def _pivots(self, key: str, joints: dict[str, Joint]) -> list[float]:
         """Return a pivot of the left side; where along its axis an origin lies means nothing."""
-        points = {side: self._point_of(self._tree, side, joints[side]) for side in SIDES}
-        y = {side: self._tree.origin(joint)[1] for side, joint in joints.items()}
+        points = {side: self._point_of(side, joints[side]) for side in SIDES}
+        y = {side: self._posture.point(joint.child)[1] for side, joint in joints.items()}
         if abs(y["left"] + y["right"]) <= MAX_ASYMMETRY:
             for side in SIDES:
                 points[side][1] = y[side]
@@ -310,12 +294,12 @@ class _Reading:
 
     def _wheel_centre(self, wheel: str) -> Floats:
         """Return the middle of a wheel's cylinder; without one, the origin of its joint [m]."""
-        cylinders = self._cylinders(wheel)
-        joint = self._wheels[wheel]
-        return cylinders[0][1][:3, 3] if cylinders else self._tree.origin(joint)
+        for _, place in self._cylinders(wheel):
+            return place[:3, 3]
+        return self._posture.point(self._wheels[wheel].child)
 
     def _cylinders(self, wheel: str) -> list[tuple[Solid, Floats]]:
-        return self._tree.solids(self._tree.links_on(self._wheels[wheel]), "cylinder")
+        return self._posture.solids(self._robot.links_on(self._wheels[wheel]), "cylinder")
 
     def _wheel(self) -> dict[str, float]:
         """Return size, mass and drive of the wheels."""
@@ -327,11 +311,10 @@ class _Reading:
                 raise RoverFileError("wheels have cylinders of several sizes; all must be alike")
             found["radius"], found["width"] = sizes.mean(axis=0).tolist()
         joints = self._wheels.values()
-        for key, of in (("max_torque", "effort"), ("max_speed", "velocity")):
-            least = min(getattr(joint.limit, of) for joint in joints)
-            if np.isfinite(least):
-                found[key] = float(least)
-        return found
+        return found | _finite(
+            max_torque=min(joint.effort for joint in joints),
+            max_speed=min(joint.velocity for joint in joints),
+        )
 
     def _suspension(self) -> dict[str, Any]:
         """Return pivots, wheel centres and limits."""
@@ -339,7 +322,7 @@ class _Reading:
             position
             for position in WHEEL_POSITIONS
             for side in SIDES
-            if self._wheels[f"{position}_{side}"].child in self._on_bogie(side)
+            if self._wheels[f"{position}_{side}"].child in self._on_bogie[side]
         }
         alone = set(WHEEL_POSITIONS) - on_bogie
         if len(alone) != 1 or "middle" in alone:
@@ -360,97 +343,125 @@ class _Reading:
             },
         }
         for key, joints in (("rocker_limits", self._rockers), ("bogie_limits", self._bogies)):
-            limits = [self._limits(joint) for joint in joints.values()]
-            low, high = max(limit[0] for limit in limits), min(limit[1] for limit in limits)
-            if np.isfinite([low, high]).all():
-                found[key] = [float(low), float(high)]
+            limits = np.array([self._limits(joint) for joint in joints.values()])
+            found |= _finite(**{key: [float(limits[:, 0].max()), float(limits[:, 1].min())]})
         return found
 
     def _limits(self, joint: Joint) -> tuple[float, float]:
         """Return lowest and highest angle about body y, counted from flat ground [rad]."""
-        name = next(name for name, other in self._robot.joints.items() if other is joint)
-        flat, limit = self._angles.get(name, 0.0), joint.limit
-        low, high = limit.lower - flat, limit.upper - flat
-        return (low, high) if self._tree.axis(joint)[1] > 0.0 else (-high, -low)
+        flat = self._angles.get(joint.name, 0.0)
+        low, high = joint.lower - flat, joint.upper - flat
+        return (low, high) if self._posture.axis(joint)[1] > 0.0 else (-high, -low)
 
     def _steered(self) -> dict[str, Any]:
-        """Return the steered axles, their limit and rate."""
+        """Return the steered axles, their limit and rate; nothing if no wheel steers."""
         axles = [
             position
             for position in WHEEL_POSITIONS
             if any(f"{position}_{side}" in self._steering for side in SIDES)
         ]
-        for axle in axles:
-            for side in SIDES:
-                if f"{axle}_{side}" not in self._steering:
-                    raise RoverFileError(
-                        f"missing key steering.{axle}_{side}; both wheels of an axle steer"
-                    )
-        found: dict[str, Any] = {"wheels": axles}
-        limits = [joint.limit for joint in self._steering.values()]
-        reach = min(min(abs(limit.lower), abs(limit.upper)) for limit in limits)
-        rate = min(limit.velocity for limit in limits)
-        if np.isfinite(reach):
-            found["limit"] = float(reach)
-        if np.isfinite(rate):
-            found["rate"] = float(rate)
-        return found
+        for wheel in (f"{axle}_{side}" for axle in axles for side in SIDES):
+            if wheel not in self._steering:
+                raise RoverFileError(f"missing key steering.{wheel}; both wheels of an axle steer")
+        if not axles:
+            return {}
+        joints = self._steering.values()
+        limit = min(min(abs(joint.lower), abs(joint.upper)) for joint in joints)
+        rate = min(joint.velocity for joint in joints)
+        return {"wheels": axles, **_finite(limit=limit, rate=rate)}
 
     def _masses(self) -> dict[str, Any]:
         """Return body, rocker and bogie; what a wheel weighs beyond the lightest is its link's."""
-        wheel_mass, tree = self._wheel_mass(), self._tree
-        on_rockers = [self._on_rocker[side] for side in SIDES]
-        body = tree.lump(set(self._robot.links) - on_rockers[0] - on_rockers[1])
+        masses, wheel_mass = self._posture.masses, self._wheel_mass()
+        body = masses(set(self._robot.links) - self._on_rocker["right"] - self._on_rocker["left"])
         if self._joints.arm is not None:
-            body = body - tree.lump({self._joints.arm.tip})
-        parts: dict[str, dict[str, Lump]] = {"rocker": {}, "bogie": {}}
-        for side, on_rocker in zip(SIDES, on_rockers, strict=True):
-            on_bogie = self._on_bogie(side)
-            parts["rocker"][side] = tree.lump(on_rocker - on_bogie)
-            parts["bogie"][side] = tree.lump(on_bogie)
+            body = body - masses({self._joints.arm.tip})
+        parts: dict[str, dict[str, Floats]] = {"rocker": {}, "bogie": {}}
+        for side in SIDES:
+            on_bogie = self._on_bogie[side]
+            parts["rocker"][side] = masses(self._on_rocker[side] - on_bogie)
+            parts["bogie"][side] = masses(on_bogie)
             for position in WHEEL_POSITIONS:
                 wheel = f"{position}_{side}"
                 part = "bogie" if self._wheels[wheel].child in on_bogie else "rocker"
-                point = Lump(wheel_mass, wheel_mass * self._wheel_centre(wheel))
-                parts[part][side] = parts[part][side] - point
+                parts[part][side] -= wheel_mass * np.append(1.0, self._wheel_centre(wheel))
         pivots = {"rocker": self._rockers, "bogie": self._bogies}
         found: dict[str, Any] = {
-            "body": {"mass": body.mass, "com": body.com(np.zeros(3)).tolist()}
+            "body": {"mass": float(body[0]), "com": _com(body, np.zeros(3)).tolist()}
         }
-        for name, lumps in parts.items():
-            mass = 0.5 * (lumps["right"].mass + lumps["left"].mass)
+        for name, sides in parts.items():
+            mass = 0.5 * float(sides["right"][0] + sides["left"][0])
+            coms = {
+                side: _com(sides[side], self._posture.point(pivots[name][side].child))
+                for side in SIDES
+            }
             found[name] = {
                 "mass": mass if mass > 1e-12 else 0.0,
-                "com": self._mean(
-                    ("masses", name, "com"),
-                    {side: lumps[side].com(tree.origin(pivots[name][side])) for side in SIDES},
-                ),
+                "com": self._mean(("masses", name, "com"), coms),
             }
         return found
 
     def _wheel_mass(self) -> float:
         """Return the mass of the lightest wheel with what steers it [kg]."""
-        lumps = [
-            self._tree.lump(self._tree.links_on(self._steering.get(wheel, self._wheels[wheel])))
-            for wheel in WHEELS
-        ]
-        return min(lump.mass for lump in lumps)
+        joints = [self._steering.get(wheel, self._wheels[wheel]) for wheel in WHEELS]
+        return min(self._mass_of(self._robot.links_on(joint)) for joint in joints)
 
-    def _on_bogie(self, side: str) -> set[str]:
-        return self._tree.links_on(self._bogies[side])
+    def _mass_of(self, links: set[str]) -> float:
+        return float(self._posture.masses(links)[0])
 
     def _belly(self) -> dict[str, Any]:
         """Return the underside of the lowest box of the body; nothing if there is none."""
-        links = self._tree.rigid_group(self._rockers["right"].parent)
+        links = self._robot.rigid_group(self._rockers["right"].parent)
         links -= self._on_rocker["right"] | self._on_rocker["left"]
-        boxes = [_bounds(*box) for box in self._tree.solids(links, "box")]
+        boxes = [_bounds(*box) for box in self._posture.solids(links, "box")]
         if not boxes:
             return {}
         low, high = min(boxes, key=lambda box: box[0][2])
         return {"z": low[2], "x": [low[0], high[0]], "y": [low[1], high[1]]}
 
+    def _arm(self) -> dict[str, Any]:
+        """Return the contents of `manipulator` of a rover file; nothing if the map has no arm.
 
-def level_wheels(robot: Robot, joints: UrdfJointMap) -> Levelling:
+        Raises:
+            RoverFileError: A joint or link is missing, or the arm is no column with two links that
+                point forward at 0.
+        """
+        arm = self._joints.arm
+        if arm is None:
+            return {}
+        joints = [self._robot.joint(name) for name in arm.joints]
+        groups = [self._robot.links_on(joint) for joint in joints]
+        if arm.tip not in groups[2]:
+            raise RoverFileError(
+                f"arm.tip: link {arm.tip!r} does not hang on joint {arm.joints[2]}"
+            )
+        links = [*(joint.child for joint in joints), arm.tip]
+        points = np.array([self._posture.point(link) for link in links])
+        lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        model = Manipulator(
+            tuple(points[0]), arm.joints, tuple(lengths), (0.0, 0.0, 0.0), arm.stowed
+        )  # fmt: skip
+        off = np.abs(link_points(model, np.array(arm.stowed)) - points).max()
+        if off > ARM_TOLERANCE:
+            raise RoverFileError(
+                f"arm: its joints are {off:.3g} m off a column along z with two links that point "
+                "along x at 0 and turn about y; leave arm out, so that the arm is part of the body"
+            )
+        return {
+            "base": points[0].tolist(),
+            "joints": list(arm.joints),
+            "link_lengths": lengths.tolist(),
+            "link_masses": [
+                self._mass_of(group - further)
+                for group, further in zip(groups, [*groups[1:], {arm.tip}], strict=True)
+            ],
+            "stowed": list(arm.stowed),
+            "payload": self._mass_of({arm.tip}),
+            **_finite(joint_limits=[[joint.lower, joint.upper] for joint in joints]),
+        }
+
+
+def level_wheels(reading: _Reading) -> Levelling:
     """Find the pitch and the bogie angle at which all wheels are level.
 
     Returns:
@@ -460,11 +471,8 @@ def level_wheels(robot: Robot, joints: UrdfJointMap) -> Levelling:
         RoverFileError: There are none within MAX_ANGLE.
     """
 
-    def find_heights(angles: Floats) -> list[float]:
-        return _Reading(robot, joints, Levelling(*angles.tolist())).wheel_heights()
-
     def differ(angles: Floats) -> Floats:
-        rear, middle, front = find_heights(angles)
+        rear, middle, front = reading.turn(Levelling(*angles.tolist())).wheel_heights()
         return np.array([middle - rear, front - rear])
 
     angles = np.zeros(2)
@@ -473,7 +481,7 @@ def level_wheels(robot: Robot, joints: UrdfJointMap) -> Levelling:
         if np.abs(off).max() <= LEVEL * 1e-3:
             break
         if not angles.any() and np.abs(off).max() <= LEVEL:
-            return NOT_LEVELLED
+            return Levelling()
         matrix = np.column_stack(
             [(differ(angles + step) - off) / STEP for step in STEP * np.eye(2)]
         )
@@ -483,7 +491,7 @@ def level_wheels(robot: Robot, joints: UrdfJointMap) -> Levelling:
         if np.abs(angles).max() > MAX_ANGLE:
             break
     if np.abs(angles).max() > MAX_ANGLE or np.abs(differ(angles)).max() > LEVEL:
-        rear, middle, front = find_heights(np.zeros(2))
+        rear, middle, front = reading.wheel_heights()
         raise RoverFileError(
             f"wheels at angle 0 are not level: rear {rear:.4g}, middle {middle:.4g}, front "
             f"{front:.4g} m; give the angles of joints on flat ground, or correct axes"
@@ -491,59 +499,23 @@ def level_wheels(robot: Robot, joints: UrdfJointMap) -> Levelling:
     return Levelling(*angles.tolist())
 
 
-def _read_arm(tree: JointTree, arm: ArmMap) -> dict[str, Any]:
-    """Return the contents of `manipulator` of a rover file.
-
-    Args:
-        tree: The robot in the body frame, the arm stowed.
-        arm: Its joints.
-
-    Raises:
-        RoverFileError: A joint or link is missing, or the arm is no column with two links that
-            point forward at 0.
-    """
-    joints = [tree.joint(name) for name in arm.joints]
-    if arm.tip not in tree.links_on(joints[2]):
-        raise RoverFileError(f"arm.tip: link {arm.tip!r} does not hang on joint {arm.joints[2]}")
-    points = np.array([*(tree.origin(joint) for joint in joints), tree.place(arm.tip)[:3, 3]])
-    lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    masses = []
-    groups = [tree.links_on(joint) for joint in joints]
-    for group, inner in zip(groups, [*groups[1:], {arm.tip}], strict=True):
-        masses.append(tree.lump(group - inner).mass)
-    found: dict[str, Any] = {
-        "base": points[0].tolist(),
-        "joints": list(arm.joints),
-        "link_lengths": lengths.tolist(),
-        "link_masses": masses,
-        "stowed": list(arm.stowed),
-        "payload": tree.lump({arm.tip}).mass,
-    }
-    limits = [[joint.limit.lower, joint.limit.upper] for joint in joints]
-    if np.isfinite(limits).all():
-        found["joint_limits"] = limits
-    model = Manipulator(
-        tuple(points[0]), arm.joints, tuple(lengths), (0.0, 0.0, 0.0), arm.stowed
-    )  # fmt: skip
-    off = np.abs(link_points(model, np.array(arm.stowed)) - points).max()
-    if off > ARM_TOLERANCE:
+def _check_below(key: str, joint: Joint, above: Joint, links: set[str]) -> None:
+    """Check that a joint hangs on another one, on which `links` do."""
+    if joint.child == above.child or joint.child not in links:
         raise RoverFileError(
-            f"arm: its joints are {off:.3g} m off a column along z with two links that point "
-            "along x at 0 and turn about y; leave arm out, so that the arm is part of the body"
+            f"{key}: its link {joint.child} does not hang on {above.child} in the URDF; where "
+            "the parts of a rocker have joints of their own, name those under fixed"
         )
-    return found
 
 
-def _angle_to_y(axis: Floats) -> float:
-    """Return the angle between an axis (3,) and y, in either direction [rad]."""
-    return float(np.arctan2(np.hypot(axis[0], axis[2]), abs(axis[1])))
+def _com(masses: Floats, missing: Floats) -> Floats:
+    """Return the centre of mass (3,) [m] of `Posture.masses`; `missing` if there is no mass."""
+    return masses[1:] / masses[0] if masses[0] > 0.0 else missing
 
 
-def _pose(rotation: Floats) -> Floats:
-    """Return a rotation (3, 3) as a pose (4, 4)."""
-    pose = np.eye(4)
-    pose[:3, :3] = rotation
-    return pose
+def _finite(**limits: Any) -> dict[str, Any]:
+    """Return limits without those that are infinite, which the URDF does not set."""
+    return {key: limit for key, limit in limits.items() if np.isfinite(limit).all()}
 
 
 def _bounds(box: Solid, place: Floats) -> tuple[list[float], list[float]]:

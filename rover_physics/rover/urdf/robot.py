@@ -6,7 +6,9 @@ import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -26,7 +28,11 @@ MAX_NUMBER = 1e9
 """Largest coordinate, size or mass [m, kg]."""
 MOVING = ("revolute", "continuous", "prismatic")
 KINDS = (*MOVING, "fixed", "floating", "planar")
-X_AXIS = (1.0, 0.0, 0.0)
+ORIGIN, X_AXIS = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)
+ABSENT = (math.nan,)
+"""Stands for a number that must be there: an error if it is not."""
+
+Element = ElementTree.Element
 
 
 @dataclass(frozen=True)
@@ -54,23 +60,11 @@ class Link:
 
 
 @dataclass(frozen=True)
-class JointLimit:
-    """Limits of a joint; inf where the file sets none."""
-
-    lower: float = -math.inf
-    """[rad] or [m]."""
-    upper: float = math.inf
-    """[rad] or [m]."""
-    effort: float = math.inf
-    """[N m] or [N]."""
-    velocity: float = math.inf
-    """[rad/s] or [m/s]."""
-
-
-@dataclass(frozen=True)
 class Joint:
-    """A connection of two links."""
+    """A connection of two links; limits are inf where the file sets none."""
 
+    name: str
+    """Its name."""
     kind: str
     """One of KINDS."""
     parent: str
@@ -81,8 +75,14 @@ class Joint:
     """(4, 4) pose of the child in the parent's frame at angle 0 [m]."""
     axis: Floats
     """(3,) unit vector in the child's frame."""
-    limit: JointLimit
-    """Range, torque and speed."""
+    lower: float = -math.inf
+    """[rad] or [m]."""
+    upper: float = math.inf
+    """[rad] or [m]."""
+    effort: float = math.inf
+    """[N m] or [N]."""
+    velocity: float = math.inf
+    """[rad/s] or [m/s]."""
 
 
 @dataclass(frozen=True)
@@ -95,12 +95,60 @@ class Robot:
     """Links by name."""
     joints: dict[str, Joint]
     """Joints by name."""
-    root: str
-    """Name of the link without a parent."""
 
-    def joint_of(self, link: str) -> Joint | None:
-        """Return the joint that carries a link, None for the root."""
-        return next((joint for joint in self.joints.values() if joint.child == link), None)
+    @cached_property
+    def carriers(self) -> dict[str, Joint]:
+        """The joint that carries each link but the root."""
+        return {joint.child: joint for joint in self.joints.values()}
+
+    @cached_property
+    def carried(self) -> dict[str, list[Joint]]:
+        """The joints whose parent is a link, for each link from the root outwards."""
+        hung: dict[str, list[Joint]] = {}
+        for joint in self.joints.values():
+            hung.setdefault(joint.parent, []).append(joint)
+        order = [next(name for name in self.links if name not in self.carriers)]
+        for link in order:
+            order += [joint.child for joint in hung.get(link, ())]
+        return {link: hung.get(link, []) for link in order}
+
+    def joint(self, name: str) -> Joint:
+        """Return a joint by its name.
+
+        Raises:
+            RoverFileError: There is no such joint.
+        """
+        if name not in self.joints:
+            known = [other for other, joint in self.joints.items() if joint.kind in MOVING]
+            raise RoverFileError(
+                f"no joint {name!r} in the URDF; {suggest(name, known)}its moving joints are "
+                f"{', '.join(known)}"
+            )
+        return self.joints[name]
+
+    def joints_between(self, link: str, above: str) -> list[Joint]:
+        """Return the joints between a link and one that it hangs on, the nearest first."""
+        found = []
+        while link != above and link in self.carriers:
+            found.append(self.carriers[link])
+            link = self.carriers[link].parent
+        return found
+
+    def links_on(self, joint: Joint) -> set[str]:
+        """Return the names of all links that hang on a joint."""
+        found = [joint.child]
+        for link in found:
+            found += [other.child for other in self.carried[link]]
+        return set(found)
+
+    def rigid_group(self, link: str) -> set[str]:
+        """Return the links that move as one with a link: it, and all it is fixed to."""
+        while link in self.carriers and self.carriers[link].kind == "fixed":
+            link = self.carriers[link].parent
+        found = [link]
+        for name in found:
+            found += [joint.child for joint in self.carried[name] if joint.kind == "fixed"]
+        return set(found)
 
 
 def read_robot(path: Path) -> Robot:
@@ -138,37 +186,36 @@ def parse_robot(text: bytes) -> Robot:
             raise RoverFileError(f"has two <{tag}> of the same name, {describe(twice)}")
     links = {_name(element): _read_link(element) for element in top.findall("link")}
     joints = {_name(element): _read_joint(element, links) for element in top.findall("joint")}
-    return Robot(top.get("name", "rover"), links, joints, _find_root(links, joints))
+    robot = Robot(top.get("name", "rover"), links, joints)
+    _check_tree(robot)
+    return robot
 
 
-def _read_link(element: ElementTree.Element) -> Link:
+def _read_link(element: Element) -> Link:
     """Return a link; a missing inertial means no mass."""
-    inertial = element.find("inertial")
-    mass, com = 0.0, np.zeros(3)
-    if inertial is not None:
-        weight = inertial.find("mass")
-        mass = _number(weight, "value", _name(element)) if weight is not None else 0.0
-        com = _read_place(inertial, _name(element))[:3, 3]
+    name, weight = _name(element), element.find("inertial/mass")
+    mass = 0.0 if weight is None else float(_numbers(weight, "value", name, ABSENT)[0])
     if mass < 0.0:
-        raise RoverFileError(f"link {_name(element)}: mass is {mass:g}; it must not be negative")
-    solids = [_read_solid(part, _name(element)) for part in element.findall("collision")]
+        raise RoverFileError(f"link {name}: mass is {mass:g}; it must not be negative")
+    com = _read_place(element.find("inertial/origin"), name)[:3, 3]
+    solids = [_read_solid(part, name) for part in element.findall("collision")]
     return Link(mass, com, tuple(solid for solid in solids if solid is not None))
 
 
-def _read_solid(element: ElementTree.Element, link: str) -> Solid | None:
+def _read_solid(element: Element, link: str) -> Solid | None:
     """Return the box or cylinder of a collision element, None for a mesh or sphere."""
-    place = _read_place(element, link)
+    place = _read_place(element.find("origin"), link)
     cylinder, box = element.find("geometry/cylinder"), element.find("geometry/box")
     if cylinder is not None:
-        size = _number(cylinder, "radius", link), _number(cylinder, "length", link)
-        return Solid("cylinder", size, place)
+        size = [_numbers(cylinder, key, link, ABSENT)[0] for key in ("radius", "length")]
+        return Solid("cylinder", (float(size[0]), float(size[1])), place)
     if box is not None:
-        return Solid("box", tuple(_vector(box, "size", (0.0, 0.0, 0.0), link).tolist()), place)
+        return Solid("box", tuple(_numbers(box, "size", link, ORIGIN).tolist()), place)
     return None
 
 
-def _read_joint(element: ElementTree.Element, links: dict[str, Link]) -> Joint:
-    """Return a joint between links that exist."""
+def _read_joint(element: Element, links: dict[str, Link]) -> Joint:
+    """Return a joint between links that exist; 0 as its torque or speed counts as not given."""
     name, kind = _name(element), element.get("type", "")
     if kind not in KINDS:
         raise RoverFileError(f"joint {name}: type is {kind!r}; it must be {', '.join(KINDS)}")
@@ -179,191 +226,116 @@ def _read_joint(element: ElementTree.Element, links: dict[str, Link]) -> Joint:
         if link not in links:
             raise RoverFileError(f"joint {name}: {tag} {link!r} is no link of this file")
         ends.append(link)
-    axis = _vector(element.find("axis"), "xyz", X_AXIS, name)
+    axis = _numbers(element.find("axis"), "xyz", name, X_AXIS)
     length = float(np.linalg.norm(axis))
     if kind in MOVING and not length > 0.0:
         raise RoverFileError(f"joint {name}: axis is 0 0 0; it must have a direction")
-    place = _read_place(element, name)
-    parent, child = ends
-    return Joint(
-        kind, parent, child, place, axis / (length or 1.0), _read_limit(element, name, kind)
-    )
-
-
-def _read_limit(element: ElementTree.Element, name: str, kind: str) -> JointLimit:
-    """Return the limits of a joint; 0 as torque or speed counts as not given."""
-    limit = element.find("limit")
-    if limit is None:
-        return JointLimit()
-
-    def read(key: str, missing: float) -> float:
-        value = missing if limit.get(key) is None else _number(limit, key, name, math.inf)
-        return value if abs(value) < UNLIMITED else math.copysign(math.inf, value)
-
-    lower, upper = read("lower", 0.0), read("upper", 0.0)
+    place, limit = _read_place(element.find("origin"), name), element.find("limit")
+    limits: dict[str, Any] = {}
+    for key in ("lower", "upper", "effort", "velocity") if limit is not None else ():
+        value = float(_numbers(limit, key, name, (0.0,), math.inf)[0])
+        value = value if abs(value) < UNLIMITED else math.copysign(math.inf, value)
+        limits[key] = value if value or key in ("lower", "upper") else math.inf
     if kind == "continuous":
-        lower, upper = -math.inf, math.inf
-    return JointLimit(
-        lower, upper, read("effort", 0.0) or math.inf, read("velocity", 0.0) or math.inf
-    )
+        limits |= {"lower": -math.inf, "upper": math.inf}
+    parent, child = ends
+    return Joint(name, kind, parent, child, place, axis / (length or 1.0), **limits)
 
 
-def _read_place(element: ElementTree.Element, name: str) -> Floats:
-    """Return the (4, 4) pose of an element's origin."""
-    origin = element.find("origin")
-    place = np.eye(4)
-    rpy = _vector(origin, "rpy", (0.0, 0.0, 0.0), name)
+def _read_place(origin: Element | None, name: str) -> Floats:
+    """Return the (4, 4) pose of an origin."""
+    place, rpy = np.eye(4), _numbers(origin, "rpy", name, ORIGIN)
     if rpy.any():
         place[:3, :3] = Rotation.from_euler("xyz", rpy).as_matrix()
-    place[:3, 3] = _vector(origin, "xyz", (0.0, 0.0, 0.0), name)
+    place[:3, 3] = _numbers(origin, "xyz", name, ORIGIN)
     return place
 
 
-def _vector(
-    element: ElementTree.Element | None, key: str, missing: tuple[float, ...], name: str
+def _numbers(
+    element: Element | None,
+    key: str,
+    name: str,
+    absent: tuple[float, ...],
+    most: float = MAX_NUMBER,
 ) -> Floats:
-    """Return three numbers of an attribute."""
+    """Return the numbers of an attribute, each of at most `most` and at least its negative.
+
+    There are as many as in `absent`, which holds where the attribute is absent.
+    """
     text = None if element is None else element.get(key)
-    if text is None:
-        return np.array(missing)
     try:
-        numbers = np.array([float(word) for word in text.split()])
+        numbers = np.array(absent if text is None else [float(word) for word in text.split()])
     except ValueError:
         numbers = np.empty(0)
-    if numbers.shape != (3,) or not (np.abs(numbers) <= MAX_NUMBER).all():
-        raise RoverFileError(f"{name}: {key} is {describe(text)}; it must be 3 numbers")
+    if len(numbers) != len(absent) or not (np.abs(numbers) <= most).all():
+        must = "a number" if len(absent) == 1 else f"{len(absent)} numbers"
+        raise RoverFileError(f"{name}: {key} is {describe(text)}; it must be {must}")
     return numbers
 
 
-def _number(element: ElementTree.Element, key: str, name: str, most: float = MAX_NUMBER) -> float:
-    """Return a number of an attribute, of at most `most` and at least its negative."""
-    text = element.get(key)
-    try:
-        number = float(text or "")
-    except ValueError:
-        number = math.nan
-    if not abs(number) <= most:
-        raise RoverFileError(f"{name}: {key} is {describe(text)}; it must be a number")
-    return number
-
-
-def _name(element: ElementTree.Element) -> str:
+def _name(element: Element) -> str:
     name = element.get("name", "")
     if not name:
         raise RoverFileError(f"has a <{element.tag}> without a name")
     return name
 
 
-def _find_root(links: dict[str, Link], joints: dict[str, Joint]) -> str:
-    """Return the link without a parent; all others must hang on it."""
-    children = Counter(joint.child for joint in joints.values())
+def _check_tree(robot: Robot) -> None:
+    """Check that all links hang on one."""
+    children = Counter(joint.child for joint in robot.joints.values())
     twice = next((name for name, count in children.items() if count > 1), None)
     if twice is not None:
         raise RoverFileError(f"link {twice} hangs on two joints; a URDF is a tree")
-    roots = links.keys() - set(children)
+    roots = sorted(robot.links.keys() - children)
     if len(roots) != 1:
         raise RoverFileError(
-            f"has {len(roots)} links without a parent; a URDF has one ({', '.join(sorted(roots))})"
+            f"has {len(roots)} links without a parent; a URDF has one ({', '.join(roots)})"
         )
-    return roots.pop()
+    lost = sorted(robot.links.keys() - robot.carried.keys())
+    if lost:
+        raise RoverFileError(f"link {lost[0]} hangs on itself; a URDF is a tree")
 
 
-@dataclass(frozen=True)
-class Lump:
-    """Mass of several links as one."""
+class Posture:
+    """A robot with its joints at angles; all positions are in one frame of choice."""
 
-    mass: float
-    """[kg]."""
-    moment: Floats
-    """(3,) mass times centre of mass, in the frame of the tree [kg m]."""
-
-    def __add__(self, other: "Lump") -> "Lump":
-        """Return both as one."""
-        return Lump(self.mass + other.mass, self.moment + other.moment)
-
-    def __sub__(self, other: "Lump") -> "Lump":
-        """Return this one without the other one."""
-        return Lump(self.mass - other.mass, self.moment - other.moment)
-
-    def com(self, missing: Floats) -> Floats:
-        """Return the centre of mass (3,) [m]; `missing` if there is no mass."""
-        return self.moment / self.mass if self.mass > 0.0 else missing
-
-
-class JointTree:
-    """A robot in one posture; all positions are in one frame of choice."""
-
-    def __init__(self, robot: Robot, angles: Mapping[str, float], frame: Floats):
-        """Place the links.
+    def __init__(self, robot: Robot, angles: Mapping[str, float], rotation: Floats):
+        """Place the links, the root at the origin.
 
         Args:
             robot: The robot.
             angles: Angles of joints by name [rad]; 0 for all others.
-            frame: (4, 4) pose of the root link in the frame of choice.
+            rotation: (3, 3), turns vectors of the root link into the frame of choice.
         """
-        self.robot = robot
-        self._children: dict[str, list[Joint]] = {}
-        for joint in robot.joints.values():
-            self._children.setdefault(joint.parent, []).append(joint)
-        self._angles = {id(self.joint(name)): angle for name, angle in angles.items()}
-        self._places: dict[str, Floats] = {robot.root: frame}
-        self._order = [robot.root]
-        for link in self._order:
-            for joint in self._children.get(link, ()):
-                self._places[joint.child] = self._places[link] @ self._place_of(joint)
-                self._order.append(joint.child)
-        lost = robot.links.keys() - self._places.keys()
-        if lost:
-            raise RoverFileError(f"link {sorted(lost)[0]} hangs on itself; a URDF is a tree")
+        self._robot = robot
+        self._places: dict[str, Floats] = {}
+        for link, joints in robot.carried.items():
+            if not self._places:
+                self._places[link] = np.eye(4)
+                self._places[link][:3, :3] = rotation
+            for joint in joints:
+                place = _place_of(joint, angles.get(joint.name, 0.0))
+                self._places[joint.child] = self._places[link] @ place
 
-    def joint(self, name: str) -> Joint:
-        """Return a joint by its name.
+    def move(self, shift: Floats) -> None:
+        """Move all by (3,) [m]."""
+        for place in self._places.values():
+            place[:3, 3] += shift
 
-        Raises:
-            RoverFileError: There is no such joint.
-        """
-        if name not in self.robot.joints:
-            known = [other for other, joint in self.robot.joints.items() if joint.kind in MOVING]
-            raise RoverFileError(
-                f"no joint {name!r} in the URDF; {suggest(name, known)}its moving joints are "
-                f"{', '.join(known)}"
-            )
-        return self.robot.joints[name]
-
-    def place(self, link: str) -> Floats:
-        """Return the pose (4, 4) of a link [m]."""
-        return self._places[link]
-
-    def origin(self, joint: Joint) -> Floats:
-        """Return the position (3,) of a joint [m]."""
-        return self._places[joint.child][:3, 3]
+    def point(self, link: str) -> Floats:
+        """Return the position (3,) of a link, and of the joint that carries it [m]."""
+        return self._places[link][:3, 3]
 
     def axis(self, joint: Joint) -> Floats:
         """Return the axis (3,) of a joint, a unit vector."""
         return self._places[joint.child][:3, :3] @ joint.axis
 
-    def joints_between(self, link: str, above: str) -> list[str]:
-        """Return the names of the joints between a link and one that it hangs on."""
-        names = {joint.child: name for name, joint in self.robot.joints.items()}
-        found = []
-        while link != above and link in names:
-            found.append(names[link])
-            link = self.robot.joints[names[link]].parent
-        return found
-
-    def links_on(self, joint: Joint) -> set[str]:
-        """Return the names of all links that hang on a joint."""
-        found = [joint.child]
-        for link in found:
-            found += [other.child for other in self._children.get(link, ())]
-        return set(found)
-
-    def lump(self, links: set[str]) -> Lump:
-        """Return the mass of links as one."""
-        total = Lump(0.0, np.zeros(3))
+    def masses(self, links: set[str]) -> Floats:
+        """Return the mass of links [kg], and that times their centre of mass [kg m]: (4,)."""
+        total = np.zeros(4)
         for name in sorted(links):
-            link, place = self.robot.links[name], self._places[name]
-            total += Lump(link.mass, link.mass * (place[:3, :3] @ link.com + place[:3, 3]))
+            link, place = self._robot.links[name], self._places[name]
+            total += link.mass * np.append(1.0, place[:3, :3] @ link.com + place[:3, 3])
         return total
 
     def solids(self, links: set[str], kind: str) -> list[tuple[Solid, Floats]]:
@@ -371,32 +343,18 @@ class JointTree:
         return [
             (solid, self._places[name] @ solid.place)
             for name in sorted(links)
-            for solid in self.robot.links[name].solids
+            for solid in self._robot.links[name].solids
             if solid.kind == kind
         ]
 
-    def rigid_group(self, link: str) -> set[str]:
-        """Return the links that move as one with a link: it, and all it is fixed to."""
-        found = [link]
-        for name in found:
-            found += [
-                joint.child
-                for joint in self._children.get(name, ())
-                if joint.kind == "fixed" and joint.child not in found
-            ]
-            above = self.robot.joint_of(name)
-            if above is not None and above.kind == "fixed" and above.parent not in found:
-                found.append(above.parent)
-        return set(found)
 
-    def _place_of(self, joint: Joint) -> Floats:
-        """Return the pose (4, 4) of a joint's child in its parent."""
-        angle = self._angles.get(id(joint), 0.0)
-        if angle == 0.0 or joint.kind not in MOVING:
-            return joint.place
-        turn = np.eye(4)
-        if joint.kind == "prismatic":
-            turn[:3, 3] = angle * joint.axis
-        else:
-            turn[:3, :3] = Rotation.from_rotvec(angle * joint.axis).as_matrix()
-        return joint.place @ turn
+def _place_of(joint: Joint, angle: float) -> Floats:
+    """Return the pose (4, 4) of a joint's child in its parent."""
+    if angle == 0.0 or joint.kind not in MOVING:
+        return joint.place
+    turn = np.eye(4)
+    if joint.kind == "prismatic":
+        turn[:3, 3] = angle * joint.axis
+    else:
+        turn[:3, :3] = Rotation.from_rotvec(angle * joint.axis).as_matrix()
+    return joint.place @ turn

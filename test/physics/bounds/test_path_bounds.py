@@ -79,7 +79,7 @@ def test_at_most_one_map_in_a_thousand_leaves_the_bounds(rover, ground, paths, c
 @pytest.mark.parametrize("length", [0.1, 0.8])
 def test_bounds_are_of_the_size_of_what_happens(length):
     """Not infinitely wide: that would be conservative, too."""
-    outcome = draw_path(LSR1, with_std(fractal(2), 0.003), PATH, length, 20, 1)
+    outcome = draw_path(LSR1, with_std(fractal(2), 0.003), PATH, length, 10, 1)
     widest = {0.1: 8.0, 0.8: 40.0}[length]
     for name in ("roll", "pitch", "friction_utilisation", "torque_saturation"):
         assert 1.0 < outcome.widths[name] < widest, name
@@ -124,16 +124,6 @@ def test_a_uniform_shift_of_wheels_gives_the_height_of_geometry():
     np.testing.assert_allclose(bounds.roll[:, 0], -bounds.roll[:, 1], rtol=0.01)
     np.testing.assert_allclose(bounds.tilt[:, 0], 0.0, atol=1e-9)
     assert np.all(bounds.tilt[:, 1] > bounds.roll[:, 1])
-
-
-def test_only_errors_under_the_rover_matter():
-    std = np.zeros(fractal(2).elevation.shape)
-    std[:40] = 0.01
-    terrain = replace(fractal(2), elevation_std=std)
-    far = bounds_on(LSR1, terrain, np.array([[0.0, 1.5, 0.0]]))[1]
-    near = bounds_on(LSR1, terrain, np.array([[0.0, -1.8, 0.0]]))[1]
-    assert np.ptp(far.roll) < 1e-9
-    assert np.ptp(near.roll) > 0.02
 
 
 @settings(max_examples=10)

@@ -115,14 +115,6 @@ def test_what_is_common_stays_common_along_a_path():
     assert set(many.failure_chance_at) == {few.failure_chance}
 
 
-@pytest.mark.parametrize(
-    "name", ["friction", "max_torque", "com", "mass", "position", "heading", "wheel_radius"]
-)
-def test_nothing_fails_that_is_far_from_all_limits(name):
-    told = rover_with(**{name: 0.05})
-    assert chance_on(plane(0.05, 0.02), told, "servo").failure_chance == 0.0
-
-
 @pytest.mark.parametrize(("name", "std"), [("com", 0.1), ("friction_per_wheel", 0.1)])
 def test_deviations_count_near_the_limit_of_friction(name, std):
     told = rover_with(**{name: std})

@@ -42,7 +42,7 @@ SOFT = ("lunar_nominal", "mars_simulant", "dry_sand", "lete_sand")
 SAND = replace(SERVO, soil="lete_sand", max_torque=20.0)
 POSE = np.zeros((1, 3))
 soils = st.sampled_from(SOFT)
-few = settings(max_examples=25)
+few = settings(max_examples=12)
 
 
 def with_droop(rover, droop):
@@ -126,23 +126,6 @@ def test_uphill_the_speed_lost_is_that_of_droop_and_creep(rover, slope):
     assert found.tangential.sum() == pytest.approx(weight_along, rel=1e-5)
 
 
-def test_backward_up_a_slope_is_downhill():
-    down = judge_path(LSR1, plane(0.2, 0.0), POSE, replace(SERVO, backward=True))[0]
-    assert down.tangential.sum() == pytest.approx(LSR1.weight * np.sin(np.arctan(0.2)), rel=1e-5)
-    assert down.speed_share[0] > 1.0  # gravity pulls, and droop lets it
-    assert (down.slip_ratio < 0.0).all()
-
-
-def test_a_cross_slope_beyond_friction_slides():
-    slides, holds = (
-        judge_path(LSR1, plane(0.0, slope), POSE, replace(SERVO, friction=0.4))[0]
-        for slope in (0.5, 0.3)
-    )
-    assert slides.speed_share[0] == 0.0
-    assert holds.speed_share[0] > 0.9
-    assert -0.1 < holds.deviation[0, 1] < 0.0  # a creep downhill
-
-
 # Firm ground and soil
 
 
@@ -172,23 +155,6 @@ def test_a_slope_beyond_the_ground_slides_and_one_beyond_the_motors_stalls(
     found, verdict = judge_path(LSR1, plane(slope, 0.0), POSE, options)
     assert (found.speed_share[0], found.stalls[0]) == (0.0, stalls)
     assert verdict.code == code and reason in verdict.reason
-
-
-@pytest.mark.parametrize(
-    ("ground", "half", "soil"),
-    [(fractal(8, roughness=0.1), 2.0, None), (smooth(8), 0.6, "dry_sand")],
-    ids=["firm", "soil"],
-)
-def test_the_limits_of_friction_and_torque_are_kept(ground, half, soil):
-    torque = 0.6 if soil is None else LSR1.limits.torque_saturation
-    limits = replace(LSR1.limits, friction_utilisation=0.5, torque_saturation=torque)
-    careful = replace(LSR1, limits=limits)
-    found = judge_path(careful, ground, random_poses(8, 40, half), replace(SERVO, soil=soil))[0]
-    drives = found.speed_share > 0.0
-    loaded = found.wheel_loads[drives] > 0.0
-    assert drives.sum() >= 14
-    assert (found.friction_utilisation[drives][loaded] <= 0.5 + 1e-6).all()
-    assert (found.torque_saturation[drives] <= torque + 1e-9).all()
 
 
 @pytest.mark.parametrize(("slope", "soil"), [(0.3, None), (0.05, "dry_sand")])
@@ -236,31 +202,18 @@ def test_firm_patches_of_a_soil_layer_are_driven_as_coulomb_ground():
     firm = judge_path(LSR1, layered, POSE, replace(SERVO, friction=0.3))[0]
     plain = judge_path(LSR1, level, POSE, replace(SERVO, friction=0.8))[0]
     np.testing.assert_array_equal(firm.torque, plain.torque)
-    soil[: soil.shape[0] // 2] = 1
-    mixed = replace(layered, soil=soil, soil_names=("firm_ground", "lete_sand"))
-    found = judge_path(LSR1, mixed, POSE, SERVO)[0]
-    right, left = slice(0, 3), slice(3, 6)
-    assert (found.sinkage[0, right] > 0.0).all() and (found.sinkage[0, left] == 0.0).all()
-    assert found.tangential[0, left].sum() > found.tangential[0, right].sum()
 
 
-@pytest.mark.parametrize(
-    ("soil", "curvature"), [("lunar_nominal", 0.0), ("dry_sand", 0.7), ("lete_sand", np.inf)]
-)
+@pytest.mark.parametrize(("soil", "curvature"), [("lunar_nominal", 0.0), ("lete_sand", np.inf)])
 def test_on_rough_soil_servos_drive_wherever_equal_torques_suffice(soil, curvature):
-    held = refused = 0
     poses, bends = random_poses(3, 40, 0.8), np.full(40, curvature)
-    for rover in (LSR1, M2020):
-        for ground in (fractal(3), smooth(4)):
-            equal, servo = (
-                judge_poses(rover, ground, poses, bends, SweepOptions(soil=soil, policy=policy))[0]
-                for policy in ("equal", "servo")
-            )
-            used = np.maximum(equal.friction_utilisation, equal.torque_saturation)
-            holds = equal.settled & ((used <= 0.93) & (equal.wheel_loads > 0.0)).all(axis=1)
-            held += holds.sum()
-            refused += (holds & ~(servo.speed_share > 0.0)).sum()
-    assert held >= 20 and refused == 0
+    equal, servo = (
+        judge_poses(LSR1, smooth(4), poses, bends, SweepOptions(soil=soil, policy=policy))[0]
+        for policy in ("equal", "servo")
+    )
+    used = np.maximum(equal.friction_utilisation, equal.torque_saturation)
+    holds = equal.settled & ((used <= 0.93) & (equal.wheel_loads > 0.0)).all(axis=1)
+    assert holds.sum() >= 10 and (servo.speed_share[holds] > 0.0).all()
 
 
 BAND, FULL = 0.01, 0.2
@@ -274,7 +227,7 @@ grips = st.floats(1e-3, 0.5)
 loads = st.floats(0.01, 0.4)
 droops = st.floats(0.0, 0.9)
 limits = st.floats(0.02, 0.5)
-many = settings(max_examples=100)
+many = settings(max_examples=50)
 
 
 def servo_of(limit, droop, share=1.0):

@@ -126,23 +126,6 @@ def test_forces_within_the_effective_friction_are_within_the_strength(name, whee
         assert math.hypot(T + resistance, S) == pytest.approx(strength, rel=1e-9)
 
 
-@pytest.mark.parametrize("name", RIGID)
-def test_from_pulling_beyond_its_most_to_being_dragged_slip_goes_from_one_to_minus_one(name):
-    soil, wheel = packed(name), (0.2, 0.15, 80.0)
-    idle = solve(soil, *wheel, 0.0, 0.0)
-    beyond = solve(soil, *wheel, 1.5 * idle.drawbar_pull, 0.0)
-    assert (beyond.slip_ratio, beyond.utilisation) == (1.0, pytest.approx(1.5))
-    most = thrust_at_slip(soil, *wheel, 1.0)
-    assert most == pytest.approx(idle.drawbar_pull + idle.resistance)
-    resistance = idle.resistance
-    free = solve(soil, *wheel, -resistance, 0.0)
-    braked = solve(soil, *wheel, -1.2 * resistance, 0.0)
-    locked = solve(soil, *wheel, -10.0 * 80.0, 0.0)
-    assert free.slip_ratio == 0.0 and free.torque == 0.0
-    assert -1.0 < braked.slip_ratio < 0.0 and braked.torque < 0.0
-    assert locked.slip_ratio == -1.0 and locked.utilisation > 1.0
-
-
 def test_a_wheel_that_cannot_pull_itself_may_still_be_dragged_unless_sunk_to_its_axle():
     soil = packed("mars_simulant")
     sunk = solve(soil, 0.1, 0.08, 2000.0, 1.0, 0.0)

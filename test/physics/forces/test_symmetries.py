@@ -32,7 +32,7 @@ AHEAD = np.zeros(4)
 ARM = {"arm_yaw": 0.0, "arm_shoulder": 0.0, "arm_elbow": 0.0}
 EQUAL, SERVO = SweepOptions(), SweepOptions(policy="servo")
 seeds = st.integers(0, 10_000)
-few = settings(max_examples=25)
+few = settings(max_examples=12)
 
 
 def assert_mirrored(rover, ground, poses, curvature, options, loads=1e-3, torques=2e-3) -> int:

@@ -18,7 +18,7 @@ from support.rover_geometry import balance_matrix
 
 LSR1 = load_rover("lsr1")
 STEP = reference_ground("settled_a/step")
-few = settings(max_examples=20)
+few = settings(max_examples=10)
 
 
 @pytest.mark.parametrize("max_torque", [2.0, 0.4])
@@ -68,22 +68,6 @@ def test_optimal_torques_never_use_more_friction_than_equal_ones(seed, asked):
     assert (least <= most * (1.0 + 1e-4) + 1e-6).all()
 
 
-def test_neither_policy_nor_tool_load_moves_the_rover():
-    ground, poses = rocky(4), random_poses(4, 30, 1.8)
-    here, *others = (
-        judge_path(LSR1, ground, poses, options)[0]
-        for options in (
-            SweepOptions(),
-            SweepOptions(policy="optimal"),
-            SweepOptions(tool_force=[5.0, -3.0, 9.0]),
-        )
-    )
-    for there in others:
-        for name in ("status", "position", "roll", "pitch", "wheel_centres"):
-            assert getattr(here, name).tobytes() == getattr(there, name).tobytes(), name
-        assert not np.array_equal(here.wheel_loads, there.wheel_loads)
-
-
 def range_by_program(prediction, i, wheel, max_torque, *, inside: bool, shared: bool):
     """Return the range [N m] of a wheel's torque by linear programs."""
     unit, share = LSR1.wheel.radius * LSR1.weight, INSIDE if inside else 1.0
@@ -99,7 +83,7 @@ def range_by_program(prediction, i, wheel, max_torque, *, inside: bool, shared: 
     ("ground", "poses", "friction", "max_torque", "shared"),
     [
         (rocky(5), random_poses(2, 2, 0.5), 0.8, 0.8, True),
-        (fractal(13, roughness=0.12), random_poses(13, 12, 1.8), 0.4, 2.0, False),
+        (fractal(13, roughness=0.12), random_poses(13, 6, 1.8), 0.4, 2.0, False),
     ],
 )
 def test_ranges_lie_between_those_of_linear_programs(ground, poses, friction, max_torque, shared):
@@ -145,19 +129,6 @@ def test_ranges_are_empty_where_no_torques_keep_the_constraints():
     ranges = find_torque_ranges(LSR1, plane(0.45, 0.0), poses, SweepOptions(friction=0.4))
     assert not ranges.feasible.any()
     assert np.isnan(ranges.lowest).all() and np.isnan(ranges.highest).all()
-
-
-def test_tighter_limits_leave_narrower_ranges():
-    ground, pose = plane(0.2, 0.0), [[0.0, 0.0, 0.2]]
-    wide = find_torque_ranges(LSR1, ground, pose)
-    careful = replace(
-        LSR1, limits=replace(LSR1.limits, friction_utilisation=0.8, torque_saturation=0.5)
-    )
-    narrow = find_torque_ranges(careful, ground, pose)
-    assert narrow.feasible.all() and np.abs(narrow.highest).max() <= 1.0
-    assert (narrow.lowest >= wide.lowest - 1e-4).all()
-    assert (narrow.highest <= wide.highest + 1e-4).all()
-    assert (narrow.highest - narrow.lowest < wide.highest - wide.lowest - 1e-3).any()
 
 
 def test_ranges_are_physical_neither_policy_nor_control_margin_matters():

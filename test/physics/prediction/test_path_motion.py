@@ -15,7 +15,7 @@ from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.rover.model import Steering
 from rover_physics.traversability.judge import PartwiseJudge
-from support.rough_grounds import fractal, plane, random_poses
+from support.rough_grounds import plane, random_poses
 
 LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
 ALL_STEER = replace(LSR1, steering=Steering(("rear", "middle", "front"), 1.57, 0.35))
@@ -83,11 +83,6 @@ def test_an_arc_whose_headings_follow_its_chords_is_an_arc(curvature, spacing):
     found = motions(with_chord_headings(arc(curvature, spacing)))
     assert (found[:, 1] == 0.0).all()
     assert found[1:-1, 2] == pytest.approx(np.full(len(found) - 2, curvature * SPEED), rel=0.02)
-
-
-def test_a_path_against_its_headings_is_driven_backwards():
-    poses = arc(0.8)
-    assert motions(poses[::-1]) == pytest.approx(-motions(poses))
 
 
 def test_the_same_place_with_other_headings_is_a_turn_on_the_spot():
@@ -223,17 +218,6 @@ def test_wheels_that_turn_beside_a_wall_are_judged_whole_and_split_alike():
     assert (whole.first_failure, whole.code) == (11, after.code)
 
 
-def test_single_poses_have_no_way_between_them():
-    ground, poses = fractal(3), random_poses(2, 30, 1.0)
-    prediction = judge_poses(LSR1, ground, poses, np.linspace(-2.0, 2.0, 30))[0]
-    assert prediction.between is None and prediction.wheel_drop.max() == 0.0
-    assert (prediction.time[prediction.settled] == 0.0).all()
-    alone = judge_poses(
-        LSR1, ground, poses[7:8], [prediction.motion[7, 2] / prediction.motion[7, 0]]
-    )[0]
-    assert alone.wheel_loads[0] == pytest.approx(prediction.wheel_loads[7])
-
-
 def test_power_is_what_each_wheel_spends_on_its_own_way():
     ground, sand = plane(0.05, 0.0), SweepOptions(soil="dry_sand")
     prediction = judge_path(LSR1, ground, arc(1.0, length=0.6), sand)[0]
@@ -293,12 +277,6 @@ def test_within_a_long_turn_no_wheel_goes_farther_than_a_quarter_of_its_radius(n
     reach = max(np.hypot(x, y) for x, y, _ in rover.suspension.wheels.values())
     assert np.abs(np.diff(yaw)).max() * reach <= 0.25 * rover.wheel.radius * (1.0 + 1e-9)
     assert not between.poses[:, :2].any()
-
-
-def test_waypoints_that_are_close_and_ways_that_are_open_have_nothing_in_between():
-    assert not len(ask(dense(HALF_TURN), LEVEL)[0].between.poses)
-    apart = np.array([[0.0, 0.0, 0.0], [0.3, 0.0, np.pi]])  # turns and goes on at once
-    assert not len(ask(apart, LEVEL)[0].between.poses)
 
 
 def test_the_drift_of_fixed_wheels_in_a_turn_is_that_of_dense_waypoints():

@@ -80,19 +80,6 @@ def test_soil_in_some_cells_changes_the_wheels_on_them_alone():
         assert found[3] != found[0], name
 
 
-def test_where_the_layer_has_no_soil_the_default_soil_holds():
-    ground = plane(0.05, 0.0)
-    layer = with_soil(ground, "lete_sand", index=-1)
-    sand = SweepOptions(soil="dry_sand")
-    here, there, elsewhere = (
-        judge_path(LSR1, on, POSE, sand)[0]
-        for on in (layer, ground, with_soil(ground, "lete_sand"))
-    )
-    for name in ON_SOIL:
-        assert getattr(here, name).tobytes() == getattr(there, name).tobytes(), name
-        assert not np.allclose(getattr(elsewhere, name), getattr(there, name)), name
-
-
 def test_a_coulomb_soil_is_as_its_friction_without_a_soil():
     ground, poses = smooth(4), random_poses(4, 5, 0.6)
     soil, plain = (

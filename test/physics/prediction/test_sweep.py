@@ -2,7 +2,6 @@
 """Sweeps: bad arguments, waypoints on their own, time and energy, scores, several at once."""
 
 import threading
-from contextlib import suppress
 from unittest.mock import Mock
 
 import numpy as np
@@ -37,7 +36,7 @@ POSE = [[0.0, 0.0, 0.0]]
 NAN, INF = float("nan"), float("inf")
 GROWING = {"energy", "time", "distance"}
 ALONG_THE_PATH = GROWING | {"wheel_drop", "falling", "between", "waypoint", "bounds"}
-few = settings(max_examples=20, deadline=None)
+few = settings(max_examples=8, deadline=None)
 
 
 def line(start: float, end: float, count: int = 41, yaw: float = 0.0) -> np.ndarray:
@@ -91,14 +90,6 @@ def test_bad_arguments_are_refused_by_name_and_value(arguments, words):
 # What comes back
 
 
-def test_the_poses_of_the_caller_are_left_alone():
-    poses = np.asfortranarray(line(-0.2, 0.2))
-    before = poses.copy()
-    prediction = judge_path(LSR1, LEVEL, poses)[0]
-    assert np.array_equal(poses, before)
-    assert np.array_equal(prediction.poses, before)
-
-
 # Each waypoint on its own
 
 
@@ -145,21 +136,6 @@ def test_energy_uphill_is_the_weight_lifted_and_braking_downhill_gives_nothing_b
     lifted = LSR1.weight * np.ptp(prediction.position[:, 2])
     assert prediction.energy[0] == 0.0
     assert prediction.energy[-1] == pytest.approx(lifted, rel=1e-4)
-
-
-@few
-@given(st.integers(0, 19), st.floats(-np.pi, np.pi))
-def test_energy_time_and_distance_never_fall(seed, yaw):
-    steps = np.linspace(-1.5, 1.5, 60)[:, None]
-    poses = np.hstack([steps * [np.cos(yaw), np.sin(yaw)], np.full((60, 1), yaw)])
-    prediction = judge_path(LSR1, rocky(seed), poses)[0]
-    for name in GROWING:
-        values = getattr(prediction, name)
-        values = values[~np.isnan(values)]
-        assert values.size >= 50
-        assert (np.diff(values) >= 0.0).all(), name
-    assert (np.diff(prediction.time[prediction.settled]) > 0.0).all()
-    assert (prediction.power[prediction.settled] >= 0.0).all()
 
 
 # Scores
@@ -216,9 +192,9 @@ def test_sweeps_at_once_have_the_bits_of_sweeps_alone():
     exact = make_terrain(low_rock)
     uncertain = with_std(exact, 0.002)
     asked = [
-        (terrain, line(-2.5, 2.5, 150) + np.array([0.0, y, 0.0]), SweepOptions(policy=policy))
+        (terrain, line(-2.5, 2.5, 60) + np.array([0.0, y, 0.0]), SweepOptions(policy=policy))
         for terrain in (exact, uncertain)
-        for y in (-0.5, 0.3)
+        for y in (-0.5,)
         for policy in ("equal", "optimal")
     ]
     alone = [judge_path(LSR1, *one) for one in asked]
@@ -240,30 +216,6 @@ def test_sweeps_at_once_have_the_bits_of_sweeps_alone():
             assert_identical(other, prediction)
 
 
-def test_a_short_sweep_does_not_wait_for_the_end_of_a_long_one():
-    terrain = make_terrain(low_rock)
-    begun, enough, ended = threading.Event(), threading.Event(), threading.Event()
-
-    def check():
-        begun.set()
-        if enough.is_set():
-            raise InterruptedError
-
-    def sweep():
-        with suppress(InterruptedError), interruptible(check):
-            judge_path(LSR1, terrain, line(-2.5, 2.5, 400_000))
-            ended.set()
-
-    thread = threading.Thread(target=sweep)
-    thread.start()
-    assert begun.wait(20.0)
-    for _ in range(3):
-        judge_path(LSR1, terrain, line(-2.5, 2.5, 20))
-    assert not ended.is_set()
-    enough.set()
-    thread.join()
-
-
 def test_a_check_that_raises_ends_the_sweep_and_the_next_one_runs():
     ground, poses = make_terrain(waves), line(-1.5, 1.5, 2000)
     check = Mock(side_effect=[None, InterruptedError])
@@ -273,7 +225,7 @@ def test_a_check_that_raises_ends_the_sweep_and_the_next_one_runs():
 
 
 def test_slices_change_no_bit_of_a_prediction_or_its_bounds(monkeypatch):
-    ground, poses = with_std(make_terrain(waves), 0.002), line(-1.5, 1.5, 300)
+    ground, poses = with_std(make_terrain(waves), 0.002), line(-1.5, 1.5, 60)
     whole = judge_path(LSR1, ground, poses)[0]
     monkeypatch.setattr(interruption, "FIRST_SLICE", 7)
     monkeypatch.setattr(interruption, "MAX_GROWTH", 1.0)

@@ -5,19 +5,23 @@ import math
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 
 from rover_physics import Rover, load_rover
 from rover_physics.errors import RoverFileError
+from rover_physics.names import WHEELS
 from rover_physics.rover.rover_file import preset_names, rover_to_dict, save_rover, save_yaml
 from rover_physics.rover.urdf.joint_map import load_joint_map, map_of
 from rover_physics.rover.urdf.read_rover import Levelling, rover_from_urdf
-from rover_physics.rover.urdf.robot import JointTree, parse_robot, read_robot
+from rover_physics.rover.urdf.robot import parse_robot
 from rover_physics.rover.urdf.write_urdf import write_urdf
 from support.project.checkout import TOP
+from support.rover_geometry import place_rover, wheel_axes
 
 
 def numbers_of(contents: Any, key: str = "") -> dict[str, Any]:
@@ -57,20 +61,6 @@ def test_a_rover_comes_back_from_its_urdf_and_its_file(name, tmp_path):
     assert read.asymmetry < 1e-9 and read.levelling == Levelling()
     save_rover(tmp_path / "rover.yaml", rover, "two\nlines")
     assert load_rover(tmp_path / "rover.yaml") == rover
-
-
-def test_links_have_inertias_that_a_body_can_have_and_wheels_collide_as_cylinders(tmp_path):
-    rover = load_rover("lsr1")
-    urdf, _ = written(rover, tmp_path)
-    text = urdf.read_text()
-    for moments in re.findall(r'ixx="(\S+)" iyy="(\S+)" izz="(\S+)"', text):
-        moment = sorted(map(float, moments))
-        assert 0.0 < moment[2] <= moment[0] + moment[1] + 1e-15
-    robot = read_robot(urdf)
-    for wheel in ("rear_right", "front_left"):
-        (cylinder,) = robot.links[wheel].solids
-        assert cylinder.size == (rover.wheel.radius, rover.wheel.width)
-        assert abs(cylinder.place[1, 2]) == pytest.approx(1.0)
 
 
 def foreign_urdf() -> str:
@@ -163,18 +153,6 @@ def test_a_urdf_of_another_convention_is_turned_into_the_body_frame(tmp_path):
     assert masses.rocker.com == pytest.approx((0.0, 0.3 - 0.5 * 0.05 / 2.0, 0.0))
 
 
-def test_a_heavier_wheel_loads_the_link_that_carries_it(tmp_path):
-    text = foreign_urdf()
-    for side in "RL":
-        before, after = text.split(f'<link name="WheelB{side}">')
-        heavier = after.replace('mass value="0.5"', 'mass value="0.8"', 1)
-        text = f'{before}<link name="WheelB{side}">{heavier}'
-    rover = read_foreign(tmp_path, text)
-    assert rover.wheel.mass == pytest.approx(0.5)
-    assert rover.masses.rocker.mass == pytest.approx(2.3)
-    assert rover.masses.rocker.com[0] == pytest.approx(0.3 * -0.4 / 2.3)
-
-
 def test_angles_of_the_map_bring_the_rover_onto_flat_ground(tmp_path):
     straight = read_foreign(tmp_path)
     turned = foreign_urdf()
@@ -211,21 +189,6 @@ def test_wheels_that_are_not_level_are_brought_onto_level_ground(tmp_path):
     for wheel, place in straight.suspension.wheels.items():
         assert rover.suspension.wheels[wheel] == pytest.approx(place, abs=1e-6)
     assert rover.suspension.bogie_limits == pytest.approx((-0.4 - turn, 0.5 - turn), abs=1e-6)
-
-
-def test_a_rocker_may_be_fixed_if_the_map_has_its_limits(tmp_path):
-    text = foreign_urdf()
-    for side in "RL":
-        text = text.replace(
-            f'<joint name="P{side}" type="revolute">', f'<joint name="P{side}" type="fixed">'
-        )
-    keys = foreign_map()["rover"]
-    rover = read_foreign(
-        tmp_path, text, rover={**keys, "suspension": {"rocker_limits": [-0.3, 0.3]}}
-    )
-    assert rover.suspension.rocker_limits == (-0.3, 0.3)
-    assert rover.masses.rocker.mass == pytest.approx(2.0)
-    assert rover.masses.body.mass == pytest.approx(10.0)
 
 
 @pytest.mark.parametrize(
@@ -368,14 +331,6 @@ def test_pivots_of_rockers_that_rise_outwards_are_taken_as_level_and_told(tmp_pa
         read_foreign(tmp_path, tilted(foreign_urdf(), 0.4))
 
 
-def test_masses_of_the_map_count_before_those_of_the_file_are_compared(tmp_path):
-    rocker = '<link name="RockerL"><inertial>'
-    lopsided = foreign_urdf().replace(rocker, f'{rocker}<origin xyz="0 9 0"/>')
-    given = {"mass": 2.0, "com": [0.0, 0.3, 0.0]}
-    keys = foreign_map()["rover"] | {"masses": {"rocker": given}}
-    assert read_foreign(tmp_path, lopsided, rover=keys).masses.rocker.com == (0.0, 0.3, 0.0)
-
-
 @pytest.mark.parametrize("kind", ["rocker", "bogie"])
 def test_a_rover_of_three_bogies_is_refused_by_name(kind, tmp_path):
     """The one across the rover is on both sides, whatever it was thought to be."""
@@ -397,9 +352,8 @@ def test_xacro_and_circles_are_refused():
         for ends in ((b"x", b"a", b"b"), (b"y", b"b", b"a"))
     )
     links = b'<link name="a"/><link name="b"/><link name="c"/>'
-    robot = parse_robot(b"<robot>" + links + circle + b"</robot>")
     with pytest.raises(RoverFileError, match="hangs on itself"):
-        JointTree(robot, {}, np.eye(4))
+        parse_robot(b"<robot>" + links + circle + b"</robot>")
 
 
 def test_a_file_of_many_links_is_refused_at_once():
@@ -415,9 +369,9 @@ def test_limits_that_no_joint_reaches_count_as_none():
         '<limit lower="-1.79769e+308" upper="1.79769e+308" effort="0" velocity="1e+300"/>'
         "</joint></robot>"
     )
-    limit = parse_robot(text.encode()).joints["j"].limit
-    assert (limit.lower, limit.upper) == (-math.inf, math.inf)
-    assert (limit.effort, limit.velocity) == (math.inf, math.inf)
+    joint = parse_robot(text.encode()).joints["j"]
+    assert (joint.lower, joint.upper) == (-math.inf, math.inf)
+    assert (joint.effort, joint.velocity) == (math.inf, math.inf)
 
 
 @pytest.mark.parametrize("name", ["front_left", "arm_tip"])
@@ -428,3 +382,46 @@ def test_a_joint_of_the_arm_with_the_name_of_a_link_is_refused(name, tmp_path):
     with pytest.raises(RoverFileError, match=f"manipulator.joints has '{name}'"):
         write_urdf(tmp_path / "rover.urdf", named)
     assert not (tmp_path / "rover.urdf").exists()
+
+
+# As MuJoCo reads it
+
+ROCKER, BOGIES, TURN = 0.2, np.array([0.3, -0.25]), 0.4
+"""Angles of the right rocker, of both bogies and of the steered wheels [rad]."""
+
+
+@pytest.mark.parametrize("name", ["lsr1", "m2020"])
+def test_mujoco_has_masses_and_wheels_of_the_urdf_where_the_model_has_them(name, tmp_path):
+    rover, urdf = load_rover(name), tmp_path / "rover.urdf"
+    write_urdf(urdf, rover)
+    spec = mujoco.MjSpec.from_file(str(urdf))
+    spec.body("base_link").add_freejoint()
+    ((mimic,), model) = spec.equalities, spec.compile()
+    assert {mimic.name1, mimic.name2} == {"rocker_right", "rocker_left"}
+    assert mimic.data[:2].tolist() == [0.0, -1.0]  # one side goes up as the other goes down
+    assert model.body_mass.sum() == pytest.approx(rover.total_mass)
+    data, steering = mujoco.MjData(model), np.zeros((1, 6))
+    angles = {"rocker_right": ROCKER, "rocker_left": -ROCKER}
+    angles |= dict(zip(("bogie_right", "bogie_left"), BOGIES, strict=True))
+    if rover.manipulator is not None:
+        angles |= dict(zip(rover.manipulator.joints, rover.manipulator.stowed, strict=True))
+    for wheel, side_and_place in enumerate(WHEELS):
+        if side_and_place.split("_")[0] in rover.steering.wheels:
+            angles[f"{side_and_place}_steering"] = steering[0, wheel] = TURN
+    for joint, angle in angles.items():
+        data.joint(joint).qpos = angle
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    posed = SimpleNamespace(
+        rocker_angle=np.array([[ROCKER, -ROCKER]]), bogie_angle=BOGIES[None],
+        steering_angle=steering, roll=[0.0], pitch=[0.0], poses=np.zeros((1, 3)),
+        position=np.zeros((1, 3)),
+    )  # fmt: skip
+    placed, bodies = place_rover(rover, posed, 0), [data.body(wheel) for wheel in WHEELS]
+    masses, places, *_ = zip(*placed.masses, strict=True)
+    com = np.average(places, axis=0, weights=masses)
+    np.testing.assert_allclose(data.subtree_com[0], com, atol=1e-9)
+    centres = np.array([body.xpos for body in bodies])
+    np.testing.assert_allclose(centres, placed.wheels, atol=1e-9)
+    axes = np.array([body.xmat.reshape(3, 3)[:, 1] for body in bodies])
+    np.testing.assert_allclose(axes, wheel_axes(rover, posed, 0), atol=1e-9)

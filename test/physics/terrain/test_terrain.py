@@ -4,7 +4,6 @@
 import gc
 import pickle
 import weakref
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,15 +14,11 @@ from hypothesis import strategies as st
 from rover_physics import Terrain, load_rover, load_terrain, save_terrain
 from rover_physics.errors import TerrainError
 from rover_physics.prediction.packed_model import pack_model
-from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.ground import (
     BLOCK,
-    SOIL_NUMBERS,
-    copy_soil,
     friction_at,
     height_inside,
     pack_ground,
-    with_soils,
 )
 from rover_physics.terrain.terrain_file import terrain_presets
 
@@ -80,15 +75,6 @@ def test_look_up_is_unknown_off_the_map_and_where_a_corner_is_unknown():
     assert terrain.contains(x, y) and terrain.elevation_at(0.0, 3.0).shape == ()
 
 
-def test_elevation_becomes_contiguous_float64():
-    heights = np.asfortranarray(np.arange(12, dtype=np.float32).reshape(3, 4))
-    terrain = Terrain(heights, np.float32(0.5), np.array([1, 2]))
-    assert terrain.elevation.dtype == np.float64
-    assert terrain.elevation.flags.c_contiguous
-    assert isinstance(terrain.resolution, float)
-    assert terrain.origin == (1.0, 2.0)
-
-
 FLAT = np.zeros((4, 5))
 SOIL = np.full((4, 5), -1)
 NAMES = ("dry_sand", "slab")
@@ -113,6 +99,8 @@ def same(value: float) -> np.ndarray:
         ("friction", same(0.0), r"friction\[0, 0\] is 0.0; it must be above 0"),
         ("elevation_std", same(-0.01), r"elevation_std\[0, 0\] is -0.01; it must be at least 0"),
         ("elevation_std", same(np.nan), r"\[0, 0\] is nan; .* where the height is known"),
+        *[("ground_class", same(v), r"ground_class\[0, 0\] is .* must be")
+          for v in (2.5, -1.0, 1e6)],
         ("soil", SOIL + 3, r"soil\[0, 0\] is 2; it must be -1 for the default, or 0 to 1"),
         ("soil", FLAT, "soil has type float64; it must be an array of whole numbers"),
         ("soil", None, "soil_names are dry_sand, slab without a soil layer"),
@@ -168,20 +156,6 @@ def test_a_gap_at_the_edge_of_the_map_stays():
         assert np.isnan(gapped.fill_gaps(5.0).elevation).sum() == 2
 
 
-def test_filling_makes_no_new_extremes_and_leaves_known_cells_and_the_terrain_alone():
-    heights = np.random.default_rng(3).normal(size=(30, 30))
-    unknown = np.zeros((30, 30), dtype=bool)
-    unknown[10:14, 12:20] = True
-    before = np.where(unknown, np.nan, heights)
-    gapped = Terrain(before, 0.1)
-    filled, rim = gapped.fill_gaps(0.5).elevation, heights[9:15, 11:21]
-    assert rim.min() <= filled[unknown].min() <= filled[unknown].max() <= rim.max()
-    assert np.array_equal(filled[~unknown], before[~unknown])
-    assert np.array_equal(gapped.elevation, before, equal_nan=True)
-    whole = plane()
-    assert whole.fill_gaps(1.0) is whole
-
-
 def test_a_saved_terrain_is_loaded_as_it_was(tmp_path):
     rng = np.random.default_rng(2)
     heights = rng.normal(size=(4, 5))
@@ -190,6 +164,7 @@ def test_a_saved_terrain_is_loaded_as_it_was(tmp_path):
         "friction": np.where(np.isnan(heights), np.nan, 0.7),
         "soil": rng.integers(-1, 2, (4, 5)),
         "elevation_std": rng.uniform(0.0, 0.1, (4, 5)),
+        "ground_class": np.where(np.arange(5) < 2, 3.0, np.nan) + np.zeros((4, 1)),
     }
     for some in ({}, layers):
         terrain = Terrain(heights, 0.25, (3.0, -4.0), soil_names=NAMES if some else (), **some)
@@ -237,19 +212,6 @@ def test_an_unreadable_or_unwritable_file_is_refused(tmp_path):
         load_terrain(tmp_path)
     with pytest.raises(TerrainError, match="cannot be written: No such file"):
         save_terrain(tmp_path / "none" / "map.npz", plane())
-
-
-def test_classes_of_ground_are_kept_in_files_and_are_whole_numbers(tmp_path):
-    classes = np.where(np.arange(8) < 4, 3.0, np.nan) + 0.0 * plane().elevation
-    terrain = replace(plane(), ground_class=classes)
-    save_terrain(tmp_path / "a.npz", terrain)
-    np.testing.assert_array_equal(load_terrain(tmp_path / "a.npz").ground_class, classes)
-    assert fingerprint(terrain) != fingerprint(plane())
-    for value in (2.5, -1.0, 1e6):
-        with pytest.raises(TerrainError, match=r"ground_class\[0, 0\] is .* must be"):
-            replace(plane(), ground_class=np.full((6, 8), value))
-    with pytest.raises(TerrainError, match="ground_class has shape"):
-        replace(plane(), ground_class=classes[1:])
 
 
 def test_a_preset_is_found_by_its_name_from_any_folder_and_keeps_its_licence(
@@ -316,17 +278,6 @@ def test_a_ground_outlives_its_terrain():
     _ = [np.full((40, 40), -1.0) for _ in range(50)]  # would take the place of what is freed
     assert height_inside(ground.records[0], 10.3, 20.7) == 0.25
     assert friction_at(ground.records[0], 1.0, 2.0, 0.9) == 0.6
-
-
-def test_a_ground_with_other_soils_keeps_them():
-    ground = pack_ground(Terrain(np.zeros((4, 4)), 0.1))
-    other = with_soils(ground, np.full((1, SOIL_NUMBERS), 7.0))
-    gc.collect()
-    soil = np.empty(SOIL_NUMBERS)
-    copy_soil(other.records[0], 0, soil)
-    assert soil.tolist() == [7.0] * SOIL_NUMBERS
-    copy_soil(ground.records[0], 0, soil)
-    assert soil.tolist() == [0.0] * SOIL_NUMBERS
 
 
 def test_addresses_do_not_leave_the_process():

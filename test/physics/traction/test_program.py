@@ -13,7 +13,7 @@ from rover_physics.traction.contact_ekf import Motion, MotionContactEstimator
 from rover_physics.traction.layout import LOADS, TRACTIONS
 from rover_physics.traction.map_contacts import MapContactFinder
 from rover_physics.traction.program import ProgramInputs
-from rover_physics.traction.solver import TractionWorkspace, measure_peak, solve_traction
+from rover_physics.traction.solver import TractionWorkspace, solve_traction
 from support.best_torques import can_stand
 from support.rough_grounds import fractal, plane, random_poses
 from support.rover_geometry import balance_matrix, free_balance_matrix, place_rover
@@ -37,7 +37,7 @@ def solve(rover, state, net=0.0, friction=FRICTION, torque=None, programs=12, **
 
 def test_the_answer_keeps_the_nine_equations_and_is_within_3_percent_of_the_optimum():
     workspace, writer, short = TractionWorkspace(), BalanceWriter(LSR1), []
-    for prediction, i in rough_states(LSR1, 15):
+    for prediction, i in rough_states(LSR1, 8):
         rows = writer.write(state_of(LSR1, prediction, i), 0.0)
         answer = solve_traction(workspace, rows, INPUTS, max_programs=12)
         assert not answer.fallback and answer.load_slack == answer.torque_slack == 0.0
@@ -104,26 +104,6 @@ def test_a_wheel_that_has_to_lift_is_told_with_its_missing_load():
     assert not answer.fallback
     assert answer.load_slack == pytest.approx(-answer.loads.min()) and answer.load_slack > 1.0
     assert np.isinf(answer.utilisation.max()) and np.isinf(answer.friction_slack)
-
-
-def test_the_peak_never_rises_from_one_program_to_the_next():
-    writer, workspace = BalanceWriter(LSR1), TractionWorkspace()
-    for prediction, i in rough_states(LSR1, 20):
-        rows = writer.write(state_of(LSR1, prediction, i), 0.0)
-        last, peak = None, measure_peak(rows, FRICTION, rows.complete(np.zeros(6)))
-        for _ in range(6):
-            answer = solve_traction(workspace, rows, INPUTS, last=last, max_programs=1)
-            assert not answer.fallback
-            assert answer.utilisation.max() <= peak * (1.0 + 1e-3)
-            last, peak = answer.tractions, answer.utilisation.max()
-
-
-def test_limits_of_torque_turn_to_wheels_with_torque_left():
-    prediction, i = next(rough_states(LSR1, 1))
-    free = solve(LSR1, state_of(LSR1, prediction, i), net=10.0)
-    limit = 0.9 * np.abs(free.torques).max()
-    held = solve(LSR1, state_of(LSR1, prediction, i), net=10.0, torque=limit)
-    assert np.abs(held.torques).max() <= limit and held.torque_slack < 1e-3 * limit
 
 
 def test_an_unsolved_program_falls_back_to_equal_torques_and_those_on_demand_are_no_fallback():

@@ -137,17 +137,6 @@ def test_on_uncertain_ground_speed_servos_are_not_asked_about():
         judge_path(LSR1, uncertain, POSE, SweepOptions(policy="servo"))
 
 
-@pytest.mark.parametrize(
-    ("slope", "traversability_class"),
-    [(0.1, PASSABLE), (0.2, WITH_SPEED_SERVOS), (0.4, IMPASSABLE)],
-)
-def test_on_soil_speed_servos_pass_where_one_wheel_is_too_light_for_its_share(
-    slope, traversability_class
-):
-    found = classify_path(LSR1, plane(slope, 0.0), POSE, SweepOptions(soil="dry_sand"))
-    assert found[0].traversability_class == traversability_class
-
-
 def test_a_path_hangs_on_its_worst_waypoint():
     poses = [[x, 0.0, 0.0] for x in (-0.3, -0.1, 0.1, 0.3)]
     level = plane(0.0, 0.0)
@@ -186,17 +175,6 @@ def test_what_speed_servos_pass_is_classed_so_whatever_the_margin(margin, passes
     assert found.traversability_class == WITH_SPEED_SERVOS
 
 
-def test_torques_keep_the_margin_where_they_can():
-    step = drive_ground("step", 0.08)
-    options = replace(OPTIMAL, friction=1.0, max_torque=0.85)
-    free = judge_path(LSR1, step, drive_path(), options)[0]
-    kept = judge_path(LSR1, step, drive_path(), replace(options, control_margin=0.2))[0]
-    assert free.between is not None and kept.between is not None
-    assert free.between.torque_saturation.max() > 0.8
-    assert kept.between.torque_saturation.max() <= 0.8 + 1e-9
-    assert kept.control_margin == 0.2
-
-
 def test_what_equal_torques_pass_needs_no_margin():
     poses = random_poses(3, 300, 2.0)
     ground, options = rocky(3), SweepOptions(friction=0.5, policy="optimal", control_margin=0.6)
@@ -223,9 +201,3 @@ def test_the_margin_holds_within_the_bounds_of_an_uncertain_map():
     assert judge_path(LSR1, STEEP, POSE, replace(options, control_margin=between))[1].traversable
     refused = judge_path(LSR1, ground, POSE, replace(options, control_margin=between))[1]
     assert "control margin" in refused.reason and "at worst" in refused.reason
-
-
-@pytest.mark.parametrize("margin", [-0.1, 1.0, float("nan")])
-def test_a_margin_outside_its_range_is_named(margin):
-    with pytest.raises(ModelError, match="control_margin"):
-        SweepOptions(control_margin=margin)

@@ -108,20 +108,6 @@ def test_down_a_sandy_slope_to_a_wall_there_is_a_way_round_it():
     assert verdict_in(wall, -4.5, 1.4, soil="dry_sand").traversable
 
 
-@pytest.mark.parametrize("soil", [None, "dry_sand"])
-def test_an_obstacle_ahead_on_level_ground_is_no_trap(soil):
-    x = np.tile(np.arange(-6.0, 6.001, 0.05), (241, 1))
-    wall = Terrain(np.where(x > 2.0, 1.0, 0.0), 0.05, (-6.0, -6.0))
-    assert verdict_in(wall, -2.0, 3.0, soil=soil).code not in ("", "trapped")
-
-
-def test_backwards_into_a_crater_is_as_much_a_trap():
-    x = np.arange(-5.0, 0.0, 0.04)
-    poses = np.column_stack([x, 0.0 * x, np.full(len(x), np.pi)])
-    verdict = judge_path(LSR1, CRATER, poses, SweepOptions(soil="dry_sand", backward=True))[1]
-    assert verdict.code == "trapped"
-
-
 def test_poses_close_together_before_an_edge_do_not_take_the_time_and_the_memory(close=1e-12):
     x = 0.05 * np.arange(120) - 3.0
     heights = np.where(x < 0.5, 0.0, -0.09) + np.where(x > 1.6, 0.5, 0.0)
