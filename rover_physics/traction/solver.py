@@ -168,7 +168,7 @@ def solve_traction(
     friction, max_pull, qp = inputs.friction, inputs.max_pull(rows.force_unit), workspace.qp
     status, iterations, programs = "", 0, 0
     while programs < max_programs:
-        write_program(rows, friction, max_pull, x, measure_peak(rows, friction, x), qp)
+        write_program(rows, friction, max_pull, x, _measure_peak(rows, friction, x), qp)
         y, count, status, solved = workspace.solve(qp)
         iterations += count
         if not solved:
@@ -176,7 +176,7 @@ def solve_traction(
         programs += 1
         unit = float(qp.scale[TRACTION])
         start, aim, x = x, rows.complete(unit * y[TRACTIONS]), np.empty(FORCES)
-        if search_line(rows, friction, max_pull, (start, aim, x)) <= CONVERGED_SHARE * unit:
+        if _search_line(rows, friction, max_pull, (start, aim, x)) <= CONVERGED_SHARE * unit:
             break
     x = x if programs else rows.pull_equally()
     fallback = programs == 0 < max_programs
@@ -215,7 +215,7 @@ def _measure_wheels(rows, friction, x, laterals, utilisation):
 
 
 @kernel
-def measure_peak(rows, friction, x):
+def _measure_peak(rows, friction, x):
     """Return the largest sqrt(T^2 + S^2) / (mu N) of x (14,), with loads of MIN_LOAD at least."""
     shares = rows.lateral_shares
     peak = 0.0
@@ -227,7 +227,7 @@ def measure_peak(rows, friction, x):
 
 
 @kernel
-def search_line(rows, friction, max_pull, points):
+def _search_line(rows, friction, max_pull, points):
     """Write the forces of the smallest cost, by golden section; return how far tractions moved.
 
     Args:
@@ -242,7 +242,7 @@ def search_line(rows, friction, max_pull, points):
     mean_friction = 0.0
     for wheel in range(WHEEL_COUNT):
         mean_friction += friction[wheel] / WHEEL_COUNT
-    peak_unit = max(measure_peak(rows, friction, start), MIN_PEAK)
+    peak_unit = max(_measure_peak(rows, friction, start), MIN_PEAK)
     units = max_pull, peak_unit, peak_unit * mean_friction
     low, high = 0.0, LINE_END
     a, b = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
@@ -273,7 +273,7 @@ def search_line(rows, friction, max_pull, points):
 def _cost_at(place, rows, friction, points, units):
     """Write the forces at a place on the line, and return what the program minimises.
 
-    `points` are as for `search_line`; `units` are the largest pull in force units, the unit of
+    `points` are as for `_search_line`; `units` are the largest pull in force units, the unit of
     peaks, and that of tractions.
     """
     start, aim, x = points
@@ -286,6 +286,6 @@ def _cost_at(place, rows, friction, points, units):
         squares += traction * traction
         pull = max(pull, abs(traction) - (1.0 + ROUNDING) * max_pull)
         lift = max(lift, -x[LOAD + wheel])
-    peak = measure_peak(rows, friction, x) / peak_unit
+    peak = _measure_peak(rows, friction, x) / peak_unit
     cost = 0.5 * (PEAK_WEIGHT * peak * peak + EFFORT_WEIGHT * squares / (unit * unit))
     return cost + SLACK_PRICE * (max(peak - 1.0 / peak_unit, 0.0) + (pull + lift) / unit)
