@@ -115,7 +115,7 @@ class BalanceRows(NamedTuple):
                 keep the equations.
         """
         x = np.empty(FORCES)
-        _complete(self, tractions, x)
+        _complete(self.A, self.b, self.directions, tractions, x)
         return x
 
     def pull_equally(self) -> np.ndarray:
@@ -230,9 +230,8 @@ def _centre_of_mass(linkage: Any) -> np.ndarray:
 
 
 @kernel
-def _complete(rows, tractions, x):
+def _complete(A, b, directions, tractions, x):
     """Write x (14,) that keeps all nine equations and the differences between tractions (6,)."""
-    A, b, directions = rows.A, rows.b, rows.directions
     last = directions[LAST_WHEEL] * tractions[LAST_WHEEL]
     for row in range(EQUATIONS):
         rest = b[row]

@@ -23,7 +23,6 @@ from rover_physics.traction.layout import (
     LATERAL_SHARE,
     LATERAL_SLOPE,
     LOAD,
-    LOADS,
     ROWS,
     TRACTION,
     TRACTIONS,
@@ -165,10 +164,11 @@ def solve_traction(
             equal torques.
     """
     x = rows.pull_equally() if last is None else rows.complete(last / rows.force_unit)
-    friction, max_pull, qp = inputs.friction, inputs.max_pull(rows.force_unit), workspace.qp
+    shares, friction, qp = rows.lateral_shares, inputs.friction, workspace.qp
+    max_pull = inputs.max_pull(rows.force_unit)
     status, iterations, programs = "", 0, 0
     while programs < max_programs:
-        write_program(rows, friction, max_pull, x, _measure_peak(rows, friction, x), qp)
+        write_program(rows, friction, max_pull, x, _measure_peak(shares, friction, x), qp)
         y, count, status, solved = workspace.solve(qp)
         iterations += count
         if not solved:
@@ -176,7 +176,7 @@ def solve_traction(
         programs += 1
         unit = float(qp.scale[TRACTION])
         start, aim, x = x, rows.complete(unit * y[TRACTIONS]), np.empty(FORCES)
-        if _search_line(rows, friction, max_pull, (start, aim, x)) <= CONVERGED_SHARE * unit:
+        if _search_line(shares, friction, max_pull, (start, aim, x)) <= CONVERGED_SHARE * unit:
             break
     x = x if programs else rows.pull_equally()
     fallback = programs == 0 < max_programs
@@ -188,36 +188,45 @@ def _describe_answer(
     rows: BalanceRows, inputs: ProgramInputs, x: np.ndarray, run: dict[str, Any]
 ) -> TractionAnswer:
     """Return forces x (14,) in SI units, with what the run of the programs came to."""
-    most, (lateral, utilisation) = inputs.max_torque, np.empty((2, WHEEL_COUNT))
-    _measure_wheels(rows, inputs.friction, x, lateral, utilisation)
-    loads, tractions = rows.force_unit * x[LOADS], rows.force_unit * x[TRACTIONS]
-    torques = inputs.radius * tractions
+    table = np.empty((5, WHEEL_COUNT))
+    peak, min_load, max_torque = _measure_wheels(
+        rows.lateral_shares, rows.force_unit, *inputs, x, table
+    )
+    torques, loads, tractions, lateral, utilisation = table
     return TractionAnswer(
-        np.clip(torques, -most, most), loads, tractions, lateral, utilisation,
-        friction_slack=max(float(utilisation.max()) - 1.0, 0.0),
-        load_slack=max(float(-loads.min()), 0.0),
-        torque_slack=max(float(np.abs(torques).max()) - most, 0.0),
+        torques, loads, tractions, lateral, utilisation,
+        friction_slack=max(peak - 1.0, 0.0),
+        load_slack=max(-min_load, 0.0),
+        torque_slack=max(max_torque - inputs.max_torque, 0.0),
         **run,
     )  # fmt: skip
 
 
 @kernel
-def _measure_wheels(rows, friction, x, laterals, utilisation):
-    """Write lateral forces [N] and friction utilisations (6,) of forces x (14,) in force units."""
-    unit = rows.force_unit
+def _measure_wheels(shares, unit, friction, limit, radius, x, table):
+    """Write the first five fields of a TractionAnswer into a table (5, 6), for forces x (14,).
+
+    Returns:
+        Largest utilisation, smallest load [N], largest torque without the limit [N m].
+    """
+    peak, min_load, max_traction = 0.0, np.inf, 0.0
     for wheel in range(WHEEL_COUNT):
         traction, load = unit * x[TRACTION + wheel], unit * x[LOAD + wheel]
-        shares = rows.lateral_shares[wheel]
-        lateral = unit * (x[LATERAL_SHARE] * shares[0] + x[LATERAL_SLOPE] * shares[1])
+        own = shares[wheel]
+        lateral = unit * (x[LATERAL_SHARE] * own[0] + x[LATERAL_SLOPE] * own[1])
         across = np.sqrt(traction * traction + lateral * lateral)
-        laterals[wheel] = lateral
-        utilisation[wheel] = across / (friction[wheel] * load) if load > 0.0 else np.inf
+        used = across / (friction[wheel] * load) if load > 0.0 else np.inf
+        table[0, wheel] = min(max(radius * traction, -limit), limit)
+        table[1, wheel], table[2, wheel], table[3, wheel] = load, traction, lateral
+        table[4, wheel] = used
+        peak, min_load = max(peak, used), min(min_load, load)
+        max_traction = max(max_traction, abs(traction))
+    return peak, min_load, radius * max_traction
 
 
 @kernel
-def _measure_peak(rows, friction, x):
+def _measure_peak(shares, friction, x):
     """Return the largest sqrt(T^2 + S^2) / (mu N) of x (14,), with loads of MIN_LOAD at least."""
-    shares = rows.lateral_shares
     peak = 0.0
     for wheel in range(WHEEL_COUNT):
         lateral = x[LATERAL_SHARE] * shares[wheel, 0] + x[LATERAL_SLOPE] * shares[wheel, 1]
@@ -227,11 +236,11 @@ def _measure_peak(rows, friction, x):
 
 
 @kernel
-def _search_line(rows, friction, max_pull, points):
+def _search_line(shares, friction, max_pull, points):
     """Write the forces of the smallest cost, by golden section; return how far tractions moved.
 
     Args:
-        rows: BalanceRows.
+        shares: (6, 2) `lateral_shares` of the balance.
         friction: (6,) friction coefficients.
         max_pull: Largest traction of a motor in force units.
         points: The last forces, the answer of a program, and the forces to write, (14,) each, in
@@ -242,27 +251,27 @@ def _search_line(rows, friction, max_pull, points):
     mean_friction = 0.0
     for wheel in range(WHEEL_COUNT):
         mean_friction += friction[wheel] / WHEEL_COUNT
-    peak_unit = max(_measure_peak(rows, friction, start), MIN_PEAK)
+    peak_unit = max(_measure_peak(shares, friction, start), MIN_PEAK)
     units = max_pull, peak_unit, peak_unit * mean_friction
     low, high = 0.0, LINE_END
     a, b = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-    cost_a = _cost_at(a, rows, friction, points, units)
-    cost_b = _cost_at(b, rows, friction, points, units)
+    cost_a = _cost_at(a, shares, friction, points, units)
+    cost_b = _cost_at(b, shares, friction, points, units)
     for _ in range(SECTIONS):
         if cost_a <= cost_b:
             high, b, cost_b = b, a, cost_a
             a = high - GOLDEN * (high - low)
-            cost_a = _cost_at(a, rows, friction, points, units)
+            cost_a = _cost_at(a, shares, friction, points, units)
         else:
             low, a, cost_a = a, b, cost_b
             b = low + GOLDEN * (high - low)
-            cost_b = _cost_at(b, rows, friction, points, units)
+            cost_b = _cost_at(b, shares, friction, points, units)
     place, least = 0.5 * (low + high), np.inf
     for candidate in (0.0, place, 1.0):
-        cost = _cost_at(candidate, rows, friction, points, units)
+        cost = _cost_at(candidate, shares, friction, points, units)
         if cost <= least:
             place, least = candidate, cost
-    _cost_at(place, rows, friction, points, units)
+    _cost_at(place, shares, friction, points, units)
     moved = 0.0
     for k in range(TRACTION, TRACTION + WHEEL_COUNT):
         moved = max(moved, abs(x[k] - start[k]))
@@ -270,7 +279,7 @@ def _search_line(rows, friction, max_pull, points):
 
 
 @kernel
-def _cost_at(place, rows, friction, points, units):
+def _cost_at(place, shares, friction, points, units):
     """Write the forces at a place on the line, and return what the program minimises.
 
     `points` are as for `_search_line`; `units` are the largest pull in force units, the unit of
@@ -286,6 +295,6 @@ def _cost_at(place, rows, friction, points, units):
         squares += traction * traction
         pull = max(pull, abs(traction) - (1.0 + ROUNDING) * max_pull)
         lift = max(lift, -x[LOAD + wheel])
-    peak = _measure_peak(rows, friction, x) / peak_unit
+    peak = _measure_peak(shares, friction, x) / peak_unit
     cost = 0.5 * (PEAK_WEIGHT * peak * peak + EFFORT_WEIGHT * squares / (unit * unit))
     return cost + SLACK_PRICE * (max(peak - 1.0 / peak_unit, 0.0) + (pull + lift) / unit)
