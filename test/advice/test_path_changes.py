@@ -58,12 +58,6 @@ def test_a_shift_is_that_far_to_the_left_at_its_place(bend, offset):
         assert dy * np.cos(yaw) - dx * np.sin(yaw) == pytest.approx(offset, abs=1e-9)
 
 
-def test_another_angle_turns_the_path_at_its_place():
-    path = arc(0.0)
-    changed = turn_path(path, PLACE, 0.3, 0.8)
-    np.testing.assert_allclose(changed[PLACE], path[PLACE] + [0.0, 0.0, 0.3], atol=1e-3)
-
-
 def test_there_is_no_room_for_a_shift_at_an_end():
     assert shift_path(arc(0.0), 30, 0.3, 0.8) is None
     assert turn_path(arc(0.0), 390, 0.3, 0.8) is None

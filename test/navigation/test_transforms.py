@@ -3,7 +3,6 @@
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from rover_planner.errors import PlanningError
 from rover_planner.planning.navigation.sensor_mounts import SensorPoses, read_mounts
@@ -80,11 +79,6 @@ def test_old_transforms_are_dropped_and_a_clock_set_back_starts_anew(tree):
     tree.take("map", "odom", 3 * SECOND, ODOM_BASE)
     found = tree.find("map", "odom", None, 3 * SECOND)
     np.testing.assert_allclose(found.translation, ODOM_BASE.translation)
-
-
-def test_x_y_and_yaw_are_those_of_the_x_axis():
-    rigid = Rigid(np.array([1.0, 2.0, 3.0]), Rotation.from_euler("xyz", [0.2, 0.3, 2.0]))
-    np.testing.assert_allclose(rigid.xyyaw, (1.0, 2.0, 2.0), atol=1e-12)
 
 
 MOUNT = Rigid.from_rpy(0.3, 0.1, 0.4, 0.0, 0.5, -0.2)

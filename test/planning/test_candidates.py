@@ -76,22 +76,6 @@ def test_the_fan_spreads_by_the_spacing_to_both_sides():
     assert lateral_offsets(4, 0.5) == [0.0, 0.5, -0.5, 1.0]
 
 
-def test_curves_too_tight_for_the_rover_are_dropped_but_never_all():
-    wide = generate_candidates((0, 0, 0), (3, 0, 0), count=9, min_radius=0.1)
-    tight = generate_candidates((0, 0, 0), (3, 0, 0), count=9, min_radius=2.0)
-    assert len(wide) == 9
-    assert 1 <= len(tight) < 9
-
-
-@pytest.mark.parametrize("goal", [(-5, 0, 0), (0, 0, np.pi), (0, 0.01, 0)])
-def test_awkward_goals_get_arcs_of_the_smallest_radius(goal):
-    paths = generate_candidates((0, 0, 0), goal, min_radius=0.8)
-    assert paths
-    lengths = [path_length(path) for path in paths]
-    assert lengths[0] == pytest.approx(min(lengths))
-    assert lengths[0] < np.hypot(goal[0], goal[1]) + 4 * np.pi * 0.8
-
-
 @pytest.mark.parametrize(
     ("change", "names"),
     [

@@ -56,21 +56,6 @@ def test_a_ridge_across_all_candidates_is_refused_with_its_reason():
     assert 0 < answer.chosen.passable_share < 1
 
 
-def test_the_goal_at_the_start_is_a_single_pose_that_is_judged():
-    outside = answer_path_query(LSR1, FLAT, (99, 0, 0), (99, 0, 0), COARSE)
-    assert outside.chosen.poses.shape == (1, 3) and not outside.traversable
-    assert outside.chosen.passable_share == 0.0 and outside.chosen.verdict.code == "off_map"
-
-
-def test_options_reach_the_model():
-    slope = make_terrain(lambda x, y: 0.2 * x + 0 * y)
-    grippy = COARSE.change(friction=1.0, max_torque=100.0)
-    slippery = COARSE.change(friction=0.05, max_torque=100.0)
-    assert answer_path_query(LSR1, slope, (-2, 0, 0), (2, 0, 0), grippy).traversable
-    refused = answer_path_query(LSR1, slope, (-2, 0, 0), (2, 0, 0), slippery)
-    assert refused.chosen.verdict.code == "friction"
-
-
 def test_the_safer_path_wins_and_energy_decides_between_equals():
     answer = answer_path_query(LSR1, FLAT, (-2, 0, 0), (2, 0, 0), COARSE)
     first, second, third = answer.candidates[:3]

@@ -21,7 +21,7 @@ from rover_planner.studies.rover_values import (
     write_rover,
 )
 from rover_planner.studies.runner import describe_ties, find_rover, run_study
-from rover_planner.studies.study_file import name_thing, study_from_dict
+from rover_planner.studies.study_file import study_from_dict
 
 LSR1 = load_rover("lsr1")
 PIVOT_X = {"name": "suspension.bogie_pivot.x", "from": 0.10, "to": 0.30, "count": 9}
@@ -46,12 +46,6 @@ def test_an_optimisation_finds_what_a_sweep_finds_without_ties():
     keys = [parameter.keys[0] for parameter in found.study.parameters]
     best = vary(found.study.rover, dict(zip(keys, found.best.values, strict=True)))
     assert find_rover(found.study, found.best) == best
-
-
-def test_equal_load_shares_need_the_least_friction_on_nearly_level_ground():
-    drives = [{"slope": 0.05, "length": 0.1}, {"slope": -0.05, "length": 0.1}]
-    best = run_study(study(objective="worst_utilisation", drives=drives)).best
-    assert best.values[0] == pytest.approx(0.2, abs=0.026)
 
 
 def test_the_tallest_step_is_climbed_and_a_little_more_is_not():
@@ -97,30 +91,6 @@ def test_the_tip_over_margin_is_an_angle_that_tells_wide_rovers_from_narrow_ones
     height = LSR1.masses.body.com[2] - LSR1.suspension.wheels["rear"][2] + LSR1.wheel.radius
     assert narrow.objective < wide.objective < np.arctan(0.4 / height) + 0.5
     assert run_study(task).baseline.values == (0.31,)
-
-
-def test_what_stops_the_rover_at_a_taller_step_is_noted():
-    [first, _] = run_study(
-        study(
-            objective="tallest_step", friction=0.5,
-            parameters=[{"name": "wheel.max_torque", "from": 0.5, "to": 2.0, "count": 2}],
-        )
-    ).trials  # fmt: skip
-    taller = float(first.note.split(" m:")[0])
-    assert taller == pytest.approx(first.objective + 0.002, abs=6e-4)
-    assert "limit" in first.note
-
-
-def test_files_are_looked_for_beside_the_study(tmp_path):
-    from rover_physics.terrain.grid import Terrain, save_terrain
-
-    save_terrain(tmp_path / "flat.npz", Terrain(np.zeros((60, 60)), 0.05, (-1.5, -1.5)))
-    data = {
-        "rover": "lsr1", "objective": "drive_energy", "parameters": [PIVOT_X | {"count": 2}],
-        "drives": [{"file": "flat.npz", "length": 0.1}],
-    }  # fmt: skip
-    task = study_from_dict(data, "study", tmp_path)
-    assert np.isfinite([trial.objective for trial in run_study(task).trials]).all()
 
 
 @pytest.mark.parametrize(
@@ -207,12 +177,3 @@ def test_rovers_as_good_within_the_resolution_are_named():
     assert max(values) - min(values) < 0.002  # the heights are found to 2 mm
     assert len(result.ties) == 2 and result.best not in result.ties
     assert describe_ties(result).startswith("as good within 0.002 m: bogie pivot z ")
-
-
-def test_pictures_of_studies_name_things_in_words():
-    words = {
-        "friction": "friction", "wheel.radius": "wheel radius",
-        "suspension.bogie_pivot.x": "bogie pivot x", "suspension.wheels.rear.x": "rear wheel x",
-        "masses.body.com.z": "body centre z", "limits.tilt": "tilt limit",
-    }  # fmt: skip
-    assert {name: name_thing(name) for name in words} == words

@@ -240,3 +240,16 @@ def test_a_layer_that_cannot_be_written_is_named(tmp_path):
         write_layers(prepared.store, tmp_path / "file")
     with pytest.raises(PlanningError, match="cannot be written"):
         write_cog(tmp_path / "no" / "a.tif", np.zeros((3, 3)), prepared.store.notes.frame, 1)
+
+
+def test_a_damaged_block_is_refused_in_words_of_its_own(tmp_path):
+    heights = np.random.default_rng(1).random((60, 60)).astype(np.float32)
+    path = write_tif(tmp_path / "map.tif", heights, compress="deflate")
+    with rasterio.open(path) as file:
+        start = int(file.get_tag_item("BLOCK_OFFSET_0_0", "TIFF", bidx=1))
+    content = bytearray(path.read_bytes())
+    content[start : start + 2000] = bytes(2000)
+    path.write_bytes(content)
+    with pytest.raises(PlanningError, match=r"map\.tif: cannot be read: ") as refusal:
+        GeoTiffMap(path).read((slice(0, 60), slice(0, 60)))
+    assert "See previous exception" not in str(refusal.value)

@@ -138,16 +138,6 @@ def test_two_commands_do_not_write_into_one_store(files):
         pass
 
 
-def test_a_store_that_cannot_be_created_leaves_nothing_behind(files):
-    (files / "out").write_text("a file")
-    with pytest.raises(PlanningError, match="is not a survey"):
-        prepare(files)
-    missing = files / "no" / "such"
-    with pytest.raises(PlanningError, match="cannot be written: "):
-        prepare_survey(make_request(), str(files / "map.npz"), files / "map.npz" / "out")
-    assert not missing.exists()
-
-
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
@@ -169,11 +159,10 @@ def test_filled_gaps_are_another_map(files):
         prepare(files)
 
 
-@pytest.mark.parametrize("name", ["worst_tilt", "seconds"])
-def test_a_missing_layer_is_named(files, name):
+def test_a_missing_layer_is_named(files):
     path = prepare(files).store.path
-    shutil.rmtree(path / name)
-    with pytest.raises(PlanningError, match=f"{name} is damaged .*survey again"):
+    shutil.rmtree(path / "worst_tilt")
+    with pytest.raises(PlanningError, match="worst_tilt is damaged .*survey again"):
         SurveyStore(path)
 
 

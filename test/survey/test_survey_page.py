@@ -15,9 +15,7 @@ from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.survey.layers import CLASS_COLOURS, CLASS_NUMBERS
-from rover_planner.viewer.scene.ground_mesh import draw_picture
 from rover_planner.viewer.state.colours import UNKNOWN, from_css
-from rover_planner.viewer.state.ground_grid import make_grid
 from rover_planner.viewer.state.survey_layers import CLASS, LIMIT, load_map, open_survey
 from support.survey_maps import make_request, survey_here
 
@@ -70,16 +68,6 @@ def test_the_first_limit_has_a_colour_and_a_meaning_for_each_that_fails_somewher
     assert colour_at(shown, LIMIT, PASSABLE) != colour_at(shown, LIMIT, WALL)
     labels = [text for _, text in found.legend.keys]
     assert "none: all headings pass" in labels and any("off map" in text for text in labels)
-
-
-def test_a_pixel_of_the_ground_is_that_of_its_cell(shown, surveyed):
-    terrain = load_map(surveyed, 10_000)
-    grid = make_grid(terrain)
-    picture = draw_picture(grid, shown.colour(CLASS, LSR1, DEFAULT_OPTIONS, grid))
-    factor = picture.shape[0] // 60
-    assert factor == 8
-    row, column = (int((at / 0.1 + 0.5) * factor) for at in PASSABLE[::-1])
-    np.testing.assert_allclose(picture[row, column], from_css(CLASS_COLOURS[0]), atol=2)
 
 
 def test_what_differs_from_the_page_is_said(shown):

@@ -12,7 +12,6 @@ from rover_planner.traction.loops import (
     StallDetector,
     WheelRates,
     estimate_rolling_rates,
-    limit_rate,
 )
 
 
@@ -28,11 +27,6 @@ def test_a_push_that_cannot_be_given_does_not_add_up():
         held.update(0.1, 0.02, k > 10)
     assert free.update(0.0, 0.0, False) > 2.0 * held.update(0.0, 0.0, False)
     assert held.update(-0.1, 0.02, True) < held.update(0.0, 0.0, True) + 0.1
-
-
-def test_all_changes_are_limited_alike():
-    limited = limit_rate(np.array([2.0, 1.0, 0.0, 0.0, 0.0, -1.0]), np.zeros(6), 0.5)
-    assert limited == pytest.approx([0.5, 0.25, 0.0, 0.0, 0.0, -0.25])
 
 
 def test_rolling_goes_with_the_wheels_but_not_with_those_that_spin():

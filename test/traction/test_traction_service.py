@@ -96,22 +96,6 @@ def test_it_pushes_up_a_slope_with_the_weight_along_it():
     assert update.torques.sum() == pytest.approx(wanted, rel=0.01)
 
 
-def test_slow_wheels_are_pushed_and_fast_ones_held():
-    rig = Rig()
-    rig.velocities |= dict.fromkeys(WHEEL_JOINTS, 0.1)
-    assert rig.run().torques.sum() > 0.0
-    rig = Rig()
-    rig.velocities |= dict.fromkeys(WHEEL_JOINTS, 0.6)
-    assert rig.run().torques.sum() < 0.0
-
-
-def test_a_wheel_that_runs_away_gets_less_torque_than_the_others():
-    rig = Rig()
-    rig.velocities["front_right_wheel"] = 0.6
-    torques = rig.run(5).torques
-    assert torques[2] < torques[[0, 1, 3, 4, 5]].min()
-
-
 def test_the_source_of_contact_angles_is_the_best_there_is():
     rig = Rig()
     assert rig.run().estimate.source == "motion"

@@ -3,14 +3,13 @@
 
 import dataclasses
 import time
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from rover_physics import Terrain
 from rover_physics.terrain.fingerprint import fingerprint
-from rover_planner.maps.known_map import KnownMap, stamp_text
+from rover_planner.maps.known_map import KnownMap
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.server_health import LATENCIES, OK, WARN, ServerHealth
 from rover_planner.planning.answering.service_settings import load_service_settings
@@ -72,6 +71,7 @@ def test_any_change_of_a_terrain_changes_its_hash_and_nothing_else_does():
         Terrain(np.zeros((20, 45)), 0.1),
         dataclasses.replace(FLAT, friction=layer),
         dataclasses.replace(FLAT, elevation_std=layer),
+        dataclasses.replace(FLAT, ground_class=np.ones((30, 30))),
     ]
     hashes = [fingerprint(kind) for kind in kinds]
     assert len(set(hashes)) == len(kinds) and all(len(text) == 16 for text in hashes)
@@ -79,44 +79,6 @@ def test_any_change_of_a_terrain_changes_its_hash_and_nothing_else_does():
     holes = np.zeros((2, 30, 30))
     holes[0, 1, 1], holes[1, 1, 1] = np.nan, -np.nan
     assert fingerprint(Terrain(holes[0], 0.1)) == fingerprint(Terrain(holes[1], 0.1))
-
-
-def test_stamps_are_exact_texts():
-    assert stamp_text(1_700_000_000_123_456_789) == "1700000000.123456789"
-    assert stamp_text(5) == "0.000000005" and stamp_text(None) == ""
-
-
-def test_the_map_is_told_with_its_age_and_coverage():
-    heights = np.zeros((40, 100))
-    heights[:10] = np.nan
-    known = KnownMap(Terrain(heights, 0.05), Terrain(heights, 0.05), "elevation_cloud", 1, 2.0, "")
-    assert known.describe(12.0) == {
-        "map": "elevation_cloud",
-        "map age [s]": "12.0",
-        "map cells": "100 x 40",
-        "map resolution [m]": "0.05",
-        "map coverage [%]": "75.0",
-    }
-    assert replace(known, source="").describe(1.0)["map"] == "unnamed"
-
-
-def test_the_last_question_is_told_with_its_latency():
-    health = ServerHealth()
-    assert health.describe(0.0, "", "", {}).values == {"last question": "none"}
-    health.take_answer("", 10.0, "1, can_traverse", 0.25)
-    health.take_answer("friction", 12.0, "2, check_path", 0.015)
-    told = health.describe(13.5, "", "", {"open questions": 0})
-    assert (told.level, told.message) == (OK, "ready")
-    assert told.values == {
-        "open questions": 0,
-        "last question": "2, check_path",
-        "last answer": "friction",
-        "last answer age [s]": "1.5",
-        "last latency [ms]": "15.0",
-        "largest latency of 2 [ms]": "250.0",
-        "answers friction": 1,
-        "answers traversable": 1,
-    }
 
 
 def test_old_latencies_are_forgotten_and_a_lack_of_time_is_a_warning_for_a_while():

@@ -1,13 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Paths and searches keep out of places that are marked as impassable, until these are cleared."""
+"""Searches keep out of marked places until these are cleared, and off ground never seen."""
 
 import json
 
 import numpy as np
 import pytest
 
+from rover_physics import Terrain, load_rover
 from rover_planner.errors import PlanningError
-from rover_planner.parameters.traverse_server import AUTO, TraverseServerParameters
+from rover_planner.maps.unobserved_ground import ASSUMED, ObservedGround, observed_ground
+from rover_planner.parameters.traverse_server import (
+    ALLOW_FOOTPRINT,
+    AUTO,
+    REFUSE,
+    TraverseServerParameters,
+)
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.marked_places import (
@@ -17,6 +24,11 @@ from rover_planner.planning.marked_places import (
     MarkedPlaces,
     parse_place,
 )
+from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.search.edge_memory import EdgeMemory
+from rover_planner.planning.search.path_search import START_REFUSED, find_path
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+from rover_planner.planning.search.unobserved_check import UnobservedCheck
 from support.rough_grounds import plane
 
 PLACE = MarkedPlace(1.5, 0.0, 0.4, "wheels turn and the rover stays", "2026-11-25 04:00:00 UTC")
@@ -67,3 +79,30 @@ def test_what_is_no_place_is_refused(change):
     text = json.dumps(vars(PLACE) | change)
     with pytest.raises(PlanningError, match="radius"):
         parse_place(text, "a test")
+
+
+def flat_with_hole() -> Terrain:
+    """Return level ground with unseen cells that pass between the wheels of a straight drive."""
+    x, y = np.meshgrid(np.arange(-1.0, 4.01, 0.05), np.arange(-2.0, 2.01, 0.05))
+    hole = (np.abs(x - 1.5) < 0.31) & (np.abs(y) < 0.06)
+    return Terrain(np.where(hole, np.nan, 0.0), 0.05, (-1.0, -2.0))
+
+
+def test_a_search_leads_around_ground_never_seen_until_it_is_seen():
+    memory, ground, rover = EdgeMemory(), flat_with_hole(), load_rover("lsr1")
+    unseen = observed_ground(ground, None)
+    kinds = np.where(unseen.kinds == 0, 0, ASSUMED).astype(np.uint8)
+    filled = ObservedGround(unseen.terrain, kinds)
+
+    def search(seen: ObservedGround, rule=ALLOW_FOOTPRINT, start=START):
+        check = UnobservedCheck(rover, seen, rule)
+        options = PathQueryOptions(waypoint_spacing=0.04)
+        query = SearchQuery(rover, ground, start, GOAL, options, check)
+        return find_path(query, LatticeSettings(budget=60.0), memory)
+
+    around, warm = search(unseen).path.poses, search(filled).path.poses
+    assert np.abs(around[:, 1]).max() > 0.2 and np.abs(warm[:, 1]).max() < 0.05
+    assert unseen.share(rover, around).unobserved_share == 0.0
+    refused = search(filled, REFUSE, start=(1.5, 0.0, 0.0))
+    assert refused.outcome == START_REFUSED
+    assert "never seen (blind_ground is refuse)" in refused.reason

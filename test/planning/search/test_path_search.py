@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tests of the search for ways around obstacles."""
 
+from copy import deepcopy
 from dataclasses import replace
 
 import numba
@@ -43,13 +44,13 @@ def ask(terrain, start=START, goal=GOAL, rover=LSR1, **options):
 
 @pytest.fixture(scope="module")
 def around():
-    """Return question and answer of a way around a wall."""
-    question = ask(make_terrain(long_wall))
-    return question, find_path(question, LONG)
+    """Return question and answer of a way around a wall, and what is remembered of it."""
+    question, memory = ask(make_terrain(long_wall)), EdgeMemory()
+    return question, find_path(question, LONG, memory), memory
 
 
 def test_a_way_leads_around_a_wall_that_refuses_all_candidates(around):
-    question, answer = around
+    question, answer, _ = around
     fan = answer_path_query(LSR1, question.terrain, START, GOAL, OPTIONS)
     assert not fan.traversable
     assert answer.outcome == FOUND and not answer.reason
@@ -58,7 +59,7 @@ def test_a_way_leads_around_a_wall_that_refuses_all_candidates(around):
 
 
 def test_the_way_passes_as_any_path_does_and_ends_where_it_was_asked_to(around):
-    question, answer = around
+    question, answer, _ = around
     poses = answer.path.poses
     np.testing.assert_allclose(poses[[0, -1]], [START, GOAL], atol=1e-12)
     assert np.hypot(*np.diff(poses[:, :2], axis=0).T).max() <= OPTIONS.waypoint_spacing + 1e-9
@@ -67,17 +68,17 @@ def test_the_way_passes_as_any_path_does_and_ends_where_it_was_asked_to(around):
 
 
 def test_a_search_that_ends_by_itself_is_near_the_best_and_judges_few_edges(around):
-    _, answer = around
+    _, answer, _ = around
     assert answer.repeatable and 1.0 <= answer.bound <= 1.0201
     assert 0 < answer.edges_judged < 0.1 * answer.edges and answer.warning == ""
 
 
 def test_the_same_query_has_the_same_path_to_the_bit_with_any_number_of_threads(around):
-    query, answer = around
-    threads, memory = numba.get_num_threads(), EdgeMemory()
+    query, answer, memory = around
+    threads, memory = numba.get_num_threads(), deepcopy(memory)
     try:
         numba.set_num_threads(1)
-        again = find_path(query, LONG, memory)
+        again = find_path(query, LONG)
     finally:
         numba.set_num_threads(threads)
     np.testing.assert_array_equal(again.path.poses, answer.path.poses)
@@ -89,7 +90,8 @@ def test_the_same_query_has_the_same_path_to_the_bit_with_any_number_of_threads(
 
 
 def test_of_a_closed_pen_the_answer_tells_its_area_and_what_closes_it():
-    answer = find_path(ask(make_terrain(pen), (0.0, 0.0, 0.0), (3.0, 0.0, 0.0)), LONG)
+    ground = make_terrain(pen, half=3.2)
+    answer = find_path(ask(ground, (0.0, 0.0, 0.0), (2.4, 0.0, 1.57)), LONG)
     assert answer.outcome == NO_WAY and answer.path is None
     closed = answer.closed
     assert not closed.around_goal and 0.0 < closed.area < 9.0
@@ -100,7 +102,7 @@ def test_of_a_closed_pen_the_answer_tells_its_area_and_what_closes_it():
     cell, (column, row) = answer.nodes.cell, answer.nodes.first
     assert np.abs(cell * (columns + column)).max() < 1.6
     assert np.abs(cell * (rows + row)).max() < 1.6
-    answer = find_path(ask(make_terrain(pen), (3.0, 0.0, 0.0), (0.0, 0.0, 0.0)), LONG)
+    answer = find_path(ask(ground, (2.4, 0.0, 1.57), (0.0, 0.0, 0.0)), LONG)
     assert answer.outcome == NO_WAY and answer.closed.around_goal
 
 
@@ -138,22 +140,13 @@ def test_impossible_ends_and_settings_are_refused_by_name(start, goal, said):
             LatticeSettings(**{name: value})
 
 
-def test_a_rover_with_fixed_wheels_finds_a_way_too():
-    fixed = replace(LSR1, steering=None)
-    answer = find_path(ask(make_terrain(long_wall), rover=fixed), LONG)
-    assert answer.outcome == FOUND
-    steps = np.diff(answer.path.poses, axis=0)
-    assert np.hypot(steps[:, 0], steps[:, 1]).min() > 0.0
-
-
-def test_after_a_change_of_the_map_what_is_remembered_gives_the_way_of_a_new_search():
-    before = make_terrain(long_wall)
+def test_after_a_change_of_the_map_what_is_remembered_gives_the_way_of_a_new_search(around):
+    question, first, memory = around
+    before, memory = question.terrain, deepcopy(memory)
     elevation = np.array(before.elevation)
     x = before.origin[0] + before.resolution * np.arange(elevation.shape[1])
     elevation[np.ix_((x > 1.9) & (x < 2.3), np.abs(x) < 0.1)] += 1.0  # a longer wall
     after = Terrain(elevation, before.resolution, before.origin)
-    memory = EdgeMemory()
-    first = find_path(ask(before), LONG, memory)
     warm, cold = find_path(ask(after), LONG, memory), find_path(ask(after), LONG)
     assert not np.array_equal(first.path.poses, cold.path.poses)
     assert warm.outcome == cold.outcome == FOUND
@@ -163,9 +156,9 @@ def test_after_a_change_of_the_map_what_is_remembered_gives_the_way_of_a_new_sea
     assert verdict.traversable
 
 
-def test_the_last_way_is_the_first_path_after_a_change_of_the_map_that_it_passes():
-    before, memory = make_terrain(long_wall), EdgeMemory()
-    first = find_path(ask(before), LONG, memory)
+def test_the_last_way_is_the_first_path_after_a_change_of_the_map_that_it_passes(around):
+    question, first, memory = around
+    before, memory = question.terrain, deepcopy(memory)
     elevation = np.array(before.elevation)
     elevation[:3] += 0.02  # far from the way
     after = Terrain(elevation, before.resolution, before.origin)

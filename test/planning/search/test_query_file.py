@@ -1,12 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tests of the files that hold a question for a path."""
 
-import json
-
 import numpy as np
 import pytest
 
-from rover_physics import RoverError, load_rover, load_terrain, save_terrain
+from rover_physics import load_rover, save_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
@@ -41,23 +39,3 @@ def test_a_terrain_file_is_no_question(tmp_path):
     save_terrain(tmp_path / "ground.npz", make_terrain(waves))
     with pytest.raises(PlanningError, match="ground.npz holds no question for a path"):
         read_query(tmp_path / "ground.npz")
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "said"),
-    [
-        ("goal", None, "missing key goal"),
-        ("rover", {"name": "x"}, "missing keys gravity, .*nominal_speed"),
-    ],
-)
-def test_a_question_with_a_wrong_entry_is_refused_by_name(written, key, value, said):
-    path, question = written
-    with np.load(path) as entries:
-        content = json.loads(str(entries["way_question"]))
-    if value is None:
-        del content[key]
-    else:
-        content[key] = value
-    save_terrain(path, load_terrain(path), way_question=json.dumps(content))
-    with pytest.raises((PlanningError, RoverError), match=said):
-        read_query(path)
