@@ -30,10 +30,12 @@ Journal of Optimization Theory and Applications 47, 1985; Rockafellar, "Monotone
 proximal point algorithm", SIAM Journal on Control and Optimization 14, 1976.
 """
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from rover_physics.errors import ModelError
 from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.kernels import kernel
@@ -72,8 +74,13 @@ SLACK_PRICE = 100.0
 """Price of a slack: more than a peak can be worth, so that no limit gives way to another."""
 
 
-class ProgramInputs(NamedTuple):
-    """Friction and torque that the wheels can count on; all numbers are above 0."""
+@dataclass(frozen=True, eq=False)
+class ProgramInputs:
+    """Friction and torque that the wheels can count on.
+
+    Raises:
+        ModelError: A friction coefficient, the largest torque or the radius is not above 0.
+    """
 
     friction: Floats
     """(6,) friction coefficients."""
@@ -81,6 +88,14 @@ class ProgramInputs(NamedTuple):
     """Largest torque of a wheel [N m]."""
     radius: float
     """Wheel radius [m]."""
+
+    def __post_init__(self) -> None:
+        """Check all values."""
+        if not (self.friction.min() > 0.0 and self.max_torque > 0.0 and self.radius > 0.0):
+            raise ModelError(
+                f"friction {self.friction.tolist()}, largest torque {self.max_torque} N m and "
+                f"wheel radius {self.radius} m must all be above 0"
+            )
 
     def max_pull(self, force_unit: float) -> float:
         """Return the largest traction of a motor in a unit of force [N]."""

@@ -190,8 +190,9 @@ def _describe_answer(
     """Return forces x (14,) in SI units, with what the run of the programs came to."""
     table = np.empty((5, WHEEL_COUNT))
     peak, min_load, max_torque = _measure_wheels(
-        rows.lateral_shares, rows.force_unit, *inputs, x, table
-    )
+        rows.lateral_shares, rows.force_unit, inputs.friction, inputs.max_torque, inputs.radius,
+        x, table,
+    )  # fmt: skip
     torques, loads, tractions, lateral, utilisation = table
     return TractionAnswer(
         torques, loads, tractions, lateral, utilisation,
