@@ -10,50 +10,20 @@ from dataclasses import replace
 from statistics import median
 
 import numpy as np
-from nav_msgs.msg import Odometry
-from rclpy.node import Node
-from std_msgs.msg import Bool
 
 from benchmarks.measure import Figure
 from benchmarks.processes import SERVER, START_TIME, open_nodes
 from msg_adapters.elevation import terrain_to_point_cloud
-from msg_adapters.paths import stamped_pose
-from rover_planner.ros.qos import latched_qos
 from support.grounds import make_terrain, waves
 from support.planner_client import PlannerClient
-from support.ros_fixtures import RosRun
+from support.standing_rover import GOAL, START, StandingRover, rock_ahead
 from support.waiting import wait_until
 
 MAPS = ((6.0, 0.05, 0.0), (6.0, 0.05, 0.001), (15.0, 0.02, 0.0), (15.0, 0.02, 0.001))
 """Half width, cell size and standard deviation of the heights of each map [m]."""
 REPEATS = 8
-START, GOAL = (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
 LIMIT = 500.0
 """Longest allowed time from map to stop [ms]."""
-
-
-class Rover(Node):
-    """A rover that stands at START and hears ~/stop."""
-
-    def __init__(self, ros: RosRun):
-        super().__init__("rover", context=ros.context)
-        self._odometry = self.create_publisher(Odometry, "odometry", 10)
-        self.stops: list[tuple[float, bool]] = []
-        self.create_subscription(Bool, f"{SERVER}/stop", self._hear, latched_qos())
-        self.create_timer(0.05, self._publish)
-
-    def _hear(self, stop: Bool) -> None:
-        self.stops.append((time.monotonic(), stop.data))
-
-    def _publish(self) -> None:
-        odometry = Odometry(child_frame_id="base_link")
-        odometry.header.frame_id, odometry.pose.pose = "map", stamped_pose(START, "map").pose
-        self._odometry.publish(odometry)
-
-
-def rock_ahead(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return waves with a rock of 0.4 m across the way from START to GOAL."""
-    return np.asarray(waves(x, y) + 0.4 * ((abs(x - 1.2) < 0.15) & (abs(y) < 2.0)))
 
 
 def measure() -> list[Figure]:
@@ -70,7 +40,10 @@ def _measure(half: float, resolution: float, std: float) -> list[Figure]:
         free, blocked = (replace(one, elevation_std=layer) for one in (free, blocked))
     clouds = [terrain_to_point_cloud(one, "map") for one in (free, blocked)]
     with open_nodes() as nodes:
-        client, rover = nodes.ros.spin(PlannerClient(nodes.ros)), nodes.ros.spin(Rover(nodes.ros))
+        client, rover = (
+            nodes.ros.spin(PlannerClient(nodes.ros)),
+            nodes.ros.spin(StandingRover(nodes.ros)),
+        )
         nodes.start(SERVER, monitor=True, monitor_timeout=60.0)
         wait_until(lambda: rover.stops, "the server", START_TIME)
         delays = [_time_stop(client, rover, clouds) for _ in range(REPEATS)]
@@ -83,14 +56,14 @@ def _measure(half: float, resolution: float, std: float) -> list[Figure]:
     ]
 
 
-def _time_stop(client: PlannerClient, rover: Rover, clouds: list) -> float:
+def _time_stop(client: PlannerClient, rover: StandingRover, clouds: list) -> float:
     """Have a path accepted, block it, and return the time until the stop is heard [ms]."""
     client.logs.clear()
     client.send_cloud(clouds[0])
     wait_until(lambda: client.can_traverse(START, GOAL).poses, "a path")
-    wait_until(lambda: not rover.stops[-1][1], "the watch")
+    rover.wait_for_stop(False)
     time.sleep(0.3)
     sent = time.monotonic()
     client.send_cloud(clouds[1])
-    wait_until(lambda: rover.stops[-1][1], "the stop")
-    return 1e3 * (next(at for at, stops in rover.stops if stops and at > sent) - sent)
+    rover.wait_for_stop()
+    return 1e3 * (next(at for stops, at in rover.stops if stops and at > sent) - sent)

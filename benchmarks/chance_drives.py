@@ -6,7 +6,6 @@ It needs the extra `bench`. The file gets a line of JSON for each path; lines th
 """
 
 import json
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
@@ -14,8 +13,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from benchmarks.drives import LOOK_AHEAD, MAX_TILT, Obstacle
-from rover_physics import Rover, Terrain
+from benchmarks.drives import LOOK_AHEAD, MAX_TILT
 from rover_physics.rover.steered_drive import SteeredDrive
 from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.simulator.path_follower import PathFollower
@@ -39,33 +37,14 @@ class Truth:
 
 
 def passes(path: ChancePath, truth: Truth) -> bool:
-    """Drive a path with speed servos with droop and a follower; return whether it arrives."""
-    obstacle = Obstacle(path.kind, path.size, truth.friction, path.seed, truth.max_torque)
-    return arrives(path.rover(truth.max_torque), obstacle.ground, path.poses, truth.friction)
-
-
-@dataclass(frozen=True, eq=False)
-class Moment:
-    """A rover on its way, after each period of the steering."""
-
-    plant: MujocoRover
-    """The rover."""
-    torques: np.ndarray
-    """(6,) torques of the wheels [N m]."""
-    driven: float
-    """Way along the path [m]."""
-    is_lost: bool
-    """Whether it tipped over or is stuck."""
-
-
-def drive(rover: Rover, ground: Terrain, poses: np.ndarray, friction: float) -> Iterator[Moment]:
-    """Drive poses (n, 3) with speed servos with droop and a follower, to their end or until lost.
+    """Drive a path with speed servos with droop and a follower; return whether it arrives.
 
     The follower aims at LOOK_AHEAD beyond the last pose.
     """
+    rover, poses = path.rover(truth.max_torque), path.poses
     x, y, yaw = poses[-1]
     beyond = [x + LOOK_AHEAD * np.cos(yaw), y + LOOK_AHEAD * np.sin(yaw), yaw]
-    plant = MujocoRover(rover, ground, tuple(poses[0]), friction)
+    plant = MujocoRover(rover, path.ground, tuple(poses[0]), truth.friction)
     follower = PathFollower(np.vstack([poses, beyond]), LOOK_AHEAD)
     length = float(np.hypot(*np.diff(poses[:, :2], axis=0).T).sum())
     steered, way = SteeredDrive(rover), [0.0]
@@ -75,21 +54,14 @@ def drive(rover: Rover, ground: Terrain, poses: np.ndarray, friction: float) -> 
         aims = steered.aim(*follower.steer(here, rover.nominal_speed))
         plant.steer(aims.angles)
         share = steered.share(plant.steering_angles, aims.angles)
-        torques = plant.servo_with_droop(
+        plant.servo_with_droop(
             share * aims.speeds / rover.wheel.radius, rover.wheel.servo_droop, PERIOD
         )
         way.append(follower.driven)
         stands = len(way) > within and way[-1] - way[-1 - within] < STUCK_WAY
         is_lost = plant.tilt > MAX_TILT or stands
-        yield Moment(plant, torques, follower.driven, is_lost)
-
-
-def arrives(rover: Rover, ground: Terrain, poses: np.ndarray, friction: float) -> bool:
-    """Drive poses (n, 3) as `drive` does; return whether the rover arrives."""
-    for moment in drive(rover, ground, poses, friction):
-        last = moment
-    off = np.hypot(*(last.plant.pose[:2] - poses[-1, :2]))
-    return not last.is_lost and bool(off <= KEPT)
+    off = np.hypot(*(plant.pose[:2] - poses[-1, :2]))
+    return not is_lost and bool(off <= KEPT)
 
 
 def main(

@@ -66,18 +66,9 @@ class ChancePath:
         return drive_ground(self.kind, self.size, self.seed)
 
     @property
-    def length(self) -> float:
-        """Length [m]."""
-        return LENGTH
-
-    @property
     def poses(self) -> np.ndarray:
         """Waypoints (n, 3) x, y [m] and yaw [rad]."""
-        return self.extended(0.0)
-
-    def extended(self, by: float) -> np.ndarray:
-        """Return waypoints (n, 3) of the path, led on by a length [m]."""
-        along = np.linspace(0.0, LENGTH + by, round((LENGTH + by) / SPACING) + 1)
+        along = np.linspace(0.0, LENGTH, round(LENGTH / SPACING) + 1)
         turn = self.curvature * along
         ahead = along * np.sinc(turn / np.pi)
         aside = 0.5 * turn * along * np.sinc(turn / (2.0 * np.pi)) ** 2

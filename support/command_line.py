@@ -7,7 +7,6 @@ import numpy as np
 
 from rover_physics import Terrain, save_terrain
 
-REPOSITORY = Path(__file__).resolve().parents[1]
 N = 30
 """Number of poses of the path in `write_ground_and_path`."""
 

@@ -21,6 +21,11 @@ def wait_until(condition: Callable[[], Any], what: str, timeout: float = TIMEOUT
     raise AssertionError(f"waited {timeout} s for {what}")
 
 
+def repeat_until(act: Callable[[], Any], condition: Callable[[], Any], what: str) -> Any:
+    """Act, such as publish what may be lost, until a condition holds; return its value."""
+    return wait_until(lambda: (act(), condition())[1], what)
+
+
 def start_watch() -> Callable[[], float]:
     """Return what tells the time since now [s], without that of a machine that was elsewhere.
 

@@ -66,7 +66,7 @@ from rover_planner.ros.deferred_service import Reply, serve_later
 from rover_planner.ros.frames import NodeFrames, is_empty
 from rover_planner.ros.map_intake import read_message
 from rover_planner.ros.node import RoverNode
-from rover_planner.ros.qos import polled_qos, replace_reliability, topic_qos
+from rover_planner.ros.qos import newest_qos, polled_qos, replace_reliability, topic_qos
 from rover_planner.ros.server_inputs import ServerInputs, describe_path
 from rover_planner.ros.steady import create_steady_timer
 from rover_planner.ros.subscriptions import subscribe_to_requests
@@ -116,6 +116,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self._map_cloud = MapCloud(self, self.service)
         self.watch = PathWatch(self, self.service, self._find_watched, self._publish_stop)
         """Watches the accepted path."""
+        self.urgent_threads = (self.watch.heartbeat_thread,)
         self._hazards = HazardTopics(self, self.service, lambda: self.desk.open_count > 0)
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
         create_steady_timer(self, DIAGNOSTICS_PERIOD, self._publish_diagnostics)
@@ -136,7 +137,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
 
     def _create_subscriptions(self) -> None:
         self.heard.subscribe(JointState, "joint_states", self._take_joints, polled_qos())
-        self.heard.subscribe(Odometry, "odometry", self._take_odometry, polled_qos())
+        self.heard.subscribe(Odometry, "odometry", self._take_odometry, newest_qos())
         if self.values.imu_attitude:
             self.heard.subscribe(Imu, "imu", self._take_imu, polled_qos())
         reliability = self.values.input_reliability

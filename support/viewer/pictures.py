@@ -4,7 +4,6 @@
 import argparse
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,63 +24,50 @@ MAX_GAP = 0.2
 """Gaps in maps up to this width are filled, as `rover_planner view` does [m]."""
 
 
-@dataclass(frozen=True)
-class PictureCase:
-    """A picture of the page."""
-
-    file: str
-    """Name of the picture."""
-    ground: str
-    """The page's name of the ground."""
-    make: Callable[[], Terrain]
-    """Makes or loads the ground."""
-    ends: tuple[Pose, Pose] | None = None
-    """Start and goal; None: those that `rover_planner view` chooses."""
-    refused: bool = True
-    """True if it shows a refused path, at its failure; else the page as it opens, under way."""
+def make_ground() -> Terrain:
+    """Return the ground that the page makes without one."""
+    return make_mars_terrain(SEED, TERRAIN_SIZE, 0.05)
 
 
 MADE = f"made, seed {SEED}"
-CASES = (
-    PictureCase(
-        "viewer.png", MADE, lambda: make_mars_terrain(SEED, TERRAIN_SIZE, 0.05), refused=False
-    ),
-    PictureCase("viewer_made.png", MADE, lambda: make_mars_terrain(SEED, TERRAIN_SIZE, 0.05)),
-    PictureCase(
-        "viewer_spirit.png",
+CASES: dict[str, tuple[str, Callable[[], Terrain], tuple[Pose, Pose] | None]] = {
+    "viewer.png": (MADE, make_ground, None),
+    "viewer_made.png": (MADE, make_ground, None),
+    "viewer_spirit.png": (
         "spirit",
         lambda: load_terrain("spirit").fill_gaps(MAX_GAP),
         ((-47.2, -21.0, 1.2), (-45.7, -17.1, 1.2)),
     ),
-    PictureCase(
-        "viewer_otira.png",
+    "viewer_otira.png": (
         "otira_tls_boulders_3cm",
         lambda: real_maps()["otira_tls_boulders_3cm"].fill_gaps(MAX_GAP),
         ((20.3, 17.4, 0.0), (23.4, 17.4, 0.0)),
     ),
-)
+}
+"""Name of the ground, the ground, and start and goal (None: those that `rover_planner view`
+chooses) of each picture. The first shows the page as it opens, the others a refused path."""
 
 
 def write_pictures(folder: Path, names: list[str]) -> Iterator[str]:
     """Write the pictures and yield their names with what they show; no names: all of them."""
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=PROGRAM, args=ARGUMENTS)
-        for case in CASES:
-            if not names or case.file in names:
-                yield f"{case.file}: {_write(browser, case, folder / case.file)}"
+        for name in names or CASES:
+            yield f"{name}: {_write(browser, folder / name)}"
         browser.close()
 
 
-def _write(browser: Any, case: PictureCase, file: Path) -> str:
+def _write(browser: Any, file: Path) -> str:
     """Write one picture; return what it shows."""
-    rover, ground = load_rover("lsr1"), case.make()
-    session = ViewSession(rover, ground, *(case.ends or choose_ends(rover, ground)))
-    page = Page(session, port=0, ground_name=case.ground)
+    name, make, ends = CASES[file.name]
+    rover, ground = load_rover("lsr1"), make()
+    session = ViewSession(rover, ground, *(ends or choose_ends(rover, ground)))
+    page = Page(session, port=0, ground_name=name)
     try:
         wait_until(lambda: not page.is_busy, "the verdicts")
         visitor = Visitor(browser, page.url, scale=1.0)
         _close_notice(visitor)
-        shows = _show_failure(page, visitor) if case.refused else _show_drive(page)
+        shows = _show_drive(page) if file.name == "viewer.png" else _show_failure(page, visitor)
         time.sleep(SETTLE)  # what changes while a page opens may be drawn once more
         file.write_bytes(visitor.tab.screenshot())
         visitor.tab.close()

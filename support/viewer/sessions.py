@@ -4,12 +4,10 @@
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from benchmarks.grounds import made_reef
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.path_query import PathQueryOptions
@@ -21,11 +19,11 @@ from support.grounds import make_terrain, waves
 from support.waiting import wait_until
 
 LSR1 = load_rover("lsr1")
-SHARE = 0.2
-"""Heights over those of the made reef, on which every path ends after a few centimetres."""
 START, GOAL = (-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)
 FAR = (500_000.0, 4_000_000.0)
 """Place of a map in a UTM zone: easting and northing [m]."""
+SURE = PathQueryOptions(count=5, spacing=0.5, accepted_chance=1.0)
+"""Options of a session without chances of failure, which take most of the time of a verdict."""
 PATIENCE = 120.0
 """Longest wait for a page [s]; drawing and judging take seconds on a busy machine."""
 
@@ -43,7 +41,7 @@ def ramp(x, y):
 
 def session_on(height, start=(-2.0, 0.0, 0.0), goal=(1.0, 0.0, 0.0)) -> ViewSession:
     """Return a session of the LSR-1 on a ground with heights height(x, y) [m]."""
-    return ViewSession(LSR1, make_terrain(height), start, goal)
+    return ViewSession(LSR1, make_terrain(height), start, goal, SURE)
 
 
 def blocked(x, y):
@@ -81,6 +79,17 @@ def ask(page: Any, action: Callable[[], Any]) -> None:
     wait_until(lambda: not page._fulfils, "what the action makes the page say", PATIENCE)
 
 
+def finish(session: ViewSession) -> None:
+    """Wait until a session that judges in the background has judged, and take what was found."""
+    wait_until(lambda: session.progress is None, "the end of the work", 60.0)
+    session.take_finished()
+
+
+def wait_patiently(condition: Callable[[], Any], what: str) -> None:
+    """Wait for what a busy machine's page does late."""
+    wait_until(condition, what, PATIENCE)
+
+
 def wait_for_rest(page: Any) -> None:
     """Wait until everything that is wanted is judged and shown."""
     session = page.session
@@ -91,34 +100,10 @@ def wait_for_rest(page: Any) -> None:
     )
 
 
-def lowered_reef() -> Terrain:
-    """Return the made reef with lower heights, so that paths do not end at once."""
-    reef = made_reef()
-    return Terrain(SHARE * reef.elevation, reef.resolution, reef.origin)
-
-
-def tolerant_rover():
-    """Return an LSR-1 that hardly slips and whose limits are wide, so that its paths are long."""
-    limits = replace(
-        LSR1.limits,
-        tilt=1.4,
-        tip_over_ratio=0.01,
-        belly_clearance=0.001,
-        wheel_drop=5.0,
-    )
-    wheel = replace(LSR1.wheel, max_torque=100.0)
-    return replace(LSR1, friction=2.0, wheel=wheel, limits=limits)
-
-
-def slow_options(count: int = 3, waypoint_spacing: float = 2e-4) -> PathQueryOptions:
-    """Return options for candidates with so many waypoints that they take seconds."""
-    return PathQueryOptions(count=count, spacing=0.2, waypoint_spacing=waypoint_spacing)
-
-
-def slow_scenario(friction: float = 2.0) -> Scenario:
-    """Return a scenario that takes seconds, with a friction coefficient."""
-    rover = replace(tolerant_rover(), friction=friction)
-    return Scenario(rover, rover, lowered_reef(), START, GOAL, slow_options(), {})
+def slow_scenario() -> Scenario:
+    """Return a scenario of three paths with so many waypoints that each takes a while."""
+    options = PathQueryOptions(count=3, spacing=0.2, waypoint_spacing=5e-5)
+    return Scenario(LSR1, LSR1, make_terrain(waves), START, GOAL, options, {})
 
 
 def walled_session(
@@ -127,7 +112,7 @@ def walled_session(
     """Return a session on 5 m x 5 m with a wall at x = 0; a search for the best may take long."""
     search = LatticeSettings(budget=60.0, ends_at_first=ends_at_first)
     ground = make_terrain(height, half=2.5)
-    return ViewSession(rover, ground, (-1.6, 0.0, 0.0), goal, search=search)
+    return ViewSession(rover, ground, (-1.6, 0.0, 0.0), goal, SURE, search=search)
 
 
 @contextmanager

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line keeps its promise: bad input is exit code 2 and one line, whatever it is."""
 
-import numpy as np
 import pytest
 
 from rover_planner.cli import main
@@ -71,18 +70,6 @@ def test_bad_input_is_refused_in_one_short_line(files, capfd, words, names):
 def test_view_refuses_what_it_cannot_serve_instead_of_waiting(files, capfd, words, names):
     pytest.importorskip("viser", reason="needs viser")
     assert_one_short_line(capfd, ["view", "lsr1", "terrain.npz", "--port", "0", *words], names)
-
-
-@pytest.mark.parametrize(
-    ("arrays", "names"),
-    [
-        ({"poses": np.zeros((4, 2))}, "pose"),
-        ({"poses": np.zeros((2, 3)), "curvature": np.zeros(3)}, "shape (3,); it must be numbers"),
-    ],
-)
-def test_impossible_poses_are_one_line(capfd, files, arrays, names):
-    np.savez(files / "poses.npz", **arrays)
-    assert_one_short_line(capfd, predict(), names)
 
 
 def test_names_with_control_characters_are_shown_escaped(files, capfd):

@@ -6,14 +6,12 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 
 from rover_planner.demo.child_process import ChildProcess, stopping_children
+from support.project.checkout import TOP
 from support.waiting import is_running, wait_until_gone
-
-REPOSITORY = Path(__file__).resolve().parents[2]
 
 STUBBORN = """
 import signal, subprocess, sys, time
@@ -45,7 +43,7 @@ def environment(tmp_path):
     (tmp_path / "stubborn.py").write_text(STUBBORN)
     (tmp_path / "polite.py").write_text(POLITE)
     (tmp_path / "failing.py").write_text("raise SystemExit('no luck today')")
-    return os.environ | {"PYTHONPATH": f"{REPOSITORY}{os.pathsep}{tmp_path}"}
+    return os.environ | {"PYTHONPATH": f"{TOP}{os.pathsep}{tmp_path}"}
 
 
 def test_a_child_that_ignores_sigterm_is_killed_with_its_own_child(

@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,13 +14,12 @@ from rover_physics import Terrain, save_terrain
 from rover_planner.cli import main
 from rover_planner.demo import demo as demo_module
 from rover_planner.worlds.mars_terrain import make_mars_terrain
+from support.project.checkout import TOP
 from support.project.processes import ProcessToken
 from support.ros_fixtures import DOMAINS, domain_id
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 pytest.importorskip("matplotlib", reason="needs matplotlib")
-
-REPOSITORY = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture
@@ -43,8 +41,8 @@ class Demo:
         self.folder = folder
         self.process = subprocess.Popen(
             [sys.executable, "-m", "rover_planner", "demo", *map(str, words)],
-            cwd=REPOSITORY,
-            env=os.environ | self.token.environment | {"PYTHONPATH": str(REPOSITORY)},
+            cwd=TOP,
+            env=os.environ | self.token.environment | {"PYTHONPATH": str(TOP)},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
@@ -112,7 +110,7 @@ def test_a_demo_takes_no_domain_of_a_test_though_it_looks_unused():
 @pytest.mark.long
 def test_the_kernels_are_compiled_before_the_server_starts(tmp_path):
     """The step that says so did nothing once its module had moved; the server compiled then."""
-    environment = os.environ | {"PYTHONPATH": str(REPOSITORY), "NUMBA_CACHE_DIR": str(tmp_path)}
+    environment = os.environ | {"PYTHONPATH": str(TOP), "NUMBA_CACHE_DIR": str(tmp_path)}
     command = [sys.executable, "-m", demo_module.COMPILER]
     with subprocess.Popen(command, env=environment) as compiler:
         deadline = time.monotonic() + 240.0

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from rover_physics import Terrain, load_rover
 from rover_planner.figures.path_picture import _draw_uses, draw_path
-from rover_planner.figures.plots import LabelledAnswer, draw_answers, hill_shade
+from rover_planner.figures.plots import LabelledAnswer, draw_answers
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query, check_path
 from rover_planner.planning.search.path_search import find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
@@ -108,13 +108,3 @@ def test_forces_that_no_verdict_asks_for_are_shaded(draw):
     before = answer_path_query(LSR1, ledge, (-3.5, 0, 0), (-3.2, 0, 0), options)
     assert before.traversable
     assert not any(axes.patches for axes in draw(LabelledAnswer("B", "level", before))[1])
-
-
-def test_slopes_towards_the_sun_are_brighter():
-    x = np.arange(30.0)[None, :] + np.zeros((30, 1))
-    level = hill_shade(np.zeros((30, 30)), 0.1)
-    rising_east = hill_shade(0.05 * x, 0.1)
-    assert level == pytest.approx(2 / 3)
-    # the sun is in the north-west: a slope that rises to the east faces it
-    assert (rising_east > level).all()
-    assert (hill_shade(0.05 * x.T, 0.1) < level).all()

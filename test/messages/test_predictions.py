@@ -13,14 +13,16 @@ from std_msgs.msg import Float64MultiArray
 from visualization_msgs.msg import Marker
 
 from msg_adapters.errors import MessageError
+from msg_adapters.joints import JointNames
 from msg_adapters.paths import PoseStock, settled_path
 from msg_adapters.results.diagnostics import to_json, verdict_to_diagnostics
-from msg_adapters.results.markers import IMPASSABLE, PASSABLE, path_markers
+from msg_adapters.results.markers import IMPASSABLE, PASSABLE, WITH_SPEED_SERVOS, path_markers
 from msg_adapters.results.predictions import JOINTS, array_values, joint_trajectory, waypoint_array
 from rover_physics import PoseStatus, Terrain, judge_path, load_rover
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.rover.steering_joints import steered_wheels, steering_joints
+from rover_physics.traversability import classification
 
 LSR1 = load_rover("lsr1")
 STAMP = Time(sec=12, nanosec=34)
@@ -98,7 +100,8 @@ def test_a_trajectory_has_the_angles_of_the_steered_wheels_with_the_sign_of_the_
     flat = Terrain(np.zeros((81, 81)), 0.05, (-2.0, -2.0))
     prediction = judge_path(LSR1, flat, path)[0]
     for positive, sign in (("left", 1.0), ("right", -1.0)):
-        message = joint_trajectory(prediction, LSR1, "map", STAMP, positive_steering=positive)
+        names = JointNames(steering=positive)
+        message = joint_trajectory(prediction, LSR1, "map", STAMP, names=names)
         for i, point in enumerate(message.points):
             angles = dict(zip(message.joint_names, point.positions, strict=True))
             own = {name: angles[name] for name in steering_joints(LSR1)}
@@ -159,6 +162,9 @@ def test_markers_colour_the_path_and_show_where_it_fails(prediction):
         [[p.x, p.y, p.z] for p in contacts[:6]], prediction.contact_points[0]
     )
     assert all(marker.header.stamp == STAMP for marker in markers)
+    classes = [classification.WITH_SPEED_SERVOS] * 60
+    drawn = path_markers(prediction, [""] * 60, np.arange(0, 60, 7), "map", STAMP, classes)
+    assert WITH_SPEED_SERVOS in next(m for m in drawn.markers if m.ns == "path").colors
 
 
 def test_every_entry_of_a_verdict_becomes_a_key_and_a_value():

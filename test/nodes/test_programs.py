@@ -17,12 +17,11 @@ from rclpy.parameter import Parameter
 from rover_planner.nodes import start
 from rover_planner.nodes.programs import PROGRAMS
 from rover_planner.shell.extras import PLAIN
-from support.command_line import REPOSITORY
-from support.project.checkout import setup_arguments
+from support.project.checkout import TOP, setup_arguments
 from support.waiting import wait_until
 
 MODULES = {name: importlib.import_module(f"rover_planner.nodes.{name}") for name in PROGRAMS}
-PARAMETER_FILES = REPOSITORY / "config" / "parameters"
+PARAMETER_FILES = TOP / "config" / "parameters"
 OF_ROS = re.compile(r"/(parameter_events|rosout|.*/(\w+_parameters?\w*|get_type_description))$")
 
 
@@ -48,7 +47,7 @@ def ended_without_ros():
     """Return exit code, stdout and stderr of each program with and without --help, by words."""
     ran = subprocess.run(
         [sys.executable, "-c", RUN_ALL],
-        env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
+        env=os.environ | {"PYTHONPATH": str(TOP)},
         capture_output=True,
         text=True,
         timeout=60,

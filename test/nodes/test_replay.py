@@ -15,20 +15,18 @@ from nav_msgs.msg import Path as PathMessage
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from sensor_msgs.msg import Imu, JointState, PointCloud2
+from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.stamps import ns_to_stamp
-from rover_physics import Terrain, judge_path, load_rover, load_terrain, save_terrain
+from rover_physics import Terrain, judge_path, load_rover, load_terrain
 from rover_physics.names import SUSPENSION_JOINTS
-from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_planner.cli import main
 from rover_planner.nodes.result_topics import RESULT_KINDS
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.bags.bag_reader import GRID_MAP, GRID_MAP_FIELDS, GRID_MAP_INFO_FIELDS
-from support.messages.grid_maps import grid_map_of
 
 LSR1 = load_rover("lsr1")
 BEGIN = 1_700_000_000_000_000_000
@@ -112,14 +110,6 @@ def replay(capsys, bag: Path, out: Path, *words: str) -> tuple[list[dict], dict]
     assert main(["replay", str(bag), str(out), *words]) == 0, capsys.readouterr().err
     *answers, total = map(json.loads, capsys.readouterr().out.splitlines())
     return answers, total
-
-
-def imu_at(roll: float) -> Imu:
-    """Return the attitude of a rover that leans by a roll [rad]."""
-    message = Imu()
-    x, y, z, w = xyzw_from_rpy(roll, 0.0, 0.0).tolist()
-    message.orientation = Quaternion(x=x, y=y, z=z, w=w)
-    return message
 
 
 def transforms_of(parent: str, child: str, rigid: Rigid):
@@ -252,28 +242,6 @@ def test_an_answer_is_never_written_over(tmp_path, capsys):
     assert "exists already" in capsys.readouterr().err
 
 
-def test_ground_under_the_rover_is_filled_as_the_imu_says(tmp_path, capsys):
-    X, Y = np.meshgrid(np.arange(-1.0, 4.0, 0.04), np.arange(-2.0, 2.0, 0.04))
-    unseen = (np.abs(X - 1.0) < 0.5) & (np.abs(Y) < 0.45)
-    terrain = Terrain(np.where(unseen, np.nan, 0.0), 0.04, (-1.0, -2.0))
-    standing = dict.fromkeys(SUSPENSION_JOINTS, 0.0)
-    messages = [
-        ("/joint_states", joints_of(standing)),
-        ("/odometry", odometry_at(1.0)),
-        ("/imu", imu_at(0.2)),
-        ("/other/imu_raw", imu_at(-0.5)),
-        ("/elevation_cloud", cloud(terrain)),
-    ]
-    bag, file = record(tmp_path / "bag", messages), tmp_path / "server.yaml"
-    file.write_text("/**: {ros__parameters: {imu_attitude: true, planner: fan}}\n")
-    words = ["--parameters", str(file), "--goal", "3,0,0"]
-    (answer,), total = replay(capsys, bag, tmp_path / "out", *words)
-    assert total["topics"]["imu"] == "/imu"
-    ground = load_terrain(tmp_path / "out" / answer["map"])
-    left, right = ground.elevation_at(np.array([1.0, 1.0]), np.array([0.3, -0.3]))
-    assert left - right == pytest.approx(0.6 * np.tan(0.2), abs=0.03)
-
-
 def test_recorded_transforms_place_odometry_and_clouds_on_the_map(tmp_path, capsys):
     map_odom = Rigid.from_rpy(2.0, -1.0, 0.3, 0.0, 0.0, 1.1)
     mount = Rigid.from_rpy(0.4, 0.0, 0.6, 0.0, 0.5, 0.0)
@@ -302,29 +270,6 @@ def test_recorded_transforms_place_odometry_and_clouds_on_the_map(tmp_path, caps
     np.testing.assert_allclose(ground.elevation_at(x, y), right.elevation_at(x, y), atol=2e-3)
     poses = np.load(tmp_path / "out" / answer["prediction"])["poses"]
     np.testing.assert_allclose(poses[0], [1.0, 0.0, 0.0], atol=1e-6)
-
-
-def test_a_grid_map_in_odom_is_laid_onto_the_loaded_map(tmp_path, capsys):
-    save_terrain(tmp_path / "prior.npz", Terrain(np.zeros((100, 250)), 0.04, (-1.0, -2.0)))
-    file = tmp_path / "server.yaml"
-    file.write_text(f"/**: {{ros__parameters: {{terrain_file: {tmp_path / 'prior.npz'}}}}}\n")
-    map_odom = Rigid.from_rpy(2.0, -0.5, 0.02, 0.0, 0.0, 0.7)
-    x, y = np.meshgrid(np.arange(-25, 26) * 0.04, np.arange(-25, 26) * 0.04)
-    message = grid_map_of({"elevation": 0.05 * np.sin(2.0 * x) * np.cos(y)}, 0.04)
-    message.header.frame_id = "odom"
-    transforms = {"/tf_static": transforms_of("map", "odom", map_odom)}
-    messages = [("/odometry", odometry_at(1.0)), ("/elevation_map", message)]
-    bag = record(tmp_path / "bag", [*transforms.items(), *messages])
-    words = ["--parameters", str(file), "--goal", "3,0.2,0"]
-    (answer,), total = replay(capsys, bag, tmp_path / "out", *words)
-    assert total["refused_messages"] == {}
-    ground = load_terrain(tmp_path / "out" / answer["map"])
-    assert (ground.origin, ground.elevation.shape) == ((-1.0, -2.0), (100, 250))
-    for own in ((0.0, 0.0), (0.4, -0.3), (-0.5, 0.6)):
-        there = map_odom.rotation.apply((*own, 0.0)) + map_odom.translation
-        height = 0.02 + 0.05 * np.sin(2.0 * own[0]) * np.cos(own[1])
-        assert ground.elevation_at(*there[:2]) == pytest.approx(height, abs=1e-3)
-    assert ground.elevation_at(6.0, 1.0) == 0.0
 
 
 def messages_on(bag, topic, kind):

@@ -5,17 +5,14 @@ import importlib
 import json
 import math
 import shutil
-from pathlib import Path
 
-import numpy as np
 import pytest
 
 pytest.importorskip("rclpy", reason="benchmarks start nodes")
 from benchmarks.measure import print_figures, write_figures
 from benchmarks.run import TOPICS
-from rover_physics import load_rover
+from support.project.checkout import TOP
 
-FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 SMALL = {
     "page": {"TRIES": 1},
     "paths": {"REPEATS": 1, "MANY": 5_000},
@@ -63,40 +60,7 @@ def test_every_topic_measures_in_a_small_size(topic, monkeypatch, tmp_path, caps
     assert figures[0].topic in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("name", sorted(file.stem for file in FOLDER.glob("*.py")))
+@pytest.mark.parametrize("name", sorted(file.stem for file in (TOP / "benchmarks").glob("*.py")))
 def test_every_benchmark_can_be_imported(name):
     pytest.importorskip("mujoco", reason="install the extra bench")
     importlib.import_module(f"benchmarks.{name}")
-
-
-@pytest.mark.long
-def test_paths_are_searched_in_a_small_size(capsys):
-    from benchmarks.path_search import SearchCase, run_case, show
-    from rover_planner.worlds.mars_terrain import make_mars_terrain
-
-    case = SearchCase("small", load_rover("lsr1"), make_mars_terrain(3, 8.0))
-    asked = {"count": 2, "seed": 0, "budget": 2.0, "longest": 2.0, "warm": 1}
-    rows = list(run_case(case, asked))
-    assert [row["outcome"] for row in rows] == ["found", "found"]
-    assert all(row["passes"] and 0.0 < row["cost"] < np.inf for row in rows)
-    assert rows[0]["warm_outcome"] == "found"
-    show(rows)
-    assert "of all that any search finds" in capsys.readouterr().out
-
-
-@pytest.mark.long
-def test_energy_is_compared_with_drives_in_mujoco(capsys):
-    pytest.importorskip("mujoco", reason="install the extra bench")
-    importlib.import_module("benchmarks.validate").print_energy(step=19)
-    assert "median error" in capsys.readouterr().out
-
-
-@pytest.mark.long
-def test_controllers_are_compared_in_mujoco(tmp_path, monkeypatch, capsys):
-    pytest.importorskip("mujoco", reason="install the extra bench")
-    traction = importlib.import_module("benchmarks.traction")
-    monkeypatch.setattr(traction, "QUICK_STEP", 19)
-    traction.main(quick=True, out=tmp_path)
-    assert "Rocks and relief" in capsys.readouterr().out
-    assert (tmp_path / "traction.png").is_file()
-    assert len(json.loads((tmp_path / "traction.json").read_text())["drives"]) == 8

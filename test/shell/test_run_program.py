@@ -21,7 +21,7 @@ from rover_planner.shell.run_program import (
     one_line,
     run_program,
 )
-from support.command_line import REPOSITORY
+from support.project.checkout import TOP
 
 
 def run_raising(error):
@@ -94,7 +94,7 @@ HELP = "import sys; from rover_planner.cli import main; sys.exit(main(['predict'
 
 @pytest.mark.parametrize("script", [PRINT, HELP], ids=["print", "help"])
 def test_output_into_a_closed_pipe_or_a_full_disk_leaves_no_traceback(script):
-    environment = os.environ | {"PYTHONPATH": str(REPOSITORY)}
+    environment = os.environ | {"PYTHONPATH": str(TOP)}
 
     def run(stdout):
         return subprocess.run(

@@ -3,7 +3,6 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
@@ -16,7 +15,7 @@ from rover_planner.viewer.documents.advice import PROMISED, describe_advice, lis
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.state.path_advice import Advised, apply_remedy, seek_advice
 from rover_planner.viewer.state.session import ViewSession
-from support.grounds import make_terrain
+from support.grounds import make_terrain, rock_left
 from support.viewer.sessions import wait_for_rest
 from support.waiting import wait_until
 
@@ -25,18 +24,13 @@ ENDS = (-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)
 OPTIONS = PathQueryOptions(count=1, waypoint_spacing=0.05)
 
 
-def rock(x, y):
-    """Return level ground with a rock below the left wheels of a rover on the x axis."""
-    return 0.3 * np.exp(-((x - 0.2) ** 2 + (y - 0.2) ** 2) / 0.02)
-
-
 def slope(x, y):
     return 0.3 * x
 
 
 @pytest.mark.parametrize(
     ("ground", "changes", "levers"),
-    [(slope, {"friction": 0.45}, {"policy", "friction"}), (rock, {}, {"shift", "curve"})],
+    [(slope, {"friction": 0.45}, {"policy", "friction"}), (rock_left, {}, {"shift", "curve"})],
 )
 def test_a_path_passes_with_the_values_that_a_remedy_has(ground, changes, levers):
     rover = replace(LSR1, **changes)
@@ -58,7 +52,7 @@ def test_a_path_passes_with_the_values_that_a_remedy_has(ground, changes, levers
 
 @pytest.fixture
 def page():
-    served = Page(ViewSession(LSR1, make_terrain(rock), *ENDS, OPTIONS), port=0)
+    served = Page(ViewSession(LSR1, make_terrain(rock_left), *ENDS, OPTIONS), port=0)
     wait_for_rest(served)
     yield served
     served.close()
@@ -82,7 +76,7 @@ def test_advice_is_sought_when_it_is_asked_for_shown_as_a_ghost_and_taken(page):
 
 
 def test_a_search_tells_what_was_found_by_a_promised_time_and_that_it_goes_on():
-    session = ViewSession(LSR1, make_terrain(rock), *ENDS, OPTIONS)
+    session = ViewSession(LSR1, make_terrain(rock_left), *ENDS, OPTIONS)
     path, since = session.shown.path, 1000.0
     first, *_, last = (Advised(path, since, one) for one in seek_advice(path))
     told = describe_advice(first, True, since + 0.5 * PROMISED)

@@ -25,7 +25,7 @@ from rover_planner.viewer.state.limits import ShownLimit, write_use
 from rover_planner.viewer.state.scenario import Judged
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import gap, make_terrain, wall_at, waves
-from support.viewer.sessions import LSR1, ramp, session_on
+from support.viewer.sessions import LSR1, SURE, ramp, session_on
 
 
 def stepped(x, y):
@@ -35,7 +35,7 @@ def stepped(x, y):
 
 def judged_on(height, start=-1.0, **options) -> Judged:
     """Return a straight path to x = 1 m over a ground, judged."""
-    options = PathQueryOptions(count=1).change(**options)
+    options = SURE.change(count=1, **options)
     ends = (start, 0.0, 0.0), (start + 2.0, 0.0, 0.0)
     return ViewSession(LSR1, make_terrain(height), *ends, options).shown.path
 
@@ -87,6 +87,10 @@ def test_board_lanes_curves_and_verdict_show_one_number_for_the_wheel_that_fails
     path = judged_on(ramp, friction=0.3, policy=policy)
     failure, end = path.failure, path.trajectory.duration
     assert failure.code == "friction" and failure.link in WHEELS
+    words = ShownLimit("friction", "friction", 1.0).compare(failure.value)
+    assert failure.headline == f"{words}, {failure.where}"
+    told = words.replace("friction", "utilisation").replace(" of ", ", limit ")
+    assert failure.link in path.verdict.reason and told in path.verdict.reason
     wheel, codes = WHEELS.index(failure.link), [lane.limit.code for lane in path.limits.lanes]
     board = describe_board(failure.state, failure.link)["wheels"][wheel]
     assert board["fails"] and board["bars"][0][2] == write_use(failure.use)
@@ -218,17 +222,6 @@ def test_with_speed_servos_friction_is_no_number_that_a_passing_path_may_cross()
 
 
 # The failure.
-
-
-def test_the_failure_names_value_limit_and_wheel_as_the_verdict_does():
-    path = judged_on(ramp, friction=0.3)
-    failure, verdict = path.failure, path.verdict
-    assert failure is not None and failure.code == verdict.code == "friction"
-    assert failure.link in WHEELS and failure.link in verdict.reason
-    assert f"{failure.value:.2f}, limit 1.00" in verdict.reason
-    assert failure.headline == f"friction {failure.value:.2f} of 1.00, {failure.where}"
-    row = verdict.first_failure
-    assert failure.distance == pytest.approx(path.candidate.prediction.distance[row], abs=0.021)
 
 
 def test_a_failure_between_waypoints_has_the_pose_at_which_the_model_was_asked():

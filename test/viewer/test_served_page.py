@@ -22,6 +22,7 @@ from support.viewer.sessions import (
     FAR,
     LSR1,
     PATIENCE,
+    SURE,
     ask,
     held,
     ramp,
@@ -29,7 +30,7 @@ from support.viewer.sessions import (
     shift,
     wait_for_rest,
 )
-from support.waiting import wait_until as wait
+from support.viewer.sessions import wait_patiently as wait_until
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
@@ -42,11 +43,6 @@ from rover_planner.viewer.state.judging import POLICY
 
 pytestmark = pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
 FRICTION = "friction [-]"
-
-
-def wait_until(condition, what: str) -> None:
-    """Wait for what a busy machine's page does late."""
-    wait(condition, what, PATIENCE)
 
 
 @pytest.fixture(scope="module")
@@ -111,25 +107,12 @@ def test_another_site_gets_no_channel(page):
 # What is told and drawn.
 
 
-def test_no_press_of_a_key_is_lost_and_of_a_slider_only_the_last_value_counts(page):
-    times, asked = page.session.shown.path.trajectory.times, []
+def test_no_press_of_a_key_is_lost(page):
+    times = page.session.shown.path.trajectory.times
     ask(page, lambda: page.playback.go_to(0.0))
     for _ in range(3):
         page.hear({"ask": "step", "by": 1}, None)
     wait_until(lambda: abs(page.playback.time - times[3]) < 1e-6, "three steps")
-    busy, go_on = threading.Event(), threading.Event()
-    page.requests.put(lambda: (busy.set(), go_on.wait(PATIENCE)))
-    assert busy.wait(PATIENCE)
-    page._answers["seek"], seek = (
-        lambda words: asked.append(words["time"]),
-        page._answers["seek"],
-    )
-    for time_asked in (1.0, 2.0, 3.0):
-        page.hear({"ask": "seek", "time": time_asked}, None)
-    go_on.set()
-    wait_until(lambda: asked, "the last value")
-    page._answers["seek"] = seek
-    assert asked == [3.0]
 
 
 def test_a_changed_number_is_told_with_what_it_changes_and_can_be_undone_and_reset(page):
@@ -380,7 +363,8 @@ def test_on_a_far_map_the_rover_is_where_it_is_on_a_near_one_and_a_click_lands_w
     places = {}
     for x, y in ((0.0, 0.0), FAR):
         ground = shift(make_terrain(waves), (x, y))
-        page = Page(ViewSession(LSR1, ground, (x - 2.0, y, 0.0), (x + 1.0, y, 0.0)), port=0)
+        ends = (x - 2.0, y, 0.0), (x + 1.0, y, 0.0)
+        page = Page(ViewSession(LSR1, ground, *ends, SURE), port=0)
         try:
             wait_for_rest(page)
             places[x] = np.array(page.scene._visual.root.position)

@@ -13,7 +13,7 @@ from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.judging import BETTER, SEARCH, JudgeRequest, judge_request
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import wall_with_gap, whole_wall
-from support.viewer.sessions import LSR1, held, walled_session
+from support.viewer.sessions import LSR1, finish, held, walled_session
 from support.waiting import wait_until
 
 GOAL = (1.6, 0.0, 0.0)
@@ -96,11 +96,6 @@ def session() -> Iterator[ViewSession]:
     made.judge_in_background(lambda: None)
     yield made
     assert made.close()
-
-
-def finish(session: ViewSession) -> None:
-    wait_until(lambda: session.progress is None, "the end of the work", 60.0)
-    session.take_finished()
 
 
 def test_a_search_can_be_cancelled_and_begun_again_and_a_chosen_path_stays_meanwhile(session):

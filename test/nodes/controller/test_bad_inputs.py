@@ -2,7 +2,6 @@
 """Inputs that cannot be used stop the rover, are named once, and pass by themselves."""
 
 import copy
-import gc
 import math
 
 import pytest
@@ -12,12 +11,11 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.elevation import terrain_to_point_cloud
-from rover_physics.errors import ModelError
 from rover_planner.ros.qos import map_qos, sensor_qos
 from support.driven_rover import JOINTS
 from support.ros_fixtures import run_in_executor
 from support.rough_grounds import plane
-from support.waiting import wait_until
+from support.waiting import repeat_until, wait_until
 
 CYCLES_IN_A_TENTH = 5
 
@@ -58,18 +56,6 @@ def test_what_cannot_be_used_stops_the_rover_is_said_once_and_passes_by_itself(
     assert ros.is_alive(controller)
 
 
-def test_steering_is_read_with_the_sign_of_the_rover(rover, start_controller):
-    rover.joints.position[JOINTS.index("front_left_steering")] = 0.2
-    controller = start_controller(steering_sign="right")
-    wait_until(lambda: controller.service.steering[5] == -0.2, "the angle")
-
-
-def test_joints_that_do_not_reach_the_steering_limit_end_the_start(start_controller):
-    with pytest.raises(ModelError, match=r"reach 0\.5 rad.*must be at most 0\.5"):
-        start_controller(steering_limit=0.5)
-    gc.collect()  # what is left of the node would end the log of another one later
-
-
 def spoilt_odometry(field):
     odometry = Odometry(child_frame_id="mast" if field == "frame" else "base_link")
     odometry.header.frame_id = "map"
@@ -83,16 +69,6 @@ def cloud_sender(rover):
     return rover.create_publisher(PointCloud2, "elevation_cloud", map_qos())
 
 
-def send_until(sender, message, condition, what):
-    """Publish a message again and again until a condition holds."""
-
-    def send():
-        sender.publish(message)
-        return condition()
-
-    wait_until(send, what)
-
-
 FLAT = terrain_to_point_cloud(plane(0.0, 0.0, half=3.0), "map", Time())
 
 
@@ -104,9 +80,8 @@ def test_corrupt_odometry_and_maps_are_not_used_and_the_rover_drives_on_with_the
     refused = "odometry not used: odometry "
     for field in ("covariance", "frame"):
         heard = len(rover.commands)
-        send_until(
-            sender,
-            spoilt_odometry(field),
+        repeat_until(
+            lambda field=field: sender.publish(spoilt_odometry(field)),
             lambda heard=heard: rover.count_lines(refused) and rover.pushes_on(heard, 10),
             "the refusal in the log",
         )
@@ -117,12 +92,12 @@ def test_corrupt_odometry_and_maps_are_not_used_and_the_rover_drives_on_with_the
         last = controller.statistics.last
         return last.estimate is not None and last.estimate.source == "map"
 
-    send_until(sender, place, source_is_map, "the map")
+    repeat_until(lambda: sender.publish(place), source_is_map, "the map")
     elsewhere = copy.deepcopy(FLAT)
     elsewhere.header.frame_id = "elsewhere"
     cloud_sender.publish(elsewhere)
     wait_until(lambda: rover.count_lines("elevation_cloud refused"), "the refusal in the log")
-    send_until(sender, place, source_is_map, "the last map")
+    repeat_until(lambda: sender.publish(place), source_is_map, "the last map")
     assert ros.is_alive(controller) and rover.faults == [] and rover.state == "driving"
 
 
@@ -156,10 +131,16 @@ def test_a_change_of_the_cell_height_acts_on_the_map_that_is_there(
     assert controller.service.terrain.resolution == 0.2
 
 
-def test_a_mounted_imu_is_turned_into_the_body_frame(rover, start_controller):
+def test_a_mounted_imu_is_turned_into_the_body_frame_and_steering_has_the_sign_of_the_rover(
+    rover, start_controller
+):
+    rover.joints.position[JOINTS.index("front_left_steering")] = 0.2
     rover.imu.header.frame_id = "imu_link"
     rover.imu.orientation.w, rover.imu.orientation.z = 0.0, 1.0
     rover.imu.angular_velocity.x = 0.1
-    node = start_controller(imu_frame="imu_link", imu_mounting=[0.0, 0.0, math.pi])
+    node = start_controller(
+        imu_frame="imu_link", imu_mounting=[0.0, 0.0, math.pi], steering_sign="right"
+    )
     wait_until(lambda: rover.state == "driving", "driving")
     assert node.service._body_rates == pytest.approx([-0.1, 0.0, 0.0])
+    assert node.service.steering[5] == -0.2

@@ -8,6 +8,7 @@ from geometry_msgs.msg import Twist
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import PointCloud2
 
+from rover_planner.ros import subscriptions
 from support.driven_rover import DrivenRover
 from support.ros_fixtures import RosRun
 from support.waiting import wait_until
@@ -36,8 +37,9 @@ def test_cmd_vel_without_a_stamp_is_driven_where_the_parameter_says_so(
 
 
 def test_cmd_vel_of_another_type_is_named_with_the_parameter(
-    other_context, start_controller, capfd
+    other_context, start_controller, capfd, monkeypatch
 ):
+    monkeypatch.setattr(subscriptions, "PERIOD", 0.5)
     start_controller()
     rover = start_rover(other_context, Twist)
     text = "cmd_vel of /rover is not heard: its type is geometry_msgs/msg/Twist; "

@@ -4,7 +4,6 @@
 import json
 from concurrent.futures import Future
 
-import numpy as np
 from nav_msgs.srv import GetPlan
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -12,17 +11,12 @@ from std_srvs.srv import Trigger
 from msg_adapters.paths import stamped_pose
 from rover_physics import judge_path
 from rover_planner.ros.qos import latched_qos
-from support.grounds import make_terrain
+from support.grounds import make_terrain, rock_left
 from support.planner_client import SERVER
 from support.ros_fixtures import call
 from support.waiting import wait_until
 
 START, GOAL = (-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)
-
-
-def rock(x, y):
-    """Return level ground with a rock below the left wheels of a rover on the x axis."""
-    return 0.3 * np.exp(-((x - 0.2) ** 2 + (y - 0.2) ** 2) / 0.02)
 
 
 def send_request(client, kind, name, request) -> Future:
@@ -39,7 +33,7 @@ def test_advice_is_about_the_path_that_was_refused_last(start_server, client, ro
         String, f"{SERVER}/advice", lambda one: grown.append(json.loads(one.data)), latched_qos()
     )
     assert json.loads(call(advise, Trigger.Request()).message)["code"] == "no_path"
-    client.send_terrain(make_terrain(rock))
+    client.send_terrain(make_terrain(rock_left))
     assert not client.can_traverse(START, GOAL).poses
     response = call(advise, Trigger.Request())
     advice = json.loads(response.message)
@@ -60,7 +54,7 @@ def test_advice_in_work_gives_way_to_questions_and_ends_when_it_is_cancelled(
     start_server, client, endless
 ):
     server = start_server(planner="fan", candidate_count=1, advice_time=600.0, time_budget=600.0)
-    client.send_terrain(make_terrain(rock))
+    client.send_terrain(make_terrain(rock_left))
     assert not client.can_traverse(START, GOAL).poses
     with endless():  # a question that lasts
         ends = stamped_pose(START, "map"), stamped_pose(GOAL, "map")

@@ -1,20 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Questions in another frame, from where the rover is, and about a robot with another origin."""
+"""Questions in another frame, and from where the rover is."""
 
-import json
 from functools import partial
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped
 
-from msg_adapters.paths import path_to_poses, poses_path, stamped_pose
-from rover_planner.nodes.nav2_services import PathValidity
+from msg_adapters.paths import path_to_poses, stamped_pose
 from rover_planner.planning.navigation.transforms import Rigid
 from support.grounds import make_terrain, rocky
 from support.messages.transforms import send_transforms
-from support.planner_client import GOAL, START, ask, verdict_of
+from support.planner_client import GOAL, START, verdict_of
 from support.waiting import wait_until
 
 MAP_ODOM = Rigid.from_rpy(30.0, -12.0, 0.4, 0.0, 0.0, 2.2)
@@ -52,21 +49,6 @@ def test_a_goal_on_the_map_gets_the_answer_of_one_frame(in_odom, client):
     assert np.abs(path_to_poses(mixed, "odom") - one)[:, :2].max() < 1e-3
 
 
-def test_a_path_on_the_map_is_judged_in_odom(in_odom, client):
-    send(in_odom, ("map", "odom", MAP_ODOM))
-    poses = [(x, 0.0, 0.0) for x in (-1.0, 0.0, 1.0)]
-    path = poses_path([(0.0, 0.0, 0.0)] * 3, "map")
-    path.poses = [on_map(pose) for pose in poses]
-    client.send_path(path)
-    wait_until(lambda: in_odom.service.path is not None, "the path")
-    np.testing.assert_allclose(in_odom.service.path, poses, atol=1e-9)
-    replies = []
-    validity = PathValidity(in_odom.desk, in_odom.read_path, in_odom.publish)
-    validity.take(SimpleNamespace(path=path), SimpleNamespace(), replies.append)
-    wait_until(lambda: replies, "the reply")
-    assert replies[0].is_valid
-
-
 def test_an_empty_start_is_where_odometry_says_the_rover_is(mapped, client, lasting):
     plan, results = client.next_results(
         lambda: client.plan(PoseStamped(), stamped_pose(GOAL, "map"))
@@ -79,24 +61,3 @@ def test_an_empty_start_is_where_odometry_says_the_rover_is(mapped, client, last
     nowhere = stamped_pose((1.0, 0.0, 0.0), "")  # has no frame, but is not empty
     _, results = client.next_results(lambda: client.plan(nowhere, stamped_pose(GOAL, "map")))
     assert "start is without a frame_id" in verdict_of(results)["reason"]
-
-
-def test_a_robot_with_another_origin_gets_plans_of_its_own_frame(start_server, client, lasting):
-    offset = [0.3, 0.0, 0.25, 0.0, 0.0, 0.0]
-    shifted = start_server(base_offset=offset)
-    shifted.service.take_terrain(make_terrain(lambda x, y: 0.0 * x))
-    plan, _, _ = ask(client, (-1.3, 0.0, 0.0), (0.7, 0.0, 0.0))
-    poses = path_to_poses(plan, "map")
-    np.testing.assert_allclose(poses[[0, -1]], [(-1.3, 0.0, 0.0), (0.7, 0.0, 0.0)], atol=1e-9)
-    body = shifted.watch._last_path.poses
-    np.testing.assert_allclose(body[[0, -1], 0], (-1.0, 1.0), atol=1e-9)
-    wheels = shifted.service.settings.rover.suspension.wheels["rear"]
-    stands = shifted.service.settings.rover.wheel.radius - wheels[2]  # of the body over the ground
-    assert plan.poses[0].pose.position.z == pytest.approx(stands - 0.25, abs=1e-3)
-    client.send_odometry((1.0, 0.0, np.pi / 2))
-    wait_until(lambda: shifted.service.fresh_pose() is not None, "odometry")
-    np.testing.assert_allclose(shifted.service.fresh_pose(), (1.0, 0.3, np.pi / 2), atol=1e-9)
-    client.send_path(poses_path([(0.0, 0.0, 0.0), (1.0, 0.0, 0.0)], "map"))
-    wait_until(lambda: shifted.service.path is not None, "the path")
-    np.testing.assert_allclose(shifted.service.path[:, 0], (0.3, 1.3), atol=1e-9)
-    assert json.loads(client.check_path().message)["traversable"]

@@ -2,7 +2,9 @@
 """A traverse server takes what was learned of the ground; its answers say what they assume."""
 
 import json
+from dataclasses import replace
 
+import numpy as np
 from rclpy.node import Node
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -16,7 +18,9 @@ from support.waiting import wait_until
 
 def test_answers_say_which_ground_they_assume_and_since_when(start_server, client, ros: RosRun):
     server = start_server(planner="fan", learn="use")
-    client.send_terrain(make_terrain(waves))
+    ground = make_terrain(waves)
+    classes = np.full(ground.elevation.shape, 7.0)
+    client.send_terrain(replace(ground, ground_class=classes))
     teller = ros.spin(Node("teller", context=ros.context))
     sender = teller.create_publisher(String, f"{SERVER}/ground_estimate", topic_qos())
     wait_until(lambda: sender.get_subscription_count() == 1, "the server's subscription")
@@ -26,7 +30,8 @@ def test_answers_say_which_ground_they_assume_and_since_when(start_server, clien
     friction = {"mean": 0.5, "std": 0.05, "low": 0.4, "high": 0.6}
     for text in ("no JSON", "{}", json.dumps({"friction": friction | {"mean": -1.0}})):
         sender.publish(String(data=text))
-    sender.publish(String(data=json.dumps({"friction": friction})))
+    learned = {"friction": friction, "classes": {"7": friction | {"mean": 0.45}}}
+    sender.publish(String(data=json.dumps(learned)))
     wait_until(lambda: server.service.snapshot().ground is not None, "the estimate")
     client.heard["verdict"].clear()
     client.can_traverse(START, GOAL)
@@ -34,6 +39,7 @@ def test_answers_say_which_ground_they_assume_and_since_when(start_server, clien
     verdict = verdict_of({"verdict": client.heard["verdict"][-1]})
     assert verdict["ground"] == "learned"
     assert float(verdict["ground_friction"]) == 0.5 and verdict["ground_since"]
+    assert json.loads(verdict["ground_classes"].replace("'", '"')) == {"7": 0.45}
 
 
 def test_a_marked_place_stays_impassable_until_places_are_cleared(

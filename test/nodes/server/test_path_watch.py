@@ -6,74 +6,30 @@ import time
 from statistics import median
 
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from nav_msgs.msg import Odometry
+from diagnostic_msgs.msg import DiagnosticStatus
 from nav_msgs.srv import GetPlan
 from rclpy.node import Node
-from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.identity import path_hash
 from msg_adapters.paths import stamped_pose
 from rover_planner.nodes.navigation.path_watch import PathWatch
-from rover_planner.ros.qos import latched_qos
 from support.grounds import make_terrain, wall_at, waves
 from support.planner_client import SERVER, verdict_of
 from support.ros_fixtures import call
+from support.standing_rover import GOAL, START, StandingRover, rock_ahead
 from support.waiting import wait_until
 
-START, GOAL = (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
 WATCHFUL = {"planner": "fan", "candidate_count": 1, "monitor_timeout": 60.0}
 """Parameters; a busy machine may keep the pose from the server for more than the usual second."""
-
-
-def rock_ahead(x, y):
-    """Return waves with a rock of 0.4 m across the way from START to GOAL."""
-    return waves(x, y) + 0.4 * ((abs(x - 1.2) < 0.15) & (abs(y) < 2.0))
-
-
-class Rover(Node):
-    """Publishes odometry of a rover that stands, and hears ~/stop."""
-
-    def __init__(self, ros):
-        super().__init__("rover", context=ros.context)
-        self._odometry = self.create_publisher(Odometry, "odometry", 10)
-        self.stops: list[tuple[bool, float]] = []
-        self.statuses: list[DiagnosticStatus] = []
-        self.create_subscription(Bool, f"{SERVER}/stop", self._hear, latched_qos())
-        self.create_subscription(DiagnosticArray, "diagnostics", self._note, 10)
-        self.create_timer(0.05, self._publish)
-
-    def _hear(self, stop):
-        self.stops.append((stop.data, time.monotonic()))
-
-    def _note(self, message):
-        self.statuses += [one for one in message.status if one.name.endswith(": monitor")]
-
-    def _publish(self):
-        odometry = Odometry(child_frame_id="base_link")
-        odometry.header.frame_id = "map"
-        odometry.pose.pose = stamped_pose(START, "map").pose
-        self._odometry.publish(odometry)
-
-    def wait_for_stop(self, value=True):
-        wait_until(lambda: self.stops and self.stops[-1][0] == value, f"stop {value}")
-        return self.stops[-1][1]
-
-    def wait_for_status(self, level, text):
-        """Wait for a status with a level and a text."""
-        wait_until(
-            lambda: any(one.level == level and text in one.message for one in self.statuses),
-            f"a status with {text!r}",
-        )
 
 
 @pytest.fixture
 def watched(start_server, client, ros):
     """Return a server that watches the way from START to GOAL, and its rover."""
     server = start_server(monitor=True, **WATCHFUL)
-    rover = ros.spin(Rover(ros))
+    rover = ros.spin(StandingRover(ros))
     client.send_terrain(make_terrain(waves))
     wait_until(lambda: server.service.fresh_pose() is not None, "odometry")
     rover.wait_for_stop()  # no path was accepted yet
@@ -114,7 +70,11 @@ def test_a_rock_put_across_the_path_stops_the_rover_in_half_a_second(watched, cl
     assert verdict["map_hash"] == server.service.known_map.fingerprint
     # The way from the front wheel at the start to the rock.
     assert 2.0 < float(verdict["failure_distance"]) < 3.0
-    rover.wait_for_status(DiagnosticStatus.ERROR, verdict["reason"])
+    level, reason = DiagnosticStatus.ERROR, verdict["reason"]
+    wait_until(
+        lambda: any(one.level == level and reason in one.message for one in rover.statuses),
+        "the stop in the diagnostics",
+    )
     for _ in range(2):
         clear_the_path(rover, client)
         delays.append(time_stop(rover, client))
@@ -135,6 +95,22 @@ def test_the_stop_is_a_heartbeat_with_the_path_and_the_age_of_the_map(watched, r
     server.watch._look = lambda *given: go_on.wait(60.0) and server.watch.finding
     wait_until(
         lambda: time.monotonic() - rover.stops[-1][1] > 0.5, "silence of a watch that hangs"
+    )
+    go_on.set()
+    wait_until(lambda: time.monotonic() - rover.stops[-1][1] < 0.2, "the heartbeat")
+
+
+def test_a_busy_executor_does_not_delay_the_heartbeat_and_one_that_hangs_ends_it(watched):
+    server, rover = watched
+    urgent = [one.name for one in threading.enumerate() if one.native_id in server.urgent_threads]
+    assert urgent == ["heartbeat"]
+    is_held, go_on = threading.Event(), threading.Event()
+    server.handover.call(lambda: is_held.set() or go_on.wait(60.0))
+    assert is_held.wait(20.0)
+    before = len(rover.stops)
+    wait_until(lambda: len(rover.stops) > before + 3, "the heartbeat of a busy node")
+    wait_until(
+        lambda: time.monotonic() - rover.stops[-1][1] > 0.5, "silence of a node that hangs"
     )
     go_on.set()
     wait_until(lambda: time.monotonic() - rover.stops[-1][1] < 0.2, "the heartbeat")

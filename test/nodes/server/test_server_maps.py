@@ -6,15 +6,13 @@ import time
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import Quaternion
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import Imu, JointState, PointCloud2
+from sensor_msgs.msg import JointState, PointCloud2
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import stamped_pose
 from rover_physics import Terrain, save_terrain
 from rover_physics.names import SUSPENSION_JOINTS
-from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.ros.qos import map_qos
 from support.grounds import make_terrain, wall_at, waves
@@ -114,28 +112,3 @@ def test_unknown_ground_under_the_standing_rover_is_filled(start_server, client)
     _, verdict, _ = ask(client, start, goal)
     assert verdict["traversable"] == "true"
     assert 0.0 < float(verdict["footprint_share"]) == float(verdict["blind_share"]) < 0.5
-
-
-def test_roll_and_pitch_of_the_standing_rover_are_those_of_the_imu(start_server, client):
-    server = start_server(imu_attitude=True)
-    publisher = client.create_publisher(Imu, "imu", 1)
-
-    def is_standing():
-        send_standing(client, (0.0, 0.0, 0.3))
-        time.sleep(0.05)
-        return server.service.standing() is not None
-
-    wait_until(is_standing, "the odometry")
-    turned = xyzw_from_rpy(0.1, -0.2, 1.0)
-    x, y, z, w = turned.tolist()
-    message = Imu(orientation=Quaternion(x=x, y=y, z=z, w=w))
-
-    def is_tilted():
-        publisher.publish(message)
-        send_standing(client, (0.0, 0.0, 0.3))
-        time.sleep(0.05)
-        now = server.service.standing()
-        return now is not None and now.roll != 0.0 and now
-
-    now = wait_until(is_tilted, "the tilt")
-    assert (now.roll, now.pitch, now.yaw) == pytest.approx((0.1, -0.2, 0.3))

@@ -14,10 +14,8 @@ from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import path_to_poses, stamped_pose
-from msg_adapters.results.markers import WITH_SPEED_SERVOS as LIME
 from msg_adapters.results.predictions import MEASURES, array_values
-from rover_physics.names import WHEELS
-from rover_physics.traversability.classification import IMPASSABLE, PASSABLE, WITH_SPEED_SERVOS
+from rover_physics.traversability.classification import IMPASSABLE, PASSABLE
 from rover_planner.nodes.result_topics import WHEEL_TOPICS
 from rover_planner.ros.qos import map_qos
 from support.grounds import gap, make_terrain, waves
@@ -136,25 +134,6 @@ def test_check_path_answers_in_json_with_all_results_and_says_why_not(shared):
     found = verdict["traversability_class"], verdict["class_constraint"], verdict["class_waypoint"]
     assert found == (IMPASSABLE, "off_map", verdict["first_failure"])
     assert verdict["class_margin"] is None and verdict["class_wheel"] == ""
-
-
-def test_the_class_is_named_and_drawn_whichever_policy_is_assumed(shared):
-    server, client = shared.server, shared.client
-    client.send_terrain(make_terrain(lambda x, y: 0.45 * x))  # 24 degrees: servos climb it
-    for policy, traversable in (("servo", True), ("optimal", True), ("equal", False)):
-        assert client.set_parameter("policy", policy)[0]
-        answer, results = client.next_results(lambda: client.check_poses(server, AHEAD))
-        verdict = json.loads(answer.message)
-        assert verdict["traversable"] == traversable and verdict["policy"] == policy
-        assert verdict["traversability_class"] == WITH_SPEED_SERVOS
-        assert verdict["class_constraint"] == "friction" and verdict["class_wheel"] in WHEELS
-        assert 0.0 < verdict["class_margin"] < 1.0
-        assert set(verdict["traversability_classes"]) == {WITH_SPEED_SERVOS}
-    markers = {marker.ns: marker for marker in results["markers"].markers}
-    assert markers.keys() >= {"failing_pose", "reason"}
-    line = markers["path"]
-    (drawn,) = {(colour.r, colour.g, colour.b) for colour in line.colors}
-    assert drawn == pytest.approx((LIME.r, LIME.g, LIME.b))
 
 
 def test_the_measured_suspension_raises_a_warning_where_it_disagrees(shared, lasting):

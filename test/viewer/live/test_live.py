@@ -10,18 +10,13 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 
 from msg_adapters.commands import labelled_array
 from msg_adapters.results.predictions import waypoint_array
-from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.names import WHEEL_JOINTS
 from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import save_terrain
-from rover_physics.warm_up import warm_up
-from rover_planner.nodes.rover_simulator import RoverSimulator
-from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.ros.qos import latched_qos, result_qos, sensor_qos, topic_qos
 from rover_planner.viewer.documents.live import (
@@ -42,8 +37,7 @@ from rover_planner.viewer.live.live_state import (
     TopicAge,
     read_state,
 )
-from support.grounds import make_terrain, wall_at
-from support.waiting import wait_until
+from support.waiting import repeat_until, wait_until
 
 LSR1 = load_rover("lsr1")
 
@@ -79,16 +73,6 @@ def talker(ros, listener) -> Talker:
     return talker
 
 
-def send_until(publish, condition, what):
-    """Publish until a condition holds: best effort may lose a message."""
-
-    def received():
-        publish()
-        return condition()
-
-    wait_until(received, what)
-
-
 def odometry(x=1.0, y=2.0, z=0.3, speed=0.05) -> Odometry:
     message = Odometry()
     place = message.pose.pose.position
@@ -101,7 +85,7 @@ def test_the_state_has_the_measured_joints(listener, talker):
     angles = {"rocker_right": 0.1, "rocker_left": -0.1, "bogie_right": 0.2, "bogie_left": -0.05}
     state = JointState(name=[*angles, *WHEEL_JOINTS])
     state.position = [*angles.values(), *np.arange(6.0).tolist()]
-    send_until(
+    repeat_until(
         lambda: (talker.joints.publish(state), talker.odometry.publish(odometry())),
         lambda: len(listener.latest().joints) == 10 and listener.latest().speed,
         "joints and odometry",
@@ -123,12 +107,12 @@ def test_the_energy_is_torque_times_rate_times_time(listener, talker):
         message.header.stamp.sec = second
         return message
 
-    send_until(
+    repeat_until(
         lambda: talker.joints.publish(state(10)),
         lambda: listener.latest().efforts,
         "the first state",
     )
-    send_until(
+    repeat_until(
         lambda: talker.joints.publish(state(12)),
         lambda: listener.latest().time == 2.0,
         "two seconds",
@@ -146,7 +130,7 @@ def test_estimates_of_the_controller_take_precedence_over_predictions(listener, 
         received.append(listener.latest())
         return "controller" in received[-1].forces_from
 
-    send_until(
+    repeat_until(
         lambda: talker.estimated.publish(labelled_array(loads, "wheel")),
         is_estimated,
         "the controller",
@@ -161,7 +145,7 @@ def test_invalid_messages_are_skipped_and_values_without_a_topic_are_nan(ros, li
     talker.joints.publish(broken)
     talker.odometry.publish(odometry(x=float("inf")))
     talker.estimated.publish(Float64MultiArray(data=[1.0]))
-    send_until(
+    repeat_until(
         lambda: talker.odometry.publish(odometry()),
         lambda: listener.latest().position is not None,
         "good odometry",
@@ -188,7 +172,7 @@ def test_what_was_learned_of_the_ground_is_told_with_the_places_where_it_was(lis
         (0.0, None, "friction at least 0.35: no wheel has slipped yet"),
         (0.5, 0.9, "friction 0.80, give or take 0.10: wheels have slipped"),
     ):
-        send_until(
+        repeat_until(
             lambda x=x: talker.odometry.publish(odometry(x, 0.0)),
             lambda x=x: is_at(x),
             "the place",
@@ -211,7 +195,7 @@ def test_a_trail_keeps_places_a_step_apart_and_the_newest_of_many():
 
 def test_a_plan_needs_odometry_and_a_server(listener, talker):
     assert "odometry" in listener.request_plan(np.zeros(2))
-    send_until(
+    repeat_until(
         lambda: talker.odometry.publish(odometry()),
         lambda: listener.latest().position is not None,
         "odometry",
@@ -227,45 +211,6 @@ def test_a_closed_link_leaves_no_thread_and_no_context():
     link.close()
     assert not link.listener.context.ok()
     wait_until(lambda: set(threading.enumerate()) <= before, "the threads to end")
-
-
-def test_a_rover_its_map_and_the_answers_of_its_server_are_followed(ros, listener, tmp_path):
-    warm_up()
-    save_terrain(tmp_path / "terrain.npz", make_terrain(wall_at(1.5)))
-    values = {"terrain_file": str(tmp_path / "terrain.npz"), "start_x": -1.0, "speed": 0.08}
-    parameters = [Parameter(name, value=value) for name, value in values.items()]
-    simulator = ros.spin(RoverSimulator(context=ros.context, parameter_overrides=parameters))
-    server = ros.spin(TraverseServer(context=ros.context))
-    wait_until(lambda: server.service.terrain is not None, "the map")
-    wait_until(lambda: listener.latest().position is not None, "odometry")
-    wait_until(lambda: listener.request_plan(np.array([0.5, 0.2])) == "", "the server")
-    wait_until(lambda: listener.latest().plan is not None, "the plan")
-    np.testing.assert_allclose(listener.latest().plan[-1, :2], [0.5, 0.2], atol=1e-6)
-    wait_until(
-        lambda: np.isfinite(listener.latest().forces.get("wheel_loads", np.nan)).all(), "the loads"
-    )
-    wait_until(lambda: listener.latest().verdict is not None, "the verdict")
-    joints = set(SUSPENSION_JOINTS)
-    wait_until(lambda: joints <= set(listener.latest().joints), "the joints")
-    data = listener.latest()
-    assert data.verdict.traversable
-    state = read_state(LSR1, data)
-    assert state is not None
-    plant = simulator.simulation.plant
-    assert state.position == pytest.approx(plant.state().position, abs=1e-6)
-    assert state.wheel_loads.sum() == pytest.approx(LSR1.weight, rel=0.05)
-    x, y, z = state.contact_points.T
-    assert np.abs(z - data.terrain.elevation_at(x, y)).max() < 0.02
-
-    assert listener.request_plan(np.array([3.0, 0.0])) == ""
-    wait_until(lambda: not listener.latest().verdict.traversable, "the refusal")
-    assert listener.latest().verdict.reason
-    wait_until(lambda: listener.latest().plan is None, "no plan")  # it is another topic
-    click = listener.latest().click
-    assert click.verdict.reason == listener.latest().verdict.reason and click.plan is None
-    wait_until(lambda: listener.latest().freshness == "live", "the server's sign of life")
-    listener.forget_click()
-    assert listener.latest().click is None
 
 
 def test_a_stream_gets_stale_and_a_result_never():

@@ -16,9 +16,9 @@ from rover_planner.viewer.live.listener import LiveLink
 from rover_planner.viewer.pages.live_page import LivePage
 from rover_planner.viewer.state.colours import UNKNOWN
 from rover_planner.viewer.state.link import PageLink, write_link
-from support import waiting
 from support.grounds import make_terrain, waves
-from support.viewer.sessions import PATIENCE, ask
+from support.viewer.sessions import ask
+from support.viewer.sessions import wait_patiently as wait_until
 
 pytestmark = pytest.mark.slow
 
@@ -27,10 +27,6 @@ QUERY = write_link(
     PageLink({}, {}, "0", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), "equal", "", 1, 0.0, "height", 0.0)
 )
 LEVEL = Terrain(np.zeros((160, 160)), 0.05, (-4.0, -4.0))
-
-
-def wait_until(condition, what: str) -> None:
-    waiting.wait_until(condition, what, PATIENCE)
 
 
 @pytest.fixture
