@@ -159,7 +159,9 @@ class Programs:
             realtime_priority=PRIORITY,
         )
         drives = self._write("rover_simulator", realtime_priority=PRIORITY)
-        reads = self._write("traverse_server", map_folder=str(nodes.folder))
+        reads = self._write(
+            "traverse_server", map_folder=str(nodes.folder), realtime_priority=PRIORITY
+        )
         commands = simulation_commands(
             terrain_file=str(terrain),
             speed="0.08",

@@ -10,9 +10,13 @@ from typing import Annotated
 
 import numpy as np
 import typer
+from scipy.optimize import linprog
 
 from benchmarks.measure import console, print_table
 from rover_physics import SweepOptions, judge_path, load_rover
+from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES, balance_forces
+from rover_physics.prediction.evaluation import new_work, stand
+from rover_physics.prediction.packed_model import pack_model
 from support.reference_cases import reference_predictions, steered_predictions
 from support.reference_drives import (
     PASSED,
@@ -102,6 +106,7 @@ def print_curves() -> None:
 def print_traces() -> None:
     """Print the median errors of wheel forces and torques along the traces of curves.
 
+    The first pose of a trace is left out: there the rover starts from rest, at its torque limit.
     The scatter is the standard deviation, over the poses of a trace, of a wheel's torque in MuJoCo
     less the model's.
     """
@@ -111,7 +116,7 @@ def print_traces() -> None:
         for curve in read_curves():
             if curve.mode == mode and len(curve.poses):
                 found = predict_trace(curve)
-                drives = found.speed_share > 0.0
+                drives = (found.speed_share > 0.0) & (np.arange(len(curve.poses)) > 0)
                 parts = (found.wheel_loads, found.tangential, found.lateral)
                 errors = np.sqrt(sum(part**2 for part in parts)) - curve.forces
                 forces.append(100.0 * np.abs(errors[drives]).ravel() / weight)
@@ -126,6 +131,45 @@ def print_traces() -> None:
     torque_headings = "mean torque [%]", "missing [N m]", "scatter [N m]"
     headings = ("mode", "curves", "wheel force [% of the weight]", *torque_headings)
     print_table("Along the traces of curves, under servo torques", headings, rows)
+
+
+def print_bands() -> None:
+    """Print the bands in which friction leaves the loads of turned wheels that stand still."""
+    rover, bands, loads = load_rover("lsr1"), [], []
+    for case, found in steered_predictions():
+        model = pack_model(rover, case.terrain, SweepOptions()).record
+        for i, pose in enumerate(case.poses):
+            work = new_work()
+            work.pose[:], work.placement.steering[:] = pose, found.steering_angle[i]
+            work.can_follow = True
+            stand(model, work)
+            columns = 1 + FREE_FORCES
+            balance_forces(model.linkage, work.placement, work.contacts, columns, work.balance)
+            bands += load_bands(work.balance, rover.friction)
+            loads += np.sum(work.balance.frames[:, 0] * case.forces[i], axis=1).tolist()
+    low, high = 100.0 * np.array(bands).T
+    shares = 100.0 * np.array(loads) / rover.weight
+    beyond = np.maximum(low - shares, shares - high)
+    inside = f"{100.0 * np.mean(beyond <= 0.1):.0f} % of {len(loads)}"
+    row = f"{np.median(high - low):.1f}", f"{np.quantile(high - low, 0.95):.1f}", inside
+    headings = "width [% of the weight]", "95 %", "loads in MuJoCo within"
+    print_table("Bands of the loads of turned wheels at rest", headings, [row])
+
+
+def load_bands(balance, friction: float) -> list[tuple[float, float]]:
+    """Return the least and largest load of each wheel over the weight, tractions being equal.
+
+    Lateral forces are free as long as they balance and friction holds them.
+    """
+    free = slice(1 + FREE_TORQUES, 1 + FREE_FORCES)
+    N, S = balance.normal, balance.lateral
+    rows = [(side * S - friction * N) for side in (1.0, -1.0)] + [-N]
+    A, b = np.concatenate(rows)[:, free], -np.concatenate(rows)[:, 0]
+    ends = [
+        [start + side * linprog(side * change, A, b, bounds=(None, None)).fun for side in (1, -1)]
+        for start, change in zip(N[:, 0], N[:, free], strict=True)
+    ]
+    return [(low, high) for low, high in ends]
 
 
 def print_energy() -> None:
@@ -156,6 +200,7 @@ def main(
     """Print all tables."""
     print_settled("Settled cases", reference_predictions())
     print_settled("Settled with turned wheels", steered_predictions())
+    print_bands()
     for policy in ("optimal", "servo", "equal"):
         with console(stderr=True).status(f"drives, {policy}"):
             print_drives(policy)

@@ -8,6 +8,8 @@ read back unchanged.
 """
 
 import array
+import math
+import struct
 from collections.abc import Mapping
 from typing import Any
 
@@ -41,6 +43,8 @@ LAYERS = {"friction": "friction", "elevation_std": "elevation_std", CLASS: "grou
 COMBINED = {"friction": "min", "elevation_std": "max", CLASS: "most frequent"}
 """How the values of several points of a cell are combined."""
 
+MAX_FIELDS = 1000
+"""Largest number of fields of a cloud."""
 MAX_POINT_STEP = 1_000_000
 """Largest size of a point [bytes]."""
 
@@ -55,6 +59,34 @@ _KINDS = {
 }
 _NUMBERS = _FLOATS | {getattr(PointField, name): kind for name, kind in _KINDS.items()}
 _DATATYPE_NAMES = {getattr(PointField, n): n for n in (*_KINDS, "FLOAT32", "FLOAT64")}
+
+
+def find_cloud_data(message: bytes) -> slice:
+    """Return where the bytes of a serialised PointCloud2 are its data, without reading these.
+
+    Raises:
+        MessageError: They are no PointCloud2.
+    """
+    order = "<I" if message[1:2] == b"\1" else ">I"
+
+    def number(at: int) -> int:
+        return int(struct.unpack_from(order, message, at)[0])
+
+    def skip_text(at: int) -> int:
+        return at + 4 + 4 * math.ceil(number(at) / 4)
+
+    try:
+        at = skip_text(12) + 8  # behind stamp, frame_id, height and width
+        count, at = number(at), at + 4
+        for _ in range(min(count, MAX_FIELDS)):
+            at = skip_text(at) + 12  # behind name, offset, datatype and count
+        begin = at + 16  # behind is_bigendian, point_step, row_step and the number of bytes
+        data = slice(begin, begin + number(begin - 4))
+    except struct.error:
+        data = slice(0, len(message) + 1)
+    if data.stop > len(message):
+        raise MessageError(f"{len(message)} bytes were received that are no PointCloud2")
+    return data
 
 
 PointMove = tuple[NDArray[np.float64], NDArray[np.float64]]

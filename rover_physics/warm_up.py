@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from rover_physics.bounds.kernel import NOMINAL, find_bounds
-from rover_physics.compilation import CompilationStep, compile_groups
+from rover_physics.compilation import compile_groups
 from rover_physics.prediction.evaluation import AHEAD
 from rover_physics.prediction.map_sweep import score_poses
 from rover_physics.prediction.packed_model import pack_model
@@ -22,25 +22,6 @@ from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import pack_ground
 from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.torque_ranges import find_torque_ranges
-
-EXACT = (
-    CompilationStep("rover", "rover_physics.warm_up:pack_rover"),
-    CompilationStep("poses", "rover_physics.warm_up:evaluate_poses"),
-    CompilationStep("paths", "rover_physics.warm_up:judge_paths"),
-)
-"""All that a question needs on a map whose heights are exact."""
-UNCERTAIN = (CompilationStep("uncertain heights", "rover_physics.warm_up:bound_poses"),)
-"""All that a question needs besides on other maps."""
-SCORES = (CompilationStep("map scores", "rover_physics.warm_up:score_map"),)
-"""All that scores of single poses need."""
-SINGLE = (CompilationStep("single poses", "rover_physics.warm_up:evaluate_single_poses"),)
-"""All that torque ranges and a rover with measured steering angles need."""
-
-
-def warm_up() -> None:
-    """Load the kernels of questions, or compile them in this process."""
-    for step in (*EXACT, *UNCERTAIN):
-        step.run()
 
 
 def pack_rover() -> None:
@@ -92,5 +73,25 @@ def _rover_and_step() -> tuple[Rover, Terrain]:
     return load_rover("lsr1"), replace(step, friction=layer)
 
 
+EXACT = (pack_rover, evaluate_poses, judge_paths)
+"""All that a question needs on a map whose heights are exact."""
+UNCERTAIN = (bound_poses,)
+"""All that a question needs besides on other maps."""
+SCORES = (score_map,)
+"""All that scores of single poses need."""
+SINGLE = (evaluate_single_poses,)
+"""All that torque ranges and a rover with measured steering angles need."""
+
+
+def warm_up() -> None:
+    """Load the kernels of questions, or compile them in this process."""
+    for step in (*EXACT, *UNCERTAIN):
+        step()
+
+
 if __name__ == "__main__":
-    compile_groups([(*EXACT, *SCORES, *SINGLE), UNCERTAIN], print, os.cpu_count() or 1)
+    from rover_physics import warm_up as here  # the name by which processes find the steps
+
+    compile_groups(
+        [(*here.EXACT, *here.SCORES, *here.SINGLE), here.UNCERTAIN], print, os.cpu_count() or 1
+    )

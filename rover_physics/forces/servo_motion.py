@@ -12,7 +12,6 @@ regular: "one unit forward" means that the treads travel as far as on level grou
 
 import numpy as np
 
-from rover_physics.forces.servo_wheel import GAUSS_POINT
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_solve import solve_in_place
 from rover_physics.numerics.records import record_type
@@ -28,6 +27,8 @@ SCRUB = 13
 """First column of X with scrub forces."""
 COLUMNS = 19
 """Columns of X."""
+GAUSS_POINT = 1.0 / np.sqrt(3.0)
+"""Places of two points that stand for a uniform pressure, as of soil, over half the width."""
 FLUSH = 0.02
 """Angle [rad] between axle and ground from which a wheel stands on its rim; a flush wheel has its
 whole width on the ground."""
@@ -39,7 +40,7 @@ SERVO = record_type(
     ("velocity", float, (6, 3, MOTIONS)),  # along, across, spin of contacts for unit motions
     ("nominal", float, (MOTIONS,)),  # commanded motion over the nominal speed
     ("command", float, (6,)),  # commanded rim speeds over the nominal speed
-    ("spread", float, (6,)),  # distance of the Gauss points from the contact line's middle [m]
+    ("spread", float, (6,)),  # distance of the two points of contact from their middle [m]
     ("mu", float, (6,)),  # friction coefficients within the friction share
     ("yields", np.int64, (6,)),  # 1 where a wheel is on yielding soil, 0 on Coulomb ground
     ("soil", float, (6, SOIL_NUMBERS)),  # this soil
@@ -97,6 +98,8 @@ def find_motions(linkage, placement, contacts, balance, servo):
         X[row, WEIGHTS] = balance.B[row, 0]
     for wheel in range(6):
         servo.spread[wheel] = _spread(linkage, contacts, balance, wheel)
+        if servo.yields[wheel]:
+            servo.spread[wheel] *= GAUSS_POINT
         contact = contacts.point[wheel], balance.frames[wheel]
         _write_wheel(linkage, placement, contact, wheel, X)
     for wheel in range(6):
@@ -141,11 +144,11 @@ def _write_base(placement, servo):
 
 @kernel
 def _spread(linkage, contacts, balance, wheel):
-    """Return the distance [m] of the Gauss points of a contact line from its middle."""
+    """Return the distance [m] of the ends of a contact line from its middle."""
     axis, slope = balance.frames[wheel, 2], contacts.slope[wheel]
     rise = axis[2] - slope[0] * axis[0] - slope[1] * axis[1]
     tilt = abs(rise) / np.sqrt(1.0 + slope[0] * slope[0] + slope[1] * slope[1])
-    return 0.5 * linkage.width * GAUSS_POINT * max(1.0 - tilt / FLUSH, 0.0)
+    return 0.5 * linkage.width * max(1.0 - tilt / FLUSH, 0.0)
 
 
 @kernel

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """One wheel on a speed servo: its friction force from the velocity of its contact.
 
-The wheel touches the ground along a line, its width, or at a point of it. The line is taken as two
-points with half the load each, at the Gauss points of a uniform pressure. Velocities are over the
-nominal speed, forces over the rover's weight.
+The wheel touches the ground along a line, its width, or at a point of it. A rigid cylinder on
+rigid ground stands on the ends of that line, its rims; half the load is on each. Velocities are
+over the nominal speed, forces over the rover's weight.
 
 Friction opposes the sliding velocity s of a point on the tread: F = -mu N s / sqrt(s^2 + eps^2),
 Coulomb friction with a creep eps. The servo turns the wheel at r omega = command - c T, where c is
@@ -15,8 +15,6 @@ import numpy as np
 
 from rover_physics.numerics.kernels import kernel
 
-GAUSS_POINT = 1.0 / np.sqrt(3.0)
-"""Places of the two points on the contact line, over half its length."""
 MAX_STEPS = 40
 """Largest number of steps of the search for the slip of a wheel."""
 SLIP_PRECISION = 1e-9

@@ -6,6 +6,7 @@ slope. How much is learned wherever the motion is measured without the wheels, p
 way, and taken off where it is not. The misses that are left are the noise of the odometry.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,36 +103,47 @@ class WheelOdometry:
     def take(self, motion: WheelMotion) -> None:
         """Go on by a measurement."""
         last, self._last = self._last, motion
-        speeds = self._radius * motion.rates
-        c, s = np.cos(motion.steering), np.sin(motion.steering)
-        ahead = (speeds - motion.yaw_rate * self._x * s) / c + motion.yaw_rate * self._y
         elapsed = 0.0 if last is None else motion.time - last.time
-        if last is None or not 0.0 < elapsed < LONGEST_GAP or not np.isfinite(ahead).any():
+        if last is None or not 0.0 < elapsed < LONGEST_GAP:
             return
-        slope, aside = -np.tan(motion.pitch), np.tan(motion.roll)
-        raw = float(np.nanmean(ahead)) * np.cos(motion.pitch)
+        ahead = self._find_speeds(motion)
+        if not len(ahead):
+            return
+        # Plain numbers: arrays of two elements take several times as long.
+        slope, aside = -math.tan(motion.pitch), math.tan(motion.roll)
+        raw = float(ahead.sum()) / len(ahead) * math.cos(motion.pitch)
         step = raw * elapsed
         # Slip grows with the load on the wheels against the motion, so with the slope ahead.
-        inputs = np.array([1.0, slope * np.sign(raw)])
-        lost, drift = float(self.forward.mean @ inputs), float(self.side.mean[0]) * aside
-        used = min(float(np.hypot(slope, aside)) / max(self.friction, 1e-3), 1.0)
+        uphill = slope if raw > 0.0 else -slope
+        everywhere, per_slope = self.forward.mean.tolist()
+        lost, drift = everywhere + per_slope * uphill, float(self.side.mean[0]) * aside
+        used = min(math.hypot(slope, aside) / max(self.friction, 1e-3), 1.0)
         slide = MOST_SLIDE * used**LIMIT
         self.speed = raw * (1.0 - lost)
-        shares = self.forward.variance, self.side.variance * aside**2 + self.side.variance
-        self.speed_deviation = abs(raw) * float(np.hypot(np.sqrt(shares[0]), slide))
+        along = float(self.forward.variance)
+        across = float(self.side.variance) * (aside**2 + 1.0)
+        self.speed_deviation = abs(raw) * math.hypot(math.sqrt(along), slide)
         self.pose[2] += 0.5 * elapsed * (motion.yaw_rate + last.yaw_rate)
-        heading = np.array([np.cos(self.pose[2]), np.sin(self.pose[2])])
-        left = np.array([-heading[1], heading[0]])
+        c, s = math.cos(self.pose[2]), math.sin(self.pose[2])
+        heading, left = np.array([c, s]), np.array([-s, c])
         self.pose[:2] += step * ((1.0 - lost) * heading - drift * left)
-        self._forward_ways += np.outer(heading, inputs) * step
-        self._side_way += left * aside * step
-        self._slide += heading * slide * step
-        way = abs(step) * self._piece
-        self._noise += shares[0] * way * np.outer(heading, heading)
-        self._noise += shares[1] * way * np.outer(left, left)
+        self._forward_ways += step * np.array([[c, c * uphill], [s, s * uphill]])
+        self._side_way += left * (aside * step)
+        self._slide += heading * (slide * step)
+        mixed = (along - across) * c * s
+        self._noise += (abs(step) * self._piece) * np.array(
+            [[along * c**2 + across * s**2, mixed], [mixed, along * s**2 + across * c**2]]
+        )
         self._elapsed += elapsed
-        self._piece_ways += step * np.append(inputs, aside)
+        self._piece_ways += step * np.array([1.0, uphill, aside])
         self._way += abs(step)
+
+    def _find_speeds(self, motion: WheelMotion) -> Floats:
+        """Return the speeds of the body [m/s] that the wheels tell, those that were measured."""
+        c, s = np.cos(motion.steering), np.sin(motion.steering)
+        turning = motion.yaw_rate
+        ahead = (self._radius * motion.rates - turning * self._x * s) / c + turning * self._y
+        return np.asarray(ahead[np.isfinite(ahead)])
 
     def learn(self, pose: Floats) -> None:
         """Take a pose (3,) that was not measured by the wheels: x, y [m], yaw [rad]."""

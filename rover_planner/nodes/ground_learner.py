@@ -9,7 +9,6 @@ from typing import Any
 
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
-from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Bool, String
 
@@ -32,7 +31,7 @@ from rover_planner.learning.wheel_odometry import WheelOdometry
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.warm_up import LEARNING
 from rover_planner.parameters.ground_learner import GroundLearnerParameters
-from rover_planner.ros.map_intake import CLOUD
+from rover_planner.ros.map_intake import CLOUD, read_message
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import latched_qos, polled_qos, sensor_qos
 from rover_planner.ros.row_collector import RowCollector
@@ -100,7 +99,7 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
         return receive
 
     def _take_map(self, data: bytes) -> None:
-        values, cloud = self.values, deserialize_message(data, PointCloud2)
+        values, cloud = self.values, read_message(data, PointCloud2)
         check_frame(cloud.header.frame_id, values.map_frame, CLOUD)
         terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height)
         if self.learner is None:

@@ -24,7 +24,7 @@ from msg_adapters.commands import joint_order, twist_to_speeds
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash
-from msg_adapters.joints import convert_steering
+from msg_adapters.joints import JointNames
 from msg_adapters.paths import path_to_poses
 from msg_adapters.results.diagnostics import SIMULATOR, diagnostics, make_status
 from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_message
@@ -51,6 +51,8 @@ STANDING_PERIOD = 0.1
 """Time between two commands of a rover that is to stand [s]."""
 DEVIATIONS = (0.01, 0.005)
 """Standard deviations in odometry: positions [m] and angles [rad]."""
+COVARIANCE = np.diag(np.repeat(np.square(DEVIATIONS), 3))
+"""The same as (6, 6) of a pose: x, y, z, roll, pitch, yaw."""
 SWITCH_INTERVAL = 5e-4
 """Longest time for which the thread that makes maps may delay a step whenever that needs Python's
 lock [s]; Python's thread switch interval."""
@@ -68,7 +70,8 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
     def __init__(self, **node_arguments: Any):
         super().__init__(NODE_NAME, RoverSimulatorParameters, **node_arguments)
         parameters = self.values
-        self._frame, self._steering_sign = parameters.map_frame, parameters.steering_sign
+        self._frame = parameters.map_frame
+        self._joint_names = JointNames(steering=parameters.steering_sign)
         self._order = joint_order(parameters.joints)
         self._settings = load_simulation_settings(parameters)
         if parameters.engine == QUASI_STATIC:
@@ -78,12 +81,13 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
         self._period = 1.0 / parameters.rate
         self._standing_steps = max(1, round(STANDING_PERIOD * parameters.rate))
         self._stopped, self._path_hash, self._steps = "", "", 0
+        self._measured: tuple[Any, ...] = ()
         self._own_stamps: deque[tuple[int, int]] = deque(maxlen=64)
         self._create_publishers()
         self._create_subscriptions()
         self._state: PlantState = self.simulation.plant.state()
         self._start = time.time_ns()
-        create_steady_timer(self, self._period, self._advance)
+        self.loop = create_steady_timer(self, self._period, self._advance)
         # A map takes longer than a step: other threads must not make the rover's sensors late.
         self._maps, self._map_in_work = ThreadPoolExecutor(1, "maps"), Future[None]()
         self._map_in_work.set_result(None)
@@ -98,9 +102,8 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
 
     def _create_publishers(self) -> None:
         qos = QoSProfile(depth=5)  # reliable, so that every subscriber hears it
-        self._joints = self.create_publisher(JointState, "joint_states", qos)
-        self._odometry = self.create_publisher(Odometry, "odometry", qos)
-        self._imu = self.create_publisher(Imu, "imu", qos)
+        kinds = {"joint_states": JointState, "odometry": Odometry, "imu": Imu}
+        self._sensors = [self.create_publisher(kind, name, qos) for name, kind in kinds.items()]
         self._driven = self.create_publisher(String, "path_driven", latched_qos())
         self._cloud = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
@@ -157,27 +160,16 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
 
     def _advance(self) -> None:
         self.heard.poll()
-        self._state = state = self.simulation.advance(time.monotonic(), self._period)
+        before, self._state = self._state, self.simulation.advance(time.monotonic(), self._period)
         self._steps += 1
-        stamp = self._stamp
+        state, stamp = self._state, self._stamp
         if self._clock_publisher is not None:
             self._clock_publisher.publish(ClockMessage(clock=stamp))
-        efforts = dict(zip(WHEEL_JOINTS, state.wheel_torques.tolist(), strict=True))
-        positions, velocities = (
-            convert_steering(values, self._steering_sign)
-            for values in (state.joint_positions | self._arm_angles(), state.joint_velocities)
-        )
-        self._joints.publish(joint_state(positions, velocities, efforts, stamp))
-        self._odometry.publish(
-            odometry_message(
-                state.position, state.orientation, state.velocity, state.body_rates,
-                DEVIATIONS, self._frame, stamp,
-            )
-        )  # fmt: skip
-        gravity = self._settings.rover.gravity
-        self._imu.publish(
-            imu_message(state.orientation, state.body_rates, gravity, DEVIATIONS[1], stamp)
-        )
+        if state is not before or not self._measured:
+            self._measured = self._write_sensors(state, stamp)
+        for publisher, message in zip(self._sensors, self._measured, strict=True):
+            message.header.stamp = stamp
+            publisher.publish(message)
         is_due = any(self.simulation.steering) or self._steps % self._standing_steps == 0
         own = not self.simulation.has_speeds(time.monotonic())
         if self._commands is not None and is_due and own:
@@ -190,6 +182,21 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
         if self._path_hash and self.simulation.at_end:
             self._driven.publish(String(data=self._path_hash))
             self._path_hash = ""
+
+    def _write_sensors(self, state: PlantState, stamp: Any) -> tuple[JointState, Odometry, Imu]:
+        """Return what the sensors measure."""
+        efforts = dict(zip(WHEEL_JOINTS, state.wheel_torques.tolist(), strict=True))
+        positions, velocities = (
+            self._joint_names.turn(values)
+            for values in (state.joint_positions | self._arm_angles(), state.joint_velocities)
+        )
+        odometry = odometry_message(
+            state.position, state.orientation, state.velocity, state.body_rates,
+            (COVARIANCE, COVARIANCE), self._frame, stamp,
+        )  # fmt: skip
+        gravity = self._settings.rover.gravity
+        imu = imu_message(state.orientation, state.body_rates, gravity, DEVIATIONS[1], stamp)
+        return joint_state(positions, velocities, efforts, stamp), odometry, imu
 
     @property
     def _stamp(self) -> Any:

@@ -15,12 +15,12 @@ from typing import Any
 import rclpy
 import rclpy.logging
 from rclpy.executors import ExternalShutdownException
-from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 
 from rover_physics.errors import RoverError
 from rover_planner.nodes.programs import read_arguments
 from rover_planner.ros.guard import GuardedExecutor
+from rover_planner.ros.node import RoverNode
 from rover_planner.ros.process import init_ros, take_priority, warn_of_disk
 from rover_planner.shell.run_program import EXIT_BAD_INPUT, EXIT_OK
 
@@ -32,7 +32,7 @@ LOOK_FOR_STOP = 0.5
 def run_node(
     name: str,
     argv: Sequence[str] | None,
-    make: Callable[[Any], Node],
+    make: Callable[[Any], RoverNode[Any]],
     switch_interval: float | None = None,
 ) -> int:
     """Run a node until it is stopped.
@@ -76,10 +76,11 @@ def run_node(
     return EXIT_OK
 
 
-def _take_priority(node: Node) -> None:
+def _take_priority(node: RoverNode[Any]) -> None:
     """Set the real-time priority of a node's parameter; log a warning if it is not granted."""
     if node.has_parameter("realtime_priority"):
-        refusal = take_priority(node.get_parameter("realtime_priority").value)
+        priority = node.get_parameter("realtime_priority").value
+        refusal = take_priority(priority, node.urgent_threads)
         if refusal:
             node.get_logger().warning(refusal)
 

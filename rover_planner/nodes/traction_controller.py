@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from rclpy.duration import Duration
-from rclpy.event_handler import SubscriptionEventCallbacks
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
@@ -82,7 +81,7 @@ class TractionController(RoverNode[TractionControllerParameters]):
         self._create_switches()
         self._watchdog = Watchdog(self._send_watchdog_command)
         self.follow_changes(self._load, self._apply_settings)
-        self._timer = create_steady_timer(self, 1.0 / values.rate, self.update)
+        self._timer = self.loop = create_steady_timer(self, 1.0 / values.rate, self.update)
         create_steady_timer(self, DIAGNOSTICS_PERIOD, self._publish_diagnostics)
         self.get_logger().info(
             f"ready for rover {self.service.settings.rover.name}, "
@@ -121,11 +120,8 @@ class TractionController(RoverNode[TractionControllerParameters]):
         started, so there are three subscriptions; a stop may arrive three times.
         """
         self.create_service(SetBool, "~/enable", self._enable)
-        silent = SubscriptionEventCallbacks(use_default_callbacks=False)
         for qos in (topic_qos(), latched_qos(), sensor_qos()):
-            self.create_subscription(
-                Bool, "~/emergency_stop", self._take_emergency_stop, qos, event_callbacks=silent
-            )
+            self.heard.subscribe(Bool, "~/emergency_stop", self._take_emergency_stop, qos)
 
     def _load(self, parameters: TractionControllerParameters) -> TractionSettings:
         return load_traction_settings(parameters, self.service.settings)
@@ -147,7 +143,7 @@ class TractionController(RoverNode[TractionControllerParameters]):
             self.update()
         return response
 
-    def _take_emergency_stop(self, message: Bool) -> None:
+    def _take_emergency_stop(self, message: Bool, _arrival: float) -> None:
         permission = self._supervisor.permission
         if message.data == permission.emergency_stop:
             return
@@ -155,7 +151,6 @@ class TractionController(RoverNode[TractionControllerParameters]):
         self.get_logger().warning(
             "emergency stop" if message.data else "emergency stop released; ~/enable drives again"
         )
-        self.update()
 
     def update(self) -> None:
         """Estimate, build, solve and publish; called by the timer."""

@@ -278,6 +278,8 @@ class TraverseServerParameters(ParameterTable):
         bounds=(0.0, 3.2),
     )
 
+    realtime_priority: int = shared.REALTIME_PRIORITY
+
     hazard_map: bool = parameter(
         False, "Whether ~/hazard_map has the class of each cell and heading."
     )

@@ -12,14 +12,17 @@ from typing import Any, TypeVar
 
 from rclpy.event_handler import EventHandler
 from rclpy.exceptions import InvalidHandle
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 
 from rover_physics.errors import RoverError
 
+NANOSECONDS = 1e9
 EVENT_PERIOD, EVENT_WINDOW = 1.0, 0.01
 """Time between two looks at events of publishers and subscriptions, such as profiles that do not
 match, and the length of a look [s]: they are half of the entities of a wait set."""
+PATIENCE = 0.1
+"""Time between two looks at all else where a node has a loop [s]."""
 
 Refusal = TypeVar("Refusal")
 
@@ -97,12 +100,50 @@ class GuardedExecutor(SingleThreadedExecutor):
 
     They go to the node's `guard`. In rclpy, and for a node without one, such an error ends `spin`,
     and after one in the reading of a message the node's callback group stays blocked for ever.
+
+    The timer that a node names as its `loop` is called without a wait set: to make one for each
+    wait, as rclpy does, takes longer than most updates. All else is looked at each PATIENCE.
     """
 
     def __init__(self, **executor_arguments: Any):
         super().__init__(**executor_arguments)
         self._guard_of_node: Guard | None = None
         self._events_due = self._events_until = 0.0
+        self._loop: Any = None
+        self._loop_due = self._others_due = 0.0
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        """Call what is ready next; a loop that is due comes first."""
+        if not self._is_apart(self._loop):
+            super().spin_once(timeout_sec)
+        elif self._others_due <= time.monotonic() < self._loop_due:
+            self._call_other()
+        else:
+            self._call_loop()
+
+    def _is_apart(self, timer: Any) -> bool:
+        """Return whether a timer is a loop; with a simulated clock, /clock comes before loops."""
+        if timer is None or timer is not self._loop or timer.is_canceled():
+            return False
+        return not any(node.get_clock().ros_time_is_active for node in self.get_nodes())
+
+    def _call_loop(self) -> None:
+        now = time.monotonic()
+        time.sleep(max(self._loop_due - now, 0.0))
+        self._loop_due = max(self._loop_due, now) + self._loop.timer_period_ns / NANOSECONDS
+        try:
+            self._loop.callback()
+        except Exception as error:
+            self._report("the loop", error)
+
+    def _call_other(self) -> None:
+        """Call one of what is ready besides the loop; look again later if there is nothing."""
+        try:
+            call, _, _ = self.wait_for_ready_callbacks(timeout_sec=0.0)
+        except TimeoutException:
+            self._others_due = time.monotonic() + PATIENCE
+        else:
+            call()
 
     def can_execute(self, entity: Any) -> bool:
         """Return whether the next wait is for an entity, too; events wait for their turn."""
@@ -112,11 +153,12 @@ class GuardedExecutor(SingleThreadedExecutor):
                 self._events_due, self._events_until = now + EVENT_PERIOD, now + EVENT_WINDOW
             if now >= self._events_until:
                 return False
-        return bool(super().can_execute(entity))
+        return not self._is_apart(entity) and bool(super().can_execute(entity))
 
     def add_node(self, node: Node) -> bool:
         """Add the node; errors of its callbacks go to its guard, if it has one."""
         self._guard_of_node = getattr(node, "guard", None)
+        self._loop = getattr(node, "loop", None)
         return bool(super().add_node(node))
 
     def _make_handler(self, entity, node, take_from_wait_list):

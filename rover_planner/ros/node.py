@@ -9,6 +9,7 @@ from typing import Any, Generic, TypeVar
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.timer import Timer
 
 from msg_adapters.stamps import NANOSECONDS
 from rover_physics.errors import RoverError
@@ -39,6 +40,10 @@ class RoverNode(Node, Generic[Table]):
         """Calls functions of other threads in the executor's."""
         self.heard = PolledTopics(self, self.guard)
         """Topics that are read when the node needs what they say."""
+        self.loop: Timer | None = None
+        """Timer of what the node does all the time, for its executor; a steady one."""
+        self.urgent_threads: tuple[int, ...] = ()
+        """Ids of the threads that take the real-time priority; empty for all of the process."""
 
     @property
     def seconds(self) -> float:

@@ -7,6 +7,7 @@ longer than most messages do.
 
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
@@ -19,17 +20,33 @@ from rover_planner.ros.guard import Guard
 NANOSECONDS = 1e9
 
 
+@dataclass(frozen=True)
+class _Topic:
+    """A topic that is polled."""
+
+    subscription: Subscription
+    name: str
+    take: Callable[[Any, float], None]
+    depth: int
+    is_due: Callable[[], bool]
+
+
 class PolledTopics:
     """Subscriptions of a node that are read by `poll`, in the executor's thread."""
 
     def __init__(self, node: Node, guard: Guard):
         """Begin without topics; `guard` takes unexpected errors."""
         self._node, self._guard, self._group = node, guard, _Apart()
-        self._topics: list[tuple[Subscription, Callable[[Any, float], None], int]] = []
+        self._topics: list[_Topic] = []
         self._polled = time.monotonic()
 
     def subscribe(
-        self, kind: type, name: str, take: Callable[[Any, float], None], qos: QoSProfile
+        self,
+        kind: type,
+        name: str,
+        take: Callable[[Any, float], None],
+        qos: QoSProfile,
+        is_due: Callable[[], bool] = lambda: True,
     ) -> None:
         """Subscribe to a topic.
 
@@ -38,26 +55,19 @@ class PolledTopics:
             name: Name of the topic.
             take: Called with each message and the time of its arrival [s], monotonic.
             qos: The profile; of more messages than its depth the last ones are read.
+            is_due: Whether it is to be read at all now.
         """
         group = self._group
         topic = self._node.create_subscription(kind, name, take, qos, callback_group=group)
-        self._topics.append((topic, take, qos.depth))
+        self._topics.append(_Topic(topic, topic.topic_name, take, qos.depth, is_due))
 
     def poll(self) -> None:
         """Read all that has come since the last time, in the order of its arrival."""
         before, self._polled = self._polled, time.monotonic()
         arrived = []
-        for topic, take, depth in self._topics:
-            for _ in range(depth):
-                try:
-                    with topic.handle:
-                        found = topic.handle.take_message(topic.msg_type, False)
-                except Exception as error:
-                    self._guard.report(f"reading of {topic.topic_name}", error)
-                    continue
-                if found is None:
-                    break
-                arrived.append((found[1]["received_timestamp"], topic.topic_name, take, found[0]))
+        for topic in self._topics:
+            if topic.is_due():
+                arrived += self._read(topic)
         for at, name, take, message in sorted(arrived, key=lambda one: one[0]):
             # Since the last poll at most, whatever the system clock was set to meanwhile.
             age, now = (time.time_ns() - at) / NANOSECONDS, time.monotonic()
@@ -65,6 +75,22 @@ class PolledTopics:
                 take(message, now - min(max(age, 0.0), now - before))
             except Exception as error:
                 self._guard.report(f"reading of {name}", error)
+
+
+    def _read(self, topic: _Topic) -> list[tuple[int, str, Callable[[Any, float], None], Any]]:
+        """Return what has come with its time [ns], the name of the topic and who takes it."""
+        handle, arrived = topic.subscription.handle, []
+        for _ in range(topic.depth):
+            try:
+                with handle:
+                    found = handle.take_message(topic.subscription.msg_type, False)
+            except Exception as error:
+                self._guard.report(f"reading of {topic.name}", error)
+                continue
+            if found is None:
+                break
+            arrived.append((found[1]["received_timestamp"], topic.name, topic.take, found[0]))
+        return arrived
 
 
 class _Apart(CallbackGroup):

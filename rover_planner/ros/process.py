@@ -73,11 +73,12 @@ def avoid_huge_pages() -> None:
         prctl(_PR_SET_THP_DISABLE, 1, 0, 0, 0)
 
 
-def take_priority(priority: int) -> str:
-    """Set the real-time priority (SCHED_FIFO) of all threads of this process.
+def take_priority(priority: int, threads: Sequence[int] = ()) -> str:
+    """Set the real-time priority (SCHED_FIFO) of threads of this process.
 
     Args:
         priority: 1 to 99 as in sched(7); 0 changes nothing.
+        threads: Their ids; empty takes all threads of now.
 
     Returns:
         The reason why it was not granted, empty if it was granted.
@@ -85,8 +86,8 @@ def take_priority(priority: int) -> str:
     if priority == 0:
         return ""
     try:
-        for thread in THREADS.iterdir():
-            os.sched_setscheduler(int(thread.name), os.SCHED_FIFO, os.sched_param(priority))
+        for thread in threads or [int(entry.name) for entry in THREADS.iterdir()]:
+            os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
     except (OSError, AttributeError) as error:
         return (
             f"realtime_priority {priority} is not granted ({error}); it needs CAP_SYS_NICE or an "

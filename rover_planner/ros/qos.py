@@ -49,6 +49,11 @@ def polled_qos() -> QoSProfile:
     return QoSProfile(depth=20, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
+def newest_qos() -> QoSProfile:
+    """Return the profile of sensor data of which only the last message matters."""
+    return QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
 def service_qos() -> QoSProfile:
     """Return the profile of services that many clients may call at once."""
     return QoSProfile(depth=100)

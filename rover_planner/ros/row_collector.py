@@ -102,7 +102,7 @@ class RowCollector:
         row = self._row
         if math.isnan(self.yaw_rate) or np.isnan(row[RATES]).all():
             return None
-        steering = np.nan_to_num(row[STEERING])
+        steering = np.where(np.isnan(row[STEERING]), 0.0, row[STEERING])
         return WheelMotion(time, row[RATES].copy(), steering, row[ROLL], row[PITCH], self.yaw_rate)
 
     def take_odometry(self, message: Any, time: float, frame: str = "") -> Floats:

@@ -60,13 +60,16 @@ class ServerInputs:
         """Knows map, path and measurements."""
         self.keeper = MapKeeper(self.service.settings.rover, parameters)
         """Makes one map of those that come."""
-        self.joint_names = read_joint_map(parameters.joint_map, self.service.all_joint_names)
+        self.joint_names = read_joint_map(
+            parameters.joint_map, self.service.all_joint_names, parameters.steering_sign
+        )
         """Names of the joints in messages."""
         self._mounting = ImuMounting(parameters.imu_frame or BASE_FRAME, parameters.imu_mounting)
         self._clock, self._looked = clock, -float("inf")
         if parameters.terrain_file:
             terrain = load_terrain(parameters.terrain_file, parameters.max_map_cells)
             self.keep(self.keeper.load(terrain, self.seconds, None), parameters.terrain_file)
+            self.service.prepare()
 
     @property
     def seconds(self) -> float:

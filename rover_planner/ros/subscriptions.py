@@ -4,9 +4,11 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from rclpy.callback_groups import CallbackGroup, MutuallyExclusiveCallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.qos import QoSPolicyKind, QoSProfile
+from rclpy.subscription import Subscription
 
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import (
@@ -51,9 +53,28 @@ def subscribe_to_map(
 
     The rest is as for `subscribe_to_requests`.
     """
-    values = node.values
+    values, group = node.values, None
     for qos, mends in map_subscriptions(values.map_durability, values.input_reliability):
-        _subscribe(node, kind, name, take, qos, mends, raw=True)
+        heard = _subscribe(node, kind, name, take, qos, mends, raw=True, group=group)
+        group = _Spare(heard)
+
+
+class _Spare(MutuallyExclusiveCallbackGroup):
+    """The group of a subscription that is read only if another one does not hear all publishers.
+
+    To read a large map takes Python's lock for long.
+    """
+
+    def __init__(self, other: Subscription):
+        super().__init__()
+        self._other = other
+
+    def can_execute(self, entity: Any) -> bool:
+        """Return whether there is a publisher that only this subscription hears."""
+        if isinstance(entity, Subscription):
+            alone = entity.get_publisher_count() > self._other.get_publisher_count()
+            return alone and bool(super().can_execute(entity))
+        return bool(super().can_execute(entity))
 
 
 def _subscribe(
@@ -65,7 +86,8 @@ def _subscribe(
     mends: Mapping[QoSPolicyKind, str],
     *,
     raw: bool = False,
-) -> None:
+    group: CallbackGroup | None = None,
+) -> Subscription:
     """Subscribe, and warn of mismatches of the kinds in `mends`; others are expected."""
 
     def warn(event) -> None:
@@ -77,7 +99,9 @@ def _subscribe(
             )
 
     events = SubscriptionEventCallbacks(incompatible_qos=warn, use_default_callbacks=False)
-    node.create_subscription(kind, name, take, qos, event_callbacks=events, raw=raw)
+    return node.create_subscription(
+        kind, name, take, qos, callback_group=group, event_callbacks=events, raw=raw
+    )
 
 
 class PublisherCheck:

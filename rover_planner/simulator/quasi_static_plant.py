@@ -41,6 +41,8 @@ MAX_SLIP = 0.95
 """Largest slip ratio that is used for wheel rates, which would be infinite at 1."""
 CREEP = 1e-4
 """Speed below which the rover does not steer [m/s]."""
+HELD = 1e-5
+"""Speed below which the gears hold the rover [m/s]; else it would creep for ever."""
 MIN_PROGRESS, PATIENCE = 0.02, 2.0
 """A rover that moves less than MIN_PROGRESS [m] within PATIENCE [s] counts as stuck."""
 
@@ -90,7 +92,9 @@ class QuasiStaticPlant:
         self._torques = np.zeros(6)
         self._speed, self._moved, self._duration = 0.0, np.zeros(3), 1.0
         self._stopped = ""
-        self._braked_at: PathPrediction | None = None
+        self._last_step: tuple[object, ...] = ()
+        self._forces: DrivingForces | None = None
+        self._measured: PlantState | None = None
         self._anchor, self._stalled = self._pose.copy(), 0.0
 
     def pose(self) -> Floats:
@@ -99,6 +103,8 @@ class QuasiStaticPlant:
 
     def drive(self, speed: float, yaw_rate: float, duration: float) -> None:
         """Drive at a speed [m/s] and yaw rate [rad/s] for a duration [s], if this is possible."""
+        if self._repeats("drive", speed, yaw_rate):
+            return
         self._torques = self._here.torque[0].copy()
         angles, aims = self._steer((speed, yaw_rate), duration)
         if aims.refusal:
@@ -108,6 +114,18 @@ class QuasiStaticPlant:
         share = self._drive.share(angles, aims.angles)
         self._speed = share * speed
         self._move(share * np.array([speed, 0.0, yaw_rate]), angles, duration)
+
+    def _repeats(self, *step: object) -> bool:
+        """Return whether this is the last step again, which began and ended at rest.
+
+        Such a step changes nothing.
+        """
+        rests = self._before is self._here
+        repeats = rests and self._last_step == (*step, True)
+        self._last_step = *step, rests
+        if not repeats:
+            self._measured = None
+        return repeats
 
     def _steer(self, command: tuple[float, float], duration: float) -> tuple[Floats, WheelAims]:
         """Return the steering angles (6,) [rad] after a duration [s], and the aims of a command.
@@ -121,10 +139,15 @@ class QuasiStaticPlant:
 
     def pull(self, torques: Floats, command: tuple[float, float], duration: float) -> None:
         """Apply torques (6,) [N m] for a duration [s]; speed and yaw rate set the steering."""
+        if self._repeats("pull", *torques.tolist(), *command):
+            self._watch_stall(duration)
+            return
         wheel, limit = self._rover.wheel, self._rover.wheel.max_torque
         self._torques = np.clip(torques, -limit, limit)
         angles, aims = self._steer(command, duration)
         same = self._take_course()
+        if not same:
+            self._last_step = ()  # the next step is the first of this course
         forces = self._find_forces(self._torques, float(np.sign(self._speed)))
         speed = self._accelerate(forces, DRAG, duration)
         top = wheel.max_speed * wheel.radius
@@ -138,12 +161,12 @@ class QuasiStaticPlant:
         self._move(motion, angles, duration, forces)
         racing = np.sign(torques) * wheel.max_speed
         self._wheel_rates = np.where(forces.sliding, racing, self._wheel_rates)
-        self._watch_stall(forces, duration)
+        self._forces = forces
+        self._watch_stall(duration)
 
     def brake(self, duration: float) -> None:
         """Lock the wheels for a duration [s]; beyond their friction the rover slides."""
-        if self._braked_at is self._here and self._speed == 0.0:
-            self._stand(duration)
+        if self._repeats("brake"):
             return
         self._torques = np.zeros(6)
         self._take_course()
@@ -158,7 +181,7 @@ class QuasiStaticPlant:
         spin = self._spin.copy()
         motion = self._speed * self._course.sign * self._rolling.motion
         self._move(motion, self._angles, duration, forces)
-        self._spin, self._wheel_rates, self._braked_at = spin, np.zeros(6), self._here
+        self._spin, self._wheel_rates = spin, np.zeros(6)
 
     def _find_forces(self, torques: Floats, direction: float) -> DrivingForces:
         """Return the forces under torques (6,) [N m] of a rover that moves along its speed.
@@ -172,15 +195,17 @@ class QuasiStaticPlant:
         """Return the speed [m/s] after a duration [s]; the rover stops before it reverses."""
         push = self._course.sign * forces.push / self._rolling.inertia
         speed = self._speed + (push / self._mass - drag * self._speed) * duration
-        return speed if self._speed * speed >= 0.0 else 0.0
+        return speed if self._speed * speed >= 0.0 and abs(speed) >= HELD else 0.0
 
     def _take_course(self) -> bool:
         """Note how the wheels roll; return False if this is another motion than before."""
         self._rolling = self._writer.find_rolling(measure_state(self._here, self._writer.on_bogie))
         return self._course.take(self._rolling, self._angles)
 
-    def _watch_stall(self, forces: DrivingForces, duration: float) -> None:
+    def _watch_stall(self, duration: float) -> None:
         """Set the reason for standing still when wheels slide or motors saturate for PATIENCE."""
+        forces = self._forces
+        assert forces is not None
         saturated = np.abs(self._torques) >= 0.999 * self._rover.wheel.max_torque
         moved = float(np.hypot(*(self._pose - self._anchor)[:2]))
         if moved > MIN_PROGRESS or not (forces.sliding.any() or saturated.any()):
@@ -284,7 +309,12 @@ class QuasiStaticPlant:
         return {row: reason for row, (_, reason) in explained.items()}
 
     def state(self) -> PlantState:
-        """Return the current measurements."""
+        """Return the current measurements; the same object while nothing has changed."""
+        if self._measured is None or self._measured.stopped != self._stopped:
+            self._measured = self._measure()
+        return self._measured
+
+    def _measure(self) -> PlantState:
         here, before, duration = self._here, self._before, self._duration
         angles = _suspension(here)
         rates = (angles - _suspension(before)) / duration

@@ -12,7 +12,9 @@ import traceback
 from collections.abc import Callable
 
 POLL = 0.01
-"""Longest sleep of the thread [s]."""
+"""Time between two actions of the thread [s]."""
+LONGEST = 0.05
+"""Longest sleep of the thread while a command is valid [s]: a later one may expire earlier."""
 SHORTEST = 0.001
 """Shortest sleep of the thread [s]."""
 
@@ -68,7 +70,7 @@ class Watchdog:
             now = time.monotonic()
             if now < self._deadline:
                 tripped = False
-                time.sleep(min(max(self._deadline - now, SHORTEST), POLL))
+                time.sleep(min(max(self._deadline - now, SHORTEST), LONGEST))
                 continue
             # A thread that hangs while it sends must not keep the watchdog from acting.
             locked = self._lock.acquire(timeout=POLL)

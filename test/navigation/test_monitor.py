@@ -103,6 +103,16 @@ def test_what_is_near_is_judged_on_the_map_around_it_so_that_a_large_one_delays_
     assert found.judgement.judge.terrain.elevation.size < 0.2 * large.elevation.size
 
 
+def test_a_wall_that_is_certain_stops_before_the_errors_of_the_map_are_allowed_for(service):
+    for ground, std, is_exact in ((wall_at(0.5), 0.001, True), (waves, 0.2, False)):
+        terrain, monitor = make_terrain(ground, half=3.0), watching(service)
+        doubtful = replace(terrain, elevation_std=np.full(terrain.elevation.shape, std))
+        service.take_terrain(doubtful)
+        found = monitor.look(Sight(service.snapshot(), STRAIGHT[0], 1.0))
+        assert found.state == STOPPED
+        assert (found.judgement.candidate.prediction.bounds is None) == is_exact
+
+
 def test_a_stop_does_not_wait_for_what_lies_beyond_its_reason(service):
     found = watching(service).look(sight(service, STRAIGHT[0], 1.0, wall_at(0.5)))
     assert found.state == STOPPED and not found.judgement.candidate.is_complete

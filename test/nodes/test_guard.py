@@ -49,8 +49,10 @@ class Fragile(Node):
         raise RuntimeError("tick")
 
 
-def test_a_node_outlives_errors_of_timers_subscriptions_and_services(ros):
+@pytest.mark.parametrize("has_loop", [False, True])
+def test_a_node_outlives_errors_of_timers_subscriptions_and_services(ros, has_loop):
     node = Fragile(ros.context)
+    node.loop = node.timer if has_loop else None
     ros.spin(node)
     other = ros.spin(Node("other", context=ros.context))
     words = other.create_publisher(String, "words", 10)

@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Maps taken as bytes: each is prepared once, the latest is returned, bad ones are refused."""
 
+import pytest
 from builtin_interfaces.msg import Time
-from rclpy.serialization import serialize_message
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cloud
+from msg_adapters.errors import MessageError
 from rover_physics import load_rover
 from rover_physics.errors import ModelError
 from rover_physics.traction.map_contacts import MapContactFinder
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.ros.frames import Frames
-from rover_planner.ros.map_intake import MapIntake
+from rover_planner.ros.map_intake import MapIntake, read_message
 from support.rough_grounds import plane
 from support.waiting import wait_until
 
@@ -68,3 +71,14 @@ def test_damaged_bytes_are_refused_as_no_cloud():
     intake.close()
     assert "are no PointCloud2" in told[0]
     assert "internal error" not in told[0]
+
+
+def test_the_data_of_a_cloud_are_read_where_they_are():
+    message = cloud_of(1.0)
+    whole, read = deserialize_message(message, PointCloud2), read_message(message, PointCloud2)
+    assert read.data.obj is message and read.data == whole.data
+    read._data = whole.data
+    assert read == whole
+    for damaged in (message[:-9], message[:60], b""):
+        with pytest.raises(MessageError, match="no PointCloud2"):
+            read_message(damaged, PointCloud2)

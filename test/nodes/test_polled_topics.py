@@ -27,12 +27,18 @@ def test_messages_wait_until_polled_come_in_the_order_of_arrival_and_errors_end_
     topics = PolledTopics(node, guard)
     for name in NAMES:
         topics.subscribe(String, name, take, topic_qos())
+    due: list[bool] = []
+    topics.subscribe(String, "news", take, topic_qos(), lambda: bool(due))
     ros.spin(node)
     speaker = ros.spin(Node("speaker", context=ros.context))
     publishers = [speaker.create_publisher(String, name, topic_qos()) for name in NAMES]
+    news = speaker.create_publisher(String, "news", topic_qos())
+    publishers.append(news)
     wait_until(lambda: all(p.get_subscription_count() for p in publishers), "the subscriptions")
     topics.poll()
     before = time.monotonic()
+    publishers.remove(news)
+    news.publish(String(data="later"))
     for publisher, word in zip(itertools.cycle(publishers), WORDS, strict=False):
         publisher.publish(String(data=word))
         time.sleep(0.02)
@@ -43,3 +49,6 @@ def test_messages_wait_until_polled_come_in_the_order_of_arrival_and_errors_end_
     assert [word for word, _ in heard] == WORDS
     assert all(before - 0.01 <= arrival < after for _, arrival in heard)
     assert guard.total == 1
+    due.append(True)
+    topics.poll()
+    assert heard[-1][0] == "later"

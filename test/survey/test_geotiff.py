@@ -2,7 +2,6 @@
 """GeoTIFF maps keep their georeference and holes; those of another kind are refused."""
 
 import tracemalloc
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -231,15 +230,6 @@ def test_the_page_gets_the_map_that_was_surveyed_and_not_one_that_has_changed(tm
     write_tif(path, heights[::-1] + 1, nodata=np.nan)
     with pytest.raises(PlanningError, match=r"map\.tif has changed since .*out was made"):
         load_map(tmp_path / "out", 10_000)
-
-
-def test_a_layer_that_cannot_be_written_is_named(tmp_path):
-    prepared = survey_here(tmp_path, replace(make_rough_map(20, 20)), make_request(step=5))
-    (tmp_path / "file").write_text("")
-    with pytest.raises(PlanningError, match="cannot be made"):
-        write_layers(prepared.store, tmp_path / "file")
-    with pytest.raises(PlanningError, match="cannot be written"):
-        write_cog(tmp_path / "no" / "a.tif", np.zeros((3, 3)), prepared.store.notes.frame, 1)
 
 
 def test_a_damaged_block_is_refused_in_words_of_its_own(tmp_path):

@@ -16,7 +16,7 @@ from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.survey.layers import CLASS_COLOURS, CLASS_NUMBERS
 from rover_planner.viewer.state.colours import UNKNOWN, from_css
-from rover_planner.viewer.state.survey_layers import CLASS, LIMIT, load_map, open_survey
+from rover_planner.viewer.state.survey_layers import CLASS, load_map, open_survey
 from support.survey_maps import make_request, survey_here
 
 LSR1 = load_rover("lsr1")
@@ -59,15 +59,6 @@ def test_classes_have_the_colours_of_the_picture_and_a_legend_of_those_that_are_
     legend = str(colour(shown, CLASS, np.array([1.0]), np.array([1.0])).legend)
     assert "impassable" in legend and "traction control" not in legend
     assert "8 headings" in legend and "not as on the page" not in legend
-
-
-def test_the_first_limit_has_a_colour_and_a_meaning_for_each_that_fails_somewhere(shown):
-    at = np.linspace(0.0, 5.9, 60)
-    found = colour(shown, LIMIT, at, at)
-    assert found.colours.shape == (60, 60, 3)
-    assert colour_at(shown, LIMIT, PASSABLE) != colour_at(shown, LIMIT, WALL)
-    labels = [text for _, text in found.legend.keys]
-    assert "none: all headings pass" in labels and any("off map" in text for text in labels)
 
 
 def test_what_differs_from_the_page_is_said(shown):

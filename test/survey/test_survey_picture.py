@@ -9,14 +9,11 @@ pytest.importorskip("matplotlib", reason="install the extra plots")
 import matplotlib.image
 import numpy as np
 
-from rover_physics import Terrain
 from rover_planner.figures.survey_picture import (
     choose_bar,
     draw_reachable,
     draw_survey,
-    on_level_ground,
 )
-from rover_planner.survey.layers import CLASS_COLOURS
 from rover_planner.survey.reachable import find_reachable
 from support.survey_maps import make_request, make_rough_map, survey_here
 
@@ -37,15 +34,6 @@ def test_a_map_that_is_all_edge_has_the_colour_of_edges_and_no_legend_above_it(
     along = int(rows > columns)
     shares = is_edge.mean(axis=1 - along)
     assert shares.max() > 0.6  # a line of pixels along the map, from one end to the other
-
-
-def test_level_ground_has_the_colour_of_its_class_in_the_legend(tmp_path):
-    store = survey_here(tmp_path / "out", Terrain(np.zeros((30, 30)), 0.1), make_request()).store
-    draw_survey(tmp_path / "p.png", store)
-    pixels = matplotlib.image.imread(tmp_path / "p.png")[..., :3]
-    same = np.abs(pixels - on_level_ground(CLASS_COLOURS[0])).max(axis=-1) < 0.02
-    legend = slice(int(0.9 * len(pixels)), None)
-    assert same[: legend.start].sum() > 50_000 and same[legend].sum() > 100
 
 
 def test_a_start_without_ways_is_drawn(tmp_path):

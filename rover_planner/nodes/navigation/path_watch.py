@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Watches the accepted path in a thread: ~/stop at once and as a heartbeat, and ~/monitor."""
+"""Watches the accepted path in threads: ~/stop at once and as a heartbeat, and ~/monitor."""
 
 import math
 import threading
@@ -56,7 +56,11 @@ ReportStop = Callable[[PathJudgement, str, Snapshot], None]
 
 
 class PathWatch:
-    """Connects a PathMonitor to a node; looks are taken in a thread, in which maps are judged."""
+    """Connects a PathMonitor to a node; looks are taken in a thread, in which maps are judged.
+
+    Another thread sends the heartbeat and nothing else, so that no work of the node delays it.
+    It ends when the thread of the looks or the executor hangs: both take part in each look.
+    """
 
     def __init__(
         self,
@@ -86,6 +90,7 @@ class PathWatch:
         self._state = node.create_publisher(DiagnosticStatus, "~/watch", latched_qos())
         self._map_age = math.nan
         self._looked, self._idle_until = time.monotonic(), 0.0
+        self._stop_is_new = threading.Event()
         self._changed = threading.Condition()
         self._new_path: WatchedPath | None = None
         self._sight: Sight | None = None
@@ -94,6 +99,8 @@ class PathWatch:
         self._thread.start()
         node.create_service(SetBool, "~/monitor", self._switch)
         self.apply()
+        self._heartbeat = threading.Thread(target=self._send_stops, name="heartbeat", daemon=True)
+        self._heartbeat.start()
 
     def apply(self) -> None:
         """Follow the parameter `monitor`."""
@@ -119,6 +126,12 @@ class PathWatch:
         return replace(health, values={**health.values, "map_age": f"{self._map_age:.1f} s"})
 
     @property
+    def heartbeat_thread(self) -> int:
+        """Id of the thread that sends the heartbeat."""
+        assert self._heartbeat.native_id is not None
+        return self._heartbeat.native_id
+
+    @property
     def _stops(self) -> bool:
         """True if the rover is to stop: while paths are watched, it may drive a watched one."""
         return self.enabled and self.finding.state in (IDLE, STOPPED)
@@ -128,29 +141,41 @@ class PathWatch:
         self._node.handover.call(self.beat)
 
     def beat(self) -> None:
-        """Have a look taken if one is due, and publish `~/stop`; to be called each PERIOD."""
+        """Have a look taken if one is due, and publish `~/watch`; to be called each PERIOD."""
         now = time.monotonic()
-        is_idle = self.finding.state == IDLE and self._new_path is None
-        if (self.enabled and not is_idle) or now >= self._idle_until:
+        if not self.is_idle or now >= self._idle_until:
             self._idle_until = now + IDLE_PERIOD
             self._offer_sight()
-        self._publish()
-
-    def _publish(self) -> None:
-        """Publish that the watch is alive, and what it says; a watch that hangs says nothing."""
-        if time.monotonic() - self._looked > LONGEST_LOOK:
-            return
-        self._stop.publish(Bool(data=self._stops))
-        if self._state.get_subscription_count():
+        if self._is_alive and self._state.get_subscription_count():
             health, name = self.describe(), self._service.settings.rover.name
             status = make_status(MONITOR, health.level, health.message, health.values, name)
             self._state.publish(status)
 
+    @property
+    def is_idle(self) -> bool:
+        """True if no path is watched."""
+        return not self.enabled or (self.finding.state == IDLE and self._new_path is None)
+
+    @property
+    def _is_alive(self) -> bool:
+        """False if no look has reached the executor for LONGEST_LOOK."""
+        return time.monotonic() - self._looked <= LONGEST_LOOK
+
+    def _send_stops(self) -> None:
+        """Publish ~/stop each PERIOD and when it is new; a watch that hangs says nothing."""
+        while not self._ending and self._node.context.ok():
+            if self._is_alive:
+                self._node.guard.call(lambda: self._stop.publish(Bool(data=self._stops)))
+            self._stop_is_new.wait(PERIOD)
+            self._stop_is_new.clear()
+
     def close(self) -> None:
-        """End the thread."""
+        """End the threads."""
         with self._changed:
             self._ending = True
             self._changed.notify_all()
+        self._stop_is_new.set()
+        self._heartbeat.join(END_TIME)
         self._thread.join(END_TIME)
 
     def _set_path(self, path: WatchedPath | None) -> None:
@@ -235,13 +260,13 @@ class PathWatch:
         )
 
     def _take(self, finding: Finding) -> None:
-        """Publish ~/stop at once where it has changed; called in the executor's thread."""
+        """Have ~/stop published at once where it has changed; called in the executor's thread."""
         stopped, before = self._stops, self.finding
         self.finding, self._looked = finding, time.monotonic()
         if not self.enabled or finding.state == before.state:
             return
         if self._stops != stopped:
-            self._publish()
+            self._stop_is_new.set()
         logger = self._node.get_logger()
         if finding.state == STOPPED:
             assert finding.judgement is not None

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The subscriptions of the traction controller: checks messages and passes them to its service."""
 
+import math
 import time
 from collections.abc import Callable
 from typing import Any
@@ -12,19 +13,19 @@ from std_msgs.msg import Bool
 
 from msg_adapters.commands import twist_to_speeds
 from msg_adapters.imu import ImuMounting, imu_to_attitude
-from msg_adapters.joints import convert_steering, read_joint_map
+from msg_adapters.joints import read_joint_map
 from msg_adapters.odometry import odometry_to_pose
 from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
-from rover_physics.rover.steering_joints import STEERING_SIGNS, steering_joints
+from rover_physics.rover.steering_joints import steering_joints
 from rover_planner.parameters.shared import STOP
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.ros.frames import NodeFrames
 from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.map_intake import CLOUD, MapIntake
 from rover_planner.ros.node import RoverNode
-from rover_planner.ros.qos import sensor_qos, topic_qos
+from rover_planner.ros.qos import newest_qos, sensor_qos, topic_qos
 from rover_planner.ros.subscriptions import PublisherCheck, subscribe_to_map
 from rover_planner.traction.clocks import NANOSECONDS, StampCheck, StampError
 from rover_planner.traction.traction_service import (
@@ -38,6 +39,8 @@ from rover_planner.traction.traction_service import (
 JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
 ANGLES = (*SUSPENSION_JOINTS, *STEERING_JOINTS)
 """Joints whose positions are read; a rover has the steering joints of its steered wheels."""
+REST_PERIOD = 0.1
+"""Time between two readings of odometry by a rover at rest [s]."""
 TWIST, TWIST_STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"
 
 
@@ -53,16 +56,17 @@ class TractionInputs:
     ):
         """Subscribe to all inputs of a node; `frames` brings odometry to the frame of the map."""
         self._node, self._service, self._frames, parameters = node, service, frames, node.values
-        self._steering_sign = parameters.steering_sign
         arm = service.settings.rover.manipulator
         known = (*JOINTS, *STEERING_JOINTS, *(() if arm is None else arm.joints))
-        self.joint_names = read_joint_map(parameters.joint_map, known)
+        sign = parameters.steering_sign
+        self.joint_names = read_joint_map(parameters.joint_map, known, sign)
         """Names of the joints in messages."""
         self._heard = frozenset(self.joint_names.robot_names({*JOINTS, *ANGLES}))
         self._map_frame, self._base_frame = parameters.map_frame, parameters.base_frame
         self._mounting = ImuMounting(
             parameters.imu_frame or parameters.base_frame, parameters.imu_mounting
         )
+        self._odometry_read = -math.inf
         self._log = TransitionLog(node.get_logger())
         self.stamps = StampCheck(parameters.stamp_tolerance)
         """Judges the header stamps."""
@@ -74,20 +78,29 @@ class TractionInputs:
     def to_robot_steering(self, angles: Floats) -> Floats:
         """Return angles of the steered wheels [rad], in wheel order, as messages have them."""
         joints = steering_joints(self._service.settings.rover)
-        ours = STEERING_SIGNS[self._steering_sign] * angles
         names = self.joint_names
-        return names.signs(joints) * (ours - names.offsets(joints))
+        return names.signs(joints) * (angles - names.offsets(joints))
 
     def _subscribe(self, parameters: TractionControllerParameters) -> None:
         twist = TwistStamped if parameters.cmd_vel_stamped else Twist
+        hear = self._node.heard.subscribe
         for kind, name, take in (
             (JointState, JOINT_STATES, self._take_joints),
             (Imu, IMU, self._take_imu),
             (twist, CMD_VEL, self._take_command),
-            (Odometry, ODOMETRY, self._take_odometry),
         ):
-            self._node.heard.subscribe(kind, name, self._guard(name, take), sensor_qos())
-        self._node.heard.subscribe(Bool, STOP, self._guard(STOP, self._take_stop), topic_qos())
+            hear(kind, name, self._guard(name, take), sensor_qos())
+        take_odometry = self._guard(ODOMETRY, self._take_odometry)
+        hear(Odometry, ODOMETRY, take_odometry, newest_qos(), self._needs_odometry)
+        hear(Bool, STOP, self._guard(STOP, self._take_stop), topic_qos())
+
+    def _needs_odometry(self) -> bool:
+        """Return whether odometry is to be read: it takes longest, and at rest nothing uses it."""
+        now = time.monotonic()
+        if not self._service.drives and now - self._odometry_read < REST_PERIOD:
+            return False
+        self._odometry_read = now
+        return True
 
     def _check_publishers(self, parameters: TractionControllerParameters) -> PublisherCheck:
         types = {
@@ -135,9 +148,8 @@ class TractionInputs:
             return
         stamp = _stamp_of(state)
         measured = self._find_time(JOINT_STATES, stamp, now, merged=True)
-        angles = self.joint_names.positions(state, ANGLES)
+        positions = self.joint_names.positions(state, ANGLES)
         rates = self.joint_names.velocities(state, JOINTS)
-        positions = convert_steering(angles, self._steering_sign)
         self._service.take_joints(positions, rates, measured, stamp)
 
     def _take_imu(self, imu: Imu, now: float) -> None:

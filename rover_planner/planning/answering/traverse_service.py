@@ -108,9 +108,10 @@ class TraverseService(Measurements):
             self._keep_map(known)
 
     def prepare(self) -> None:
-        """Pack the present map for bounds; the watch does not wait for that."""
+        """Pack the present map for questions; the watch, which looks at a part, does not wait."""
         terrain = self.terrain
         if terrain is not None:
+            pack_ground(terrain)
             prepare_bounds(terrain, self.settings.query.map_sigmas)
 
     def take_path(self, poses: NDArray[np.float64], path_hash: str = "", stamp: str = "") -> None:
@@ -195,13 +196,12 @@ class TraverseService(Measurements):
     def _keep_map(self, about: KnownMap) -> bool:
         """Keep a map, of which only terrain and fingerprint are missing; return whether it is new.
 
-        What takes time is done here, so that the first question about it is fast; see `prepare`.
+        `prepare` makes the first question about it fast.
         """
         with self._map_lock:
             received, gap = about.received, self.settings.largest_gap
             terrain = received.fill_gaps(gap) if gap > 0.0 else received
             forget_terrains()
-            pack_ground(terrain)
             before = self.known_map
             content = fingerprint(received)
             self.known_map = replace(about, terrain=terrain, fingerprint=content)

@@ -253,14 +253,20 @@ class PathMonitor:
         return replace(judgement, reason=f"{away:.2f} m ahead: {judgement.reason}")
 
     def _check_rest(self, path: WatchedPath, snapshot: Snapshot) -> PathJudgement:
-        """Judge the part of the path just ahead, and the rest if that may be driven."""
+        """Judge the part of the path just ahead, and the rest if that may be driven.
+
+        What is refused whatever the errors of the map does not wait for them to be allowed for.
+        """
         first = 0 if self._finding.place is None else self._finding.place.index
         near = int(np.searchsorted(path.distances, path.distances[first] + NEAR)) + 1
         if near < len(path.poses):
             ahead = path.poses[first:near]
-            judgement = _check(_cut_map(snapshot, ahead), ahead)
-            if not judgement.traversable:
-                return judgement
+            cut = _cut_map(snapshot, ahead)
+            is_exact = cut.terrain is None or cut.terrain.elevation_std is None
+            for known in (cut,) if is_exact else (_take_as_exact(cut), cut):
+                judgement = _check(known, ahead)
+                if not judgement.traversable:
+                    return judgement
         return _check(snapshot, path.poses[first:])
 
     def _has_arrived(self, path: WatchedPath) -> bool:
@@ -286,6 +292,13 @@ def rehearse(settings: ServiceSettings) -> None:
 
 def _check(snapshot: Snapshot, poses: NDArray[np.float64]) -> PathJudgement:
     return replace(snapshot, path=GivenPath(poses, "")).check_path(stop_at_failure=True)
+
+
+def _take_as_exact(snapshot: Snapshot) -> Snapshot:
+    """Return a snapshot whose map has no errors, and nothing else has."""
+    settings = snapshot.settings
+    query = replace(settings.query, map_sigmas=0.0, accepted_chance=1.0)
+    return replace(snapshot, settings=replace(settings, query=query))
 
 
 def _cut_map(snapshot: Snapshot, poses: NDArray[np.float64]) -> Snapshot:

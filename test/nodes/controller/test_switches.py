@@ -80,18 +80,6 @@ def test_an_emergency_stop_from_before_the_start_is_heard(rover, start_controlle
     wait_until(lambda: rover.state == "emergency_stop", "the stop")
 
 
-def test_a_stop_is_not_delayed_to_the_next_update(rover, start_controller):
-    controller = start_controller(rate=10.0)
-    wait_until(lambda: rover.state == "driving", "driving")
-
-    def stop():
-        before = controller.statistics.updates
-        controller._take_emergency_stop(Bool(data=True))
-        return controller.state, controller.statistics.updates - before
-
-    assert run_in_executor(controller, stop) == ("emergency_stop", 1)
-
-
 def test_a_node_that_ends_sends_zeros_last(rover, controller):
     run_in_executor(controller, controller.stop)
     wait_until(lambda: rover.torque == 0.0 and rover.brakes[-1], "zeros and the brake")

@@ -100,6 +100,22 @@ def test_the_stop_is_a_heartbeat_with_the_path_and_the_age_of_the_map(watched, r
     wait_until(lambda: time.monotonic() - rover.stops[-1][1] < 0.2, "the heartbeat")
 
 
+def test_a_busy_executor_does_not_delay_the_heartbeat_and_one_that_hangs_ends_it(watched):
+    server, rover = watched
+    urgent = [one.name for one in threading.enumerate() if one.native_id in server.urgent_threads]
+    assert urgent == ["heartbeat"]
+    is_held, go_on = threading.Event(), threading.Event()
+    server.handover.call(lambda: is_held.set() or go_on.wait(60.0))
+    assert is_held.wait(20.0)
+    before = len(rover.stops)
+    wait_until(lambda: len(rover.stops) > before + 3, "the heartbeat of a busy node")
+    wait_until(
+        lambda: time.monotonic() - rover.stops[-1][1] > 0.5, "silence of a node that hangs"
+    )
+    go_on.set()
+    wait_until(lambda: time.monotonic() - rover.stops[-1][1] < 0.2, "the heartbeat")
+
+
 @pytest.mark.timed
 def test_a_question_in_work_does_not_delay_the_stop(watched, client, ros, endless):
     server, rover = watched

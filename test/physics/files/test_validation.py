@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import pytest
 
-from rover_physics import Rover, RoverError
+from rover_physics import RoverError
 from rover_physics.errors import RoverFileError
 from rover_physics.files.rules import (
     Keys,
@@ -18,7 +18,7 @@ from rover_physics.files.rules import (
     interval,
     number,
 )
-from rover_physics.files.validation import describe, errors_of, find_unit, read_as, show_key
+from rover_physics.files.validation import describe, errors_of, read_as, show_key
 
 
 @dataclass(frozen=True)
@@ -98,20 +98,6 @@ def test_errors_name_the_part_of_a_file_from_the_top_and_open_with_the_file():
         read_as(Walker, 3, "a walker file", ("dune",))
     with pytest.raises(RoverError, match="^mine: no key"), errors_of("mine"):
         raise RoverFileError("no key")
-
-
-@pytest.mark.parametrize(
-    ("key", "unit"),
-    [
-        (("wheel", "radius"), "m"),
-        (("suspension", "wheels", "front", 2), "m"),
-        (("manipulator", "link_masses", 0), "kg"),
-        (("manipulator", "joint_limits", 2, 1), "rad"),
-        (("limits", "tip_over_ratio"), ""),
-    ],
-)
-def test_the_unit_of_each_number_is_in_its_type(key, unit):
-    assert find_unit(Rover, key) == unit
 
 
 def test_long_values_and_keys_are_shown_briefly():

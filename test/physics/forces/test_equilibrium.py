@@ -130,14 +130,6 @@ def test_torque_is_traction_times_radius_and_both_utilisations_are_shares_of_the
         assert np.isinf(prediction.friction_utilisation[~carried]).all()
 
 
-def test_the_friction_of_the_ground_goes_before_that_of_the_rover():
-    ground = plane(0.1, 0.0)
-    friction = np.full(ground.elevation.shape, np.nan)
-    friction[: friction.shape[0] // 2] = 0.25
-    prediction = judge_path(LSR1, replace(ground, friction=friction), [[0.0, 0.0, 0.0]])[0]
-    assert prediction.friction[0].tolist() == [0.25] * 3 + [0.8] * 3
-
-
 # Free forces: what torques change, and what no balance decides
 
 

@@ -140,6 +140,17 @@ def test_what_is_missing_is_the_weight_along_the_slope_less_what_the_motors_give
     assert found.stalls[0] == (Stall.STALLED if slope > 0.0 else Stall.RUNS_AWAY)
 
 
+@pytest.mark.parametrize("curvature", [0.5, 1.0])
+def test_on_an_arc_motors_work_against_friction_at_the_rims(curvature):
+    """A wheel that stands on its rims scrubs with mu N half a width from its middle."""
+    half = 0.5 * LSR1.wheel.width
+    found, _ = judge_poses(LSR1, plane(0.0, 0.0), POSE, np.array([curvature]), SERVO)
+    work = float(np.sum(found.torque * found.wheel_speed))
+    gripped = half * curvature / np.hypot(half * curvature, CREEP)
+    scrub = LSR1.friction * gripped * LSR1.weight * half * found.motion[0, 2]
+    assert work == pytest.approx(scrub, rel=0.05)
+
+
 @pytest.mark.parametrize(
     ("slope", "options", "stalls", "code", "reason"),
     [

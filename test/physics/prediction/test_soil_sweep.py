@@ -57,12 +57,6 @@ def test_every_wheel_obeys_the_formulas_under_its_own_load(soil, policy):
     assert prediction.torque_saturation == pytest.approx(np.abs(prediction.torque) / 2.0)
 
 
-def test_energy_on_level_soil_is_resistance_over_way_and_slip():
-    prediction = judge_path(LSR1, plane(0.0, 0.0), AHEAD, SweepOptions(soil="dry_sand"))[0]
-    shares = prediction.motion_resistance[0] / (1.0 - prediction.slip_ratio[0])
-    assert prediction.energy[-1] == pytest.approx(shares.sum() * 1.0, rel=1e-6)
-
-
 def test_soil_in_some_cells_changes_the_wheels_on_them_alone():
     ground = plane(0.05, 0.0)
     rows = np.arange(ground.elevation.shape[0])[:, None]

@@ -38,14 +38,6 @@ def with_status(prediction, row, status):
     return replace(prediction, results=results)
 
 
-def test_a_path_over_level_ground_is_traversable(fine):
-    verdict = hold_against_limits(LSR1, fine)
-    assert verdict.traversable
-    assert verdict.first_failure == -1
-    assert (verdict.code, verdict.reason) == ("", "")
-    assert verdict.reasons == verdict.codes == ("",) * 5
-
-
 @pytest.mark.parametrize(
     ("code", "name", "column", "value", "words"),
     [

@@ -90,8 +90,8 @@ def test_the_same_query_has_the_same_path_to_the_bit_with_any_number_of_threads(
 
 
 def test_of_a_closed_pen_the_answer_tells_its_area_and_what_closes_it():
-    ground = make_terrain(pen, half=3.2)
-    answer = find_path(ask(ground, (0.0, 0.0, 0.0), (2.4, 0.0, 1.57)), LONG)
+    ground, coarse = make_terrain(pen, half=3.2), replace(LONG, cell=0.3)
+    answer = find_path(ask(ground, (0.0, 0.0, 0.0), (2.4, 0.0, 1.57)), coarse)
     assert answer.outcome == NO_WAY and answer.path is None
     closed = answer.closed
     assert not closed.around_goal and 0.0 < closed.area < 9.0
@@ -102,7 +102,7 @@ def test_of_a_closed_pen_the_answer_tells_its_area_and_what_closes_it():
     cell, (column, row) = answer.nodes.cell, answer.nodes.first
     assert np.abs(cell * (columns + column)).max() < 1.6
     assert np.abs(cell * (rows + row)).max() < 1.6
-    answer = find_path(ask(ground, (2.4, 0.0, 1.57), (0.0, 0.0, 0.0)), LONG)
+    answer = find_path(ask(ground, (2.4, 0.0, 1.57), (0.0, 0.0, 0.0)), coarse)
     assert answer.outcome == NO_WAY and answer.closed.around_goal
 
 

@@ -1,0 +1,278 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hours of ordinary drives on all test grounds: alarms of slip and sticking, against the truth.
+
+Run from the repository: python -m benchmarks.learned_alarms [--hours H] [--seed S]
+
+Each drive is drawn at random from what the model lets pass: straight, curves, turns on the spot,
+backward, rests. All sensors have noise. It needs the extra `bench`.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Annotated
+
+import numpy as np
+import typer
+from scipy.stats import chi2
+
+from benchmarks.drives import PERIOD, SPEED, run_in_processes
+from benchmarks.grounds import all_grounds
+from benchmarks.learned_soil import make_ground
+from benchmarks.learning import add_noise, row_of, told_rover
+from benchmarks.measure import print_table
+from rover_physics import Rover, Terrain, judge_poses
+from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.rover.steered_drive import SteeredDrive
+from rover_planner.errors import PlanningError
+from rover_planner.learning.drive_log import RATES, TIME, YAW, X, Y
+from rover_planner.learning.ground_learner import GroundEstimate, GroundLearner
+from rover_planner.simulator.mujoco_rover import MujocoRover
+from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
+from support.learning_drives import row_of_plant
+from support.reference_drives import drive_ground
+
+MUJOCO, QUASI_STATIC, SOIL = "MuJoCo", "quasi-static", "soil"
+SOFT = "lunar_nominal"
+"""Soil of drives over soil."""
+TURN, RADII = 0.1, (0.8, 3.0)
+"""Rate of turns on the spot [rad/s], and smallest and largest radius of curves [m]."""
+PARTS, LASTS = 6, (5.0, 14.0)
+"""Number of parts of a drive, and shortest and longest duration of each [s]."""
+MARGIN = 1.0
+"""Least distance of the course from the map's edge [m]."""
+STEP = 0.1
+"""Period of the quasi-static simulator [s]."""
+TRUE_SLIP, BEFORE = 0.1, 0.8
+"""A wheel slips in truth if its tread slid by more than this share of what it rolled, in this time
+before it is noticed [s]."""
+LEVER = 0.4
+"""Distance of the wheels from the middle of turns on the spot [m]."""
+STAYS, STAYED_FOR = 0.1, 1.2
+"""A rover is stuck in truth if it goes on for this time [s] by less than this share of what its
+treads roll."""
+
+
+@dataclass(frozen=True)
+class Outing:
+    """A drive."""
+
+    simulator: str
+    """MUJOCO, QUASI_STATIC or SOIL."""
+    ground: str
+    """Name of the ground."""
+    seed: int
+    """Seed of course and noise; the learner hears commands if it is odd."""
+
+
+@dataclass(frozen=True)
+class Alarms:
+    """What a drive had told; None for what it had not."""
+
+    outing: Outing
+    """The drive."""
+    seconds: float
+    """Its duration [s]."""
+    slip: bool | None
+    """Whether a wheel slipped in truth when this was first told; on soil all wheels slip, and
+    nothing is asked."""
+    stuck: bool | None
+    """Whether the rover was stuck in truth when this was first told."""
+    faults: str
+    """Sensors that were not believed, and why."""
+    is_within: bool
+    """Whether the interval of the friction has the truth."""
+
+
+@lru_cache(maxsize=1)
+def grounds() -> dict[str, Terrain]:
+    """Return the grounds by name."""
+    more = {"waves": make_ground(1)} | {
+        kind.replace("_", " "): drive_ground(kind, 12.0) for kind in ("slope", "cross_slope")
+    }
+    return all_grounds() | more
+
+
+def draw_course(outing: Outing) -> tuple[np.ndarray, np.ndarray] | None:
+    """Return a start (3,) and parts (k, 3) of a course: speed, yaw rate, duration.
+
+    None if there is none that the model lets pass.
+    """
+    rng, rover, ground = np.random.default_rng(outing.seed), told_rover(), grounds()[outing.ground]
+    options = SweepOptions(soil=SOFT if outing.simulator == SOIL else None)
+    low, high = np.array(ground.bounds[::2]) + MARGIN, np.array(ground.bounds[1::2]) - MARGIN
+    for _ in range(300):
+        start = np.append(rng.uniform(low, high), rng.uniform(-np.pi, np.pi))
+        parts = np.array([draw_part(rng) for _ in range(PARTS)])
+        poses, curvature = follow(start, parts)
+        if (poses[:, :2] < low).any() or (poses[:, :2] > high).any():
+            continue
+        if judge_poses(rover, ground, poses, curvature, options)[1].traversable:
+            return start, parts
+    return None
+
+
+def draw_part(rng: np.random.Generator) -> tuple[float, float, float]:
+    """Return speed [m/s], yaw rate [rad/s] and duration [s]."""
+    side, duration = rng.choice([-1.0, 1.0]), rng.uniform(*LASTS)
+    match rng.choice(["straight", "curve", "curve", "on the spot", "backward", "rest"]):
+        case "straight":
+            return SPEED, 0.0, duration
+        case "curve":
+            return SPEED, side * SPEED / rng.uniform(*RADII), duration
+        case "on the spot":
+            return 0.0, side * TURN, duration
+        case "backward":
+            return -SPEED, 0.0, duration
+    return 0.0, 0.0, LASTS[0]
+
+
+def follow(start: np.ndarray, parts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return poses (n, 3) each half second along a course, and their curvatures (n,)."""
+    poses, curvatures, period = [start], [0.0], 0.5
+    for speed, turn, duration in parts:
+        for _ in range(round(duration / period)):
+            yaw = poses[-1][2] + 0.5 * turn * period
+            step = period * np.array([speed * np.cos(yaw), speed * np.sin(yaw), turn])
+            poses.append(poses[-1] + step)
+            curvatures.append(turn / speed if speed else np.sign(turn) * np.inf if turn else 0.0)
+    return np.array(poses), np.array(curvatures)
+
+
+def drive(
+    outing: Outing, start: np.ndarray, parts: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return rows of a drive without noise, slip speeds (n, 6) and commanded speeds (n,)."""
+    rover, ground = told_rover(), grounds()[outing.ground]
+    rows, slips, commands = [], [], []
+    if outing.simulator == MUJOCO:
+        plant = MujocoRover(rover, ground, tuple(start.tolist()), timestep=0.004)
+        steering = SteeredDrive(rover)
+        for speed, turn, duration in parts:
+            aims = steering.aim(speed, turn)
+            if speed or turn:
+                plant.steer(aims.angles)
+            for _ in range(round(duration / PERIOD)):
+                share = steering.share(plant.steering_angles, aims.angles)
+                rolling = share * aims.speeds if speed or turn else np.zeros(6)
+                plant.servo(rolling / rover.wheel.radius, PERIOD)
+                rows.append(row_of(plant))
+                slips.append(plant.measure_contacts().slip_speeds)
+                commands.append(speed)
+    else:
+        soil = SOFT if outing.simulator == SOIL else None
+        model = QuasiStaticPlant(rover, ground, tuple(start.tolist()), soil=soil)
+        for speed, turn, duration in parts:
+            for _ in range(round(duration / STEP)):
+                model.drive(speed, turn, STEP)
+                rows.append(row_of_plant(model, (len(rows) + 1) * STEP))
+                slips.append(np.zeros(6))
+                commands.append(speed)
+                if model.state().stopped:
+                    return np.array(rows), np.array(slips), np.array(commands)
+    return np.array(rows), np.array(slips), np.array(commands)
+
+
+def listen(outing: Outing) -> Alarms | None:
+    """Drive and listen to the learner; None if there is no course, or no standing at its start."""
+    course = draw_course(outing)
+    if course is None:
+        return None
+    try:
+        rows, slips, commands = drive(outing, *course)
+    except PlanningError:
+        return None
+    rover = told_rover()
+    learner, faults = GroundLearner(rover, grounds()[outing.ground]), {}
+    noisy = add_noise(rows, "strong" if outing.seed % 3 == 0 else "usual", outing.seed)
+    for row, command in zip(noisy, commands, strict=True):
+        if outing.seed % 2:
+            learner.commanded = float(command)
+        if learner.take(row):
+            faults |= learner.estimate.faults
+    told = learner.estimate
+    friction = told.friction
+    return Alarms(
+        outing,
+        float(rows[-1, TIME] - rows[0, TIME]),
+        None if outing.simulator == SOIL else slipped_in_truth(told, rows, slips, rover),
+        stuck_in_truth(told, rows, rover),
+        ", ".join(f"{wheel}: {why}" for wheel, why in faults.items()),
+        outing.simulator == SOIL or friction.low <= rover.friction <= (friction.high or np.inf),
+    )
+
+
+def slipped_in_truth(
+    told: GroundEstimate, rows: np.ndarray, slips: np.ndarray, rover: Rover
+) -> bool | None:
+    """Return whether a wheel slipped in truth when it was said; None if it was not."""
+    if told.slip_time is None:
+        return None
+    times = rows[:, TIME]
+    then = (times > told.slip_time - BEFORE) & (times <= told.slip_time + 0.1)
+    rolled = rover.wheel.radius * np.abs(rows[then][:, RATES]).mean(axis=0)
+    return bool((slips[then].mean(axis=0) > TRUE_SLIP * np.maximum(rolled, 0.1 * SPEED)).any())
+
+
+def stuck_in_truth(told: GroundEstimate, rows: np.ndarray, rover: Rover) -> bool | None:
+    """Return whether the rover was stuck in truth when it was said; None if it was not."""
+    if told.immobilised_time is None:
+        return None
+    times = rows[:, TIME]
+    then = rows[
+        (times > told.immobilised_time - STAYED_FOR - 0.3) & (times <= told.immobilised_time)
+    ]
+    way = np.hypot(*(then[-1] - then[0])[[X, Y]]) + LEVER * abs(then[-1, YAW] - then[0, YAW])
+    rolled = rover.wheel.radius * np.abs(then[:, RATES].mean(axis=0)).mean()
+    return bool(way < STAYS * rolled * (then[-1, TIME] - then[0, TIME]))
+
+
+def rate(count: int, hours: float) -> str:
+    """Return a number an hour with its 95 % interval, of a Poisson distribution."""
+    if not count:
+        return f"0 (below {3.0 / hours:.1f})"
+    low, high = 0.5 * chi2.ppf(0.025, 2 * count), 0.5 * chi2.ppf(0.975, 2 * count + 2)
+    return f"{count / hours:.1f} ({low / hours:.1f} to {high / hours:.1f})"
+
+
+def main(
+    hours: Annotated[float, typer.Option(help="Hours in each simulator.")] = 1.0,
+    seed: Annotated[int, typer.Option(help="Seed of the drives.")] = 1,
+    only: Annotated[str, typer.Option(help="One simulator: MuJoCo, quasi-static, soil.")] = "",
+) -> None:
+    """Drive, and print the alarms by simulator and ground."""
+    mean = PARTS * (0.5 * sum(LASTS) * 5.0 + LASTS[0]) / 6.0
+    count, names = round(3600.0 * hours / mean), list(grounds())
+    simulators = [only] if only else [QUASI_STATIC, SOIL, MUJOCO]
+    outings = [
+        Outing(simulator, names[k % len(names)], 1000 * seed + k)
+        for simulator in simulators
+        for k in range(count)
+    ]
+    heard = [one for one in run_in_processes(listen, [(o,) for o in outings], 2) if one]
+    table = []
+    for simulator in simulators:
+        for name in (*names, "all"):
+            own = [
+                one
+                for one in heard
+                if one.outing.simulator == simulator and name in (one.outing.ground, "all")
+            ]
+            driven = sum(one.seconds for one in own) / 3600.0
+            false = [sum(getattr(o, what) is False for o in own) for what in ("slip", "stuck")]
+            false.append(sum(bool(one.faults) for one in own))
+            true = [sum(getattr(o, what) is True for o in own) for what in ("slip", "stuck")]
+            cells = [rate(n, driven) if name == "all" else str(n) for n in false]
+            outside = sum(not one.is_within for one in own)
+            table.append((simulator, name, f"{driven:.2f}", *cells, *map(str, true), str(outside)))
+    for one in heard:
+        if one.slip is False or one.stuck is False or one.faults or not one.is_within:
+            print(one)
+    headings = "simulator", "ground", "hours", "slip", "stuck", "sensor"
+    more = "slipped in truth", "stuck in truth", "friction outside"
+    print_table(
+        "False alarms in ordinary drives; in the last row per hour", (*headings, *more), table
+    )
+
+
+if __name__ == "__main__":
+    typer.run(main)
