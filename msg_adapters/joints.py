@@ -3,7 +3,7 @@
 
 import math
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,26 +11,11 @@ from sensor_msgs.msg import JointState
 
 from msg_adapters.errors import MessageError
 from rover_physics.names import STEERING_JOINTS
-from rover_physics.rover.steering_joints import STEERING_SIGNS
+from rover_physics.rover.steering_joints import LEFT, RIGHT
 
 _PLURALS = {"position": "positions", "velocity": "velocities"}
 FORM = "model_joint:robot_joint, model_joint:robot_joint:-1 or model_joint:robot_joint:-1:0.05"
 """Form of an entry, for error texts."""
-
-
-def convert_steering(values: Mapping[str, float], positive: str) -> dict[str, float]:
-    """Return angles or rates by joint name with the sign of steering joints of messages or ours.
-
-    The conversion is the same both ways. Other joints keep their values.
-
-    Args:
-        values: Angles [rad] or rates [rad/s] by joint name.
-        positive: One of STEERING_SIGNS: the side to which positive angles of the messages turn.
-    """
-    sign = STEERING_SIGNS[positive]
-    return {
-        name: sign * value if name in STEERING_JOINTS else value for name, value in values.items()
-    }
 
 
 def _read_by_name(
@@ -74,8 +59,8 @@ class JointLink:
 class JointNames:
     """Converts joint values of messages; joints that it does not name are the same in both."""
 
-    def __init__(self, links: Sequence[JointLink] = ()):
-        """Take the links.
+    def __init__(self, links: Sequence[JointLink] = (), steering: str = LEFT):
+        """Take the links, and the side to which positive steering angles of messages turn.
 
         Raises:
             MessageError: A name occurs twice.
@@ -88,6 +73,9 @@ class JointNames:
             raise MessageError(
                 f"joint_map names {', '.join(twice)} twice; each joint has one name"
             )
+        for name in STEERING_JOINTS if steering == RIGHT else ():
+            link = self.link(name)
+            self._of_model[name] = replace(link, sign=-link.sign, offset=-link.offset)
 
     def link(self, model: str) -> JointLink:
         """Return the link of a joint of the model."""
@@ -137,6 +125,10 @@ class JointNames:
         """Return the signs of joints of the model, which rates and efforts have too."""
         return np.array([self.link(name).sign for name in names])
 
+    def turn(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return rates or efforts by names of the model with the signs of messages."""
+        return {name: self.link(name).sign * value for name, value in values.items()}
+
     def offsets(self, names: Collection[str]) -> NDArray[np.float64]:
         """Return the offsets of joints of the model [rad]."""
         return np.array([self.link(name).offset for name in names])
@@ -146,19 +138,22 @@ OWN_NAMES = JointNames()
 """The map of a robot whose joints have the names, signs and zeros of the model."""
 
 
-def read_joint_map(entries: Sequence[str], known: Collection[str]) -> JointNames:
+def read_joint_map(
+    entries: Sequence[str], known: Collection[str], steering: str = LEFT
+) -> JointNames:
     """Return the map of the parameter joint_map.
 
     Args:
         entries: One text for each joint, in a form of FORM.
         known: Names of the joints of the model.
+        steering: Side to which positive steering angles of messages turn.
 
     Raises:
         MessageError: An entry has another form, a joint that is not known, or a name that another
             joint has.
     """
     links = [_read_link(entry, known) for entry in entries]
-    joints = JointNames(links)
+    joints = JointNames(links, steering)
     own = {name for name in known if name not in {link.model for link in links}}
     for link in links:
         if link.robot in own:

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame, read_orientation
-from msg_adapters.sensing import BASE_FRAME
+from msg_adapters.sensing import odometry_message
+from rover_physics.numerics.quaternions import xyzw_from_yaw
 
 MAX_COORDINATE = 1e8
 """Largest coordinate of a pose [m]; UTM has 1e7."""
@@ -72,19 +73,19 @@ def planar_odometry(
         frame_id: Frame of the pose.
         stamp: builtin_interfaces/Time.
     """
-    message = Odometry(child_frame_id=BASE_FRAME)
-    message.header.frame_id, message.header.stamp = frame_id, stamp
-    place, turn = message.pose.pose.position, message.pose.pose.orientation
-    place.x, place.y = float(pose[0]), float(pose[1])
-    turn.z, turn.w = float(np.sin(0.5 * pose[2])), float(np.cos(0.5 * pose[2]))
-    message.twist.twist.linear.x, message.twist.twist.angular.z = speed[0], yaw_rate
     measured, unknown = [0, 1, 5], np.full(6, UNKNOWN)
     whole = np.diag(unknown)
     whole[np.ix_(measured, measured)] = covariance
-    message.pose.covariance = whole.ravel()
-    unknown[[0, 1, 5]] = speed[1] ** 2, speed[1] ** 2, YAW_RATE_VARIANCE
-    message.twist.covariance = np.diag(unknown).ravel()
-    return message
+    unknown[measured] = speed[1] ** 2, speed[1] ** 2, YAW_RATE_VARIANCE
+    return odometry_message(
+        np.array([pose[0], pose[1], 0.0]),
+        np.array(xyzw_from_yaw(float(pose[2]))),
+        np.array([speed[0], 0.0, 0.0]),
+        np.array([0.0, 0.0, yaw_rate]),
+        (whole, np.diag(unknown)),
+        frame_id,
+        stamp,
+    )
 
 
 def odometry_to_tilt(odometry: Odometry) -> tuple[float, float]:

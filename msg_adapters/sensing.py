@@ -37,7 +37,7 @@ def odometry_message(
     orientation: Floats,
     velocity: Floats,
     body_rates: Floats,
-    deviations: tuple[float, float],
+    covariances: tuple[Floats, Floats],
     frame_id: str,
     stamp,
 ) -> Odometry:
@@ -48,8 +48,8 @@ def odometry_message(
         orientation: (4,) quaternion x, y, z, w.
         velocity: (3,) [m/s], body frame.
         body_rates: (3,) angular velocity [rad/s], body frame.
-        deviations: Standard deviations of positions [m] and angles [rad].
-        frame_id: Map frame.
+        covariances: (6, 6) of the pose and of the velocities: x, y, z, roll, pitch, yaw.
+        frame_id: Frame of the pose.
         stamp: builtin_interfaces/Time.
     """
     message = Odometry(child_frame_id=BASE_FRAME)
@@ -60,9 +60,7 @@ def odometry_message(
     linear, angular = message.twist.twist.linear, message.twist.twist.angular
     linear.x, linear.y, linear.z = velocity.tolist()
     angular.x, angular.y, angular.z = body_rates.tolist()
-    variances = np.repeat(np.square(deviations), 3)
-    message.pose.covariance = np.diag(variances).ravel()
-    message.twist.covariance = np.diag(variances).ravel()
+    message.pose.covariance, message.twist.covariance = (one.ravel() for one in covariances)
     return message
 
 

@@ -19,7 +19,6 @@ import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 
 import rover_physics
@@ -27,34 +26,26 @@ from rover_physics.numerics.kernel_cache import KernelMissingError, can_save_ker
 
 NICENESS = 19
 """Niceness of a process if nobody waits for what it compiles: the largest."""
+Step = Callable[[], None]
+"""Function at the top of a module that calls kernels once: they are loaded from disk, or
+compiled."""
+Report = Callable[[str], object]
+"""Function that takes the name of a step that is compiled, when it begins."""
 
 
-@dataclass(frozen=True)
-class CompilationStep:
-    """Kernels that belong together, and how to get them."""
-
-    name: str
-    """Name of the kernels, for people."""
-    function: str
-    """MODULE:NAME of a function without arguments that calls the kernels once."""
-
-    def run(self) -> None:
-        """Call the kernels once: they are loaded from disk, or compiled."""
-        _call(self.function)
-
-    def load(self) -> bool:
-        """Load the kernels; return False if one of them is not on disk."""
-        try:
-            with loading_only():
-                self.run()
-        except KernelMissingError:
-            return False
-        return True
+def name_of(step: Step) -> str:
+    """Return the name of a step for people."""
+    return step.__name__.replace("_", " ")
 
 
-def _call(function: str) -> None:
-    module, name = function.split(":")
-    getattr(importlib.import_module(module), name)()
+def load(step: Step) -> bool:
+    """Load the kernels of a step; return False if one of them is not on disk."""
+    try:
+        with loading_only():
+            step()
+    except KernelMissingError:
+        return False
+    return True
 
 
 class Compilation:
@@ -64,7 +55,7 @@ class Compilation:
     block; the process then ends at once.
     """
 
-    def __init__(self, steps: Sequence[CompilationStep], niceness: int = 0):
+    def __init__(self, steps: Sequence[Step], niceness: int = 0):
         """Start nothing yet.
 
         Args:
@@ -73,8 +64,9 @@ class Compilation:
         """
         self._steps, self._niceness = steps, niceness
         self._lock = threading.Lock()
+        self._closed = threading.Event()
         self._process: subprocess.Popen[str] | None = None
-        self._closed = False
+        self._thread: threading.Thread | None = None
 
     def __enter__(self) -> "Compilation":
         return self
@@ -82,49 +74,54 @@ class Compilation:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def run(self, report: Callable[[str], None]) -> bool:
-        """Load the kernels and return True; False if it was closed before.
-
-        Args:
-            report: Function that takes the name of each step that is compiled, when it begins.
-        """
-        missing = [step for step in self._steps if not step.load()]
+    def run(self, report: Report) -> None:
+        """Load the kernels; it ends early if it is closed."""
+        missing = [step for step in self._steps if not load(step)]
         if missing and can_save_kernels():
             self._compile(missing, report)
         for step in missing:
-            if self._closed:
-                return False
-            step.run()
-        return not self._closed
+            if not self._closed.is_set():
+                step()
+
+    def start(self, report: Report, delay: float = 0.0) -> None:
+        """Run in a thread after a delay [s], if it has not been started before."""
+
+        def wait_and_run() -> None:
+            if not self._closed.wait(delay):
+                self.run(report)
+
+        if self._thread is None:
+            self._thread = threading.Thread(target=wait_and_run, daemon=True)
+            self._thread.start()
 
     def close(self) -> None:
-        """End the process if it still runs."""
+        """End the process and the thread if they still run."""
         with self._lock:
-            self._closed = True
+            self._closed.set()
             if self._process is not None:
                 self._process.kill()
                 self._process.wait()
+        if self._thread is not None:
+            self._thread.join()
 
-    def _compile(self, steps: Sequence[CompilationStep], report: Callable[[str], None]) -> None:
+    def _compile(self, steps: Sequence[Step], report: Report) -> None:
         """Compile steps in a process."""
         with self._lock:
-            if self._closed:
+            if self._closed.is_set():
                 return
-            self._process = start_process([step.function for step in steps], self._niceness)
+            self._process = start_process(steps, self._niceness)
         assert self._process.stdout is not None
         for line in self._process.stdout:
-            report(steps[int(line)].name)
+            report(name_of(steps[int(line)]))
         self._process.wait()
 
 
-def compile_groups(
-    groups: Sequence[Sequence[CompilationStep]], report: Callable[[str], None], processes: int
-) -> None:
+def compile_groups(groups: Sequence[Sequence[Step]], report: Report, processes: int) -> None:
     """Load the kernels of groups; compile what is missing, each group in a process of its own.
 
     Args:
         groups: Steps; two groups should have few kernels in common.
-        report: Function that takes the name of each step that is compiled; called from threads.
+        report: Called from threads.
         processes: Largest number of processes at the same time.
     """
     with ThreadPoolExecutor(processes) as pool, ExitStack() as compilations:
@@ -133,42 +130,9 @@ def compile_groups(
             done.result()
 
 
-class BackgroundCompilation:
-    """Loads what is not needed yet, or compiles it in a process that gives way to all others."""
-
-    def __init__(self, steps: Sequence[CompilationStep], done: Callable[[Sequence[str]], None]):
-        """Start nothing yet.
-
-        Args:
-            steps: What to load.
-            done: Function that takes the names of what was compiled, called from a thread.
-        """
-        self._compilation = Compilation(steps, NICENESS)
-        self._done = done
-        self._closed = threading.Event()
-        self._thread: threading.Thread | None = None
-
-    def start(self, delay: float = 0.0) -> None:
-        """Begin after a delay [s], if it has not begun yet."""
-        if self._thread is None:
-            self._thread = threading.Thread(target=self._run, args=(delay,), daemon=True)
-            self._thread.start()
-
-    def close(self) -> None:
-        """End the process and the thread."""
-        self._closed.set()
-        self._compilation.close()
-        if self._thread is not None:
-            self._thread.join()
-
-    def _run(self, delay: float) -> None:
-        names: list[str] = []
-        if not self._closed.wait(delay) and self._compilation.run(names.append):
-            self._done(names)
-
-
-def start_process(functions: Sequence[str], niceness: int) -> "subprocess.Popen[str]":
-    """Start a process that calls functions and writes the index of each when it begins."""
+def start_process(steps: Sequence[Step], niceness: int) -> "subprocess.Popen[str]":
+    """Start a process that runs steps and writes the index of each when it begins."""
+    functions = [f"{step.__module__}:{step.__name__}" for step in steps]
     packages = [str(Path(rover_physics.__file__).parents[1]), *filter(None, sys.path)]
     return subprocess.Popen(
         [sys.executable, "-m", "rover_physics.compilation", str(niceness), *functions],
@@ -188,7 +152,8 @@ def main(niceness: str, *functions: str) -> None:
     gc.disable()  # it would take a seventh of the time and save 120 MB of 420
     for index, function in enumerate(functions):
         print(index, flush=True)
-        _call(function)
+        module, name = function.split(":")
+        getattr(importlib.import_module(module), name)()
 
 
 def _end_with_parent() -> None:

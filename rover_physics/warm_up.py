@@ -9,38 +9,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from rover_physics.bounds.kernel import NOMINAL, find_bounds
-from rover_physics.compilation import CompilationStep, compile_groups
-from rover_physics.prediction.evaluation import AHEAD
+from rover_physics.bounds.path import find_bounds
+from rover_physics.compilation import compile_groups
 from rover_physics.prediction.map_sweep import score_poses
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.sweep import predict_steered
 from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.results.record import new_results
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import pack_ground
 from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.torque_ranges import find_torque_ranges
-
-EXACT = (
-    CompilationStep("rover", "rover_physics.warm_up:pack_rover"),
-    CompilationStep("poses", "rover_physics.warm_up:evaluate_poses"),
-    CompilationStep("paths", "rover_physics.warm_up:judge_paths"),
-)
-"""All that a question needs on a map whose heights are exact."""
-UNCERTAIN = (CompilationStep("uncertain heights", "rover_physics.warm_up:bound_poses"),)
-"""All that a question needs besides on other maps."""
-SCORES = (CompilationStep("map scores", "rover_physics.warm_up:score_map"),)
-"""All that scores of single poses need."""
-SINGLE = (CompilationStep("single poses", "rover_physics.warm_up:evaluate_single_poses"),)
-"""All that torque ranges and a rover with measured steering angles need."""
-
-
-def warm_up() -> None:
-    """Load the kernels of questions, or compile them in this process."""
-    for step in (*EXACT, *UNCERTAIN):
-        step.run()
 
 
 def pack_rover() -> None:
@@ -68,8 +50,9 @@ def judge_paths() -> None:
 def bound_poses() -> None:
     """Bound a pose on a map with uncertain heights; it need not settle."""
     rover, step = _rover_and_step()
-    grounds = (pack_ground(step),) * 3
-    find_bounds(pack_model(rover, step), grounds, np.zeros((1, 3)), AHEAD, np.zeros(1, NOMINAL))
+    grounds, results = (pack_ground(step),) * 3, new_results(1)
+    results["status"], results["motion"] = PoseStatus.NOT_SETTLED, 0.0
+    find_bounds(pack_model(rover, step), grounds, np.zeros((1, 3)), results)
 
 
 def score_map() -> None:
@@ -92,5 +75,25 @@ def _rover_and_step() -> tuple[Rover, Terrain]:
     return load_rover("lsr1"), replace(step, friction=layer)
 
 
+EXACT = (pack_rover, evaluate_poses, judge_paths)
+"""All that a question needs on a map whose heights are exact."""
+UNCERTAIN = (bound_poses,)
+"""All that a question needs besides on other maps."""
+SCORES = (score_map,)
+"""All that scores of single poses need."""
+SINGLE = (evaluate_single_poses,)
+"""All that torque ranges and a rover with measured steering angles need."""
+
+
+def warm_up() -> None:
+    """Load the kernels of questions, or compile them in this process."""
+    for step in (*EXACT, *UNCERTAIN):
+        step()
+
+
 if __name__ == "__main__":
-    compile_groups([(*EXACT, *SCORES, *SINGLE), UNCERTAIN], print, os.cpu_count() or 1)
+    from rover_physics import warm_up as here  # the name by which processes find the steps
+
+    compile_groups(
+        [(*here.EXACT, *here.SCORES, *here.SINGLE), here.UNCERTAIN], print, os.cpu_count() or 1
+    )

@@ -53,13 +53,6 @@ def diagnostics(statuses: Sequence[DiagnosticStatus], stamp: Any) -> DiagnosticA
     return message
 
 
-def search_diagnostics(
-    values: Mapping[str, Any], text: str, hardware_id: str, stamp: Any
-) -> DiagnosticArray:
-    """Return the progress of a search for a path as one status; arguments as for `make_status`."""
-    return diagnostics([make_status(SEARCH, "ok", text, values, hardware_id)], stamp)
-
-
 def traction_diagnostics(
     values: Mapping[str, Any],
     state: str,

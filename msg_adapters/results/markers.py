@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from geometry_msgs.msg import Point
 from numpy.typing import NDArray
-from std_msgs.msg import ColorRGBA
+from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from rover_physics.numerics.quaternions import xyzw_from_yaw
@@ -50,19 +50,29 @@ def path_markers(
         waypoint_classes: (n,) classes, which set the colours; without them the reasons do.
     """
     markers = cleared_markers(frame_id, stamp)
+    header = markers.markers[0].header
     positions = _drawable_positions(prediction)
     failures = [i for i, reason in enumerate(reasons) if reason]
     rows = np.unique(np.concatenate([rows, failures[:1]]).astype(np.intp))
-    settled = rows[prediction.settled[rows]]
     outcomes = [(reasons[i], waypoint_classes[i] if waypoint_classes else "") for i in rows]
-    colours = [_colour(reason, traversability_class) for reason, traversability_class in outcomes]
-    markers.markers.append(_path_line(positions[rows], colours, frame_id, stamp))
-    markers.markers.append(_contact_points(prediction.contact_points[settled], frame_id, stamp))
-    if failures:
-        first = failures[0]
-        yaw = float(prediction.poses[first, 2])
-        markers.markers.append(_failing_pose(positions[first], yaw, frame_id, stamp))
-        markers.markers.append(_failing_text(positions[first], reasons[first], frame_id, stamp))
+    path = _marker("path", Marker.LINE_STRIP, header, (_LINE_WIDTH, 0.0, 0.0))
+    path.points = _points(positions[rows])
+    path.colors = [_colour(*outcome) for outcome in outcomes]
+    contacts = prediction.contact_points[rows[prediction.settled[rows]]].reshape(-1, 3)
+    spheres = _marker("contact_points", Marker.SPHERE_LIST, header, 3 * (_CONTACT_SIZE,), CONTACT)
+    spheres.points = _points(contacts[np.isfinite(contacts).all(axis=1)])
+    markers.markers += [path, spheres]
+    for first in failures[:1]:
+        arrow = _marker("failing_pose", Marker.ARROW, header, (0.6, 0.1, 0.1), IMPASSABLE)
+        text = _marker(
+            "reason", Marker.TEXT_VIEW_FACING, header, (0.0, 0.0, _TEXT_HEIGHT), IMPASSABLE
+        )
+        arrow.pose.position, text.pose.position = _points(positions[[first, first]])
+        turn = arrow.pose.orientation
+        turn.x, turn.y, turn.z, turn.w = xyzw_from_yaw(float(prediction.poses[first, 2]))
+        text.pose.position.z += _TEXT_ABOVE
+        text.text = reasons[first]
+        markers.markers += [arrow, text]
     return markers
 
 
@@ -79,58 +89,24 @@ def _colour(reason: str, traversability_class: str) -> ColorRGBA:
 
 def cleared_markers(frame_id: str, stamp) -> MarkerArray:
     """Return a marker that deletes all markers drawn before."""
-    marker = _marker("", Marker.CUBE, frame_id, stamp)
+    marker = _marker("", Marker.CUBE, Header(frame_id=frame_id, stamp=stamp), (0.0, 0.0, 0.0))
     marker.action = Marker.DELETEALL
     return MarkerArray(markers=[marker])
 
 
-def _marker(namespace: str, kind: int, frame_id: str, stamp) -> Marker:
-    """Return an empty marker that stays until the next path is drawn."""
-    marker = Marker(ns=namespace, type=kind, action=Marker.ADD)
-    marker.header.frame_id = frame_id
-    marker.header.stamp = stamp
+def _marker(
+    namespace: str,
+    kind: int,
+    header: Header,
+    size: tuple[float, float, float],
+    colour: ColorRGBA | None = None,
+) -> Marker:
+    """Return a marker that stays until the next path is drawn."""
+    marker = Marker(header=header, ns=namespace, type=kind, action=Marker.ADD)
+    marker.scale.x, marker.scale.y, marker.scale.z = size
+    if colour is not None:
+        marker.color = colour
     return marker
-
-
-def _path_line(positions, colours, frame_id: str, stamp) -> Marker:
-    """Return the path as a line with a colour at each waypoint."""
-    line = _marker("path", Marker.LINE_STRIP, frame_id, stamp)
-    line.scale.x = _LINE_WIDTH
-    line.points = _points(positions)
-    line.colors = colours
-    return line
-
-
-def _contact_points(contacts, frame_id: str, stamp) -> Marker:
-    """Return points at the wheels' contacts (m, 6, 3) [m]."""
-    spheres = _marker("contact_points", Marker.SPHERE_LIST, frame_id, stamp)
-    spheres.scale.x = spheres.scale.y = spheres.scale.z = _CONTACT_SIZE
-    spheres.color = CONTACT
-    flat = contacts.reshape(-1, 3)
-    spheres.points = _points(flat[np.isfinite(flat).all(axis=1)])
-    return spheres
-
-
-def _failing_pose(position, yaw: float, frame_id: str, stamp) -> Marker:
-    """Return an arrow along the heading of the first failing pose."""
-    arrow = _marker("failing_pose", Marker.ARROW, frame_id, stamp)
-    arrow.pose.position = _points([position])[0]
-    turn = arrow.pose.orientation
-    turn.x, turn.y, turn.z, turn.w = xyzw_from_yaw(yaw)
-    arrow.scale.x, arrow.scale.y, arrow.scale.z = 0.6, 0.1, 0.1
-    arrow.color = IMPASSABLE
-    return arrow
-
-
-def _failing_text(position, reason: str, frame_id: str, stamp) -> Marker:
-    """Return a text marker with the reason, above the failing pose."""
-    text = _marker("reason", Marker.TEXT_VIEW_FACING, frame_id, stamp)
-    text.pose.position = _points([position])[0]
-    text.pose.position.z += _TEXT_ABOVE
-    text.scale.z = _TEXT_HEIGHT
-    text.color = IMPASSABLE
-    text.text = reason
-    return text
 
 
 def _drawable_positions(prediction: PathPrediction) -> NDArray[np.float64]:

@@ -14,12 +14,7 @@ from msg_adapters.joints import OWN_NAMES, JointNames
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
-from rover_physics.rover.steering_joints import (
-    LEFT,
-    STEERING_SIGNS,
-    steered_wheels,
-    steering_joints,
-)
+from rover_physics.rover.steering_joints import steered_wheels, steering_joints
 
 MEASURES = ("tip_over_ratio", "tip_over_force_angle")
 """Columns of the tip-over margin: the paper's ratio, and the force-angle measure over its
@@ -65,8 +60,6 @@ def joint_trajectory(
     frame_id: str,
     stamp,
     stock: list[JointTrajectoryPoint] | None = None,
-    *,
-    positive_steering: str = LEFT,
     names: JointNames = OWN_NAMES,
 ) -> JointTrajectory:
     """Return the joints along a path, up to the first waypoint that did not settle.
@@ -84,7 +77,6 @@ def joint_trajectory(
         stamp: builtin_interfaces/Time.
         stock: Points to reuse, because making them takes most of the time. The list grows as
             needed. One message must be sent before the next one is made from it.
-        positive_steering: One of STEERING_SIGNS: where positive angles of the message turn.
         names: Names, signs and offsets of the joints in messages.
     """
     count = len(prediction.settled)
@@ -92,8 +84,7 @@ def joint_trajectory(
         count = int(np.argmin(prediction.settled))
     trajectory = empty_trajectory(rover, frame_id, stamp, names)
     suspension = suspension_angles(prediction)[:count]
-    sign, wheels = STEERING_SIGNS[positive_steering], steered_wheels(rover)
-    steering = sign * prediction.steering_angle[:count, wheels]
+    steering = prediction.steering_angle[:count, steered_wheels(rover)]
     times = prediction.time[:count]
     rolled = _rolled_angles(prediction, rover.wheel.radius, count)
     positions = np.hstack([suspension, rolled, steering])

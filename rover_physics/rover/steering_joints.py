@@ -11,9 +11,8 @@ from rover_physics.names import STEERING_JOINTS, WHEEL_POSITIONS
 from rover_physics.rover.model import Rover
 
 LEFT, RIGHT = "left", "right"
-STEERING_SIGNS = {LEFT: 1.0, RIGHT: -1.0}
-"""Signs of steering angles in messages over those here, by the side to which positive ones turn.
-REP-103 has them positive to the left; some rovers have it the other way round."""
+"""Sides to which positive steering angles of messages may turn: to the left in REP-103, and here;
+some rovers have it the other way round."""
 MARGIN = 1e-3
 """Angle by which a limit may be rounded [rad]."""
 

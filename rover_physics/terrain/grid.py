@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rover_physics.errors import TerrainError
+from rover_physics.files.npz_file import write_npz
 from rover_physics.files.user_file import open_regular_file
 from rover_physics.files.validation import errors_of, show_file
 from rover_physics.numerics.read_only import freeze_array, seal_array
@@ -27,7 +28,6 @@ from rover_physics.terrain.terrain_file import (
     MAX_CELLS,
     find_terrain_file,
     read_entries,
-    write_entries,
 )
 
 _EDGE_TOLERANCE = 1e-9  # cells; for rounding of (x - origin) / resolution at the map's edge
@@ -243,7 +243,8 @@ def save_terrain(path: str | Path, terrain: Terrain, **notes: Any) -> None:
             entries[layer] = getattr(terrain, layer)
     if terrain.soil_names:
         entries["soil_names"] = np.array(terrain.soil_names)
-    write_entries(path, entries)
+    with errors_of(path, TerrainError):
+        write_npz(path, entries)
 
 
 def _small_gaps(unknown: NDArray[np.bool_], max_cells: int) -> NDArray[np.bool_]:

@@ -3,7 +3,6 @@
 
 import math
 import os
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -11,7 +10,7 @@ import numpy as np
 
 from rover_physics.errors import RoverFileError, TerrainError
 from rover_physics.files.config_files import find_config
-from rover_physics.files.npz_file import NpzReader, write_npz
+from rover_physics.files.npz_file import NpzReader
 from rover_physics.files.validation import errors_of, show_file
 from rover_physics.numerics.read_only import seal_array
 
@@ -94,16 +93,6 @@ def read_entries(file: BinaryIO, source: str | Path, max_cells: int) -> dict[str
             if name in there:
                 entries[name] = archive.read(name, dtype, most=8 * max_cells)
     return {name: seal_array(values) for name, values in entries.items()}
-
-
-def write_entries(path: str | Path, entries: Mapping[str, Any]) -> None:
-    """Write the entries of a terrain to a file.
-
-    Raises:
-        TerrainError: The file cannot be written.
-    """
-    with errors_of(path, TerrainError):
-        write_npz(path, entries)
 
 
 def _check_grid(archive: NpzReader, name: str, max_cells: int) -> None:

@@ -15,7 +15,7 @@ from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
 
-from msg_adapters.results.diagnostics import search_diagnostics
+from msg_adapters.results.diagnostics import SEARCH, diagnostics, make_status
 from rover_planner.nodes.maps.map_topics import MapTopics
 from rover_planner.planning.answering.budget import STOPPING, Budget, QuestionStoppedError
 from rover_planner.planning.answering.question_queue import Answered, Asked, QuestionQueue
@@ -146,7 +146,8 @@ class QuestionDesk:
         )
         name = self._service.settings.rover.name
         stamp = self._node.get_clock().now().to_msg()
-        self._progress.publish(search_diagnostics(report, text, name, stamp))
+        status = make_status(SEARCH, "ok", text, report, name)
+        self._progress.publish(diagnostics([status], stamp))
 
     def identify(self, service: str, path_hash: str, snapshot: Snapshot) -> IdentityReport:
         """Return a new number with what a judgement that nobody asked for is about."""

@@ -209,7 +209,7 @@ class ResultMessages:
             return empty_trajectory(self.rover, self.frame, self.stamp, self.inputs.joint_names)
         return joint_trajectory(
             candidate.prediction, self.rover, self.frame, self.stamp, self.points,
-            positive_steering=self.values.steering_sign, names=self.inputs.joint_names,
+            self.inputs.joint_names,
         )  # fmt: skip
 
     def _markers(self) -> MarkerArray:

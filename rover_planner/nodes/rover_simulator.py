@@ -24,7 +24,7 @@ from msg_adapters.commands import joint_order, twist_to_speeds
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash
-from msg_adapters.joints import convert_steering
+from msg_adapters.joints import JointNames
 from msg_adapters.paths import path_to_poses
 from msg_adapters.results.diagnostics import SIMULATOR, diagnostics, make_status
 from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_message
@@ -51,6 +51,8 @@ STANDING_PERIOD = 0.1
 """Time between two commands of a rover that is to stand [s]."""
 DEVIATIONS = (0.01, 0.005)
 """Standard deviations in odometry: positions [m] and angles [rad]."""
+COVARIANCE = np.diag(np.repeat(np.square(DEVIATIONS), 3))
+"""The same as (6, 6) of a pose: x, y, z, roll, pitch, yaw."""
 SWITCH_INTERVAL = 5e-4
 """Longest time for which the thread that makes maps may delay a step whenever that needs Python's
 lock [s]; Python's thread switch interval."""
@@ -68,7 +70,8 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
     def __init__(self, **node_arguments: Any):
         super().__init__(NODE_NAME, RoverSimulatorParameters, **node_arguments)
         parameters = self.values
-        self._frame, self._steering_sign = parameters.map_frame, parameters.steering_sign
+        self._frame = parameters.map_frame
+        self._joint_names = JointNames(steering=parameters.steering_sign)
         self._order = joint_order(parameters.joints)
         self._settings = load_simulation_settings(parameters)
         if parameters.engine == QUASI_STATIC:
@@ -184,12 +187,12 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
         """Return what the sensors measure."""
         efforts = dict(zip(WHEEL_JOINTS, state.wheel_torques.tolist(), strict=True))
         positions, velocities = (
-            convert_steering(values, self._steering_sign)
+            self._joint_names.turn(values)
             for values in (state.joint_positions | self._arm_angles(), state.joint_velocities)
         )
         odometry = odometry_message(
             state.position, state.orientation, state.velocity, state.body_rates,
-            DEVIATIONS, self._frame, stamp,
+            (COVARIANCE, COVARIANCE), self._frame, stamp,
         )  # fmt: skip
         gravity = self._settings.rover.gravity
         imu = imu_message(state.orientation, state.body_rates, gravity, DEVIATIONS[1], stamp)

@@ -3,7 +3,6 @@
 
 import numpy as np
 
-from rover_physics.compilation import CompilationStep
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
@@ -20,25 +19,6 @@ from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
 from rover_planner.traction.traction_service import TractionService
-
-PATH_SEARCH = (CompilationStep("path search", "rover_planner.nodes.warm_up:search_paths"),)
-"""All that searches around obstacles need."""
-HAZARDS = (CompilationStep("classes of poses", "rover_planner.nodes.warm_up:classify_pose"),)
-"""All that the hazard map needs."""
-TRACTION = (
-    CompilationStep("traction controller", "rover_planner.nodes.warm_up:control_traction"),
-)
-"""All that updates of the traction controller need."""
-LEARNING = (CompilationStep("ground learner", "rover_planner.nodes.warm_up:feel_ground"),)
-"""All that learning the ground needs beside TRACTION."""
-SIMULATION = (CompilationStep("simulator", "rover_planner.nodes.warm_up:simulate"),)
-"""All that the quasi-static simulator needs."""
-GROUPS = (
-    (*EXACT, *SCORES, *SINGLE, *HAZARDS, *PATH_SEARCH, *SIMULATION),
-    (*UNCERTAIN, *TRACTION, *LEARNING),
-)
-"""All kernels in two groups that take about the same time to compile: the first compiles the model
-of a pose once for all that use it."""
 
 JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS, *STEERING_JOINTS)
 
@@ -97,3 +77,21 @@ def update_traction(settings: TractionSettings) -> None:
         service.take_command(0.01, 0.0, now)
         service.take_odometry(np.zeros(4), 0.0, now)
         service.update(now)
+
+
+PATH_SEARCH = (search_paths,)
+"""All that searches around obstacles need."""
+HAZARDS = (classify_pose,)
+"""All that the hazard map needs."""
+TRACTION = (control_traction,)
+"""All that updates of the traction controller need."""
+LEARNING = (feel_ground,)
+"""All that learning the ground needs beside TRACTION."""
+SIMULATION = (simulate,)
+"""All that the quasi-static simulator needs."""
+GROUPS = (
+    (*EXACT, *SCORES, *SINGLE, *HAZARDS, *PATH_SEARCH, *SIMULATION),
+    (*UNCERTAIN, *TRACTION, *LEARNING),
+)
+"""All kernels in two groups that take about the same time to compile: the first compiles the model
+of a pose once for all that use it."""

@@ -3,7 +3,7 @@
 
 from msg_adapters.gridding import CELL_HEIGHTS
 from rover_physics.names import SUSPENSION_JOINTS
-from rover_physics.rover.steering_joints import LEFT, STEERING_SIGNS
+from rover_physics.rover.steering_joints import LEFT, RIGHT
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.parameters.table import ParameterError, parameter
 
@@ -24,7 +24,7 @@ MAX_TORQUE: float = parameter(
 STEERING_SIGN: str = parameter(
     LEFT,
     "Side to which positive steering angles turn in messages.",
-    choices=tuple(STEERING_SIGNS),
+    choices=(LEFT, RIGHT),
     read_only=True,
 )
 BASE_OFFSET: tuple[float, ...] = parameter(

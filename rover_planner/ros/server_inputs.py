@@ -60,7 +60,9 @@ class ServerInputs:
         """Knows map, path and measurements."""
         self.keeper = MapKeeper(self.service.settings.rover, parameters)
         """Makes one map of those that come."""
-        self.joint_names = read_joint_map(parameters.joint_map, self.service.all_joint_names)
+        self.joint_names = read_joint_map(
+            parameters.joint_map, self.service.all_joint_names, parameters.steering_sign
+        )
         """Names of the joints in messages."""
         self._mounting = ImuMounting(parameters.imu_frame or BASE_FRAME, parameters.imu_mounting)
         self._clock, self._looked = clock, -float("inf")

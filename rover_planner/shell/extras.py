@@ -22,7 +22,6 @@ PLAIN = {
     "numba": "numba",
     "numpy": "numpy",
     "osqp": "osqp",
-    "pydantic": "pydantic",
     "rich": "rich",
     "scipy": "scipy",
     "typer": "typer",

@@ -4,18 +4,15 @@
 import itertools
 from collections.abc import Callable, Sequence
 
-from rover_physics.compilation import BackgroundCompilation, Compilation, CompilationStep
+from rover_physics.compilation import NICENESS, Compilation, Step
 
 LOADING_DELAY = 1.0
 """Time that a program has to itself before it loads what it needs later [s]."""
 
-Report = Callable[[str], object]
-"""Function that takes a line for people."""
-
 
 def load_kernels(
-    first: Sequence[CompilationStep], behind: Sequence[CompilationStep], report: Report
-) -> BackgroundCompilation:
+    first: Sequence[Step], behind: Sequence[Step], report: Callable[[str], object]
+) -> Compilation:
     """Load kernels, and begin to load others while the program works.
 
     Args:
@@ -26,22 +23,20 @@ def load_kernels(
     Returns:
         What loads the others; to be closed when the program ends.
     """
+    background, count = Compilation(behind, NICENESS), itertools.count(1)
 
-    def describe(names: Sequence[str]) -> None:
-        if names:
-            report(f"compiled besides: {', '.join(names)}")
+    def tell_behind(name: str) -> None:
+        report(f"compiling besides: {name}")
 
-    background, count = BackgroundCompilation(behind, describe), itertools.count(1)
-
-    def begin(name: str) -> None:
-        background.start()
+    def tell_first(name: str) -> None:
+        background.start(tell_behind)
         report(f"compiling kernels {next(count)} of {len(first)}: {name}")
 
     try:
         with Compilation(first) as compilation:
-            compilation.run(begin)
+            compilation.run(tell_first)
     except BaseException:  # such as KeyboardInterrupt
         background.close()
         raise
-    background.start(LOADING_DELAY)
+    background.start(tell_behind, LOADING_DELAY)
     return background

@@ -10,8 +10,9 @@ import pytest
 from support.project.without_disk import fill_disk
 
 LOAD_ALL = """
+from rover_physics.compilation import load
 from rover_planner.nodes.warm_up import GROUPS
-print({step.name: step.load() for group in GROUPS for step in group})
+print([load(step) for group in GROUPS for step in group])
 """
 
 
@@ -27,7 +28,7 @@ def test_after_it_every_kernel_is_on_disk(tmp_path):
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
     first = run("-m", "rover_planner", "warm-up", env=environment)
     assert first.returncode == 0 and str(tmp_path) in first.stdout
-    for name in ("poses", "uncertain heights", "map scores", "traction controller"):
+    for name in ("evaluate poses", "bound poses", "score map", "control traction"):
         assert f"compiling {name}\n" in first.stderr
     again = run("-m", "rover_planner", "warm-up", env=environment)
     assert again.returncode == 0 and again.stderr == ""

@@ -10,11 +10,11 @@ from sensor_msgs.msg import JointState
 
 from msg_adapters.commands import joint_order
 from msg_adapters.errors import MessageError
-from msg_adapters.joints import OWN_NAMES, convert_steering, read_joint_map
+from msg_adapters.joints import OWN_NAMES, JointNames, read_joint_map
 from msg_adapters.results.predictions import JOINTS, joint_trajectory
 from rover_physics import judge_path, load_rover
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_physics.rover.steering_joints import LEFT, RIGHT
+from rover_physics.rover.steering_joints import RIGHT
 from support.grounds import make_terrain, waves
 
 KNOWN = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
@@ -56,11 +56,14 @@ def test_joint_states_that_disagree_or_are_not_finite_are_refused(names, positio
 
 def test_steering_is_converted_to_positive_left_and_back_and_nothing_else_is():
     state = JointState(name=["front_left_steering", "rocker_left"], position=[0.3, 0.1])
-    read = OWN_NAMES.positions(state, ("rocker_left", *STEERING_JOINTS))
-    assert convert_steering(read, LEFT) == {"front_left_steering": 0.3, "rocker_left": 0.1}
-    turned = convert_steering(read, RIGHT)
-    assert turned == {"front_left_steering": -0.3, "rocker_left": 0.1}
-    assert convert_steering(turned, RIGHT) == read
+    names, wanted = JointNames(steering=RIGHT), ("rocker_left", *STEERING_JOINTS)
+    read = OWN_NAMES.positions(state, wanted)
+    assert read == {"front_left_steering": 0.3, "rocker_left": 0.1}
+    turned = {"front_left_steering": -0.3, "rocker_left": 0.1}
+    assert names.positions(state, wanted) == turned and names.turn(turned) == read
+    mapped = read_joint_map(["front_left_steering:s:-1:0.1"], STEERING_JOINTS, RIGHT)
+    state = JointState(name=["s"], position=[0.3])
+    assert mapped.positions(state, wanted) == {"front_left_steering": pytest.approx(0.3 - 0.1)}
 
 
 def test_angles_and_rates_are_those_of_the_model():

@@ -13,6 +13,7 @@ from std_msgs.msg import Float64MultiArray
 from visualization_msgs.msg import Marker
 
 from msg_adapters.errors import MessageError
+from msg_adapters.joints import JointNames
 from msg_adapters.paths import PoseStock, settled_path
 from msg_adapters.results.diagnostics import to_json, verdict_to_diagnostics
 from msg_adapters.results.markers import IMPASSABLE, PASSABLE, WITH_SPEED_SERVOS, path_markers
@@ -99,7 +100,8 @@ def test_a_trajectory_has_the_angles_of_the_steered_wheels_with_the_sign_of_the_
     flat = Terrain(np.zeros((81, 81)), 0.05, (-2.0, -2.0))
     prediction = judge_path(LSR1, flat, path)[0]
     for positive, sign in (("left", 1.0), ("right", -1.0)):
-        message = joint_trajectory(prediction, LSR1, "map", STAMP, positive_steering=positive)
+        names = JointNames(steering=positive)
+        message = joint_trajectory(prediction, LSR1, "map", STAMP, names=names)
         for i, point in enumerate(message.points):
             angles = dict(zip(message.joint_names, point.positions, strict=True))
             own = {name: angles[name] for name in steering_joints(LSR1)}

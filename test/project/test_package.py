@@ -20,8 +20,6 @@ ROS_FREE = {
     "numba",
     "osqp",
     "clarabel",
-    "pydantic",
-    "pydantic_core",
     "yaml",
     "rover_physics",
 }

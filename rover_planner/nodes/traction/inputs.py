@@ -13,12 +13,12 @@ from std_msgs.msg import Bool
 
 from msg_adapters.commands import twist_to_speeds
 from msg_adapters.imu import ImuMounting, imu_to_attitude
-from msg_adapters.joints import convert_steering, read_joint_map
+from msg_adapters.joints import read_joint_map
 from msg_adapters.odometry import odometry_to_pose
 from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
-from rover_physics.rover.steering_joints import STEERING_SIGNS, steering_joints
+from rover_physics.rover.steering_joints import steering_joints
 from rover_planner.parameters.shared import STOP
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.ros.frames import NodeFrames
@@ -56,10 +56,10 @@ class TractionInputs:
     ):
         """Subscribe to all inputs of a node; `frames` brings odometry to the frame of the map."""
         self._node, self._service, self._frames, parameters = node, service, frames, node.values
-        self._steering_sign = parameters.steering_sign
         arm = service.settings.rover.manipulator
         known = (*JOINTS, *STEERING_JOINTS, *(() if arm is None else arm.joints))
-        self.joint_names = read_joint_map(parameters.joint_map, known)
+        sign = parameters.steering_sign
+        self.joint_names = read_joint_map(parameters.joint_map, known, sign)
         """Names of the joints in messages."""
         self._heard = frozenset(self.joint_names.robot_names({*JOINTS, *ANGLES}))
         self._map_frame, self._base_frame = parameters.map_frame, parameters.base_frame
@@ -78,9 +78,8 @@ class TractionInputs:
     def to_robot_steering(self, angles: Floats) -> Floats:
         """Return angles of the steered wheels [rad], in wheel order, as messages have them."""
         joints = steering_joints(self._service.settings.rover)
-        ours = STEERING_SIGNS[self._steering_sign] * angles
         names = self.joint_names
-        return names.signs(joints) * (ours - names.offsets(joints))
+        return names.signs(joints) * (angles - names.offsets(joints))
 
     def _subscribe(self, parameters: TractionControllerParameters) -> None:
         twist = TwistStamped if parameters.cmd_vel_stamped else Twist
@@ -149,9 +148,8 @@ class TractionInputs:
             return
         stamp = _stamp_of(state)
         measured = self._find_time(JOINT_STATES, stamp, now, merged=True)
-        angles = self.joint_names.positions(state, ANGLES)
+        positions = self.joint_names.positions(state, ANGLES)
         rates = self.joint_names.velocities(state, JOINTS)
-        positions = convert_steering(angles, self._steering_sign)
         self._service.take_joints(positions, rates, measured, stamp)
 
     def _take_imu(self, imu: Imu, now: float) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import rover_physics
-from rover_physics.compilation import BackgroundCompilation, CompilationStep, compile_groups
+from rover_physics.compilation import Compilation, compile_groups
 from support.waiting import wait_until_gone
 
 MODULE = """
@@ -29,6 +29,9 @@ def first():
 def second():
     twice(1)
 
+def third():
+    raise AttributeError("third")
+
 def endless():
     from rover_physics.numerics.kernel_cache import KernelMissingError
     if "compilation" not in sys.argv[0]:
@@ -38,18 +41,19 @@ def endless():
         time.sleep(0.01)
 """
 PROGRAM = """
-from rover_physics.compilation import Compilation, CompilationStep
+from rover_physics.compilation import Compilation
 import some_kernels
 
-steps = [CompilationStep(name, f"some_kernels:{name}") for name in ("first", "second")]
-print(Compilation(steps).run(lambda name: print(name, end=" ")), end=" ")
+steps = [some_kernels.first, some_kernels.second]
+Compilation(steps).run(lambda name: print(name, end=" "))
 print(sum(some_kernels.twice.whole.stats.cache_hits.values()))
 """
 PARENT = """
-from rover_physics.compilation import Compilation, CompilationStep
-Compilation([CompilationStep("endless", "some_kernels:endless")]).run(print)
+from rover_physics.compilation import Compilation
+import some_kernels
+
+Compilation([some_kernels.endless]).run(print)
 """
-ENDLESS = CompilationStep("endless", "some_kernels:endless")
 
 
 @pytest.fixture
@@ -90,18 +94,18 @@ def wait_for_process(folder: Path) -> int:
 
 @pytest.mark.long
 def test_a_process_compiles_what_is_missing_and_this_one_loads_it(folder):
-    assert output_of(folder) == "first second True 2"
-    assert output_of(folder) == "True 2"
+    assert output_of(folder) == "first second 2"
+    assert output_of(folder) == "2"
 
 
 def test_a_background_compilation_can_be_closed(folder):
-    told = []
-    background = BackgroundCompilation([ENDLESS], told.append)
-    background.start()
+    import some_kernels
+
+    background = Compilation([some_kernels.endless])
+    background.start(print)
     pid = wait_for_process(folder)
     background.close()
     wait_until_gone(pid)
-    assert told == []
 
 
 def test_the_process_ends_with_its_parent_even_if_that_is_killed(folder):
@@ -114,9 +118,10 @@ def test_the_process_ends_with_its_parent_even_if_that_is_killed(folder):
 
 @pytest.mark.long
 def test_groups_are_compiled_by_several_processes_and_errors_are_raised(folder):
-    names = []
-    steps = [CompilationStep(name, f"some_kernels:{name}") for name in ("first", "second")]
+    import some_kernels
+
+    names, steps = [], [some_kernels.first, some_kernels.second]
     compile_groups([[step] for step in steps], names.append, 2)
     assert sorted(names) == ["first", "second"]
     with pytest.raises(AttributeError, match="third"):
-        compile_groups([[CompilationStep("third", "some_kernels:third")], steps], names.append, 2)
+        compile_groups([[some_kernels.third], steps], names.append, 2)

@@ -31,7 +31,7 @@ def service(**parameters):
 
 for group in GROUPS:
     for step in group:
-        step.run()
+        step()
 service()
 before = compiled()
 start, goal = (-1.0, 0.0, 0.0), (2.0, 0.2, 0.0)
