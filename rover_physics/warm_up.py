@@ -9,15 +9,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from rover_physics.bounds.kernel import NOMINAL, find_bounds
+from rover_physics.bounds.path import find_bounds
 from rover_physics.compilation import compile_groups
-from rover_physics.prediction.evaluation import AHEAD
 from rover_physics.prediction.map_sweep import score_poses
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.sweep import predict_steered
 from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.results.record import new_results
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import pack_ground
 from rover_physics.traversability.judge import judge_path
@@ -49,8 +50,9 @@ def judge_paths() -> None:
 def bound_poses() -> None:
     """Bound a pose on a map with uncertain heights; it need not settle."""
     rover, step = _rover_and_step()
-    grounds = (pack_ground(step),) * 3
-    find_bounds(pack_model(rover, step), grounds, np.zeros((1, 3)), AHEAD, np.zeros(1, NOMINAL))
+    grounds, results = (pack_ground(step),) * 3, new_results(1)
+    results["status"], results["motion"] = PoseStatus.NOT_SETTLED, 0.0
+    find_bounds(pack_model(rover, step), grounds, np.zeros((1, 3)), results)
 
 
 def score_map() -> None:

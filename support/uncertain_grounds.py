@@ -8,7 +8,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter
 
 from rover_physics import Rover, SweepOptions, Terrain, judge_path
-from rover_physics.bounds.path import BOUNDED_VALUES, bound_path
+from rover_physics.bounds.path import bound_path
+from rover_physics.results.path_bounds import BOUNDED_VALUES
 from support.rough_grounds import RESOLUTION, fractal, plane, rocky
 
 ROUNDING = 1e-6

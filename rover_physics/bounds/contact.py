@@ -55,7 +55,7 @@ def bound_contacts(uncertain, work, nominal):
     Args:
         uncertain: UNCERTAIN; the elevation of its `error` bounds the error of each height [m].
         work: BOUNDS_WORK; `spread.shift` is the motion of the wheels forward or back.
-        nominal: NOMINAL contacts.
+        nominal: RESULT on the nominal ground.
     """
     placement, contact_bounds = work.rover.placement, work.contact_bounds
     angles, points, shift = nominal.contact_angle, nominal.contact_points, work.spread.shift
@@ -182,11 +182,6 @@ def _weight(gx, gy, row, column):
 
 
 @kernel
-def _angle_of_row(samples, k):
-    return np.pi * (k / (samples.rows - 1) - 0.5)
-
-
-@kernel
 def _widen(uncertain, work, wheel):
     """Widen the contact of a wheel to all points of its rim that may touch."""
     samples, contact_bounds = uncertain.nominal.samples, work.contact_bounds
@@ -263,7 +258,7 @@ def _find_farthest(uncertain, work, wheel, m, side):
     outside = nearest
     for step in range(samples.rows):
         k = step if side == 0 else samples.rows - 1 - step
-        angle = _angle_of_row(samples, k)
+        angle = np.pi * (k / (samples.rows - 1) - 0.5)
         if away * (angle - nearest) <= 0.0:
             break
         outside = angle

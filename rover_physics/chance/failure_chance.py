@@ -21,12 +21,7 @@ from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.read_only import freeze_fields
 from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import Crossings, join_crossings, none_held
-from rover_physics.prediction.servo_path import (
-    carry_by_momentum,
-    find_drift,
-    find_lift_heights,
-    stop_in_slots,
-)
+from rover_physics.prediction.servo_path import write_servo_path
 from rover_physics.prediction.sweep import SweptPath
 from rover_physics.results.record import place_results
 from rover_physics.results.uses import find_uses
@@ -215,15 +210,7 @@ def _evaluate_near(
         results["torque_share"] = results["torque_saturation"].mean(axis=1)
     place_results(results, all_results, near)
     if on_path and model.wheels.on_servos:
-        _write_path(model, swept, all_results)
+        n = len(swept.prediction.poses)
+        crossings = swept.crossings._replace(results=all_results[n:])
+        write_servo_path(model, swept.prediction.poses, all_results[:n], crossings)
     return np.asarray(all_results)
-
-
-def _write_path(model: PackedModel, swept: SweptPath, results: np.ndarray) -> None:
-    """Write what the path decides under speed servos into RESULTs of all rows."""
-    poses, wheels, n = swept.prediction.poses, model.wheels, len(swept.prediction.poses)
-    own, between = results[:n], swept.crossings._replace(results=results[n:])
-    carry_by_momentum(wheels, float(model.record.linkage.gravity), poses, own, between)
-    stop_in_slots(poses, own, between)
-    own["drift"] = find_drift(wheels, float(model.record.linkage.length), poses, own, between)
-    own["lift_height"], results["lift_height"][n:] = find_lift_heights(wheels, poses, own, between)

@@ -74,16 +74,13 @@ def _find_drops(wheels, poses, results, between):
     _merge(n, between.place, order)
     steps = np.zeros(n + m)
     height, rolling_off_edge = np.empty((n + m, 6)), np.zeros((n + m, 6), np.bool_)
-    at_wall = np.zeros((n + m, 6), np.bool_)
     angle, last = np.empty((n + m, 6)), poses[0]
     for k in range(n + m):
         i = order[k]
         here = poses[i] if i < n else between.poses[i - n]
         result = results[i] if i < n else between.results[i - n]
         steps[k] = distance_between(last, here, wheels.swing_radius)
-        if _read_contacts(result, angle[k], height[k]) < -WALL:
-            for wheel in range(6):
-                at_wall[k, wheel] = angle[k, wheel] < -WALL
+        _read_contacts(result, angle[k], height[k])
         last = here
     for k in range(n + m):
         i = order[k]
@@ -95,7 +92,7 @@ def _find_drops(wheels, poses, results, between):
             _find_rolling_off_edge(angle[k], result, wheels, rolling_off_edge[k])
     first_open = _find_first_open(rolling_off_edge)
     _clear_open_runs(rolling_off_edge)
-    _clear_slides(height, at_wall, wheels.drop_limit, rolling_off_edge)
+    _clear_slides(height, angle, wheels.drop_limit, rolling_off_edge)
     descents, drops = np.zeros((n + m, 6)), np.zeros((n, 6))
     _measure_drops(wheels.radius, (height, angle, steps), rolling_off_edge, descents)
     at_waypoints, at_between = np.empty((n, 6), np.bool_), np.empty((m, 6), np.bool_)
@@ -162,19 +159,12 @@ def _merge(n, place, order):
 
 @exact_kernel
 def _read_contacts(result, angle, height):
-    """Write contact angles [rad], positive where each wheel rolls to, and heights [m].
-
-    Returns the smallest angle.
-    """
-    smallest = 0.0
+    """Write contact angles [rad], positive where each wheel rolls to, and heights [m]."""
     for wheel in range(6):
         angle[wheel] = result.contact_angle[wheel]
         if result.wheel_speed[wheel] < 0.0:
             angle[wheel] = -angle[wheel]
         height[wheel] = result.wheel_centres[wheel, 2]
-        if angle[wheel] < smallest:
-            smallest = angle[wheel]
-    return smallest
 
 
 @exact_kernel
@@ -217,7 +207,7 @@ def _clear_open_runs(rolling_off_edge):
 
 
 @exact_kernel
-def _clear_slides(height, at_wall, limit, rolling_off_edge):
+def _clear_slides(height, angle, limit, rolling_off_edge):
     """Clear runs (k, 6) without a wall that go down by more than `limit` [m]."""
     rows = rolling_off_edge.shape[0]
     for wheel in range(6):
@@ -225,7 +215,7 @@ def _clear_slides(height, at_wall, limit, rolling_off_edge):
         while start < rows:
             end, walls = start, False
             while end < rows and rolling_off_edge[end, wheel]:
-                walls = walls or at_wall[end, wheel]
+                walls = walls or angle[end, wheel] < -WALL
                 end += 1
             if start < end < rows and start > 0 and not walls:
                 so_far, most = 0.0, 0.0

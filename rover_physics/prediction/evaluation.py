@@ -43,9 +43,6 @@ SETTINGS = record_type(
     ("friction_factor", float, (6,)),  # factor of the friction under each wheel
     ("max_torque", float),  # largest wheel torque [N m]
     ("allowed_torque", float),  # largest torque within safety limit and control margin [N m]
-    ("allowed_friction", float),  # largest friction utilisation within the safety limit
-    ("allowed_saturation", float),  # largest torque saturation within the safety limit
-    ("allowed_drop", float),  # largest drop of a wheel [m]
     ("control_margin", float),  # share of the limits of friction and torque left to the controller
     ("servo_droop", float),  # share of the nominal speed that a servo loses at full torque
     ("friction_share", float),  # share of the friction that policy SERVO may use

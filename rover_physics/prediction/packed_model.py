@@ -84,13 +84,13 @@ class PackedModel:
     @cached_property
     def wheels(self) -> Wheels:
         """Size and limits of the rover's wheels."""
-        linkage, settings = self.record.linkage, self.settings
+        linkage, limits = self.record.linkage, self.rover.limits
         return Wheels(
             float(linkage.radius),
             float(linkage.swing_radius),
-            float(settings.allowed_friction),
-            float(settings.allowed_saturation),
-            float(settings.allowed_drop),
+            float(limits.friction_utilisation),
+            float(limits.torque_saturation),
+            float(limits.wheel_drop),
             self.options.policy == SERVO,
         )
 
@@ -192,9 +192,6 @@ def _pack_request(
         allowed_torque=float(
             torque * rover.limits.torque_saturation * (1.0 - options.kept_margin)
         ),
-        allowed_friction=float(rover.limits.friction_utilisation),
-        allowed_saturation=float(rover.limits.torque_saturation),
-        allowed_drop=float(rover.limits.wheel_drop),
         control_margin=float(options.kept_margin),
         servo_droop=float(rover.wheel.servo_droop),
         friction_share=float(rover.limits.friction_utilisation),

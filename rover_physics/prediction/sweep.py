@@ -28,12 +28,10 @@ from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import Crossings, add_up, join_crossings
 from rover_physics.prediction.path_motion import path_motions
 from rover_physics.prediction.servo_path import (
-    carry_by_momentum,
     climb_costs,
     distances_between,
-    find_drift,
-    find_lift_heights,
-    stop_in_slots,
+    drift_window,
+    write_servo_path,
 )
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.record import join_results, place_results, unwritten_results
@@ -153,11 +151,6 @@ def _find_restart(model: PackedModel, poses: np.ndarray, drops: Drops) -> int:
         last = way[min(drops.decided, len(way) - 1)]
         starts = starts[way[starts] <= last - drift_window(model)]
     return int(starts[-1]) if len(starts) else 0
-
-
-def drift_window(model: PackedModel) -> float:
-    """Return the way before a waypoint within which drift counts [m]: the rover's length."""
-    return float(model.record.linkage.length)
 
 
 @quiet
@@ -352,17 +345,13 @@ def make_prediction(
     if wheels.on_servos:
         results = results.copy()
         crossings = crossings._replace(results=crossings.results.copy())
-        carry_by_momentum(wheels, float(model.record.linkage.gravity), poses, results, crossings)
-        stop_in_slots(poses, results, crossings)
+        write_servo_path(model, poses, results, crossings)
     between = crossings.results
     results["wheel_drop"] = drops.heights
     results["falling"], between["falling"] = drops.at_waypoints, drops.between
     _write_sums(model, crossings.poses, between, NO_SUMS)
     _write_sums(model, poses, results, start)
     if wheels.on_servos:
-        results["drift"] = find_drift(wheels, drift_window(model), poses, results, crossings)
-        heights = find_lift_heights(wheels, poses, results, crossings)
-        results["lift_height"], between["lift_height"] = heights
         time, energy = climb_costs(poses, results, crossings).T
         results["time"] += time
         results["energy"] += energy

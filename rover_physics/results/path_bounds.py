@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bounds on a prediction along a path over an uncertain map: one frozen record of intervals."""
+"""Bounds on the prediction along a path over a map with uncertain heights."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -9,54 +9,54 @@ from numpy.typing import NDArray
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.read_only import freeze_fields
+from rover_physics.numerics.records import record_type
 from rover_physics.status import BoundStatus
+
+BOUNDS = record_type(
+    ("status", np.int8),  # a BoundStatus
+    ("roll", float, (2,)),  # [rad]
+    ("pitch", float, (2,)),  # [rad]
+    ("rocker_angle", float, (2, 2)),  # right and left [rad]
+    ("bogie_angle", float, (2, 2)),  # right and left [rad]
+    ("belly_clearance", float, (2,)),  # [m]
+    ("tip_over_ratio", float, (2,)),
+    ("wheel_loads", float, (6, 2)),  # [N]; the largest is infinite under policy "optimal"
+    ("friction_utilisation", float, (6, 2)),
+    ("torque_saturation", float, (6, 2)),
+    ("sinkage", float, (6, 2)),  # [m]
+)
+"""Smallest and largest value at one pose, of quantities as in `PathPrediction`.
+
+The torques of policy "optimal" follow the ground, so that a load has no upper bound.
+"""
+BOUNDED_VALUES = tuple(name for name in BOUNDS.names or () if name != "status")
+"""Names of the bounded values."""
 
 
 @dataclass(frozen=True, eq=False)
 class PathBounds:
-    """Bounds along a path of n waypoints; the last axis holds smallest and largest value.
+    """Bounds at n waypoints: its attributes are the arrays (n, ..., 2) of BOUNDS, and more.
 
-    Quantities and units are those of `PathPrediction`. A waypoint without bounds has NaN. All
-    arrays are read-only.
+    The last axis holds smallest and largest value. A waypoint without bounds has NaN. All arrays
+    are read-only.
     """
 
     sigmas: float
     """Number of standard deviations by which the map's heights may be wrong."""
-    status: NDArray[np.int8]
-    """(n,) BoundStatus of each waypoint."""
-    roll: Floats
-    """(n, 2) [rad]."""
-    pitch: Floats
-    """(n, 2) [rad]."""
-    rocker_angle: Floats
-    """(n, 2, 2) [rad]."""
-    bogie_angle: Floats
-    """(n, 2, 2) [rad]."""
-    belly_clearance: Floats
-    """(n, 2) [m]."""
-    tip_over_ratio: Floats
-    """(n, 2)."""
-    wheel_loads: Floats
-    """(n, 6, 2) [N]; the largest is infinite under policy "optimal", whose torques follow the
-    ground."""
-    friction_utilisation: Floats
-    """(n, 6, 2)."""
-    torque_saturation: Floats
-    """(n, 6, 2)."""
-    sinkage: Floats
-    """(n, 6, 2) [m]."""
+    values: Any
+    """(n,) BOUNDS of each waypoint."""
 
     def __post_init__(self) -> None:
         freeze_fields(self)
 
+    def __getattr__(self, name: str) -> Any:
+        if name in (BOUNDS.names or ()):
+            return self.values[name]
+        raise AttributeError(f"a PathBounds has no {name!r}; it has {', '.join(BOUNDED_VALUES)}")
+
     def cut(self, waypoints: int) -> "PathBounds":
         """Return the bounds on the first waypoints."""
-        first: dict[str, Any] = {
-            name: value[:waypoints]
-            for name, value in vars(self).items()
-            if isinstance(value, np.ndarray)
-        }
-        return replace(self, **first)
+        return replace(self, values=self.values[:waypoints])
 
     @property
     def bounded(self) -> NDArray[np.bool_]:

@@ -6,14 +6,14 @@ the last wheel, as linear functions of the other wheels' tractions relative to t
 wanted push enters as d'Alembert's force, backward at the centre of mass. The tractions together
 then hold the rover against gravity and add the push.
 
-Wheels may be turned. They then roll along the motion of `rolling`: tractions count along the
+Wheels may be turned. They then roll along the motion of ROLLING: tractions count along the
 wheels' own headings, "equal" ones have the sign with which each wheel rolls in this motion, and a
 push accelerates the rover along it. A push is a generalised force: its work per mean distance that
 the wheels roll.
 """
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,7 +25,9 @@ from rover_physics.forces.equilibrium import (
     solve_equations,
     write_equations,
 )
+from rover_physics.forces.shares import has_turned_wheels, write_shares
 from rover_physics.names import WHEEL_COUNT
+from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import array_of, new_record, record_type
 from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place, place_masses
@@ -43,7 +45,6 @@ from rover_physics.traction.layout import (
     TRACTION_EQUATION,
     TRACTIONS,
 )
-from rover_physics.traction.rolling import ROLLING, Rolling, write_rolling
 
 FORCE_ROW, MOMENT_ROW = 0, 3
 """First row of the forces and of the moments in the equations of `equilibrium`."""
@@ -71,35 +72,26 @@ class MeasuredState:
     """(6,) steering angles in [rad], positive to the left."""
 
 
-MEASURED_BALANCE = record_type(
-    ("A", float, (EQUATIONS, FORCES)),  # coefficients, of order 1
-    ("b", float, (EQUATIONS,)),  # right-hand sides
-    ("lateral_shares", float, (WHEEL_COUNT, 2)),  # of the wheels in s0 and s1
-    ("directions", float, (WHEEL_COUNT,)),  # 1 where a wheel rolls forward, -1 where backward
-    ("force_unit", float),  # a sixth of the weight [N]
-)
-"""The equations of `BalanceRows`, for kernels."""
-
-
-class BalanceRows:
+class BalanceRows(NamedTuple):
     """Nine equations A x = b with x = tractions (6), loads (6), s0, s1, all in `force_unit`.
 
-    `layout` names the variables and equations; the arrays are views of MEASURED_BALANCE.
+    `layout` names the variables and equations.
     """
 
-    def __init__(self, packed: np.ndarray):
-        """Give the fields of `packed`, an array (1,) of MEASURED_BALANCE, their names."""
-        self.packed = packed
-        self.A, self.b = packed["A"][0], packed["b"][0]
-        self.directions = packed["directions"][0]
-        self.lateral_shares = packed["lateral_shares"][0]
-        """Shares (6, 2) of the wheels in the lateral terms: S_i = s0 share_i0 + s1 share_i1.
+    A: Floats
+    """(9, 14) coefficients, of order 1."""
+    b: Floats
+    """(9,) right-hand sides."""
+    lateral_shares: Floats
+    """Shares (6, 2) of the wheels in the lateral terms: S_i = s0 share_i0 + s1 share_i1.
 
-        With wheels straight ahead they are 1 and the wheel's position along the body in rover
-        lengths, from rear to front axle.
-        """
-        self.force_unit = float(packed["force_unit"][0])
-        """A sixth of the weight in [N]."""
+    With wheels straight ahead they are 1 and the wheel's position along the body in rover lengths,
+    from rear to front axle.
+    """
+    directions: Floats
+    """(6,) 1 where a wheel rolls forward, -1 where backward."""
+    force_unit: float
+    """A sixth of the weight in [N]."""
 
     def lateral_forces(self, x: np.ndarray) -> np.ndarray:
         """Return the lateral forces (6,) of x (14,), in its unit."""
@@ -123,7 +115,7 @@ class BalanceRows:
                 keep the equations.
         """
         x = np.empty(FORCES)
-        _complete(self.packed, tractions, x)
+        _complete(self.A, self.b, self.directions, tractions, x)
         return x
 
     def pull_equally(self) -> np.ndarray:
@@ -132,18 +124,32 @@ class BalanceRows:
 
 
 MEASUREMENT = record_type(
-    ("pose", float, (3,)),  # x, y [m] and yaw [rad], for `place`
     ("q", float, (6,)),  # z [m], roll, pitch, right rocker, right and left bogie [rad]
     ("contact_angles", float, (WHEEL_COUNT,)),  # [rad]
     ("contact_offsets", float, (WHEEL_COUNT,)),  # [m]
     ("steering", float, (WHEEL_COUNT,)),  # [rad]
-    ("push", float),  # wanted push along the motion of `rolling` [N]
+    ("push", float),  # wanted push along the motion of ROLLING [N]
     ("resistance", float),  # resistance to the travel of the wheels [N]
 )
-"""A `MeasuredState` and the wanted push, for kernels; x, y, z and yaw are 0."""
+"""A `MeasuredState` and the wanted push, for kernels; z is 0."""
+
+ROLLING = record_type(
+    ("motion", float, (3,)),  # speed ahead, to the left, yaw rate per mean wheel speed [1, 1, 1/m]
+    ("directions", float, (WHEEL_COUNT,)),  # 1 where a wheel rolls forward, -1 where backward
+    ("speeds", float, (WHEEL_COUNT,)),  # along the headings on level ground, over the mean speed
+    ("thrust", float, (3,)),  # force at the centre of mass and moment of a unit push [1, 1, m]
+    ("inertia", float),  # push over acceleration of the mean wheel speed, over the rover's mass
+    ("arms", float, (WHEEL_COUNT,)),  # moment about body z per traction [m], positive to the left
+)
+"""The motion in which the wheels roll with their steering angles.
+
+It is that of `shares`, scaled so that the mean speed of the wheels along their headings is 1. It
+goes forward, or to the left if it is mostly a turn. Wheels straight ahead have the motion (1, 0,
+0)."""
 
 BALANCE_WORK = record_type(
     ("measured", MEASUREMENT),
+    ("pose", float, (3,)),  # x, y [m] and yaw [rad], all 0
     ("com", float, (3,)),  # centre of mass of the whole rover on flat ground [m], body frame
     ("placement", PLACEMENT),
     ("contacts", CONTACTS),
@@ -170,26 +176,21 @@ class BalanceWriter:
         linkage = pack_linkage(rover, mass, com)
         self._linkages = array_of(linkage)
         self._works = array_of(new_record(BALANCE_WORK, com=_centre_of_mass(linkage)))
-        # Views are kept because looking up a field of a record is as slow as writing it.
-        measured, fields = self._works["measured"], MEASUREMENT.names or ()
-        self._measured = [measured[name].reshape(-1) for name in fields[1:]]  # x, y, yaw stay 0
         self.weight = float(linkage.mass * linkage.gravity)
         """Weight of the rover with its payload in [N]."""
         self.on_bogie = np.array(linkage.on_bogie, dtype=bool)
         """(6,) whether each wheel hangs on a bogie."""
 
-    def find_rolling(self, state: MeasuredState) -> Rolling:
-        """Return how the wheels roll at a measured state; contact angles are not used."""
+    def find_rolling(self, state: MeasuredState) -> Any:
+        """Return how the wheels roll at a measured state, without its contacts: a ROLLING."""
         self._take(state)
         _place_wheels(self._linkages, self._works)
-        return Rolling(self._works["rolling"].copy())
+        return self._works["rolling"].copy()[0]
 
     def _take(self, state: MeasuredState, push: float = 0.0, resistance: float = 0.0) -> None:
         q = 0.0, state.roll, state.pitch, state.rocker_angle, *state.bogie_angles
         angles, offsets = state.contact_angles, state.contact_offsets
-        values = q, angles, offsets, state.steering, push, resistance
-        for view, value in zip(self._measured, values, strict=True):
-            view[:] = value
+        self._works["measured"][0] = q, angles, offsets, state.steering, push, resistance
 
     def write(
         self, state: MeasuredState, net_traction: float, resistance: float = 0.0
@@ -208,13 +209,15 @@ class BalanceWriter:
                 that the rover could not roll.
         """
         self._take(state, net_traction, resistance)
-        packed = np.zeros(1, MEASURED_BALANCE)
-        if not _write_balance(self._linkages, self._works, packed):
+        A, b = np.zeros((EQUATIONS, FORCES)), np.zeros(EQUATIONS)
+        shares, directions = np.zeros((WHEEL_COUNT, 2)), np.zeros(WHEEL_COUNT)
+        rows = BalanceRows(A, b, shares, directions, self.weight / WHEEL_COUNT)
+        if not _write_balance(self._linkages, self._works, rows):
             raise ModelError(
                 f"contact angles {np.round(state.contact_angles, 3).tolist()} rad leave the "
                 "balance without a solution; they must be such that all wheels can roll at once"
             )
-        return BalanceRows(packed)
+        return rows
 
 
 def _centre_of_mass(linkage: Any) -> np.ndarray:
@@ -227,10 +230,8 @@ def _centre_of_mass(linkage: Any) -> np.ndarray:
 
 
 @kernel
-def _complete(balances, tractions, x):
+def _complete(A, b, directions, tractions, x):
     """Write x (14,) that keeps all nine equations and the differences between tractions (6,)."""
-    balance = balances[0]
-    A, b, directions = balance.A, balance.b, balance.directions
     last = directions[LAST_WHEEL] * tractions[LAST_WHEEL]
     for row in range(EQUATIONS):
         rest = b[row]
@@ -251,14 +252,14 @@ def _place_wheels(linkages, works):
     measured, placement = work.measured, work.placement
     for wheel in range(WHEEL_COUNT):
         placement.steering[wheel] = measured.steering[wheel]
-    place(linkage, measured.pose, measured.q, placement)
-    write_rolling(linkage, placement, work.com, work.balance.shares, work.rolling)
+    place(linkage, work.pose, measured.q, placement)
+    _write_rolling(linkage, placement, work.com, work.balance.shares, work.rolling)
 
 
 @kernel
-def _write_balance(linkages, works, balances):
+def _write_balance(linkages, works, rows):
     """Write the nine equations at the state in `works`; return False if they are singular."""
-    linkage, work, rows = linkages[0], works[0], balances[0]
+    linkage, work = linkages[0], works[0]
     placement, balance, measured = work.placement, work.balance, work.measured
     columns = 1 + FREE_TORQUES
     _place_wheels(linkages, works)
@@ -268,7 +269,6 @@ def _write_balance(linkages, works, balances):
     _add_push(linkage, work)
     if not solve_equations(columns, balance):
         return False
-    rows.force_unit = linkage.mass * linkage.gravity / WHEEL_COUNT
     _write_rows(balance, rows)
     _add_resistance(measured.resistance / rows.force_unit, rows)
     return True
@@ -354,3 +354,57 @@ def _add_resistance(resistance, rows):
         for wheel in range(WHEEL_COUNT):
             share = A[TRACTION_EQUATION, TRACTION + wheel]
             b[row] += resistance * share * A[row, TRACTION + wheel]
+
+
+@kernel
+def _write_rolling(linkage, placement, com, shares, rolling):
+    """Write how placed wheels roll.
+
+    Args:
+        linkage: LINKAGE.
+        placement: PLACEMENT.
+        com: (3,) centre of mass of the rover [m], body frame, where a push acts.
+        shares: SHARES, written.
+        rolling: ROLLING, written.
+    """
+    write_shares(linkage, placement, shares)
+    motion, speeds, length = rolling.motion, rolling.speeds, linkage.length
+    turned = has_turned_wheels(placement)
+    motion[0], motion[1], motion[2] = 1.0, 0.0, 0.0
+    if turned:
+        motion[0], motion[1] = shares.rolling[0], shares.rolling[1]
+        motion[2] = shares.rolling[2] / length
+    mean = 0.0
+    for wheel in range(WHEEL_COUNT):
+        x, y = _place_of(placement, wheel)
+        ahead, left = 1.0, 0.0
+        if turned:
+            # The heading is a quarter turn to the right of the axle.
+            ahead, left = shares.axles[wheel, 1], -shares.axles[wheel, 0]
+        rolling.arms[wheel] = x * left - y * ahead
+        rolling.directions[wheel] = shares.common[wheel, 2]
+        speeds[wheel] = ahead * (motion[0] - motion[2] * y) + left * (motion[1] + motion[2] * x)
+        mean += rolling.directions[wheel] * speeds[wheel] / WHEEL_COUNT
+    if turned:
+        for k in range(3):
+            motion[k] /= mean
+        for wheel in range(WHEEL_COUNT):
+            speeds[wheel] /= mean
+    # Yaw inertia of a mass at the distance of the middle wheels.
+    squared_radius = linkage.wheels[1, 1] * linkage.wheels[1, 1]
+    ahead, left = motion[0] - motion[2] * com[1], motion[1] + motion[2] * com[0]
+    inertia = ahead * ahead + left * left + squared_radius * motion[2] * motion[2]
+    rolling.inertia = inertia
+    rolling.thrust[0], rolling.thrust[1] = ahead / inertia, left / inertia
+    rolling.thrust[2] = squared_radius * motion[2] / inertia
+
+
+@kernel
+def _place_of(placement, wheel):
+    """Return the position of a wheel along body x and y [m]."""
+    R, origin, centres = placement.R, placement.origin, placement.centres
+    x = y = 0.0
+    for i in range(3):
+        x += R[i, 0] * (centres[wheel, i] - origin[i])
+        y += R[i, 1] * (centres[wheel, i] - origin[i])
+    return x, y

@@ -98,6 +98,7 @@ FILTER = record_type(
     ("second", np.int64, (PAIRS,)),  # wheel whose velocity counts negative
     ("known", float, (PAIRS, 2)),  # difference of their velocities by the links [m/s]
     ("gain", float, (WHEEL_COUNT,)),  # covariance times an equation's coefficients
+    ("started", np.bool_),  # whether the angles are known
 )
 """State and work space of the filter."""
 
@@ -127,33 +128,13 @@ class MotionContactEstimator:
             )
         )
         self._motions = array_of(new_record(MOTION))
-        self._started = False
-
-    @property
-    def estimate(self) -> ContactEstimate:
-        """The current estimate."""
-        state = self._filters
-        angles, covariance = state["angles"][0].copy(), state["covariance"][0].copy()
-        return ContactEstimate(angles, covariance, "motion")
 
     def update(self, motion: Motion, duration: float) -> ContactEstimate:
         """Correct the angles by a measurement, `duration` [s] after the last, and return them."""
-        self._motions[0] = motion
-        if not self._started:
-            _start(self._linkages, self._motions, self._filters)
-            self._started = True
-        _update(self._linkages, self._motions, duration, self._filters)
-        return self.estimate
-
-
-@kernel
-def _start(linkages, motions, filters):
-    """Start from the slopes between neighbouring wheels, which a rover at rest can measure."""
-    motion, state = motions[0], filters[0]
-    _write_headings(motion, state)
-    _place(linkages[0], motion, state)
-    for wheel in range(WHEEL_COUNT):
-        state.angles[wheel] = state.slopes[wheel]
+        self._motions[0], state = motion, self._filters
+        _update(self._linkages, self._motions, duration, state)
+        angles, covariance = state["angles"][0].copy(), state["covariance"][0].copy()
+        return ContactEstimate(angles, covariance, "motion")
 
 
 @kernel
@@ -169,18 +150,18 @@ def _write_headings(motion, state):
 
 
 @kernel
-def _find_level(motion):
-    """Return the direction of the horizontal in the body's x-z plane [rad]."""
-    roll, pitch = motion.attitude[0], motion.attitude[1]
-    return np.arctan2(np.sin(pitch), np.cos(pitch) * np.cos(roll))
-
-
-@kernel
 def _update(linkages, motions, duration, filters):
-    """Place the wheels; if the rover moves, let the angles drift and correct them."""
+    """Place the wheels; if the rover moves, let the angles drift and correct them.
+
+    They start from the slopes between neighbouring wheels, which a rover at rest can measure.
+    """
     linkage, motion, state = linkages[0], motions[0], filters[0]
     _write_headings(motion, state)
     _place(linkage, motion, state)
+    if not state.started:
+        for wheel in range(WHEEL_COUNT):
+            state.angles[wheel] = state.slopes[wheel]
+        state.started = True
     max_speed = 0.0
     for wheel in range(WHEEL_COUNT):
         # The link's rate about the axle.
@@ -198,7 +179,8 @@ def _update(linkages, motions, duration, filters):
 def _place(linkage, motion, state):
     """Write places, turning rates, slopes and the velocity differences given by the links."""
     wheels, places, known = linkage.wheels, state.places, state.known
-    level = _find_level(motion)
+    roll, pitch = motion.attitude[0], motion.attitude[1]
+    level = np.arctan2(np.sin(pitch), np.cos(pitch) * np.cos(roll))  # in the body's x-z plane
     for side in range(2):
         angle = rocker_sign(side) * motion.joints[0]
         rocker_rate = motion.body_rates[1] + rocker_sign(side) * motion.joint_rates[0]
@@ -218,7 +200,7 @@ def _place(linkage, motion, state):
                 dx, dz = dx + px, dz + pz
                 state.turning[wheel] = rocker_rate
             places[wheel, 0], places[wheel, 1] = dx, dz
-        _write_slopes(motion.attitude[0], level, side, state)
+        _write_slopes(roll, level, side, state)
         low, high = state.second[2 * side], state.first[2 * side]
         own = state.first[2 * side + 1]
         for i, sign in ((0, 1.0), (1, -1.0)):

@@ -19,8 +19,8 @@ A quadratic program cannot hold the cone sqrt(T^2 + S^2) <= u mu N itself:
   cone.
 
 So an answer is measured by the round cone and the product, from the last forces on towards it, and
-the best place on that line is taken (`line_search.py`): the peak never rises from one program to
-the next, and the reported utilisation is that of the round cone.
+the best place on that line is taken (`solver.py`): the peak never rises from one program to the
+next, and the reported utilisation is that of the round cone.
 
 The change from the last forces has a weight as well: it makes the program well conditioned, and
 it vanishes where the sequence converges, so that it costs nothing there (a proximal point method).
@@ -31,15 +31,14 @@ proximal point algorithm", SIAM Journal on Control and Optimization 14, 1976.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from rover_physics.errors import ModelError
 from rover_physics.names import WHEEL_COUNT
+from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.kernels import kernel
-from rover_physics.numerics.records import record_type
-from rover_physics.traction.balance import BalanceRows
 from rover_physics.traction.layout import (
     BACKWARD_PULL_ROWS,
     BALANCE_ROWS,
@@ -74,13 +73,6 @@ CHANGE_WEIGHT = 3.0
 SLACK_PRICE = 100.0
 """Price of a slack: more than a peak can be worth, so that no limit gives way to another."""
 
-PROGRAM_INPUTS = record_type(
-    ("friction", float, (WHEEL_COUNT,)),  # friction coefficients
-    ("max_torque", float),  # largest torque of a wheel [N m]
-    ("radius", float),  # wheel radius [m]
-)
-"""`ProgramInputs` as the kernels read them."""
-
 
 @dataclass(frozen=True, eq=False)
 class ProgramInputs:
@@ -90,7 +82,7 @@ class ProgramInputs:
         ModelError: A friction coefficient, the largest torque or the radius is not above 0.
     """
 
-    friction: np.ndarray
+    friction: Floats
     """(6,) friction coefficients."""
     max_torque: float
     """Largest torque of a wheel [N m]."""
@@ -105,19 +97,9 @@ class ProgramInputs:
                 f"wheel radius {self.radius} m must all be above 0"
             )
 
-    @cached_property
-    def packed(self) -> np.ndarray:
-        """Array (1,) of PROGRAM_INPUTS, made once."""
-        return np.array([(self.friction, self.max_torque, self.radius)], PROGRAM_INPUTS)
-
-
-@kernel
-def max_pull_of(inputs, force_unit):
-    """Return the largest traction of a motor in force units: torque over wheel radius.
-
-    `inputs` is a record PROGRAM_INPUTS, `force_unit` in [N].
-    """
-    return inputs.max_torque / (inputs.radius * force_unit)
+    def max_pull(self, force_unit: float) -> float:
+        """Return the largest traction of a motor in a unit of force [N]."""
+        return self.max_torque / (self.radius * force_unit)
 
 
 MIN_LOAD = 0.05
@@ -130,80 +112,61 @@ SLACK_CURVATURE = 0.1
 """Curvature of a slack, as a share of its price."""
 
 
-@dataclass(frozen=True, eq=False)
-class Reference:
-    """The last answer, about which the program is written."""
+class TractionQP(NamedTuple):
+    """Minimise 1/2 y'Py + q'y subject to lower <= A y <= upper; `layout` names y and the rows."""
 
-    x: np.ndarray
-    """(14,) tractions, loads and lateral terms in force units."""
-    peak: float
-    """Its peak friction utilisation, or the one to expand about."""
-
-
-QP = record_type(
-    ("P", float, (VARIABLES,)),  # diagonal of the cost's matrix
-    ("q", float, (VARIABLES,)),  # linear cost
-    ("A", float, (ROWS, VARIABLES)),  # rows
-    ("lower", float, (ROWS,)),  # lower bounds
-    ("upper", float, (ROWS,)),  # upper bounds
-    ("scale", float, (VARIABLES,)),  # x = scale * y + shift in force units, 1 for the peak
-    ("shift", float, (VARIABLES,)),  # the same
-    ("start", float, (VARIABLES,)),  # y of the reference
-)
-"""The numbers of a `TractionQP` as the kernels write them."""
+    P: Floats
+    """(18,) diagonal of the cost's matrix."""
+    q: Floats
+    """(18,) linear cost."""
+    A: Floats
+    """(56, 18) rows."""
+    lower: Floats
+    """(56,) lower bounds."""
+    upper: Floats
+    """(56,) upper bounds."""
+    scale: Floats
+    """(18,) x = scale * y + shift in force units, 1 for the peak."""
+    shift: Floats
+    """(18,) the same."""
+    start: Floats
+    """(18,) y of the last answer."""
 
 
-class TractionQP:
-    """Minimise 1/2 y'Py + q'y subject to lower <= A y <= upper; `layout` names y and the rows.
-
-    A program of zeros, to be written again and again by `build_traction_qp`. The arrays are views
-    of a record QP.
-    """
-
-    def __init__(self) -> None:
-        """Make a program of zeros."""
-        self.packed = np.zeros(1, QP)
-        views = (self.packed[name][0] for name in QP.names or ())
-        self.P, self.q, self.A, self.lower, self.upper, self.scale, self.shift, self.start = views
-
-
-def build_traction_qp(
-    rows: BalanceRows, inputs: ProgramInputs, reference: Reference, qp: TractionQP | None = None
-) -> TractionQP:
-    """Write the program for one state of the rover.
-
-    Args:
-        rows: Balance at that state, with the wanted net traction.
-        inputs: Friction and torque of the wheels.
-        reference: The last answer; at first that of equal torques.
-        qp: A program to write over, a new one by default.
-    """
-    qp = qp or TractionQP()
-    _write_program(rows.packed, inputs.packed, reference.x, reference.peak, qp.packed)
-    return qp
+def new_program() -> TractionQP:
+    """Return a program of zeros, to be written again and again by `write_program`."""
+    sizes = {"A": (ROWS, VARIABLES), "lower": ROWS, "upper": ROWS}
+    return TractionQP(*(np.zeros(sizes.get(name, VARIABLES)) for name in TractionQP._fields))
 
 
 @kernel
-def _write_program(balances, all_inputs, last, last_peak, programs):
-    """Write a record QP about the last forces (14,) and their peak utilisation.
+def write_program(rows, friction, max_pull, last, last_peak, qp):
+    """Write the program for one state of the rover, about the last answer.
 
     The same entries are written for every state, so that a program can be written over.
+
+    Args:
+        rows: BalanceRows at that state, with the wanted net traction.
+        friction: (6,) friction coefficients.
+        max_pull: Largest traction of a motor in force units.
+        last: (14,) forces of the last answer in force units; at first those of equal torques.
+        last_peak: Their peak utilisation, or the one to expand about.
+        qp: TractionQP, written.
     """
-    balance, inputs, qp = balances[0], all_inputs[0], programs[0]
     peak = min(max(last_peak, MIN_PEAK), MAX_PEAK)
-    friction = 0.0
+    total = 0.0
     for wheel in range(WHEEL_COUNT):
-        friction += inputs.friction[wheel]
-    unit = peak * friction / WHEEL_COUNT
+        total += friction[wheel]
+    unit = peak * total / WHEEL_COUNT
     _write_units(last, peak, unit, qp)
     _write_costs(qp)
     for row in range(ROWS):
         qp.lower[row], qp.upper[row] = -np.inf, np.inf
-    _write_balance_rows(balance, unit, qp)
+    _write_balance_rows(rows, unit, qp)
     for wheel in range(WHEEL_COUNT):
-        shares = balance.lateral_shares[wheel, 0], balance.lateral_shares[wheel, 1]
-        _write_cone(shares, inputs.friction[wheel], last, wheel, qp)
-    _write_limit_rows(max_pull_of(inputs, balance.force_unit), qp)
+        shares = rows.lateral_shares[wheel, 0], rows.lateral_shares[wheel, 1]
+        _write_cone(shares, friction[wheel], last, wheel, qp)
+    _write_limit_rows(max_pull, qp)
 
 
 @kernel
@@ -232,13 +195,13 @@ def _write_costs(qp):
 
 
 @kernel
-def _write_balance_rows(balance, unit, qp):
+def _write_balance_rows(rows, unit, qp):
     """Write the equations of the balance, divided by `unit`, for shifted loads."""
     for equation in range(EQUATIONS):
-        rest = balance.b[equation]
+        rest = rows.b[equation]
         for k in range(FORCES):
-            qp.A[BALANCE_ROWS + equation, k] = balance.A[equation, k]
-            rest -= balance.A[equation, k] * qp.shift[k]
+            qp.A[BALANCE_ROWS + equation, k] = rows.A[equation, k]
+            rest -= rows.A[equation, k] * qp.shift[k]
         row = BALANCE_ROWS + equation
         qp.lower[row] = qp.upper[row] = rest / unit
 

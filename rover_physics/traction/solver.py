@@ -1,5 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Solving for the torques: a sequence of quadratic programs by OSQP, each about the last one."""
+"""Solving for the torques: a sequence of quadratic programs by OSQP, each about the last one.
+
+A program knows cones as they are about the last forces; far from these they may be wrong, and a
+sequence of answers may oscillate. So the best place on the line from the last forces to an answer
+is searched. Where the answer has a smaller peak, peaks fall from the last forces on, so that the
+best place never has a larger one. The balance is linear: all on the line keep it.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -10,9 +16,9 @@ from scipy import sparse
 
 from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.kernels import kernel
-from rover_physics.numerics.records import array_of, new_record
-from rover_physics.traction.balance import MEASURED_BALANCE, BalanceRows
+from rover_physics.traction.balance import BalanceRows
 from rover_physics.traction.layout import (
+    EQUATIONS,
     FORCES,
     LATERAL_SHARE,
     LATERAL_SLOPE,
@@ -22,8 +28,17 @@ from rover_physics.traction.layout import (
     TRACTIONS,
     VARIABLES,
 )
-from rover_physics.traction.line_search import find_best_between, measure_peak
-from rover_physics.traction.program import ProgramInputs, Reference, TractionQP, build_traction_qp
+from rover_physics.traction.program import (
+    EFFORT_WEIGHT,
+    MIN_LOAD,
+    MIN_PEAK,
+    PEAK_WEIGHT,
+    SLACK_PRICE,
+    ProgramInputs,
+    TractionQP,
+    new_program,
+    write_program,
+)
 
 OSQP_SETTINGS = {
     # Of scaled rows. The default of 1e-3 leaves rows 1e-2 of the weight open.
@@ -47,8 +62,14 @@ CONVERGED_SHARE = 0.02
 """Change of the scaled tractions, which are of order one, at which a sequence has converged."""
 OSQP_SOLVED = 1
 """OSQP's status_val of a solved problem; the first versions have no name for it."""
-WHEEL_FORCES = ("torques", "loads", "tractions", "lateral", "utilisation")
-"""Rows of a table of wheel forces."""
+LINE_END = 1.5
+"""Where the search along a line ends; 0 is at the last forces and 1 at the answer."""
+GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+"""The golden section."""
+SECTIONS = 10
+"""Sections of the search; they find the best place to within 1 % of the line."""
+ROUNDING = 1e-4
+"""Share of the largest pull by which OSQP may exceed it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +107,7 @@ class TractionWorkspace:
 
     def __init__(self, max_iterations: int = MAX_ITERATIONS):
         """Set up the problem; OSQP gives up after `max_iterations`."""
-        self.qp = TractionQP()
+        self.qp = new_program()
         """The program that is written anew each time."""
         self._cells, pattern = _find_pattern()
         self._solver = osqp.OSQP()
@@ -112,14 +133,11 @@ class TractionWorkspace:
 
 def _find_pattern() -> tuple[np.ndarray, sparse.csc_matrix]:
     """Return where the entries of a sparse A are in a full one, and a sparse A."""
-    ones = new_record(
-        MEASURED_BALANCE, A=1.0, b=1.0, lateral_shares=1.0, directions=1.0, force_unit=1.0
-    )
-    inputs = ProgramInputs(np.ones(WHEEL_COUNT), 1.0, 1.0)
-    reference = Reference(np.full(FORCES, 0.5), 0.5)
-    A = build_traction_qp(BalanceRows(array_of(ones)), inputs, reference).A
-    columns, rows = np.nonzero(A.T)
-    return rows * VARIABLES + columns, sparse.csc_matrix(A != 0.0).astype(float)
+    A, shares, each = np.ones((EQUATIONS, FORCES)), np.ones((WHEEL_COUNT, 2)), np.ones(WHEEL_COUNT)
+    rows, qp = BalanceRows(A, np.ones(EQUATIONS), shares, each, 1.0), new_program()
+    write_program(rows, each, 1.0, np.full(FORCES, 0.5), 0.5, qp)
+    columns, entries = np.nonzero(qp.A.T)
+    return entries * VARIABLES + columns, sparse.csc_matrix(qp.A != 0.0).astype(float)
 
 
 def solve_traction(
@@ -146,21 +164,21 @@ def solve_traction(
             equal torques.
     """
     x = rows.pull_equally() if last is None else rows.complete(last / rows.force_unit)
-    forces = Reference(x, measure_peak(rows, inputs, x))
+    shares, friction, qp = rows.lateral_shares, inputs.friction, workspace.qp
+    max_pull = inputs.max_pull(rows.force_unit)
     status, iterations, programs = "", 0, 0
     while programs < max_programs:
-        qp = build_traction_qp(rows, inputs, forces, workspace.qp)
+        write_program(rows, friction, max_pull, x, _measure_peak(shares, friction, x), qp)
         y, count, status, solved = workspace.solve(qp)
         iterations += count
         if not solved:
             break
         programs += 1
         unit = float(qp.scale[TRACTION])
-        aim = rows.complete(unit * y[TRACTIONS])
-        forces, moved = find_best_between(rows, inputs, forces, aim)
-        if moved <= CONVERGED_SHARE * unit:
+        start, aim, x = x, rows.complete(unit * y[TRACTIONS]), np.empty(FORCES)
+        if _search_line(shares, friction, max_pull, (start, aim, x)) <= CONVERGED_SHARE * unit:
             break
-    x = forces.x if programs else rows.pull_equally()
+    x = x if programs else rows.pull_equally()
     fallback = programs == 0 < max_programs
     run = {"iterations": iterations, "programs": programs, "fallback": fallback, "status": status}
     return _describe_answer(rows, inputs, x, run)
@@ -170,46 +188,114 @@ def _describe_answer(
     rows: BalanceRows, inputs: ProgramInputs, x: np.ndarray, run: dict[str, Any]
 ) -> TractionAnswer:
     """Return forces x (14,) in SI units, with what the run of the programs came to."""
-    table = np.empty((len(WHEEL_FORCES), WHEEL_COUNT))
-    peak, min_load, max_traction = write_wheel_forces(rows.packed, inputs.packed, x, table)
+    table = np.empty((5, WHEEL_COUNT))
+    peak, min_load, max_torque = _measure_wheels(
+        rows.lateral_shares, rows.force_unit, inputs.friction, inputs.max_torque, inputs.radius,
+        x, table,
+    )  # fmt: skip
     torques, loads, tractions, lateral, utilisation = table
     return TractionAnswer(
         torques, loads, tractions, lateral, utilisation,
         friction_slack=max(peak - 1.0, 0.0),
         load_slack=max(-min_load, 0.0),
-        torque_slack=max(inputs.radius * max_traction - inputs.max_torque, 0.0),
+        torque_slack=max(max_torque - inputs.max_torque, 0.0),
         **run,
     )  # fmt: skip
 
 
 @kernel
-def write_wheel_forces(balances, all_inputs, x, table):
-    """Write forces x (14,), in force units, into a table of wheel forces.
-
-    Args:
-        balances: Array (1,) of MEASURED_BALANCE.
-        all_inputs: Array (1,) of PROGRAM_INPUTS; torques are cut off at its largest.
-        x: (14,) tractions, loads and lateral terms in force units.
-        table: (5, 6) rows as in WHEEL_FORCES: torques [N m], loads, tractions and lateral forces
-            [N], utilisations, infinite where there is no load.
+def _measure_wheels(shares, unit, friction, limit, radius, x, table):
+    """Write the first five fields of a TractionAnswer into a table (5, 6), for forces x (14,).
 
     Returns:
-        Largest utilisation, smallest load [N], largest size of a traction [N].
+        Largest utilisation, smallest load [N], largest torque without the limit [N m].
     """
-    balance, inputs = balances[0], all_inputs[0]
-    unit, limit = balance.force_unit, inputs.max_torque
-    torques, loads, tractions = table[0], table[1], table[2]
-    laterals, utilisation = table[3], table[4]
     peak, min_load, max_traction = 0.0, np.inf, 0.0
     for wheel in range(WHEEL_COUNT):
         traction, load = unit * x[TRACTION + wheel], unit * x[LOAD + wheel]
-        shares = balance.lateral_shares[wheel]
-        lateral = unit * (x[LATERAL_SHARE] * shares[0] + x[LATERAL_SLOPE] * shares[1])
+        own = shares[wheel]
+        lateral = unit * (x[LATERAL_SHARE] * own[0] + x[LATERAL_SLOPE] * own[1])
         across = np.sqrt(traction * traction + lateral * lateral)
-        used = across / (inputs.friction[wheel] * load) if load > 0.0 else np.inf
-        torques[wheel] = min(max(inputs.radius * traction, -limit), limit)
-        loads[wheel], tractions[wheel], laterals[wheel] = load, traction, lateral
-        utilisation[wheel] = used
+        used = across / (friction[wheel] * load) if load > 0.0 else np.inf
+        table[0, wheel] = min(max(radius * traction, -limit), limit)
+        table[1, wheel], table[2, wheel], table[3, wheel] = load, traction, lateral
+        table[4, wheel] = used
         peak, min_load = max(peak, used), min(min_load, load)
         max_traction = max(max_traction, abs(traction))
-    return peak, min_load, max_traction
+    return peak, min_load, radius * max_traction
+
+
+@kernel
+def _measure_peak(shares, friction, x):
+    """Return the largest sqrt(T^2 + S^2) / (mu N) of x (14,), with loads of MIN_LOAD at least."""
+    peak = 0.0
+    for wheel in range(WHEEL_COUNT):
+        lateral = x[LATERAL_SHARE] * shares[wheel, 0] + x[LATERAL_SLOPE] * shares[wheel, 1]
+        across = np.sqrt(x[TRACTION + wheel] * x[TRACTION + wheel] + lateral * lateral)
+        peak = max(peak, across / (friction[wheel] * max(x[LOAD + wheel], MIN_LOAD)))
+    return peak
+
+
+@kernel
+def _search_line(shares, friction, max_pull, points):
+    """Write the forces of the smallest cost, by golden section; return how far tractions moved.
+
+    Args:
+        shares: (6, 2) `lateral_shares` of the balance.
+        friction: (6,) friction coefficients.
+        max_pull: Largest traction of a motor in force units.
+        points: The last forces, the answer of a program, and the forces to write, (14,) each, in
+            force units.
+    """
+    start, _, x = points
+    # What the program divides by about `start`: the unit of peaks, and that of tractions.
+    mean_friction = 0.0
+    for wheel in range(WHEEL_COUNT):
+        mean_friction += friction[wheel] / WHEEL_COUNT
+    peak_unit = max(_measure_peak(shares, friction, start), MIN_PEAK)
+    units = max_pull, peak_unit, peak_unit * mean_friction
+    low, high = 0.0, LINE_END
+    a, b = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+    cost_a = _cost_at(a, shares, friction, points, units)
+    cost_b = _cost_at(b, shares, friction, points, units)
+    for _ in range(SECTIONS):
+        if cost_a <= cost_b:
+            high, b, cost_b = b, a, cost_a
+            a = high - GOLDEN * (high - low)
+            cost_a = _cost_at(a, shares, friction, points, units)
+        else:
+            low, a, cost_a = a, b, cost_b
+            b = low + GOLDEN * (high - low)
+            cost_b = _cost_at(b, shares, friction, points, units)
+    place, least = 0.5 * (low + high), np.inf
+    for candidate in (0.0, place, 1.0):
+        cost = _cost_at(candidate, shares, friction, points, units)
+        if cost <= least:
+            place, least = candidate, cost
+    _cost_at(place, shares, friction, points, units)
+    moved = 0.0
+    for k in range(TRACTION, TRACTION + WHEEL_COUNT):
+        moved = max(moved, abs(x[k] - start[k]))
+    return moved
+
+
+@kernel
+def _cost_at(place, shares, friction, points, units):
+    """Write the forces at a place on the line, and return what the program minimises.
+
+    `points` are as for `_search_line`; `units` are the largest pull in force units, the unit of
+    peaks, and that of tractions.
+    """
+    start, aim, x = points
+    max_pull, peak_unit, unit = units
+    squares = pull = lift = 0.0
+    for k in range(FORCES):
+        x[k] = start[k] + place * (aim[k] - start[k])
+    for wheel in range(WHEEL_COUNT):
+        traction = x[TRACTION + wheel]
+        squares += traction * traction
+        pull = max(pull, abs(traction) - (1.0 + ROUNDING) * max_pull)
+        lift = max(lift, -x[LOAD + wheel])
+    peak = _measure_peak(shares, friction, x) / peak_unit
+    cost = 0.5 * (PEAK_WEIGHT * peak * peak + EFFORT_WEIGHT * squares / (unit * unit))
+    return cost + SLACK_PRICE * (max(peak - 1.0 / peak_unit, 0.0) + (pull + lift) / unit)

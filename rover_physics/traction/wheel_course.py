@@ -6,13 +6,14 @@ The loops of the controller know one speed: the mean speed of the wheels, positi
 rolls while the others go on as before, so a slow turn of the steering never reverses the loops.
 """
 
+from typing import Any
+
 import numpy as np
 
 from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.rover.steered_drive import SteeredDrive
-from rover_physics.traction.rolling import Rolling
 
 TURN_LEFT = np.repeat([1.0, -1.0], 3)
 """Signs (6,) of wheel torques that turn the rover left: the right wheels drive forward."""
@@ -37,8 +38,8 @@ class WheelCourse:
         self.sign = 1.0
         """Sign of the mean speed over that of the rolling motion of the balance."""
 
-    def take(self, rolling: Rolling, angles: Floats) -> bool:
-        """Take how the wheels roll at measured angles (6,) [rad]; return False for a new motion.
+    def take(self, rolling: Any, angles: Floats) -> bool:
+        """Take a ROLLING at measured angles (6,) [rad]; return False for a new motion.
 
         The motion is new after a change such as that from straight ahead to a turn on the spot.
         """

@@ -49,21 +49,6 @@ class TorqueRanges:
         freeze_fields(self)
 
 
-@dataclass(frozen=True, eq=False)
-class _FeasibleSet:
-    """The forces that keep the constraints, over the rover's weight, linear in x (k,).
-
-    A row holds a constant and k slopes; its value is row @ [1, *x].
-    """
-
-    rows: np.ndarray
-    """(30, 1 + k) rows. First three per wheel, a second-order cone: largest shear force, shear
-    force along the wheel and across it. Then the distance of each torque below its upper limit
-    (6) and above its lower limit (6), over the wheel radius."""
-    thrust: np.ndarray
-    """(6, 1 + k) torque over the wheel radius: T + R."""
-
-
 def find_torque_ranges(
     rover: Rover,
     terrain: Terrain,
@@ -108,7 +93,7 @@ def find_torque_ranges(
         if result.status != PoseStatus.SETTLED or not _is_within(model, results):
             continue
         feasible[i] = True
-        lowest[i], highest[i] = _find_extremes(_describe_set(rover, model, work.balance, result))
+        lowest[i], highest[i] = _find_extremes(*_describe_set(rover, model, work.balance, result))
     scale = model.record.linkage.radius * model.record.linkage.mass * model.record.linkage.gravity
     most = model.settings.allowed_torque  # Clarabel's tolerance is 1e-8
     lowest, highest = (np.clip(scale * ends, -most, most) for ends in (lowest, highest))
@@ -122,7 +107,19 @@ def _is_within(model: PackedModel, results: Any) -> bool:
     return bool((uses.use[0, decisive] < 1.0).all())
 
 
-def _describe_set(rover: Rover, model: PackedModel, balance: Any, result: Any) -> _FeasibleSet:
+def _describe_set(
+    rover: Rover, model: PackedModel, balance: Any, result: Any
+) -> tuple[Floats, Floats]:
+    """Return the forces that keep the constraints, over the rover's weight, linear in x (k,).
+
+    A row holds a constant and k slopes; its value is row @ [1, *x].
+
+    Returns:
+        (30, 1 + k) rows: three per wheel, a second-order cone of largest shear force, shear force
+        along the wheel and across it; then the distance of each torque below its upper limit (6)
+        and above its lower limit (6), over the wheel radius. And (6, 1 + k) the torques over the
+        wheel radius, T + R.
+    """
     weight = model.record.linkage.mass * model.record.linkage.gravity
     known = np.concatenate([result.tangential, result.lateral]) / weight
     slopes = np.vstack([balance.tangential, balance.lateral])
@@ -140,10 +137,10 @@ def _describe_set(rover: Rover, model: PackedModel, balance: Any, result: Any) -
     thrust = tangential + resistance
     limits = np.vstack([-thrust, thrust])
     limits[:, 0] += model.settings.allowed_torque / (model.record.linkage.radius * weight)
-    return _FeasibleSet(np.vstack([*cones, limits]), thrust)
+    return np.vstack([*cones, limits]), thrust
 
 
-def _find_extremes(forces: _FeasibleSet) -> tuple[Floats, Floats]:
+def _find_extremes(rows: Floats, thrust: Floats) -> tuple[Floats, Floats]:
     """Return the lowest and highest thrust (6,) of each wheel; NaN where the solver fails."""
     import clarabel  # imported here: it takes 0.25 s, with scipy.sparse
     from scipy.sparse import csc_matrix
@@ -152,14 +149,14 @@ def _find_extremes(forces: _FeasibleSet) -> tuple[Floats, Floats]:
     settings.verbose = False
     settings.equilibrate_enable = False  # scaled by the weight, all numbers are about 1
     cones = [clarabel.SecondOrderConeT(3)] * 6 + [clarabel.NonnegativeConeT(12)]
-    k = forces.thrust.shape[1] - 1
+    k = thrust.shape[1] - 1
     solver = clarabel.DefaultSolver(
-        csc_matrix((k, k)), np.zeros(k), csc_matrix(-forces.rows[:, 1:]), forces.rows[:, 0],
+        csc_matrix((k, k)), np.zeros(k), csc_matrix(-rows[:, 1:]), rows[:, 0],
         cones, settings,
     )  # fmt: skip
     ends = np.full((2, 6), np.nan)
     for row, sign in enumerate((1.0, -1.0)):
-        for wheel, (constant, *slopes) in enumerate(forces.thrust):
+        for wheel, (constant, *slopes) in enumerate(thrust):
             solver.update(q=sign * np.array(slopes))
             answer = solver.solve()
             if answer.status == clarabel.SolverStatus.Solved:

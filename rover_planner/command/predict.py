@@ -131,7 +131,7 @@ def predict(
             return find_torque_ranges(model, ground, path, options, curvature)
 
         if len(path) > MAX_IN_MEMORY and not (classes or chance):
-            from rover_physics.traversability.partwise import PartwiseJudge
+            from rover_physics.traversability.judge import PartwiseJudge
 
             with writing_parts(out, len(path), assumed) as file:
                 judge = PartwiseJudge(

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from rover_physics.bounds.path import BOUNDED_VALUES
 from rover_physics.errors import RoverFileError
 from rover_physics.files.npz_file import ArrayHeader, NpzParts, open_npz, write_npz
 from rover_physics.files.validation import errors_of, show_file
+from rover_physics.results.path_bounds import BOUNDED_VALUES
 from rover_physics.results.path_prediction import PathPrediction, prediction_of
 from rover_physics.results.record import QUANTITIES
 from rover_physics.traversability.verdict import Verdict

@@ -19,8 +19,7 @@ from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traction.balance import BalanceWriter, MeasuredState
-from rover_physics.traction.layout import LOADS as LOAD_ENTRIES
-from rover_physics.traction.layout import TRACTIONS
+from rover_physics.traction.layout import LOADS, TRACTIONS
 from rover_physics.traction.map_contacts import MapContactFinder
 from rover_planner.learning.drive_log import (
     FORCES,
@@ -56,9 +55,7 @@ class WheelState:
     doubts: Floats
     """(6,) errors of them, because it is not clear where the wheels touch."""
     tractions: Floats
-    """(6,) measured torques over the radius; or what force sensors feel, as in the others."""
-    lateral: Floats
-    """(6,) lateral forces: their sum follows from the balance, their shares are assumed."""
+    """(6,) measured torques over the radius; or what force sensors feel, as in the loads."""
     excess: float
     """Sum of the tractions beyond what holds the rover: resistance, acceleration, errors."""
     clear: Floats
@@ -106,7 +103,7 @@ class ContactSense:
         try:
             ends = [self._finder.find(state, pose, 0.0, way).angles for way in (forward, -forward)]
             tractions = torques / self._radius
-            (loads, lateral, excess), (other_loads, other_lateral, other_excess) = (
+            (loads, excess), (other_loads, other_excess) = (
                 self._balance_at(state, angles, tractions) for angles in ends
             )
         except ModelError:
@@ -116,7 +113,6 @@ class ContactSense:
         share = float(np.clip(-other_excess / spread, 0.0, 1.0)) if spread else 0.5
         doubts = 0.5 * np.abs(loads - other_loads)
         loads = share * loads + (1.0 - share) * other_loads
-        lateral = share * lateral + (1.0 - share) * other_lateral
         excess = share * excess + (1.0 - share) * other_excess
         middle = share * ends[0] + (1.0 - share) * ends[1]
         s, c = np.sin(middle)[:, None], np.cos(middle)[:, None]
@@ -135,7 +131,6 @@ class ContactSense:
             loads = np.where(
                 np.isfinite(felt[:, 2]), c * felt[:, 2] - s * np.nan_to_num(felt[:, 0]), loads
             )
-            lateral = np.where(np.isfinite(felt[:, 1]), felt[:, 1], lateral)
         return WheelState(
             centres=centres,
             along=along,
@@ -143,7 +138,6 @@ class ContactSense:
             loads=loads,
             doubts=doubts,
             tractions=tractions,
-            lateral=lateral,
             excess=excess,
             clear=clear.astype(float),
             links=links,
@@ -152,13 +146,13 @@ class ContactSense:
 
     def _balance_at(
         self, state: MeasuredState, angles: Floats, tractions: Floats
-    ) -> tuple[Floats, Floats, float]:
-        """Return loads and lateral forces (6,), and the tractions' excess, at contact angles."""
+    ) -> tuple[Floats, float]:
+        """Return loads (6,), and the tractions' excess, at contact angles."""
         balance = self._balance.write(replace(state, contact_angles=angles), 0.0)
         unit = balance.force_unit
         forces = balance.complete(tractions / unit)
         excess = float((balance.directions * (tractions - unit * forces[TRACTIONS])).sum())
-        return unit * forces[LOAD_ENTRIES], unit * balance.lateral_forces(forces), excess
+        return unit * forces[LOADS], excess
 
 
 @kernel

@@ -173,7 +173,7 @@ class GroundLearner:
         self._rates, self._place = np.zeros(WHEEL_COUNT), np.full(3, -np.inf)
         self._spot, self._here = np.full((WHEEL_COUNT, 2), np.inf), np.zeros(WHEEL_COUNT)
         self._last: Floats | None = None
-        self._recent: deque[tuple[float, Floats, Floats, float]] = deque(maxlen=WINDOW)
+        self._recent: deque[tuple[Floats, Floats]] = deque(maxlen=WINDOW)
         self._resistance, self._resistance_square, self._steady = 0.0, 0.0, 0.0
         self._slip_time: float | None = None
         self._immobilised_time: float | None = None
@@ -255,7 +255,7 @@ class GroundLearner:
         if state is None:
             return False
         count = np.maximum(block.known[TORQUES], 1.0)
-        self._recent.append((row[TIME], block.squares / count, row, float(block.count)))
+        self._recent.append((row, block.squares / count))
         window = self._windows.take(row[TIME], block.turned / block.count, state)
         if window is None:
             return False
@@ -301,7 +301,7 @@ class GroundLearner:
             self._slip_time = window.time
         good &= turning
         slips, grips = lasting & good, ~slipping
-        rows = [recent[2] for recent in self._recent]
+        rows = [row for row, _ in self._recent]
         climb = _find_change(np.array([row[[PITCH, *_ANGLES]] for row in rows]))
         torques = np.mean([row[TORQUES] for row in rows], axis=0)
         stuck = self._stuck.update(window, torques, climb, self.commanded)
@@ -384,8 +384,8 @@ class GroundLearner:
 
     def _find_fluctuation(self) -> Floats:
         """Return (6,) standard deviations of the torques over the window, over their means."""
-        squares = np.mean([recent[1] for recent in self._recent], axis=0)
-        means = np.mean([recent[2][TORQUES] for recent in self._recent], axis=0)
+        squares = np.mean([squares for _, squares in self._recent], axis=0)
+        means = np.mean([row[TORQUES] for row, _ in self._recent], axis=0)
         spread = np.sqrt(np.maximum(squares - means**2, 0.0))
         return np.asarray(spread / np.maximum(np.abs(means), 1e-9))
 

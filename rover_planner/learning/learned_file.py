@@ -6,11 +6,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from rover_physics.files.user_file import write_file
 from rover_physics.files.validation import errors_of
 from rover_physics.names import WHEELS
+from rover_physics.numerics.plain_values import to_plain
 from rover_planner.errors import PlanningError
 from rover_planner.learning.ground_learner import GroundEstimate
 from rover_planner.learning.soil_fit import SoilEstimate
@@ -23,27 +22,27 @@ def describe(estimate: GroundEstimate, told: float) -> dict[str, Any]:
         estimate: The estimate.
         told: Friction that was assumed before anything was measured.
     """
-    ratios = estimate.slip_ratios
-    found = {
+    found: dict[str, Any] = {
         "friction": asdict(estimate.friction),
         "slip_time": estimate.slip_time,
         "immobilised_time": estimate.immobilised_time,
         "sides": {side: asdict(one) for side, one in estimate.sides.items()},
-        "classes": {str(number): asdict(one) for number, one in estimate.classes.items()},
+        "classes": {number: asdict(one) for number, one in estimate.classes.items()},
         "told_friction": told,
         "mean_is": "the told friction, given the bound"
         if estimate.friction.high is None
         else "measured by wheels that slipped",
-        "resistance": {"mean": estimate.resistance, "std": _finite(estimate.resistance_std)},
-        "slip_ratios": {
-            name: _finite(value) for name, value in zip(WHEELS, ratios.tolist(), strict=True)
-        },
+        "resistance": {"mean": estimate.resistance, "std": estimate.resistance_std},
+        "slip_ratios": dict(zip(WHEELS, estimate.slip_ratios, strict=True)),
         "side_slip": estimate.side_slip,
-        "time": _finite(estimate.time),
+        "time": estimate.time,
         "stuck": estimate.stuck,
         "faults": estimate.faults,
     }
-    return found if estimate.soil is None else found | {"soil": _describe_soil(estimate.soil)}
+    if estimate.soil is not None:
+        found["soil"] = _describe_soil(estimate.soil)
+    contents: dict[str, Any] = to_plain(found)
+    return contents
 
 
 def write_learned(path: Path, contents: dict[str, Any]) -> None:
@@ -60,7 +59,3 @@ def _describe_soil(soil: SoilEstimate) -> dict[str, Any]:
     pairs = {"sinkage": soil.sinkage, "resistance": soil.resistance, "strength": soil.strength}
     values = {name: {"mean": m, "std": s} for name, (m, s) in (pairs | soil.parameters).items()}
     return values | {"told_apart": soil.told_apart, "cohesion_angle_correlation": soil.trade}
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

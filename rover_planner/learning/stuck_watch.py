@@ -2,12 +2,16 @@
 """Notices that a rover is stuck: its wheels push or spin, and it does not move."""
 
 from collections import deque
+from datetime import UTC, datetime
 
 import numpy as np
 
 from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
+from rover_physics.rover.model import Rover
+from rover_planner.learning.drive_log import TIME, YAW, X, Y
 from rover_planner.learning.wheel_slip import LONGEST_GAP, SlipWindow
+from rover_planner.planning.marked_places import MarkedPlace
 
 NO_PROGRESS = 0.10
 """Way over that of the treads below which a rover that rolls does not get on."""
@@ -78,3 +82,20 @@ class StuckWatch:
             elif all(wishes) and max(moved, rolling.max()) < self._slowest:
                 self.reason = "wheels push and do not turn"
         return bool(self.reason)
+
+
+def find_place_ahead(rover: Rover, row: Floats, rolling: float, reason: str) -> MarkedPlace:
+    """Return the place that a stuck rover cannot pass: half a wheelbase, its rim at the body.
+
+    Args:
+        rover: The rover.
+        row: What was measured last, as in `drive_log`; its time is that of the epoch.
+        rolling: Speed at which the wheels roll; below 0 the disc is behind the rover.
+        reason: Why it is stuck.
+    """
+    radius = 0.5 * rover.wheelbase
+    ahead = np.copysign(radius, rolling)
+    x = float(row[X] + ahead * np.cos(row[YAW]))
+    y = float(row[Y] + ahead * np.sin(row[YAW]))
+    date = datetime.fromtimestamp(float(row[TIME]), UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+    return MarkedPlace(round(x, 3), round(y, 3), round(radius, 3), f"{reason} there", date)

@@ -58,8 +58,6 @@ class SlipWindow:
     """(6,) errors of them by unclear contacts [N]."""
     tractions: Floats
     """(6,) mean tractions [N]."""
-    lateral: Floats
-    """(6,) mean lateral forces, with assumed shares [N]."""
     clear: Floats
     """(6,) whether a wheel had one clear contact all the time."""
     excess: float
@@ -154,7 +152,6 @@ class SlipWindows:
             loads=np.mean([state.loads for state in states], axis=0),
             doubts=np.mean([state.doubts for state in states], axis=0),
             tractions=np.mean([state.tractions for state in states], axis=0),
-            lateral=np.mean([state.lateral for state in states], axis=0),
             clear=np.min([state.clear for state in states], axis=0) * steady,
             excess=float(np.mean([state.excess for state in states])),
             unsteadiness=float(steps[-1] - steps[0]),

@@ -26,7 +26,7 @@ from rover_planner.learning.drive_log import YAW, X, Y
 from rover_planner.learning.ground_learner import GroundLearner
 from rover_planner.learning.learned_file import describe
 from rover_planner.learning.soil_fit import SoilFit
-from rover_planner.learning.stuck_place import find_place_ahead
+from rover_planner.learning.stuck_watch import find_place_ahead
 from rover_planner.learning.wheel_odometry import WheelOdometry
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.warm_up import LEARNING

@@ -25,6 +25,7 @@ from msg_adapters.results.diagnostics import (
     make_status,
     to_json,
 )
+from msg_adapters.stamps import NANOSECONDS
 from rover_physics.errors import RoverError
 from rover_physics.numerics.kernel_cache import kernel_cache_note
 from rover_physics.warm_up import EXACT, UNCERTAIN
@@ -76,6 +77,8 @@ NODE_NAME = "traverse_server"
 SWITCH_INTERVAL = 1e-3
 """Longest time for which a thread that prepares maps may delay a question whenever it needs
 Python's lock [s]; Python's thread switch interval."""
+IDLE_PERIOD = 0.5
+"""Time between two beats while no path is watched [s]."""
 DIAGNOSTICS_PERIOD = 1.0
 """Time between two diagnostic messages [s]."""
 
@@ -120,7 +123,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self._hazards = HazardTopics(self, self.service, lambda: self.desk.open_count > 0)
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
         create_steady_timer(self, DIAGNOSTICS_PERIOD, self._publish_diagnostics)
-        create_steady_timer(self, PERIOD, self._beat)
+        self._beats = create_steady_timer(self, PERIOD, self._beat)
         self.follow_changes(load_service_settings, self._apply_settings)
         self._log_ready()
 
@@ -161,11 +164,19 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self._hazards.apply()
 
     def _beat(self) -> None:
-        """Do all that is done ten times a second; each timer of its own would cost a wake-up."""
+        """Do all that is done again and again; each timer of its own would cost a wake-up."""
         self.heard.poll()
         self.watch.beat()
         self._results.serve_late_comers()
         self._hazards.catch_up()
+        self._set_pace()
+
+    def _set_pace(self) -> None:
+        """Beat less often while no path is watched: each wake-up of the executor takes long."""
+        period = round(NANOSECONDS * (IDLE_PERIOD if self.watch.is_idle else PERIOD))
+        if self._beats.timer_period_ns != period:
+            self._beats.timer_period_ns = period
+            self._beats.reset()
 
     def _hear_of_map(self, error: str) -> None:
         """Note why a map was refused, or have the watch look at a new one at once."""
@@ -339,6 +350,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         if judgement.traversable and judgement.candidate is not None:
             poses = judgement.candidate.poses
             self.watch.accept(poses, identity.path_hash or path_hash(plan))
+            self._set_pace()
         return plan, report
 
     def _publish_stop(self, judgement: PathJudgement, watched: str, snapshot: Snapshot) -> None:

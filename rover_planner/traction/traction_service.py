@@ -65,7 +65,7 @@ class TractionUpdate:
     estimate: ContactEstimate | None
     """The contact angles; None if there is a fault."""
     duration: float
-    """Computation time of the update [s]."""
+    """Computation time of the update [s]; 0 if there is a fault."""
 
 
 class TractionService:
@@ -153,11 +153,6 @@ class TractionService:
     def weight(self) -> float:
         """Weight with payload [N]."""
         return float(self._writer.weight)
-
-    @property
-    def terrain(self) -> Terrain | None:
-        """The map; None before the first one."""
-        return None if self._finder is None else self._finder.terrain
 
     @property
     def drives(self) -> bool:
@@ -266,10 +261,11 @@ class TractionService:
         start = time.perf_counter()
         fault = self.find_fault(now)
         if fault:
-            return self.rest(fault, start)
+            return self.rest(fault)
         duration = 0.0 if self._last_time is None else min(now - self._last_time, MAX_STEP)
         self._last_time = now
-        if not self.course.take(self._writer.find_rolling(self._level_state()), self.steering):
+        level = self._measure_state(level_estimate())
+        if not self.course.take(self._writer.find_rolling(level), self.steering):
             self._speed.reset()
         estimate, warning = self._estimate_contacts(now, duration)
         state = self._measure_state(estimate)
@@ -277,23 +273,19 @@ class TractionService:
         try:
             rows = self._write_rows(state, push)
         except ModelError as error:
-            rows, warning = self._write_rows(self._level_state(), push), str(error)
+            rows, warning = self._write_rows(level, push), str(error)
         warning = warning or self.course.describe_refusal(self.wanted)
         answer = self._share_torques(rows)
         self._from_map = estimate.source == MAP_SOURCE
         torques = self._command_torques(answer, rows, duration)
         if not np.isfinite(torques).all():
-            return self.rest(
-                f"torques {torques.tolist()} N m came out; they must be finite", start
-            )
+            return self.rest(f"torques {torques.tolist()} N m came out; they must be finite")
         return TractionUpdate(torques, "", warning, answer, estimate, time.perf_counter() - start)
 
-    def rest(self, fault: str, start: float | None = None) -> TractionUpdate:
+    def rest(self, fault: str) -> TractionUpdate:
         """Return zero torques at once, and reset the loops."""
         self._reset()
-        start = time.perf_counter() if start is None else start
-        duration = time.perf_counter() - start
-        return TractionUpdate(np.zeros(WHEEL_COUNT), fault, "", None, None, duration)
+        return TractionUpdate(np.zeros(WHEEL_COUNT), fault, "", None, None, 0.0)
 
     def _reset(self) -> None:
         """Discard the last answer and set all integrals to zero."""
@@ -332,19 +324,12 @@ class TractionService:
         )
         return self._estimator.update(motion, duration), ""
 
-    def _level_state(self) -> MeasuredState:
-        """Return the measured state with zero contact angles."""
-        joints = _mean_rocker(self.joints.suspension_angles)
-        return MeasuredState(
-            self.roll, self.pitch, joints[0], joints[1:], np.zeros(WHEEL_COUNT),
-            steering=self.steering,
-        )  # fmt: skip
-
     def _measure_state(self, estimate: ContactEstimate) -> MeasuredState:
         """Return the measured state with estimated contact angles."""
-        state = self._level_state()
-        state.contact_angles[:] = estimate.angles
-        return state
+        joints = _mean_rocker(self.joints.suspension_angles)
+        return MeasuredState(
+            self.roll, self.pitch, joints[0], joints[1:], estimate.angles, steering=self.steering
+        )
 
     def _mean_wanted(self) -> float:
         """Return the wanted mean speed of the wheels [m/s]."""

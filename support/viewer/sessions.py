@@ -22,8 +22,9 @@ LSR1 = load_rover("lsr1")
 START, GOAL = (-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)
 FAR = (500_000.0, 4_000_000.0)
 """Place of a map in a UTM zone: easting and northing [m]."""
-SURE = PathQueryOptions(count=5, spacing=0.5, accepted_chance=1.0)
-"""Options of a session without chances of failure, which take most of the time of a verdict."""
+SURE = PathQueryOptions(count=5, spacing=0.5, waypoint_spacing=0.05, accepted_chance=1.0)
+"""Options of a session with waypoints far apart and no chances of failure, which take most of the
+time of a verdict."""
 PATIENCE = 120.0
 """Longest wait for a page [s]; drawing and judging take seconds on a busy machine."""
 

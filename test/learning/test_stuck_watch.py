@@ -30,7 +30,6 @@ def window(
         loads=none,
         doubts=none,
         tractions=none,
-        lateral=none,
         clear=none,
         excess=0.0,
         unsteadiness=0.0,

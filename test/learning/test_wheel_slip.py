@@ -26,7 +26,6 @@ def turn_on_the_spot(blocks: int) -> list[SlipWindow]:
             loads=none,
             doubts=none,
             tractions=none,
-            lateral=none,
             excess=0.0,
             clear=none,
             links=none,

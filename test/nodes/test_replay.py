@@ -15,7 +15,7 @@ from nav_msgs.msg import Path as PathMessage
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from sensor_msgs.msg import JointState, PointCloud2
+from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory
 
@@ -193,12 +193,15 @@ def test_messages_that_cannot_be_used_are_counted_and_told(tmp_path, capsys):
         ("/elevation_cloud", cloud(waves())),
         ("/odometry", odometry_at(1.0, frame="odom")),
         ("/joint_states", JointState(name=["bogie_left"], position=[float("nan")])),
+        ("/imu", Imu(orientation=Quaternion(w=0.0))),
     ]
-    bag = record(tmp_path / "bag", messages)
-    assert main(["replay", str(bag), str(tmp_path / "out")]) == 0
+    bag, file = record(tmp_path / "bag", messages), tmp_path / "server.yaml"
+    file.write_text("/**: {ros__parameters: {imu_attitude: true}}\n")
+    assert main(["replay", str(bag), str(tmp_path / "out"), "--parameters", str(file)]) == 0
     out, err = capsys.readouterr()
-    assert json.loads(out)["refused_messages"] == {"map": 1, "odometry": 1, "joints": 1}
-    assert err.count("not used: ") == 3
+    refused = json.loads(out)["refused_messages"]
+    assert refused == dict.fromkeys(("map", "odometry", "joints", "imu"), 1)
+    assert err.count("not used: ") == 4
     assert "not used: /elevation_cloud at 1700000000.000000000" in err
 
 

@@ -143,14 +143,18 @@ class PathWatch:
     def beat(self) -> None:
         """Have a look taken if one is due, and publish `~/watch`; to be called each PERIOD."""
         now = time.monotonic()
-        is_idle = self.finding.state == IDLE and self._new_path is None
-        if (self.enabled and not is_idle) or now >= self._idle_until:
+        if not self.is_idle or now >= self._idle_until:
             self._idle_until = now + IDLE_PERIOD
             self._offer_sight()
         if self._is_alive and self._state.get_subscription_count():
             health, name = self.describe(), self._service.settings.rover.name
             status = make_status(MONITOR, health.level, health.message, health.values, name)
             self._state.publish(status)
+
+    @property
+    def is_idle(self) -> bool:
+        """True if no path is watched."""
+        return not self.enabled or (self.finding.state == IDLE and self._new_path is None)
 
     @property
     def _is_alive(self) -> bool:

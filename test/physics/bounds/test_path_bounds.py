@@ -12,11 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rover_physics import Rover, SweepOptions, judge_path, load_rover
-from rover_physics.bounds.path import BOUNDED_VALUES, bound_path, forget_terrains, prepare_bounds
+from rover_physics.bounds.path import bound_path, forget_terrains, prepare_bounds
 from rover_physics.errors import ModelError
+from rover_physics.results.path_bounds import BOUNDED_VALUES
 from rover_physics.status import BoundStatus
-from rover_physics.traversability.bounded_verdict import refuse_worst_case
-from rover_physics.traversability.verdict import hold_against_limits
+from rover_physics.traversability.verdict import hold_against_limits, refuse_worst_case
 from support.rough_grounds import fractal, plane, rocky
 from support.uncertain_grounds import (
     arc_across,

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from rover_physics import SweepOptions, judge_path, judge_poses, load_rover
-from rover_physics.forces.servo_balance import CREEP, write_residual
+from rover_physics.forces.servo import CREEP, write_residual
 from rover_physics.forces.servo_motion import SERVO as SERVO_RECORD
 from rover_physics.forces.servo_soil import roll_on_soil
 from rover_physics.forces.servo_wheel import S, T, roll_wheel

@@ -14,7 +14,7 @@ from rover_physics.names import TORQUE_POLICIES
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.rover.model import Steering
-from rover_physics.traversability.partwise import PartwiseJudge
+from rover_physics.traversability.judge import PartwiseJudge
 from support.rough_grounds import plane, random_poses
 
 LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")

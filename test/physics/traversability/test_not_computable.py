@@ -27,8 +27,7 @@ from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.sweep import predict_poses
 from rover_physics.results.record import QUANTITIES
-from rover_physics.traversability.bounded_verdict import refuse_worst_case
-from rover_physics.traversability.verdict import hold_against_limits
+from rover_physics.traversability.verdict import hold_against_limits, refuse_worst_case
 from rover_planner.planning.path_query import path_cost
 from support.rough_grounds import plane
 
@@ -151,9 +150,9 @@ def test_a_bound_that_is_no_number_is_a_refusal():
     ground = replace(LEVEL, elevation_std=np.full(LEVEL.elevation.shape, 1e-4))
     prediction, verdict = judge_path(LSR1, ground, POSES)
     assert verdict.traversable and prediction.bounds is not None
-    loads = prediction.bounds.wheel_loads.copy()
-    loads[2, 4, 0] = math.nan
-    bounds = replace(prediction.bounds, wheel_loads=loads)
+    values = prediction.bounds.values.copy()
+    values["wheel_loads"][2, 4, 0] = math.nan
+    bounds = replace(prediction.bounds, values=values)
     worst = refuse_worst_case(LSR1, prediction, bounds, verdict)
     assert (worst.first_failure, worst.code) == (2, "not_computable")
     assert "wheel_loads" in worst.reason and "3 sigma" in worst.reason

@@ -19,11 +19,11 @@ from rover_physics import (
     judge_pieces,
     load_rover,
 )
-from rover_physics.bounds.path import BOUNDED_VALUES
 from rover_physics.prediction import sweep
 from rover_physics.prediction.packed_model import PackedModel, pack_model
+from rover_physics.results.path_bounds import BOUNDED_VALUES
 from rover_physics.results.record import QUANTITIES
-from rover_physics.traversability.partwise import PartwiseJudge
+from rover_physics.traversability.judge import PartwiseJudge
 from rover_physics.traversability.pieces import SAFE, find_exposure
 from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import bouldered, bowl, fractal, rocky

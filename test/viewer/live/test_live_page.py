@@ -79,6 +79,13 @@ def test_a_live_page_shows_a_rover_and_the_plan_and_forces_of_its_server_until_t
     assert sum(loads) == pytest.approx(LSR1.weight, rel=0.05)
     assert not topic("odometry")["stale"] and words().startswith("live")
     wait_until(lambda: page.scene.paths.lines["plan"], "the plan")
+    ask(page, lambda: page.click(np.array([3.9, 0.0]), False))
+    wait_until(lambda: told("verdict")["passes"] is False, "the refusal of what is off the map")
+    wait_until(lambda: not page.scene.paths.lines["plan"], "no plan")
+    ask(page, lambda: page.click(np.array([1.0, 0.0]), False))
+    wait_until(lambda: page.scene.paths.lines["plan"], "the plan again")
+    page.hear({"ask": "newest"}, None)
+    wait_until(lambda: told("verdict")["about"].startswith("question"), "the newest verdict")
 
     for timer in server.timers:  # the server falls silent, as if it was killed
         timer.cancel()
