@@ -11,8 +11,9 @@ IMPORT_PACKAGES = ("rover_physics", "msg_adapters", "rover_planner")
 HERE = Path(__file__).resolve().parent  # colcon --symlink-install runs a link to this file
 
 # Lower bounds: what Ubuntu Noble has, the home of ROS 2 Jazzy; numba, osqp and clarabel are not in
-# it, and its typer is 0.9, which knows no `float | None`. 0.18 is the first typer that works with
-# every click it allows. constraints-lowest.txt holds the lowest versions; a test installs them.
+# it, its pydantic is version 1, and its typer is 0.9, which knows no `float | None`. 0.18 is the
+# first typer that works with every click it allows. constraints-lowest.txt holds the lowest
+# versions; a test installs them.
 # Upper bounds: the next version that may break. constraints.txt holds the versions tested.
 REQUIRES = [
     "numpy>=1.26,<3",
@@ -20,6 +21,7 @@ REQUIRES = [
     "numba>=0.60,<1",
     "osqp>=1.0,<2",
     "clarabel>=0.10,<1",
+    "pydantic>=2.12,<3",
     "PyYAML>=6.0,<7",
     "typer>=0.18,<1",
     "rich>=13.7,<16",

@@ -2,13 +2,12 @@
 """Rules for the values of configuration files, written in type annotations.
 
 A field such as ``radius: Annotated[float, number("m", above=0.0)]`` defines a key completely:
-`read_as` checks it, and errors quote the rule.
+pydantic checks it, and errors quote the rule. pydantic is imported only when a file is read.
 """
 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Annotated, Any
 
 
@@ -23,10 +22,40 @@ class Rule:
     holds: Callable[[Any], object] = lambda value: True
     """Returns whether a value of the right type keeps the rule."""
 
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """Refuse values of another type or that break the rule; the error quotes the rule."""
+        from pydantic_core import core_schema
+
+        schema: Any = {**handler(source), "strict": True}
+        if schema["type"] == "tuple":
+            schema = core_schema.no_info_before_validator_function(_list_to_tuple, schema)
+        schema = core_schema.no_info_after_validator_function(self._check, schema)
+        return core_schema.custom_error_schema(schema, "rule", custom_error_message=self.must)
+
+    def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
+        """Add the unit to the description of the type."""
+        return {**handler(schema), "unit": self.unit}
+
+    def _check(self, value: Any) -> Any:
+        if not self.holds(value):
+            raise ValueError(self.must)
+        return value
+
 
 @dataclass(frozen=True)
 class ListOfMappings:
     """A list of one or more mappings; each mapping has its own errors."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """Refuse an empty list or another type before the mappings are checked."""
+        from pydantic_core import PydanticCustomError, core_schema
+
+        def check(value: Any) -> Any:
+            if not isinstance(value, list) or not value:
+                raise PydanticCustomError("rule", "a list of one mapping or more")
+            return value
+
+        return core_schema.no_info_before_validator_function(check, handler(source))
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,10 +67,18 @@ class Keys:
     optional: Mapping[str, Any] = field(default_factory=dict)
     """Optional keys."""
 
-    @cached_property
-    def all(self) -> dict[str, Any]:
-        """All keys."""
-        return {**self.required, **self.optional}
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        """Accept a dict with these keys."""
+        from pydantic_core import core_schema
+
+        return core_schema.typed_dict_schema(
+            {
+                key: core_schema.typed_dict_field(
+                    handler.generate_schema(kind), required=key in self.required
+                )
+                for key, kind in {**self.required, **self.optional}.items()
+            }
+        )
 
 
 def number(
@@ -81,3 +118,9 @@ Point = Annotated[
     tuple[Metres, Metres, Metres], Rule("a list of 3 numbers in m, [x, y, z] in the body frame")
 ]
 """A position in [m]."""
+
+
+def _list_to_tuple(value: Any) -> Any:
+    """Return lists and NumPy arrays as tuples, and other values unchanged."""
+    value = value.tolist() if hasattr(value, "tolist") else value
+    return tuple(value) if isinstance(value, list) else value

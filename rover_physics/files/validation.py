@@ -4,25 +4,26 @@
 import difflib
 import math
 import reprlib
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
-from dataclasses import MISSING as NO_DEFAULT
-from dataclasses import fields, is_dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from functools import cache
-from types import NoneType, UnionType
-from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any
 
 from rover_physics.errors import RoverError, RoverFileError
-from rover_physics.files.rules import Keys, ListOfMappings, Rule
 
+if TYPE_CHECKING:
+    from pydantic import TypeAdapter
+
+UNKNOWN_KEY = ("unexpected_keyword_argument", "extra_forbidden", "invalid_key")
+"""Error types of pydantic for unknown keys."""
+MISSING_KEY = "missing"
+RULE_BROKEN = "rule"
+KEY_ITSELF = "[key]"
+"""Last part of pydantic's place of an error about a key that must be a text."""
 MAX_SHOWN = 60
 """Largest number of characters of a value or key in an error text."""
 MAX_FILE_SHOWN = 150
 """Largest number of characters of a file's name in an error text."""
-UNKNOWN, MISSING, WRONG = range(3)
-"""Kinds of faults; those of the first kind are told first."""
-PLAIN = {bool: "true or false", int: "a whole number", float: "a number", str: "a text"}
-"""Types of single values, and the words for them."""
 Key = tuple[str | int, ...]
 
 _brief = reprlib.Repr()
@@ -43,27 +44,24 @@ def read_as(kind: Any, data: object, what: str, at: Key = ()) -> Any:
         RoverFileError: A key is missing, unknown or invalid; the text names the dotted key, the
             value and the rule.
     """
-    reader = _Reader(what)
-    contents = reader.read(kind, data, at)
-    if not reader.faults:
-        return contents
+    from pydantic import ValidationError
+
+    try:
+        return _adapter(kind).validate_python(data, extra="forbid")
+    except ValidationError as error:
+        faults = error.errors(include_url=False, include_context=False)
     # A misspelt key is both unknown and missing; the error of the unknown key has a suggestion.
-    kind_of_fault, text = min(reader.faults, key=lambda fault: fault[0])
-    if kind_of_fault == MISSING and len(reader.missing) > 1:
-        raise RoverFileError(f"missing keys {', '.join(reader.missing)}; {what} needs all of them")
-    raise RoverFileError(text)
+    order = (*UNKNOWN_KEY, MISSING_KEY)
+    first = min(faults, key=lambda fault: (fault["type"] not in order, fault["type"] == order[-1]))
+    missing = [show_key((*at, *one["loc"])) for one in faults if one["type"] == MISSING_KEY]
+    if first["type"] == MISSING_KEY and len(missing) > 1:
+        raise RoverFileError(f"missing keys {', '.join(missing)}; {what} needs all of them")
+    raise RoverFileError(_describe_fault(kind, first, what, at))
 
 
 def find_unit(kind: Any, key: Key) -> str:
     """Return the unit of the number at a key of a type, empty if it has none."""
-    for name in key:
-        kind, marks = _split(kind)
-        keys, parts = _keys_of(kind, marks), get_args(kind)
-        if keys is not None:
-            kind = keys.all[str(name)]
-        else:
-            kind = parts[0] if parts[-1] is Ellipsis else parts[int(name)]
-    return next((mark.unit for mark in _split(kind)[1] if isinstance(mark, Rule)), "")
+    return str(_part(kind, key).get("unit", ""))
 
 
 def refuse(key: str, value: object, must: str) -> RoverFileError:
@@ -118,125 +116,42 @@ def _show_part(part: str) -> str:
 
 
 @cache
-def _keys_of_dataclass(kind: Any) -> Keys:
-    hints = get_type_hints(kind, include_extras=True)
-    required, optional = dict[str, Any](), dict[str, Any]()
-    for one in fields(kind):
-        is_required = one.default is NO_DEFAULT and one.default_factory is NO_DEFAULT
-        (required if is_required else optional)[one.name] = hints[one.name]
-    return Keys(required, optional)
+def _adapter(kind: Any) -> "TypeAdapter[Any]":
+    from pydantic import TypeAdapter
+
+    return TypeAdapter(kind)
 
 
-def _keys_of(kind: Any, marks: Sequence[Any]) -> Keys | None:
-    """Return the keys of a mapping whose keys are known, None for another type."""
-    if isinstance(kind, type) and is_dataclass(kind):
-        return _keys_of_dataclass(kind)
-    return next((mark for mark in marks if isinstance(mark, Keys)), None)
+@cache
+def _json_schema(kind: Any) -> dict[str, Any]:
+    return _adapter(kind).json_schema()
 
 
-def _split(kind: Any) -> tuple[Any, Sequence[Any]]:
-    """Return a type without its marks and without "or None", and the marks."""
-    if get_origin(kind) in (Union, UnionType):
-        kind = next(one for one in get_args(kind) if one is not NoneType)
-    if get_origin(kind) is Annotated:
-        kind, *marks = get_args(kind)
-        return kind, marks
-    return kind, ()
+def _describe_fault(kind: Any, fault: Any, what: str, at: Key) -> str:
+    """Return one line about a fault that pydantic has found."""
+    found, place = fault["loc"], fault["loc"][:-1]
+    key = show_key((*at, *found))
+    if fault["type"] == RULE_BROKEN:
+        return str(refuse(key, fault["input"], fault["msg"] + _hint(fault)))
+    if fault["type"] not in (*UNKNOWN_KEY, MISSING_KEY):
+        part = _part(kind, found)
+        must = fault["msg"].removeprefix("Input should be ")
+        if "properties" in part:
+            must = f"a mapping with {', '.join(_names(part))}"
+        return str(refuse(key or "the file", fault["input"], must))
+    where, part = show_key((*at, *place)) or what, _part(kind, place)
+    if fault["type"] == MISSING_KEY:
+        return f"missing key {key}; {where} needs {', '.join(_names(part))}"
+    name, known = str(found[-1]), tuple(part["properties"])
+    key, hint = show_key((*at, *place, name)), suggest(name, known)
+    return f"unknown key {key}; {hint}{where} has {', '.join(known)}"
 
 
-class _Reader:
-    """Reads contents as types, and collects what is wrong with them."""
-
-    def __init__(self, what: str):
-        self._what = what
-        self.faults: list[tuple[int, str]] = []
-        """Kind and text of each."""
-        self.missing: list[str] = []
-        """The missing keys."""
-
-    def read(self, kind: Any, value: Any, key: Key) -> Any:
-        """Return a value as a type; after a fault, anything."""
-        if value is None and NoneType in get_args(kind):
-            return None
-        kind, marks = _split(kind)
-        for mark in marks:
-            if isinstance(mark, Rule):
-                return self._read_by_rule(kind, mark, value, key)
-            if isinstance(mark, ListOfMappings) and not (isinstance(value, list) and value):
-                return self._refuse(key, value, "a list of one mapping or more")
-        keys = _keys_of(kind, marks)
-        if keys is not None:
-            contents = self._read_keys(keys, value, key)
-            return kind(**contents) if not self.faults else contents
-        if get_origin(kind) is tuple:
-            return self._read_tuple(get_args(kind), value, key)
-        if get_origin(kind) in (dict, Mapping):
-            return self._read_mapping(get_args(kind)[1], value, key)
-        return value if kind is Any else self._read_plain(kind, value, key)
-
-    def _read_by_rule(self, kind: Any, rule: Rule, value: Any, key: Key) -> Any:
-        """Return a value that keeps a rule, of which alone the error tells."""
-        inner = _Reader(self._what)
-        found = inner.read(kind, value, key)
-        if inner.faults or not rule.holds(found):
-            return self._refuse(key, value, rule.must)
-        return found
-
-    def _read_keys(self, keys: Keys, value: Any, key: Key) -> dict[str, Any]:
-        known, where = tuple(keys.all), show_key(key) or self._what
-        needed = ", ".join(keys.required or known)
-        if not isinstance(value, dict):
-            return self._refuse(key, value, f"a mapping with {needed}")
-        found = {}
-        for name, kind in keys.all.items():
-            if name in value:
-                found[name] = self.read(kind, value[name], (*key, name))
-            elif name in keys.required:
-                missing = show_key((*key, name))
-                self.missing.append(missing)
-                self.faults.append((MISSING, f"missing key {missing}; {where} needs {needed}"))
-        for name in (name for name in value if name not in keys.all):
-            unknown, hint = show_key((*key, str(name))), suggest(str(name), known)
-            text = f"unknown key {unknown}; {hint}{where} has {', '.join(known)}"
-            self.faults.append((UNKNOWN, text))
-        return found
-
-    def _read_mapping(self, kind: Any, value: Any, key: Key) -> Any:
-        if not isinstance(value, dict):
-            return self._refuse(key, value, "a mapping")
-        for name in value:
-            if not isinstance(name, str):
-                text = f"a key of {show_key(key) or self._what}"
-                self.faults.append((WRONG, str(refuse(text, name, "a text"))))
-        return {name: self.read(kind, one, (*key, name)) for name, one in value.items()}
-
-    def _read_tuple(self, kinds: tuple[Any, ...], value: Any, key: Key) -> Any:
-        items = value.tolist() if hasattr(value, "tolist") else value
-        if not isinstance(items, list | tuple):
-            return self._refuse(key, value, "a list")
-        kinds = kinds[:1] * len(items) if kinds[-1] is Ellipsis else kinds
-        if len(items) != len(kinds):
-            return self._refuse(key, value, f"a list of {len(kinds)}")
-        pairs = enumerate(zip(kinds, items, strict=True))
-        return tuple(self.read(kind, item, (*key, k)) for k, (kind, item) in pairs)
-
-    def _read_plain(self, kind: Any, value: Any, key: Key) -> Any:
-        """Return a single value; a whole number will do for a number, but no bool for either."""
-        kinds = (int, float) if kind is float else kind
-        if isinstance(value, kinds) and isinstance(value, bool) == (kind is bool):
-            with suppress(OverflowError):
-                return kind(value)
-        return self._refuse(key, value, PLAIN[kind])
-
-    def _refuse(self, key: Key, value: object, must: str) -> Any:
-        text = str(refuse(show_key(key) or "the file", value, must + _hint(value, must)))
-        self.faults.append((WRONG, text))
-
-
-def _hint(value: object, must: str) -> str:
+def _hint(fault: Any) -> str:
     """Return a hint for a number that YAML reads as text."""
+    value = fault["input"]
     items = value if isinstance(value, list) else [value]
-    if "number" not in must or not any(map(_is_number_as_text, items)):
+    if "number" not in fault["msg"] or not any(map(_is_number_as_text, items)):
         return ""
     return (
         "; YAML reads it as text: leave the quotes out, and write an exponent with a decimal "
@@ -249,3 +164,33 @@ def _is_number_as_text(value: object) -> bool:
         return isinstance(value, str) and math.isfinite(float(value))
     except ValueError:
         return False
+
+
+def _names(part: dict[str, Any]) -> Sequence[str]:
+    """Return the required keys of a mapping, or its optional keys if none is required."""
+    return part.get("required") or tuple(part["properties"])
+
+
+def _part(kind: Any, key: Key) -> dict[str, Any]:
+    """Return the JSON schema at a key of a type."""
+    schema = _json_schema(kind)
+    part = _resolve(schema, schema)
+    for name in key:
+        if name == KEY_ITSELF:
+            return {}
+        if "additionalProperties" in part and "properties" not in part:  # keys of any name
+            inner = part["additionalProperties"]
+            if not isinstance(inner, dict):
+                return {}
+        elif isinstance(name, str):
+            inner = part["properties"][name]
+        else:
+            inner = part["prefixItems"][name] if "prefixItems" in part else part["items"]
+        part = _resolve(inner, schema)
+    return part
+
+
+def _resolve(part: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:
+    """Return a part of a JSON schema with references resolved; "X or null" becomes X."""
+    part = part["anyOf"][0] if "anyOf" in part else part
+    return schema["$defs"][part["$ref"].rsplit("/", 1)[1]] if "$ref" in part else part

@@ -52,6 +52,7 @@ STANDING_PERIOD = 0.1
 DEVIATIONS = (0.01, 0.005)
 """Standard deviations in odometry: positions [m] and angles [rad]."""
 COVARIANCE = np.diag(np.repeat(np.square(DEVIATIONS), 3))
+"""The same as (6, 6) of a pose: x, y, z, roll, pitch, yaw."""
 SWITCH_INTERVAL = 5e-4
 """Longest time for which the thread that makes maps may delay a step whenever that needs Python's
 lock [s]; Python's thread switch interval."""

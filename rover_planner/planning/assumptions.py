@@ -3,12 +3,10 @@
 
 import json
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 from rover_physics.bounds.path import SIGMAS
 from rover_physics.errors import RoverError
-from rover_physics.files.rules import number
-from rover_physics.files.validation import read_as
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_planner.errors import PlanningError
@@ -16,32 +14,32 @@ from rover_planner.errors import PlanningError
 if TYPE_CHECKING:
     from rover_planner.planning.path_query import PathQueryOptions
 
-Number = Annotated[float, number("")]
-
 
 @dataclass(frozen=True)
 class Assumptions:
     """Rover and options of a prediction, as a file keeps them; None is the rover's own value."""
 
+    __pydantic_config__ = {"extra": "forbid", "strict": True, "allow_inf_nan": False}  # noqa: RUF012
+
     rover: str
     """Name of the rover."""
     policy: str
     """Torque policy."""
-    control_margin: Number = 0.0
+    control_margin: float = 0.0
     """Share of friction and torque left to the controller."""
-    friction: Number | None = None
+    friction: float | None = None
     """Coulomb friction where the terrain has none."""
-    max_torque: Number | None = None
+    max_torque: float | None = None
     """Largest wheel torque [N m]."""
     soil: str | None = None
     """Preset soil where the terrain names none; None: Coulomb friction."""
-    payload: Number | None = None
+    payload: float | None = None
     """Mass at the arm's tip [kg]."""
-    joint_angles: dict[str, Number] | None = None
+    joint_angles: dict[str, float] | None = None
     """Arm angles [rad] by joint name; None is stowed."""
     has_tool_load: bool = False
     """True if a force or moment acted on the arm's tip."""
-    map_sigmas: Number = SIGMAS
+    map_sigmas: float = SIGMAS
     """Standard deviations that were allowed for."""
 
     def change(self, rover: Rover) -> Rover:
@@ -91,11 +89,14 @@ def read_assumptions(text: str) -> Assumptions:
     Raises:
         PlanningError: The text is something else.
     """
+    from pydantic import TypeAdapter, ValidationError
+
     from rover_planner.planning.path_query import PathQueryOptions
 
     try:
-        assumptions: Assumptions = read_as(Assumptions, json.loads(text), "a set of assumptions")
+        assumptions: Assumptions = TypeAdapter(Assumptions).validate_json(text)
         assumptions.change_options(PathQueryOptions())
-    except (ValueError, RecursionError, RoverError) as error:
-        raise PlanningError(f"assumptions are invalid: {error}") from None
+    except (ValidationError, RoverError) as error:
+        reason = str(error).splitlines()[0]
+        raise PlanningError(f"assumptions are invalid: {reason}") from None
     return assumptions

@@ -22,6 +22,7 @@ PLAIN = {
     "numba": "numba",
     "numpy": "numpy",
     "osqp": "osqp",
+    "pydantic": "pydantic",
     "rich": "rich",
     "scipy": "scipy",
     "typer": "typer",

@@ -8,18 +8,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
+from pydantic import Field
+
 from rover_physics.errors import RoverFileError
 from rover_physics.files.config_files import find_config
-from rover_physics.files.rules import (
-    Keys,
-    ListOfMappings,
-    Metres,
-    Radians,
-    Rule,
-    Text,
-    choice,
-    number,
-)
+from rover_physics.files.rules import ListOfMappings, Metres, Radians, Rule, Text, choice, number
 from rover_physics.files.validation import Key, errors_of, read_as, refuse, show_file
 from rover_physics.files.yaml_file import read_yaml
 from rover_physics.rover.model import Rover
@@ -73,35 +66,28 @@ def _are_names(texts: Sequence[str]) -> bool:
 _NUMBER = Rule("a number in the unit of that number of the rover", holds=math.isfinite)
 
 
-_PARAMETER = Keys(
-    {
-        "name": Text,
-        "from": Annotated[float, _NUMBER],
-        "to": Annotated[float, _NUMBER],
-    },
-    {
-        "count": Annotated[int, _whole(2, 1000)],
-        "also": Annotated[
-            tuple[Text, ...], Rule("a list of one name or more, all different", holds=_are_names)
-        ],
-    },
-)
+@dataclass(frozen=True, kw_only=True)
+class ParameterEntry:
+    """A varied number of the rover, as written in a study file."""
+
+    name: Text
+    """Dotted name, such as suspension.bogie_pivot.z."""
+    low: Annotated[float, Field(alias="from"), _NUMBER]
+    """Smallest value."""
+    high: Annotated[float, Field(alias="to"), _NUMBER]
+    """Largest value."""
+    count: Annotated[int, _whole(2, 1000)] = 11
+    """Number of values in a sweep, including both ends."""
+    also: Annotated[
+        tuple[Text, ...], Rule("a list of one name or more, all different", holds=_are_names)
+    ] = ()
+    """Names of further numbers that get the same value."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class StudyParameter:
+class StudyParameter(ParameterEntry):
     """A varied number of the rover with its keys, unit and current value."""
 
-    name: str
-    """Dotted name, such as suspension.bogie_pivot.z."""
-    low: float
-    """Smallest value, `from` in a file."""
-    high: float
-    """Largest value, `to` in a file."""
-    count: int = 11
-    """Number of values in a sweep, including both ends."""
-    also: tuple[str, ...] = ()
-    """Names of further numbers that get the same value."""
     keys: tuple[Key, ...]
     """Its key in the rover file, then those of the further numbers."""
     unit: str
@@ -175,7 +161,7 @@ class _StudyFile(StudyOptions):
     """The keys of a study file."""
 
     rover: Text
-    parameters: Annotated[tuple[Annotated[dict[str, Any], _PARAMETER], ...], ListOfMappings()]
+    parameters: Annotated[tuple[ParameterEntry, ...], ListOfMappings()]
     drives: Annotated[tuple[StudyDrive, ...], ListOfMappings()] | None = None
 
 
@@ -222,7 +208,7 @@ def study_from_dict(data: object, source: str, folder: Path = Path()) -> Study:
 
 def _check_use(file: _StudyFile) -> None:
     """Check that drives are given if needed, and drives and soil only if they are used."""
-    count = math.prod(one.get("count", StudyParameter.count) for one in file.parameters)
+    count = math.prod(parameter.count for parameter in file.parameters)
     if file.method == "sweep" and count > MAX_TRIALS:
         raise RoverFileError(
             f"parameters have {count:.3g} combinations; a sweep tries at most {MAX_TRIALS}: lower "
@@ -249,7 +235,7 @@ def _check_use(file: _StudyFile) -> None:
 
 
 def _find_parameters(
-    entries: Sequence[Mapping[str, Any]], rover: Rover
+    entries: Sequence[ParameterEntry], rover: Rover
 ) -> tuple[StudyParameter, ...]:
     """Return the parameters with their keys in the rover file; check that none is varied twice."""
     contents, found, taken = rover_to_dict(rover), [], set[Key]()
@@ -257,25 +243,21 @@ def _find_parameters(
         parameter = _find_parameter(entry, contents, f"parameters[{k}]")
         if taken & {*parameter.keys}:
             must = "a number that no other parameter varies"
-            raise refuse(f"parameters[{k}].name", entry["name"], must)
+            raise refuse(f"parameters[{k}].name", entry.name, must)
         taken |= {*parameter.keys}
         found.append(parameter)
     return tuple(found)
 
 
-def _find_parameter(
-    entry: Mapping[str, Any], contents: Mapping[str, Any], at: str
-) -> StudyParameter:
-    given = dict(entry)
-    low, high, also = given.pop("from"), given.pop("to"), given.get("also", ())
-    if not low < high:
-        raise refuse(f"{at}.to", high, f"above from, {low:g}")
-    key, unit = find_key(contents, entry["name"])
-    others = [find_key(contents, name) for name in also]
+def _find_parameter(entry: ParameterEntry, contents: Mapping[str, Any], at: str) -> StudyParameter:
+    if not entry.low < entry.high:
+        raise refuse(f"{at}.to", entry.high, f"above from, {entry.low:g}")
+    key, unit = find_key(contents, entry.name)
+    others = [find_key(contents, name) for name in entry.also]
     if any(own_unit != unit for _, own_unit in others):
-        raise refuse(f"{at}.also", also, f"names of numbers in {unit or 'no unit'}")
-    keys, now = (key, *(other for other, _ in others)), get_value(contents, key)
-    return StudyParameter(**given, low=low, high=high, keys=keys, unit=unit, now=now)
+        raise refuse(f"{at}.also", entry.also, f"names of numbers in {unit or 'no unit'}")
+    keys = (key, *(other for other, _ in others))
+    return StudyParameter(**vars(entry), keys=keys, unit=unit, now=get_value(contents, key))
 
 
 def _find_file(drive: StudyDrive, folder: Path) -> StudyDrive:

@@ -20,6 +20,8 @@ ROS_FREE = {
     "numba",
     "osqp",
     "clarabel",
+    "pydantic",
+    "pydantic_core",
     "yaml",
     "rover_physics",
 }

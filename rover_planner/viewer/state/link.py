@@ -2,16 +2,14 @@
 """A link that holds what the page shows: rover, changed numbers, ends, path, time and colours."""
 
 import base64
-import json
 import zlib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Annotated, Any
 from urllib.parse import parse_qs
 
-from rover_physics.errors import RoverFileError
-from rover_physics.files.rules import Radians, Rule, number
-from rover_physics.files.validation import read_as
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+
 from rover_planner.errors import PlanningError
 from rover_planner.viewer.state.scenario import Pose
 
@@ -27,6 +25,8 @@ MAX_TEXT = 200_000
 class PageLink:
     """Content of a link to the page."""
 
+    __pydantic_config__ = ConfigDict(allow_inf_nan=False, extra="forbid")
+
     loaded: Mapping[str, Any]
     """Content of the file of the rover as it was loaded."""
     rover: Mapping[str, Any]
@@ -41,18 +41,21 @@ class PageLink:
     """Torque policy."""
     soil: str
     """Preset soil; empty for none."""
-    path: Annotated[int, Rule("a whole number from 1", holds=lambda path: path >= 1)]
+    path: Annotated[int, Field(ge=1)]
     """Number of the path that is looked at, from 1."""
-    time: Annotated[float, number("s")]
+    time: float
     """Time of the drive [s]."""
     layer: str
     """Name of the layer that colours the ground."""
-    heading: Annotated[float, number("deg", least=-180.0, most=180.0)]
+    heading: Annotated[float, Field(ge=-180.0, le=180.0)]
     """Heading of the rover for predicted layers [deg]."""
-    joints: Mapping[str, Radians] = field(default_factory=dict)
+    joints: Mapping[str, float] = field(default_factory=dict)
     """Angles of the arm's joints by name [rad]."""
     along: bool = False
     """True if predicted layers are for the heading of the path, not for `heading`."""
+
+
+LINK = TypeAdapter(PageLink)
 
 
 def write_link(link: PageLink) -> str:
@@ -61,8 +64,7 @@ def write_link(link: PageLink) -> str:
     Raises:
         PlanningError: It would have more than MAX_LENGTH characters.
     """
-    text = json.dumps(asdict(link), separators=(",", ":"), ensure_ascii=False)
-    packed = base64.urlsafe_b64encode(zlib.compress(text.encode(), 9))
+    packed = base64.urlsafe_b64encode(zlib.compress(LINK.dump_json(link), 9))
     query = f"{KEY}={packed.decode().rstrip('=')}"
     if len(query) >= MAX_LENGTH:
         raise PlanningError(
@@ -90,7 +92,8 @@ def read_link(query: str) -> PageLink | None:
     if not unpacker.eof:
         raise PlanningError(f"the link is cut off, or holds more than {MAX_TEXT} bytes")
     try:
-        link: PageLink = read_as(PageLink, json.loads(text), "a link")
-    except (ValueError, RecursionError, RoverFileError) as error:
-        raise PlanningError(f"the link is invalid: {error}") from None
-    return link
+        return LINK.validate_json(text)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(map(str, first["loc"])) or "it"
+        raise PlanningError(f"the link is invalid: {where}: {first['msg']}") from None
