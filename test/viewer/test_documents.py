@@ -160,6 +160,7 @@ def test_the_chance_of_failure_is_a_lane_of_its_own_with_its_main_cause():
     curve = told[-1]["now"]["y"][0]
     assert max(curve) == pytest.approx(max(verdict.failure_chance_at), abs=1e-3)
     use = describe_uses(shown.path, np.inf, shown.chance)[-1]
+    assert use["broken"]
     percent = f"{100.0 * verdict.failure_chance:.0f} %"
     assert use["value"] == f"whole path {percent}"
     words = describe_verdict(shown, Work())

@@ -77,6 +77,7 @@ def describe_uses(
     if chance is not None:
         of = "whole path" if failure is None or failure.code == CHANCE else "up to the failure"
         uses[-1]["value"] = f"{of} {100.0 * chance.path:.0f} %"
+        uses[-1]["broken"] = failure is not None and failure.code == CHANCE
     return uses
 
 
