@@ -64,7 +64,7 @@ def show_names(total: int) -> Iterator[Callable[[str], None]]:
         A function to call with the name of each of at most `total` pieces when it begins.
     """
     if not _is_terminal():
-        yield lambda name: print(f"compiling {name}", file=sys.stderr, flush=True)
+        yield lambda name: print(f"compiling to {name}", file=sys.stderr, flush=True)
         return
     with _open_bar("{task.completed}/{task.total}") as progress:
         task, begun = progress.add_task("load kernels", total=total), itertools.count()
