@@ -155,6 +155,11 @@ class TractionService:
         return float(self._writer.weight)
 
     @property
+    def terrain(self) -> Terrain | None:
+        """The map; None before the first one."""
+        return None if self._finder is None else self._finder.terrain
+
+    @property
     def drives(self) -> bool:
         """True if the last update did not rest."""
         return self._last is not None
