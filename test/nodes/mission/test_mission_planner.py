@@ -97,7 +97,7 @@ def run_planner(monkeypatch, capfd):
 
 def test_answers_drives_and_refusals_have_exit_codes_of_their_own(start_server, run_planner):
     server = start_server(planner="fan")
-    code, out, _ = run_planner(NEAR, "--timeout=10")  # nothing is judged without a map
+    code, out, _ = run_planner(NEAR, "--timeout=4")  # nothing is judged without a map
     assert code == 1 and "goal 1: not judged, " in out
     server.service.take_terrain(make_terrain(wall_at(0.5)))
     code, out, _ = run_planner(BEYOND, NEAR)
