@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Trials of a traverse server in its own process: many questions at once, and a signal."""
+"""Trials of a traverse server in its own process: many questions at once, a signal, death."""
 
 import itertools
 import json
@@ -10,7 +10,7 @@ from collections import Counter
 
 import pytest
 
-from benchmarks.processes import SERVER, START_TIME, finish, open_nodes
+from benchmarks.processes import SERVER, START_TIME, LostAnswerError, finish, open_nodes
 from msg_adapters.identity import path_hash
 from msg_adapters.paths import poses_path
 from support.grounds import make_terrain, waves
@@ -59,6 +59,30 @@ def test_fifty_questions_at_once_are_answered_or_refused_within_the_budget(
     assert time.monotonic() - began < budget + LATE
     codes = Counter(json.loads(message)["code"] or "traversable" for message in messages)
     assert codes.keys() <= {"traversable", "busy", "too_long"} and codes["busy"] >= busy
+
+
+def test_no_answer_is_lost_under_questions_without_a_pause(nodes):
+    nodes.start(SERVER, terrain_file=make_terrain(waves), candidate_count=1, time_budget=30.0)
+    asker, answers, end = nodes.client("asker").connect(), 0, time.monotonic() + 4.0
+    while time.monotonic() < end:
+        assert asker.plan((-2.0, 0.0, 0.0), (2.0, 0.3, 0.0), 40.0).poses
+        answers += 1
+    assert answers > 20
+
+
+def test_after_a_sudden_death_a_new_server_answers_the_same_client(nodes):
+    server, asker = begin_heavy_question(nodes)
+    os.kill(server.pid, signal.SIGKILL)
+    wait_until(lambda: not server.running, "the end of the server")
+    began = time.monotonic()
+    nodes.start(SERVER, planner="fan", terrain_file=make_terrain(waves))
+    while time.monotonic() - began < 15.0:
+        try:
+            assert asker.plan(START, GOAL, 1.0).poses
+            return
+        except LostAnswerError:
+            continue
+    pytest.fail("the new server has not answered")
 
 
 def test_a_signal_during_a_question_ends_the_server_soon(nodes):
