@@ -76,7 +76,6 @@ class PolledTopics:
             except Exception as error:
                 self._guard.report(f"reading of {name}", error)
 
-
     def _read(self, topic: _Topic) -> list[tuple[int, str, Callable[[Any, float], None], Any]]:
         """Return what has come with its time [ns], the name of the topic and who takes it."""
         handle, arrived = topic.subscription.handle, []
