@@ -12,7 +12,8 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.query import LatticeSettings
-from rover_planner.viewer.state.background_work import Progress
+from rover_planner.viewer.state.background_work import BackgroundWork, Progress
+from rover_planner.viewer.state.inbox import Inbox
 from rover_planner.viewer.state.scenario import Scenario
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, waves
@@ -80,10 +81,24 @@ def ask(page: Any, action: Callable[[], Any]) -> None:
     wait_until(lambda: not page._fulfils, "what the action makes the page say", PATIENCE)
 
 
-def finish(session: ViewSession) -> None:
-    """Wait until a session that judges in the background has judged, and take what was found."""
-    wait_until(lambda: session.progress is None, "the end of the work", 60.0)
-    session.take_finished()
+class Judge:
+    """Judges for a session in a thread, as a page does, until it is closed."""
+
+    def __init__(self, session: ViewSession):
+        """Let a session judge in the background; nothing is judged yet."""
+        self.session, self._found = session, Inbox[Any]()
+        self.work = BackgroundWork(session.find_steps, lambda *found: self._found.put(found))
+        session.judge = self.work.ask
+
+    def take(self) -> None:
+        """Let the session take what was found."""
+        for request, found in self._found.take().values():
+            self.session.take(request, found)
+
+    def finish(self) -> None:
+        """Wait until all is judged, and let the session take it."""
+        wait_until(lambda: self.work.progress is None, "the end of the work", 60.0)
+        self.take()
 
 
 def wait_patiently(condition: Callable[[], Any], what: str) -> None:

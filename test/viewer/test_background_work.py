@@ -12,7 +12,7 @@ import pytest
 from rover_planner.planning.path_query import answer_path_query
 from rover_planner.viewer.state.background_work import BackgroundWork, Progress
 from rover_planner.viewer.state.judging import PATH, JudgeRequest, judge_request
-from support.viewer.sessions import finish, ramp, session_on, slow_scenario
+from support.viewer.sessions import Judge, ramp, session_on, slow_scenario
 from support.waiting import start_watch, wait_until
 
 STOP_TIME = 2.0
@@ -29,9 +29,16 @@ def judge_without_end(request):
 
 
 @pytest.fixture
-def busy_judge():
+def found() -> list:
+    """What work has found: requests, and results or errors."""
+    return []
+
+
+@pytest.fixture
+def busy_judge(found):
     """A thread that judges, and does not end with SLOW by itself; it must end."""
-    work = BackgroundWork(judge_without_end, lambda: None, "judge of this test")
+    take = lambda request, one: found.append((request, one))  # noqa: E731
+    work = BackgroundWork(judge_without_end, take, "judge of this test")
     yield work
     assert work.close()
     assert "judge of this test" not in {thread.name for thread in threading.enumerate()}
@@ -41,7 +48,7 @@ def wait_for_idle(work) -> None:
     wait_until(lambda: work.progress is None, "the end of the work", 60.0)
 
 
-def test_a_newer_request_stops_at_once_what_follows_a_result():
+def test_a_newer_request_stops_at_once_what_follows_a_result(found):
     steps = {"old": 0}
 
     def count_steps(request):
@@ -52,19 +59,19 @@ def test_a_newer_request_stops_at_once_what_follows_a_result():
             time.sleep(0.005)
         yield "last"
 
-    work = BackgroundWork(count_steps, lambda: None, "counts")
+    work = BackgroundWork(count_steps, lambda *one: found.append(one))
     work.ask("old")
     wait_until(lambda: steps["old"] > 3, "the old work to begin")
     work.ask("new")
     asked_at = steps["old"]
     wait_for_idle(work)
     assert steps["old"] <= asked_at + 2
-    assert [(one.request, one.result) for one in work.take()][-1] == ("new", "last")
+    assert found == [("old", "first"), ("new", "first"), ("new", "last")]
     assert work.close()
 
 
 @pytest.mark.timed
-def test_cancelled_work_stops_soon_and_is_never_delivered(busy_judge):
+def test_cancelled_work_stops_soon_and_is_never_delivered(busy_judge, found):
     quick = session_on(ramp).wanted
     busy_judge.ask(JudgeRequest(SLOW))
     wait_until(lambda: busy_judge.progress.step == 2, "the second path")
@@ -76,7 +83,7 @@ def test_cancelled_work_stops_soon_and_is_never_delivered(busy_judge):
     wait_until(lambda: busy_judge.progress is None or busy_judge.progress.what, "the next work")
     assert passed() < STOP_TIME
     wait_for_idle(busy_judge)
-    assert {one.request.scenario for one in busy_judge.take()} == {quick}
+    assert {request.scenario for request, _ in found} == {quick}
     busy_judge.ask(JudgeRequest(SLOW))
     wait_until(lambda: busy_judge.progress.what, "the work to begin")
     passed = start_watch()
@@ -85,19 +92,17 @@ def test_cancelled_work_stops_soon_and_is_never_delivered(busy_judge):
 
 
 @pytest.mark.parametrize("error", [MemoryError(), SystemExit(3)])
-def test_no_error_ends_the_thread(error):
+def test_no_error_ends_the_thread(error, found):
     def fail_or_answer(request):
         if request:
             raise error
         yield "answer"
 
-    work = BackgroundWork(fail_or_answer, lambda: None)
-    work.ask(True)
-    wait_for_idle(work)
-    assert [one.error for one in work.take()] == [error]
-    work.ask(False)
-    wait_for_idle(work)
-    assert [one.result for one in work.take()] == ["answer"]
+    work = BackgroundWork(fail_or_answer, lambda *one: found.append(one))
+    for fails in (True, False):
+        work.ask(fails)
+        wait_for_idle(work)
+    assert found == [(True, error), (False, "answer")]
     assert work.close()
 
 
@@ -105,7 +110,7 @@ def test_a_process_ends_although_work_runs_in_it():
     code = (
         "import itertools, time\n"
         "from rover_planner.viewer.state.background_work import BackgroundWork, Progress\n"
-        "work = BackgroundWork(lambda _: itertools.repeat(Progress('on', 1, 1)), lambda: None)\n"
+        "work = BackgroundWork(lambda _: itertools.repeat(Progress('on', 1, 1)), print)\n"
         "work.ask('for ever')\n"
         "while not work.progress.what: time.sleep(0.01)\n"
         "print('end', flush=True)\n"
@@ -118,20 +123,20 @@ def test_a_process_ends_although_work_runs_in_it():
 
 
 @pytest.fixture
-def session():
-    """A session on a ramp that judges in the background."""
-    made = session_on(ramp)
-    made.judge_in_background(lambda: None)
+def judge():
+    """Judges in the background for a session on a ramp."""
+    made = Judge(session_on(ramp))
     yield made
-    assert made.close()
+    assert made.work.close()
 
 
-def test_changes_add_up_although_the_judgements_between_are_dropped(session):
+def test_changes_add_up_although_the_judgements_between_are_dropped(judge):
+    session = judge.session
     session.plan_to(np.array([1.5, 0.5]))
     session.change_rover([("friction",)], 0.5)
     session.change_arm("arm_yaw", 0.3)
     session.change_options(soil="dry_sand")
-    finish(session)
+    judge.finish()
     asked = session.shown.scenario
     assert asked is session.wanted and session.is_complete
     assert asked.goal[:2] == (1.5, 0.5) and asked.rover.friction == 0.5
@@ -141,19 +146,19 @@ def test_changes_add_up_although_the_judgements_between_are_dropped(session):
     assert [p.verdict for p in session.shown.paths] == [c.verdict for c in answer.candidates]
 
 
-def test_an_error_of_the_judgement_is_raised_and_stops_it(session):
-    session.change_options(map_sigmas="many")  # type: ignore[arg-type]
-    wait_for_idle(session)
+def test_an_error_of_the_judgement_is_raised_and_stops_it(judge):
+    judge.session.change_options(map_sigmas="many")  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="many"):
-        session.take_finished()
-    assert session.is_outdated and session.is_stopped
+        judge.finish()
+    assert judge.session.is_outdated and judge.session.is_stopped
 
 
-def test_a_path_of_an_old_list_is_not_chosen_while_others_are_planned(session):
+def test_a_path_of_an_old_list_is_not_chosen_while_others_are_planned(judge):
+    session = judge.session
     session.plan_to(np.array([1.5, 0.5]))
     with pytest.raises(Exception, match="the listed paths are old"):
         session.show_path(1)
-    finish(session)
+    judge.finish()
     session.show_path(1)
-    finish(session)
+    judge.finish()
     assert session.shown.index == 1

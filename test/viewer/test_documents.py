@@ -18,9 +18,8 @@ from rover_planner.viewer.documents.limits import (
     describe_uses,
 )
 from rover_planner.viewer.documents.numbers import plain
-from rover_planner.viewer.documents.paths import list_paths
 from rover_planner.viewer.documents.rover import compare_drives, describe_sliders, read_values
-from rover_planner.viewer.documents.verdict import Work, describe_verdict
+from rover_planner.viewer.documents.verdict import Work, describe_verdict, list_paths
 from rover_planner.viewer.state.limits import ShownLimit, write_use
 from rover_planner.viewer.state.scenario import Judged
 from rover_planner.viewer.state.session import ViewSession
@@ -79,7 +78,8 @@ def test_a_limit_is_broken_on_a_lane_exactly_where_the_verdict_refuses_the_path(
     if failure is not None:
         assert failure.code == verdict.code and failure.headline
         assert np.isfinite(failure.state.position).all()
-        assert failure.is_settled == (failure.code != "unknown_ground")
+        stands = np.isfinite(failure.state.wheel_loads).all()
+        assert stands == (failure.code != "unknown_ground")
 
 
 @pytest.mark.parametrize("policy", [EQUAL, OPTIMAL])
@@ -242,7 +242,7 @@ def test_a_failure_between_waypoints_has_the_pose_at_which_the_model_was_asked()
 def test_where_the_rover_does_not_settle_a_level_one_stands_and_the_wheel_beyond_is_named():
     failure = judged_on(gap).failure
     assert failure is not None and failure.code == "unknown_ground"
-    assert not failure.is_settled and failure.link.startswith("front")
+    assert np.isnan(failure.state.wheel_loads).all() and failure.link.startswith("front")
     assert failure.headline.startswith("unknown ground, front")
     np.testing.assert_allclose(failure.state.attitude[:2], 0.0)
     wheels = failure.state.wheel_centres - failure.state.position

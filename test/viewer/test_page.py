@@ -201,7 +201,7 @@ def test_a_button_that_is_pressed_while_what_it_stands_on_is_told_anew_takes_the
 ):
     visitor.press("To the start")
     visitor.tab.wait_for_timeout(4000)  # the longest press is 5 s: this one must not end the next
-    with held(page.session._background):
+    with held(page._judging):
         page.hear({"ask": "value", "label": FRICTION, "value": 0.75}, None)
         visitor.tab.get_by_role("button", name="Cancel").hover()
         visitor.tab.mouse.down()
@@ -222,7 +222,7 @@ def test_a_click_into_the_scene_sets_the_goal_and_one_into_the_sky_is_refused(vi
     box = visitor.tab.locator("#scene").bounding_box()
     middle = box["x"] + 0.5 * box["width"], box["y"] + 0.7 * box["height"]
     client = wait_for_scene(page)
-    ask(page, lambda: page._look(client, "Fit"))
+    ask(page, lambda: page._look([client], "Fit"))
     visitor.tab.wait_for_timeout(500)
     visitor.tab.mouse.click(*middle)
     wait_until(lambda: page.session.wanted.goal != goal, "another goal")

@@ -3,7 +3,6 @@
 
 import json
 import threading
-import time
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -34,7 +33,7 @@ from support.viewer.sessions import wait_patiently as wait_until
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
-from rover_planner.viewer.pages import page as page_module
+from rover_planner.viewer.pages import base
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.scene.nodes import Nodes, Strand
 from rover_planner.viewer.scene.rover_visual import RoverVisual
@@ -143,7 +142,7 @@ def test_a_rover_file_and_a_preset_are_loaded_and_the_arm_follows(page):
     page.hear({"ask": "upload", "name": "bare.yaml", "text": text}, None)
 
     def meshes() -> dict:
-        return {} if page.scene._visual is None else page.scene._visual._meshes
+        return page.scene.rover.visual._meshes
 
     wait_until(lambda: told(page, "sliders")["rover"] == "bare", "the loaded rover")
     wait_until(lambda: "arm" not in meshes() and "body" in meshes(), "no arm")
@@ -155,7 +154,7 @@ def test_a_rover_file_and_a_preset_are_loaded_and_the_arm_follows(page):
 
 def test_while_a_change_is_judged_the_verdict_and_the_paths_are_grey_and_it_can_be_cancelled(page):
     session, shown = page.session, page.session.shown
-    with held(session._background):
+    with held(page._judging):
         change_friction(page, 0.75)
         wait_until(lambda: told(page, "verdict")["judging"], "the notice")
         assert told(page, "verdict")["old"].startswith("judging path")
@@ -178,13 +177,13 @@ def test_the_verdict_is_told_before_its_drawings_and_policies_are_judged_after_t
     begun, go_on, judged, show = threading.Event(), threading.Event(), [], page.scene.paths.show
 
     def draw_slowly(*arguments) -> None:
-        progress = page.session.progress
+        progress = page._judging.progress
         judged.append(progress.what if progress else "")
         begun.set()
         assert go_on.wait(PATIENCE)
         show(*arguments)
 
-    monkeypatch.setattr(page_module, "DRAWING_TIME", PATIENCE)  # or it would give up the wait
+    monkeypatch.setattr(base, "DRAWING_TIME", PATIENCE)  # or it would give up the wait
     monkeypatch.setattr(page.scene.paths, "show", draw_slowly)
     change_friction(page, 0.4)
     assert begun.wait(PATIENCE)
@@ -203,16 +202,16 @@ def test_the_ghost_of_a_failure_stays_for_the_next_one_and_hides_without(page):
         session.change_rover([("friction",)], friction)
         failure = session.shown.path.failure
         mark.show(LSR1, failure)
-        ghosts.append(mark._ghost)
+        ghosts.append(mark.ghost.visual)
         np.testing.assert_allclose(
-            mark._ghost.root.position, page.scene.frame.to_scene(failure.state.position)
+            mark.ghost.visual.root.position, page.scene.frame.to_scene(failure.state.position)
         )
-    assert ghosts[0] is ghosts[1] and mark._root.visible
-    assert mark._ghost._meshes[failure.link].color == REFUSED
-    assert mark.make_room(failure.state) == failure.link and not mark._ghost.root.visible
-    assert mark.make_room(None) == "" and mark._ghost.root.visible
+    assert ghosts[0] is ghosts[1] and mark.ghost.root.visible
+    assert mark.ghost.visual._meshes[failure.link].color == REFUSED
+    assert mark.make_room(failure.state) == failure.link and not mark.ghost.root.visible
+    assert mark.make_room(None) == "" and mark.ghost.root.visible
     mark.show(LSR1, None)
-    assert not mark._root.visible and mark.make_room(failure.state) == ""
+    assert not mark.ghost.root.visible and mark.make_room(failure.state) == ""
 
 
 def test_the_link_that_fails_has_the_colour_of_that_and_its_own_again_where_none_does(page):
@@ -282,18 +281,19 @@ def test_a_trail_has_a_colour_from_blue_to_yellow_at_each_place(page):
 # Errors.
 
 
-def test_a_drawing_that_is_asked_for_again_is_done_once_and_one_that_fails_stops_no_other(page):
-    done = []
+def test_a_drawing_that_fails_is_told_and_stops_no_other_and_what_is_drawn_is_not_drawn_again(
+    page,
+):
+    done, ground, rover = [], object(), object()
 
     def ask_for_four() -> None:
-        page.draw_made("the paths", [object()], lambda: done.append("old paths"))
-        page.draw_made("the plots", [object()], lambda: 1 / 0)
-        page.draw_made("the paths", [object()], lambda: done.append("new paths"))
-        page.draw_made("the rover", [object()], lambda: done.append("rover"))
+        page.draw_made("the paths", [ground], lambda: done.append("paths"))
+        page.draw_made("the plots", [ground], lambda: 1 / 0)
+        page.draw_made("the paths", [ground], lambda: done.append("paths again"))
+        page.draw_made("the rover", [ground, rover], lambda: done.append("rover"))
 
     ask(page, ask_for_four)
-    wait_until(lambda: not page.is_drawing, "the drawings")
-    assert done == ["new paths", "rover"]
+    assert done == ["paths", "rover"]
     assert "ZeroDivisionError" in page.errors.messages.pop("the plots")
 
 
@@ -305,25 +305,13 @@ def test_a_failed_request_is_told_until_a_request_succeeds(page):
     wait_until(lambda: told(page, "errors") == [], "the notice to go")
 
 
-def test_a_failed_picture_is_not_drawn_again_at_once(page, monkeypatch):
-    tried = []
-    ask(page, lambda: None)  # nothing else is asked any more
-
-    def fail_and_count(_frame):
-        tried.append(True)
-        fail()
-
+def test_a_failed_picture_is_told_until_the_next_one_that_is_drawn(page, monkeypatch):
     with monkeypatch.context() as patch:
-        patch.setattr(page.scene, "show", fail_and_count)
+        patch.setattr(page.scene, "show", fail)
         page.hear({"ask": "toggle"}, None)
         wait_until(lambda: told(page, "errors"), "the notice")
-        stopped_at = page.playback.time
-        time.sleep(0.5)  # a dozen pictures
-        assert len(tried) == 1 and page.playback.time == stopped_at
-    ask(page, lambda: None)
-    wait_until(lambda: page.playback.time > stopped_at, "the rover to drive on")
     wait_until(lambda: not told(page, "errors"), "the notice to go")
-    ask(page, page.playback.toggle)
+    ask(page, lambda: page.playback.go_to(0.0))
 
 
 def test_a_closed_page_leaves_no_thread_behind():
@@ -350,7 +338,7 @@ def test_a_camera_sees_all_of_the_path_from_behind_or_above_and_the_rover_from_i
     middle = 0.5 * (path.min(axis=0) + path.max(axis=0))
     away = {}
     for view in ("Fit", "Top", "Side"):
-        page._look(client, view)
+        page._look([client], view)
         away[view] = client.camera.position - client.camera.look_at
         if view != "Side":
             np.testing.assert_allclose(client.camera.look_at[:2], middle, atol=1e-6)
@@ -367,7 +355,7 @@ def test_on_a_far_map_the_rover_is_where_it_is_on_a_near_one_and_a_click_lands_w
         page = Page(ViewSession(LSR1, ground, *ends, SURE), port=0)
         try:
             wait_for_rest(page)
-            places[x] = np.array(page.scene._visual.root.position)
+            places[x] = np.array(page.scene.rover.visual.root.position)
             aim = np.array([x + 1.5, y + 0.5])
             place = page.scene.frame.to_scene([*aim, float(ground.elevation_at(*aim))])
             away = np.array([-1.0, 0.0, 2.0])

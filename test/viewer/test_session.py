@@ -20,14 +20,12 @@ from rover_planner.command.prediction_files import (
 from rover_planner.command.view import SEED, choose_ends, name_ground
 from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import assume
-from rover_planner.viewer.documents.header import name_ground as name_by_size
-from rover_planner.viewer.documents.paths import list_paths
 from rover_planner.viewer.documents.rover import describe_changes
-from rover_planner.viewer.documents.verdict import Work, describe_verdict
+from rover_planner.viewer.documents.verdict import Work, describe_verdict, list_paths
+from rover_planner.viewer.documents.verdict import name_ground as name_by_size
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, wall_at, waves
-from support.viewer.sessions import LSR1, blocked_session, ramp, session_on, straight
-from support.waiting import wait_until
+from support.viewer.sessions import LSR1, Judge, blocked_session, ramp, session_on, straight
 
 # What a person looks at, and what it is compared with.
 
@@ -97,26 +95,23 @@ def test_a_kept_reference_takes_the_place_of_the_loaded_rover_also_for_another_p
 
 def test_all_paths_are_judged_again_after_a_value_that_is_refused_and_old_ones_say_why():
     session = session_on(waves)
-    session.judge_in_background(lambda: None)
+    judge = Judge(session)
     try:
         session.change_rover(Z, -0.19)
         with pytest.raises(RoverFileError):
             session.change_rover([("wheel", "radius")], -1.0)
-        wait_until(lambda: session.progress is None, "all paths", 60.0)
-        session.take_finished()
+        judge.finish()
         assert session.is_complete and session.wanted.rover.suspension.wheels["rear"][2] == -0.19
         rows = list_paths(session.shown, is_outdated=False, is_judging=False)
         assert not any(row["waits"] for row in rows)
         session.change_rover(FRICTION, 0.7)
         session.change_options(soil="best")  # it is refused when it is judged
-        wait_until(lambda: session.has_news and session.progress is None, "the refusal", 60.0)
-        session.take_finished()
+        judge.finish()
         assert "best" in session.refusal
-        wait_until(lambda: session.progress is None, "the paths that were left", 60.0)
-        session.take_finished()
+        judge.finish()  # the paths that were left
         assert session.is_complete and "best" in session.refusal
     finally:
-        assert session.close()
+        assert judge.work.close()
     half = replace(session.shown, scenario=replace(session.wanted))
     rows = list_paths(half, is_outdated=True, is_judging=False)
     assert {row["waits"] for row in rows} == {"old, was not judged again"}
@@ -136,7 +131,8 @@ def test_a_refused_change_alters_nothing_and_says_why():
         lambda: session.change_arm("arm_yaw", float("nan")),
     ):
         change()
-        assert session.refusal and session.shown is shown and session.wanted is shown.scenario
+        assert session.refusal and session.shown.path is shown.path
+        assert session.wanted is shown.scenario
     session.plan_to(np.array([0.5, 0.5]))
     assert not session.refusal
 

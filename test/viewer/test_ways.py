@@ -13,7 +13,7 @@ from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.judging import BETTER, SEARCH, JudgeRequest, judge_request
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import wall_with_gap, whole_wall
-from support.viewer.sessions import LSR1, finish, held, walled_session
+from support.viewer.sessions import LSR1, Judge, held, walled_session
 from support.waiting import wait_until
 
 GOAL = (1.6, 0.0, 0.0)
@@ -90,40 +90,35 @@ def test_a_way_that_is_looked_at_stays_when_a_slider_moves_and_others_go_with_th
 
 
 @pytest.fixture
-def session() -> Iterator[ViewSession]:
-    """A session before a wall with a gap that judges in the background."""
-    made = walled_session(wall_with_gap)
-    made.judge_in_background(lambda: None)
+def judge() -> Iterator[Judge]:
+    """Judges in the background for a session before a wall with a gap."""
+    made = Judge(walled_session(wall_with_gap))
     yield made
-    assert made.close()
+    assert made.work.close()
 
 
-def test_a_search_can_be_cancelled_and_begun_again_and_a_chosen_path_stays_meanwhile(session):
-    finish(session)
-    with held(session._background, SEARCH):
+def test_a_search_can_be_cancelled_and_begun_again_and_a_chosen_path_stays_meanwhile(judge):
+    session, work = judge.session, judge.work
+    with held(work, SEARCH):
         session.plan_to(BEYOND)
-        wait_until(lambda: session.progress.what == SEARCH, "the search", 60.0)
-        session.take_finished()
+        wait_until(lambda: work.progress.what == SEARCH, "the search", 60.0)
+        judge.take()
         assert not session.is_outdated and not session.shown.verdict.traversable
         other = 1 if session.shown.index != 1 else 2
         session.show_path(other)
-        wait_until(lambda: session.progress.what == SEARCH, "the search again", 60.0)
-        session.take_finished()
+        wait_until(lambda: work.progress.what == SEARCH, "the search again", 60.0)
+        judge.take()
         shown = session.shown
-        session.cancel()
-        session.take_finished()
-        assert session.is_stopped and session.shown is shown and shown.around is None
+        work.cancel()
+        judge.take()
+        assert session.shown is shown and shown.around is None
     session.judge_again()
-    finish(session)
+    judge.finish()
     assert session.shown.around.outcome == FOUND and session.shown.index == other
 
 
-def test_a_session_that_begins_before_a_wall_searches_as_soon_as_it_has_a_thread():
+def test_a_session_that_begins_before_a_wall_searches_when_it_is_asked_to():
     session = walled_session(wall_with_gap, GOAL)
     assert session.shown.needs_search and len(session.shown.paths) == 5
-    session.judge_in_background(lambda: None)
-    try:
-        finish(session)
-        assert session.shown.offer == 5
-    finally:
-        assert session.close()
+    session.judge_again()
+    assert session.shown.offer == 5

@@ -1,15 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The verdict with its reason, its age, and what a person can do about it."""
+"""What is judged, and its verdicts: the subject, the verdict with its reason and age, all paths."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from rover_planner.viewer.documents.header import POLICY_TITLES
-from rover_planner.viewer.documents.limits import write_chance
-from rover_planner.viewer.state.failure import Failure
-from rover_planner.viewer.state.scenario import PolicyVerdict, Shown
+import numpy as np
 
+from rover_physics.names import EQUAL, OPTIMAL, SERVO
+from rover_physics.terrain.grid import Terrain
+from rover_planner.viewer.documents.limits import write_chance
+from rover_planner.viewer.documents.numbers import write
+from rover_planner.viewer.state.failure import Failure
+from rover_planner.viewer.state.limits import write_use
+from rover_planner.viewer.state.scenario import Judged, PolicyVerdict, Scenario, Shown
+
+POLICY_TITLES = {EQUAL: "equal torques", SERVO: "speed servos", OPTIMAL: "traction control"}
+"""Names of the torque policies on the page."""
 WORDS = {None: "no verdict", True: "traversable", False: "not traversable"}
 
 
@@ -25,6 +32,27 @@ class Work:
     """Why the last request was refused; empty if it was not."""
     is_stopped: bool = False
     """True if visitors have stopped the work."""
+
+
+def name_ground(terrain: Terrain) -> str:
+    """Return a name, by its size, for a ground that has none."""
+    x_low, x_high, y_low, y_high = terrain.bounds
+    return f"{x_high - x_low:.3g} x {y_high - y_low:.3g} m"
+
+
+def describe_subject(scenario: Scenario, ground: str) -> dict[str, str]:
+    """Return what a scenario is about, by name, on a ground with a name."""
+    rover, terrain, options = scenario.rover, scenario.terrain, scenario.options
+    soil = options.model.soil or f"firm, friction {rover.friction:g}"
+    if terrain.soil_names:
+        soil = f"{', '.join(terrain.soil_names)} on the map"
+    return {
+        "rover": rover.name + ("" if rover == scenario.loaded else " (changed)"),
+        "map": ground,
+        "soil": soil,
+        "torques": POLICY_TITLES[options.model.policy],
+        "mode": "planning" if scenario.recorded is None else "replay",
+    }
 
 
 def describe_verdict(shown: Shown, work: Work) -> dict[str, Any]:
@@ -77,3 +105,39 @@ def _list_offers(shown: Shown) -> Sequence[dict[str, Any]]:
     length = shown.paths[shown.offer].candidate.length
     words = f"{kind} {shown.offer + 1} passes ({length:.1f} m)"
     return [{"words": words, "ask": {"ask": "show", "index": shown.offer}}]
+
+
+def list_paths(shown: Shown, *, is_outdated: bool, is_judging: bool) -> list[dict[str, Any]]:
+    """Return a row for each path; the numbers of a refused one are up to its first failure.
+
+    Args:
+        shown: What is shown.
+        is_outdated: True if other values are wanted than those of what is shown.
+        is_judging: True if something is judged; else old paths say that they wait.
+    """
+    every = frozenset(range(len(shown.paths)))
+    old = every if is_outdated else shown.old
+    waits = "old, is judged" if is_judging else "old, was not judged again"
+    return [
+        _describe_row(path, number=k + 1, waits=waits if k in old else "", best=k == shown.best)
+        for k, path in enumerate(shown.paths)
+    ]
+
+
+def _describe_row(path: Judged, number: int, waits: str, best: bool) -> dict[str, Any]:
+    verdict, length = path.verdict, f"{path.candidate.length:.2f}"
+    limits = path.limits
+    uses = [float(np.nanmax(one.used, initial=0.0)) for one in limits.lanes]
+    most = limits.lanes[int(np.argmax(uses))].limit.title
+    word = "passes" if verdict.traversable else "refused"
+    return {
+        "number": number,
+        "passes": verdict.traversable,
+        "word": f"{word}, best" if best else word,
+        "waits": waits,
+        "length": length if verdict.traversable else f"{limits.end:.2f} of {length}",
+        "energy": write(path.trajectory.energy, 1),
+        "use": write_use(max(uses)),
+        "limit": most,
+        "reason": verdict.reason,
+    }

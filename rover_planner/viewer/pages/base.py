@@ -4,8 +4,9 @@
 import socket
 import threading
 import time
+import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from typing import Any
@@ -18,24 +19,27 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.viewer.front.channel import Channel, Mailbox, Part
-from rover_planner.viewer.pages.errors import Action, Errors
-from rover_planner.viewer.pages.ground_painter import PaintRequest, paint
 from rover_planner.viewer.scene.cameras import START, VIEWS
-from rover_planner.viewer.scene.ground_mesh import intersect_ground
+from rover_planner.viewer.scene.ground_mesh import PaintRequest, intersect_ground, paint
 from rover_planner.viewer.scene.scene import Scene
-from rover_planner.viewer.state.background_work import BackgroundWork
+from rover_planner.viewer.state.background_work import (
+    BackgroundWork,
+    Progress,
+    Request,
+    Result,
+)
 from rover_planner.viewer.state.inbox import Inbox
-from rover_planner.viewer.state.layers import PREDICTED, Colouring, Legend
+from rover_planner.viewer.state.layers import PREDICTED, Colouring, Legend, list_layers
 from rover_planner.viewer.state.session import REFUSALS
+from rover_planner.viewer.state.survey_layers import ShownSurvey
 
 PERIOD = 0.04
 """Time between two pictures [s]."""
-RETRY = 2.0
-"""Time from an error in a picture to the next one without a request [s]."""
-RESTART = 1.0
-"""Time until a stopped page starts again [s]."""
+DRAWING_TIME = 0.2
+"""Longest time for which work in the background waits for the drawings [s]."""
 FOLLOW, STAY = "Follow", "Stay"
 """The last button of the camera: go along with the rover, or stop that."""
+Action = Callable[[], None]
 Words = dict[str, Any]
 """What a visitor asks: the word `ask` and its values."""
 Answer = Callable[[Words], Mapping[str, Part] | None]
@@ -52,55 +56,87 @@ CONTINUOUS = ("value", "seek", "place")
 MAX_PORT = 65535
 
 
+class Errors:
+    """Runs parts of the page's work; an error in one of them is told and stops no other."""
+
+    def __init__(self, tell: Callable[[list[list[str]]], None]):
+        """Tell nothing yet; `tell` shows what failed and why."""
+        self._tell = tell
+        self.messages: dict[str, str] = {}
+        """The messages by what failed; each stays until the same part succeeds."""
+
+    def run(self, failure: str, work: Action) -> None:
+        """Run some work.
+
+        Args:
+            failure: What is told of an error, such as "the paths are not drawn".
+            work: The work.
+        """
+        message = ""
+        try:
+            work()
+        except REFUSALS as error:
+            message = str(error)
+        except Exception as error:
+            message = f"{type(error).__name__}: {error}"
+            if self.messages.get(failure) != message:
+                traceback.print_exc()
+        if self.messages.get(failure, "") != message:
+            self.messages.pop(failure, None)
+            self.messages |= {failure: message} if message else {}
+            self._tell([[what, why] for what, why in self.messages.items()])
+
+
 class PageBase(ABC):
     """A served page. Callbacks of browsers only add requests for the page's own thread.
 
-    No error ends that thread. The page shows an error in a request and takes the next request. An
-    error in a picture stops the pictures until the next request, or for RETRY. After any other
-    error the page says that it has stopped and why, and starts again by itself.
+    No error ends that thread: the page shows it, and goes on.
     """
 
-    def __init__(self, rover: Rover, terrain: Terrain, host: str, port: int):
+    def __init__(
+        self,
+        rover: Rover,
+        terrain: Terrain,
+        address: tuple[str, int],
+        survey: ShownSurvey | None = None,
+    ):
         """Start the servers; `start` starts the thread.
 
         Args:
             rover: The rover.
             terrain: The ground.
-            host: Address to serve on.
-            port: Port of the page; the scene has the next free one. 0 takes free ones.
+            address: Where to serve: a host, and the port of the page; the scene has the next free
+                one. 0 takes free ones.
+            survey: A survey of rover and ground, whose layers are offered.
         """
         import viser
 
-        self._host = host
+        self._host, port = address
+        self.ground, self.survey = terrain, survey
+        """What is shown."""
         self.requests: Inbox[Action] = Inbox()
         self.moved = True
         """True if the next picture may differ from the last one."""
-        self.colouring, self.forces = Colouring(), True
+        self.colouring, self.forces = Colouring(self.layers[0]), True
         self._ended = threading.Event()
         self._fulfils = False
-        self._stopped_at: float | None = None
-        """When an error stopped the pictures [s]; None while they go on."""
         own: dict[str, Answer] = {"colour": self._colour, "forces": self._show_forces}
         self._answers = {**own, **self.list_answers()}
         try:
-            self.channel = Channel(host, port, self.hear)
+            self.channel = Channel(self._host, port, self.hear)
         except OSError:  # the port is taken
-            self.channel = Channel(host, 0, self.hear)
+            self.channel = Channel(self._host, 0, self.hear)
         scene_port = self.channel.port + 1 if port and self.channel.port < MAX_PORT else 0
-        self.server = viser.ViserServer(host, scene_port, label="camera", verbose=False)
+        self.server = viser.ViserServer(self._host, scene_port, label="camera", verbose=False)
         self.errors = Errors(lambda messages: self.channel.tell("errors", messages))
         self._made_of: dict[str, tuple[Any, ...]] = {}
-        self._drawings: dict[str, Action] = {}
-        """What is still to be drawn, by what is told if that fails."""
         self.scene = Scene(self.server)
         self.scene.frame.move_to(terrain)
-        self.scene.draw_rover(rover, {})
+        self.scene.rover.take(rover, {})
         self._add_camera()
-        self.painter: BackgroundWork[PaintRequest, tuple[bytes, Legend]] = BackgroundWork(
-            paint, lambda: self.requests.put(self._take_ground, "painted"), "ground"
-        )
+        self.painter = self.begin_work(paint, self._draw_ground, "ground")
         self.channel.tell("scene", {"port": self.server.get_port()})
-        self._last = self._due = time.monotonic()
+        self._last = time.monotonic()
         self._thread = threading.Thread(target=self._run, name="page", daemon=True)
 
     def _add_camera(self) -> None:
@@ -124,9 +160,9 @@ class PageBase(ABC):
         return f"http://{host}:{self.channel.port}"
 
     @property
-    def is_drawing(self) -> bool:
-        """True if the page acts on requests, or has still to draw what they have changed."""
-        return self._fulfils or bool(self._drawings)
+    def is_acting(self) -> bool:
+        """True if the page acts on requests, or has still to."""
+        return self.requests.wait(0.0) or self._fulfils
 
     def start(self) -> None:
         """Start the thread that changes the page."""
@@ -158,23 +194,38 @@ class PageBase(ABC):
         for name, part in parts.items() if mailbox is not None else ():
             mailbox.put(part, name)  # type: ignore[union-attr]
 
+    def begin_work(
+        self,
+        work: Callable[[Request], Iterator[Progress | Result]],
+        take: Callable[[Request, Result | BaseException], object],
+        name: str,
+    ) -> BackgroundWork[Request, Result]:
+        """Return work in a thread of a name; what it finds is taken by the page's thread.
+
+        The work waits until that is drawn: what it finds next would slow down the drawings.
+        """
+
+        def hand_over(request: Request, found: Result | BaseException) -> None:
+            drawn = threading.Event()
+
+            def take_and_tell() -> None:
+                try:
+                    take(request, found)
+                finally:
+                    drawn.set()
+
+            self.requests.put(take_and_tell)
+            drawn.wait(DRAWING_TIME)
+
+        return BackgroundWork(work, hand_over, name)
+
     @abstractmethod
     def list_answers(self) -> Mapping[str, Answer]:
         """Return what the page does by the word `ask`; refusals are raised as errors."""
 
-    @property
-    @abstractmethod
-    def layers(self) -> Sequence[str]:
-        """The layers that may colour the ground."""
-
     @abstractmethod
     def describe_ground(self) -> PaintRequest | None:
         """Return what is painted as the ground; None while it is not known."""
-
-    @property
-    @abstractmethod
-    def ground(self) -> Terrain:
-        """The ground that is shown."""
 
     @property
     @abstractmethod
@@ -197,6 +248,12 @@ class PageBase(ABC):
     def show_refusal(self, reason: str) -> None:
         """Show why a request was refused."""
 
+    @property
+    def layers(self) -> Sequence[str]:
+        """The layers that may colour the ground, those of a survey first."""
+        surveyed = () if self.survey is None else self.survey.names
+        return [*surveyed, *list_layers(self.ground)]
+
     def list_layers(self) -> dict[str, Any]:
         """Return the part `offers` as far as each page has it."""
         return {"layers": list(self.layers), "predicted": list(PREDICTED)}
@@ -211,16 +268,17 @@ class PageBase(ABC):
         if request is not None:
             self.painter.ask(request)
 
-    def _take_ground(self) -> None:
-        self.errors.run("the ground is not drawn", self._draw_ground)
-
-    def _draw_ground(self) -> None:
-        for one in self.painter.take():
-            if one.error is not None or one.result is None:
-                raise one.error or ValueError("nothing was painted")
-            file, legend = one.result
+    def _draw_ground(
+        self, _request: PaintRequest, painted: tuple[bytes, Legend] | BaseException
+    ) -> None:
+        def draw() -> None:
+            if isinstance(painted, BaseException):
+                raise painted
+            file, legend = painted
             self.scene.draw_ground(file)
             self.channel.tell("legend", asdict(legend))
+
+        self.errors.run("the ground is not drawn", draw)
 
     def _colour(self, words: Words) -> None:
         if words["layer"] not in self.layers:
@@ -233,7 +291,7 @@ class PageBase(ABC):
         self.scene.show_forces(self.forces)
 
     def _aim_camera(self, client: Any) -> None:
-        self._look(client, START)
+        self._look([client], START)
 
     def _press(self, words: Words, _event: Any) -> None:
         self.hear(words, None)
@@ -241,12 +299,12 @@ class PageBase(ABC):
     def _request_view(self, event: Any) -> None:
         client, name = event.client, event.target.value
         act = self._follow if name in (FOLLOW, STAY) else self._look
-        self.requests.put(lambda: act(client, name))
+        self.requests.put(lambda: act([client], name))
 
-    def _look(self, client: Any, view: str) -> None:
-        self.scene.look(client, view, self.ground, self.points)
+    def _look(self, clients: Collection[Any], view: str) -> None:
+        self.scene.look(clients, view, self.ground, self.points)
 
-    def _follow(self, _client: Any, name: str) -> None:
+    def _follow(self, _clients: Collection[Any], name: str) -> None:
         """Go along with the rover or not, and name the button by what it does next."""
         self.scene.follow(name == FOLLOW)
         self._camera.options = (*VIEWS, STAY if name == FOLLOW else FOLLOW)
@@ -265,30 +323,27 @@ class PageBase(ABC):
         self.requests.put(click, "click")
 
     def _run(self) -> None:
-        self.errors.run("what is shown is old", self.tell)
+        self._tell()
         self.channel.open()
         while not self._ended.is_set():
-            if not self.errors.run("stopped", self._run_period):
-                self._ended.wait(RESTART)
+            self._run_period()
 
     def _run_period(self) -> None:
-        """Fulfil the requests, draw one of what waits, and draw the next picture when it is due.
-
-        Without anything to draw, a picture follows the requests at once.
-        """
-        self.requests.wait(0.0 if self._drawings else self._due - time.monotonic())
+        """Fulfil the requests, tell what they have changed, and draw the next picture if due."""
+        due = self._last + PERIOD
+        self.requests.wait(due - time.monotonic())
         self._fulfils = True
         for action in self.requests.take().values():
-            self._fulfil(action)
+            self.errors.run("the last request failed", partial(self._fulfil, action))
+        self._tell()
         self._fulfils = False
-        self.errors.run("what is shown is old", self.tell)
-        self._draw_next()
         now = time.monotonic()
-        if self._drawings and now < self._due:
-            return
-        passed, self._last, self._due = now - self._last, now, now + PERIOD
-        if self._stopped_at is None or now - self._stopped_at > RETRY:
-            self._draw_picture(passed)
+        passed, self._last = now - self._last, now
+        with self.server.atomic():  # one message to wake the server for all that is sent
+            self.errors.run("drawing stopped", partial(self.advance, passed))
+
+    def _tell(self) -> None:
+        self.errors.run("what is shown is old", self.tell)
 
     def has_changed(self, name: str, *made_of: Any) -> bool:
         """Return whether something is made of other objects than when this was asked last."""
@@ -302,42 +357,23 @@ class PageBase(ABC):
             self.channel.tell(name, make())
 
     def draw_made(self, failure: str, made_of: Sequence[Any], draw: Action) -> None:
-        """Draw something soon if one of the objects has changed of which it is made.
-
-        What is asked for again while it waits is drawn once, at its old place.
+        """Draw something if one of the objects has changed of which it is made.
 
         Args:
             failure: What is told of an error, such as "the paths are not drawn".
             made_of: The objects.
-            draw: Draws it as it is by then.
+            draw: Draws it.
         """
         if self.has_changed(failure, *made_of):
-            self._drawings[failure] = draw
-
-    def _draw_next(self) -> None:
-        """Draw what has waited longest, if there is anything."""
-        for failure, draw in [*self._drawings.items()][:1]:
             with self.server.atomic():
                 self.errors.run(failure, draw)
-            del self._drawings[failure]
 
     def _fulfil(self, request: Action) -> None:
-        """Act on a request, or say why not; the pictures go on if an error had stopped them."""
-
-        def act() -> None:
-            try:
-                request()
-            except REFUSALS as error:
-                self.show_refusal(str(error))
-
-        self.errors.run("the last request failed", act)
-        self._stopped_at = None
-
-    def _draw_picture(self, passed: float) -> None:
-        """Draw the next picture; after an error none for a while, as the same may fail again."""
-        with self.server.atomic():  # one message to wake the server for all that is sent
-            drawn = self.errors.run("drawing stopped", lambda: self.advance(passed))
-        self._stopped_at = None if drawn else time.monotonic()
+        """Act on a request, or say why not."""
+        try:
+            request()
+        except REFUSALS as error:
+            self.show_refusal(str(error))
 
 
 def check_address(host: str, port: int) -> None:

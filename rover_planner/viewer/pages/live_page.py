@@ -2,7 +2,7 @@
 """The page that follows a live rover: the data of its topics, and plans asked of its server."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -15,8 +15,7 @@ from rover_planner.viewer.documents.live import choose_answer, describe_learned,
 from rover_planner.viewer.live.listener import LiveListener
 from rover_planner.viewer.live.live_state import LiveData, read_state
 from rover_planner.viewer.pages.base import Answer, PageBase
-from rover_planner.viewer.pages.ground_painter import PaintRequest
-from rover_planner.viewer.state.layers import list_layers
+from rover_planner.viewer.scene.ground_mesh import PaintRequest
 from rover_planner.viewer.state.link import read_link
 from rover_planner.viewer.state.rover_state import RoverState
 
@@ -62,13 +61,13 @@ class LivePage(PageBase):
             port: Port to serve on; 0 takes a free one.
             ground_name: Name of the terrain; empty if it is not that of the rover.
         """
-        self._listener, self._rover, self._terrain = listener, rover, terrain
+        self._listener, self._rover = listener, rover
         self._ground_name, self._refusal = ground_name, ""
         self._data: LiveData = listener.latest()
         self._first: Floats | None = None
         """Where the rover was first seen (2,) [m]."""
         self._told_at = self._ground_at = 0.0
-        super().__init__(rover, terrain, host, port)
+        super().__init__(rover, terrain, (host, port))
         self.channel.tell("offers", self.list_layers())
         self.paint()
         self.start()
@@ -80,21 +79,11 @@ class LivePage(PageBase):
             "open": lambda words: _refuse_link(words["query"]),
         }
 
-    @property
-    def layers(self) -> Sequence[str]:
-        """The layers that may colour the ground."""
-        return list_layers(self._terrain)
-
     def describe_ground(self) -> PaintRequest | None:
         """Return the ground as it is known."""
         origin = self.scene.frame.origin
-        request = PaintRequest(self._rover, self._terrain, self.colouring, origin)
+        request = PaintRequest(self._rover, self.ground, self.colouring, origin)
         return request if self._ground_name else None
-
-    @property
-    def ground(self) -> Terrain:
-        """The ground that is shown."""
-        return self._terrain
 
     @property
     def points(self) -> Floats:
@@ -117,14 +106,14 @@ class LivePage(PageBase):
         data, now, tell = self._data, time.monotonic(), self.channel.tell
         answer = choose_answer(data, now, self._refusal)
         tell("verdict", answer.document)
-        soil = ", ".join(self._terrain.soil_names)
+        soil = ", ".join(self.ground.soil_names)
         ground = self._ground_name or "not known yet"
         facts = {"rover": self._rover.name, "map": ground, "soil": soil, "mode": data.freshness}
         tell("subject", facts)
         tell("chosen", self.list_chosen())
         tell("learned", describe_learned(data.learned))
         trail = None if data.learned is None else data.learned.places
-        shown, paths, terrain = (answer.plan, answer.is_old), self.scene.paths, self._terrain
+        shown, paths, terrain = (answer.plan, answer.is_old), self.scene.paths, self.ground
         self.draw_made(
             "the trail is not drawn",
             (trail, terrain),
@@ -165,10 +154,10 @@ class LivePage(PageBase):
     def _take_terrain(self, data: LiveData, now: float) -> None:
         """Show a new map, at most every GROUND_PERIOD."""
         terrain = data.terrain
-        is_new = terrain is not None and terrain is not self._terrain
+        is_new = terrain is not None and terrain is not self.ground
         if terrain is None or not is_new or now - self._ground_at < GROUND_PERIOD:
             return
-        self._terrain, self._ground_name, self._ground_at = terrain, "elevation_cloud", now
+        self.ground, self._ground_name, self._ground_at = terrain, "elevation_cloud", now
         if self.scene.frame.move_to(terrain):
             self._first = None
         self.channel.tell("offers", self.list_layers())
@@ -180,7 +169,7 @@ class LivePage(PageBase):
             joints = data.joints
             known = {name: joints[name] for name in arm.joints if name in joints}
             steps = {name: ARM_STEP * round(angle / ARM_STEP) for name, angle in known.items()}
-            self.scene.turn_arm(steps)
+            self.scene.rover.take(self._rover, steps)
 
 
 def _refuse_link(query: str) -> None:

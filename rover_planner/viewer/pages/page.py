@@ -2,27 +2,25 @@
 """The page that plans: what visitors ask of the session, and one function that shows its state."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.rover_file import load_rover, preset_names
 from rover_physics.terrain.fingerprint import fingerprint
-from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.soil_file import load_soils
+from rover_planner.advice.advise import Advice
 from rover_planner.advice.remedy import Remedy
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import read_rover, write_rover
 from rover_planner.viewer.documents.advice import describe_advice, list_remedies
 from rover_planner.viewer.documents.board import describe_board
-from rover_planner.viewer.documents.header import POLICY_TITLES, describe_subject, name_ground
 from rover_planner.viewer.documents.limits import (
     describe_limits,
     describe_uses,
 )
-from rover_planner.viewer.documents.paths import list_paths
 from rover_planner.viewer.documents.rover import (
     describe_changes,
     describe_sliders,
@@ -30,22 +28,29 @@ from rover_planner.viewer.documents.rover import (
     list_joints,
     list_numbers,
 )
-from rover_planner.viewer.documents.verdict import Work, describe_verdict
+from rover_planner.viewer.documents.verdict import (
+    POLICY_TITLES,
+    Work,
+    describe_subject,
+    describe_verdict,
+    list_paths,
+    name_ground,
+)
 from rover_planner.viewer.pages.base import Answer, PageBase, Words
-from rover_planner.viewer.pages.ground_painter import PaintRequest
 from rover_planner.viewer.pages.sharing import make_link, read_scenario, write_file
-from rover_planner.viewer.state.background_work import BackgroundWork
-from rover_planner.viewer.state.layers import Colouring, list_layers
+from rover_planner.viewer.scene.cameras import FIT
+from rover_planner.viewer.scene.ground_mesh import PaintRequest
+from rover_planner.viewer.scene.overlays import GHOST
+from rover_planner.viewer.state.judging import JudgeRequest
+from rover_planner.viewer.state.layers import Colouring
 from rover_planner.viewer.state.link import PageLink, read_link, write_link
 from rover_planner.viewer.state.path_advice import Advised, apply_remedy, seek_advice
 from rover_planner.viewer.state.playback import SPEEDS, Playback
 from rover_planner.viewer.state.rover_state import RoverState
-from rover_planner.viewer.state.scenario import Scenario
+from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.survey_layers import ShownSurvey
 
-DRAWING_TIME, DRAWING_POLL = 0.2, 0.002
-"""Longest time for which judging waits for the drawings, and between two looks at them [s]."""
 NOTICE_DELAY = 0.2
 """Time without a result after which the page tells what it judges, and greys what is old [s]."""
 BOARD_PERIOD = 0.1
@@ -77,23 +82,21 @@ class Page(PageBase):
         """
         self.session, self.playback = session, Playback()
         self._ground_name = ground_name or name_ground(session.wanted.terrain)
-        self._survey = survey
         self._click_sets = "goal"
         self._opening: tuple[PageLink, Scenario] | None = None
         """The link whose path and time are not shown yet, and what it asks for."""
         self._told_at = 0.0
-        super().__init__(session.wanted.rover, session.wanted.terrain, host, port)
-        self.colouring = Colouring(self.layers[0])
-        self._advice = BackgroundWork(
-            seek_advice, lambda: self.requests.put(self._take_advice, "advice"), "advice"
-        )
+        super().__init__(session.wanted.rover, session.wanted.terrain, (host, port), survey)
+        self._advice = self.begin_work(seek_advice, self._take_advice, "advice")
+        self._judging = self.begin_work(session.find_steps, self._take_judged, "judge")
+        session.judge = self._judging.ask
         self._advised: Advised | None = None
         """The path for which advice was asked last, and what was found."""
         self.channel.tell("offers", self._list_offers())
-        session.judge_in_background(self._show_and_wait)
         self.has_changed("the cameras are not moved", session.wanted.loaded)  # START is theirs
         self._show()
         self.paint()
+        session.judge_again()  # with the search that was not made
         self.start()
 
     def _list_offers(self) -> dict[str, Any]:
@@ -109,34 +112,23 @@ class Page(PageBase):
     @property
     def is_busy(self) -> bool:
         """True if something is judged, or judged and not shown yet."""
-        works = self.session, self.painter, self._advice
-        is_judged = any(work.progress is not None or work.has_news for work in works)
-        return is_judged or self.is_drawing  # in this order: what was taken is drawn
+        works = self._judging, self.painter, self._advice
+        is_judging = any(work.progress is not None for work in works)
+        return is_judging or self.is_acting  # in this order: what was found is still shown
 
     def close(self) -> None:
         """End the page and its threads in the background."""
         super().close()
-        self.session.close()
+        self._judging.close()
         self._advice.close()
-
-    @property
-    def layers(self) -> Sequence[str]:
-        """The layers that may colour the ground, those of a survey first."""
-        surveyed = () if self._survey is None else self._survey.names
-        return [*surveyed, *list_layers(self.ground)]
 
     def describe_ground(self) -> PaintRequest:
         """Return the ground with what is shown on it."""
         path, now = self.session.shown.path.poses, self.session.shown.scenario
         return PaintRequest(
             now.rover, now.terrain, self.colouring, self.scene.frame.origin,
-            now.asked_options.model, path, self._survey,
+            now.asked_options.model, path, self.survey,
         )  # fmt: skip
-
-    @property
-    def ground(self) -> Terrain:
-        """The ground that is shown."""
-        return self.session.shown.scenario.terrain
 
     @property
     def points(self) -> Floats:
@@ -154,7 +146,7 @@ class Page(PageBase):
             "options": lambda words: session.change_options(**_read_options(words)),
             "undo": lambda _words: session.undo(),
             "reset": lambda _words: session.reset(),
-            "keep": lambda _words: session.keep_reference(session.wanted),
+            "keep": lambda _words: session.keep_reference(session.shown.scenario),
             "drop": lambda _words: session.keep_reference(None),
             "cancel": lambda _words: self._cancel(),
             "judge": lambda _words: session.judge_again(),
@@ -203,7 +195,7 @@ class Page(PageBase):
         self.session.change_rover(one.keys, min(max(number, one.low), one.high))
 
     def _cancel(self) -> None:
-        self.session.cancel()
+        self.session.is_stopped |= self._judging.cancel()
         self._advice.cancel()
         self.painter.cancel()
 
@@ -224,12 +216,11 @@ class Page(PageBase):
         self._advised = Advised(path, time.monotonic())
         self._advice.ask(path)
 
-    def _take_advice(self) -> None:
-        for one in self._advice.take():
-            if one.error is not None:
-                raise PlanningError(f"no advice: {one.error}")
-            if self._advised is not None and one.request is self._advised.path:
-                self._advised = replace(self._advised, advice=one.result)
+    def _take_advice(self, path: Judged, found: Advice | BaseException) -> None:
+        if isinstance(found, BaseException):
+            raise PlanningError(f"no advice: {found}")
+        if self._advised is not None and path is self._advised.path:
+            self._advised = replace(self._advised, advice=found)
 
     @property
     def _advice_here(self) -> Advised | None:
@@ -246,7 +237,8 @@ class Page(PageBase):
     def _show_ghost(self, words: str | None) -> None:
         """Show where the path of a remedy leads while a person points at it; None ends that."""
         path = None if words is None else self._find_remedy(words).judged.case.poses
-        self.scene.paths.show_ghost(self.session.shown.scenario.rover, self.ground, path)
+        rover = self.session.shown.scenario.rover
+        self.scene.paths.show_line("ghost", rover, self.ground, path, GHOST)
 
     def _take_remedy(self, words: str) -> None:
         """Judge the path with the levers of a remedy set."""
@@ -317,32 +309,19 @@ class Page(PageBase):
             self.playback.go_to(link.time)
         elif link.path <= len(session.shown.paths):
             session.show_path(link.path - 1)
-        elif session.progress is None:  # no way around was found this time
+        elif self._judging.progress is None:  # no way around was found this time
             self._opening = None
 
     # What was judged.
 
-    def _show_and_wait(self) -> None:
-        """Request that what was judged is shown; in the judging thread.
-
-        What is judged next would slow down the drawings, so it waits for them; a newer change does
-        not.
-        """
-        self.requests.put(self._take_judged, "judged")
-        wanted, end = self.session.wanted, time.monotonic() + DRAWING_TIME
-        while self.session.has_news or self.is_drawing:
-            if self.session.wanted is not wanted or time.monotonic() > end:
-                return
-            time.sleep(DRAWING_POLL)
-
-    def _take_judged(self) -> None:
-        if self.session.has_news:
-            self.errors.run("not judged", self.session.take_finished)
-            self._show()
-            self._go_on_opening()
+    def _take_judged(self, request: JudgeRequest, found: Shown | BaseException) -> None:
+        self.errors.run("not judged", partial(self.session.take, request, found))
+        self._tell()  # the verdict before its drawings
+        self._show()
+        self._go_on_opening()
 
     def _show(self) -> None:
-        """Show what was judged: the drive at once, and soon what takes longer to draw."""
+        """Show what was judged."""
         shown = self.session.shown
         asked, path = shown.scenario, shown.path
         if self._advised is not None and self._advice_here is None:
@@ -358,17 +337,17 @@ class Page(PageBase):
         self.draw_made("the rover is not drawn", look, self._draw_rover)
         self.draw_made("the cameras are not moved", [asked.loaded], self._fit_cameras)
         self.draw_made("the paths are not drawn", [*shown.paths, shown.index], self._draw_paths)
-        depends = self.colouring.is_predicted or self._survey is not None
+        depends = self.colouring.is_predicted or self.survey is not None
         if self.has_changed("ground", asked) and depends:
             self.paint()
         self.moved = True
 
     def _draw_rover(self) -> None:
         asked = self.session.shown.scenario
-        self.scene.draw_rover(asked.rover, asked.arm_angles)
+        self.scene.rover.take(asked.rover, asked.arm_angles)
 
     def _fit_cameras(self) -> None:
-        self.scene.fit_all(self.ground, self.points)
+        self._look(self.server.get_clients().values(), FIT)
 
     def _draw_paths(self) -> None:
         shown = self.session.shown
@@ -384,7 +363,7 @@ class Page(PageBase):
     def _find_work(self) -> Work:
         """Return what is worked on, and whether the verdict is an old one meanwhile."""
         session, judging, old = self.session, "", ""
-        progress = session.progress
+        progress = self._judging.progress
         shown = progress or self.painter.progress
         if shown is not None and shown.seconds > NOTICE_DELAY:
             judging = f"{shown.describe()} ... {int(shown.seconds)} s"
@@ -406,7 +385,7 @@ class Page(PageBase):
         name = self._ground_name
         made("subject", (shown.scenario,), lambda: describe_subject(shown.scenario, name))
         tell("verdict", describe_verdict(shown, work))
-        is_judging = session.progress is not None
+        is_judging = self._judging.progress is not None
         made(
             "paths",
             (shown, waits, is_judging),
@@ -415,7 +394,7 @@ class Page(PageBase):
                 "shown": shown.index,
             },
         )
-        is_seeking = self._advice.progress is not None or self._advice.has_news
+        is_seeking = self._advice.progress is not None
         tell("advice", describe_advice(self._advice_here, is_seeking, time.monotonic()))
         made("current", (shown, self.colouring), self._write_current)
         made("sliders", (wanted.loaded,), lambda: describe_sliders(wanted.loaded))

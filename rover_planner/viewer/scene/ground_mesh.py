@@ -2,6 +2,8 @@
 """The terrain as a mesh with a picture on it, and where a ray meets the ground."""
 
 import gc
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,9 +11,19 @@ import trimesh
 from numpy.typing import NDArray
 
 from rover_physics.numerics.arrays import Floats
+from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
+from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.viewer.state.ground_grid import GroundGrid
-from rover_planner.viewer.state.layers import ColouredGround
+from rover_planner.viewer.state.background_work import Progress
+from rover_planner.viewer.state.ground_grid import GroundGrid, make_grid
+from rover_planner.viewer.state.layers import (
+    ColouredGround,
+    Colouring,
+    Legend,
+    colour_ground,
+    colour_limit,
+)
+from rover_planner.viewer.state.survey_layers import ShownSurvey
 
 LIGHT = (-0.6, 0.5, 1.0)
 """Direction to the light of the hillshade."""
@@ -26,6 +38,45 @@ LINE_SHADE = 0.82
 UNLIT = "KHR_materials_unlit"
 """Extension of glTF for what needs no light. Without a graphics card, a matt surface that fills
 the screen takes most of the time of a picture."""
+
+
+@dataclass(frozen=True, eq=False)
+class PaintRequest:
+    """Ground and layer to draw."""
+
+    rover: Rover
+    """The rover, for layers that are predicted."""
+    terrain: Terrain
+    """The ground."""
+    colouring: Colouring
+    """The layer."""
+    origin: Floats
+    """(3,) origin of the scene [m], map frame."""
+    options: SweepOptions = DEFAULT_OPTIONS
+    """Options of the model for predicted layers."""
+    path: Floats | None = None
+    """(n, 3) poses whose yaw the rover has if predicted layers are for the path."""
+    survey: ShownSurvey | None = None
+    """The survey; None if there is none."""
+
+
+def paint(request: PaintRequest) -> Iterator[Progress | tuple[bytes, Legend]]:
+    """Yield what is begun, and the painted ground as a file for the scene, with its legend.
+
+    A layer that is predicted for the rover takes seconds.
+    """
+    yield Progress("ground")
+    how, rover, terrain, options = (
+        request.colouring, request.rover, request.terrain, request.options
+    )  # fmt: skip
+    grid = make_grid(terrain)
+    if request.survey is not None and how.layer in request.survey.names:
+        ground = request.survey.colour(how.layer, rover, options, grid)
+    elif how.is_predicted:
+        ground = colour_limit(how, rover, terrain, request.path, options, grid)
+    else:
+        ground = colour_ground(how.layer, terrain, grid)
+    yield write_ground(grid, ground, request.origin), ground.legend
 
 
 def draw_picture(grid: GroundGrid, ground: ColouredGround) -> NDArray[np.uint8]:

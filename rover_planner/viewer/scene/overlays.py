@@ -89,16 +89,17 @@ class PathOverlay:
 
         An old one is grey.
         """
-        radius, colour = rover.wheel.radius, UNKNOWN if is_old else PASSABLE
-        points = np.empty((0, 2)) if plan is None else plan[:, :2]
-        self._draw("plan", self._find_strand(terrain, points, colour, CLEARANCE * radius))
-        self._draw_flags(terrain, {} if plan is None else {"goal": plan[-1]}, radius)
+        self.show_line("plan", rover, terrain, plan, UNKNOWN if is_old else PASSABLE)
+        flags = {} if plan is None else {"goal": plan[-1]}
+        self._draw_flags(terrain, flags, rover.wheel.radius)
 
-    def show_ghost(self, rover: Rover, terrain: Terrain, path: Floats | None) -> None:
-        """Draw a path (n, 3) that a person points at, or none."""
+    def show_line(
+        self, name: str, rover: Rover, terrain: Terrain, path: Floats | None, colour: Colour
+    ) -> None:
+        """Draw a path (n, 3), or none, instead of the one that had the name."""
         points = np.empty((0, 2)) if path is None else path[:, :2]
         height = CLEARANCE * rover.wheel.radius
-        self._draw("ghost", self._find_strand(terrain, points, GHOST, height))
+        self._draw(name, self._find_strand(terrain, points, colour, height))
 
     def show_trail(self, rover: Rover, terrain: Terrain, trail: Floats | None) -> None:
         """Draw where (n, 3) something was learned: x, y [m] and a number from 0 to 1."""

@@ -3,7 +3,6 @@
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
@@ -26,12 +25,7 @@ class RoverVisual:
     """The rover's nodes of the scene: body, rockers, bogies, wheels and arm, with their joints."""
 
     def __init__(
-        self,
-        scene: Any,
-        rover: Rover,
-        frame: LocalFrame,
-        name: str = "/rover",
-        opacity: float | None = None,
+        self, scene: Any, rover: Rover, frame: LocalFrame, name: str, opacity: float | None
     ):
         """Add the nodes below a node `name`; without an opacity it is opaque."""
         self._scene, self._frame = scene, frame
@@ -118,15 +112,6 @@ class RoverVisual:
             self._meshes[link].color = REFUSED if link == failing else colour
             self._meshes[link].opacity = self._opacity if link != failing else 1.0
         self._failing = failing
-
-
-def look_alike(one: Rover, other: Rover) -> bool:
-    """Return whether two rovers are drawn the same, with their forces."""
-    wheel = replace(one.wheel, max_torque=other.wheel.max_torque)
-    friction, speed, limits = other.friction, other.nominal_speed, other.limits
-    return (
-        replace(one, wheel=wheel, friction=friction, nominal_speed=speed, limits=limits) == other
-    )
 
 
 def on_side(point: tuple[float, float, float], side: str) -> Floats:

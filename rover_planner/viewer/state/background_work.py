@@ -42,16 +42,8 @@ Work = Callable[[Request], Iterator[Progress | Result]]
 """Yields what is begun, and the results of a request, each as soon as it is known."""
 
 
-@dataclass(frozen=True, eq=False)
-class Delivery(Generic[Request, Result]):
-    """A result of a request, or the error that ended it."""
-
-    request: Request
-    """The request, the same object as was asked."""
-    result: Result | None
-    """The result; None after an error."""
-    error: BaseException | None = None
-    """The error; None with a result."""
+Take = Callable[[Request, Result | BaseException], object]
+"""Takes a result of a request, or the error that ended it."""
 
 
 class _StoppedError(Exception):
@@ -71,32 +63,27 @@ class _Job(Generic[Request]):
 class BackgroundWork(Generic[Request, Result]):
     """Does one request at a time, the newest; those that a newer one replaces are dropped.
 
-    A newer request stops work that has had PATIENCE, or has given its first result. What is
-    finished is handed over by `take`, each result once and in the order of the requests. The
-    methods may be called from any thread.
+    A newer request stops work that has had PATIENCE, or has given its first result. The methods
+    may be called from any thread.
     """
 
     def __init__(
-        self,
-        work: Work[Request, Result],
-        wake: Callable[[], object],
-        name: str = "background",
+        self, work: Work[Request, Result], take: Take[Request, Result], name: str = "background"
     ):
         """Start the thread.
 
         Args:
             work: Does a request. Between the slices of the model's sweeps it may be stopped by
                 an error, which it must let pass; it is left at what it yields.
-            wake: Called in the thread when there is something to take. It may wait until that
-                was taken.
+            take: Called in the thread with all that is found, in the order of the requests. It
+                may wait until that was used.
             name: Name of the thread.
         """
-        self._work, self._wake = work, wake
+        self._work, self._take = work, take
         self._changed = threading.Condition()
         # The lock of _changed guards all that follows.
         self._waiting: Request | None = None
         self._job: _Job[Request] | None = None
-        self._done: list[Delivery[Request, Result]] = []
         self._progress = Progress()
         self._since = 0.0
         self._ending = False
@@ -119,18 +106,6 @@ class BackgroundWork(Generic[Request, Result]):
             if self._job is not None:
                 self._job.is_stopped = True
         return was_busy
-
-    def take(self) -> list[Delivery[Request, Result]]:
-        """Return what was finished since the last call, the oldest first."""
-        with self._changed:
-            done, self._done = self._done, []
-        return done
-
-    @property
-    def has_news(self) -> bool:
-        """True if there is something to take."""
-        with self._changed:
-            return bool(self._done)
 
     @property
     def progress(self) -> Progress | None:
@@ -178,24 +153,18 @@ class BackgroundWork(Generic[Request, Result]):
                         with self._changed:
                             self._progress = found
                     else:
-                        self._deliver(job, Delivery(job.request, found))
+                        self._deliver(job, found)
+                        check()
         except _StoppedError:
             return
         except BaseException as error:  # the thread must go on; whoever takes it tells of it
-            self._deliver(job, Delivery(job.request, None, error))
+            if self._waiting is None:
+                self._deliver(job, error)
 
-    def _deliver(self, job: _Job[Request], done: Delivery[Request, Result]) -> None:
-        """Hand over what was found, unless it was cancelled; stop work that was replaced."""
+    def _deliver(self, job: _Job[Request], found: Result | BaseException) -> None:
+        """Hand over what was found, unless it was cancelled."""
         with self._changed:
-            replaced = self._waiting is not None
-            wanted = not job.is_stopped and not (replaced and done.error is not None)
-            if wanted:
-                self._done.append(done)
-                self._since = time.monotonic()
-                job.has_result = True
-            if replaced:
-                job.is_stopped = True
-        if wanted:
-            self._wake()
-        if job.is_stopped and done.error is None:
-            raise _StoppedError("a newer request or a visitor stopped the work")
+            if job.is_stopped:
+                return
+            self._since, job.has_result = time.monotonic(), True
+        self._take(job.request, found)

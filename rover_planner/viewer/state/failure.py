@@ -59,10 +59,8 @@ class Failure:
     """True if it is between two waypoints."""
     row: int
     """Its row of the limits along the path."""
-    is_settled: bool
-    """True if the rover stands there; if not, `state` is a level rover above the ground."""
     state: RoverState
-    """The rover there."""
+    """The rover there; a level one of unknown forces above the ground if it does not stand."""
 
     @property
     def where(self) -> str:
@@ -102,7 +100,6 @@ def find_failure(
         broken = np.flatnonzero(is_there & ~rows.is_between)
     at = int(broken[np.argmin(rows.is_between[broken])])
     here, value = rows.prediction.select([at]), float(lane.values[at])
-    settled = bool(here.settled[0])
     limit = lane.limit.keep(float(here.results["kept_share"][0]))
     explains = limit.is_broken_by(value)
     return Failure(
@@ -117,9 +114,8 @@ def find_failure(
         time=float(rows.time[at]),
         is_between=bool(rows.is_between[at]),
         row=at,
-        is_settled=settled,
         state=RoverState(rover, here, np.zeros(6))
-        if settled
+        if here.settled[0]
         else level_state(rover, terrain, rows, at),
     )
 

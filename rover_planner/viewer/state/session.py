@@ -21,7 +21,7 @@ from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.query import LatticeSettings
 from rover_planner.studies.rover_values import with_value
-from rover_planner.viewer.state.background_work import BackgroundWork, Progress
+from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.judging import JudgeRequest, judge_request, show_recorded
 from rover_planner.viewer.state.scenario import Pose, Scenario, Shown
 
@@ -34,9 +34,9 @@ MAX_STEPS = 50
 class ViewSession:
     """The scenario that is wanted and what is shown: frozen values that are replaced as a whole.
 
-    It judges at once, or in the background after `judge_in_background`. All changes belong to one
-    thread, the owner's. A refused change alters nothing but `refusal`. The path that is looked at
-    stays until `show_path`, another goal or another rover.
+    It judges at once, or has its owner judge in another thread. All changes belong to one thread,
+    the owner's. A refused change alters nothing but `refusal`. The path that is looked at stays
+    until `show_path`, another goal or another rover.
     """
 
     def __init__(
@@ -73,11 +73,15 @@ class ViewSession:
         self.is_stopped = False
         """True if the judgement of `wanted` was cancelled or failed."""
         self._undo: list[Scenario] = []
-        self._background: BackgroundWork[JudgeRequest, Shown] | None = None
-        self._judge = partial(judge_request, memory=EdgeMemory())
+        self.judge: Callable[[JudgeRequest], object] = self._judge_now
+        """Judges a request: at once, or by `find_steps` in a thread of the owner, who then calls
+        `take` with all that is found."""
+        self.find_steps = partial(judge_request, memory=EdgeMemory())
+        """Finds what is shown, as `judge_request` does."""
         self._asked = JudgeRequest(self.wanted)
         """The newest request."""
-        *_, self.shown = islice(_results(self._judge(self._asked)), 2)  # and not what it searches
+        first = self.find_steps(self._asked)
+        *_, self.shown = islice(_results(first), 2)  # and not what it searches
         """The last finding."""
         self._index = self.shown.index
         """Index of the path that visitors want to look at."""
@@ -92,8 +96,8 @@ class ViewSession:
         """True if all paths were judged for what is wanted."""
         return not self.is_outdated and not self.shown.old
 
-    # What is wanted. In the background a change may be accepted and refused when it is judged;
-    # `refusal` then says why.
+    # What is wanted. A change may be accepted, and refused when it is judged; `refusal` then says
+    # why.
 
     def show_path(self, index: int) -> None:
         """Look at another path.
@@ -189,72 +193,38 @@ class ViewSession:
         self.wanted, self.refusal, self.is_stopped = wanted, "", False
         before, at = (self.shown, self._index) if same else (None, None)
         self._asked = JudgeRequest(wanted, before, at, self.kept)
-        if self._background is not None:
-            self._background.ask(self._asked)
-            return
+        self.judge(self._asked)
+
+    def _judge_now(self, request: JudgeRequest) -> None:
         try:
-            for shown in _results(self._judge(self._asked)):
-                self._finish(self._asked, shown)
+            for shown in _results(self.find_steps(request)):
+                self.take(request, shown)
         except REFUSALS as error:
-            self._refuse(error)
+            self.take(request, error)
 
-    def _finish(self, request: JudgeRequest, shown: Shown) -> None:
-        """Take what was judged, unless visitors look at another path meanwhile."""
-        same = shown.index == self._index and shown.scenario.has_paths_of(self.wanted)
-        if request is self._asked or same:
-            self.shown, self._index = shown, shown.index
-
-    def _refuse(self, error: Exception) -> None:
-        """Want again what was judged last, and judge what was left of it."""
-        self.wanted, self._index = self.shown.scenario, self.shown.index
-        if self._background is not None or self.shown.old:
-            self._ask(self.wanted)
-        self.refusal = str(error)
-
-    # In the background.
-
-    def judge_in_background(self, wake: Callable[[], object]) -> None:
-        """Judge in a thread from now on, until `close`; begin with the search that was not made.
+    def take(self, request: JudgeRequest, found: Shown | BaseException) -> None:
+        """Take what was judged, unless visitors look at another path meanwhile.
 
         Args:
-            wake: Called in that thread when there is something to take with `take_finished`.
-        """
-        self._background = BackgroundWork(self._judge, wake, "judge")
-        self._ask(self.wanted)
-
-    @property
-    def progress(self) -> Progress | None:
-        """Progress of the judgement in the background; None if nothing is judged."""
-        return self._background.progress if self._background is not None else None
-
-    @property
-    def has_news(self) -> bool:
-        """True if there is something for `take_finished`."""
-        return self._background is not None and self._background.has_news
-
-    def take_finished(self) -> None:
-        """Take what was judged in the background.
+            request: What was asked.
+            found: What is shown, or the error that ended the judgement. After a refusal, what was
+                judged last is wanted again.
 
         Raises:
             Exception: The newest judgement failed by an error that is no refusal.
         """
-        for one in self._background.take() if self._background is not None else []:
-            if one.result is not None:
-                self._finish(one.request, one.result)
-            elif one.request is self._asked and isinstance(one.error, REFUSALS):
-                self._refuse(one.error)
-            elif one.request is self._asked and one.error is not None:
-                self.is_stopped = True
-                raise one.error
-
-    def cancel(self) -> None:
-        """Stop the judgement in the background; the last one stays, and `wanted` stays."""
-        if self._background is not None and self._background.cancel():
+        is_newest = request is self._asked
+        if isinstance(found, Shown):
+            same = found.index == self._index and found.scenario.has_paths_of(self.wanted)
+            if is_newest or same:
+                self.shown, self._index = found, found.index
+        elif is_newest and isinstance(found, REFUSALS):
+            self._index = self.shown.index
+            self._ask(self.shown.scenario)  # also what was left of it
+            self.refusal = str(found)
+        elif is_newest:
             self.is_stopped = True
-
-    def close(self) -> bool:
-        """End the thread; return whether it has ended."""
-        return self._background is None or self._background.close()
+            raise found
 
     def replay(
         self,
