@@ -2,6 +2,7 @@
 """The rover's numbers as sliders, and what of it and of its drive differs from the reference."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,24 +15,24 @@ from rover_planner.viewer.documents.verdict import POLICY_TITLES
 from rover_planner.viewer.state.limits import write_use
 from rover_planner.viewer.state.scenario import Judged, Scenario
 
+JOINTS = "joints"
+"""First key of the angle of a joint, which is no number of the rover file."""
 FULL_TURN = 3.15
 """Largest angle, both ways, of the slider of an arm's joint without limits [rad]."""
 SAME = 1e-9
 """Difference up to which two numbers are the same."""
 
 
-def list_numbers(rover: Rover) -> list[RoverValue]:
-    """Return the changeable numbers of a rover."""
-    return [value for values in list_values(rover).values() for value in values]
-
-
-def list_joints(rover: Rover) -> dict[str, tuple[float, float]]:
-    """Return the smallest and largest angle [rad] of each joint of a rover's arm by name."""
-    arm = rover.manipulator
-    if arm is None:
-        return {}
-    ends = arm.joint_limits or ((-FULL_TURN, FULL_TURN),) * 3
-    return dict(zip(arm.joints, ends, strict=True))
+def list_sliders(rover: Rover) -> dict[str, list[RoverValue]]:
+    """Return the changeable numbers of a rover by part; the last are the angles of its arm."""
+    parts, arm = list_values(rover), rover.manipulator
+    if arm is not None:
+        ends = arm.joint_limits or ((-FULL_TURN, FULL_TURN),) * 3
+        parts["Arm"] = [
+            RoverValue(((JOINTS, name),), f"{name} [rad]", low, high, 0.01)
+            for name, (low, high) in zip(arm.joints, ends, strict=True)
+        ]
+    return parts
 
 
 def describe_sliders(loaded: Rover) -> dict[str, Any]:
@@ -41,27 +42,22 @@ def describe_sliders(loaded: Rover) -> dict[str, Any]:
             "title": title,
             "sliders": [[one.label, one.low, one.high, one.step] for one in values],
         }
-        for title, values in list_values(loaded).items()
+        for title, values in list_sliders(loaded).items()
     ]
-    joints = [[f"{name} [rad]", *ends, 0.01] for name, ends in list_joints(loaded).items()]
-    if joints:
-        parts.append({"title": "Arm", "sliders": joints})
     return {"rover": loaded.name, "parts": parts}
 
 
 def read_values(scenario: Scenario) -> dict[str, float]:
     """Return the numbers of a scenario by the label of their slider."""
-    data = rover_to_dict(scenario.rover)
-    numbers = {one.label: get_value(data, one.keys[0]) for one in list_numbers(scenario.loaded)}
-    return numbers | {f"{joint} [rad]": angle for joint, angle in scenario.arm.items()}
+    data = {**rover_to_dict(scenario.rover), JOINTS: scenario.arm}
+    parts = list_sliders(scenario.loaded).values()
+    return {one.label: get_value(data, one.keys[0]) for values in parts for one in values}
 
 
 def describe_values(scenario: Scenario) -> dict[str, list[float]]:
     """Return the numbers now and as loaded, by the label of their slider."""
     now = read_values(scenario)
-    loaded = read_values(
-        Scenario(**{**vars(scenario), "rover": scenario.loaded, "arm_angles": {}})
-    )
+    loaded = read_values(replace(scenario, rover=scenario.loaded, arm_angles={}))
     return {label: [value, loaded[label]] for label, value in now.items()}
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is judged, and its verdicts: the subject, the verdict with its reason and age, all paths."""
+"""What is judged, the verdict with its reason and age, and those on all paths."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -166,10 +166,15 @@ class LiveData:
 
 
 def read_state(rover: Rover, data: LiveData) -> RoverState | None:
-    """Return the state of a rover; None before the first odometry."""
+    """Return the state of a rover; None before the first odometry.
+
+    Nobody knows the forces any more once the odometry is stale.
+    """
     if data.position is None:
         return None
-    torques = np.array([data.efforts.get(name, np.nan) for name in WHEEL_JOINTS])
+    is_live = not data.odometry.is_stale
+    efforts, forces = (data.efforts, data.forces) if is_live else ({}, {})
+    torques = np.array([efforts.get(name, np.nan) for name in WHEEL_JOINTS])
     return place_state(
         rover,
         data.position,
@@ -183,5 +188,5 @@ def read_state(rover: Rover, data: LiveData) -> RoverState | None:
         tangential=torques / rover.wheel.radius,
         lateral=np.zeros(6),
         torque_saturation=np.abs(torques) / rover.wheel.max_torque,
-        **data.forces,
+        **forces,
     )

@@ -323,7 +323,7 @@ class PageBase(ABC):
         self.requests.put(click, "click")
 
     def _run(self) -> None:
-        self._tell()
+        self.tell_all()
         self.channel.open()
         while not self._ended.is_set():
             self._run_period()
@@ -335,14 +335,15 @@ class PageBase(ABC):
         self._fulfils = True
         for action in self.requests.take().values():
             self.errors.run("the last request failed", partial(self._fulfil, action))
-        self._tell()
+        self.tell_all()
         self._fulfils = False
         now = time.monotonic()
         passed, self._last = now - self._last, now
         with self.server.atomic():  # one message to wake the server for all that is sent
             self.errors.run("drawing stopped", partial(self.advance, passed))
 
-    def _tell(self) -> None:
+    def tell_all(self) -> None:
+        """Tell what is shown, or that it is old."""
         self.errors.run("what is shown is old", self.tell)
 
     def has_changed(self, name: str, *made_of: Any) -> bool:

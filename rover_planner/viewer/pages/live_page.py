@@ -25,16 +25,6 @@ GROUND_PERIOD = 2.0
 """Shortest time between two pictures of the ground [s]."""
 ARM_STEP = 0.01
 """Smallest turn of the arm that is drawn [rad]."""
-FORCES = (
-    "wheel_loads",
-    "tangential",
-    "lateral",
-    "friction_utilisation",
-    "torque_saturation",
-    "slip_ratio",
-    "tip_over_ratio",
-)
-"""What nobody knows any more of a rover whose odometry is stale: grey wheels without arrows."""
 AHEAD = np.array([4.0, 0.0])
 """From the rover to where a new camera looks [m]."""
 
@@ -131,8 +121,6 @@ class LivePage(PageBase):
         now = time.monotonic()
         self._take_terrain(data, now)
         state = read_state(self._rover, data)
-        if state is not None and data.odometry.is_stale:
-            state = state.change(**{name: np.nan * getattr(state, name) for name in FORCES})
         self.scene.show(state)
         if state is not None:
             self._turn_arm(data)

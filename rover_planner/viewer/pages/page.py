@@ -22,11 +22,11 @@ from rover_planner.viewer.documents.limits import (
     describe_uses,
 )
 from rover_planner.viewer.documents.rover import (
+    JOINTS,
     describe_changes,
     describe_sliders,
     describe_values,
-    list_joints,
-    list_numbers,
+    list_sliders,
 )
 from rover_planner.viewer.documents.verdict import (
     POLICY_TITLES,
@@ -46,7 +46,6 @@ from rover_planner.viewer.state.layers import Colouring
 from rover_planner.viewer.state.link import PageLink, read_link, write_link
 from rover_planner.viewer.state.path_advice import Advised, apply_remedy, seek_advice
 from rover_planner.viewer.state.playback import SPEEDS, Playback
-from rover_planner.viewer.state.rover_state import RoverState
 from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.survey_layers import ShownSurvey
@@ -183,16 +182,17 @@ class Page(PageBase):
 
     def _change_value(self, label: str, number: float) -> None:
         """Change a number of the rover, or turn a joint, by the label of its slider."""
-        joint, joints = label.removesuffix(" [rad]"), list_joints(self.session.wanted.loaded)
-        if joint in joints:
-            low, high = joints[joint]
-            self.session.change_arm(joint, min(max(number, low), high))
-            return
-        known = {one.label: one for one in list_numbers(self.session.wanted.loaded)}
-        if label not in known:
+        parts = list_sliders(self.session.wanted.loaded).values()
+        found = [one for values in parts for one in values if one.label == label]
+        if not found:
             raise PlanningError(f"the rover has no number {label!r}")
-        one = known[label]
-        self.session.change_rover(one.keys, min(max(number, one.low), one.high))
+        (one,) = found
+        number = min(max(number, one.low), one.high)
+        kind, *name = one.keys[0]
+        if kind == JOINTS:
+            self.session.change_arm(str(name[0]), number)
+        else:
+            self.session.change_rover(one.keys, number)
 
     def _cancel(self) -> None:
         self.session.is_stopped |= self._judging.cancel()
@@ -316,12 +316,11 @@ class Page(PageBase):
 
     def _take_judged(self, request: JudgeRequest, found: Shown | BaseException) -> None:
         self.errors.run("not judged", partial(self.session.take, request, found))
-        self._tell()  # the verdict before its drawings
         self._show()
         self._go_on_opening()
 
     def _show(self) -> None:
-        """Show what was judged."""
+        """Show what was judged: in words and numbers at once, then in the scene."""
         shown = self.session.shown
         asked, path = shown.scenario, shown.path
         if self._advised is not None and self._advice_here is None:
@@ -332,6 +331,8 @@ class Page(PageBase):
             self.playback.go_to(0.0)
         if self.has_changed("drive", path):
             self.playback.set_drive(path.trajectory.times, path.trajectory.places)
+        self.tell_all()
+        self._tell_drive()
         self.draw_made("the failure is not shown", [path], self._draw_failure)
         look = asked.rover, asked.arm_angles
         self.draw_made("the rover is not drawn", look, self._draw_rover)
@@ -419,19 +420,16 @@ class Page(PageBase):
         self.moved = playback.advance(seconds) or self.moved
         if not self.moved:
             return
-        state = self.session.shown.path.trajectory.state_at(playback.time)
-        self.scene.show(state)
-        self.moved = False
+        self.scene.show(self.session.shown.path.state_at(playback.time))
         now = time.monotonic()
-        if now - self._told_at < BOARD_PERIOD and playback.is_playing:
-            self.moved = True
-            return
-        self._told_at = now
-        self._tell_drive(state)
+        self.moved = now - self._told_at < BOARD_PERIOD and playback.is_playing
+        if not self.moved:
+            self._told_at = now
+            self._tell_drive()
 
-    def _tell_drive(self, state: RoverState | None) -> None:
+    def _tell_drive(self) -> None:
         path, playback = self.session.shown.path, self.playback
-        failure = path.failure
+        state, failure = path.state_at(playback.time), path.failure
         self.channel.tell("drive", {
             "time": round(playback.time, 2), "duration": round(playback.duration, 2),
             "distance": 0.0 if state is None else round(state.distance, 4),
@@ -439,8 +437,7 @@ class Page(PageBase):
             "fails": None if failure is None else round(failure.time, 2),
         })  # fmt: skip
         link = "" if failure is None else failure.link
-        shown = state if state is not None or failure is None else failure.state
-        board = describe_board(shown, link, has_slip=path.trajectory.has_slip)
+        board = describe_board(state, link, has_slip=path.trajectory.has_slip)
         self.channel.tell("board", board)
         uses = describe_uses(path, playback.time, self.session.shown.chance)
         self.channel.tell("uses", uses)

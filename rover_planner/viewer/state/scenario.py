@@ -17,6 +17,7 @@ from rover_planner.planning.search.path_search import SearchResult
 from rover_planner.planning.search.query import LatticeSettings
 from rover_planner.viewer.state.failure import Failure, find_failure
 from rover_planner.viewer.state.path_limits import PathLimits, find_path_limits
+from rover_planner.viewer.state.rover_state import RoverState
 from rover_planner.viewer.state.trajectory import Trajectory
 
 Pose = tuple[float, float, float]
@@ -117,6 +118,11 @@ class Judged:
         """The first failure; None if the path can be driven."""
         asked = self.scenario
         return find_failure(asked.rover, asked.terrain, self.verdict, self.limits)
+
+    def state_at(self, time: float) -> RoverState | None:
+        """Return the rover at a time [s]; where it does not stand at the start, as it fails."""
+        state = self.trajectory.state_at(time)
+        return self.failure.state if state is None and self.failure is not None else state
 
     def is_of(self, poses: Floats, values: Scenario) -> bool:
         """Return whether it is a path with these poses under these values."""
