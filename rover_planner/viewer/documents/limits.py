@@ -13,7 +13,7 @@ from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_planner.viewer.documents.numbers import plain
 from rover_planner.viewer.state.limits import MAX_USE, write_use
-from rover_planner.viewer.state.path_limits import Lane, PathLimits, make_chance_lane
+from rover_planner.viewer.state.path_limits import Lane, PathLimits
 from rover_planner.viewer.state.scenario import Judged
 
 MAX_POINTS = 240
@@ -28,52 +28,40 @@ def describe_limits(
     A lane has the use now and before, and six curves where wheels have it.
     """
     failure, before = path.failure, None if reference is None else reference.limits
-    end = max(path.limits.end, 0.0 if before is None else before.end)
+    limits = path.limits.add_chance(chance)
+    end = max(limits.end, 0.0 if before is None else before.end)
     lanes = [
         {
             "code": lane.limit.code,
             "title": lane.limit.title,
-            "now": _pick_points(path.limits.rows.distance, lane.used[:, None]),
+            "now": _pick_points(limits.rows.distance, lane.used[:, None]),
             "wheels": None
             if lane.wheels is None
-            else _pick_points(path.limits.rows.distance, lane.wheels),
+            else _pick_points(limits.rows.distance, lane.wheels),
             "before": _find_before(lane, before),
         }
-        for lane in list_lanes(path, chance)
+        for lane in limits.lanes
     ]
     return {
         "end": round(end, 4),
         "fails": None if failure is None else round(failure.distance, 4),
-        "code": "" if failure is None else _find_lane(path.limits, failure.code, chance),
+        "code": "" if failure is None else limits.lane(failure.code).limit.code,
         "compared": reference is not None,
         "lanes": lanes,
         "loads": _describe_loads(path),
     }
 
 
-def _find_lane(limits: PathLimits, code: str, chance: FailureChance | None) -> str:
-    """Return the code of the lane that shows a failure."""
-    shows_chance = code == CHANCE and chance is not None
-    return CHANCE if shows_chance else limits.lane(code).limit.code
-
-
-def list_lanes(path: Judged, chance: FailureChance | None) -> list[Lane]:
-    """Return the lanes of the limits, and the one of the chance of failure if it is known."""
-    lanes = list(path.limits.lanes)
-    return lanes if chance is None else [*lanes, make_chance_lane(path.limits, chance)]
-
-
 def describe_uses(
     path: Judged, time: float, chance: FailureChance | None = None
 ) -> list[dict[str, Any]]:
     """Return for each lane its use at a time [s] and the worst so far, with value and wheel."""
-    limits, failure = path.limits, path.failure
+    limits, failure = path.limits.add_chance(chance), path.failure
     rows = limits.rows_until(time)
     here = rows - 1
     if failure is not None and time >= failure.time - 1e-6:
         rows, here = max(rows, failure.row + 1), failure.row
-    lanes = list_lanes(path, chance)
-    uses = [_describe_use(lane, limits, lane.worst_until(rows), here) for lane in lanes]
+    uses = [_describe_use(lane, limits, lane.worst_until(rows), here) for lane in limits.lanes]
     if chance is not None:
         of = "whole path" if failure is None or failure.code == CHANCE else "up to the failure"
         uses[-1]["value"] = f"{of} {100.0 * chance.path:.0f} %"

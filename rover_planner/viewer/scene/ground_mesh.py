@@ -89,12 +89,15 @@ def draw_picture(grid: GroundGrid, ground: ColouredGround) -> NDArray[np.uint8]:
     factor = grid.refine(_light(*grid.slopes))
     if ground.beyond is not None:
         period = max(MIN_PERIOD, round(HATCH_PERIOD / (x[1] - x[0])))
-        row, column = np.ogrid[: len(y), : len(x)]
-        factor[ground.beyond & ((row + column) % period < 0.4 * period)] *= HATCH_SHADE
+        row, column = (np.arange(len(at), dtype=np.int16) for at in (y, x))
+        stripes = (row[:, None] + column) % period < 0.4 * period
+        np.multiply(factor, HATCH_SHADE, out=factor, where=ground.beyond & stripes)
     factor[np.flatnonzero(np.diff(np.floor(y)))] *= LINE_SHADE
     factor[:, np.flatnonzero(np.diff(np.floor(x)))] *= LINE_SHADE
-    shaded = ground.colours * factor[..., None]
-    return np.minimum(shaded, 255.0, out=shaded).astype(np.uint8)
+    picture = np.empty_like(ground.colours)
+    for k in range(3):  # one by one: all at once take three times the memory
+        picture[..., k] = np.minimum(ground.colours[..., k] * factor, 255.0)
+    return picture
 
 
 def _light(along_x: Floats, along_y: Floats) -> Floats:

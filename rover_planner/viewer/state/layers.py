@@ -131,17 +131,19 @@ def colour_limit(
     asked = [np.linspace(one[0], one[-1], min(len(one), MAX_PREDICTED)) for one in grid.pixels]
     heading = path if how.along and path is not None else np.radians(how.heading)
     used = predict_use(PREDICTED[how.layer], rover, terrain, heading, asked, options)
+    colours = map_colours(used, 0.0, 1.0)
+    colours[used > 1.0] = REFUSED
     columns, rows = (
         np.rint(np.linspace(0, len(few) - 1, len(many))).astype(int)
         for few, many in zip(asked, grid.pixels, strict=True)
     )
-    used = used[np.ix_(rows, columns)]
-    colours, beyond = map_colours(used, 0.0, 1.0), used > 1.0
-    colours[beyond] = REFUSED
+    nearest = np.ix_(rows, columns)
     words = "along the path" if how.along else f"at heading {how.heading:g} deg"
     hatched = ("hatched", "beyond the limit")
     return ColouredGround(
-        colours, _grade(f"{how.layer} {words}", ("0 %", "100 %"), hatched), beyond
+        colours[nearest],
+        _grade(f"{how.layer} {words}", ("0 %", "100 %"), hatched),
+        (used > 1.0)[nearest],
     )
 
 

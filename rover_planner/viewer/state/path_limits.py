@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The limits along a path: how much of each is used, by which wheel, and the worst so far."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,6 +69,15 @@ class PathLimits:
         found = {lane.limit.code: lane for lane in self.lanes}
         return found.get(code, found[GROUND])
 
+    def add_chance(self, chance: FailureChance | None) -> "PathLimits":
+        """Return the limits with a lane for the chance that the path fails there, if known."""
+        if chance is None:
+            return self
+        waypoint = self.rows.prediction.waypoint
+        unknown, no_wheel = np.full(len(waypoint), np.nan), np.full(len(waypoint), -1)
+        lane = Lane(ShownLimit(CHANCE, "chance"), unknown, chance.at[waypoint], no_wheel)
+        return replace(self, lanes=(*self.lanes, lane))
+
 
 def find_path_limits(rover: Rover, prediction: PathPrediction, verdict: Verdict) -> PathLimits:
     """Return how a prediction uses the limits, up to and including the first failure.
@@ -126,13 +135,6 @@ def _find_wheel_uses(prediction: PathPrediction, uses: Uses, k: int) -> Floats |
     return np.asarray(
         np.where(np.isnan(uses.use[:, [k]]), np.nan, values / (uses.limits.bounds[k] * kept))
     )
-
-
-def make_chance_lane(limits: PathLimits, chance: FailureChance) -> Lane:
-    """Return the chance that a path fails at each pose as a lane beside those of its limits."""
-    waypoint = limits.rows.prediction.waypoint
-    unknown, no_wheel = np.full(len(waypoint), np.nan), np.full(len(waypoint), -1)
-    return Lane(ShownLimit(CHANCE, "chance"), unknown, chance.at[waypoint], no_wheel)
 
 
 def _add_refusals(limits: PathLimits, verdict: Verdict) -> None:
