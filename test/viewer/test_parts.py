@@ -88,9 +88,13 @@ TIMES = np.linspace(0.0, 10.0, 11)
 def test_playing_stops_at_the_end_and_starts_again_from_the_beginning():
     playback = Playback(TIMES, speed=2.0)
     playback.toggle()
-    assert playback.advance(1.0) and (playback.time, playback.is_playing) == (2.0, True)
+    playback.advance(1.0)
+    assert (playback.time, playback.is_playing, playback.moved) == (2.0, True, True)
     playback.advance(10.0)
-    assert (playback.time, playback.is_playing) == (10.0, False) and not playback.advance(1.0)
+    assert (playback.time, playback.is_playing) == (10.0, False)
+    playback.moved = False
+    playback.advance(1.0)
+    assert not playback.moved
     playback.toggle()
     assert playback.time == 0.0
 

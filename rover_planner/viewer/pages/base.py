@@ -115,8 +115,6 @@ class PageBase(ABC):
         self.ground, self.survey = terrain, survey
         """What is shown."""
         self.requests: Inbox[Action] = Inbox()
-        self.moved = True
-        """True if the next picture may differ from the last one."""
         self.colouring, self.forces = Colouring(self.layers[0]), True
         self._ended = threading.Event()
         self._fulfils = False
@@ -190,7 +188,7 @@ class PageBase(ABC):
             self.requests.put(partial(self._answer, answer, words, mailbox), kind)
 
     def _answer(self, answer: Answer, words: Words, mailbox: Mailbox | None) -> None:
-        parts, self.moved = answer(words) or {}, True
+        parts = answer(words) or {}
         for name, part in parts.items() if mailbox is not None else ():
             mailbox.put(part, name)  # type: ignore[union-attr]
 

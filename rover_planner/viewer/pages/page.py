@@ -341,7 +341,7 @@ class Page(PageBase):
         depends = self.colouring.is_predicted or self.survey is not None
         if self.has_changed("ground", asked) and depends:
             self.paint()
-        self.moved = True
+        self.playback.moved = True
 
     def _draw_rover(self) -> None:
         asked = self.session.shown.scenario
@@ -417,13 +417,13 @@ class Page(PageBase):
     def advance(self, seconds: float) -> None:
         """Play on by a time of the visitor [s], and show what has changed."""
         playback = self.playback
-        self.moved = playback.advance(seconds) or self.moved
-        if not self.moved:
+        playback.advance(seconds)
+        if not playback.moved:
             return
         self.scene.show(self.session.shown.path.state_at(playback.time))
         now = time.monotonic()
-        self.moved = now - self._told_at < BOARD_PERIOD and playback.is_playing
-        if not self.moved:
+        playback.moved = now - self._told_at < BOARD_PERIOD and playback.is_playing
+        if not playback.moved:
             self._told_at = now
             self._tell_drive()
 

@@ -25,6 +25,8 @@ class Playback:
     """Chosen speed, one of SPEEDS."""
     is_playing: bool = False
     """True if the time moves on."""
+    moved: bool = True
+    """True if it has changed since it was shown; whoever shows it sets this to False."""
     _place: float | None = None
     """Where the rover is by `set_drive` until the time is moved; None if the time tells."""
 
@@ -35,14 +37,14 @@ class Playback:
 
     def toggle(self) -> None:
         """Pause if it plays; else play, from the start if the shown time is the end."""
-        self.is_playing = not self.is_playing
+        self.is_playing, self.moved = not self.is_playing, True
         if self.is_playing and self.time >= self.duration:
             self.seek(0.0)
 
     def seek(self, time: float) -> None:
         """Go to a time [s], limited to the drive."""
         self.time = float(np.clip(time, 0.0, self.duration))
-        self._place = None
+        self._place, self.moved = None, True
 
     def go_to(self, time: float) -> None:
         """Pause, and go to a time [s], limited to the drive."""
@@ -57,13 +59,11 @@ class Playback:
             index = int(np.searchsorted(self.times, self.time - 1e-9, side="left")) - 1
         self.go_to(float(self.times[np.clip(index, 0, len(self.times) - 1)]))
 
-    def advance(self, seconds: float) -> bool:
-        """Move on by the visitor's time [s]; return whether the shown time may have changed."""
-        if not self.is_playing:
-            return False
-        self.seek(self.time + self.speed * seconds)
-        self.is_playing = self.time < self.duration
-        return True
+    def advance(self, seconds: float) -> None:
+        """Move on by the visitor's time [s] if it plays."""
+        if self.is_playing:
+            self.seek(self.time + self.speed * seconds)
+            self.is_playing = self.time < self.duration
 
     def describe(self) -> str:
         """Return how it moves, in words."""
