@@ -269,18 +269,14 @@ class Page(PageBase):
         return _file(f"{rover.name.removesuffix('.yaml')}.yaml", write_rover(rover))
 
     def _save_page(self, base: str) -> dict[str, Any]:
-        """Return the page as a file, with the rover where the path is refused if it is."""
-        self.tell()
-        path, parts = self.session.shown.path, dict(self.channel.parts)
+        """Return the page as a file; the rover goes to where the path is refused if it is."""
+        path = self.session.shown.path
         if path.failure is not None:
-            state, at = path.failure.state, path.failure.time
-            parts |= {
-                "board": describe_board(state, path.failure.link),
-                "uses": describe_uses(path, at, self.session.shown.chance),
-                "drive": {**parts["drive"], "time": at, "distance": path.failure.distance},
-            }
+            self.playback.go_to(path.failure.time)
+        self.advance(0.0)
+        self.tell()
         rover = path.scenario.rover
-        text = write_file(self.server, parts, self._link(), rover, base)
+        text = write_file(self.server, self.channel.parts, self._link(), rover, base)
         return _file(f"{rover.name}.html", text)
 
     def _open(self, link: PageLink | None) -> None:
@@ -321,8 +317,8 @@ class Page(PageBase):
 
     def _show(self) -> None:
         """Show what was judged: in words and numbers at once, then in the scene."""
-        shown = self.session.shown
-        asked, path = shown.scenario, shown.path
+        shown, scene, draw = self.session.shown, self.scene, self.draw_made
+        asked, path, rover = shown.scenario, shown.path, shown.scenario.rover
         if self._advised is not None and self._advice_here is None:
             self._advice.cancel()  # nobody looks at its path any more
             self._advised = None
@@ -333,31 +329,23 @@ class Page(PageBase):
             self.playback.set_drive(path.trajectory.times, path.trajectory.places)
         self.tell_all()
         self._tell_drive()
-        self.draw_made("the failure is not shown", [path], self._draw_failure)
-        look = asked.rover, asked.arm_angles
-        self.draw_made("the rover is not drawn", look, self._draw_rover)
-        self.draw_made("the cameras are not moved", [asked.loaded], self._fit_cameras)
-        self.draw_made("the paths are not drawn", [*shown.paths, shown.index], self._draw_paths)
+        arm, candidates = asked.arm_angles, [one.candidate for one in shown.paths]
+        draw("the failure is not shown", [path], lambda: scene.failure.show(rover, path.failure))
+        draw("the rover is not drawn", [rover, arm], lambda: scene.rover.take(rover, arm))
+        draw(
+            "the cameras are not moved",
+            [asked.loaded],
+            lambda: self._look(self.server.get_clients().values(), FIT),
+        )
+        draw(
+            "the paths are not drawn",
+            [*shown.paths, shown.index],
+            lambda: scene.paths.show(rover, self.ground, candidates, shown.index),
+        )
         depends = self.colouring.is_predicted or self.survey is not None
         if self.has_changed("ground", asked) and depends:
             self.paint()
         self.playback.moved = True
-
-    def _draw_rover(self) -> None:
-        asked = self.session.shown.scenario
-        self.scene.rover.take(asked.rover, asked.arm_angles)
-
-    def _fit_cameras(self) -> None:
-        self._look(self.server.get_clients().values(), FIT)
-
-    def _draw_paths(self) -> None:
-        shown = self.session.shown
-        candidates = [one.candidate for one in shown.paths]
-        self.scene.paths.show(shown.scenario.rover, self.ground, candidates, shown.index)
-
-    def _draw_failure(self) -> None:
-        shown = self.session.shown
-        self.scene.failure.show(shown.scenario.rover, shown.path.failure)
 
     # What is told.
 
