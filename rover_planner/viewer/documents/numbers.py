@@ -14,8 +14,10 @@ def plain(values: ArrayLike, digits: int = 3) -> Any:
     None stands for NaN and for what is infinite.
     """
     array = np.round(np.asarray(values, float), digits)
-    unknown = np.array(None, object)
-    return np.where(np.isfinite(array), array.astype(object), unknown).tolist()
+    known = np.isfinite(array)
+    if known.all():
+        return array.tolist()
+    return np.where(known, array.astype(object), np.array(None, object)).tolist()
 
 
 def write(value: float, digits: int, unit: str = "") -> str:

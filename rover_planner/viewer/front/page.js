@@ -277,7 +277,7 @@ function drawLimits({ end, lanes, code, compared }) {
   if (!lanes.some((lane) => lane.code === chosen.lane) || code) chosen.lane = code || "friction";
   const strip = (curve, title, extra = "") => [...listRuns(curve)].map(([left, right, kind, most]) => make("i", {
     class: `${kind} ${extra}`, title: `${title} ${most === null ? "does not count or is not known" : percent(most)}; at ${left.toFixed(2)} m`,
-    style: end ? `left:${share(left)};width:calc(${share(right)} - ${share(left)})` : "left:0;width:100%",
+    style: end ? `left:min(${share(left)}, 100% - 5px);width:calc(${share(right)} - ${share(left)})` : "left:0;width:100%",
   }));
   const rows = lanes.map((lane) => make("div", { class: "lane", "data-code": lane.code, onclick: () => { chosen.lane = lane.code; drawCurves(); drawUses(); } },
     make("div", {}, lane.title),

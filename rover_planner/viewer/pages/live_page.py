@@ -15,6 +15,7 @@ from rover_planner.viewer.documents.live import choose_answer, describe_learned,
 from rover_planner.viewer.live.listener import LiveListener
 from rover_planner.viewer.live.live_state import LiveData, read_state
 from rover_planner.viewer.pages.base import Answer, PageBase
+from rover_planner.viewer.scene.cameras import START
 from rover_planner.viewer.scene.ground_mesh import PaintRequest
 from rover_planner.viewer.state.link import read_link
 from rover_planner.viewer.state.rover_state import RoverState
@@ -126,8 +127,7 @@ class LivePage(PageBase):
             self._turn_arm(data)
             if self._first is None:
                 self._first = state.position[:2]
-                for client in self.server.get_clients().values():
-                    self._aim_camera(client)
+                self._look(self.server.get_clients().values(), START)
         if now - self._told_at > BOARD_PERIOD:
             self._told_at = now
             self._tell_board(state, data)

@@ -323,11 +323,11 @@ class Page(PageBase):
             self._advice.cancel()  # nobody looks at its path any more
             self._advised = None
             self._show_ghost(None)
+        self.tell_all()
         if self.has_changed("ends", asked.start, asked.goal):
             self.playback.go_to(0.0)
         if self.has_changed("drive", path):
             self.playback.set_drive(path.trajectory.times, path.trajectory.places)
-        self.tell_all()
         self._tell_drive()
         arm, candidates = asked.arm_angles, [one.candidate for one in shown.paths]
         draw("the failure is not shown", [path], lambda: scene.failure.show(rover, path.failure))

@@ -80,10 +80,8 @@ class Failure:
         return f"{words}, {self.where}" if self.where else words
 
 
-def find_failure(
-    rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathLimits
-) -> Failure | None:
-    """Return the first failure of a judged path; None if there is none.
+def find_failure(rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathLimits) -> Failure:
+    """Return the first failure of a path that is refused.
 
     Args:
         rover: The rover.
@@ -91,8 +89,6 @@ def find_failure(
         verdict: The verdict on the path.
         limits: Its limits, as `find_path_limits` returns them.
     """
-    if verdict.first_failure < 0:
-        return None
     lane, rows = limits.lane(verdict.code), limits.rows
     is_there = rows.prediction.waypoint == verdict.first_failure
     broken = np.flatnonzero(is_there & (lane.used > 1.0))

@@ -116,6 +116,8 @@ class Judged:
     @cached_property
     def failure(self) -> Failure | None:
         """The first failure; None if the path can be driven."""
+        if self.verdict.first_failure < 0:
+            return None
         asked = self.scenario
         return find_failure(asked.rover, asked.terrain, self.verdict, self.limits)
 
