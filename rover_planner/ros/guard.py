@@ -21,8 +21,9 @@ NANOSECONDS = 1e9
 EVENT_PERIOD, EVENT_WINDOW = 1.0, 0.01
 """Time between two looks at events of publishers and subscriptions, such as profiles that do not
 match, and the length of a look [s]: they are half of the entities of a wait set."""
-PATIENCE = 0.1
-"""Time between two looks at all else where a node has a loop [s]."""
+PATIENCE, PATIENT_PERIODS = 0.1, 5
+"""Time between two looks at all else where a node has a loop [s], or that number of its periods if
+it is more."""
 
 Refusal = TypeVar("Refusal")
 
@@ -102,7 +103,7 @@ class GuardedExecutor(SingleThreadedExecutor):
     and after one in the reading of a message the node's callback group stays blocked for ever.
 
     The timer that a node names as its `loop` is called without a wait set: to make one for each
-    wait, as rclpy does, takes longer than most updates. All else is looked at each PATIENCE.
+    wait, as rclpy does, takes longer than most updates. All else is looked at from time to time.
     """
 
     def __init__(self, **executor_arguments: Any):
@@ -141,7 +142,8 @@ class GuardedExecutor(SingleThreadedExecutor):
         try:
             call, _, _ = self.wait_for_ready_callbacks(timeout_sec=0.0)
         except TimeoutException:
-            self._others_due = time.monotonic() + PATIENCE
+            period = self._loop.timer_period_ns / NANOSECONDS
+            self._others_due = time.monotonic() + max(PATIENCE, PATIENT_PERIODS * period)
         else:
             call()
 

@@ -29,6 +29,7 @@ class _Topic:
     take: Callable[[Any, float], None]
     depth: int
     is_due: Callable[[], bool]
+    raw: bool
 
 
 class PolledTopics:
@@ -47,6 +48,8 @@ class PolledTopics:
         take: Callable[[Any, float], None],
         qos: QoSProfile,
         is_due: Callable[[], bool] = lambda: True,
+        *,
+        raw: bool = False,
     ) -> None:
         """Subscribe to a topic.
 
@@ -56,10 +59,11 @@ class PolledTopics:
             take: Called with each message and the time of its arrival [s], monotonic.
             qos: The profile; of more messages than its depth the last ones are read.
             is_due: Whether it is to be read at all now.
+            raw: Whether `take` gets the bytes of a message.
         """
         group = self._group
         topic = self._node.create_subscription(kind, name, take, qos, callback_group=group)
-        self._topics.append(_Topic(topic, topic.topic_name, take, qos.depth, is_due))
+        self._topics.append(_Topic(topic, topic.topic_name, take, qos.depth, is_due, raw))
 
     def poll(self) -> None:
         """Read all that has come since the last time, in the order of its arrival."""
@@ -82,7 +86,7 @@ class PolledTopics:
         for _ in range(topic.depth):
             try:
                 with handle:
-                    found = handle.take_message(topic.subscription.msg_type, False)
+                    found = handle.take_message(topic.subscription.msg_type, topic.raw)
             except Exception as error:
                 self._guard.report(f"reading of {topic.name}", error)
                 continue
