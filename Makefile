@@ -8,6 +8,7 @@ SHELL := bash
 
 VENV ?= .venv
 BIN := $(VENV)/bin
+CORE := $(VENV)/.core
 READY := $(VENV)/.ready
 BENCH_READY := $(VENV)/.bench_ready
 PACKAGES := rover_physics msg_adapters rover_planner
@@ -39,7 +40,7 @@ view: $(READY) kernels ## watch the rover on a terrain in a web page; MAP as for
 	@$(BIN)/python -m rover_planner view lsr1 $(if $(MAP),"$(MAP)")
 
 .PHONY: test
-test: $(READY) ## lint, type check and all tests
+test: $(CORE) ## lint, type check and all tests
 	@$(MAKE) --no-print-directory --jobs 2 --output-sync lint kernels
 	run() { # a second run of what fails tells whether it needs other tests to fail; it mends nothing
 	  echo "== $$1"; shift
@@ -80,7 +81,7 @@ lint: $(READY) ## ruff, mypy, and oxlint for the page
 	$(BIN)/python -m mypy
 
 .PHONY: kernels
-kernels: $(READY) ## compile the numba kernels into their cache
+kernels: $(CORE) ## compile the numba kernels into their cache
 	@echo "== compiling kernels"
 	$(BIN)/python -m rover_planner warm-up
 
@@ -93,8 +94,13 @@ clean: ## remove the environment and everything that was made
 	rm -rf "$(VENV)" build dist install log demo_output bench_output *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find $(PACKAGES) test -name __pycache__ -prune -exec rm -rf {} +
 
-$(READY): setup.py pyproject.toml constraints.txt .ci/make_venv
+# Kernels compile while the extras are installed.
+$(CORE): setup.py pyproject.toml constraints.txt .ci/make_venv
 	@.ci/make_venv "$(VENV)"
+	touch $@
+
+$(READY): $(CORE)
+	@.ci/make_venv "$(VENV)" extras
 	touch $@
 
 $(BENCH_READY): $(READY)
