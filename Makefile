@@ -41,7 +41,7 @@ view: $(READY) kernels ## watch the rover on a terrain in a web page; MAP as for
 
 .PHONY: test
 test: $(CORE) ## lint, type check and all tests
-	@$(MAKE) --no-print-directory --jobs 2 --output-sync lint kernels
+	@$(MAKE) --no-print-directory --jobs 2 --output-sync kernels lint collected
 	run() { # a second run of what fails tells whether it needs other tests to fail; it mends nothing
 	  echo "== $$1"; shift
 	  $(LIMIT) $(BIN)/python -m pytest $(END_HANGS) --durations 25 --durations-min 10 --cache-clear "$$@" && return
@@ -79,6 +79,11 @@ lint: $(READY) ## ruff, mypy, and oxlint for the page
 	$(BIN)/oxlint --deny-warnings rover_planner/viewer/front
 	echo "== mypy"
 	$(BIN)/python -m mypy
+
+.PHONY: collected
+collected: $(READY) # no worker prepares again what one has
+	@echo "== collecting the tests"
+	$(BIN)/python -m pytest -qq --collect-only test | tail -n 3
 
 .PHONY: kernels
 kernels: $(CORE) ## compile the numba kernels into their cache
