@@ -127,7 +127,7 @@ def test_every_option_that_a_page_gives_to_a_command_exists(page):
 def test_every_parameter_argument_topic_and_service_that_a_page_gives_to_ros_exists(page):
     text = current_text(page)
     parameters = {spec.name for one in PROGRAMS.values() for spec in one.parameters}
-    assert set(re.findall(r"-p (\w+):=", text)) <= parameters
+    assert set(re.findall(r"-p ([a-z]\w*):=", text)) <= parameters
     assert set(re.findall(r"ros2 param set /\w+ (\w+)", text)) <= parameters
     for file, given in re.findall(r"ros2 launch rover_planner ([\w.]+)([^`\n#]*)", text):
         declared = (TOP / "launch" / file).read_text(encoding="utf-8")
