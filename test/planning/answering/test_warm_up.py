@@ -40,7 +40,7 @@ grounds = [make_terrain(one, half=3.2) for one in heights]
 grounds += [replace(one, elevation_std=np.full_like(one.elevation, 0.005)) for one in grounds]
 fan = {"planner": "fan"}  # one search is enough
 for parameters, asked in (
-    ({}, grounds),
+    ({"search_budget": 0.3}, grounds),
     (fan | {"policy": "optimal"}, grounds[::3]),
     (fan | {"soil": "mars_simulant"}, grounds[::3]),  # sinkage takes long
 ):
