@@ -126,7 +126,7 @@ class GuardedExecutor(SingleThreadedExecutor):
         """Return whether a timer is a loop; with a simulated clock, /clock comes before loops."""
         if timer is None or timer is not self._loop or timer.is_canceled():
             return False
-        return not any(node.get_clock().ros_time_is_active for node in self.get_nodes())
+        return not self._clock.ros_time_is_active
 
     def _call_loop(self) -> None:
         now = time.monotonic()
@@ -160,7 +160,7 @@ class GuardedExecutor(SingleThreadedExecutor):
     def add_node(self, node: Node) -> bool:
         """Add the node; errors of its callbacks go to its guard, if it has one."""
         self._guard_of_node = getattr(node, "guard", None)
-        self._loop = getattr(node, "loop", None)
+        self._loop, self._clock = getattr(node, "loop", None), node.get_clock()
         return bool(super().add_node(node))
 
     def _make_handler(self, entity, node, take_from_wait_list):

@@ -29,7 +29,6 @@ class _Topic:
     take: Callable[[Any, float], None]
     depth: int
     is_due: Callable[[], bool]
-    raw: bool
 
 
 class PolledTopics:
@@ -59,11 +58,13 @@ class PolledTopics:
             take: Called with each message and the time of its arrival [s], monotonic.
             qos: The profile; of more messages than its depth the last ones are read.
             is_due: Whether it is to be read at all now.
-            raw: Whether `take` gets the bytes of a message.
+            raw: Whether `take` gets the bytes of a message: to make the message takes long.
         """
         group = self._group
-        topic = self._node.create_subscription(kind, name, take, qos, callback_group=group)
-        self._topics.append(_Topic(topic, topic.topic_name, take, qos.depth, is_due, raw))
+        topic = self._node.create_subscription(
+            kind, name, take, qos, callback_group=group, raw=raw
+        )
+        self._topics.append(_Topic(topic, topic.topic_name, take, qos.depth, is_due))
 
     def poll(self) -> None:
         """Read all that has come since the last time, in the order of its arrival."""
@@ -82,11 +83,11 @@ class PolledTopics:
 
     def _read(self, topic: _Topic) -> list[tuple[int, str, Callable[[Any, float], None], Any]]:
         """Return what has come with its time [ns], the name of the topic and who takes it."""
-        handle, arrived = topic.subscription.handle, []
+        one, arrived = topic.subscription, []
         for _ in range(topic.depth):
             try:
-                with handle:
-                    found = handle.take_message(topic.subscription.msg_type, topic.raw)
+                with one.handle:
+                    found = one.handle.take_message(one.msg_type, one.raw)
             except Exception as error:
                 self._guard.report(f"reading of {topic.name}", error)
                 continue
