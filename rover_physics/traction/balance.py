@@ -180,6 +180,8 @@ class BalanceWriter:
         """(1,) BALANCE_WORK, for kernels."""
         self.weight = float(linkage.mass * linkage.gravity)
         """Weight of the rover with its payload in [N]."""
+        self.on_bogie = np.array(linkage.on_bogie, dtype=bool)
+        """(6,) whether each wheel hangs on a bogie."""
 
     def find_rolling(self, state: MeasuredState) -> Any:
         """Return how the wheels roll at a measured state, without its contacts: a ROLLING."""

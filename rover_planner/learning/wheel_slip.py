@@ -133,7 +133,7 @@ class SlipWindows:
             return None
         _fit_window(blocks, self._radius, self._half_width, self._fits)
         fits = self._fits.copy()
-        fit = {name: fits[name][0] for name in _FIT.names}
+        fit = {name: fits[name][0] for name in fits.dtype.fields or ()}
         squares, spread = fit.pop("squares"), fit.pop("spread")
         if self._scatter is None:
             self._scatter = squares.copy()

@@ -117,12 +117,12 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
 
     def _read_sensors(self) -> None:
         """Take what the sensors sent, and tell where the wheels say that the rover is."""
-        learner, wheels, self._motion = self.learner, self._wheels, None
+        learner, wheels = self.learner, self._wheels
         if learner is not None:
             is_fresh = self.seconds - self._command_time < COMMAND_AGE
             learner.commanded = self._commanded if is_fresh else None
         self.heard.poll()
-        motion = self._motion
+        motion, self._motion = self._motion, None
         if motion is None:
             return
         message = planar_odometry(
