@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Drives in MuJoCo with traction control, and which of them the planner promises.
+
+Run from the repository: python -m benchmarks.control_margin [--count N] [--seed S] [--source map]
+It needs the extra `bench`. Its results are in docs/validation.md.
+"""
+
+from dataclasses import replace
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from benchmarks.drives import BY_MAP, BY_MOTION, Obstacle, drive, run_in_processes
+from benchmarks.measure import print_table
+from rover_physics import SweepOptions, judge_path, load_rover
+from rover_physics.names import EQUAL, OPTIMAL
+from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
+from support.reference_drives import drive_path, unlimited
+
+SOURCES = {"map": BY_MAP, "motion": BY_MOTION}
+"""Controllers by the source of their contact angles."""
+TRIES, MOST_TIME = 3, 5.0
+"""Attempts at one place, and time after which a rover has failed over that of the drive."""
+SIZES = {
+    "step": (0.05, 0.25),
+    "bump_one_side": (0.05, 0.25),
+    "ditch": (0.1, 0.7),
+    "slope": (8.0, 32.0),
+    "cross_slope": (8.0, 32.0),
+    "rocks": (0.05, 0.16),
+    "relief": (0.05, 0.14),
+}
+"""Smallest and largest size of each kind of obstacle."""
+FRICTIONS = 0.35, 1.0
+"""Smallest and largest friction coefficient."""
+TORQUES = 0.3, 2.5
+"""Smallest and largest torque limit [N m]; their logarithm is uniform."""
+MARGINS = (0.0, 0.1, 0.2, 0.3)
+"""Control margins that are tried."""
+KNOWN = {
+    "friction": 0.0,
+    "friction_per_wheel": 0.0,
+    "max_torque": 0.0,
+    "max_torque_per_wheel": 0.0,
+}
+"""Uncertainty of what the drives have as the planner is told it."""
+PROMISES = (
+    *(f"control margin {margin:g}" for margin in MARGINS),
+    f"chance up to {ACCEPTED_CHANCE:g}",
+    "the same, friction and torque known",
+)
+"""What a promise asks for."""
+BATCH = 40
+"""Obstacles that are drawn at once."""
+
+
+def draw_obstacle(rng: np.random.Generator) -> Obstacle:
+    """Draw a ground, a friction and a torque limit."""
+    kind = str(rng.choice(list(SIZES)))
+    low, high = np.log(TORQUES)
+    return Obstacle(
+        kind=kind,
+        size=float(rng.uniform(*SIZES[kind])),
+        friction=float(rng.uniform(*FRICTIONS)),
+        max_torque=float(np.exp(rng.uniform(low, high))),
+        seed=int(rng.integers(1, 1_000_000)),
+    )
+
+
+def find_promises(obstacle: Obstacle) -> tuple[bool, ...]:
+    """Return which of PROMISES are given; none if the obstacle does not need traction control.
+
+    The rover has only the limits that MuJoCo knows.
+    """
+    rover, ground, path = unlimited(load_rover("lsr1")), obstacle.ground, drive_path()
+    asked = SweepOptions(friction=obstacle.friction, max_torque=obstacle.max_torque, policy=EQUAL)
+    if judge_path(rover, ground, path, asked)[1].traversable:
+        return (False,) * len(PROMISES)
+    asked = replace(asked, policy=OPTIMAL)
+    margins = [
+        judge_path(rover, ground, path, replace(asked, control_margin=margin))[1].traversable
+        for margin in MARGINS
+    ]
+    known = replace(rover, uncertainty=replace(rover.uncertainty, **KNOWN))
+    chances = [
+        judge_path(one, ground, path, asked, accepted_chance=ACCEPTED_CHANCE)[1].traversable
+        for one in (rover, known)
+    ]
+    return (*margins, *chances)
+
+
+def draw_passable(count: int, seed: int, workers: int) -> dict[Obstacle, tuple[bool, ...]]:
+    """Return obstacles that are passable with traction control and not without, with PROMISES."""
+    rng, promised = np.random.default_rng(seed), {}
+    while True:
+        drawn = [draw_obstacle(rng) for _ in range(BATCH)]
+        found = run_in_processes(find_promises, [(obstacle,) for obstacle in drawn], workers)
+        for obstacle, promises in zip(drawn, found, strict=True):
+            if promises[0]:
+                promised[obstacle] = promises
+            if len(promised) == count:
+                return promised
+
+
+def main(
+    count: Annotated[int, typer.Option(help="Number of obstacles.")] = 100,
+    seed: Annotated[int, typer.Option(help="Seed of the obstacles.")] = 1,
+    source: Annotated[str, typer.Option(help="Contact angles from: map or motion.")] = "map",
+    workers: Annotated[int, typer.Option(help="Number of processes.")] = 2,
+) -> None:
+    """Draw, judge and drive; print how many promises are kept, and what of the rest passes."""
+    promised = draw_passable(count, seed, workers)
+    jobs = [(obstacle, SOURCES[source], TRIES, MOST_TIME) for obstacle in promised]
+    drives = run_in_processes(drive, jobs, workers)
+    passed = np.array([one.passed for one in drives])
+    rows = []
+    for name, given in zip(PROMISES, np.array(list(promised.values())).T, strict=True):
+        kept, all_kept = int((given & passed).sum()), int(given.sum())
+        rows.append(
+            (
+                name,
+                f"{kept} of {all_kept} ({kept / max(all_kept, 1):.1%})",
+                f"{kept} of {passed.sum()} ({kept / max(passed.sum(), 1):.1%})",
+            )
+        )
+    title = f"{count} obstacles that need traction control, contact angles from {source}"
+    print_table(title, ("promised by", "promises kept", "promised of what passes"), rows)
+
+
+if __name__ == "__main__":
+    typer.run(main)
