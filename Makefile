@@ -8,6 +8,7 @@ SHELL := bash
 
 VENV ?= .venv
 BIN := $(VENV)/bin
+CORE := $(VENV)/.core
 READY := $(VENV)/.ready
 BENCH_READY := $(VENV)/.bench_ready
 PACKAGES := rover_physics msg_adapters rover_planner
@@ -39,8 +40,8 @@ view: $(READY) kernels ## watch the rover on a terrain in a web page; MAP as for
 	@$(BIN)/python -m rover_planner view lsr1 $(if $(MAP),"$(MAP)")
 
 .PHONY: test
-test: $(READY) ## lint, type check and all tests
-	@$(MAKE) --no-print-directory --jobs 2 --output-sync lint kernels
+test: $(CORE) ## lint, type check and all tests
+	@$(MAKE) --no-print-directory --jobs 2 --output-sync kernels lint collected
 	run() { # a second run of what fails tells whether it needs other tests to fail; it mends nothing
 	  echo "== $$1"; shift
 	  $(LIMIT) $(BIN)/python -m pytest $(END_HANGS) --durations 25 --durations-min 10 --cache-clear "$$@" && return
@@ -79,8 +80,13 @@ lint: $(READY) ## ruff, mypy, and oxlint for the page
 	echo "== mypy"
 	$(BIN)/python -m mypy
 
+.PHONY: collected
+collected: $(READY) # no worker prepares again what one has
+	@echo "== collecting the tests"
+	$(BIN)/python -m pytest -qq --collect-only test | tail -n 3
+
 .PHONY: kernels
-kernels: $(READY) ## compile the numba kernels into their cache
+kernels: $(CORE) ## compile the numba kernels into their cache
 	@echo "== compiling kernels"
 	$(BIN)/python -m rover_planner warm-up
 
@@ -93,8 +99,13 @@ clean: ## remove the environment and everything that was made
 	rm -rf "$(VENV)" build dist install log demo_output bench_output *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find $(PACKAGES) test -name __pycache__ -prune -exec rm -rf {} +
 
-$(READY): setup.py pyproject.toml constraints.txt .ci/make_venv
+# Kernels compile while the extras are installed.
+$(CORE): setup.py pyproject.toml constraints.txt .ci/make_venv
 	@.ci/make_venv "$(VENV)"
+	touch $@
+
+$(READY): $(CORE)
+	@.ci/make_venv "$(VENV)" extras
 	touch $@
 
 $(BENCH_READY): $(READY)

@@ -8,7 +8,6 @@ read back unchanged.
 """
 
 import array
-import math
 import struct
 from collections.abc import Mapping
 from typing import Any
@@ -17,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sensor_msgs.msg import PointCloud2, PointField
 
+from msg_adapters.cdr import Fields
 from msg_adapters.errors import MessageError
 from msg_adapters.gridding import (
     CELL_HEIGHTS,
@@ -67,26 +67,32 @@ def find_cloud_data(message: bytes) -> slice:
     Raises:
         MessageError: They are no PointCloud2.
     """
-    order = "<I" if message[1:2] == b"\1" else ">I"
-
-    def number(at: int) -> int:
-        return int(struct.unpack_from(order, message, at)[0])
-
-    def skip_text(at: int) -> int:
-        return at + 4 + 4 * math.ceil(number(at) / 4)
-
+    fields = Fields(message)
     try:
-        at = skip_text(12) + 8  # behind stamp, frame_id, height and width
-        count, at = number(at), at + 4
-        for _ in range(min(count, MAX_FIELDS)):
-            at = skip_text(at) + 12  # behind name, offset, datatype and count
-        begin = at + 16  # behind is_bigendian, point_step, row_step and the number of bytes
-        data = slice(begin, begin + number(begin - 4))
+        fields.stamp(), fields.text(), fields.numbers("II")  # height and width
+        for _ in range(min(fields.count(), MAX_FIELDS)):
+            fields.text(), fields.numbers("I"), fields.numbers("B"), fields.numbers("I")
+        fields.numbers("B"), fields.numbers("II")  # is_bigendian, point_step and row_step
+        size = fields.count()
+        data = slice(fields.at, fields.at + size)
     except struct.error:
         data = slice(0, len(message) + 1)
     if data.stop > len(message):
         raise MessageError(f"{len(message)} bytes were received that are no PointCloud2")
     return data
+
+
+def is_same_cloud(cloud: PointCloud2, other: PointCloud2) -> bool:
+    """Return whether two clouds differ in their stamps at most."""
+
+    def describe(one: PointCloud2) -> tuple[Any, ...]:
+        size = one.height, one.width, one.point_step, one.row_step
+        return one.header.frame_id, size, one.fields, one.is_bigendian, one.is_dense
+
+    if describe(cloud) != describe(other):
+        return False
+    data, others = (np.frombuffer(one.data, np.uint8) for one in (cloud, other))
+    return np.array_equal(data, others)
 
 
 PointMove = tuple[NDArray[np.float64], NDArray[np.float64]]

@@ -11,6 +11,7 @@ from nav_msgs.msg import Path
 from numpy.typing import ArrayLike, NDArray
 from std_msgs.msg import Header
 
+from msg_adapters.cdr import Fields
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame
 from rover_physics.numerics.plausible import MAX_COORDINATE
@@ -41,13 +42,12 @@ def count_poses(message: bytes) -> int:
     Raises:
         MessageError: The message ends before that number.
     """
-    order = "<" if message[1:2] == b"\1" else ">"
+    fields = Fields(message)
     try:
-        (length,) = struct.unpack_from(order + "I", message, 12)  # of frame_id, behind the stamp
-        (count,) = struct.unpack_from(order + "I", message, 16 + 4 * math.ceil(length / 4))
+        fields.stamp(), fields.text()
+        return fields.count()
     except struct.error:
         raise MessageError(f"{len(message)} bytes were received that are no Path") from None
-    return int(count)
 
 
 def yaw_from_quaternion(quaternion: Quaternion, what: str = "orientation") -> float:

@@ -6,7 +6,6 @@ import warnings
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO
@@ -18,27 +17,17 @@ from numpy.typing import DTypeLike, NDArray
 from rover_physics.errors import RoverFileError
 from rover_physics.files.user_file import open_regular_file, open_without_waiting, writing
 
+VALUE_BYTES, HEADER_BYTES = 8, 10_000
+"""Memory of a value that is read, and of the header of an array [bytes]."""
 METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 """Compression methods of numpy.savez and numpy.savez_compressed; zipfile unpacks others without a
 limit of memory."""
 FORCE_ZIP64 = 1 << 30
 """Size of an array [bytes] from which its entry is written as one that may exceed 2 GiB."""
 MAX_CODE_POINT = 0x10FFFF
-
-
-@dataclass(frozen=True)
-class ArrayHeader:
-    """Type and shape of an array as its header claims them."""
-
-    dtype: np.dtype[Any]
-    """Type of the elements: numbers, bools or texts."""
-    shape: tuple[int, ...]
-    """Shape."""
-
-    @property
-    def size(self) -> int:
-        """Number of elements."""
-        return math.prod(self.shape)
+NUMBERS, FLAGS, TEXTS, ANY = "fiu", "b", "U", "fiubU"
+KINDS = {NUMBERS: "numbers", FLAGS: "bools", TEXTS: "texts", ANY: "plain numbers or texts"}
+"""What arrays hold, by the kinds of their types."""
 
 
 class NpzReader:
@@ -68,49 +57,50 @@ class NpzReader:
         members = self._archive.namelist()
         return tuple(name.removesuffix(ending) for name in members if name.endswith(ending))
 
-    def read_header(self, name: str) -> ArrayHeader:
-        """Return the header of an array; nothing else is unpacked."""
-        with self._open(name) as (stream, declared):
-            version = npy_format.read_magic(stream)
-            if version != (1, 0):  # of others the length has no limit; NumPy needs none for these
-                raise RoverFileError(f"has a header of version {version}; it must be (1, 0)")
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # of headers of Python 2 and odd ones
-                shape, _, dtype = npy_format.read_array_header_1_0(stream)
-            if dtype.hasobject:
-                raise RoverFileError("holds Python objects; it must hold plain numbers or texts")
-            if dtype.kind not in "fiubU" or not dtype.itemsize:
-                raise RoverFileError(
-                    f"has elements of type {dtype.str}; they must be plain numbers or texts"
-                )
-            unpacked = declared - stream.tell()
-            if math.prod(shape) * dtype.itemsize != unpacked:
-                raise RoverFileError(
-                    f"is damaged: its header claims shape {_show(str(shape))} of type "
-                    f"{dtype.str}, and the archive {unpacked} bytes"
-                )
-            return ArrayHeader(dtype.newbyteorder("="), shape)
-
-    def read(self, name: str, dtype: DTypeLike | None = None, *, most: int) -> NDArray[Any]:
+    def read(
+        self,
+        name: str,
+        *,
+        most: int,
+        kinds: str = ANY,
+        shape: tuple[int | None, ...] | None = None,
+        dtype: DTypeLike | None = None,
+    ) -> NDArray[Any]:
         """Return an array in C order.
 
         Args:
             name: Name of the array.
+            most: Largest number of its values, or of the characters of its texts. One that takes
+                more memory is not unpacked.
+            kinds: A key of KINDS.
+            shape: Its shape, with None for any number; without one, any shape.
             dtype: Type of the returned elements; None for that of the file.
-            most: Largest allowed size of the returned array [bytes].
         """
-        header = self.read_header(name)
-        result = np.dtype(dtype) if dtype is not None else header.dtype
-        with self._open(name) as (stream, _):
-            needed = header.size * max(result.itemsize, header.dtype.itemsize)
-            if needed > most:
-                raise RoverFileError(f"takes {needed} bytes of memory; it may take at most {most}")
-            array = npy_format.read_array(stream, allow_pickle=False)
-            if header.dtype.kind == "U":
-                codes = array.astype(header.dtype).reshape(-1).view(np.uint32)
-                if (codes > MAX_CODE_POINT).any():
-                    raise RoverFileError("holds characters that do not exist; it must hold texts")
-            return np.asarray(array, result, order="C")
+        with self._open(name) as (stream, size):
+            if size > VALUE_BYTES * most + HEADER_BYTES:
+                raise RoverFileError(f"takes {size} bytes of memory; the limit is {most} values")
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # of headers of Python 2 and odd ones
+                npy_format.read_magic(stream)
+                claimed, _, kind = npy_format.read_array_header_1_0(stream)
+                claim = math.prod(claimed) * kind.itemsize
+                if claim != size - stream.tell() and not kind.hasobject:
+                    raise RoverFileError(f"is damaged: its header claims {kind.str}{claimed}")
+                stream.seek(0)
+                array = npy_format.read_array(stream, allow_pickle=False)
+            found = array.dtype
+            if found.kind not in kinds or not found.itemsize:
+                raise RoverFileError(f"is of type {found}; it must hold {KINDS[kinds]}")
+            if shape is not None and not _fits(array.shape, shape):
+                must = str(shape).replace("None", "n")
+                raise RoverFileError(f"has shape {_show(str(array.shape))}; it must be {must}")
+            count = array.size * (found.itemsize // 4 if found.kind == TEXTS else 1)
+            if count > most:
+                raise RoverFileError(f"has {count} values; the limit is {most}")
+            array = np.asarray(array, dtype or found.newbyteorder("="), order="C")
+            if found.kind == TEXTS and (array.reshape(-1).view(np.uint32) > MAX_CODE_POINT).any():
+                raise RoverFileError("holds characters that do not exist; it must hold texts")
+            return array
 
     @contextmanager
     def _open(self, name: str) -> Iterator[tuple[BinaryIO, int]]:
@@ -132,6 +122,12 @@ class NpzReader:
             raise RoverFileError(f"entry {name} {error}") from None
         except Exception as error:  # as above; NumPy's readers too raise more than they document
             raise RoverFileError(f"entry {name} is damaged ({_reason(error)})") from error
+
+
+def _fits(found: tuple[int, ...], shape: tuple[int | None, ...]) -> bool:
+    return len(found) == len(shape) and all(
+        one in (None, size) for one, size in zip(shape, found, strict=True)
+    )
 
 
 @contextmanager

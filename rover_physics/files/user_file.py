@@ -34,24 +34,11 @@ def open_regular_file(path: str | Path) -> Iterator[BinaryIO]:
             text does not name the file; `errors_of` adds the name.
     """
     with _reading():
-        check_regular(os.stat(path))  # before it is opened, because opening can start a device
-        descriptor = os.open(path, OPEN_FLAGS)
-    with wrap_descriptor(descriptor) as file:
+        _check_regular(os.stat(path))  # before it is opened, because opening can start a device
+        file = os.fdopen(os.open(path, OPEN_FLAGS), "rb")
+    with file:
+        _check_regular(os.fstat(file.fileno()))  # the name may mean another file than before
         yield file
-
-
-def wrap_descriptor(descriptor: int) -> BinaryIO:
-    """Return an open descriptor as a file object, which owns it from now on.
-
-    Raises:
-        RoverFileError: It is not a regular file; the descriptor is closed.
-    """
-    try:
-        check_regular(os.fstat(descriptor))  # the name may mean another file than before
-    except RoverFileError:
-        os.close(descriptor)
-        raise
-    return os.fdopen(descriptor, "rb")
 
 
 def read_regular_file(path: str | Path, most: int) -> bytes:
@@ -89,12 +76,8 @@ def open_without_waiting(path: str, flags: int) -> int:
     return descriptor
 
 
-def check_regular(status: os.stat_result) -> None:
-    """Check that a file is a regular file.
-
-    Raises:
-        RoverFileError: It is a directory, a device, a pipe or a socket.
-    """
+def _check_regular(status: os.stat_result) -> None:
+    """Raise a RoverFileError for a directory, a device, a pipe or a socket."""
     if stat.S_ISREG(status.st_mode):
         return
     kind = next((kind for holds, kind in _KINDS if holds(status.st_mode)), "no file")

@@ -180,13 +180,6 @@ def evaluate_row(models, limits, work, written, i):
 
 
 @kernel
-def evaluate_pose(model, work, result):
-    """Evaluate one model at the pose and motion of `set_pose` into a RESULT."""
-    _write_motion(model.linkage, work, result)
-    evaluate_stance(model, work, stand(model, work), result)
-
-
-@kernel
 def stand(model, work):
     """Settle the rover at the pose and motion of `set_pose`; return a PoseStatus.
 

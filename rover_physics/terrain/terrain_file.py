@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Finds terrain files (.npz), and reads and writes their entries, within a limit of cells."""
 
-import math
 import os
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -10,14 +9,12 @@ import numpy as np
 
 from rover_physics.errors import RoverFileError, TerrainError
 from rover_physics.files.config_files import find_config
-from rover_physics.files.npz_file import NpzReader
+from rover_physics.files.npz_file import NUMBERS, NpzReader
 from rover_physics.files.validation import errors_of, show_file
 from rover_physics.numerics.read_only import seal_array
 
 MAX_CELLS = 25_000_000
 """Default of the largest terrain [cells]."""
-MAX_CELL_BYTES = 40
-"""Largest memory of a cell: elevation and four layers, 8 bytes each."""
 REQUIRED = ("elevation", "resolution", "origin")
 GRIDS: dict[str, type | None] = {
     "elevation": np.float64,
@@ -28,8 +25,8 @@ GRIDS: dict[str, type | None] = {
 }
 """Entries with a value for each cell, and the types they are read as; None keeps that of the
 file."""
-SMALL = {"resolution": 1000, "origin": 1000, "soil_names": 1_000_000}
-"""Other entries, and their largest sizes [bytes]."""
+SMALL = {"resolution": 100, "origin": 100, "soil_names": 250_000}
+"""Other entries, and the largest numbers of their values or characters."""
 
 
 def terrain_presets() -> dict[str, Path]:
@@ -62,8 +59,7 @@ def find_terrain_file(name_or_path: str | Path) -> Path:
 def read_entries(file: BinaryIO, source: str | Path, max_cells: int) -> dict[str, Any]:
     """Read the entries of a terrain file.
 
-    Sizes are checked before anything is unpacked. Grids of numbers are unpacked piece by piece as
-    float64, so that the memory needed is that of the terrain.
+    The size of an entry is checked before it is unpacked.
 
     Args:
         file: The file, open for reading.
@@ -84,24 +80,10 @@ def read_entries(file: BinaryIO, source: str | Path, max_cells: int) -> dict[str
                 raise RoverFileError(
                     f"no entry {name}; a terrain file has elevation, resolution and origin"
                 )
-        for name in (name for name in GRIDS if name in there):
-            _check_grid(archive, name, max_cells)
         entries = {
             name: archive.read(name, most=most) for name, most in SMALL.items() if name in there
         }
         for name, dtype in GRIDS.items():
             if name in there:
-                entries[name] = archive.read(name, dtype, most=8 * max_cells)
+                entries[name] = archive.read(name, most=max_cells, kinds=NUMBERS, dtype=dtype)
     return {name: seal_array(values) for name, values in entries.items()}
-
-
-def _check_grid(archive: NpzReader, name: str, max_cells: int) -> None:
-    """Check the type and the size of a grid by its header."""
-    header = archive.read_header(name)
-    if header.dtype.kind not in "fiu":
-        raise RoverFileError(f"{name} has type {header.dtype}; it must be an array of numbers")
-    cells = math.prod(header.shape)
-    if cells > max_cells:
-        raise RoverFileError(
-            f"{name} has {' x '.join(map(str, header.shape))} cells; the limit is {max_cells}"
-        )

@@ -115,7 +115,7 @@ class BalanceRows(NamedTuple):
                 keep the equations.
         """
         x = np.empty(FORCES)
-        _complete(self.A, self.b, self.directions, tractions, x)
+        complete_forces(self.A, self.b, self.directions, tractions, x)
         return x
 
     def pull_equally(self) -> np.ndarray:
@@ -174,8 +174,10 @@ class BalanceWriter:
         """
         mass, com = body_mass_and_com(rover, payload=payload)
         linkage = pack_linkage(rover, mass, com)
-        self._linkages = array_of(linkage)
-        self._works = array_of(new_record(BALANCE_WORK, com=_centre_of_mass(linkage)))
+        self.linkages = array_of(linkage)
+        """(1,) the rover's LINKAGE, for kernels."""
+        self.works = array_of(new_record(BALANCE_WORK, com=_centre_of_mass(linkage)))
+        """(1,) BALANCE_WORK, for kernels."""
         self.weight = float(linkage.mass * linkage.gravity)
         """Weight of the rover with its payload in [N]."""
         self.on_bogie = np.array(linkage.on_bogie, dtype=bool)
@@ -184,13 +186,13 @@ class BalanceWriter:
     def find_rolling(self, state: MeasuredState) -> Any:
         """Return how the wheels roll at a measured state, without its contacts: a ROLLING."""
         self._take(state)
-        _place_wheels(self._linkages, self._works)
-        return self._works["rolling"].copy()[0]
+        _place_wheels(self.linkages, self.works)
+        return self.works["rolling"].copy()[0]
 
     def _take(self, state: MeasuredState, push: float = 0.0, resistance: float = 0.0) -> None:
         q = 0.0, state.roll, state.pitch, state.rocker_angle, *state.bogie_angles
         angles, offsets = state.contact_angles, state.contact_offsets
-        self._works["measured"][0] = q, angles, offsets, state.steering, push, resistance
+        self.works["measured"][0] = q, angles, offsets, state.steering, push, resistance
 
     def write(
         self, state: MeasuredState, net_traction: float, resistance: float = 0.0
@@ -212,7 +214,7 @@ class BalanceWriter:
         A, b = np.zeros((EQUATIONS, FORCES)), np.zeros(EQUATIONS)
         shares, directions = np.zeros((WHEEL_COUNT, 2)), np.zeros(WHEEL_COUNT)
         rows = BalanceRows(A, b, shares, directions, self.weight / WHEEL_COUNT)
-        if not _write_balance(self._linkages, self._works, rows):
+        if not write_balance(self.linkages, self.works, rows):
             raise ModelError(
                 f"contact angles {np.round(state.contact_angles, 3).tolist()} rad leave the "
                 "balance without a solution; they must be such that all wheels can roll at once"
@@ -230,7 +232,7 @@ def _centre_of_mass(linkage: Any) -> np.ndarray:
 
 
 @kernel
-def _complete(A, b, directions, tractions, x):
+def complete_forces(A, b, directions, tractions, x):
     """Write x (14,) that keeps all nine equations and the differences between tractions (6,)."""
     last = directions[LAST_WHEEL] * tractions[LAST_WHEEL]
     for row in range(EQUATIONS):
@@ -257,7 +259,7 @@ def _place_wheels(linkages, works):
 
 
 @kernel
-def _write_balance(linkages, works, rows):
+def write_balance(linkages, works, rows):
     """Write the nine equations at the state in `works`; return False if they are singular."""
     linkage, work = linkages[0], works[0]
     placement, balance, measured = work.placement, work.balance, work.measured

@@ -49,6 +49,7 @@ MAP_SEARCH = record_type(
     ("angle", float, (PROFILES, MAX_PLACES)),  # contact angles of the same [rad]
     ("gaps", float, (WHEEL_COUNT,)),  # between wheel and ground at the given height [m]
     ("angles", float, (WHEEL_COUNT,)),  # contact angles found [rad]
+    ("hindmost", float, (WHEEL_COUNT,)),  # of the places that are as near, those farthest behind
 )
 """Input, work space and result of a `MapContactFinder`; NaN where the ground is unknown."""
 
@@ -84,19 +85,14 @@ class MapContactFinder:
         """
         arrays = self._ground.records, self._linkages, self._searches
         search = self._searches  # its fields are views; attributes of a record are slow
-        q, gaps, angles = search["q"][0], search["gaps"][0], search["angles"][0]
+        q, angles = search["q"][0], search["angles"][0]
         search["pose"][0] = pose[0], pose[1], pose[3]
         q[:4] = pose[2], state.roll, state.pitch, state.rocker_angle
         q[4:] = state.bogie_angles
         search["directions"][0] = directions
         search["placement"]["steering"][0] = state.steering
-        _measure_gaps(*arrays)
-        known = np.isfinite(gaps)
-        if known.all():
-            lower, upper = np.sort(gaps)[WHEEL_COUNT // 2 - 1 : WHEEL_COUNT // 2 + 1]
-            q[0] -= 0.5 * (lower + upper)
-            _find_nearest(*arrays)
-            known = np.isfinite(angles)
+        find_contacts(*arrays)
+        known = np.isfinite(angles)
         if not known.all():
             raise ModelError(
                 f"{WHEELS[int(np.argmin(known))]} of a rover at {np.round(pose[:2], 2)} m is over "
@@ -109,9 +105,40 @@ class MapContactFinder:
 
 
 @kernel
-def _measure_gaps(grounds, linkages, searches):
-    """Write gaps at the given height [m]: from each wheel's middle circle to the ground."""
+def find_contacts(grounds, linkages, searches):
+    """Find the height above the map, from one that is near it, and write the contact angles.
+
+    NaN are those of wheels over unknown ground, perhaps of these alone.
+    """
     ground, linkage, search = grounds[0], linkages[0], searches[0]
+    _measure_gaps(ground, linkage, search)
+    for wheel in range(WHEEL_COUNT):
+        search.angles[wheel] = search.gaps[wheel]
+    gap = median_of_wheels(search.gaps)
+    if gap == gap:
+        search.q[0] -= gap
+        _find_nearest(ground, linkage, search)
+
+
+@kernel
+def median_of_wheels(values):
+    """Return the median of six values; NaN if one is."""
+    middle = 0.0
+    for one in range(WHEEL_COUNT):
+        value, smaller = values[one], 0
+        if value != value:
+            return value
+        for other in range(WHEEL_COUNT):
+            if values[other] < value or (values[other] == value and other < one):
+                smaller += 1
+        if smaller == WHEEL_COUNT // 2 - 1 or smaller == WHEEL_COUNT // 2:
+            middle += 0.5 * value
+    return middle
+
+
+@kernel
+def _measure_gaps(ground, linkage, search):
+    """Write gaps at the given height [m]: from each wheel's middle circle to the ground."""
     place(linkage, search.pose, search.q, search.placement)
     for wheel in range(WHEEL_COUNT):
         _scan_profile(ground, linkage, search, wheel, MIDDLE_PROFILE)
@@ -119,11 +146,10 @@ def _measure_gaps(grounds, linkages, searches):
 
 
 @kernel
-def _find_nearest(grounds, linkages, searches):
-    """Write for each wheel the angle of the place farthest ahead among its nearest places."""
-    ground, linkage, search = grounds[0], linkages[0], searches[0]
+def _find_nearest(ground, linkage, search):
+    """Write for each wheel the angles of the places farthest ahead and behind of its nearest."""
     place(linkage, search.pose, search.q, search.placement)
-    angles = search.angles
+    angles, hindmost = search.angles, search.hindmost
     for wheel in range(WHEEL_COUNT):
         direction = search.directions[wheel]
         nearest = np.inf
@@ -131,12 +157,16 @@ def _find_nearest(grounds, linkages, searches):
             _scan_profile(ground, linkage, search, wheel, profile)
             nearest = min(nearest, search.distance[profile, 0])
         limit = nearest + NEAREST_TOLERANCE * linkage.radius
-        angles[wheel] = np.nan
+        angles[wheel] = hindmost[wheel] = np.nan
         for profile in range(PROFILES):
             for k in range(MAX_PLACES):
                 distance, angle = search.distance[profile, k], search.angle[profile, k]
-                if distance <= limit and not direction * angles[wheel] >= direction * angle:
+                if distance > limit:
+                    continue
+                if not direction * angles[wheel] >= direction * angle:
                     angles[wheel] = angle
+                if not direction * hindmost[wheel] <= direction * angle:
+                    hindmost[wheel] = angle
 
 
 @kernel

@@ -9,6 +9,7 @@ Source: Goulart and Chen, Clarabel: An interior-point solver for conic programs 
 objectives, arXiv:2405.12762, 2024.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,12 +20,12 @@ from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES
 from rover_physics.limits.table import WHEEL_CONSTRAINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.read_only import freeze_fields
-from rover_physics.prediction.evaluation import evaluate_pose, new_work, set_pose
+from rover_physics.prediction.evaluation import NONE_HELD, evaluate_poses, new_works
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.sweep import check_poses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
-from rover_physics.results.record import new_results
+from rover_physics.results.record import new_results, numbers_of
 from rover_physics.results.uses import find_uses
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
@@ -83,13 +84,10 @@ def find_torque_ranges(
     poses = check_poses(poses)
     model = pack_model(rover, terrain, replace(options, policy="optimal", control_margin=0.0))
     n, motions = len(poses), motions_of(model, poses, curvature)
-    results, work = new_results(1), new_work()
-    result = results[0]
     feasible = np.zeros(n, dtype=bool)
     lowest, highest = np.full((n, 6), np.nan), np.full((n, 6), np.nan)
-    for i in range(n):
-        set_pose(model.record, poses, motions, i, work)
-        evaluate_pose(model.record, work, result)
+    for i, (results, work) in enumerate(evaluate_in_turn(model, poses, motions)):
+        result = results[0]
         if result.status != PoseStatus.SETTLED or not _is_within(model, results):
             continue
         feasible[i] = True
@@ -98,6 +96,19 @@ def find_torque_ranges(
     most = model.settings.allowed_torque  # Clarabel's tolerance is 1e-8
     lowest, highest = (np.clip(scale * ends, -most, most) for ends in (lowest, highest))
     return TorqueRanges(feasible, lowest, highest)
+
+
+def evaluate_in_turn(
+    model: PackedModel, poses: Floats, motions: Floats
+) -> Iterator[tuple[Any, Any]]:
+    """Yield RESULT (1,) and WORK of each pose and motion; the next pose overwrites both."""
+    results, works = new_results(1), new_works(1, 1)
+    written = results, numbers_of(results)
+    for i in range(len(poses)):
+        places = poses[i : i + 1], motions[i : i + 1], NONE_HELD
+        # The kernel of sweeps, for one pose: a kernel of its own would compile the model again.
+        evaluate_poses(model.records, model.limits.records, places, works, written, (0, 1))
+        yield results, works[0]
 
 
 def _is_within(model: PackedModel, results: Any) -> bool:

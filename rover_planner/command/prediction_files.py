@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from rover_physics.errors import RoverFileError
-from rover_physics.files.npz_file import ArrayHeader, NpzParts, open_npz, write_npz
+from rover_physics.files.npz_file import FLAGS, NUMBERS, TEXTS, NpzParts, open_npz, write_npz
 from rover_physics.files.validation import errors_of, show_file
 from rover_physics.results.path_bounds import BOUNDED_VALUES
 from rover_physics.results.path_prediction import PathPrediction, prediction_of
@@ -36,10 +36,10 @@ ARRAYS: dict[str, Shape] = {
     "bogie_angle": (2,),
 } | {one.name: one.shape for one in QUANTITIES if one.is_kept}
 """Arrays of a prediction in the output file, under the same names: shape of a waypoint's part."""
-NUMBER_TYPE: tuple[DTypeLike, str, str] = (np.float64, "fiu", "numbers")
-FLAGS: tuple[DTypeLike, str, str] = (np.bool_, "b", "bools")
-TYPES = {"settled": FLAGS, "falling": FLAGS, "status": (np.int8, "i", "whole numbers")}
-"""Arrays that do not hold numbers: type when read, kinds of types in the file, and name."""
+TYPES: dict[str, tuple[str, DTypeLike]] = {
+    "settled": (FLAGS, np.bool_), "falling": (FLAGS, np.bool_), "status": (NUMBERS, np.int8)
+}  # fmt: skip
+"""Arrays that do not hold float64: kinds of types in the file, and type when read."""
 SHOWN = ("position", "wheel_centres", "distance", "time")
 """Arrays that a replay cannot do without where the rover settled."""
 MAX_NUMBER = 1e9
@@ -48,12 +48,12 @@ MAX_POSES = 1_000_000
 """Largest number of poses or waypoints in a file."""
 BLOCK = 10_000
 """Number of reasons that are written at a time."""
-MAX_REASONS = 200_000_000
-"""Largest size of the reasons in a file [bytes]."""
+MAX_REASONS = 50_000_000
+"""Largest number of characters of the reasons in a file."""
 ASSUMPTIONS = "assumptions"
 """Array () of a text: what the prediction was made for."""
-MAX_ASSUMPTIONS = 100_000
-"""Its largest size [bytes]."""
+MAX_ASSUMPTIONS = 25_000
+"""Its largest number of characters."""
 
 
 def read_poses(path: Path) -> NDArray[np.float64]:
@@ -64,15 +64,9 @@ def read_poses(path: Path) -> NDArray[np.float64]:
             one of more than MAX_POSES poses.
     """
     with errors_of(path, PlanningError), open_npz(path) as archive:
-        header = archive.read_header("poses")
-        if header.dtype.kind not in "fiu":
-            raise RoverFileError(f"poses are of type {header.dtype}; they must be numbers")
-        if len(header.shape) != 2 or header.shape[1] != 3 or header.shape[0] == 0:
-            raise RoverFileError(
-                f"poses have shape {header.shape}; they must be (n, 3): x, y, yaw"
-            )
-        _check_count("poses", header.shape[0])
-        return archive.read("poses", np.float64, most=MAX_POSES * 24)
+        return archive.read(
+            "poses", most=3 * MAX_POSES, kinds=NUMBERS, shape=(None, 3), dtype=np.float64
+        )
 
 
 def read_curvature(path: Path, count: int) -> NDArray[np.float64] | None:
@@ -84,13 +78,9 @@ def read_curvature(path: Path, count: int) -> NDArray[np.float64] | None:
     with errors_of(path, PlanningError), open_npz(path) as archive:
         if "curvature" not in archive.names:
             return None
-        header = archive.read_header("curvature")
-        if header.dtype.kind not in "fiu" or header.shape != (count,):
-            raise RoverFileError(
-                f"curvature is of type {header.dtype} and shape {header.shape}; it must be "
-                f"numbers ({count},), one for each pose"
-            )
-        curvature = archive.read("curvature", np.float64, most=MAX_POSES * 8)
+        curvature = archive.read(
+            "curvature", most=count, kinds=NUMBERS, shape=(count,), dtype=np.float64
+        )
         unknown = np.flatnonzero(np.isnan(curvature))
         if unknown.size:
             raise RoverFileError(
@@ -111,23 +101,18 @@ def read_prediction(path: Path) -> tuple[PathPrediction, tuple[str, ...]]:
         PlanningError: The file is missing or is not a file of predictions.
     """
     with errors_of(path, PlanningError), open_npz(path) as archive:
-        reason = archive.read_header("reason")
-        if reason.dtype.kind != "U" or len(reason.shape) != 1 or reason.size == 0:
-            raise RoverFileError("reason must be an array (n,) of texts, one for each waypoint")
-        _check_count("reason", reason.size)
+        reasons = archive.read("reason", most=MAX_REASONS, kinds=TEXTS, shape=(None,)).tolist()
+        if not 1 <= len(reasons) <= MAX_POSES:
+            raise RoverFileError(f"has {len(reasons)} reasons; it must have 1 to {MAX_POSES}")
+        arrays: dict[str, Any] = {}
         for name, shape in ARRAYS.items():
-            _check_header(archive.read_header(name), name, (reason.size, *shape))
-        arrays: dict[str, Any] = {
-            name: archive.read(
-                name, TYPES.get(name, NUMBER_TYPE)[0], most=8 * reason.size * math.prod(shape)
-            )
-            for name, shape in ARRAYS.items()
-        }
-        reasons = tuple(archive.read("reason", most=MAX_REASONS).tolist())
+            kinds, dtype = TYPES.get(name, (NUMBERS, np.float64))
+            size, most = (len(reasons), *shape), len(reasons) * math.prod(shape)
+            arrays[name] = archive.read(name, most=most, kinds=kinds, shape=size, dtype=dtype)
     _check_numbers(path, arrays)
     poses, status = arrays.pop("poses"), arrays.pop("status")
     del arrays["settled"]
-    return prediction_of(poses, status, arrays, "recorded"), reasons
+    return prediction_of(poses, status, arrays, "recorded"), tuple(reasons)
 
 
 def read_recorded_assumptions(path: Path) -> Assumptions | None:
@@ -139,30 +124,11 @@ def read_recorded_assumptions(path: Path) -> Assumptions | None:
     with errors_of(path, PlanningError), open_npz(path) as archive:
         if ASSUMPTIONS not in archive.names:
             return None
-        header = archive.read_header(ASSUMPTIONS)
-        if header.dtype.kind != "U" or header.shape != ():
-            raise RoverFileError("assumptions must be one text")
-        text = str(archive.read(ASSUMPTIONS, most=MAX_ASSUMPTIONS))
+        text = str(archive.read(ASSUMPTIONS, most=MAX_ASSUMPTIONS, kinds=TEXTS, shape=()))
     try:
         return read_assumptions(text)
     except PlanningError as error:
         raise PlanningError(f"{show_file(path)}: {error}") from None
-
-
-def _check_count(name: str, count: int) -> None:
-    if count > MAX_POSES:
-        raise RoverFileError(f"{name} has {count} rows; a file may have {MAX_POSES}")
-
-
-def _check_header(header: ArrayHeader, name: str, shape: Shape) -> None:
-    """Check type and shape of an array of a prediction."""
-    _, kinds, what = TYPES.get(name, NUMBER_TYPE)
-    if header.dtype.kind not in kinds:
-        raise RoverFileError(f"{name} is of type {header.dtype}; it must hold {what}")
-    if header.shape != shape:
-        raise RoverFileError(
-            f"{name} has shape {header.shape}; it must be {shape}, as there are {shape[0]} reasons"
-        )
 
 
 def _check_numbers(path: Path, arrays: dict[str, Any]) -> None:

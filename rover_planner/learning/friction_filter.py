@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from scipy.special import log_ndtr, ndtr
+from scipy.special import ndtr
 
 from rover_physics.numerics.arrays import Floats
 
@@ -88,17 +88,17 @@ class FrictionFilter:
             for spread in (noise, np.hypot(OUTLIER_NOISE, noise))
         )
         mixed = (1.0 - OUTLIERS - WORTHLESS) * usual + OUTLIERS * rough + WORTHLESS
-        self._update(weight * np.log(mixed))
+        self._update(mixed**weight)
         self.slips = min(self.slips + weight, 1e3)
 
     def grip(self, use: float) -> None:
         """Take the shear over the load of a wheel that grips, which the friction exceeds."""
         if use > max(self._bound, LEAST):
-            self._update(_log_chance_above(use) - _log_chance_above(self._bound))
+            self._update(_chance_above(use) / _chance_above(self._bound))
             self._bound = use
 
-    def _update(self, log_likelihood: Floats) -> None:
-        chances = self._chances * np.exp(log_likelihood - log_likelihood.max())
+    def _update(self, likelihood: Floats) -> None:
+        chances = self._chances * likelihood
         self._chances = chances / chances.sum()
 
     @property
@@ -117,13 +117,11 @@ class FrictionFilter:
         return FrictionEstimate(mean, float(spread), low, high)
 
 
-def _log_chance_above(use: float) -> Floats:
-    """Return the logarithm of the chance of feeling this use or more of a gripping wheel."""
+def _chance_above(use: float) -> Floats:
+    """Return the chance of feeling this use or more of a gripping wheel."""
     if use < LEAST:
-        return np.zeros_like(GRID)
-    return np.logaddexp(
-        np.log(1.0 - DOUBT) + log_ndtr((GRID - use) / (BOUND_NOISE * use)), np.log(DOUBT)
-    )
+        return np.ones_like(GRID)
+    return np.asarray((1.0 - DOUBT) * ndtr((GRID - use) / (BOUND_NOISE * use)) + DOUBT)
 
 
 @lru_cache

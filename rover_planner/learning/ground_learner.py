@@ -5,18 +5,22 @@ It takes rows of measurements (`drive_log`) at any rate and thinks once a tenth 
 motion must be measured without the wheels: by visual odometry, or by a simulator.
 """
 
+import math
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.names import SIDES, WHEEL_COUNT, WHEELS
 from rover_physics.numerics.arrays import Floats
+from rover_physics.numerics.kernels import kernel
+from rover_physics.numerics.records import record_type
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_planner.learning.contact_sense import ContactSense, WheelState
+from rover_planner.learning.contact_sense import ContactSense
 from rover_planner.learning.drive_log import (
     PITCH,
     RATES,
@@ -32,7 +36,14 @@ from rover_planner.learning.ground_map import GroundLayers, GroundMap
 from rover_planner.learning.soil_fit import SoilEstimate, SoilFit
 from rover_planner.learning.stuck_watch import StuckWatch
 from rover_planner.learning.wheel_health import RATE, WheelHealth
-from rover_planner.learning.wheel_slip import BLOCK, LONGEST_GAP, WINDOW, SlipWindow, SlipWindows
+from rover_planner.learning.wheel_slip import (
+    BLOCK,
+    LONGEST_GAP,
+    WINDOW,
+    SlipWindow,
+    SlipWindows,
+    find_median,
+)
 
 SLIP_SHARE = 0.15
 """Slip over rolling above which a wheel slips; rigid wheels creep by less."""
@@ -65,6 +76,8 @@ FASTEST = 0.8
 """Speed over the largest one from which a motor gives less torque than it is asked for."""
 RESISTANCE_TIME = 10.0
 """Time constant of the mean resistance [s]."""
+MARK_TIME = 1.0
+"""Time after which a place is marked on the map again [s]; a way of half a wheel is sooner."""
 JUMP = 0.05
 """Step of the position beyond what the wheels can drive that is no motion [m]."""
 CHANGE_CERTAIN = 2.0
@@ -73,6 +86,7 @@ SPIKE = 1.3
 """Torque over the largest one of a motor from which it is an error."""
 
 Flags = NDArray[np.bool_]
+_RATES, _TORQUES = RATES.start, TORQUES.start
 _ANGLES = tuple(range(SUSPENSION.start, SUSPENSION.stop))
 _SIDE_WHEELS = tuple(np.array([wheel.endswith(side) for wheel in WHEELS]) for side in SIDES)
 
@@ -109,30 +123,14 @@ class GroundEstimate:
     """The soil, on ground that yields."""
 
 
-@dataclass
-class _Block:
-    """Sums of the rows of a block."""
-
-    end: float
-    count: int = 0
-    sums: Floats = field(default_factory=lambda: np.zeros(WIDTH))
-    known: Floats = field(default_factory=lambda: np.zeros(WIDTH))
-    squares: Floats = field(default_factory=lambda: np.zeros(WHEEL_COUNT))
-    turned: Floats = field(default_factory=lambda: np.zeros(WHEEL_COUNT))
-
-    def add(self, row: Floats, turned: Floats) -> None:
-        known = ~np.isnan(row)
-        values = np.where(known, row, 0.0)
-        self.count += 1
-        self.sums += values
-        self.known += known
-        self.squares += values[TORQUES] ** 2
-        self.turned += turned
-
-    @property
-    def mean(self) -> Floats:
-        """Mean row; NaN where nothing was measured."""
-        return np.where(self.known > 0.0, self.sums, np.nan) / np.maximum(self.known, 1.0)
+_SUMS = record_type(
+    ("count", float),  # number of rows
+    ("sums", float, (WIDTH,)),  # of what was measured
+    ("known", float, (WIDTH,)),  # number of rows in which it was
+    ("squares", float, (WHEEL_COUNT,)),  # sums of the squares of the torques
+    ("turned", float, (WHEEL_COUNT,)),  # and of the angles by which the wheels have turned [rad]
+)
+"""Sums of the rows of a block."""
 
 
 class GroundLearner:
@@ -166,13 +164,14 @@ class GroundLearner:
         self._classes: dict[int, FrictionFilter] = {}
         self._stuck = StuckWatch(rover.nominal_speed, wheel.max_torque)
         self._health = WheelHealth(self._sense.weight, wheel.max_torque)
-        self._block: _Block | None = None
+        self._block, self._block_end = np.zeros(1, _SUMS), np.inf
         self._turned = np.zeros(WHEEL_COUNT)
         self._forward = np.ones(WHEEL_COUNT)
         self._slipping = np.zeros(WHEEL_COUNT, dtype=int)
-        self._rates, self._place = np.zeros(WHEEL_COUNT), np.full(3, -np.inf)
+        self._rates, self._place = np.zeros(WHEEL_COUNT), (-math.inf, 0.0, 0.0)
         self._spot, self._here = np.full((WHEEL_COUNT, 2), np.inf), np.zeros(WHEEL_COUNT)
-        self._last: Floats | None = None
+        self._marked, self._mark_time = np.full((WHEEL_COUNT, 2), np.inf), -math.inf
+        self._time = -math.inf
         self._recent: deque[tuple[Floats, Floats]] = deque(maxlen=WINDOW)
         self._resistance, self._resistance_square, self._steady = 0.0, 0.0, 0.0
         self._slip_time: float | None = None
@@ -197,23 +196,22 @@ class GroundLearner:
     def take(self, row: Floats) -> bool:
         """Take a row of measurements; return whether the estimate is new."""
         row = self._clean(row)
-        if not np.isfinite(row[TIME]):
+        time, last = float(row[TIME]), self._time
+        if not math.isfinite(time):
             return False
-        last, self._last = self._last, row
-        elapsed = 0.0 if last is None else row[TIME] - last[TIME]
-        block, new = self._block, False
-        if last is None or block is None or elapsed > LONGEST_GAP or self._jumps(row):
-            self._begin(row)
-            return False
-        self._health.take(row)
-        known = np.isfinite(row[RATES])
-        before = self._rates
-        self._rates = np.where(known, row[RATES], before)
-        self._turned = self._turned + 0.5 * elapsed * (self._rates + before)
-        if row[TIME] >= block.end - 1e-9 and (block.known[: SUSPENSION.stop] > 0.0).all():
-            new = self._think(block)
-            block = self._block = _Block(row[TIME] + BLOCK)
-        block.add(row, self._turned)
+        elapsed, self._time, new = time - last, time, False
+        if not elapsed <= LONGEST_GAP or self._jumps(row):
+            self._begin()
+            elapsed = 0.0
+        else:
+            self._health.take(row)
+        is_full = time >= self._block_end - 1e-9
+        if is_full and (self._block["known"][0, : SUSPENSION.stop] > 0.0).all():
+            new = self._think(self._block[0])
+            self._block_end = np.inf
+        if self._block_end == np.inf:
+            self._block, self._block_end = np.zeros(1, _SUMS), time + BLOCK
+        _add(row, elapsed, self._rates, self._turned, self._block)
         return new
 
     def _clean(self, row: Floats) -> Floats:
@@ -227,49 +225,51 @@ class GroundLearner:
 
     def _jumps(self, row: Floats) -> bool:
         """Return whether the position, where it was measured, is beyond what the wheels drive."""
-        if not np.isfinite(row[[X, Y]]).all():
+        x, y = float(row[X]), float(row[Y])
+        if not math.isfinite(x + y):
             return False
-        wheel, last = self._rover.wheel, self._place
-        self._place = row[[TIME, X, Y]]
-        step = float(np.hypot(*(self._place - last)[1:]))
-        most = 2.0 * wheel.max_speed * wheel.radius * float(self._place[0] - last[0])
-        return not step <= most + JUMP
+        wheel, (before, last_x, last_y) = self._rover.wheel, self._place
+        self._place = self._time, x, y
+        most = 2.0 * wheel.max_speed * wheel.radius * (self._time - before)
+        return not math.hypot(x - last_x, y - last_y) <= most + JUMP
 
-    def _begin(self, row: Floats) -> None:
-        self._block = _Block(row[TIME] + BLOCK)
-        self._block.add(row, self._turned)
+    def _begin(self) -> None:
+        self._block_end = np.inf
         self._windows.begin()
         self._recent.clear()
         self._slipping[:] = 0
 
-    def _think(self, block: _Block) -> bool:
-        """Take a block of measurements; return whether it ends a window."""
-        row = block.mean
+    def _think(self, block: Any) -> bool:
+        """Take a block of measurements, _SUMS; return whether it ends a window."""
+        known, count = block["known"], block["count"]
+        row = np.where(known > 0.0, block["sums"], np.nan) / np.maximum(known, 1.0)
         rates = np.nan_to_num(row[RATES])
         still = 1e-3 * self._rover.wheel.max_speed
         self._forward = np.where(np.abs(rates) > still, np.sign(rates), self._forward)
-        measured = block.known[TORQUES] > 0.5 * block.count
+        measured = known[TORQUES] > 0.5 * count
         if measured.any():
             row[TORQUES] = np.where(measured, row[TORQUES], np.nanmean(row[TORQUES]))
         state = self._sense.feel(row, self._forward)
         if state is None:
             return False
-        count = np.maximum(block.known[TORQUES], 1.0)
-        self._recent.append((row, block.squares / count))
-        window = self._windows.take(row[TIME], block.turned / block.count, state)
+        self._recent.append((row, block["squares"] / np.maximum(known[TORQUES], 1.0)))
+        window = self._windows.take(float(row[TIME]), block["turned"] / count, state)
         if window is None:
             return False
         elapsed = window.time - self.window.time if self.window else BLOCK
         self.window = window
         classes = self.ground.classes_at(window.places)
-        for number in np.unique(classes[np.isfinite(classes)]).astype(int).tolist():
+        for number in set(classes[np.isfinite(classes)].astype(int).tolist()):
             self._classes.setdefault(number, FrictionFilter(self._told))
         on_class = {number: classes == number for number in self._classes}
-        self._learn(window, state, measured, on_class, min(elapsed, window.duration))
-        for one, wheels in zip(self._sides.values(), _SIDE_WHEELS, strict=True):
-            self.ground.visit(window.places[wheels & np.isnan(classes)], one.estimate)
-        for number, wheels in on_class.items():
-            self.ground.visit(window.places[wheels], self._classes[number].estimate)
+        self._learn(window, measured, on_class, min(elapsed, window.duration))
+        way = float(np.abs(window.places - self._marked).max())
+        if way > 0.5 * self._rover.wheel.width or window.time > self._mark_time + MARK_TIME:
+            self._marked, self._mark_time = window.places, window.time
+            for one, wheels in zip(self._sides.values(), _SIDE_WHEELS, strict=True):
+                self.ground.visit(window.places[wheels & np.isnan(classes)], one.estimate)
+            for number, wheels in on_class.items():
+                self.ground.visit(window.places[wheels], self._classes[number].estimate)
         return True
 
     @property
@@ -284,7 +284,6 @@ class GroundLearner:
     def _learn(
         self,
         window: SlipWindow,
-        state: WheelState,
         measured: Flags,
         on_class: Mapping[int, Flags],
         elapsed: float,
@@ -353,7 +352,7 @@ class GroundLearner:
         tells &= sticking < MOST_STICKING
         tells &= window.doubts < MOST_DOUBT * loads
         tells &= self._turns_freely(window)
-        distance = abs(float(np.median(window.travel))) * elapsed
+        distance = abs(float(find_median(window.travel))) * elapsed
         weights = self._weigh(window, tells, elapsed)
         doubt = EXCESS_NOISE * window.excess / self._sense.weight
         for one, own in grounds:
@@ -406,7 +405,7 @@ class GroundLearner:
             side_slip = float(np.median(np.arctan2(window.aside, np.abs(window.travel))))
         spread = np.sqrt(max(self._resistance_square - self._resistance**2, 0.0))
         return GroundEstimate(
-            time=-np.inf if self._last is None else float(self._last[TIME]),
+            time=self._time,
             friction=self._whole.estimate,
             sides={side: one.estimate for side, one in self._sides.items()},
             classes=self._class_estimates,
@@ -420,6 +419,25 @@ class GroundLearner:
             faults=self._health.faults,
             soil=None if self._soil is None else self._soil.find_estimate(),
         )
+
+
+@kernel
+def _add(row, elapsed, rates, turned, blocks):
+    """Turn the wheels on by their rates (6,) [rad/s] over a time [s], and add a row to a block."""
+    block = blocks[0]
+    block.count += 1.0
+    for k in range(WIDTH):
+        if np.isfinite(row[k]):
+            block.sums[k] += row[k]
+            block.known[k] += 1.0
+    for wheel in range(WHEEL_COUNT):
+        rate, torque = row[_RATES + wheel], row[_TORQUES + wheel]
+        rate = rate if np.isfinite(rate) else rates[wheel]
+        turned[wheel] += 0.5 * elapsed * (rates[wheel] + rate)
+        rates[wheel] = rate
+        block.turned[wheel] += turned[wheel]
+        if np.isfinite(torque):
+            block.squares[wheel] += torque * torque
 
 
 def _find_change(values: Floats) -> float:

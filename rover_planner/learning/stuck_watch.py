@@ -10,7 +10,7 @@ from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_planner.learning.drive_log import TIME, YAW, X, Y
-from rover_planner.learning.wheel_slip import LONGEST_GAP, SlipWindow
+from rover_planner.learning.wheel_slip import LONGEST_GAP, SlipWindow, find_median
 from rover_planner.planning.marked_places import MarkedPlace
 
 NO_PROGRESS = 0.10
@@ -74,9 +74,9 @@ class StuckWatch:
         if elapsed >= PATIENCE - 1e-6 and climb < CLIMBING:
             # On the spot the middle of the wheels stays, and each goes its way.
             moved = float(np.hypot(*(places[-1] - places[0]).T).mean()) / elapsed
-            rolling = np.median(np.abs(speeds), axis=1)
+            rolling = find_median(np.abs(speeds))
             # There and back a rover rolls and stays, too: what counts is where it rolls to.
-            rolled = float(np.median(np.abs(np.mean(speeds, axis=0))))
+            rolled = float(find_median(np.abs(np.mean(speeds, axis=0))))
             if rolling.min() > self._slowest and moved < NO_PROGRESS * rolled:
                 self.reason = "wheels turn and the rover stays"
             elif all(wishes) and max(moved, rolling.max()) < self._slowest:

@@ -6,7 +6,9 @@ from numpy.typing import NDArray
 
 from rover_physics.names import WHEEL_COUNT, WHEELS
 from rover_physics.numerics.arrays import Floats
-from rover_planner.learning.drive_log import RATES, TORQUES
+from rover_physics.numerics.kernels import kernel
+from rover_physics.numerics.records import record_type
+from rover_planner.learning.drive_log import RATES, TIME, TORQUES
 from rover_planner.learning.wheel_slip import SlipWindow
 
 RATE = "rate"
@@ -28,6 +30,11 @@ LEAST_EXCESS = 0.03
 """Contradiction of the tractions from which signs are looked at, over the weight."""
 TURNING_BACK = 0.3
 """Correlation of a wheel's rolling with minus its travel if its rate has the wrong sign."""
+_TORQUES, _RATES = TORQUES.start, RATES.start
+_WATCH = record_type(
+    ("last", float, (2, WHEEL_COUNT)),  # last torques [N m] and rates [rad/s]
+    ("still", float, (2, WHEEL_COUNT)),  # time for which each has stood still or was missing [s]
+)
 
 
 class WheelHealth:
@@ -36,26 +43,17 @@ class WheelHealth:
     def __init__(self, weight: float, max_torque: float):
         """Start with good sensors of a rover of a weight [N] and a largest wheel torque [N m]."""
         self._weight, self._most = weight, max_torque
-        self._last = np.full(2 * WHEEL_COUNT, np.nan)
-        self._still = np.zeros(2 * WHEEL_COUNT)
+        self._watches = np.zeros(1, _WATCH)
         self._time = np.nan
         self._excess = 0.0
         self._turned = np.zeros(WHEEL_COUNT)
         self._backward = np.zeros(WHEEL_COUNT)
-        self._missing = np.zeros(2 * WHEEL_COUNT, dtype=bool)
 
     def take(self, row: Floats) -> None:
         """Take a row of measurements."""
-        values = np.append(row[TORQUES], row[RATES])
-        elapsed = row[0] - self._time if row[0] > self._time else 0.0
-        self._missing = np.isnan(values)
-        same = values == self._last
-        full = np.append(np.abs(row[TORQUES]) >= 0.99 * self._most, np.zeros(WHEEL_COUNT, bool))
-        changes = np.repeat((~same).reshape(2, -1).sum(axis=1) >= OTHERS, WHEEL_COUNT)
-        grows = self._missing | (same & ~full & changes)
-        stays = self._missing | (same & ~full)
-        self._still = np.where(grows, self._still + elapsed, np.where(stays, self._still, 0.0))
-        self._last, self._time = values, row[0]
+        elapsed = row[TIME] - self._time if row[TIME] > self._time else 0.0
+        _take(row, elapsed, 0.99 * self._most, self._watches)
+        self._time = row[TIME]
 
     def take_window(self, window: SlipWindow, elapsed: float, grips: bool) -> None:
         """Take a window to look at signs.
@@ -81,28 +79,52 @@ class WheelHealth:
     @property
     def doubtful(self) -> NDArray[np.bool_]:
         """(6,) whether a rate stands still while others change; it may be frozen."""
-        return np.asarray(self._still[WHEEL_COUNT:] > DOUBTFUL_TIME)
+        return np.asarray(self._watches["still"][0, 1] > DOUBTFUL_TIME)
 
     @property
     def faults(self) -> dict[str, str]:
         """Faults, with the wheels that have them."""
         found: dict[str, str] = {}
-        frozen = self._still > FROZEN_TIME
+        watch = self._watches[0]
+        frozen, missing = watch["still"] > FROZEN_TIME, np.isnan(watch["last"])
         signs = np.zeros(WHEEL_COUNT, dtype=bool)
         if self._excess > LEAST_EXCESS * self._weight:
             best = int(np.argmin(self._turned))
             signs[best] = self._turned[best] < SIGN_SHARE * self._excess
-        torque, rate = slice(WHEEL_COUNT), slice(WHEEL_COUNT, None)
+        backward = self._backward > 0.6
+        if not (frozen.any() or signs.any() or backward.any()):
+            return found
+        gone, frozen = frozen & missing, frozen & ~missing
         for word, mask in (
-            ("no torque", self._missing[torque] & frozen[torque]),
-            (f"no {RATE}", self._missing[rate] & frozen[rate]),
-            ("torque is frozen", frozen[torque] & ~self._missing[torque]),
-            (f"{RATE} is frozen", frozen[rate] & ~self._missing[rate]),
+            ("no torque", gone[0]),
+            (f"no {RATE}", gone[1]),
+            ("torque is frozen", frozen[0]),
+            (f"{RATE} is frozen", frozen[1]),
             ("torque has the wrong sign", signs),
-            (f"{RATE} has the wrong sign", self._backward > 0.6),
+            (f"{RATE} has the wrong sign", backward),
         ):
             found |= {WHEELS[k]: word for k in np.flatnonzero(mask) if WHEELS[k] not in found}
         return found
+
+
+@kernel
+def _take(row, elapsed, full, watches):
+    """Take a row of measurements; torques of at least `full` [N m] may stand still."""
+    watch = watches[0]
+    for kind in range(2):
+        first = _TORQUES if kind == 0 else _RATES
+        changes = 0
+        for wheel in range(WHEEL_COUNT):
+            if row[first + wheel] != watch.last[kind, wheel]:
+                changes += 1
+        for wheel in range(WHEEL_COUNT):
+            value = row[first + wheel]
+            stays = value == watch.last[kind, wheel] and not (kind == 0 and abs(value) >= full)
+            if value != value or (stays and changes >= OTHERS):
+                watch.still[kind, wheel] += elapsed
+            elif not stays:
+                watch.still[kind, wheel] = 0.0
+            watch.last[kind, wheel] = value
 
 
 def _goes_straight(window: SlipWindow) -> bool:

@@ -2,20 +2,20 @@
 """Opens the terrain file that a client names by a URL, below a folder and within limits."""
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import BinaryIO
 from urllib.parse import unquote, urlparse
 
 from rover_physics.errors import RoverFileError, TerrainError
-from rover_physics.files.user_file import OPEN_FLAGS, check_regular, wrap_descriptor
+from rover_physics.files.user_file import open_regular_file
 from rover_physics.files.validation import errors_of, show_file
 from rover_physics.terrain.grid import Terrain, read_terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.errors import PlanningError
 
-FOLDER_FLAGS = os.O_PATH | os.O_DIRECTORY | os.O_CLOEXEC
-"""Flags for going through a folder, which needs no permission to list it."""
 MUST = "it must be the path or file:// URL of a terrain file on this machine"
 LOCAL_HOSTS = ("", "localhost")
 """Hosts of a file:// URL that mean this machine."""
@@ -76,34 +76,25 @@ def file_of_url(url: str) -> Path:
     return Path(url)
 
 
-def _open_below(file: Path, folder: str) -> BinaryIO:
+@contextmanager
+def _open_below(file: Path, folder: str) -> Iterator[BinaryIO]:
     """Open a regular file below a folder, where no symbolic link leads out of the folder.
 
-    All links are resolved first; the resolved path is then opened part by part without following
-    links, so that no one can exchange a part of it in the meantime.
+    What was opened is looked at once more: a part of the path may be exchanged in the meantime.
     """
+    folder = os.path.expanduser(folder)
     try:
-        folder = os.path.expanduser(folder)
-        top = os.path.realpath(folder)
-        path = os.path.realpath(os.path.join(folder, file))
-        if os.path.commonpath([top, path]) != top:
-            raise RoverFileError(f"not below {show_file(folder)}, the folder of maps (map_folder)")
-        return wrap_descriptor(_open_part_by_part(top, os.path.relpath(path, top).split(os.sep)))
+        top, path = (os.path.realpath(os.path.join(folder, one)) for one in ("", file))
+        _check_below(top, path, folder)
     except OSError as error:
         raise RoverFileError(f"cannot be read: {error.strerror or error}; {MUST}") from error
     except ValueError as error:  # a zero byte in the name
         raise RoverFileError(f"cannot be read: the name is impossible ({error})") from error
+    with open_regular_file(path) as opened:
+        _check_below(top, os.readlink(f"/proc/self/fd/{opened.fileno()}"), folder)
+        yield opened
 
 
-def _open_part_by_part(top: str, parts: list[str]) -> int:
-    """Return a descriptor of the file top/part/part/..., without following links below top."""
-    *folders, name = parts
-    here = os.open(top, FOLDER_FLAGS)
-    try:
-        for part in folders:
-            above, here = here, os.open(part, FOLDER_FLAGS | os.O_NOFOLLOW, dir_fd=here)
-            os.close(above)
-        check_regular(os.stat(name, dir_fd=here, follow_symlinks=False))
-        return os.open(name, OPEN_FLAGS | os.O_NOFOLLOW, dir_fd=here)
-    finally:
-        os.close(here)
+def _check_below(top: str, path: str, folder: str) -> None:
+    if os.path.commonpath([top, path]) != top:
+        raise RoverFileError(f"not below {show_file(folder)}, the folder of maps (map_folder)")

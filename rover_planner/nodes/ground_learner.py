@@ -5,6 +5,7 @@ import json
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
+from functools import partial
 from typing import Any
 
 from geometry_msgs.msg import TwistStamped
@@ -17,7 +18,8 @@ from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.frames import check_frame
 from msg_adapters.joints import read_joint_map
 from msg_adapters.odometry import planar_odometry
-from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
+from msg_adapters.raw_messages import read_sensor
+from msg_adapters.stamps import NANOSECONDS, ns_to_stamp, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
@@ -27,7 +29,7 @@ from rover_planner.learning.ground_learner import GroundLearner
 from rover_planner.learning.learned_file import describe
 from rover_planner.learning.soil_fit import SoilFit
 from rover_planner.learning.stuck_watch import find_place_ahead
-from rover_planner.learning.wheel_odometry import WheelOdometry
+from rover_planner.learning.wheel_odometry import WheelMotion, WheelOdometry
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.warm_up import LEARNING
 from rover_planner.parameters.ground_learner import GroundLearnerParameters
@@ -73,16 +75,18 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
         self._stops = self.create_publisher(Bool, EMERGENCY_STOP, latched_qos())
         self._marks = self.create_publisher(String, MARK_PLACE, latched_qos())
         self._wheels = WheelOdometry(self._rover)
-        self._imu: Imu | None = None  # the last one that the wheels' odometry went on by
+        self._motion: WheelMotion | None = None  # what the wheels' odometry went on by last
         self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", sensor_qos())
+        take_command = self._refusing("cmd_vel", self._take_command)
+        self.heard.subscribe(TwistStamped, "cmd_vel", take_command, polled_qos())
         for kind, name, take in (
-            (TwistStamped, "cmd_vel", self._take_command),
             (JointState, "joint_states", self._rows.take_joints),
             (Imu, "imu", self._take_imu),
             (Odometry, "odometry", self._take_odometry),
         ):
-            self.heard.subscribe(kind, name, self._refusing(name, take), polled_qos())
-        self.create_timer(POLLING, self._read_sensors)
+            read = self._refusing(name, partial(_read_and_take, kind, take))
+            self.heard.subscribe(kind, name, read, polled_qos(), raw=True)
+        self.loop = self.create_timer(POLLING, self._read_sensors)
         subscribe_to_map(self, PointCloud2, CLOUD, self._refusing(CLOUD, self._take_map))
         self.follow_changes(lambda _: None, lambda _: None)
         self.get_logger().info(f"ready for rover {self._rover.name}")
@@ -113,42 +117,43 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
 
     def _read_sensors(self) -> None:
         """Take what the sensors sent, and tell where the wheels say that the rover is."""
+        learner, wheels = self.learner, self._wheels
+        if learner is not None:
+            is_fresh = self.seconds - self._command_time < COMMAND_AGE
+            learner.commanded = self._commanded if is_fresh else None
         self.heard.poll()
-        imu, self._imu = self._imu, None
-        if imu is None:
+        motion, self._motion = self._motion, None
+        if motion is None:
             return
-        wheels = self._wheels
         message = planar_odometry(
             wheels.pose,
             wheels.covariance,
             (wheels.speed, wheels.speed_deviation),
-            self._rows.yaw_rate,
+            motion.yaw_rate,
             self.values.odometry_frame,
-            imu.header.stamp,
+            ns_to_stamp(round(motion.time * NANOSECONDS)),
         )
         self._wheel_odometry.publish(message)
 
     def _take_imu(self, imu: Imu) -> None:
         """Take attitude and yaw rate, and go on by what the wheels turned."""
         self._rows.take_imu(imu)
-        stamp = stamp_to_ns(imu.header.stamp)
-        motion = self._rows.motion(self.seconds if stamp is None else stamp / NANOSECONDS)
+        motion = self._rows.motion(self._time_of(imu) / NANOSECONDS)
         if motion is not None:
+            self._motion = motion
             self._wheels.take(motion)
-            self._imu = imu
+
+    def _time_of(self, message: Any) -> int:
+        """Return the stamp of a message, or the present time if it has none [ns]."""
+        return stamp_to_ns(message.header.stamp) or self.get_clock().now().nanoseconds
 
     def _take_odometry(self, odometry: Odometry) -> None:
-        stamp = stamp_to_ns(odometry.header.stamp)
-        now = self.seconds if stamp is None else stamp / NANOSECONDS
+        now = self._time_of(odometry) / NANOSECONDS
         row = self._rows.take_odometry(odometry, now, self.values.map_frame)
         self.heard_until = now
         self._wheels.learn(row[[X, Y, YAW]])
         learner = self.learner
-        if learner is None:
-            return
-        is_fresh = self.seconds - self._command_time < COMMAND_AGE
-        learner.commanded = self._commanded if is_fresh else None
-        if learner.take(row):
+        if learner is not None and learner.take(row):
             self._tell(learner, row, now)
 
     def _tell(self, learner: GroundLearner, row: Floats, now: float) -> None:
@@ -168,6 +173,10 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
             self._wheels.friction = learner.estimate.friction.mean
             contents = describe(learner.estimate, self._told)
             self._estimates.publish(String(data=json.dumps(contents)))
+
+
+def _read_and_take(kind: type, take: Callable[[Any], None], message: bytes) -> None:
+    take(read_sensor(message, kind))
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -122,7 +122,7 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
         hear(Path, "path", self._take_path, qos)
         hear(TwistStamped, "cmd_vel", self._take_speeds, sensor_qos())
         if self._settings.parameters.follow_commands:
-            hear(Float64MultiArray, COMMANDS, self._take_torques, qos)
+            hear(Float64MultiArray, COMMANDS, self._take_torques, sensor_qos())
             hear(Bool, BRAKE, self._take_brake, latched_qos())
 
     def _take_path(self, path: Path, _arrival: float) -> None:

@@ -5,6 +5,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -17,6 +18,7 @@ from std_srvs.srv import Trigger
 
 from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash, plan_request_hash
+from msg_adapters.joints import JointReader
 from msg_adapters.paths import count_poses, stamped_pose_to_array
 from msg_adapters.results.diagnostics import (
     HEALTH,
@@ -139,7 +141,8 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         super().destroy_node()
 
     def _create_subscriptions(self) -> None:
-        self.heard.subscribe(JointState, "joint_states", self._take_joints, polled_qos())
+        hear_joints = partial(self._take_joints, JointReader())
+        self.heard.subscribe(JointState, "joint_states", hear_joints, polled_qos(), raw=True)
         self.heard.subscribe(Odometry, "odometry", self._take_odometry, newest_qos())
         if self.values.imu_attitude:
             self.heard.subscribe(Imu, "imu", self._take_imu, polled_qos())
@@ -184,9 +187,9 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         if not error:
             self.watch.look()
 
-    def _take_joints(self, state: JointState, _arrival: float) -> None:
+    def _take_joints(self, reader: JointReader, message: bytes, _arrival: float) -> None:
         try:
-            self._inputs.take_joints(state)
+            self._inputs.take_joints(reader.read(message))
         except MessageError as error:
             self.get_logger().warning(
                 f"{error}; the angles known before stay", throttle_duration_sec=5.0

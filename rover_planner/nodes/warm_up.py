@@ -14,7 +14,13 @@ from rover_planner.learning.drive_log import FORCES, WIDTH
 from rover_planner.learning.soil_fit import SoilFit
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.search.difficulty import estimate_difficulty
+from rover_planner.planning.search.edges import Edges
+from rover_planner.planning.search.graph import Seeds, ShortestPaths
+from rover_planner.planning.search.ground_estimate import estimate_ground
+from rover_planner.planning.search.nodes import nodes_within
 from rover_planner.planning.search.path_search import find_path
+from rover_planner.planning.search.primitives import make_primitives
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
@@ -32,6 +38,19 @@ def search_paths() -> None:
         ground = Terrain(elevation, 0.05, (0.0, 0.0))
         question = SearchQuery(load_rover("lsr1"), ground, *ends, PathQueryOptions())
         find_path(question, LatticeSettings(budget=60.0))
+
+
+def search_lattice() -> None:
+    """Search a path over a lattice of which nothing is known, without the model of a pose."""
+    rover, ground = load_rover("lsr1"), Terrain(np.zeros((60, 60)), 0.05, (0.0, 0.0))
+    nodes = nodes_within(0.2, (1.0, 1.0), (2.0, 2.0))
+    edges = Edges(nodes, make_primitives(rover, nodes.cell, 0.1))
+    doubt = estimate_ground(rover, ground, nodes).doubt
+    difficulty = estimate_difficulty(rover, ground, nodes, 0.5, edges.samples)
+    start, goal = (Seeds(np.array([node]), np.zeros(1)) for node in (0, nodes.count - 1))
+    search = ShortestPaths(edges, doubt, difficulty, start)
+    for caution in (1.0, 0.0):
+        search.find(start, goal, caution)
 
 
 def classify_pose() -> None:
@@ -90,8 +109,8 @@ LEARNING = (feel_ground,)
 SIMULATION = (simulate,)
 """All that the quasi-static simulator needs."""
 GROUPS = (
-    (*EXACT, *SCORES, *SINGLE, *HAZARDS, *PATH_SEARCH, *SIMULATION),
-    (*UNCERTAIN, *TRACTION, *LEARNING),
+    (*EXACT, *SCORES, *SINGLE, *PATH_SEARCH, *SIMULATION),
+    (*UNCERTAIN, *HAZARDS, search_lattice, *TRACTION, *LEARNING),
 )
-"""All kernels in two groups that take about the same time to compile: the first compiles the model
-of a pose once for all that use it."""
+"""All kernels in two groups that take about the same time to compile: each compiles the model of a
+pose once for all that use it. What the search needs besides is in the second."""

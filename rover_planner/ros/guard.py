@@ -21,8 +21,9 @@ NANOSECONDS = 1e9
 EVENT_PERIOD, EVENT_WINDOW = 1.0, 0.01
 """Time between two looks at events of publishers and subscriptions, such as profiles that do not
 match, and the length of a look [s]: they are half of the entities of a wait set."""
-PATIENCE = 0.1
-"""Time between two looks at all else where a node has a loop [s]."""
+PATIENCE, PATIENT_PERIODS = 0.1, 5
+"""Time between two looks at all else where a node has a loop [s], or that number of its periods if
+it is more."""
 
 Refusal = TypeVar("Refusal")
 
@@ -102,7 +103,7 @@ class GuardedExecutor(SingleThreadedExecutor):
     and after one in the reading of a message the node's callback group stays blocked for ever.
 
     The timer that a node names as its `loop` is called without a wait set: to make one for each
-    wait, as rclpy does, takes longer than most updates. All else is looked at each PATIENCE.
+    wait, as rclpy does, takes longer than most updates. All else is looked at from time to time.
     """
 
     def __init__(self, **executor_arguments: Any):
@@ -125,7 +126,7 @@ class GuardedExecutor(SingleThreadedExecutor):
         """Return whether a timer is a loop; with a simulated clock, /clock comes before loops."""
         if timer is None or timer is not self._loop or timer.is_canceled():
             return False
-        return not any(node.get_clock().ros_time_is_active for node in self.get_nodes())
+        return not self._clock.ros_time_is_active
 
     def _call_loop(self) -> None:
         now = time.monotonic()
@@ -141,7 +142,8 @@ class GuardedExecutor(SingleThreadedExecutor):
         try:
             call, _, _ = self.wait_for_ready_callbacks(timeout_sec=0.0)
         except TimeoutException:
-            self._others_due = time.monotonic() + PATIENCE
+            period = self._loop.timer_period_ns / NANOSECONDS
+            self._others_due = time.monotonic() + max(PATIENCE, PATIENT_PERIODS * period)
         else:
             call()
 
@@ -158,7 +160,7 @@ class GuardedExecutor(SingleThreadedExecutor):
     def add_node(self, node: Node) -> bool:
         """Add the node; errors of its callbacks go to its guard, if it has one."""
         self._guard_of_node = getattr(node, "guard", None)
-        self._loop = getattr(node, "loop", None)
+        self._loop, self._clock = getattr(node, "loop", None), node.get_clock()
         return bool(super().add_node(node))
 
     def _make_handler(self, entity, node, take_from_wait_list):

@@ -14,7 +14,7 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 
-from msg_adapters.elevation import find_cloud_data
+from msg_adapters.elevation import find_cloud_data, is_same_cloud
 from msg_adapters.errors import MessageError
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.errors import RoverError
@@ -40,6 +40,7 @@ class MapIntake(Generic[Map]):
         prepare: Callable[[Any, Rigid | None], Map],
         refuse: Callable[[str], None],
         frames: Frames,
+        renew: Callable[[PointCloud2], None] = lambda _cloud: None,
     ):
         """Start the thread.
 
@@ -48,13 +49,17 @@ class MapIntake(Generic[Map]):
                 if it is that; called in the thread; may raise RoverError.
             refuse: Called in the thread with the reason why a message cannot be used.
             frames: Knows where frames are on the map; asked in the thread.
+            renew: Called in the thread, instead of `prepare`, with a cloud in the map frame from
+                which the last one differs in its stamp at most.
         """
-        self._prepare, self._refuse, self._frames = prepare, refuse, frames
+        self._prepare, self._refuse, self._renew = prepare, refuse, renew
+        self._frames = frames
         self.topic = CLOUD
         """Topic of the map in work."""
         self._unplaced: tuple[str, int | None] | None = None
         self._changed = threading.Condition()
         self._last: dict[type, bytes] = {}
+        self._used: PointCloud2 | None = None
         self._newest: dict[type, int] = {}
         self._jobs: deque[Callable[[], Any]] = deque()
         self._given, self._done = 0, 0
@@ -63,20 +68,15 @@ class MapIntake(Generic[Map]):
         self._thread = threading.Thread(target=self._run, name="maps", daemon=True)
         self._thread.start()
 
-    def offer(self, message: bytes, kind: type = PointCloud2) -> bool:
-        """Take a serialised message; return False and ignore one with the same bytes as the last.
-
-        A message that still waits is replaced by the new one of its type.
-        """
-        if message == self._last.get(kind):
-            return False
+    def offer(self, message: bytes, kind: type = PointCloud2) -> None:
+        """Take a serialised message; one of its type that still waits is replaced."""
         self._last.pop(kind, None)  # the last of all comes last
         self._last[kind] = message
         self._do_latest(message, kind)
-        return True
 
     def repeat(self) -> None:
         """Prepare the last message again, if there is one, such as with other settings."""
+        self.do(self.expect_other)
         taken = list(self._last.items())  # the thread of the maps may forget them meanwhile
         if taken:
             kind, message = taken[-1]
@@ -98,9 +98,14 @@ class MapIntake(Generic[Map]):
                 self._unplaced = None
                 self.repeat()
 
+    def expect_other(self) -> None:
+        """Prepare the next message whatever it says; to be called in the thread."""
+        self._used = None
+
     def forget(self) -> None:
-        """Forget the last messages, because another map replaces them."""
+        """Forget the last messages, because another map replaces them; call it in the thread."""
         self._last.clear()
+        self.expect_other()
 
     def do(self, job: Callable[[], Any]) -> None:
         """Call a function in the thread after all that was given before."""
@@ -167,9 +172,16 @@ class MapIntake(Generic[Map]):
             return
         self.topic = CLOUD if kind is PointCloud2 else GRID_MAP
         self._unplaced = None
+        used, self._used = self._used, None
         try:
             read = read_message(message, kind)
-            self._ready = self._prepare(read, self._find_source(read.header))
+            source = self._find_source(read.header)
+            is_plain = kind is PointCloud2 and source is None
+            if is_plain and used is not None and is_same_cloud(read, used):
+                self._renew(read)
+            else:
+                self._ready = self._prepare(read, source)
+            self._used = read if is_plain else None
         except RoverError as error:
             self._refuse(str(error))
 

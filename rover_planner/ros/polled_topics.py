@@ -47,6 +47,8 @@ class PolledTopics:
         take: Callable[[Any, float], None],
         qos: QoSProfile,
         is_due: Callable[[], bool] = lambda: True,
+        *,
+        raw: bool = False,
     ) -> None:
         """Subscribe to a topic.
 
@@ -56,9 +58,12 @@ class PolledTopics:
             take: Called with each message and the time of its arrival [s], monotonic.
             qos: The profile; of more messages than its depth the last ones are read.
             is_due: Whether it is to be read at all now.
+            raw: Whether `take` gets the bytes of a message: to make the message takes long.
         """
         group = self._group
-        topic = self._node.create_subscription(kind, name, take, qos, callback_group=group)
+        topic = self._node.create_subscription(
+            kind, name, take, qos, callback_group=group, raw=raw
+        )
         self._topics.append(_Topic(topic, topic.topic_name, take, qos.depth, is_due))
 
     def poll(self) -> None:
@@ -78,11 +83,11 @@ class PolledTopics:
 
     def _read(self, topic: _Topic) -> list[tuple[int, str, Callable[[Any, float], None], Any]]:
         """Return what has come with its time [ns], the name of the topic and who takes it."""
-        handle, arrived = topic.subscription.handle, []
+        one, arrived = topic.subscription, []
         for _ in range(topic.depth):
             try:
-                with handle:
-                    found = handle.take_message(topic.subscription.msg_type, False)
+                with one.handle:
+                    found = one.handle.take_message(one.msg_type, one.raw)
             except Exception as error:
                 self._guard.report(f"reading of {topic.name}", error)
                 continue

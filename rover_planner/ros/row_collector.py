@@ -56,8 +56,7 @@ class RowCollector:
         self._row, self._names, self._has_imu = np.full(WIDTH, np.nan), names, False
         self._listed: tuple[str, ...] = ()
         self._selections: list[_Selection] = []
-        self.yaw_rate = math.nan
-        """Rate of the yaw [rad/s]; NaN until an IMU told it."""
+        self._yaw_rate = math.nan
 
     def take_joints(self, message: Any) -> None:
         """Take joint states by name; a value that is missing or not finite was not measured."""
@@ -95,15 +94,17 @@ class RowCollector:
         if attitude.rates is not None:
             _, q, r = attitude.rates.tolist()
             turn = q * math.sin(attitude.roll) + r * math.cos(attitude.roll)
-            self.yaw_rate = turn / math.cos(attitude.pitch)
+            self._yaw_rate = turn / math.cos(attitude.pitch)
 
     def motion(self, time: float) -> WheelMotion | None:
         """Return what wheels and IMU measure at a time [s]; None until both were heard."""
         row = self._row
-        if math.isnan(self.yaw_rate) or np.isnan(row[RATES]).all():
+        if math.isnan(self._yaw_rate) or np.isnan(row[RATES]).all():
             return None
         steering = np.where(np.isnan(row[STEERING]), 0.0, row[STEERING])
-        return WheelMotion(time, row[RATES].copy(), steering, row[ROLL], row[PITCH], self.yaw_rate)
+        return WheelMotion(
+            time, row[RATES].copy(), steering, row[ROLL], row[PITCH], self._yaw_rate
+        )
 
     def take_odometry(self, message: Any, time: float, frame: str = "") -> Floats:
         """Take a pose; return the row of its time [s].

@@ -21,8 +21,7 @@ class Readings:
         self.names = tuple(names)
         self._places = {name: place for place, name in enumerate(names)}
         self.values = np.zeros(len(names))
-        self.times = np.full(len(names), NEVER)
-        self._stamps = [0] * len(names)
+        self.forget()
 
     def keep(self, values: Mapping[str, float], time: float, stamp: int) -> bool:
         """Take values by name whose stamp is after the last one; return whether any was."""
@@ -38,7 +37,7 @@ class Readings:
 
     def forget(self) -> None:
         """Forget times and stamps: each joint must arrive anew."""
-        self.times[:] = NEVER
+        self.times = [NEVER] * len(self.names)
         self._stamps = [0] * len(self.names)
 
 
@@ -82,22 +81,22 @@ class JointMemory:
     @property
     def time(self) -> float:
         """Time of the oldest value that is needed [s]; NEVER if one is missing."""
-        return min(float(self._positions.times.min()), self.wheel_time)
+        return min(*self._positions.times, self.wheel_time)
 
     @property
     def wheel_time(self) -> float:
         """Time of the oldest wheel rate [s]; NEVER if one is missing."""
-        return float(self._velocities.times[OTHERS].min())
+        return min(self._velocities.times[OTHERS])
 
     @property
     def is_empty(self) -> bool:
         """True if no joint has a value."""
-        return max(self._positions.times.max(), self._velocities.times.max()) == NEVER
+        return max(*self._positions.times, *self._velocities.times) == NEVER
 
     def find_suspension_rates(self, earliest: float) -> Floats | None:
         """Return the rates (4,) of SUSPENSION_JOINTS [rad/s]; None if one is older [s]."""
         rates = self._velocities
-        is_old = rates.times[SUSPENSION].min() < earliest
+        is_old = min(rates.times[SUSPENSION]) < earliest
         return None if is_old else rates.values[SUSPENSION].copy()
 
     def describe_older(self, earliest: float) -> str:

@@ -64,7 +64,7 @@ class MeasurementLimits:
 
     def find_wrong_rates(self, rates: Floats | None) -> str:
         """Describe an impossible angular velocity (3,) of the body [rad/s]."""
-        if rates is None or bool((abs(rates) <= MAX_TURNING_RATE).all()):
+        if rates is None or all(abs(rate) <= MAX_TURNING_RATE for rate in rates.tolist()):
             return ""
         return (
             f"imu has angular velocity {rates.tolist()}; it must be within "

@@ -205,7 +205,7 @@ class WheelServos:
 
     def start(self, torques: Floats) -> None:
         """Go on from torques (6,) [N m]."""
-        self.integral = np.clip(torques, -self._max_torque, self._max_torque)
+        self.integral = np.minimum(np.maximum(torques, -self._max_torque), self._max_torque)
 
     def update(self, errors: Floats, duration: float) -> Floats:
         """Return torques (6,) [N m] for errors (6,) of the rates [rad/s] over a time [s]."""

@@ -166,6 +166,9 @@ class TractionSupervisor:
         return STANDSTILL if self._is_standing(duration) else DRIVING
 
     def _is_stalled(self, duration: float) -> bool:
+        if not any(self.service.wanted):
+            self._stall.reset()
+            return False
         if self.service.climbs:
             self._stall.reset_time()
         stall_time = self.service.settings.parameters.stall_time
@@ -201,4 +204,4 @@ class TractionSupervisor:
             self._hold.start(np.full(WHEEL_COUNT, needed))
         self._held = True
         torques = self._hold.update(-service.joints.wheel_rates, min(duration, MAX_STEP))
-        return np.clip(torques, -most, most)
+        return np.minimum(np.maximum(torques, -most), most)

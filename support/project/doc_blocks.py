@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Code blocks of README and docs: read from the page, and the words of their commands."""
+"""Code blocks of README and docs."""
 
 import itertools
 import re
-import shlex
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,8 +11,6 @@ from support.project.checkout import TOP
 PAGES = [TOP / "README.md", *sorted((TOP / "docs").rglob("*.md"))]
 _FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _MARK = re.compile(r"<!-- not run: (.+) -->\n\Z")
-_SEPARATORS = {"&", "&&", ";", "|", "||"}
-_REDIRECTIONS = {"<", ">", ">>"}
 
 
 @dataclass(frozen=True)
@@ -39,16 +35,6 @@ class Block:
         return f"{self.page}:{self.line}"
 
 
-@dataclass(frozen=True)
-class Command:
-    """A simple command of a shell block."""
-
-    words: tuple[str, ...]
-    """Its words, quotes and redirections removed."""
-    in_background: bool
-    """True if & follows."""
-
-
 def read_blocks(page: Path, top: Path = TOP) -> list[Block]:
     """Return the blocks of a page in sh and Python, from top to bottom."""
     text = page.read_text(encoding="utf-8")
@@ -71,45 +57,3 @@ def read_blocks(page: Path, top: Path = TOP) -> list[Block]:
             )
         )
     return blocks
-
-
-def split_commands(text: str) -> list[Command]:
-    """Return the simple commands of a shell script that has no control structures."""
-    commands: list[Command] = []
-    for tokens in _tokens_of_lines(text):
-        words: list[str] = []
-        for token in [*tokens, ";"]:
-            if token in _SEPARATORS:
-                if words:
-                    commands.append(Command(_without_redirections(words), token == "&"))
-                words = []
-            else:
-                words.append(token)
-    return commands
-
-
-def _tokens_of_lines(text: str) -> Iterator[list[str]]:
-    """Yield words and operators of each line; a line that ends within quotes goes on."""
-    pending = ""
-    for line in text.replace("\\\n", " ").splitlines():
-        pending += line + "\n"
-        lexer = shlex.shlex(pending, posix=True, punctuation_chars=True)
-        lexer.whitespace_split = True
-        try:
-            yield list(lexer)
-        except ValueError:  # a quote is open
-            continue
-        pending = ""
-    assert not pending, f"quotes that nobody closes: {pending}"
-
-
-def _without_redirections(words: list[str]) -> tuple[str, ...]:
-    """Return words without > and < and the files behind them."""
-    kept = []
-    rest = iter(words)
-    for word in rest:
-        if word in _REDIRECTIONS:
-            next(rest, None)
-        else:
-            kept.append(word)
-    return tuple(kept)

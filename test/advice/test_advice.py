@@ -47,7 +47,7 @@ CASES = {
 
 
 def refused_by(height, **options):
-    return Case(LSR1, make_terrain(height), STRAIGHT, SweepOptions(**options))
+    return Case(LSR1, make_terrain(height, half=2.6), STRAIGHT, SweepOptions(**options))
 
 
 @cache
@@ -117,7 +117,7 @@ def test_words_say_what_to_do_and_what_it_does_to_the_rover():
 
 
 def test_several_levers_are_set_where_none_helps_alone():
-    steep = make_terrain(lambda x, y: 0.45 * x)
+    steep = make_terrain(lambda x, y: 0.45 * x, half=2.6)
     case = Case(LSR1, steep, STRAIGHT[24:36], SweepOptions(payload=6.0))
     for advice in grow_advice(case):
         own = [one for one in advice.found if not one.needs_others]
@@ -196,6 +196,6 @@ def test_a_gap_that_coarse_steps_miss_is_found(monkeypatch):
     def gate(x, y):
         return 1.0 * ((np.abs(x) < 0.2) & (np.abs(y - 0.4) > 0.42))
 
-    case = replace(refused_by(gate), terrain=make_terrain(gate, resolution=0.02))
+    case = replace(refused_by(gate), terrain=make_terrain(gate, resolution=0.02, half=2.4))
     found = next(one for one in grow_advice(case) if one.found).found[0]
     assert len(found.levers) == 1 and found.levers[0].value == pytest.approx(0.4, abs=0.04)

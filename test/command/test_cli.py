@@ -12,7 +12,7 @@ from rover_physics import load_rover, load_terrain, save_terrain
 from rover_planner.cli import app, main
 from rover_planner.shell.poses import join_poses
 from support.command_line import write_ground_and_path
-from support.grounds import long_wall, make_terrain
+from support.grounds import make_terrain, wall_with_gap
 
 COMMANDS = typer.main.get_command(app).commands
 
@@ -126,14 +126,14 @@ def test_reach_answers_in_json_whatever_the_answer(capfd, tmp_path):
     assert not answer["possible"] and answer["code"] == "too_far" and answer["out_of_reach"] > 4.0
 
 
-ENDS = ("--start=-2.5,0,0", "--goal=2.5,0,0")
+ENDS = ("--start=-1.2,0.5,0", "--goal=1.2,0.5,0")
 
 
 @pytest.fixture(scope="module")
 def ground(tmp_path_factory):
     """Return a terrain file with a wall that is open at one end."""
     path = tmp_path_factory.mktemp("plan") / "ground.npz"
-    save_terrain(path, make_terrain(long_wall))
+    save_terrain(path, make_terrain(wall_with_gap, half=2.6))
     return path
 
 
@@ -164,7 +164,7 @@ def test_a_way_is_written_with_its_predictions_and_predict_passes_it(ground, tmp
 
 def test_without_a_way_no_file_is_written_and_the_reason_is_told(ground, tmp_path, capfd):
     out = tmp_path / "way.npz"
-    words = ["plan", "lsr1", str(ground), str(out), "--start=-2.5,0,0", "--goal=0,0,0"]
+    words = ["plan", "lsr1", str(ground), str(out), ENDS[0], "--goal=0,0,0"]
     assert main(words) == 0
     report = json.loads(capfd.readouterr().out)
     assert report["found"] is False and report["outcome"] == "goal_refused"

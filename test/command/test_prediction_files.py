@@ -28,10 +28,10 @@ def test_a_file_without_predictions_is_refused_by_name(tmp_path):
 @pytest.mark.parametrize(
     ("changes", "names"),
     [
-        ({"assumptions": np.float64(1.0)}, "assumptions must be one text"),
+        ({"assumptions": np.float64(1.0)}, "assumptions is of type float64; it must hold texts"),
         ({"roll": np.float64(1.0)}, r"roll has shape \(\); it must be \(101,\)"),
         ({"settled": np.zeros(101)}, "settled is of type float64; it must hold bools"),
-        ({"reason": np.zeros(101)}, r"reason must be an array \(n,\) of texts"),
+        ({"reason": np.zeros(101)}, "reason is of type float64; it must hold texts"),
         ({"position": np.full((101, 3), np.nan)}, "position has a value that is NaN or beyond"),
     ],
 )

@@ -3,7 +3,8 @@
 
 import numpy as np
 
-from rover_planner.learning.contact_sense import WheelState
+from rover_physics.numerics.records import new_record
+from rover_planner.learning.contact_sense import WHEEL_STATE
 from rover_planner.learning.wheel_slip import BLOCK, SlipWindow, SlipWindows
 
 RADIUS, RATE, NOISE = 0.1, 0.1, 0.002
@@ -13,24 +14,14 @@ PLACES = np.array([(x, y, 0.0) for y in (-0.3, 0.3) for x in (-0.4, 0.0, 0.4)])
 
 def turn_on_the_spot(blocks: int) -> list[SlipWindow]:
     """Return the windows of a turn without slip, whose heading is measured with noise."""
-    rng, windows, none = np.random.default_rng(0), SlipWindows(RADIUS, 0.08), np.zeros(6)
+    rng, windows = np.random.default_rng(0), SlipWindows(RADIUS, 0.08)
     found = []
     for time in BLOCK * np.arange(blocks):
         yaw = RATE * time + NOISE * rng.standard_normal()
         centres = turned(PLACES, yaw)
         along = turned(PLACES / np.linalg.norm(PLACES, axis=1, keepdims=True), yaw + 0.5 * np.pi)
-        state = WheelState(
-            centres=centres,
-            along=along,
-            axles=turned(along, 0.5 * np.pi),
-            loads=none,
-            doubts=none,
-            tractions=none,
-            excess=0.0,
-            clear=none,
-            links=none,
-            steering=none,
-        )
+        axles = turned(along, 0.5 * np.pi)
+        state = new_record(WHEEL_STATE, centres=centres, along=along, axles=axles)
         rolled = RATE * time * np.hypot(*PLACES[:, :2].T) / RADIUS
         found.append(windows.take(float(time), rolled, state))
     return [window for window in found if window is not None]

@@ -21,29 +21,33 @@ LSR1 = load_rover("lsr1")
 FRAMES = Frames(TraverseServerParameters(), lambda: 0)
 
 
-def cloud_of(half):
-    return serialize_message(terrain_to_point_cloud(plane(0.0, 0.0, half=half), "map", Time()))
+def cloud_of(half, second=0):
+    terrain = plane(0.0, 0.0, half=half)
+    return serialize_message(terrain_to_point_cloud(terrain, "map", Time(sec=second)))
 
 
 def test_a_map_is_prepared_once_and_returned_once():
-    made = []
+    made, renewed = [], []
 
     def prepare(cloud, _source):
         made.append(MapContactFinder(LSR1, terrain_from_point_cloud(cloud)))
         return made[-1]
 
-    intake = MapIntake(prepare, made.append, FRAMES)
-    # Serialised once: the padding between fields is not initialised, so bytes may differ else.
-    cloud = cloud_of(1.0)
-    intake.offer(cloud)
+    intake = MapIntake(prepare, made.append, FRAMES, renewed.append)
+    intake.offer(cloud_of(1.0))
     prepared = wait_until(intake.take, "a map")
     assert prepared.rover is LSR1 and intake.take() is None
-    intake.offer(bytes(bytearray(cloud)))
+    intake.offer(cloud_of(1.0, second=5))
+    wait_until(lambda: renewed, "the same map, later")
+    assert renewed[0].header.stamp.sec == 5
     intake.offer(cloud_of(2.0))
     other = wait_until(intake.take, "the next map")
     assert other.terrain.elevation.shape > prepared.terrain.elevation.shape
-    intake.close()
     assert len(made) == 2
+    intake.repeat()
+    wait_until(intake.take, "the same map with other settings")
+    intake.close()
+    assert len(made) == 3 and len(renewed) == 1
 
 
 def test_a_map_that_cannot_be_used_is_refused_and_the_next_is_taken():

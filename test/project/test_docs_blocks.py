@@ -2,10 +2,9 @@
 """The code blocks of README and docs run as they are written, from top to bottom of each page.
 
 A page gets an empty folder, and the programs of this checkout by their names. A comment before a
-block says why it cannot run here; the parsers of the product read it all the same.
+block says why it cannot run here; test_docs_paths.py looks for what it names all the same.
 """
 
-import ast
 import os
 import re
 import subprocess
@@ -18,30 +17,15 @@ import pytest
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
 from support.project.checkout import TOP, console_scripts, setup_arguments
-from support.project.command_checks import check_command
-from support.project.doc_blocks import PAGES, Block, read_blocks, split_commands
+from support.project.doc_blocks import PAGES, Block, read_blocks
 from support.project.processes import ProcessToken
 from support.ros_fixtures import domain_id
 
-SERVERS = ("traverse_server", "traction_controller", "rover_simulator")
-"""Programs that run until they are told to stop, so that a block has them in the background."""
 LONGEST, GRACE = 300.0, 20.0
 """Longest time for a block, and for its processes to end after it [s]."""
 
 BLOCKS = [block for page in PAGES for block in read_blocks(page)]
 PAGES_TO_RUN = sorted({block.page for block in BLOCKS})
-
-
-@pytest.mark.parametrize("block", BLOCKS, ids=str)
-def test_a_block_names_only_what_there_is_and_leaves_no_server_in_the_way(block):
-    if block.language == "python":
-        ast.parse(block.text)
-        return
-    checked = subprocess.run(["bash", "-n"], input=block.text, capture_output=True, text=True)
-    assert (checked.returncode, checked.stderr) == (0, "")
-    for command in split_commands(block.text):
-        check_command(command.words)
-        assert block.not_run or command.words[0] not in SERVERS or command.in_background
 
 
 def test_what_a_robot_does_not_get_from_apt_is_installed_by_pip():
@@ -53,15 +37,10 @@ def test_what_a_robot_does_not_get_from_apt_is_installed_by_pip():
         re.match(r"[\w-]+", requirement)[0].lower().removeprefix("py")
         for requirement in setup_arguments()["install_requires"]
     }
-    readme = [command for block in BLOCKS if block.page == "README.md" and block.language == "sh"
-              for command in split_commands(block.text)]  # fmt: skip
-    by_pip = {
-        word.removeprefix("py")
-        for command in readme
-        if command.words[:4] == ("pip", "install", "-c", "locked.txt")
-        for word in command.words[4:]
-    }
-    assert required - from_apt == by_pip
+    (by_pip,) = re.findall(
+        r"^pip install -c locked.txt (.*)$", (TOP / "README.md").read_text(), re.M
+    )
+    assert required - from_apt == {word.removeprefix("py") for word in by_pip.split()}
 
 
 @pytest.fixture

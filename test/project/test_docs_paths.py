@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from rover_planner.nodes.programs import PROGRAMS
 from support.project.checkout import TOP, console_scripts
 
 PAGES = sorted(
@@ -120,6 +121,23 @@ def test_every_option_that_a_page_gives_to_a_command_exists(page):
         if command in known:
             asked = set(re.findall(r"(?<!\w)--[a-z][\w-]*", rest))
             assert asked <= known[command], f"rover_planner {command}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=str)
+def test_every_parameter_argument_topic_and_service_that_a_page_gives_to_ros_exists(page):
+    text = current_text(page)
+    parameters = {spec.name for one in PROGRAMS.values() for spec in one.parameters}
+    assert set(re.findall(r"-p ([a-z]\w*):=", text)) <= parameters
+    assert set(re.findall(r"ros2 param set /\w+ (\w+)", text)) <= parameters
+    for file, given in re.findall(r"ros2 launch rover_planner ([\w.]+)([^`\n#]*)", text):
+        declared = (TOP / "launch" / file).read_text(encoding="utf-8")
+        assert [
+            name for name in re.findall(r"(\w+):=", given) if f'"{name}"' not in declared
+        ] == []
+    for node, topic in re.findall(r"ros2 (?:topic|service) [\w -]*/(\w+)/(\w+)", text):
+        assert f"~/{topic}" in PROGRAMS[node].topics
+    for program in re.findall(r"ros2 run rover_planner (\w+)", text):
+        assert program in console_scripts()
 
 
 @pytest.mark.parametrize("package", ["rover_physics", "rover_planner"])

@@ -5,6 +5,7 @@ import json
 import re
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -17,7 +18,6 @@ from rover_physics.rover.urdf.write_urdf import write_urdf
 from rover_planner.nodes.programs import PROGRAMS
 from support.project import nav2_jazzy
 from support.project.checkout import TOP, console_scripts
-from support.project.command_checks import check_parameter_file, check_parameters
 from support.project.launch_files import describe, start_rover
 
 PARAMETER_FILES = sorted((TOP / "config" / "parameters").glob("*.yaml"))
@@ -26,6 +26,22 @@ MAPS = ("map_topic", "mask_topic")
 """Parameters of Nav2 that name a topic with a grid."""
 OF_OTHERS = {"robot_description", "diagnostics"}
 """Topics in layouts that are not published by a node under its own help's name."""
+
+
+def check_parameter_file(node: str, path: Path) -> None:
+    """Hold the parameters of a file for a node against its table; `/**` is every node."""
+    values = yaml.safe_load(path.read_text(encoding="utf-8"))
+    assert set(values) & {"/**", node}, f"{path.name} has nothing for {node}"
+    for section in ("/**", node):
+        check_parameters(node, values.get(section, {}).get("ros__parameters", {}))
+
+
+def check_parameters(node: str, values: dict[str, Any]) -> None:
+    """Hold parameters against the table of their node."""
+    specs = {spec.name: spec for spec in PROGRAMS[node].parameters}
+    for name, value in values.items():
+        assert name in specs, f"{node} has no parameter {name}"
+        specs[name].check(tuple(value) if isinstance(value, list) else value)
 
 
 def test_the_rover_starts_as_its_parameter_files_say():

@@ -128,7 +128,7 @@ def test_the_layers_sum_up_the_headings_of_each_cell_and_turns_to_both_sides(gro
 
 
 def test_the_chance_of_a_cell_is_that_of_its_headings_and_1_where_one_fails_as_told(ground):
-    request, places = make_request(chance=True), places_on(ground)[::5]
+    request, places = make_request(chance=True), places_on(ground)[::12]
     layers = survey_tile(request, ground, places)
     passes = unpack_bits(layers["passable_headings"], 4).ravel()
     poses, chances = poses_at(places, request), np.ones(len(passes), np.float32)
@@ -187,9 +187,9 @@ def test_bits_come_back(headings):
 
 @pytest.mark.parametrize(("step", "chunk"), [(1, 64), (3, 1)])
 def test_any_chunks_give_the_same_bits(tmp_path, step, chunk):
-    terrain, request = make_rough_map(70, 140), make_request(headings=2, step=step)
-    soil = np.where(np.arange(70)[:, None] > 40, 0, -1) * np.ones((1, 140), np.int32)
-    friction = np.where(np.arange(140) < 40, 0.2, np.nan) * np.ones((70, 1))
+    terrain, request = make_rough_map(50, 100), make_request(headings=2, step=step)
+    soil = np.where(np.arange(50)[:, None] > 30, 0, -1) * np.ones((1, 100), np.int32)
+    friction = np.where(np.arange(100) < 30, 0.2, np.nan) * np.ones((50, 1))
     terrain = replace(
         terrain, friction=friction, soil=soil.astype(np.int32), soil_names=("dry_sand",)
     )
@@ -199,7 +199,7 @@ def test_any_chunks_give_the_same_bits(tmp_path, step, chunk):
     found = layers_of(whole)
     assert_same_bits(found, layers_of(parts))
     assert step > 1 or len(np.unique(found["first_limit"])) > 3
-    x, y = (np.arange(0, count, step) * terrain.resolution for count in (140, 70))
+    x, y = (np.arange(0, count, step) * terrain.resolution for count in (100, 50))
     places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     tile = survey_tile(request, replace(terrain, origin=(0.0, 0.0)), places)["first_limit"]
     assert (tile != found["first_limit"].ravel()).mean() < 1e-3  # coordinates round differently

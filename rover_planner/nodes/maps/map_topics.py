@@ -10,6 +10,7 @@ from nav_msgs.srv import LoadMap
 from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.results.grids import terrain_to_occupancy_grid
+from msg_adapters.stamps import stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.files.validation import show_file
 from rover_planner.maps.map_file import MapFileError, MapLimits, open_map
@@ -55,7 +56,9 @@ class MapTopics:
         self._is_from_topic = False
         self._logged_at, self._logged_kind = -float("inf"), ("", False)
         self._map_count, self._refusals = 0, RepeatLog()
-        self._intake: MapIntake[None] = MapIntake(self._take_message, self._refuse, inputs.frames)
+        self._intake: MapIntake[None] = MapIntake(
+            self._take_message, self._refuse, inputs.frames, self._renew
+        )
         self.retry = self._intake.retry
         """Takes the last message if its transform has come meanwhile; to be called each second."""
         self._subscribe(CLOUD, PointCloud2)
@@ -67,8 +70,7 @@ class MapTopics:
     def _subscribe(self, topic: str, kind: type) -> None:
         def offer(message: bytes) -> None:
             self._node.heard.poll()
-            if not self._intake.offer(message, kind):
-                self._intake.do(self._renew)
+            self._intake.offer(message, kind)
 
         subscribe_to_map(self._node, kind, topic, offer)
 
@@ -97,6 +99,7 @@ class MapTopics:
         if self._is_from_topic and is_new:
             self._intake.repeat()
         else:
+            self._intake.do(self._intake.expect_other)
             self._intake.do(self._service.refresh_map)
 
     def _load_map(
@@ -148,10 +151,13 @@ class MapTopics:
         """End the thread."""
         self._intake.close()
 
-    def _renew(self) -> None:
-        """Note that the last message has arrived again, if it is the map in use."""
-        if self._is_from_topic:
-            self._service.renew_map()
+    def _renew(self, cloud: PointCloud2) -> None:
+        """Take a cloud that says what the map in use says; where maps merge, cells are newer."""
+        if self._inputs.keeper.merges:
+            self._take_message(cloud, None)
+        else:
+            self._service.renew_map(stamp_to_ns(cloud.header.stamp))
+            self._report("")
 
     def _take_message(self, message: Any, source: Rigid | None) -> None:
         topic = self._intake.topic

@@ -12,8 +12,8 @@ from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Bool
 
 from msg_adapters.commands import twist_to_speeds
-from msg_adapters.imu import ImuMounting, imu_to_attitude
-from msg_adapters.joints import read_joint_map
+from msg_adapters.imu import ImuMounting, find_attitude, read_imu
+from msg_adapters.joints import JointReader, read_joint_map
 from msg_adapters.odometry import odometry_to_pose
 from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
@@ -66,7 +66,7 @@ class TractionInputs:
         self._mounting = ImuMounting(
             parameters.imu_frame or parameters.base_frame, parameters.imu_mounting
         )
-        self._odometry_read = -math.inf
+        self._joints, self._odometry_read = JointReader(), -math.inf
         self._log = TransitionLog(node.get_logger())
         self.stamps = StampCheck(parameters.stamp_tolerance)
         """Judges the header stamps."""
@@ -84,12 +84,12 @@ class TractionInputs:
     def _subscribe(self, parameters: TractionControllerParameters) -> None:
         twist = TwistStamped if parameters.cmd_vel_stamped else Twist
         hear = self._node.heard.subscribe
-        for kind, name, take in (
-            (JointState, JOINT_STATES, self._take_joints),
-            (Imu, IMU, self._take_imu),
-            (twist, CMD_VEL, self._take_command),
+        for kind, name, take, raw in (
+            (JointState, JOINT_STATES, self._take_joints, True),
+            (Imu, IMU, self._take_imu, True),
+            (twist, CMD_VEL, self._take_command, False),
         ):
-            hear(kind, name, self._guard(name, take), sensor_qos())
+            hear(kind, name, self._guard(name, take), sensor_qos(), raw=raw)
         take_odometry = self._guard(ODOMETRY, self._take_odometry)
         hear(Odometry, ODOMETRY, take_odometry, newest_qos(), self._needs_odometry)
         hear(Bool, STOP, self._guard(STOP, self._take_stop), topic_qos())
@@ -143,18 +143,19 @@ class TractionInputs:
         clock = self._node.get_clock().now().nanoseconds - waited
         return self.stamps.find_time(name, stamp, clock, now, merged=merged)
 
-    def _take_joints(self, state: JointState, now: float) -> None:
+    def _take_joints(self, message: bytes, now: float) -> None:
+        state = self._joints.read(message)
         if not self._heard.intersection(state.name):  # an arm's message, for example
             return
-        stamp = _stamp_of(state)
-        measured = self._find_time(JOINT_STATES, stamp, now, merged=True)
+        measured = self._find_time(JOINT_STATES, state.stamp, now, merged=True)
         positions = self.joint_names.positions(state, ANGLES)
         rates = self.joint_names.velocities(state, JOINTS)
-        self._service.take_joints(positions, rates, measured, stamp)
+        self._service.take_joints(positions, rates, measured, state.stamp)
 
-    def _take_imu(self, imu: Imu, now: float) -> None:
-        measured = self._find_time(IMU, _stamp_of(imu), now)
-        attitude = imu_to_attitude(imu, self._mounting)
+    def _take_imu(self, message: bytes, now: float) -> None:
+        imu = read_imu(message)
+        measured = self._find_time(IMU, imu.stamp, now)
+        attitude = find_attitude(imu, self._mounting)
         self._service.take_attitude(attitude.roll, attitude.pitch, attitude.rates, measured)
 
     def _take_command(self, twist: TwistStamped | Twist, now: float) -> None:

@@ -95,11 +95,11 @@ class TraverseService(Measurements):
         if known is not None:
             self._keep_map(replace(known, received=terrain, cells=cells))
 
-    def renew_map(self) -> None:
-        """Note that the present map has arrived once more."""
+    def renew_map(self, stamp: int | None) -> None:
+        """Note that the present map has arrived once more, with a stamp [ns] or None."""
         known = self.known_map
         if known is not None:
-            self.known_map = replace(known, arrival=self._clock())
+            self.known_map = replace(known, stamp=stamp, arrival=self._clock())
 
     def refresh_map(self) -> None:
         """Interpolate the gaps of the received map again, with the present settings."""

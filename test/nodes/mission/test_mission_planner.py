@@ -136,7 +136,7 @@ def test_advice_that_needs_nobody_else_is_taken(
 ):
     patient = {"planner": "fan", "candidate_count": 1, "advice_time": 60.0, "time_budget": 60.0}
     server = start_server(**patient, **parameters)
-    server.service.take_terrain(make_terrain(ground))
+    server.service.take_terrain(make_terrain(ground, half=3.0))
     code, out, _ = run_planner("--goal=1.2,0,0", "--advise")
     lines = [line for line in out.splitlines() if line.startswith(("goal", "advice"))]
     assert code == 0 and lines[0].startswith("goal 1: no, ")

@@ -16,7 +16,7 @@ from support.planner_client import SERVER
 from support.ros_fixtures import call
 from support.waiting import wait_until
 
-START, GOAL = (-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)
+START, GOAL = (-1.0, 0.0, 0.0), (1.2, 0.0, 0.0)
 
 
 def send_request(client, kind, name, request) -> Future:

@@ -13,7 +13,7 @@ from support.grounds import make_terrain, pen, waves
 from support.planner_client import SERVER, ask
 from support.waiting import wait_until
 
-INSIDE, BEYOND = (0.0, 0.0, 0.0), (3.0, 0.0, 0.0)
+INSIDE, BEYOND = (0.0, 0.0, 0.0), (2.6, 0.0, 1.57)
 """Poses inside and outside of the pen."""
 LONG = {"search_budget": 60.0, "time_budget": 120.0}
 """Time enough for a busy machine."""
@@ -21,7 +21,7 @@ LONG = {"search_budget": 60.0, "time_budget": 120.0}
 
 def test_without_a_path_the_code_says_so_and_the_closed_area_is_a_grid(start_server, client):
     start_server(lattice_cell=0.5, waypoint_spacing=0.1, candidate_count=1, **LONG)
-    client.send_terrain(make_terrain(pen))
+    client.send_terrain(make_terrain(pen, half=3.5))
     assert client.set_parameter("search_budget", 0.05) == (True, "")
     _, verdict, _ = ask(client, start=INSIDE, goal=BEYOND)
     assert verdict["code"] == "out_of_time" and "0.05 s" in verdict["reason"]

@@ -27,7 +27,7 @@ DTYPES = ["f2", "f4", "f8", ">f4", ">f8", "i1", "i2", "i4", ">i8", "u1", "u8", "
 
 
 def read(archive: bytes, dtype=None, most=MOST):
-    return NpzReader(io.BytesIO(archive)).read("a", dtype, most=most)
+    return NpzReader(io.BytesIO(archive)).read("a", most=most, dtype=dtype)
 
 
 def refusal(archive: bytes, most=MOST) -> str:
@@ -66,7 +66,7 @@ def test_a_large_array_is_read_in_the_wanted_type_in_one_and_a_half_of_its_memor
     needed = 8 * values.size
     with open_npz(tmp_path / "a.npz") as archive:
         tracemalloc.start()
-        found = archive.read("a", np.float64, most=needed)
+        found = archive.read("a", most=values.size, dtype=np.float64)
         peak = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
     assert found.flags.c_contiguous
@@ -81,18 +81,18 @@ ONE = npy(HEAD % ("<f8", "(1,)"), bytes(8))
 @pytest.mark.parametrize(
     ("content", "reason"),
     [
-        (npy(HEAD % ("<f8", "(900000, 900000)")), "claims shape (900000, 900000) of type <f8"),
+        (npy(HEAD % ("<f8", "(900000, 900000)")), "its header claims <f8(900000, 900000)"),
         (npy(HEAD % ("<f8", "(" + "9" * 400 + ",)")), "is damaged"),
         (npy("{'descr': '<f8', 'fortran_order': 1or 2, 'shape': (3,)}"), "is damaged"),
         (npy("(" * 5000), "is damaged"),
         (npy(HEAD % ("<f8", "(3,), 'shape': (2,)"), bytes(24)), "is damaged"),
-        (npy(HEAD % ("|O", "(3,)")), "holds Python objects"),
-        (npy(HEAD % ("<U9999999", "(3,)")), "is damaged: its header claims"),
-        (npy(HEAD % ("<U0", "(999999999999,)")), "elements of type <U0"),
-        (npy(HEAD % ("<c16", "(3,)")), "elements of type <c16"),
-        (npy(HEAD % ("<f8", "(3,)"), bytes(16)), "is damaged: its header claims shape (3,)"),
+        (npy(HEAD % ("|O", "(3,)")), "is damaged (Object arrays cannot be loaded"),
+        (npy(HEAD % ("<U9999999", "(3,)")), "its header claims"),
+        (npy(HEAD % ("<U0", "(999999999999,)")), "of type <U0; it must hold plain"),
+        (npy(HEAD % ("<c16", "(1,)"), bytes(16)), "of type complex128; it must"),
+        (npy(HEAD % ("<f8", "(3,)"), bytes(16)), "is damaged: its header claims <f8(3,)"),
         (npy(HEAD % ("<U1", "(1,)"), b"\xff" * 4), "characters that do not exist"),
-        (npy("", version=2, length=2**32 - 1) + bytes(10**7), "has a header of version (2, 0)"),
+        (npy("", version=2, length=2**32 - 1) + bytes(10**6), "is damaged"),
         (b"\x80\x04K\x01.", "is damaged"),
         (b"", "is damaged"),
     ],
@@ -125,7 +125,7 @@ def test_an_array_that_unpacks_to_more_than_the_limit_is_not_unpacked():
     content = npy(HEAD % ("<f8", "(4000, 4000)"), bytes(8 * 4000**2))
     packed = archive_of(content)
     assert len(packed) < 200_000
-    assert "takes 128000000 bytes of memory; it may take at most 1000000" in refusal(packed)
+    assert "takes 128000075 bytes of memory; the limit is 1000000 values" in refusal(packed)
 
 
 KINDS = {

@@ -9,12 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rover_physics import PoseStatus, Rover, SweepOptions, judge_path, judge_poses, load_rover
-from rover_physics.forces.equilibrium import FREE_FORCES, balance_forces
 from rover_physics.forces.stability import tip_over_angles
-from rover_physics.prediction.evaluation import new_work
-from rover_physics.rover.linkage import pack_linkage, place, place_masses
+from rover_physics.prediction.packed_model import pack_model
+from rover_physics.prediction.path_motion import motions_of
 from rover_physics.rover.manipulator import link_points
 from rover_physics.rover.model import Steering
+from rover_physics.traversability.torque_ranges import evaluate_in_turn
 from support.reference_cases import reference_grounds, reference_predictions, steered_predictions
 from support.rough_grounds import fractal, plane, random_poses, rocky, scaled_for, smooth
 from support.rover_geometry import (
@@ -133,18 +133,10 @@ def test_torque_is_traction_times_radius_and_both_utilisations_are_shares_of_the
 # Free forces: what torques change, and what no balance decides
 
 
-def balance_of(rover: Rover, steering):
-    """Return the balance of a rover on level ground with its wheels turned (6,) [rad]."""
-    body = rover.masses.body
-    linkage = pack_linkage(rover, body.mass, np.array(body.com))
-    work, q = new_work(), np.zeros(6)
-    work.placement.steering[:] = steering
-    place(linkage, work.pose, q, work.placement)
-    place_masses(linkage, q, work.placement)
-    work.contacts.sine[:], work.contacts.cosine[:] = 0.0, 1.0
-    work.contacts.point[:] = work.placement.centres - rover.wheel.radius * work.placement.up
-    columns = 1 + FREE_FORCES
-    assert balance_forces(linkage, work.placement, work.contacts, columns, work.balance)
+def balance_of(rover: Rover):
+    """Return the balance of a rover on level ground."""
+    model, ahead = pack_model(rover, plane(0.0, 0.0), SweepOptions("optimal")), np.zeros((1, 3))
+    ((_, work),) = evaluate_in_turn(model, ahead, motions_of(model, ahead, None))
     return work.balance
 
 
@@ -153,7 +145,7 @@ def balance_of(rover: Rover, steering):
     [([-0.2, 0.2, 0.0], [-0.733, 1.467, -0.733]), ([0.0, -0.2, 0.2], [0.0, 0.0, 0.0])],
 )
 def test_torques_change_loads_as_in_figure_4(torques, changes):
-    balance, pulls = balance_of(LSR1, np.zeros(6)), np.array(torques * 2) / LSR1.wheel.radius
+    balance, pulls = balance_of(LSR1), np.array(torques * 2) / LSR1.wheel.radius
     relative = pulls[:5] - pulls[5]
     assert balance.tangential[:, 1:6] @ relative == pytest.approx(pulls, abs=1e-9)
     loads = balance.normal[:, 1:6] @ relative

@@ -27,11 +27,10 @@ from rover_physics.forces.soil import (
     shear_strength,
 )
 from rover_physics.numerics.records import new_record
-from rover_physics.prediction.evaluation import evaluate_pose, new_works, set_pose
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
-from rover_physics.results.record import new_results
 from rover_physics.status import Stall
+from rover_physics.traversability.torque_ranges import evaluate_in_turn
 from support.rough_grounds import fractal, plane, random_poses, rocky, smooth
 from support.rover_geometry import balance_residuals
 
@@ -58,11 +57,8 @@ def servos_at(rover, ground, poses, options, curvature):
     """Yield the SERVO at each pose that settles and drives."""
     model = pack_model(rover, ground, options)
     motions = motions_of(model, poses, np.full(len(poses), curvature))
-    work, result = new_works(1, 1)[0], new_results(1)[0]
-    for i in range(len(poses)):
-        set_pose(model.record, poses, motions, i, work)
-        evaluate_pose(model.record, work, result)
-        if result.status == 0 and result.speed_share > 0.0:
+    for results, work in evaluate_in_turn(model, poses, motions):
+        if results["status"][0] == 0 and results["speed_share"][0] > 0.0:
             yield work.servo
 
 
@@ -78,7 +74,7 @@ def servos_at(rover, ground, poses, options, curvature):
 def test_the_nine_equations_hold(rover, curvature, ground, half, options, least):
     poses = random_poses(1, 40, half)
     servos = servos_at(rover, ground, poses, options, curvature)
-    sizes = [write_residual(servo, servo.z) for servo in servos]
+    sizes = [np.linalg.norm(servo.residual) for servo in servos]
     assert len(sizes) >= least
     assert max(sizes) <= 2e-7
 
@@ -92,6 +88,7 @@ def test_without_turning_the_forces_balance_by_an_independent_model():
         assert max(np.abs(r).max() for r in residuals) <= 1e-2 * narrow.weight / 6.0
 
 
+@pytest.mark.long  # compiles a kernel of its own; a wrong one leaves the equations unsolved
 @pytest.mark.parametrize(
     ("ground", "half", "options", "apart"),
     [(rocky(2), 2.0, SERVO, 1e-3), (smooth(2), 0.6, SAND, 5e-3)],

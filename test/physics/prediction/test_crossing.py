@@ -101,15 +101,6 @@ def test_a_failure_on_a_face_is_told_at_the_waypoint_that_follows():
     assert place == pytest.approx(-RADIUS, abs=0.02), "the front wheels are at the face"
 
 
-# The higher the harder
-
-
-# Spacing
-
-
-# The foot of a step
-
-
 def test_a_wheel_that_meets_an_edge_is_judged_as_it_leaves_the_ground_wherever_waypoints_are():
     height = 0.8 * RADIUS
     needed = []

@@ -87,9 +87,6 @@ def test_bad_arguments_are_refused_by_name_and_value(arguments, words):
         judge_path(LSR1, LEVEL, POSE, SweepOptions(**arguments))[0]
 
 
-# What comes back
-
-
 # Each waypoint on its own
 
 

@@ -51,7 +51,7 @@ def test_a_stale_map_is_refused_and_the_same_map_again_is_not():
     assert service.answer((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)).code == "stale_map"
 
     def is_answered_after_it_came_again() -> bool:
-        service.renew_map()
+        service.renew_map(None)
         return service.answer((0.0, 0.0, 0.0), (0.5, 0.0, 0.0)).traversable
 
     # A busy machine may take the time between the two.

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reads fields of serialised messages, without making a message of them all."""
+
+import struct
+from typing import Any
+
+from msg_adapters.stamps import NANOSECONDS
+
+
+class Fields:
+    """Reads the fields of a serialised message (CDR) one after the other.
+
+    Where the message ends early, struct.error is raised.
+    """
+
+    def __init__(self, message: bytes, at: int = 4):
+        """Begin at a byte; the first four tell the order of bytes."""
+        self._message, self._order = message, "<" if message[1:2] == b"\1" else ">"
+        self.at = at
+        """Where the next field begins, before its alignment."""
+
+    def numbers(self, form: str) -> tuple[Any, ...]:
+        """Return numbers of one size in a format of struct, such as "iI" or "4d"."""
+        form = self._order + form
+        self.at += (4 - self.at) % struct.calcsize(self._order + form[-1])
+        found = struct.unpack_from(form, self._message, self.at)
+        self.at += struct.calcsize(form)
+        return found
+
+    def stamp(self) -> int:
+        """Return a stamp [ns]."""
+        seconds, rest = self.numbers("iI")
+        return int(seconds * NANOSECONDS + rest)
+
+    def count(self) -> int:
+        """Return the number of elements of a sequence."""
+        return int(self.numbers("I")[0])
+
+    def text(self) -> str:
+        """Return a text."""
+        length = self.count()
+        begin, self.at = self.at, self.at + length
+        return self._message[begin : self.at - 1].decode(errors="replace")
+
+    def doubles(self) -> tuple[float, ...]:
+        """Return a sequence of doubles."""
+        count = self.count()
+        return self.numbers(f"{count}d") if count else ()

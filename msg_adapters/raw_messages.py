@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reads sensor messages from their bytes, without a Python object for each of their fields.
+
+rclpy makes some twenty objects of an odometry, which takes several times as long as all that is
+done with it. Here a message has only the fields that adapters read, under the same names.
+"""
+
+import struct
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Imu, JointState
+
+from msg_adapters.cdr import Fields
+from msg_adapters.errors import MessageError
+
+
+class _Vector(NamedTuple):
+    x: float
+    y: float
+    z: float
+
+
+class _Quaternion(NamedTuple):
+    x: float
+    y: float
+    z: float
+    w: float
+
+
+def read_sensor(message: bytes, kind: type) -> Any:
+    """Return what adapters read of an Imu, JointState or Odometry.
+
+    Raises:
+        MessageError: The bytes are no such message.
+    """
+    try:
+        return _READERS[kind](Fields(message))
+    except struct.error as error:
+        raise MessageError(
+            f"{len(message)} bytes were received that are no {kind.__name__}; the publisher or "
+            f"the connection is damaged: {error}"
+        ) from None
+
+
+def _read_header(fields: Fields) -> SimpleNamespace:
+    seconds, nanoseconds = fields.numbers("iI")
+    stamp = SimpleNamespace(sec=seconds, nanosec=nanoseconds)
+    return SimpleNamespace(stamp=stamp, frame_id=fields.text())
+
+
+def _read_imu(fields: Fields) -> SimpleNamespace:
+    header, values = _read_header(fields), fields.numbers("25d")
+    return SimpleNamespace(
+        header=header,
+        orientation=_Quaternion(*values[:4]),
+        orientation_covariance=values[4:13],
+        angular_velocity=_Vector(*values[13:16]),
+        angular_velocity_covariance=values[16:],
+    )
+
+
+def _read_joints(fields: Fields) -> SimpleNamespace:
+    header = _read_header(fields)
+    names = [fields.text() for _ in range(fields.count())]
+    position, velocity, effort = (fields.doubles() for _ in range(3))
+    return SimpleNamespace(
+        header=header, name=names, position=position, velocity=velocity, effort=effort
+    )
+
+
+def _read_odometry(fields: Fields) -> SimpleNamespace:
+    header, child, values = _read_header(fields), fields.text(), fields.numbers("43d")
+    pose = SimpleNamespace(position=_Vector(*values[:3]), orientation=_Quaternion(*values[3:7]))
+    pose = SimpleNamespace(pose=pose, covariance=values[7:])
+    return SimpleNamespace(header=header, child_frame_id=child, pose=pose)
+
+
+_READERS = {Imu: _read_imu, JointState: _read_joints, Odometry: _read_odometry}

@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Messages read from their bytes have the fields that rclpy finds in them."""
+
+import math
+
+import pytest
+from builtin_interfaces.msg import Time
+from nav_msgs.msg import Odometry
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import Imu, JointState
+
+from msg_adapters.errors import MessageError
+from msg_adapters.raw_messages import read_sensor
+
+STAMP = Time(sec=7, nanosec=8)
+
+
+def joints(names: list[str], *values: list[float]) -> JointState:
+    """Return joint states with positions, velocities and efforts, those that there are."""
+    message = JointState(name=names)
+    for field, some in zip(("position", "velocity", "effort"), values, strict=False):
+        setattr(message, field, some)
+    return message
+
+
+def imu() -> Imu:
+    """Return an IMU message whose numbers all differ."""
+    message = Imu()
+    turn, rate = message.orientation, message.angular_velocity
+    turn.x, turn.y, turn.z, turn.w, rate.x, rate.y, rate.z = 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, math.nan
+    message.orientation_covariance[:] = range(9)
+    message.angular_velocity_covariance[:] = -1.0
+    return message
+
+
+def odometry(child: str) -> Odometry:
+    """Return an odometry of a frame whose numbers all differ."""
+    message = Odometry(child_frame_id=child)
+    place, turn = message.pose.pose.position, message.pose.pose.orientation
+    place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w = (float(k) for k in range(7))
+    message.pose.covariance[:] = range(36)
+    return message
+
+
+def fields_of(message, like) -> object:
+    """Return the fields of a message that `like` has, as plain values."""
+    if hasattr(like, "_fields"):
+        return [getattr(message, name) for name in like._fields]
+    if hasattr(like, "__dict__"):
+        return {name: fields_of(getattr(message, name), one) for name, one in vars(like).items()}
+    return [float(value) for value in message] if isinstance(like, tuple) else message
+
+
+@pytest.mark.parametrize("frame", ["", "map", "a long name of a frame"])
+@pytest.mark.parametrize(
+    "message",
+    [
+        imu(),
+        odometry(""),
+        odometry("base"),
+        joints([]),
+        joints(["a"], [1.0]),
+        joints(["a", "bcdefg"], [], [2.0, math.inf], [3.0, 4.0]),
+        joints(["wheel", "", "räd"], [1.0, 2.0, 3.0], [], [4.0, 5.0, 6.0]),
+    ],
+)
+def test_fields_are_those_that_rclpy_reads(message, frame):
+    message.header.frame_id, message.header.stamp = frame, STAMP
+    read = read_sensor(serialize_message(message), type(message))
+    assert repr(fields_of(read, read)) == repr(fields_of(message, read))
+    assert (read.header.frame_id, read.header.stamp.nanosec) == (frame, 8)
+
+
+def test_damaged_bytes_are_refused():
+    whole = serialize_message(joints(["wheel"], [1.0]))
+    for damaged in (b"", whole[:20], whole[:40]):
+        with pytest.raises(MessageError, match="no JointState"):
+            read_sensor(damaged, JointState)
