@@ -138,9 +138,10 @@ class LiveListener(Node):
             if field in self._estimated and not self._ages[f"{CONTROLLER}/{topic}"].is_stale
         }
         is_estimated = not estimated.keys().isdisjoint(PREDICTED_FIELDS.values())
-        source = "forces predicted by the server" if self._forces else ""
+        predicted = {} if self._ages[SIGN_OF_LIFE].is_stale else self._forces
+        source = "forces predicted by the server" if predicted else ""
         source = "forces estimated by the traction controller" if is_estimated else source
-        forces, ages = {**self._forces, **estimated}, tuple(self._ages.values())
+        forces, ages = {**predicted, **estimated}, tuple(self._ages.values())
         return replace(data, forces=forces, forces_from=source, ages=ages, click=self._click)
 
     def request_plan(self, goal: np.ndarray) -> str:

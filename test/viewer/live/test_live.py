@@ -7,13 +7,14 @@ import time
 
 import numpy as np
 import pytest
-from diagnostic_msgs.msg import DiagnosticArray
-from nav_msgs.msg import Odometry
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from nav_msgs.msg import Odometry, Path
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 
 from msg_adapters.commands import labelled_array
+from msg_adapters.paths import poses_path
 from msg_adapters.results.predictions import waypoint_array
 from rover_physics.names import WHEEL_JOINTS
 from rover_physics.rover.rover_file import load_rover
@@ -136,6 +137,21 @@ def test_estimates_of_the_controller_take_precedence_over_predictions(listener, 
         "the controller",
     )
     np.testing.assert_allclose(received[-1].forces["wheel_loads"], loads)
+
+
+def test_predictions_of_a_silent_server_are_no_longer_shown(listener, talker):
+    plans = talker.create_publisher(Path, "/traverse_server/plan", result_qos())
+    life = DiagnosticArray(status=[DiagnosticStatus(message="a wheel slips")])
+    poses = np.column_stack([np.linspace(0.0, 2.0, 3), np.zeros((3, 2))])
+    talker.predicted.publish(waypoint_array(np.full((3, 6), 7.0)))
+    plans.publish(poses_path(poses, "map"))
+    repeat_until(
+        lambda: (talker.verdict.publish(life), talker.odometry.publish(odometry())),
+        lambda: "server" in listener.latest().forces_from,
+        "predictions",
+    )
+    wait_until(lambda: not listener.latest().forces_from, "the server to count as silent")
+    assert not listener.latest().forces and listener.latest().plan is not None
 
 
 def test_invalid_messages_are_skipped_and_values_without_a_topic_are_nan(ros, listener, talker):
