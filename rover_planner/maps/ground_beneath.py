@@ -23,6 +23,8 @@ CONTACT_LENGTH = 0.25
 """Distance along a wheel's plane from its contact up to which the ground is measured [radii]."""
 EDGE_CELLS = 1.5
 """Width beyond the wheels' outline that interpolation between cells needs [cells]."""
+SAME_PLACE = 2e-3
+"""Change of each part of pose and suspension up to which a rover stands as before [m, rad]."""
 
 Floats = NDArray[np.float64]
 
@@ -45,6 +47,14 @@ class Standing:
     """[rad]"""
     suspension: Mapping[str, float]
     """Angles [rad] of all SUSPENSION_JOINTS by name."""
+
+    def is_like(self, other: "Standing") -> bool:
+        """Return whether the rover has hardly moved: by less than SAME_PLACE in m and rad."""
+        mine, others = (
+            (one.x, one.y, one.z, one.roll, one.pitch, one.yaw, *one.suspension.values())
+            for one in (self, other)
+        )
+        return all(abs(a - b) < SAME_PLACE for a, b in zip(mine, others, strict=True))
 
 
 @dataclass(frozen=True, eq=False)

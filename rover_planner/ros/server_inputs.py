@@ -18,6 +18,7 @@ from msg_adapters.paths import path_to_poses
 from msg_adapters.sensing import BASE_FRAME
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_planner.maps.ground_beneath import Standing
 from rover_planner.maps.known_map import stamp_text
 from rover_planner.maps.living_map import MapSnapshot
 from rover_planner.maps.map_keeper import MapKeeper
@@ -66,6 +67,7 @@ class ServerInputs:
         """Names of the joints in messages."""
         self._mounting = ImuMounting(parameters.imu_frame or BASE_FRAME, parameters.imu_mounting)
         self._clock, self._looked = clock, -float("inf")
+        self._filled: tuple[Standing, Terrain | None] | None = None
         if parameters.terrain_file:
             terrain = load_terrain(parameters.terrain_file, parameters.max_map_cells)
             self.keep(self.keeper.load(terrain, self.seconds, None), parameters.terrain_file)
@@ -151,12 +153,20 @@ class ServerInputs:
         return self.service.take_terrain(snapshot.terrain, source, stamp, snapshot.sources, frame)
 
     def may_fill_under_rover(self) -> bool:
-        """Return whether unknown ground under the rover is to be filled, once each LOOK_PERIOD."""
+        """Return whether unknown ground under the rover is to be filled.
+
+        It is once each LOOK_PERIOD, if the rover has moved since or has another map.
+        """
         now = self._clock()
-        is_due = self.values.fill_under_rover and now - self._looked >= LOOK_PERIOD
-        if not is_due or self.service.standing() is None:
+        if not self.values.fill_under_rover or now - self._looked < LOOK_PERIOD:
             return False
-        self._looked = now
+        standing, terrain = self.service.standing(), self.service.terrain
+        if standing is None:
+            return False
+        self._looked, last = now, self._filled
+        if last is not None and terrain is last[1] and standing.is_like(last[0]):
+            return False
+        self._filled = standing, terrain
         return True
 
     def fill_under_rover(self) -> MapSnapshot | None:

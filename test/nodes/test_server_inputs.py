@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages of other frames, origins and sensors reach the service as what they are of the body."""
 
+import time
+
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
@@ -15,7 +17,7 @@ from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.navigation.sensor_mounts import sensor_poses
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.frames import Frames
-from rover_planner.ros.server_inputs import ServerInputs
+from rover_planner.ros.server_inputs import LOOK_PERIOD, ServerInputs
 from support.grounds import make_terrain, waves
 from support.messages.grid_maps import grid_map_of, move_buffer
 from support.messages.transforms import transform_message
@@ -23,13 +25,13 @@ from support.messages.transforms import transform_message
 PRIOR = make_terrain(waves)
 
 
-def inputs_with(*edges, **parameters) -> ServerInputs:
+def inputs_with(*edges, clock=time.monotonic, **parameters) -> ServerInputs:
     """Return the inputs of a server that knows transforms (parent, child, where)."""
     values = TraverseServerParameters(**parameters)
     frames = Frames(values, lambda: 0, sensor_poses(values))
     for edge in edges:
         frames.take_transform(transform_message(*edge, Time()), is_static=True)
-    return ServerInputs(values, frames)
+    return ServerInputs(values, frames, clock)
 
 
 def odometry_at(pose, height=0.0) -> Odometry:
@@ -79,3 +81,19 @@ def test_roll_and_pitch_of_the_standing_rover_are_those_of_the_imu():
     inputs.take_imu(Imu(orientation=Quaternion(x=x, y=y, z=z, w=w)))
     now = inputs.service.standing()
     assert (now.roll, now.pitch, now.yaw) == pytest.approx((0.1, -0.2, 0.3))
+
+
+def test_ground_under_a_rover_is_filled_once_where_it_stands_and_again_where_it_crept_to():
+    now = [0.0]
+    inputs = inputs_with(clock=lambda: now[0])
+    inputs.keep(inputs.keeper.load(PRIOR, 0.0, None), "prior")
+
+    def may_fill(x: float) -> bool:
+        now[0] += LOOK_PERIOD
+        inputs.take_joints(JointState(name=list(SUSPENSION_JOINTS), position=[0.0] * 4))
+        inputs.take_odometry(odometry_at((x, 0.0, 0.0)))
+        return inputs.may_fill_under_rover()
+
+    assert [may_fill(x) for x in (0.0, 0.0, 0.001, 0.0015, 0.003)] == [True, *3 * [False], True]
+    inputs.keep(inputs.keeper.load(make_terrain(waves, half=3.0), 0.0, None), "another")
+    assert may_fill(0.003) and not may_fill(0.003)
