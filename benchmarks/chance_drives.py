@@ -6,7 +6,7 @@ It needs the extra `bench`. The file gets a line of JSON for each path; lines th
 """
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -17,13 +17,13 @@ from benchmarks.drives import LOOK_AHEAD, MAX_TILT
 from rover_physics.rover.steered_drive import SteeredDrive
 from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.simulator.path_follower import PathFollower
-from support.chance_paths import ChancePath, draw_path, draw_truths
+from support.chance_paths import FAST, ChancePath, draw_path, draw_truths
 from support.reference_drives import KEPT
 
 PERIOD = 0.04
 """Period of the steering [s]."""
-STUCK_TIME, STUCK_WAY = 8.0, 0.03
-"""A rover that goes less than that way [m] within that time [s] is stuck."""
+STUCK_WAY, ASKED_WAY = 0.03, 0.8
+"""A rover that goes less than the first way [m] while it is asked to go the second is stuck."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def passes(path: ChancePath, truth: Truth) -> bool:
     follower = PathFollower(np.vstack([poses, beyond]), LOOK_AHEAD)
     length = float(np.hypot(*np.diff(poses[:, :2], axis=0).T).sum())
     steered, way = SteeredDrive(rover), [0.0]
-    within, is_lost = round(STUCK_TIME / PERIOD), False
+    within, is_lost = round(ASKED_WAY / path.speed / PERIOD), False
     while follower.driven < length and not is_lost:
         here = plant.pose[[0, 1, 3]]
         aims = steered.aim(*follower.steer(here, rover.nominal_speed))
@@ -71,6 +71,7 @@ def main(
     draws: Annotated[int, typer.Option(help="Draws of friction and torque limit per path.")] = 20,
     first: Annotated[int, typer.Option(help="Number of the first path.")] = 0,
     step: Annotated[int, typer.Option(help="Every which path.")] = 1,
+    speed: Annotated[float, typer.Option(help="Nominal speed [m/s].")] = FAST,
 ) -> None:
     """Drive the paths that the file does not have."""
     lines = file.read_text().splitlines() if file.exists() else []
@@ -78,7 +79,7 @@ def main(
     for number in range(first, paths, step):
         if (seed, number) in known:
             continue
-        path = draw_path(seed, number)
+        path = replace(draw_path(seed, number), speed=speed)
         truths = [Truth(*truth) for truth in draw_truths(seed, number, path, draws)]
         passed = "".join("01"[passes(path, truth)] for truth in truths)
         row = asdict(path) | {"stream": seed, "number": number, "passed": passed}

@@ -16,8 +16,8 @@ HELD_OUT = 2
 """Stream of the paths that calibrate nothing."""
 TOLD = "friction drawn within 10 % and torque limit within 5 % of what is told"
 
-SPEED = 0.1
-"""Speed of the drives [m/s]: the largest of its wheels, to keep the run time short."""
+FAST = 0.1
+"""Speed of most drives [m/s]: the largest of the wheels, to keep the run time short."""
 START, LENGTH = -0.8, 1.7
 """x of the start, where y and yaw are 0, and length [m]."""
 SPACING = 0.01
@@ -59,6 +59,8 @@ class ChancePath:
     """Friction coefficient that the planner is told."""
     max_torque: float
     """Torque limit that the planner is told [N m]."""
+    speed: float = FAST
+    """Nominal speed of the drives [m/s]."""
 
     @property
     def ground(self) -> Terrain:
@@ -75,8 +77,8 @@ class ChancePath:
         return np.column_stack([START + ahead, aside, turn])
 
     def rover(self, max_torque: float) -> Rover:
-        """Return the rover lsr1 at SPEED with a torque limit [N m], and MuJoCo's limits only."""
-        rover = replace(unlimited(load_rover("lsr1")), nominal_speed=SPEED)
+        """Return the rover lsr1 with a torque limit [N m], and MuJoCo's limits only."""
+        rover = replace(unlimited(load_rover("lsr1")), nominal_speed=self.speed)
         return replace(rover, wheel=replace(rover.wheel, max_torque=max_torque))
 
 
@@ -119,7 +121,11 @@ def read_driven_paths(file: Path = CHANCES) -> list[DrivenPath]:
     rows = map(json.loads, file.read_text().splitlines())
     names = [field.name for field in fields(ChancePath)]
     return [
-        DrivenPath(ChancePath(**{name: row[name] for name in names}), row["stream"], row["passed"])
+        DrivenPath(
+            ChancePath(**{name: row[name] for name in names if name in row}),
+            row["stream"],
+            row["passed"],
+        )
         for row in rows
     ]
 
