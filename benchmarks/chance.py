@@ -143,7 +143,7 @@ def draw_picture(file: Path, found: Compared) -> None:
     axes.plot([0, 1], [0, 1], "k:", lw=1)
     shift = 0.012 * np.random.default_rng(0).standard_normal((2, len(found.chance)))
     axes.plot(found.chance + shift[0], found.failed + shift[1], "o", ms=4, alpha=0.35,
-              label="a path, 20 drives")  # fmt: skip
+              label=f"a path, {found.drives.max()} drives")  # fmt: skip
     for low, high in itertools.pairwise(EDGES):
         part = found.select((found.chance >= low) & ((found.chance < high) | (high == 1.0)))
         if len(part.chance):
