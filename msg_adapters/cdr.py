@@ -4,8 +4,6 @@
 import struct
 from typing import Any
 
-from msg_adapters.stamps import NANOSECONDS
-
 
 class Fields:
     """Reads the fields of a serialised message (CDR) one after the other.
@@ -27,10 +25,16 @@ class Fields:
         self.at += struct.calcsize(form)
         return found
 
-    def stamp(self) -> int:
-        """Return a stamp [ns]."""
-        seconds, rest = self.numbers("iI")
-        return int(seconds * NANOSECONDS + rest)
+    def skip(self, known: bytes) -> bool:
+        """Go on behind bytes that are known, if they come next; return whether they do."""
+        if not known or not self._message.startswith(known, self.at):
+            return False
+        self.at += len(known)
+        return True
+
+    def since(self, begin: int) -> bytes:
+        """Return the bytes that were read since a place."""
+        return self._message[begin : self.at]
 
     def count(self) -> int:
         """Return the number of elements of a sequence."""

@@ -69,7 +69,7 @@ def find_cloud_data(message: bytes) -> slice:
     """
     fields = Fields(message)
     try:
-        fields.stamp(), fields.text(), fields.numbers("II")  # height and width
+        fields.numbers("iI"), fields.text(), fields.numbers("II")  # stamp, frame, height and width
         for _ in range(min(fields.count(), MAX_FIELDS)):
             fields.text(), fields.numbers("I"), fields.numbers("B"), fields.numbers("I")
         fields.numbers("B"), fields.numbers("II")  # is_bigendian, point_step and row_step

@@ -49,7 +49,7 @@ def read_orientation(turn: Any, what: str) -> tuple[float, float, float]:
     return rpy_from_xyzw(xyzw, squared_norm=check_norm(xyzw, what) ** 2)
 
 
-def check_norm(xyzw: tuple[float, ...], what: str) -> float:
+def check_norm(xyzw: tuple[float, float, float, float], what: str) -> float:
     """Return the norm of a quaternion, which is about 1.
 
     Raises:

@@ -2,19 +2,15 @@
 """Reads IMU messages: the attitude and angular velocity of the body."""
 
 import math
-import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from sensor_msgs.msg import Imu
 
-from msg_adapters.cdr import Fields
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_norm
-from msg_adapters.stamps import stamp_to_ns
 from rover_physics.numerics.quaternions import matrix_from_xyzw, rpy_from_xyzw, xyzw_from_rpy
 
 NOT_MEASURED = -1.0
@@ -75,49 +71,11 @@ class ImuMounting:
         return self._matrix @ rates if self._is_turned else rates
 
 
-class ImuReading(NamedTuple):
-    """What is read of an IMU message."""
-
-    stamp: int
-    """Header stamp [ns]."""
-    frame: str
-    """Frame of the header."""
-    xyzw: tuple[float, ...]
-    """Orientation, a quaternion."""
-    rates: tuple[float, ...]
-    """(3,) angular velocity [rad/s]."""
-    variances: tuple[float, float]
-    """First elements of the covariances of both."""
-
-
-def read_imu(message: bytes) -> ImuReading:
-    """Return what a serialised Imu says.
-
-    Raises:
-        MessageError: It is none.
-    """
-    fields = Fields(message)
-    try:
-        stamp, frame, values = fields.stamp(), fields.text(), fields.numbers("17d")
-    except struct.error:
-        raise MessageError(f"{len(message)} bytes were received that are no Imu") from None
-    return ImuReading(stamp, frame, values[:4], values[13:16], (values[4], values[16]))
-
-
 def imu_to_attitude(imu: Imu, mounting: ImuMounting | None = None) -> Attitude:
-    """Read attitude and angular velocity of a message; see `find_attitude`."""
-    q, rate, header = imu.orientation, imu.angular_velocity, imu.header
-    variances = imu.orientation_covariance[0], imu.angular_velocity_covariance[0]
-    turn, rates = (q.x, q.y, q.z, q.w), (rate.x, rate.y, rate.z)
-    stamp = stamp_to_ns(header.stamp) or 0
-    return find_attitude(ImuReading(stamp, header.frame_id, turn, rates, variances), mounting)
-
-
-def find_attitude(imu: ImuReading, mounting: ImuMounting | None = None) -> Attitude:
-    """Return attitude and angular velocity; the yaw of the orientation is ignored.
+    """Read attitude and angular velocity; the yaw of the orientation is ignored.
 
     Args:
-        imu: What was read of a message.
+        imu: The message.
         mounting: Frame and mounting of the IMU; None takes every frame as that of the body.
 
     Raises:
@@ -125,19 +83,22 @@ def find_attitude(imu: ImuReading, mounting: ImuMounting | None = None) -> Attit
             finite.
     """
     if mounting is not None:
-        mounting.check_frame(imu.frame)
-    if imu.variances[0] == NOT_MEASURED:
+        mounting.check_frame(imu.header.frame_id)
+    if imu.orientation_covariance[0] == NOT_MEASURED:
         raise MessageError(
             "imu has no orientation (orientation_covariance[0] is -1); roll and pitch are needed"
         )
-    norm = check_norm(imu.xyzw, "imu")
-    body = imu.xyzw if mounting is None else mounting.turn_orientation(imu.xyzw)
+    q = imu.orientation
+    xyzw = (q.x, q.y, q.z, q.w)
+    norm = check_norm(xyzw, "imu")
+    body = xyzw if mounting is None else mounting.turn_orientation(xyzw)
     roll, pitch, _ = rpy_from_xyzw(body, squared_norm=norm**2)
-    if imu.variances[1] == NOT_MEASURED:
+    if imu.angular_velocity_covariance[0] == NOT_MEASURED:
         return Attitude(roll, pitch, None)
-    if not math.isfinite(sum(imu.rates)):
+    rate = imu.angular_velocity
+    if not math.isfinite(rate.x + rate.y + rate.z):
         raise MessageError(
-            f"imu has angular velocity {list(imu.rates)}; it must be finite, in rad/s"
+            f"imu has angular velocity {[rate.x, rate.y, rate.z]}; it must be finite, in rad/s"
         )
-    rates = np.array(imu.rates)
+    rates = np.array([rate.x, rate.y, rate.z])
     return Attitude(roll, pitch, rates if mounting is None else mounting.turn_rates(rates))

@@ -2,16 +2,13 @@
 """Reads joint states by name, with the robot's names, signs and offsets of the model's joints."""
 
 import math
-import struct
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from sensor_msgs.msg import JointState
 
-from msg_adapters.cdr import Fields
 from msg_adapters.errors import MessageError
 from rover_physics.names import STEERING_JOINTS
 from rover_physics.rover.steering_joints import LEFT, RIGHT
@@ -21,53 +18,8 @@ FORM = "model_joint:robot_joint, model_joint:robot_joint:-1 or model_joint:robot
 """Form of an entry, for error texts."""
 
 
-class JointReading(NamedTuple):
-    """What is read of joint states; the fields are those of sensor_msgs/JointState."""
-
-    stamp: int
-    """Header stamp [ns]."""
-    name: tuple[str, ...]
-    position: tuple[float, ...]
-    velocity: tuple[float, ...]
-
-
-class JointReader:
-    """Reads serialised joint states.
-
-    Frame and names are read once: those of a publisher are the same in each of its messages.
-    """
-
-    def __init__(self) -> None:
-        self._head = b""
-        self._name: tuple[str, ...] = ()
-
-    def read(self, message: bytes) -> JointReading:
-        """Return what a serialised JointState says.
-
-        Raises:
-            MessageError: It is none.
-        """
-        fields = Fields(message)
-        try:
-            stamp, begin = fields.stamp(), fields.at
-            if self._head and message.startswith(self._head, begin):
-                fields.at += len(self._head)
-            else:
-                fields.text()
-                self._name = tuple(fields.text() for _ in range(fields.count()))
-                self._head = message[begin : fields.at]
-            return JointReading(stamp, self._name, fields.doubles(), fields.doubles())
-        except struct.error:
-            raise MessageError(
-                f"{len(message)} bytes were received that are no JointState"
-            ) from None
-
-
-AnyJointState: TypeAlias = JointState | JointReading
-
-
 def _read_by_name(
-    state: AnyJointState, values: Sequence[float], field: str, right: str, wanted: Collection[str]
+    state: JointState, values: Sequence[float], field: str, right: str, wanted: Collection[str]
 ) -> dict[str, float]:
     if not values:
         return {}
@@ -141,7 +93,7 @@ class JointNames:
         """Return the names in messages of joints of the model."""
         return tuple(self.link(name).robot for name in names)
 
-    def positions(self, state: AnyJointState, wanted: Collection[str]) -> dict[str, float]:
+    def positions(self, state: JointState, wanted: Collection[str]) -> dict[str, float]:
         """Return the angles [rad] of wanted joints of the model in a message, by name.
 
         Other joints are ignored. The result is empty if the message has no positions, for example
@@ -161,7 +113,7 @@ class JointNames:
             if link.robot in found
         }
 
-    def velocities(self, state: AnyJointState, wanted: Collection[str]) -> dict[str, float]:
+    def velocities(self, state: JointState, wanted: Collection[str]) -> dict[str, float]:
         """Return the rates [rad/s] of wanted joints of the model; as `positions`."""
         found = _read_by_name(
             state, state.velocity, "velocity", "rate in rad/s", self.robot_names(wanted)

@@ -44,7 +44,7 @@ def count_poses(message: bytes) -> int:
     """
     fields = Fields(message)
     try:
-        fields.stamp(), fields.text()
+        fields.numbers("iI"), fields.text()  # stamp and frame
         return fields.count()
     except struct.error:
         raise MessageError(f"{len(message)} bytes were received that are no Path") from None

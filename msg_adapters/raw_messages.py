@@ -29,25 +29,52 @@ class _Quaternion(NamedTuple):
     w: float
 
 
-def read_sensor(message: bytes, kind: type) -> Any:
-    """Return what adapters read of an Imu, JointState or Odometry.
+class SensorReader:
+    """Reads messages of sensors.
 
-    Raises:
-        MessageError: The bytes are no such message.
+    Frame and names of joints are read once: those of a publisher are the same in each message.
     """
-    try:
-        return _READERS[kind](Fields(message))
-    except struct.error as error:
-        raise MessageError(
-            f"{len(message)} bytes were received that are no {kind.__name__}; the publisher or "
-            f"the connection is damaged: {error}"
-        ) from None
+
+    def __init__(self) -> None:
+        self._readers = {Imu: _read_imu, JointState: self._read_joints, Odometry: _read_odometry}
+        self._head, self._frame = b"", ""
+        self._names: tuple[str, ...] = ()
+
+    def read(self, message: bytes, kind: type) -> Any:
+        """Return what adapters read of an Imu, JointState or Odometry.
+
+        Raises:
+            MessageError: The bytes are no such message.
+        """
+        try:
+            return self._readers[kind](Fields(message))
+        except struct.error as error:
+            raise MessageError(
+                f"{len(message)} bytes were received that are no {kind.__name__}; the publisher "
+                f"or the connection is damaged: {error}"
+            ) from None
+
+    def _read_joints(self, fields: Fields) -> SimpleNamespace:
+        stamp = _read_stamp(fields)
+        if not fields.skip(self._head):
+            begin = fields.at
+            self._frame = fields.text()
+            self._names = tuple(fields.text() for _ in range(fields.count()))
+            self._head = fields.since(begin)
+        position, velocity, effort = (fields.doubles() for _ in range(3))
+        return SimpleNamespace(
+            header=SimpleNamespace(stamp=stamp, frame_id=self._frame), name=self._names,
+            position=position, velocity=velocity, effort=effort,
+        )  # fmt: skip
+
+
+def _read_stamp(fields: Fields) -> SimpleNamespace:
+    seconds, nanoseconds = fields.numbers("iI")
+    return SimpleNamespace(sec=seconds, nanosec=nanoseconds)
 
 
 def _read_header(fields: Fields) -> SimpleNamespace:
-    seconds, nanoseconds = fields.numbers("iI")
-    stamp = SimpleNamespace(sec=seconds, nanosec=nanoseconds)
-    return SimpleNamespace(stamp=stamp, frame_id=fields.text())
+    return SimpleNamespace(stamp=_read_stamp(fields), frame_id=fields.text())
 
 
 def _read_imu(fields: Fields) -> SimpleNamespace:
@@ -61,20 +88,8 @@ def _read_imu(fields: Fields) -> SimpleNamespace:
     )
 
 
-def _read_joints(fields: Fields) -> SimpleNamespace:
-    header = _read_header(fields)
-    names = [fields.text() for _ in range(fields.count())]
-    position, velocity, effort = (fields.doubles() for _ in range(3))
-    return SimpleNamespace(
-        header=header, name=names, position=position, velocity=velocity, effort=effort
-    )
-
-
 def _read_odometry(fields: Fields) -> SimpleNamespace:
     header, child, values = _read_header(fields), fields.text(), fields.numbers("43d")
     pose = SimpleNamespace(position=_Vector(*values[:3]), orientation=_Quaternion(*values[3:7]))
     pose = SimpleNamespace(pose=pose, covariance=values[7:])
     return SimpleNamespace(header=header, child_frame_id=child, pose=pose)
-
-
-_READERS = {Imu: _read_imu, JointState: _read_joints, Odometry: _read_odometry}

@@ -18,7 +18,7 @@ from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.frames import check_frame
 from msg_adapters.joints import read_joint_map
 from msg_adapters.odometry import planar_odometry
-from msg_adapters.raw_messages import read_sensor
+from msg_adapters.raw_messages import SensorReader
 from msg_adapters.stamps import NANOSECONDS, ns_to_stamp, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
@@ -74,7 +74,7 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
         self._estimates = self.create_publisher(String, ESTIMATE, latched_qos())
         self._stops = self.create_publisher(Bool, EMERGENCY_STOP, latched_qos())
         self._marks = self.create_publisher(String, MARK_PLACE, latched_qos())
-        self._wheels = WheelOdometry(self._rover)
+        self._reader, self._wheels = SensorReader(), WheelOdometry(self._rover)
         self._motion: WheelMotion | None = None  # what the wheels' odometry went on by last
         self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", sensor_qos())
         take_command = self._refusing("cmd_vel", self._take_command)
@@ -84,7 +84,7 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
             (Imu, "imu", self._take_imu),
             (Odometry, "odometry", self._take_odometry),
         ):
-            read = self._refusing(name, partial(_read_and_take, kind, take))
+            read = self._refusing(name, partial(self._read_and_take, kind, take))
             self.heard.subscribe(kind, name, read, polled_qos(), raw=True)
         self.loop = self.create_timer(POLLING, self._read_sensors)
         subscribe_to_map(self, PointCloud2, CLOUD, self._refusing(CLOUD, self._take_map))
@@ -114,6 +114,9 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
 
     def _take_command(self, twist: TwistStamped) -> None:
         self._commanded, self._command_time = twist_to_speeds(twist)[0], self.seconds
+
+    def _read_and_take(self, kind: type, take: Callable[[Any], None], message: bytes) -> None:
+        take(self._reader.read(message, kind))
 
     def _read_sensors(self) -> None:
         """Take what the sensors sent, and tell where the wheels say that the rover is."""
@@ -173,10 +176,6 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
             self._wheels.friction = learner.estimate.friction.mean
             contents = describe(learner.estimate, self._told)
             self._estimates.publish(String(data=json.dumps(contents)))
-
-
-def _read_and_take(kind: type, take: Callable[[Any], None], message: bytes) -> None:
-    take(read_sensor(message, kind))
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -18,8 +18,8 @@ from std_srvs.srv import Trigger
 
 from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash, plan_request_hash
-from msg_adapters.joints import JointReader
 from msg_adapters.paths import count_poses, stamped_pose_to_array
+from msg_adapters.raw_messages import SensorReader
 from msg_adapters.results.diagnostics import (
     HEALTH,
     MONITOR,
@@ -141,7 +141,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         super().destroy_node()
 
     def _create_subscriptions(self) -> None:
-        hear_joints = partial(self._take_joints, JointReader())
+        hear_joints = partial(self._take_joints, SensorReader())
         self.heard.subscribe(JointState, "joint_states", hear_joints, polled_qos(), raw=True)
         self.heard.subscribe(Odometry, "odometry", self._take_odometry, newest_qos())
         if self.values.imu_attitude:
@@ -187,9 +187,9 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         if not error:
             self.watch.look()
 
-    def _take_joints(self, reader: JointReader, message: bytes, _arrival: float) -> None:
+    def _take_joints(self, reader: SensorReader, message: bytes, _arrival: float) -> None:
         try:
-            self._inputs.take_joints(reader.read(message))
+            self._inputs.take_joints(reader.read(message, JointState))
         except MessageError as error:
             self.get_logger().warning(
                 f"{error}; the angles known before stay", throttle_duration_sec=5.0

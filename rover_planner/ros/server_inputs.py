@@ -6,13 +6,13 @@ from collections.abc import Callable
 from typing import Any
 
 from nav_msgs.msg import Odometry, Path
-from sensor_msgs.msg import Imu, PointCloud2
+from sensor_msgs.msg import Imu, JointState, PointCloud2
 
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
 from msg_adapters.identity import path_hash
 from msg_adapters.imu import ImuMounting, imu_to_attitude
-from msg_adapters.joints import AnyJointState, read_joint_map
+from msg_adapters.joints import read_joint_map
 from msg_adapters.odometry import odometry_to_pose, odometry_to_tilt
 from msg_adapters.paths import path_to_poses
 from msg_adapters.sensing import BASE_FRAME
@@ -78,7 +78,7 @@ class ServerInputs:
         """The present ROS time [s]."""
         return self.frames.now() / NANOSECONDS
 
-    def take_joints(self, state: AnyJointState) -> None:
+    def take_joints(self, state: JointState) -> None:
         """Take joint angles.
 
         Raises:

@@ -6,12 +6,11 @@ import math
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
-from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 
 from msg_adapters.commands import joint_order
 from msg_adapters.errors import MessageError
-from msg_adapters.joints import OWN_NAMES, JointNames, JointReader, read_joint_map
+from msg_adapters.joints import OWN_NAMES, JointNames, read_joint_map
 from msg_adapters.results.predictions import JOINTS, joint_trajectory
 from rover_physics import judge_path, load_rover
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
@@ -39,19 +38,6 @@ def test_positions_are_found_by_name_in_any_order_and_others_are_not_looked_at()
 )
 def test_a_message_without_wanted_positions_says_nothing(state):
     assert OWN_NAMES.positions(state, WANTED) == {}
-
-
-def test_serialised_joint_states_of_several_publishers_say_what_their_messages_say():
-    reader = JointReader()
-    for names in (WANTED, ("arm_shoulder",), (), WANTED, WANTED):
-        state = JointState(name=names, position=[0.5] * len(names), effort=[2.0])
-        state.header.stamp, state.header.frame_id = Time(sec=3, nanosec=4), "body"
-        state.velocity = [0.25, -1.0][: len(names)]
-        read = reader.read(serialize_message(state))
-        assert read.stamp == 3_000_000_004 and read.name == names
-        assert (list(read.position), list(read.velocity)) == ([*state.position], [*state.velocity])
-    with pytest.raises(MessageError, match="no JointState"):
-        reader.read(serialize_message(state)[:60])
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Imu, JointState
 
 from msg_adapters.errors import MessageError
-from msg_adapters.raw_messages import read_sensor
+from msg_adapters.raw_messages import SensorReader
 
 STAMP = Time(sec=7, nanosec=8)
 
@@ -66,7 +66,7 @@ def fields_of(message, like) -> object:
 )
 def test_fields_are_those_that_rclpy_reads(message, frame):
     message.header.frame_id, message.header.stamp = frame, STAMP
-    read = read_sensor(serialize_message(message), type(message))
+    read = SensorReader().read(serialize_message(message), type(message))
     assert repr(fields_of(read, read)) == repr(fields_of(message, read))
     assert (read.header.frame_id, read.header.stamp.nanosec) == (frame, 8)
 
@@ -75,4 +75,12 @@ def test_damaged_bytes_are_refused():
     whole = serialize_message(joints(["wheel"], [1.0]))
     for damaged in (b"", whole[:20], whole[:40]):
         with pytest.raises(MessageError, match="no JointState"):
-            read_sensor(damaged, JointState)
+            SensorReader().read(damaged, JointState)
+
+
+def test_the_joints_of_several_publishers_keep_their_names():
+    reader = SensorReader()
+    for names in (["a", "b"], ["c"], [], ["a", "b"], ["a", "b"]):
+        message = joints(names, [0.5] * len(names))
+        read = reader.read(serialize_message(message), JointState)
+        assert (list(read.name), list(read.position)) == (names, [0.5] * len(names))

@@ -12,9 +12,10 @@ from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Bool
 
 from msg_adapters.commands import twist_to_speeds
-from msg_adapters.imu import ImuMounting, find_attitude, read_imu
-from msg_adapters.joints import JointReader, read_joint_map
+from msg_adapters.imu import ImuMounting, imu_to_attitude
+from msg_adapters.joints import read_joint_map
 from msg_adapters.odometry import odometry_to_pose
+from msg_adapters.raw_messages import SensorReader
 from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
@@ -66,7 +67,7 @@ class TractionInputs:
         self._mounting = ImuMounting(
             parameters.imu_frame or parameters.base_frame, parameters.imu_mounting
         )
-        self._joints, self._odometry_read = JointReader(), -math.inf
+        self._reader, self._odometry_read = SensorReader(), -math.inf
         self._log = TransitionLog(node.get_logger())
         self.stamps = StampCheck(parameters.stamp_tolerance)
         """Judges the header stamps."""
@@ -144,18 +145,19 @@ class TractionInputs:
         return self.stamps.find_time(name, stamp, clock, now, merged=merged)
 
     def _take_joints(self, message: bytes, now: float) -> None:
-        state = self._joints.read(message)
+        state = self._reader.read(message, JointState)
         if not self._heard.intersection(state.name):  # an arm's message, for example
             return
-        measured = self._find_time(JOINT_STATES, state.stamp, now, merged=True)
+        stamp = _stamp_of(state)
+        measured = self._find_time(JOINT_STATES, stamp, now, merged=True)
         positions = self.joint_names.positions(state, ANGLES)
         rates = self.joint_names.velocities(state, JOINTS)
-        self._service.take_joints(positions, rates, measured, state.stamp)
+        self._service.take_joints(positions, rates, measured, stamp)
 
     def _take_imu(self, message: bytes, now: float) -> None:
-        imu = read_imu(message)
-        measured = self._find_time(IMU, imu.stamp, now)
-        attitude = find_attitude(imu, self._mounting)
+        imu = self._reader.read(message, Imu)
+        measured = self._find_time(IMU, _stamp_of(imu), now)
+        attitude = imu_to_attitude(imu, self._mounting)
         self._service.take_attitude(attitude.roll, attitude.pitch, attitude.rates, measured)
 
     def _take_command(self, twist: TwistStamped | Twist, now: float) -> None:
