@@ -48,7 +48,9 @@ def fields_of(message, like) -> object:
         return [getattr(message, name) for name in like._fields]
     if hasattr(like, "__dict__"):
         return {name: fields_of(getattr(message, name), one) for name, one in vars(like).items()}
-    return [float(value) for value in message] if isinstance(like, tuple) else message
+    if isinstance(like, tuple):
+        return [one if isinstance(one, str) else float(one) for one in message]
+    return message
 
 
 @pytest.mark.parametrize("frame", ["", "map", "a long name of a frame"])
