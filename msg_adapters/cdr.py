@@ -11,10 +11,10 @@ class Fields:
     Where the message ends early, struct.error is raised.
     """
 
-    def __init__(self, message: bytes, at: int = 4):
-        """Begin at a byte; the first four tell the order of bytes."""
+    def __init__(self, message: bytes):
+        """Begin behind the first four bytes, which tell the order of the others."""
         self._message, self._order = message, "<" if message[1:2] == b"\1" else ">"
-        self.at = at
+        self.at = 4
         """Where the next field begins, before its alignment."""
 
     def numbers(self, form: str) -> tuple[Any, ...]:
