@@ -164,7 +164,12 @@ def test_while_a_change_is_judged_the_verdict_and_the_paths_are_grey_and_it_can_
         page.hear({"ask": "cancel"}, None)
         wait_until(lambda: session.is_stopped, "the end of the work")
     wait_until(lambda: told(page, "verdict")["stopped"], "the button to judge again")
-    assert {row["waits"] for row in told(page, "paths")["rows"]} == {"old, was not judged again"}
+    wait_until(
+        lambda: (
+            {row["waits"] for row in told(page, "paths")["rows"]} == {"old, was not judged again"}
+        ),
+        "rows that say so",
+    )
     page.hear({"ask": "judge"}, None)
     wait_for_rest(page)
     wait_until(lambda: not told(page, "verdict")["old"], "the new verdict")
