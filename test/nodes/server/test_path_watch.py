@@ -109,9 +109,7 @@ def test_a_busy_executor_does_not_delay_the_heartbeat_and_one_that_hangs_ends_it
     assert is_held.wait(20.0)
     before = len(rover.stops)
     wait_until(lambda: len(rover.stops) > before + 3, "the heartbeat of a busy node")
-    wait_until(
-        lambda: time.monotonic() - rover.stops[-1][1] > 0.5, "silence of a node that hangs"
-    )
+    wait_until(lambda: time.monotonic() - rover.stops[-1][1] > 0.5, "silence of a node that hangs")
     go_on.set()
     wait_until(lambda: time.monotonic() - rover.stops[-1][1] < 0.2, "the heartbeat")
 
