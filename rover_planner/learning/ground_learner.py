@@ -304,9 +304,9 @@ class GroundLearner:
             self._slip_time = window.time
         good &= turning
         slips, grips = lasting & good, ~slipping
-        rows = [row for row, _ in self._recent]
-        climb = _find_change(np.array([row[[PITCH, *_ANGLES]] for row in rows]))
-        torques = np.mean([row[TORQUES] for row in rows], axis=0)
+        rows = np.array([row for row, _ in self._recent])
+        torques = rows[:, TORQUES].mean(axis=0)
+        climb = _find_change(rows[:, [PITCH, *_ANGLES]])
         stuck = self._stuck.update(window, torques, climb, self.commanded)
         if stuck and self._immobilised_time is None:
             self._immobilised_time = window.time
@@ -322,7 +322,10 @@ class GroundLearner:
             *zip(self._sides.values(), _SIDE_WHEELS, strict=True),
             *((self._classes[number], wheels) for number, wheels in on_class.items()),
         ]
-        self._learn_friction(window, slips, grips & good, grounds, elapsed)
+        squares = np.array([squares for _, squares in self._recent]).mean(axis=0)
+        spread = np.sqrt(np.maximum(squares - torques**2, 0.0))
+        fluctuation = spread / np.maximum(np.abs(torques), 1e-9)
+        self._learn_friction(window, slips, grips & good, fluctuation, grounds, elapsed)
 
     def _turns_freely(self, window: SlipWindow) -> Flags:
         """Return (6,) whether motors are slow enough to give the torque they are asked for."""
@@ -342,16 +345,19 @@ class GroundLearner:
         window: SlipWindow,
         slips: Flags,
         grips: Flags,
+        fluctuation: Floats,
         grounds: Sequence[tuple[FrictionFilter, Flags]],
         elapsed: float,
     ) -> None:
-        """Take what the wheels of a window tell about the friction of the grounds below them."""
+        """Take what the wheels of a window tell about the friction of the grounds below them.
+
+        `fluctuation` (6,) has the standard deviations of the torques over their means.
+        """
         unit = self._sense.weight / WHEEL_COUNT
         loads, tractions = window.loads, window.tractions
         tractions = tractions - self._resistance * loads * np.sign(window.rolling)
         counts = (window.clear > 0.0) & (loads > MIN_LOAD * unit) & (loads < MAX_LOAD * unit)
         along = np.abs(window.slip) / np.maximum(window.slip_speed, 1e-9)
-        fluctuation = self._find_fluctuation()
         sticking = fluctuation * (1.0 - np.abs(window.ratio))
         tells = slips & counts & (along > ALONG) & (window.slip * tractions > 0.0)
         tells &= sticking < MOST_STICKING
@@ -384,13 +390,6 @@ class GroundLearner:
         weights = min(elapsed / SAME_TIME, 1.0) * np.exp(-self._here / AT_A_PLACE)
         self._here = self._here + np.where(tells, weights, 0.0)
         return np.asarray(weights)
-
-    def _find_fluctuation(self) -> Floats:
-        """Return (6,) standard deviations of the torques over the window, over their means."""
-        squares = np.mean([squares for _, squares in self._recent], axis=0)
-        means = np.mean([row[TORQUES] for row, _ in self._recent], axis=0)
-        spread = np.sqrt(np.maximum(squares - means**2, 0.0))
-        return np.asarray(spread / np.maximum(np.abs(means), 1e-9))
 
     def _take_resistance(self, window: SlipWindow, elapsed: float) -> None:
         share = window.excess * float(np.sign(window.rolling.mean())) / self._sense.weight
