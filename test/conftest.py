@@ -2,6 +2,7 @@
 """What all tests share: a ROS that stays on this machine, a server and its client."""
 
 import contextlib
+import gc
 import os
 import signal
 from functools import partial
@@ -10,6 +11,7 @@ import pytest
 from hypothesis import settings
 
 os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+gc.disable()  # until the tests are collected: to look for garbage takes a seventh of the time
 settings.register_profile("untimed", deadline=None)  # no test fails because a machine is busy
 settings.load_profile("untimed")
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -36,6 +38,12 @@ def pytest_collection_modifyitems(items):
     last = len(LONGEST)
     rank = {name: number for number, name in enumerate(LONGEST)}
     items.sort(key=lambda item: rank.get(item.path.stem, last))
+
+
+def pytest_collection_finish():
+    """Look for garbage from now on, but not among what collecting has made."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture
