@@ -51,7 +51,7 @@ test: $(CORE) ## lint, type check and all tests
 	failed=0
 	run "tests" --numprocesses $(WORKERS) --dist loadfile --no-loadscope-reorder \
 	  -m "not timed and not long" test || failed=1
-	run "tests that bound a time by the clock or need all cores, one after another" \
+	run "tests that bound a time by the clock, one after another" \
 	  -m "timed and not long" $(TIMED_TESTS) || failed=1
 	exit $$failed
 

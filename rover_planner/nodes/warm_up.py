@@ -114,4 +114,4 @@ GROUPS = (
     (search_lattice, *TRACTION, *LEARNING),
 )
 """All kernels. The first group compiles the model of a pose once for all that use it, which takes
-four fifths of the time; the second has what needs no such model."""
+two thirds of the time; the second has what needs no such model."""

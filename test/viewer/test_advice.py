@@ -62,11 +62,11 @@ def test_advice_is_sought_when_it_is_asked_for_shown_as_a_ghost_and_taken(page):
     assert page.channel.parts["advice"]["can_ask"]
     page.hear({"ask": "advise"}, None)
 
-    def rows():
-        return [row["words"] for row in page.channel.parts["advice"]["rows"] if row["taken"]]
+    def find_path() -> str:
+        rows = [row["words"] for row in page.channel.parts["advice"]["rows"] if row["taken"]]
+        return next((words for words in rows if words.startswith("Drive ")), "")
 
-    wait_until(lambda: rows() and not page.channel.parts["advice"]["seeking"], "remedies", 60.0)
-    place = next(words for words in rows() if words.startswith("Drive "))
+    place = wait_until(find_path, "another path", 60.0)
     page.hear({"ask": "ghost", "words": place}, None)
     wait_until(lambda: page.scene.paths.lines.get("ghost"), "the ghost")
     page.hear({"ask": "remedy", "words": place}, None)

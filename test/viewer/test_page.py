@@ -25,7 +25,7 @@ from rover_planner.viewer.documents.limits import describe_uses
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.state.link import KEY
 
-pytestmark = [needs_browser, pytest.mark.timed]  # without a graphics card it needs all cores
+pytestmark = [needs_browser, pytest.mark.slow]
 
 FRICTION = "friction [-]"
 NAME = "blocked.npz"
