@@ -15,6 +15,8 @@ from rover_physics.numerics.kernel_cache import kernel_cache_note
 
 THREADS = Path("/proc/self/task")
 _PR_SET_THP_DISABLE = 41
+TRANSPORTS, PROFILES = "FASTDDS_BUILTIN_TRANSPORTS", "FASTRTPS_DEFAULT_PROFILES_FILE"
+"""Variables of the environment that say by what Fast DDS talks."""
 NO_LOG_FILE = ["--ros-args", "--disable-external-lib-logs"]
 """Arguments that keep ROS from writing a log file, without which it does not start."""
 
@@ -27,6 +29,7 @@ def init_ros(argv: Sequence[str] | None, **options: Any) -> None:
         options: Further arguments of `rclpy.init`.
     """
     avoid_huge_pages()
+    avoid_shared_memory()
     arguments = sys.argv if argv is None else list(argv)
     rclpy.init(args=[*arguments, *(NO_LOG_FILE if log_fault() else [])], **options)
 
@@ -71,6 +74,16 @@ def avoid_huge_pages() -> None:
     prctl = getattr(ctypes.CDLL(None), "prctl", None)
     if prctl is not None:
         prctl(_PR_SET_THP_DISABLE, 1, 0, 0, 0)
+
+
+def avoid_shared_memory() -> None:
+    """Have Fast DDS talk by UDP alone, unless the environment says by what.
+
+    Who publishes into shared memory waits for whoever holds the lock of its port. On a busy
+    machine a process without real-time priority keeps that for 0.1 s and more.
+    """
+    if PROFILES not in os.environ:
+        os.environ.setdefault(TRANSPORTS, "UDPv4")
 
 
 def take_priority(priority: int, threads: Sequence[int] = ()) -> str:
