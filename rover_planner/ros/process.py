@@ -14,6 +14,9 @@ import rclpy
 from rover_physics.numerics.kernel_cache import kernel_cache_note
 
 THREADS = Path("/proc/self/task")
+PRECEDENCE = -10
+"""Niceness of threads beside one with a real-time priority, which has to wait while one of them
+holds Python's lock."""
 _PR_SET_THP_DISABLE = 41
 TRANSPORTS, PROFILES = "FASTDDS_BUILTIN_TRANSPORTS", "FASTRTPS_DEFAULT_PROFILES_FILE"
 """Variables of the environment that say by what Fast DDS talks."""
@@ -91,7 +94,7 @@ def take_priority(priority: int, threads: Sequence[int] = ()) -> str:
 
     Args:
         priority: 1 to 99 as in sched(7); 0 changes nothing.
-        threads: Their ids; empty takes all threads of now.
+        threads: Their ids; the others of now get PRECEDENCE. Empty takes all threads of now.
 
     Returns:
         The reason why it was not granted, empty if it was granted.
@@ -99,8 +102,11 @@ def take_priority(priority: int, threads: Sequence[int] = ()) -> str:
     if priority == 0:
         return ""
     try:
-        for thread in threads or [int(entry.name) for entry in THREADS.iterdir()]:
-            os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
+        for thread in (int(entry.name) for entry in THREADS.iterdir()):
+            if thread in threads or not threads:
+                os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
+            else:
+                os.setpriority(os.PRIO_PROCESS, thread, PRECEDENCE)
     except (OSError, AttributeError) as error:
         return (
             f"realtime_priority {priority} is not granted ({error}); it needs CAP_SYS_NICE or an "

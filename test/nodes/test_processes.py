@@ -120,7 +120,7 @@ def test_a_wrong_parameter_ends_a_server_with_one_line(monkeypatch, capfd):
 
 PROGRAM = """
 import os, pathlib, rclpy, threading
-from rover_planner.ros.process import init_ros, take_priority
+from rover_planner.ros.process import PRECEDENCE, init_ros, take_priority
 init_ros([])
 node = rclpy.create_node("alone")
 print(*(file.read_text().strip() for file in pathlib.Path("/proc/self/task").glob("*/comm")))
@@ -132,7 +132,9 @@ def urgent_threads():
     return len(ids), [id for id in ids if os.sched_getscheduler(id) == os.SCHED_FIFO]
 
 print(take_priority(3, [one.native_id]))
-print(urgent_threads()[1] == [one.native_id])
+main = threading.get_native_id()
+goes_first = os.getpriority(os.PRIO_PROCESS, main) == PRECEDENCE
+print(urgent_threads()[1] == [one.native_id] and goes_first)
 print(take_priority(3))
 count, urgent = urgent_threads()
 print(len(urgent) == count)
