@@ -25,7 +25,7 @@ from support.chance_paths import (
     read_driven_paths,
 )
 
-MODEL_STDS = (0.0, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1, 0.15, 0.2)
+MODEL_STDS = (0.03, 0.06, 0.08, 0.1, 0.15, 0.2)
 """Model errors among which the calibration chooses."""
 EDGES = (0.0, 0.05, 0.2, 0.5, 0.8, 0.95, 1.0)
 """Edges of the ranges of chances in the reliability table."""
