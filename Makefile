@@ -19,8 +19,7 @@ WORKERS ?= $(shell echo $$(( $$(nproc) + 1 )))
 # A test that hangs fails, as does a stage that does not end: each says where.
 END_HANGS := --override-ini faulthandler_exit_on_timeout=true
 LIMIT := timeout --foreground --signal INT --kill-after 60 2700
-BROWSER_TESTS := $(shell grep -rl needs_browser test --include="test_*.py")
-TIMED_TESTS := $(filter-out $(BROWSER_TESTS),$(shell grep -rl mark.timed test --include="test_*.py"))
+TIMED_TESTS := $(shell grep -rl mark.timed test --include="test_*.py")
 # Tests, demo and nodes talk to this machine only.
 export ROS_AUTOMATIC_DISCOVERY_RANGE := LOCALHOST
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
@@ -51,11 +50,9 @@ test: $(CORE) ## lint, type check and all tests
 	}
 	failed=0
 	run "tests" --numprocesses $(WORKERS) --dist loadfile --no-loadscope-reorder \
-	  -m "not timed and not long" $(addprefix --ignore=,$(BROWSER_TESTS)) test || failed=1
+	  -m "not timed and not long" test || failed=1
 	run "tests that bound a time by the clock, one after another" \
 	  -m "timed and not long" $(TIMED_TESTS) || failed=1
-	run "tests of the page, alone: a browser without a graphics card needs all cores" \
-	  -m "not long" $(BROWSER_TESTS) || failed=1
 	exit $$failed
 
 .PHONY: test-long

@@ -55,9 +55,8 @@ def blocked(x, y):
 def blocked_session() -> ViewSession:
     """Return a session of which some paths are refused and some pass; it searches briefly."""
     search = LatticeSettings(budget=0.5)
-    return ViewSession(
-        LSR1, make_terrain(blocked), (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0), search=search
-    )
+    ends = (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
+    return ViewSession(LSR1, make_terrain(blocked), *ends, SURE, search=search)
 
 
 def shift(terrain: Terrain, by: tuple[float, float]) -> Terrain:

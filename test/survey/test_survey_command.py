@@ -40,8 +40,8 @@ from support.survey_maps import (
     survey_here,
 )
 
-SIDE = 130
-"""Cells of a side of the map; at every fourth cell it has 9 chunks of 16 cells."""
+SIDE = 70
+"""Cells of a side of the map; at every fourth cell it has 4 chunks of up to 16 cells."""
 
 
 @pytest.fixture
@@ -87,8 +87,8 @@ def test_a_cluster_finds_what_one_process_finds_and_a_second_run_does_nothing(
     assert survey(*words, "--chunk", 16, "--scheduler", scheduler) == 0
     out, err = capfd.readouterr()
     report = json.loads(out)
-    assert err == "" and report["chunks"] == report["chunks_done"] == 9
-    assert report["chunks_failed"] == [] and report["poses"] == 33 * 33 * 4
+    assert err == "" and report["chunks"] == report["chunks_done"] == 4
+    assert report["chunks_failed"] == [] and report["poses"] == 18 * 18 * 4
     assert sum(report["best_class"].values()) == pytest.approx(1.0, abs=1e-5)
     assert picture.stat().st_size > 10_000
     done = prepare_survey(request, str(map_file), tmp_path / "out")
@@ -97,7 +97,7 @@ def test_a_cluster_finds_what_one_process_finds_and_a_second_run_does_nothing(
     (tmp_path / "out" / ".lock").mkdir()  # as on a read-only disk, to which nothing is written
     assert survey(*words) == 0
     again = json.loads(capfd.readouterr().out)
-    assert again["chunks_done"] == 0 and again["chunks_found"] == 9
+    assert again["chunks_done"] == 0 and again["chunks_found"] == 4
 
 
 # What cannot go on.

@@ -25,7 +25,7 @@ from rover_planner.viewer.documents.verdict import Work, describe_verdict, list_
 from rover_planner.viewer.documents.verdict import name_ground as name_by_size
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, wall_at, waves
-from support.viewer.sessions import LSR1, Judge, blocked_session, ramp, session_on, straight
+from support.viewer.sessions import LSR1, SURE, Judge, blocked_session, ramp, session_on, straight
 
 # What a person looks at, and what it is compared with.
 
@@ -160,7 +160,7 @@ def test_a_path_is_judged_under_all_policies_and_one_that_cannot_judge_says_so()
     assert all(one.reason and not one.is_old for one in by_policy)
     ground = make_terrain(ramp)
     ground = replace(ground, elevation_std=np.full(ground.elevation.shape, 1e-3))
-    session = ViewSession(LSR1, ground, (-2.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    session = ViewSession(LSR1, ground, (-2.0, 0.0, 0.0), (1.0, 0.0, 0.0), SURE)
     session.judge_again()
     judged = {one.policy: one for one in session.shown.by_policy}
     assert judged["servo"].traversable is None and "no bounds" in judged["servo"].reason
@@ -170,7 +170,7 @@ def recorded(folder, poses):
     terrain = make_terrain(wall_at(0.5))
     prediction, verdict = judge_path(LSR1, terrain, poses)
     write_prediction(folder / "out.npz", prediction, verdict)
-    session = ViewSession(LSR1, terrain, (-2.0, 0.0, 0.0), (-1.5, 0.0, 0.0))
+    session = ViewSession(LSR1, terrain, (-2.0, 0.0, 0.0), (-1.5, 0.0, 0.0), SURE)
     session.replay(*read_prediction(folder / "out.npz"))
     return session, prediction, verdict
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All kernels of answers and of the simulator are among those that are compiled beforehand."""
+"""All kernels of answers, simulator and learner are among those that are compiled beforehand."""
 
 import subprocess
 import sys
@@ -12,6 +12,7 @@ import numpy as np
 
 from rover_physics.numerics.kernels import Kernel
 from rover_physics.rover.rover_file import load_rover
+from rover_planner.learning.ground_learner import GroundLearner
 from rover_planner.nodes.warm_up import GROUPS
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.traverse_server import TraverseServerParameters
@@ -19,6 +20,7 @@ from rover_planner.planning.answering.service_settings import load_service_setti
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.simulator.simulation import Simulation, SimulationSettings
 from support.grounds import make_terrain, wall_at, waves
+from support.learning_drives import climb
 
 def compiled():
     # A kernel that an earlier program left on disk is a new one on a fresh disk: both count.
@@ -57,12 +59,16 @@ for _ in range(3):
     simulation.advance(0.0, 0.02)
     simulation.plant.pull(np.full(6, 0.3), (0.03, 0.0), 0.02)
     simulation.plant.brake(0.02)
+learner = GroundLearner(load_rover("lsr1"), grounds[0], soil="dry_sand")
+for row in climb(load_rover("lsr1"), 0.1, 4.0):
+    learner.take(row)
+assert learner.estimate.soil and learner.layers
 after = compiled()
 print({name: count for name, count in after.items() if count > before.get(name, 0)})
 """
 
 
-def test_no_question_and_no_step_of_the_simulator_compiles_a_kernel():
+def test_no_question_and_no_step_of_simulator_or_learner_compiles_a_kernel():
     done = subprocess.run([sys.executable, "-c", PROGRAM], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip() == "{}"
