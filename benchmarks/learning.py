@@ -47,6 +47,7 @@ from rover_planner.learning.drive_log import (
     X,
     Y,
 )
+from rover_planner.learning.friction_filter import FrictionEstimate
 from rover_planner.learning.ground_learner import GroundEstimate, GroundLearner
 from rover_planner.learning.wheel_odometry import WheelMotion, WheelOdometry
 from rover_planner.simulator.mujoco_rover import MujocoRover
@@ -113,6 +114,12 @@ class LearningDrive:
         y = np.linspace(ground.bounds[2], ground.bounds[3], ground.elevation.shape[0])
         first = y[:, None] + 0.0 * x < 0.0 if self.layout == SIDES else x + 0.0 * y[:, None] < 0.0
         return replace(ground, friction=np.where(first, *self.frictions))
+
+    def find_friction(self, places: np.ndarray) -> np.ndarray:
+        """Return the friction (n,) at places (n, 2)."""
+        if self.layout == CONSTANT:
+            return np.full(len(places), self.frictions[0])
+        return np.where(places[:, 1 if self.layout == SIDES else 0] < 0.0, *self.frictions)
 
     def add_noise(self, rows: np.ndarray) -> np.ndarray:
         """Return the rows that are kept, with noise."""
@@ -233,8 +240,8 @@ class Learned:
     """The drive."""
     estimate: GroundEstimate
     """The estimate at its end."""
-    truth: float
-    """Friction under most wheels at its end; for a change per side the mean."""
+    under: np.ndarray
+    """(6,) friction under the wheels at its end."""
     early: tuple[float, bool] | None
     """Error of the mean, relative, when slip first bounds it; whether the interval has the truth.
     For constant friction only."""
@@ -247,7 +254,7 @@ class Learned:
 
 
 def learn(drive: LearningDrive, keep: Path | None = None) -> Learned | None:
-    """Drive and learn; None where the rover could not stand at the start."""
+    """Drive and learn; None where the rover could not stand at the start, or left the map."""
     recorded = record(drive, keep)
     if len(recorded.rows) < 50:
         return None
@@ -262,14 +269,15 @@ def learn(drive: LearningDrive, keep: Path | None = None) -> Learned | None:
             if estimate.slip_time is not None and estimate.friction.high is not None:
                 early = estimate.friction
     cost = (time.process_time() - began) / (rows[-1, TIME] - rows[0, TIME])
-    low, high = drive.frictions
-    ends = {CONSTANT: low, SIDES: 0.5 * (low + high), LINE: high if rows[-1, X] > 0.4 else low}
-    truth = ends[drive.layout]
     first = None
     if early is not None and drive.layout == CONSTANT:
-        first = early.mean / low - 1.0, early.low <= low <= (early.high or np.inf)
+        mu = drive.frictions[0]
+        first = early.mean / mu - 1.0, early.low <= mu <= (early.high or np.inf)
+    if learner.window is None:
+        return None
+    under = drive.find_friction(learner.window.places)
     return Learned(
-        drive, learner.estimate, truth, first, find_stuck(recorded), recorded.passed, cost
+        drive, learner.estimate, under, first, find_stuck(recorded), recorded.passed, cost
     )
 
 
@@ -372,13 +380,14 @@ def main(
     rows = []
     for one in learned:
         friction, sides = one.estimate.friction, one.estimate.sides
+        truth = float(np.median(one.under))
         times = one.estimate.slip_time, one.stuck_time, one.estimate.immobilised_time
         high = "-" if friction.high is None else f"{friction.high:.2f}"
         rows.append(
             (
                 one.drive.label,
                 f"{friction.mean:.2f} [{friction.low:.2f}, {high}]",
-                "" if friction.high is None else f"{friction.mean / one.truth - 1.0:+.0%}",
+                "" if friction.high is None else f"{friction.mean / truth - 1.0:+.0%}",
                 "" if is_within(one) else "outside",
                 "" if one.early is None else f"{one.early[0]:+.0%}",
                 " ".join(f"{s.mean:.2f}" for s in sides.values()),
@@ -394,13 +403,17 @@ def main(
     print_odometry([job[0] for job in jobs], keep)
 
 
-def is_within(one: Learned) -> bool:
-    """Return whether the interval has the truth; per side, each side's has its own."""
+def compare(one: Learned) -> list[tuple[FrictionEstimate, float]]:
+    """Return estimates with the friction under most wheels; per side, each with its own."""
     if one.drive.layout == SIDES:
-        pairs = zip(one.estimate.sides.values(), one.drive.frictions, strict=True)
-    else:
-        pairs = iter([(one.estimate.friction, one.truth)])
-    return all(e.low <= mu and (e.high is None or mu <= e.high) for e, mu in pairs)
+        truths = np.median(one.under.reshape(2, -1), axis=1).tolist()
+        return list(zip(one.estimate.sides.values(), truths, strict=True))
+    return [(one.estimate.friction, float(np.median(one.under)))]
+
+
+def is_within(one: Learned) -> bool:
+    """Return whether the intervals have the truth."""
+    return all(e.low <= mu and (e.high is None or mu <= e.high) for e, mu in compare(one))
 
 
 def print_summary(learned: list[Learned]) -> None:
@@ -408,16 +421,8 @@ def print_summary(learned: list[Learned]) -> None:
     rows = []
     for layout in (CONSTANT, SIDES, LINE):
         own = [one for one in learned if one.drive.layout == layout]
-        bounded = [one for one in own if one.estimate.friction.high is not None]
-        if layout == SIDES:
-            errors = [
-                abs(e.mean / mu - 1.0)
-                for one in own
-                for e, mu in zip(one.estimate.sides.values(), one.drive.frictions, strict=True)
-                if e.high is not None
-            ]
-        else:
-            errors = [abs(one.estimate.friction.mean / one.truth - 1.0) for one in bounded]
+        pairs = [pair for one in own for pair in compare(one)]
+        errors = [abs(e.mean / mu - 1.0) for e, mu in pairs if e.high is not None]
         rows.append(
             (
                 layout,

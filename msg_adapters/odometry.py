@@ -46,7 +46,7 @@ def odometry_to_pose(
     _, _, yaw = read_orientation(odometry.pose.pose.orientation, "odometry")
     pose = np.array([place.x, place.y, place.z, yaw])
     variances = [float(odometry.pose.covariance[index]) for index in (0, 7)]
-    possible = (abs(pose[:3]) <= MAX_COORDINATE).all()
+    possible = all(abs(one) <= MAX_COORDINATE for one in (place.x, place.y, place.z))
     if not possible or not all(variance <= MAX_DEVIATION**2 for variance in variances):
         raise MessageError(
             f"odometry has pose {pose.tolist()} and variances {variances}; coordinates must be "

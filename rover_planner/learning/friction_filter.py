@@ -65,13 +65,15 @@ class FrictionFilter:
         self._prior = prior / prior.sum()
         self._chances = self._prior.copy()
         self._bound = 0.0
-        self.slips = 0.0
-        """Number of independent slips that count, of this ground."""
+        self._slips = np.zeros_like(GRID)
+        """Number of independent slips since the ground changed, given each coefficient."""
 
     def drive(self, distance: float) -> None:
         """Take that the rover has driven a distance [m]: the ground may have changed."""
         kept = float(np.exp(-CHANGE * distance))
-        self._chances = kept * self._chances + (1.0 - kept) * self._prior
+        same = kept * self._chances
+        self._chances = same + (1.0 - kept) * self._prior
+        self._slips *= same / np.maximum(self._chances, 1e-300)
         self._bound *= float(np.exp(-distance / MEMORY))
 
     def slip(self, use: float, noise: float, weight: float) -> None:
@@ -89,7 +91,7 @@ class FrictionFilter:
         )
         mixed = (1.0 - OUTLIERS - WORTHLESS) * usual + OUTLIERS * rough + WORTHLESS
         self._update(mixed**weight)
-        self.slips = min(self.slips + weight, 1e3)
+        self._slips += weight
 
     def grip(self, use: float) -> None:
         """Take the shear over the load of a wheel that grips, which the friction exceeds."""
@@ -104,7 +106,7 @@ class FrictionFilter:
     @property
     def estimate(self) -> FrictionEstimate:
         """Mean, standard deviation and interval."""
-        is_bounded = self.slips >= ENOUGH
+        is_bounded = self._chances[self._slips >= ENOUGH].sum() > 0.5
         chances = self._chances / self._prior if is_bounded else self._chances
         chances = chances / chances.sum()
         mean = float(chances @ GRID)

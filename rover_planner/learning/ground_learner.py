@@ -64,12 +64,16 @@ MAX_UNSTEADY = 0.1
 """Acceleration of the treads, over gravity, from which a window does not count."""
 SAME_PLACE = 0.5
 """Way of a wheel, over its radius, within which its measurements are not independent."""
-AT_A_PLACE = 1.5
+AT_A_PLACE = 1.0
 """Number of independent measurements that a wheel makes at one place."""
-SHARE_NOISE = 0.22
-"""Relative noise of one wheel's shear over its load; loads of several wheels are known better."""
-EXCESS_NOISE = 1.5
-"""Relative noise of a use of friction per contradiction of the balance over the weight."""
+SAME_TIME = 0.2
+"""Time within which its measurements are not independent, either [s]."""
+LEAST_NOISE, FLUCTUATION_NOISE = 0.10, 0.23
+"""Relative noise of one wheel's shear over its load while the torque is steady, and per
+fluctuation of the torque over its mean."""
+STICKING_LOSS = 0.4
+"""Shear that the mean lacks while a wheel sticks and slips by turns, over the fluctuation times 1
+less the slip ratio."""
 MOST_DOUBT = 0.3
 """Error of a load over the load up to which the wheel counts."""
 FASTEST = 0.8
@@ -300,9 +304,9 @@ class GroundLearner:
             self._slip_time = window.time
         good &= turning
         slips, grips = lasting & good, ~slipping
-        rows = [row for row, _ in self._recent]
-        climb = _find_change(np.array([row[[PITCH, *_ANGLES]] for row in rows]))
-        torques = np.mean([row[TORQUES] for row in rows], axis=0)
+        rows = np.array([row for row, _ in self._recent])
+        torques = rows[:, TORQUES].mean(axis=0)
+        climb = _find_change(rows[:, [PITCH, *_ANGLES]])
         stuck = self._stuck.update(window, torques, climb, self.commanded)
         if stuck and self._immobilised_time is None:
             self._immobilised_time = window.time
@@ -318,7 +322,10 @@ class GroundLearner:
             *zip(self._sides.values(), _SIDE_WHEELS, strict=True),
             *((self._classes[number], wheels) for number, wheels in on_class.items()),
         ]
-        self._learn_friction(window, slips, grips & good, grounds, elapsed)
+        squares = np.array([squares for _, squares in self._recent]).mean(axis=0)
+        spread = np.sqrt(np.maximum(squares - torques**2, 0.0))
+        fluctuation = spread / np.maximum(np.abs(torques), 1e-9)
+        self._learn_friction(window, slips, grips & good, fluctuation, grounds, elapsed)
 
     def _turns_freely(self, window: SlipWindow) -> Flags:
         """Return (6,) whether motors are slow enough to give the torque they are asked for."""
@@ -338,33 +345,36 @@ class GroundLearner:
         window: SlipWindow,
         slips: Flags,
         grips: Flags,
+        fluctuation: Floats,
         grounds: Sequence[tuple[FrictionFilter, Flags]],
         elapsed: float,
     ) -> None:
-        """Take what the wheels of a window tell about the friction of the grounds below them."""
+        """Take what the wheels of a window tell about the friction of the grounds below them.
+
+        `fluctuation` (6,) has the standard deviations of the torques over their means.
+        """
         unit = self._sense.weight / WHEEL_COUNT
         loads, tractions = window.loads, window.tractions
         tractions = tractions - self._resistance * loads * np.sign(window.rolling)
         counts = (window.clear > 0.0) & (loads > MIN_LOAD * unit) & (loads < MAX_LOAD * unit)
         along = np.abs(window.slip) / np.maximum(window.slip_speed, 1e-9)
-        sticking = self._find_fluctuation() * (1.0 - np.abs(window.ratio))
+        sticking = fluctuation * (1.0 - np.abs(window.ratio))
         tells = slips & counts & (along > ALONG) & (window.slip * tractions > 0.0)
         tells &= sticking < MOST_STICKING
         tells &= window.doubts < MOST_DOUBT * loads
         tells &= self._turns_freely(window)
         distance = abs(float(find_median(window.travel))) * elapsed
         weights = self._weigh(window, tells, elapsed)
-        doubt = EXCESS_NOISE * window.excess / self._sense.weight
+        shears = np.abs(tractions) / np.maximum(along, 1e-9) * (1.0 + STICKING_LOSS * sticking)
+        noises = loads * np.hypot(LEAST_NOISE, FLUCTUATION_NOISE * fluctuation)
         for one, own in grounds:
             if own.any():
                 one.drive(distance)
             told = np.flatnonzero(tells & own)
             if len(told):
-                shear = float((np.abs(tractions) / along)[told].sum())
-                unclear = 2.0 * float(window.doubts[told].sum() / loads[told].sum())
-                noise = float(np.linalg.norm([SHARE_NOISE / np.sqrt(len(told)), doubt, unclear]))
-                use = shear / float(loads[told].sum())
-                one.slip(use, noise, float(weights[told].mean()))
+                load, doubt = float(loads[told].sum()), window.doubts[told].sum()
+                noise = float(np.linalg.norm([*noises[told], doubt])) / load
+                one.slip(float(shears[told].sum()) / load, noise, float(weights[told].mean()))
             held = np.sort((np.abs(tractions) / np.maximum(loads, 1e-9))[counts & grips & own])
             if len(held) >= 2:  # two wheels: the contact of one may be wrong
                 one.grip(float(held[-2]))
@@ -377,16 +387,9 @@ class GroundLearner:
         away = np.hypot(*(window.places - self._spot).T) > SAME_PLACE * self._rover.wheel.radius
         self._spot = np.where(away[:, None], window.places, self._spot)
         self._here = np.where(away, 0.0, self._here)
-        weights = elapsed / (window.duration + BLOCK) * np.exp(-self._here / AT_A_PLACE)
+        weights = min(elapsed / SAME_TIME, 1.0) * np.exp(-self._here / AT_A_PLACE)
         self._here = self._here + np.where(tells, weights, 0.0)
         return np.asarray(weights)
-
-    def _find_fluctuation(self) -> Floats:
-        """Return (6,) standard deviations of the torques over the window, over their means."""
-        squares = np.mean([squares for _, squares in self._recent], axis=0)
-        means = np.mean([row[TORQUES] for row, _ in self._recent], axis=0)
-        spread = np.sqrt(np.maximum(squares - means**2, 0.0))
-        return np.asarray(spread / np.maximum(np.abs(means), 1e-9))
 
     def _take_resistance(self, window: SlipWindow, elapsed: float) -> None:
         share = window.excess * float(np.sign(window.rolling.mean())) / self._sense.weight

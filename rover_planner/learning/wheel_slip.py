@@ -7,6 +7,7 @@ the lines tells how well they are known.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -67,17 +68,17 @@ class SlipWindow:
     unsteadiness: float
     """Change of the treads' mean speed over the window [m/s]."""
 
-    @property
+    @cached_property
     def slip(self) -> Floats:
         """(6,) speeds of the treads over the ground along the headings, positive if spinning."""
         return self.rolling - self.travel
 
-    @property
+    @cached_property
     def slip_speed(self) -> Floats:
         """(6,) magnitudes of the speeds of the treads over the ground [m/s]."""
         return np.hypot(self.slip, self.aside)
 
-    @property
+    @cached_property
     def ratio(self) -> Floats:
         """(6,) slip ratios 1 - v / (r omega), within -1 and 1, 0 where a wheel stands."""
         larger = np.maximum(np.abs(self.rolling), np.abs(self.travel))

@@ -94,3 +94,12 @@ def test_a_lower_friction_is_believed_within_a_metre_after_a_line():
         ground.slip(0.35, 0.22, 0.5)
     estimate = ground.estimate
     assert estimate.low < 0.35 and estimate.mean < 0.45
+
+
+def test_slips_before_a_line_do_not_bound_the_ground_that_is_proved_to_be_another():
+    ground = FrictionFilter(TOLD)
+    slip_on(ground, 0.26, 10)
+    ground.drive(1.0)
+    assert ground.estimate.high is not None
+    ground.grip(0.45)
+    assert ground.estimate.high is None

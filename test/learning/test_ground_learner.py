@@ -88,6 +88,18 @@ def test_wheels_that_slip_on_one_class_of_ground_tell_all_of_it_and_nothing_of_a
     np.testing.assert_array_equal(layers.friction[been], learner.ground.visited.friction[been])
 
 
+def test_a_torque_that_fluctuates_tells_the_friction_of_a_wheel_that_slips_less_surely():
+    rows = climb(ROVER, SLOPE, 40.0, speed=0.02)[::5]
+    rows[rows[:, X] > 0.3, RATES] *= 3.5
+    steady = learn(rows).estimate.friction
+    rows[::2, TORQUES] *= 1.5
+    rows[1::2, TORQUES] *= 0.5
+    shaky = learn(rows).estimate.friction
+    assert steady.high is not None and shaky.high is not None
+    assert steady.low < SLOPE < steady.high and shaky.low < SLOPE < shaky.high
+    assert shaky.high - shaky.low > 1.1 * (steady.high - steady.low)
+
+
 def test_a_gap_and_a_jump_of_the_odometry_are_no_slip():
     rows = climb(ROVER, SLOPE, 20.0)[::5]
     rows = np.delete(rows, slice(60, 80), axis=0)
