@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compares chances of failure with drives whose friction and torque limit were drawn.
 
-Run from the repository: python -m benchmarks.chance [--calibrate] [--picture FILE]
-The drives are those of test/data/chances.jsonl, made by benchmarks.chance_drives
-(docs/validation.md).
+Run from the repository: python -m benchmarks.chance [--calibrate] [--picture FILE] [--file FILE]
+The drives are those of test/data/chances.jsonl, at 0.1 m/s, or of another file that
+benchmarks.chance_drives has made (docs/validation.md).
 """
 
 import itertools
@@ -25,7 +25,7 @@ from support.chance_paths import (
     read_driven_paths,
 )
 
-MODEL_STDS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
+MODEL_STDS = (0.03, 0.06, 0.08, 0.1, 0.15, 0.2)
 """Model errors among which the calibration chooses."""
 EDGES = (0.0, 0.05, 0.2, 0.5, 0.8, 0.95, 1.0)
 """Edges of the ranges of chances in the reliability table."""
@@ -163,14 +163,13 @@ def main(
         bool, typer.Option("--calibrate", help="Score model errors on the other drives.")
     ] = False,
     picture: Annotated[Path | None, typer.Option(help="Picture to draw.")] = None,
-    file: Annotated[
-        Path | None, typer.Option(help="Drives held out; default: those of the tests.")
-    ] = None,
+    file: Annotated[Path, typer.Option(help="Drives.")] = CHANCES,
 ) -> None:
     """Print the tables."""
+    driven = read_driven_paths(file)
+    held = [one for one in driven if one.stream == HELD_OUT]
     if calibrate_too:
-        calibrate([one for one in read_driven_paths() if one.stream != HELD_OUT])
-    held = [one for one in read_driven_paths(file or CHANCES) if file or one.stream == HELD_OUT]
+        calibrate([one for one in driven if one.stream != HELD_OUT])
     found = compare(held)
     headings = ("chance", "paths", "drives", "told", "failed", "95 %")
     print_table(f"Reliability; {TOLD}", headings, reliability(found))

@@ -70,6 +70,11 @@ VICTIMS = ("traverse_server", "traction_controller", PAGE, MISSION, "rover_simul
 """Programs that are killed in turn."""
 ROCKS = (0.01, 0.005, 0.015)
 """Cover by rocks of the maps, all of one relief; the first is the ground."""
+LOOPBACK = {
+    "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET",
+    "FASTRTPS_DEFAULT_PROFILES_FILE": str(ROOT / "config" / "fast_dds_loopback.xml"),
+}
+"""Environment in which programs do not wait for each other's shared memory, as on a robot."""
 STEPS = (5, 0)
 """What the system clock is ahead by, in turn [s]."""
 
@@ -190,7 +195,7 @@ class Programs:
 
     def start(self, name: str, module: list[str] | None = None) -> None:
         """Start a program, with its module and words or others."""
-        words, environment = module or self._modules[name], self._clock.environment
+        words, environment = module or self._modules[name], {**self._clock.environment, **LOOPBACK}
         self._running[name] = self._nodes.start_module(*words, environment=environment)
 
     def kill(self, name: str) -> None:
@@ -342,6 +347,7 @@ def main(
 ) -> None:
     """Run a soak and print its report as JSON."""
     signal.signal(signal.SIGTERM, signal.default_int_handler)  # its programs end with it
+    os.environ |= LOOPBACK
     print(json.dumps(run_soak(minutes, calm, every, load, seed), indent=2))
 
 

@@ -87,8 +87,8 @@ CELL_HEIGHT: str = parameter(
 MAX_MAP_CELLS: int = parameter(MAX_CELLS, "Largest terrain file.", unit="cells", bounds=(4, 10**9))
 REALTIME_PRIORITY: int = parameter(
     0,
-    "Real-time priority (SCHED_FIFO), in traverse_server of its heartbeat alone, if the system "
-    "grants it; 0 for none.",
+    "Real-time priority (SCHED_FIFO), in traverse_server of its heartbeat alone, beside which all "
+    "else of it has a niceness of -10, if the system grants it; 0 for none.",
     bounds=(0, 99),
     read_only=True,
 )

@@ -14,7 +14,12 @@ import rclpy
 from rover_physics.numerics.kernel_cache import kernel_cache_note
 
 THREADS = Path("/proc/self/task")
+PRECEDENCE = -10
+"""Niceness of threads beside one with a real-time priority, which has to wait while one of them
+holds Python's lock."""
 _PR_SET_THP_DISABLE = 41
+TRANSPORTS, PROFILES = "FASTDDS_BUILTIN_TRANSPORTS", "FASTRTPS_DEFAULT_PROFILES_FILE"
+"""Variables of the environment that say by what Fast DDS talks."""
 NO_LOG_FILE = ["--ros-args", "--disable-external-lib-logs"]
 """Arguments that keep ROS from writing a log file, without which it does not start."""
 
@@ -27,6 +32,7 @@ def init_ros(argv: Sequence[str] | None, **options: Any) -> None:
         options: Further arguments of `rclpy.init`.
     """
     avoid_huge_pages()
+    avoid_shared_memory()
     arguments = sys.argv if argv is None else list(argv)
     rclpy.init(args=[*arguments, *(NO_LOG_FILE if log_fault() else [])], **options)
 
@@ -73,12 +79,22 @@ def avoid_huge_pages() -> None:
         prctl(_PR_SET_THP_DISABLE, 1, 0, 0, 0)
 
 
+def avoid_shared_memory() -> None:
+    """Have Fast DDS talk by UDP alone, unless the environment says by what.
+
+    Who publishes into shared memory waits for whoever holds the lock of its port. On a busy
+    machine a process without real-time priority keeps that for 0.1 s and more.
+    """
+    if PROFILES not in os.environ:
+        os.environ.setdefault(TRANSPORTS, "UDPv4")
+
+
 def take_priority(priority: int, threads: Sequence[int] = ()) -> str:
     """Set the real-time priority (SCHED_FIFO) of threads of this process.
 
     Args:
         priority: 1 to 99 as in sched(7); 0 changes nothing.
-        threads: Their ids; empty takes all threads of now.
+        threads: Their ids; the others of now get PRECEDENCE. Empty takes all threads of now.
 
     Returns:
         The reason why it was not granted, empty if it was granted.
@@ -86,8 +102,11 @@ def take_priority(priority: int, threads: Sequence[int] = ()) -> str:
     if priority == 0:
         return ""
     try:
-        for thread in threads or [int(entry.name) for entry in THREADS.iterdir()]:
-            os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
+        for thread in (int(entry.name) for entry in THREADS.iterdir()):
+            if thread in threads or not threads:
+                os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
+            else:
+                os.setpriority(os.PRIO_PROCESS, thread, PRECEDENCE)
     except (OSError, AttributeError) as error:
         return (
             f"realtime_priority {priority} is not granted ({error}); it needs CAP_SYS_NICE or an "

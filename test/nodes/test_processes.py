@@ -12,7 +12,7 @@ import pytest
 
 from rover_physics import Terrain, save_terrain
 from rover_planner.nodes.traverse_server import main
-from rover_planner.ros.process import take_priority
+from rover_planner.ros.process import PROFILES, TRANSPORTS, take_priority
 from support.project.without_disk import fill_disk
 from support.ros_fixtures import domain_id
 
@@ -119,10 +119,11 @@ def test_a_wrong_parameter_ends_a_server_with_one_line(monkeypatch, capfd):
 
 
 PROGRAM = """
-import os, threading
-from rover_planner.ros.process import init_ros
-from rover_planner.ros.process import take_priority
+import os, pathlib, rclpy, threading
+from rover_planner.ros.process import PRECEDENCE, init_ros, take_priority
 init_ros([])
+node = rclpy.create_node("alone")
+print(*(file.read_text().strip() for file in pathlib.Path("/proc/self/task").glob("*/comm")))
 one = threading.Thread(target=threading.Event().wait, daemon=True)
 one.start()
 
@@ -131,7 +132,9 @@ def urgent_threads():
     return len(ids), [id for id in ids if os.sched_getscheduler(id) == os.SCHED_FIFO]
 
 print(take_priority(3, [one.native_id]))
-print(urgent_threads()[1] == [one.native_id])
+main = threading.get_native_id()
+goes_first = os.getpriority(os.PRIO_PROCESS, main) == PRECEDENCE
+print(urgent_threads()[1] == [one.native_id] and goes_first)
 print(take_priority(3))
 count, urgent = urgent_threads()
 print(len(urgent) == count)
@@ -139,11 +142,16 @@ print([line for line in open("/proc/self/status") if line.startswith("THP_enable
 """
 
 
-def test_threads_take_it_or_the_reason_is_told_and_memory_is_not_collected_into_huge_pages():
+def test_a_program_waits_for_no_shared_memory_no_huge_pages_and_no_processor():
+    environment = os.environ | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "OFF"}
+    for name in (TRANSPORTS, PROFILES):
+        environment.pop(name, None)
     ran = subprocess.run(
-        [sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=60, check=True
-    )
-    *told, pages = ran.stdout.splitlines()
+        [sys.executable, "-c", PROGRAM],
+        env=environment, capture_output=True, text=True, timeout=60, check=True,
+    )  # fmt: skip
+    threads, *told, pages = ran.stdout.splitlines()
+    assert "dds.udp" in threads and "dds.shm" not in threads
     for reason, taken in zip(told[::2], told[1::2], strict=True):
         assert taken == "True" if reason == "" else "CAP_SYS_NICE" in reason
     assert "THP_enabled:\\t0" in pages

@@ -104,7 +104,7 @@ def test_areas_of_any_map_are_those_of_scipy(shape, headings, seed, share, chunk
 
 def test_the_area_is_kept_in_the_store_until_more_is_surveyed(tmp_path):
     request = make_request(headings=8)
-    prepared = survey_here(tmp_path, Terrain(np.zeros((50, 70)), 0.1), request, chunk=64)
+    prepared = survey_here(tmp_path, Terrain(np.zeros((44, 44)), 0.1), request, chunk=64)
     assert open_area(prepared.store) is None
     found = find_reachable(prepared.store, 2.5, 2.5)
     assert found.start == (25, 25) and found.area == pytest.approx(found.cells * 0.01)
@@ -141,12 +141,12 @@ def test_moves_lead_along_their_headings():
 
 def test_the_command_prints_area_and_longest_way_and_draws_them(tmp_path, capfd):
     request = make_request(headings=8)
-    store = survey_here(tmp_path, Terrain(np.zeros((60, 70)), 0.1), request, chunk=64).store
+    store = survey_here(tmp_path, Terrain(np.zeros((36, 70)), 0.1), request, chunk=64).store
     picture, tif = tmp_path / "area.png", tmp_path / "area.tif"
-    words = ["reachable", str(store.path), "--from", "3,3", "--picture", str(picture)]
+    words = ["reachable", str(store.path), "--from", "3,2", "--picture", str(picture)]
     assert main([*words, "--geotiff", str(tif)]) == 0
     report = json.loads(capfd.readouterr().out)
-    area = find_reachable(store, 3.0, 3.0)
+    area = find_reachable(store, 3.0, 2.0)
     assert report["cells"] == area.cells and report["turns"] == "assumed"
     assert report["longest"] == pytest.approx(area.longest, abs=1e-3)
     # At the edge the rover stands along it only, and it drives forwards only.
@@ -158,7 +158,7 @@ def test_the_command_prints_area_and_longest_way_and_draws_them(tmp_path, capfd)
     assert json.loads(capfd.readouterr().out)["chunks_missing"] == 1
     store.mark_failed((0, 0))
     with pytest.raises(PlanningError, match="not surveyed yet"):
-        find_reachable(store, 3.0, 3.0)
+        find_reachable(store, 3.0, 2.0)
     with pytest.raises(PlanningError, match=r"from \(99, 0\) is off the map; .* x 0 to 6.9"):
         find_reachable(store, 99.0, 0.0)
 

@@ -53,10 +53,12 @@ def choose_answer(data: LiveData, now: float, refusal: str = "") -> LiveAnswer:
     if click is not None and newest is not None and newest is not click.verdict:
         word = "traversable" if newest.traversable else "not traversable"
         words = f"{newest.question}: {word}, {write_age(now - newest.heard)}"
-        offers = [{"words": words, "ask": {"ask": "newest"}}]
+        offers = [
+            {"words": words + (", old" if server.is_stale else ""), "ask": {"ask": "newest"}}
+        ]
     old = ""
-    if verdict is not None and server.age is not None and server.is_stale:
-        old = f"the server is silent for {server.age:.0f} s"
+    if verdict is not None and server.is_stale:
+        old = f"the server is silent for {server.describe()}"
     shown = data.plan if click is None else click.plan
     document = {**answer, "headline": headline, "old": old, "refusal": refusal, "offers": offers}
     return LiveAnswer(document, shown)

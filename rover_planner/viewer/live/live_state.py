@@ -156,8 +156,8 @@ class LiveData:
             return "waiting for odometry"
         if odometry.is_stale:
             return f"not live: odometry is {odometry.age:.0f} s old"
-        if server.age is not None and server.is_stale:
-            return f"the rover is live; the server is silent for {server.age:.0f} s"
+        if server.is_stale:
+            return f"the rover is live; the server is silent for {server.describe()}"
         return "live"
 
     def _age_of(self, topic: str) -> TopicAge:

@@ -294,3 +294,6 @@ def test_a_verdict_of_a_server_that_fell_silent_is_old_in_words_and_in_the_scene
     )
     assert shown.is_old and shown.document["old"] == "the server is silent for 20 s"
     assert shown.document["about"] == "question 1, 25 s ago"
+    click = Click("1", NOW - 26.0, verdict_on("1", True, 25.0))
+    older = choose_answer(data_of(verdict_on("2", True, 24.0), None, click, silent), NOW)
+    assert older.document["offers"][0]["words"] == "question 2: traversable, 24 s ago, old"
