@@ -140,7 +140,7 @@ class PageBase(ABC):
     def _add_camera(self) -> None:
         """Add what needs to know which visitor looks: the camera and clicks into the scene."""
         gui = self.server.gui
-        gui.configure_theme(show_logo=False, show_share_button=False, control_width="small")
+        gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         gui.set_panel_label("Camera")
         self._camera = gui.add_button_group("View", (*VIEWS, FOLLOW))
         self._camera.on_click(self._request_view)
