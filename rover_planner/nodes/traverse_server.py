@@ -81,8 +81,8 @@ SWITCH_INTERVAL = 1e-3
 Python's lock [s]; Python's thread switch interval."""
 IDLE_PERIOD = 0.5
 """Time between two beats while no path is watched [s]."""
-DIAGNOSTICS_PERIOD = 0.95
-"""Shortest time between two diagnostic messages, which go with beats [s]."""
+DIAGNOSTICS_PERIOD = 1.0
+"""Time between two diagnostic messages [s]."""
 
 
 class TraverseServer(RoverNode[TraverseServerParameters]):
@@ -124,7 +124,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self.urgent_threads = (self.watch.heartbeat_thread,)
         self._hazards = HazardTopics(self, self.service, lambda: self.desk.open_count > 0)
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
-        self._diagnosed = time.monotonic()
+        create_steady_timer(self, DIAGNOSTICS_PERIOD, self._publish_diagnostics)
         self._beats = create_steady_timer(self, PERIOD, self._beat)
         self.follow_changes(load_service_settings, self._apply_settings)
         self._log_ready()
@@ -172,8 +172,6 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self.watch.beat()
         self._results.serve_late_comers()
         self._hazards.catch_up()
-        if time.monotonic() - self._diagnosed >= DIAGNOSTICS_PERIOD:
-            self._publish_diagnostics()
         self._set_pace()
 
     def _set_pace(self) -> None:
@@ -376,7 +374,6 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         return "use_sim_time is true, but nothing was heard on /clock" if is_silent else ""
 
     def _publish_diagnostics(self) -> None:
-        self._diagnosed = time.monotonic()
         self._map_cloud.update()
         self._maps.retry()
         now = self.get_clock().now()

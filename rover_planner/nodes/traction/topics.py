@@ -11,11 +11,8 @@ from msg_adapters.commands import effort_commands, labelled_array, set_values
 from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
 from rover_planner.ros.qos import latched_qos, topic_qos
-from rover_planner.traction.supervisor import DRIVING
 from rover_planner.traction.traction_service import TractionUpdate
 
-RENEWAL = 3
-"""At rest one of so many equal commands is sent: sending takes half of the time of an update."""
 STANDING_WHEELS = np.zeros(WHEEL_COUNT)
 """Rates of wheels that stand [rad/s]."""
 
@@ -48,7 +45,7 @@ class TractionTopics:
         self._contacts = np.zeros((2, WHEEL_COUNT))
         self._of_wheels = labelled_array(zeros, "wheel")
         self._of_contacts = labelled_array(self._contacts, "angle, deviation", "wheel")
-        self.writer = CommandWriter(self, order, signs, RENEWAL)
+        self.writer = CommandWriter(self, order, signs)
         """For the thread of the updates."""
         self.watchdog_writer = CommandWriter(self, order, signs)
         """For the thread of the watchdog."""
@@ -77,12 +74,9 @@ class TractionTopics:
 class CommandWriter:
     """Publishes commands with messages of its own, so that threads share none."""
 
-    def __init__(
-        self, topics: TractionTopics, order: NDArray[np.int64], signs: Floats, renewal: int = 1
-    ):
-        """Write to the publishers of `topics`; of `renewal` equal commands at rest one is sent."""
+    def __init__(self, topics: TractionTopics, order: NDArray[np.int64], signs: Floats):
+        """Write to the publishers of `topics`; the rest is as there."""
         self._topics, self._order, self._signs = topics, order, signs[order]
-        self._renewal, self._equal, self._last = renewal, 0, b""
         self._efforts = effort_commands(np.zeros(WHEEL_COUNT), order)
         self._rates = effort_commands(np.zeros(WHEEL_COUNT), order)
         self._brake, self._state = Bool(), String()
@@ -91,12 +85,7 @@ class CommandWriter:
         self, torques: Floats, brake: bool, state: str, rates: Floats = STANDING_WHEELS
     ) -> None:
         """Publish torques (6,) [N m] and rates (6,) [rad/s]; brake and state if changed."""
-        topics, values = self._topics, torques.tobytes()
-        rests = state != DRIVING and topics.last_state == (state, brake)
-        self._equal = (self._equal + 1) % self._renewal if rests and values == self._last else 0
-        if self._equal:
-            return
-        self._last = values
+        topics = self._topics
         if topics.velocities.get_subscription_count():
             set_values(self._rates, self._signs * rates[self._order])
             topics.velocities.publish(self._rates)

@@ -27,10 +27,9 @@ def enable(rover):
 def test_a_node_starts_disabled_and_drives_once_it_is_enabled(
     ros, rover, start_controller, enable
 ):
-    node = start_controller(enabled_at_start=False, rest_policy="coast")
+    start_controller(enabled_at_start=False, rest_policy="coast")
     wait_until(lambda: rover.state == "disabled", "the state")
     wait_until(lambda: len(rover.commands) > 20, "commands")
-    assert node.statistics.updates > 2 * len(rover.commands)  # equal ones are not all sent
     assert not any(torque for _, torque, _ in rover.commands)
     answer = enable(True)
     assert (answer.success, answer.message) == (True, "enabled")
