@@ -24,6 +24,8 @@ from rover_planner.learning.drive_log import (
     TORQUES,
     WIDTH,
     YAW,
+    X,
+    Y,
 )
 from rover_planner.learning.wheel_odometry import WheelMotion
 
@@ -87,7 +89,7 @@ class RowCollector:
             MessageError: It has no orientation.
         """
         attitude = imu_to_attitude(message)
-        self._row[ROLL : PITCH + 1] = attitude.roll, attitude.pitch
+        self._row[[ROLL, PITCH]] = attitude.roll, attitude.pitch
         self._has_imu = True
         if attitude.rates is not None:
             _, q, r = attitude.rates.tolist()
@@ -116,8 +118,7 @@ class RowCollector:
             MessageError: It has no pose that is possible, or is in another frame.
         """
         pose, _ = odometry_to_pose(message, frame or message.header.frame_id)
-        x, y, _, yaw = pose.tolist()
-        self._row[TIME : YAW + 1] = time, x, y, yaw
+        self._row[[TIME, X, Y, YAW]] = time, *pose[[0, 1, 3]]
         if not self._has_imu:
             self._row[[ROLL, PITCH]] = odometry_to_tilt(message)
         return self._row.copy()
