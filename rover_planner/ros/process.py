@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A node's process and the system: a log file, cached kernels, real-time priority."""
 
+import contextlib
 import ctypes
 import os
 import sys
@@ -103,10 +104,11 @@ def take_priority(priority: int, threads: Sequence[int] = ()) -> str:
         return ""
     try:
         for thread in (int(entry.name) for entry in THREADS.iterdir()):
-            if thread in threads or not threads:
-                os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
-            else:
-                os.setpriority(os.PRIO_PROCESS, thread, PRECEDENCE)
+            with contextlib.suppress(ProcessLookupError):  # it has ended since it was listed
+                if thread in threads or not threads:
+                    os.sched_setscheduler(thread, os.SCHED_FIFO, os.sched_param(priority))
+                else:
+                    os.setpriority(os.PRIO_PROCESS, thread, PRECEDENCE)
     except (OSError, AttributeError) as error:
         return (
             f"realtime_priority {priority} is not granted ({error}); it needs CAP_SYS_NICE or an "

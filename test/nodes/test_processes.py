@@ -105,6 +105,15 @@ def test_a_simulator_that_is_told_to_end_while_it_publishes_ends_cleanly(start_p
     end(process, signal.SIGTERM, count=3)
 
 
+def test_a_thread_that_ends_while_threads_take_priority_is_no_refusal(tmp_path, monkeypatch):
+    process = subprocess.Popen([sys.executable, "-c", ""])
+    process.wait()
+    (tmp_path / str(process.pid)).touch()
+    monkeypatch.setattr("rover_planner.ros.process.THREADS", tmp_path)
+    assert take_priority(3) == ""
+    assert take_priority(3, [os.getpid()]) == ""
+
+
 @pytest.mark.long
 def test_a_server_starts_on_a_full_disk_without_a_log_file_and_says_so(start_process):
     process = start_process("traverse_server", preexec_fn=fill_disk)
