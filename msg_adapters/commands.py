@@ -21,7 +21,7 @@ def twist_to_speeds(twist: TwistStamped | Twist) -> tuple[float, float]:
     Raises:
         MessageError: One of them is not finite.
     """
-    speeds = twist.twist if isinstance(twist, TwistStamped) else twist
+    speeds = getattr(twist, "twist", twist)
     forward, yaw = speeds.linear.x, speeds.angular.z
     if not (math.isfinite(forward) and math.isfinite(yaw)):
         raise MessageError(

@@ -4,6 +4,7 @@
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,30 +17,8 @@ from rover_physics.rover.steering_joints import LEFT, RIGHT
 _PLURALS = {"position": "positions", "velocity": "velocities"}
 FORM = "model_joint:robot_joint, model_joint:robot_joint:-1 or model_joint:robot_joint:-1:0.05"
 """Form of an entry, for error texts."""
-
-
-def _read_by_name(
-    state: JointState, values: Sequence[float], field: str, right: str, wanted: Collection[str]
-) -> dict[str, float]:
-    if not values:
-        return {}
-    if len(values) != len(state.name):
-        raise MessageError(
-            f"joint_states has {len(values)} {_PLURALS[field]} for {len(state.name)} names; "
-            "there must be one for each, or none at all"
-        )
-    found: dict[str, float] = {}
-    for name, value in zip(state.name, values, strict=True):
-        if name not in wanted:
-            continue
-        if name in found:
-            raise MessageError(f"joint_states names {name} twice")
-        if not math.isfinite(value):
-            raise MessageError(
-                f"joint_states has {field} {value} of {name}; it must be a finite {right}"
-            )
-        found[name] = float(value)
-    return found
+KNOWN_MESSAGES = 16
+"""Most sets of names whose places are remembered."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +55,8 @@ class JointNames:
         for name in STEERING_JOINTS if steering == RIGHT else ():
             link = self.link(name)
             self._of_model[name] = replace(link, sign=-link.sign, offset=-link.offset)
+        # A publisher names the same joints in each message.
+        self._places = lru_cache(maxsize=KNOWN_MESSAGES)(self._find_places)
 
     def link(self, model: str) -> JointLink:
         """Return the link of a joint of the model."""
@@ -103,23 +84,48 @@ class JointNames:
             MessageError: position has another length than name, a wanted joint occurs twice, or
                 its position is not finite.
         """
-        found = _read_by_name(
-            state, state.position, "position", "angle in rad", self.robot_names(wanted)
-        )
-        links = map(self.link, wanted)
-        return {
-            link.model: link.sign * found[link.robot] + link.offset
-            for link in links
-            if link.robot in found
-        }
+        values = self._read(state, state.position, "position", "angle in rad", wanted)
+        return {link.model: link.sign * value + link.offset for link, value in values}
 
     def velocities(self, state: JointState, wanted: Collection[str]) -> dict[str, float]:
         """Return the rates [rad/s] of wanted joints of the model; as `positions`."""
-        found = _read_by_name(
-            state, state.velocity, "velocity", "rate in rad/s", self.robot_names(wanted)
-        )
-        links = map(self.link, wanted)
-        return {link.model: link.sign * found[link.robot] for link in links if link.robot in found}
+        values = self._read(state, state.velocity, "velocity", "rate in rad/s", wanted)
+        return {link.model: link.sign * value for link, value in values}
+
+    def _read(
+        self,
+        state: JointState,
+        values: Sequence[float],
+        field: str,
+        right: str,
+        wanted: Collection[str],
+    ) -> list[tuple[JointLink, float]]:
+        """Return the values of wanted joints that a message has, with their links."""
+        if not values:
+            return []
+        if len(values) != len(state.name):
+            raise MessageError(
+                f"joint_states has {len(values)} {_PLURALS[field]} for {len(state.name)} names; "
+                "there must be one for each, or none at all"
+            )
+        places = self._places(tuple(state.name), tuple(wanted))
+        found = [(link, float(values[place])) for place, link in places]
+        for link, value in found:
+            if not math.isfinite(value):
+                raise MessageError(
+                    f"joint_states has {field} {value} of {link.robot}; it must be a finite {right}"
+                )
+        return found
+
+    def _find_places(
+        self, names: tuple[str, ...], wanted: tuple[str, ...]
+    ) -> tuple[tuple[int, JointLink], ...]:
+        """Return where the wanted joints are among the names of a message, with their links."""
+        links = [self.link(name) for name in wanted]
+        for link in links:
+            if names.count(link.robot) > 1:
+                raise MessageError(f"joint_states names {link.robot} twice")
+        return tuple((names.index(one.robot), one) for one in links if one.robot in names)
 
     def signs(self, names: Collection[str]) -> NDArray[np.float64]:
         """Return the signs of joints of the model, which rates and efforts have too."""

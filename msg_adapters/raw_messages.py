@@ -9,6 +9,7 @@ import struct
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
+from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
 
@@ -36,12 +37,15 @@ class SensorReader:
     """
 
     def __init__(self) -> None:
-        self._readers = {Imu: _read_imu, JointState: self._read_joints, Odometry: _read_odometry}
+        self._readers = {
+            Imu: _read_imu, JointState: self._read_joints, Odometry: _read_odometry,
+            Twist: _read_twist, TwistStamped: _read_twist_stamped,
+        }  # fmt: skip
         self._head, self._frame = b"", ""
         self._names: tuple[str, ...] = ()
 
     def read(self, message: bytes, kind: type) -> Any:
-        """Return what adapters read of an Imu, JointState or Odometry.
+        """Return what adapters read of an Imu, JointState, Odometry, Twist or TwistStamped.
 
         Raises:
             MessageError: The bytes are no such message.
@@ -93,3 +97,12 @@ def _read_odometry(fields: Fields) -> SimpleNamespace:
     pose = SimpleNamespace(position=_Vector(*values[:3]), orientation=_Quaternion(*values[3:7]))
     pose = SimpleNamespace(pose=pose, covariance=values[7:])
     return SimpleNamespace(header=header, child_frame_id=child, pose=pose)
+
+
+def _read_twist(fields: Fields) -> SimpleNamespace:
+    values = fields.numbers("6d")
+    return SimpleNamespace(linear=_Vector(*values[:3]), angular=_Vector(*values[3:]))
+
+
+def _read_twist_stamped(fields: Fields) -> SimpleNamespace:
+    return SimpleNamespace(header=_read_header(fields), twist=_read_twist(fields))

@@ -76,7 +76,9 @@ class MeasurementLimits:
 
         Both are scaled by the same factor, so that the curvature stays.
         """
+        if speed == yaw_rate == 0.0:
+            return 0.0, 0.0
         ahead = abs(speed) + abs(yaw_rate) * self._sides
         fastest = float(np.hypot(ahead, yaw_rate * self._arms).max())
-        share = min(1.0, self._max_speed / fastest) if fastest > 0.0 else 1.0
+        share = self._max_speed / max(fastest, self._max_speed)
         return share * speed, share * yaw_rate

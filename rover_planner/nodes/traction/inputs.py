@@ -68,6 +68,7 @@ class TractionInputs:
             parameters.imu_frame or parameters.base_frame, parameters.imu_mounting
         )
         self._reader, self._odometry_read = SensorReader(), -math.inf
+        self._twist = TwistStamped if parameters.cmd_vel_stamped else Twist
         self._log = TransitionLog(node.get_logger())
         self.stamps = StampCheck(parameters.stamp_tolerance)
         """Judges the header stamps."""
@@ -83,14 +84,13 @@ class TractionInputs:
         return names.signs(joints) * (angles - names.offsets(joints))
 
     def _subscribe(self, parameters: TractionControllerParameters) -> None:
-        twist = TwistStamped if parameters.cmd_vel_stamped else Twist
         hear = self._node.heard.subscribe
-        for kind, name, take, raw in (
-            (JointState, JOINT_STATES, self._take_joints, True),
-            (Imu, IMU, self._take_imu, True),
-            (twist, CMD_VEL, self._take_command, False),
+        for kind, name, take in (
+            (JointState, JOINT_STATES, self._take_joints),
+            (Imu, IMU, self._take_imu),
+            (self._twist, CMD_VEL, self._take_command),
         ):
-            hear(kind, name, self._guard(name, take), sensor_qos(), raw=raw)
+            hear(kind, name, self._guard(name, take), sensor_qos(), raw=True)
         take_odometry = self._guard(ODOMETRY, self._take_odometry)
         hear(Odometry, ODOMETRY, take_odometry, newest_qos(), self._needs_odometry)
         hear(Bool, STOP, self._guard(STOP, self._take_stop), topic_qos())
@@ -160,8 +160,9 @@ class TractionInputs:
         attitude = imu_to_attitude(imu, self._mounting)
         self._service.take_attitude(attitude.roll, attitude.pitch, attitude.rates, measured)
 
-    def _take_command(self, twist: TwistStamped | Twist, now: float) -> None:
-        if isinstance(twist, TwistStamped):
+    def _take_command(self, message: bytes, now: float) -> None:
+        twist = self._reader.read(message, self._twist)
+        if self._twist is TwistStamped:
             now = self._find_time(CMD_VEL, _stamp_of(twist), now)
         self._service.take_command(*twist_to_speeds(twist), now)
 
