@@ -43,6 +43,8 @@ from rover_planner.traction.watchdog import Watchdog
 NODE_NAME = "traction_controller"
 DIAGNOSTICS_PERIOD = 1.0
 """Time between two diagnostic messages [s]."""
+STANDING_RATE = 0.01
+"""Wheel rate below which a wheel stands [rad/s]."""
 MIN_WATCHDOG_PERIODS = 2.0
 """Shortest time without an update after which the watchdog acts, in periods."""
 STALE_PERIODS = 1.5
@@ -67,6 +69,7 @@ class TractionController(RoverNode[TractionControllerParameters]):
         self.statistics = TractionStatistics(1.0 / values.rate)
         """Update times, counts and the last update."""
         self._command: TractionCommand | None = None
+        self._repeats = False
         self._log = TransitionLog(self.get_logger())
         self._warning = ""
         self._trips = 0
@@ -140,6 +143,7 @@ class TractionController(RoverNode[TractionControllerParameters]):
         response.success, response.message = done, message
         if self._supervisor.permission.enabled != before or not done:
             self.get_logger().info(message)
+            self._repeats = True  # the next update is a whole one
             self.update()
         return response
 
@@ -153,17 +157,16 @@ class TractionController(RoverNode[TractionControllerParameters]):
         )
 
     def update(self) -> None:
-        """Estimate, build, solve and publish; called by the timer."""
-        start = time.perf_counter()
-        self.heard.poll()
+        """Estimate, build, solve and publish; called by the timer.
+
+        While the rover stands, each second update sends the last command again: to read and to
+        judge the inputs takes most of the time.
+        """
+        start, repeated = time.perf_counter(), self._find_repeated()
+        if repeated is None:
+            self.heard.poll()
         now = time.monotonic()
-        try:
-            command = self._find_command(now)
-        except Exception as error:
-            # After an internal error the wheels must not keep their last torque.
-            command = self._supervisor.fail(
-                f"internal error: {self.guard.report('update', error)}"
-            )
+        command = repeated or self._find_command(now)
         sent = self._watchdog.send(
             lambda: self._write(command),
             now,
@@ -188,7 +191,25 @@ class TractionController(RoverNode[TractionControllerParameters]):
             if angles is not None:
                 self._topics.publish_steering(self._inputs.to_robot_steering(angles))
 
+    def _find_repeated(self) -> TractionCommand | None:
+        """Return the last command if this update is to send it again, else None."""
+        last, rates = self._command, self.service.joints.wheel_rates
+        stands = last is not None and last.state != DRIVING and max(abs(rates)) < STANDING_RATE
+        self._repeats = stands and not self._repeats
+        return last if self._repeats else None
+
     def _find_command(self, now: float) -> TractionCommand:
+        """Return the command of the supervisor, or that of an internal error.
+
+        After one the wheels must not keep their last torque.
+        """
+        try:
+            return self._supervise(now)
+        except Exception as error:
+            reported = self.guard.report("update", error)
+            return self._supervisor.fail(f"internal error: {reported}")
+
+    def _supervise(self, now: float) -> TractionCommand:
         prepared = self._maps.take()
         if prepared is not None:
             self.service.take_map(prepared)

@@ -79,7 +79,7 @@ NODE_NAME = "traverse_server"
 SWITCH_INTERVAL = 1e-3
 """Longest time for which a thread that prepares maps may delay a question whenever it needs
 Python's lock [s]; Python's thread switch interval."""
-IDLE_PERIOD = 0.5
+IDLE_PERIOD = 1.0
 """Time between two beats while no path is watched [s]."""
 DIAGNOSTICS_PERIOD = 1.0
 """Time between two diagnostic messages [s]."""

@@ -7,12 +7,13 @@ import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
-from support.driven_rover import DrivenRover
+from support.driven_rover import RATE, DrivenRover
 from support.ros_fixtures import PATIENT, call, domain_id, run_in_executor
 from support.waiting import wait_until
 
@@ -31,6 +32,9 @@ def test_a_node_starts_disabled_and_drives_once_it_is_enabled(
     wait_until(lambda: rover.state == "disabled", "the state")
     wait_until(lambda: len(rover.commands) > 20, "commands")
     assert not any(torque for _, torque, _ in rover.commands)
+    # At rest inputs are read at half the rate; commands come at the whole one.
+    spacing = np.median(np.diff([sent for sent, _, _ in rover.commands])) / 1e9
+    assert spacing == pytest.approx(1.0 / RATE, rel=0.3)
     answer = enable(True)
     assert (answer.success, answer.message) == (True, "enabled")
     wait_until(lambda: rover.state == "driving" and rover.push > 0.0, "driving")
