@@ -113,7 +113,8 @@ class JointNames:
         for link, value in found:
             if not math.isfinite(value):
                 raise MessageError(
-                    f"joint_states has {field} {value} of {link.robot}; it must be a finite {right}"
+                    f"joint_states has {field} {value} of {link.robot}; it must be a finite "
+                    f"{right}"
                 )
         return found
 
