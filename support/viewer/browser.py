@@ -34,7 +34,12 @@ WAIT = 120.0
 """Longest wait for the page [s]; rendering takes seconds on a busy machine."""
 SCALE = 0.1
 """Pixels of the screen for each of the page: without a graphics card rendering is slow."""
-
+SCALE_SCENE = """
+if (window !== window.top && location.protocol === "http:") {{
+  history.replaceState(null, "", "?fixedDpr={scale}");
+}}
+"""
+"""JavaScript that has the scene, a page within the page, scaled like the page: else it is not."""
 MEASURE = "selector => document.querySelector(selector)?.getBoundingClientRect()?.toJSON()"
 """JavaScript that finds and measures an element at one moment."""
 
@@ -66,6 +71,7 @@ class Visitor:
         """Open the page."""
         self.tab = browser.new_page(viewport=LAPTOP, device_scale_factor=scale)
         self.page_errors: list[str] = []
+        self.tab.add_init_script(SCALE_SCENE.format(scale=scale))
         self.tab.on("pageerror", lambda error: self.page_errors.append(str(error)))
         self.tab.set_default_timeout(1000.0 * WAIT)
         self.tab.goto(url)
@@ -88,15 +94,15 @@ class Visitor:
         self.box(label).fill(value)
         self.tab.keyboard.press("Tab")
 
-    def drag_slider(self, label: str, share: float, moves: int = 10) -> None:
-        """Drag the thumb of a slider to a share of its range, in a number of moves."""
+    def drag_slider(self, label: str, share: float) -> None:
+        """Drag the thumb of a slider to a share of its range."""
         slider = self.tab.get_by_role("slider", name=label, exact=True)
         slider.scroll_into_view_if_needed()
         track = slider.bounding_box()
         y = track["y"] + 0.5 * track["height"]
         self.tab.mouse.move(track["x"] + 0.5 * track["width"], y)
         self.tab.mouse.down()
-        self.tab.mouse.move(track["x"] + share * track["width"], y, steps=moves)
+        self.tab.mouse.move(track["x"] + share * track["width"], y, steps=3)
         self.tab.mouse.up()
 
     def choose(self, label: str, option: str) -> None:
