@@ -124,7 +124,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self.urgent_threads = (self.watch.heartbeat_thread,)
         self._hazards = HazardTopics(self, self.service, lambda: self.desk.open_count > 0)
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
-        create_steady_timer(self, DIAGNOSTICS_PERIOD, self._publish_diagnostics)
+        self._diagnostics_due = 0.0
         self._beats = create_steady_timer(self, PERIOD, self._beat)
         self.follow_changes(load_service_settings, self._apply_settings)
         self._log_ready()
@@ -172,6 +172,10 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self.watch.beat()
         self._results.serve_late_comers()
         self._hazards.catch_up()
+        now = time.monotonic()
+        if now >= self._diagnostics_due:
+            self._diagnostics_due = now + DIAGNOSTICS_PERIOD - 0.5 * PERIOD
+            self._publish_diagnostics()
         self._set_pace()
 
     def _set_pace(self) -> None:
