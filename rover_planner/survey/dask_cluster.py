@@ -17,8 +17,12 @@ CONNECT_TIME = 10.0
 """Longest time to reach a scheduler [s]."""
 WORKERS_TIME = 300.0
 """Longest time to wait for the first worker of a scheduler [s]."""
+ALONE_TIME = "60s"
+"""Time after which tasks fail that no worker is there for: one may not start again on a busy
+machine, and Dask would wait for ever."""
 SETTINGS = {
     "distributed.scheduler.allowed-failures": ATTEMPTS - 1,
+    "distributed.scheduler.no-workers-timeout": ALONE_TIME,
     "distributed.logging.distributed": "critical",
     "distributed.worker.profile.enabled": False,  # it looks at a worker's stack every 10 ms
     "distributed.admin.tick.interval": "1s",  # every 20 ms, it takes 2.5 % of a core a worker

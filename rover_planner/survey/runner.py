@@ -26,9 +26,9 @@ AHEAD = 3
 few enough that the scheduler holds little, whatever the size of the map."""
 COUNT_PERIOD = 2.0
 """Time between two looks at how many threads the cluster has [s]; workers come and go."""
-GONE = (
-    "the scheduler is gone; finished chunks are kept, and the same command goes on with the others"
-)
+KEPT = "finished chunks are kept, and the same command goes on with the others"
+GONE = f"the scheduler is gone; {KEPT}"
+ALONE = f"the cluster has no worker any more; {KEPT}"
 
 Task = Callable[[SurveyJob, Index], ChunkReport]
 """Work of a task."""
@@ -66,7 +66,8 @@ def run_survey(
         What became of them. Chunks that failed are marked in the store.
 
     Raises:
-        PlanningError: No such scheduler, too little memory, or the store cannot be written.
+        PlanningError: No such scheduler, too little memory, no worker is left, or the store cannot
+            be written.
     """
     from distributed.comm import CommClosedError
 
@@ -146,15 +147,16 @@ class _Run:
     def _take(self, report: ChunkReport) -> None:
         if report.refusal:
             raise PlanningError(
-                f"{self._job.store}: cannot be written: {report.refusal}; finished chunks are "
-                "kept, and the same command goes on with the others"
+                f"{self._job.store}: cannot be written: {report.refusal}; {KEPT}"
             )
         self._outcome.done += 1
         self._outcome.poses += report.poses
         self._on_chunk(report)
 
     def _give_up(self, chunk: Index, error: BaseException) -> None:
-        """Mark a chunk as failed."""
+        """Mark a chunk as failed; raise PlanningError if the others will fail as it did."""
+        if type(error).__name__ in ("NoWorkerError", "NoValidWorkerError"):
+            raise PlanningError(ALONE) from None
         why = f"{type(error).__name__}: {error}"
         self._outcome.failed[chunk] = (
             f"its worker died {ATTEMPTS} times" if _is_killed(error) else why

@@ -14,6 +14,7 @@ import pytest
 
 pytest.importorskip("distributed", reason="install the extra survey")
 
+import dask
 from distributed import LocalCluster
 
 from rover_physics import save_terrain
@@ -24,6 +25,7 @@ from rover_planner.survey import dask_cluster
 from rover_planner.survey.chunk_survey import survey_chunk
 from rover_planner.survey.cog import write_layers
 from rover_planner.survey.dask_cluster import ClusterSettings, check_workers, open_client
+from rover_planner.survey.layout import Index
 from rover_planner.survey.runner import run_survey
 from rover_planner.survey.store import create_store
 from rover_planner.survey.survey import prepare_survey
@@ -39,6 +41,7 @@ from support.survey_maps import (
     refuse_one,
     survey_here,
 )
+from support.waiting import wait_until
 
 SIDE = 70
 """Cells of a side of the map; at every fourth cell it has 4 chunks of up to 16 cells."""
@@ -51,19 +54,17 @@ def ground(tmp_path) -> Path:
     return tmp_path / "map.npz"
 
 
-@contextmanager
-def cluster(workers: int, **changes) -> Iterator[str]:
-    """Start a cluster in this process, as one that is there already; yield its address."""
+def start_cluster(workers: int, **changes) -> LocalCluster:
+    """Start a cluster in this process, as one that is there already."""
     words = {"threads_per_worker": 2, "dashboard_address": None, "protocol": "tcp://"} | changes
-    with LocalCluster(n_workers=workers, processes=False, **words) as started:
-        yield started.scheduler_address
+    return LocalCluster(n_workers=workers, processes=False, **words)
 
 
 @pytest.fixture(scope="module")
 def scheduler() -> Iterator[str]:
     """Return the address of a cluster that is there already."""
-    with cluster(1) as address:
-        yield address
+    with start_cluster(1) as started:
+        yield started.scheduler_address
 
 
 def survey(map_file, *words) -> int:
@@ -117,6 +118,22 @@ def test_a_chunk_that_fails_is_named_and_the_rest_stands(tmp_path, scheduler):
     assert (again.store.layer("best_class")[:] == 255).sum() == 16 * 14
     with pytest.raises(PlanningError, match="cannot be written: No room; finished chunks are ke"):
         run_survey(again.job, again.chunks, settings, task=refuse_one)
+
+
+def test_a_survey_ends_when_no_worker_is_left(tmp_path):
+    """A worker of this machine that did not start again had the survey wait for ever."""
+    prepared = prepare_here(tmp_path, make_rough_map(40, 40), make_request(step=4), chunk=16)
+    settings = dask_cluster.SETTINGS | {"distributed.scheduler.no-workers-timeout": "1s"}
+    assert settings.keys() == dask_cluster.SETTINGS.keys()
+    with dask.config.set(settings), start_cluster(1) as started:
+
+        def lose_the_worker() -> Iterator[Index]:
+            started.scale(0)
+            wait_until(lambda: not started.scheduler.workers, "the worker to be gone")
+            yield from prepared.chunks
+
+        with pytest.raises(PlanningError, match="has no worker any more; finished chunks are"):
+            run_survey(prepared.job, lose_the_worker(), ClusterSettings(started.scheduler_address))
 
 
 @contextmanager
@@ -225,11 +242,11 @@ def test_a_scheduler_without_workers_or_with_small_ones_is_refused(ground, monke
     monkeypatch.setattr(dask_cluster, "WORKERS_TIME", 0.3)
     prepared = prepare_survey(make_request(), str(ground), ground.with_name("other"), 64)
     refused = pytest.raises(PlanningError, match=r"has had no worker for 0\.3 s; start some")
-    with cluster(0) as address, refused:
-        run_survey(prepared.job, prepared.chunks, ClusterSettings(address))
+    with start_cluster(0) as started, refused:
+        run_survey(prepared.job, prepared.chunks, ClusterSettings(started.scheduler_address))
     capfd.readouterr()
-    with cluster(1, memory_limit="300MB", threads_per_worker=1) as address:
-        assert survey(ground, "--scheduler", address) == 2
+    with start_cluster(1, memory_limit="300MB", threads_per_worker=1) as started:
+        assert survey(ground, "--scheduler", started.scheduler_address) == 2
     err = capfd.readouterr().err
     assert "a worker has 300 MB: give a smaller --chunk" in err
     assert not ground.with_name("out").exists()
