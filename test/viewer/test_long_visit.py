@@ -2,6 +2,7 @@
 """A visit of ten minutes to the program itself, on three grounds, as a demanding person clicks."""
 
 import time
+from contextlib import suppress
 
 import pytest
 
@@ -9,14 +10,15 @@ from benchmarks.bench_page import MOST_MEMORY, open_view
 from benchmarks.grounds import made_reef
 from benchmarks.processes import memory_of
 from rover_physics.terrain.grid import save_terrain
-from support.viewer.browser import Visitor, needs_browser, open_browser, wait_until
+from support.viewer.browser import Visitor, needs_browser, open_browser, sync_api, wait_until
 
 pytestmark = [needs_browser, pytest.mark.long]
 
 MINUTES, ROUNDS = 10.0, 4
 """Time of all visits, and the least number of rounds of each: in the first, memory grows."""
-STEADY = 1.06
-"""Largest memory at the end over that after a third of a visit."""
+STEADY = 1.02
+"""Largest share of what memory came to in the first half of a visit that it keeps to the end: it
+goes up and down by 5 %."""
 FRICTION, RADIUS, HEIGHT = "friction [-]", "radius [m]", "wheels z [m]"
 
 
@@ -66,7 +68,8 @@ def take_advice(visitor: Visitor) -> None:
         visitor.press("Undo")
         wait_for_rest(visitor)
     elif stop.count():
-        stop.click()
+        with suppress(sync_api.TimeoutError):  # it may end before it is clicked
+            stop.click(timeout=5000.0)
         wait_until(lambda: not stop.count(), "the end of the search")
 
 
@@ -132,7 +135,8 @@ def test_a_long_visit_keeps_path_comparison_and_memory(ground, browser, tmp_path
         change(visitor, friction="0.7")
         wait_for_rest(visitor)
     assert max(memory) < MOST_MEMORY, memory
-    assert memory[-1] < STEADY * memory[len(memory) // 3], memory
+    half = len(memory) // 2
+    assert min(memory[half:]) < STEADY * max(memory[:half]), memory
     visitor.wait_for("No connection to the program")
     with open_view(*arguments, port=int(url.rsplit(":", 1)[1])):
         visitor.wait_for("The program was started again; what you had changed is taken up.")
