@@ -17,8 +17,7 @@ pytestmark = [needs_browser, pytest.mark.long]
 MINUTES, ROUNDS = 10.0, 4
 """Time of all visits, and the least number of rounds of each: in the first, memory grows."""
 STEADY = 1.02
-"""Largest share of what memory came to in the first half of a visit that it keeps to the end: it
-goes up and down by 5 %."""
+"""Least memory in the second half of a visit over the most in the first: it goes up and down."""
 FRICTION, RADIUS, HEIGHT = "friction [-]", "radius [m]", "wheels z [m]"
 
 
