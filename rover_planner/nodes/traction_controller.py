@@ -195,7 +195,8 @@ class TractionController(RoverNode[TractionControllerParameters]):
         """Return the last command if this update is to send it again, else None."""
         last, rates = self._command, self.service.joints.wheel_rates
         stands = last is not None and last.state != DRIVING and max(abs(rates)) < STANDING_RATE
-        self._repeats = stands and not self._repeats
+        tripped = self._watchdog.trips != self._trips
+        self._repeats = stands and not tripped and not self._repeats
         return last if self._repeats else None
 
     def _find_command(self, now: float) -> TractionCommand:

@@ -174,6 +174,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self._hazards.catch_up()
         now = time.monotonic()
         if now >= self._diagnostics_due:
+            # Half a beat early: one that comes a little sooner than due must not be left out.
             self._diagnostics_due = now + DIAGNOSTICS_PERIOD - 0.5 * PERIOD
             self._publish_diagnostics()
         self._set_pace()
