@@ -33,7 +33,7 @@ from rover_planner.errors import DemoError, PlanningError
 from rover_planner.maps.summary import describe_terrain
 from rover_planner.planning.goals import Mission, choose_mission
 from rover_planner.shell.progress import Steps
-from rover_planner.shell.run_program import EXIT_NOT_TRAVERSABLE, EXIT_OK
+from rover_planner.shell.run_program import EXIT_OK
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 COMPILER = "rover_physics.warm_up"
@@ -246,8 +246,8 @@ def _ask_server(
                 goal = mission.goals[event["goal"] - 1]
                 status.update(f"ask for goal {goal.name} ({goal.intent})")
         status.update(f"asked for {len(answers)} goals over DDS")
-    _expect_success(planner, (EXIT_OK, EXIT_NOT_TRAVERSABLE))
     if len(answers) != len(mission.goals):
+        _expect_success(planner)
         raise DemoError(f"{len(answers)} of {len(mission.goals)} goals were answered")
     return answers
 
@@ -277,11 +277,11 @@ def _skip_to(events: Iterator[dict[str, Any]], name: str, planner: ChildProcess)
         raise DemoError(f"{planner.name} ended before {name}")
 
 
-def _expect_success(child: ChildProcess, codes: tuple[int, ...] = (EXIT_OK,)) -> None:
-    """Wait until a child has ended; raise DemoError if its exit code is not in `codes`."""
+def _expect_success(child: ChildProcess) -> None:
+    """Wait until a child has ended; raise DemoError if it failed."""
     while child.running:
         time.sleep(0.02)
-    if child.exit_code not in codes:
+    if child.exit_code != EXIT_OK:
         raise DemoError(
             f"{child.name} ended with code {child.exit_code}: {child.last_line()} "
             f"(see {child.log})"

@@ -102,6 +102,22 @@ def test_a_server_that_dies_fails_the_demo_with_one_line(tmp_path, map_file):
     assert_nothing_left(demo)
 
 
+@pytest.mark.long
+def test_goals_that_a_busy_server_has_no_time_for_are_refused_in_the_table(
+    tmp_path, map_file, monkeypatch, capsys
+):
+    """The demo ended with "it said nothing"."""
+    usual = demo_module._server_parameters
+    monkeypatch.setattr(
+        demo_module,
+        "_server_parameters",
+        lambda *words: (*usual(*words), "-p", "time_budget:=0.05"),
+    )
+    answers = demo_module.run_demo(str(map_file), tmp_path / "demo.png")
+    late = [answer["reason"] for answer in answers if answer["code"] == "too_long"]
+    assert late and late[0].split()[0] in capsys.readouterr().out
+
+
 def test_a_demo_takes_no_domain_of_a_test_though_it_looks_unused():
     taken = {int(demo_module._environment()["ROS_DOMAIN_ID"]) for _ in range(20)}
     assert domain_id() <= DOMAINS < min(taken)
