@@ -5,6 +5,7 @@ import math
 
 import pytest
 from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import Imu, JointState
@@ -42,6 +43,14 @@ def odometry(child: str) -> Odometry:
     return message
 
 
+def twist() -> TwistStamped:
+    """Return a command whose numbers all differ."""
+    message = TwistStamped()
+    for part, first in ((message.twist.linear, 1.0), (message.twist.angular, 4.0)):
+        part.x, part.y, part.z = first, first + 1.0, first + 2.0
+    return message
+
+
 def fields_of(message, like) -> object:
     """Return the fields of a message that `like` has, as plain values."""
     if hasattr(like, "_fields"):
@@ -60,6 +69,7 @@ def fields_of(message, like) -> object:
         imu(),
         odometry(""),
         odometry("base"),
+        twist(),
         joints([]),
         joints(["a"], [1.0]),
         joints(["a", "bcdefg"], [], [2.0, math.inf], [3.0, 4.0]),
@@ -71,6 +81,11 @@ def test_fields_are_those_that_rclpy_reads(message, frame):
     read = SensorReader().read(serialize_message(message), type(message))
     assert repr(fields_of(read, read)) == repr(fields_of(message, read))
     assert (read.header.frame_id, read.header.stamp.nanosec) == (frame, 8)
+
+
+def test_a_command_without_header_has_the_same_fields():
+    plain = SensorReader().read(serialize_message(twist().twist), Twist)
+    assert plain == SensorReader().read(serialize_message(twist()), TwistStamped).twist
 
 
 def test_damaged_bytes_are_refused():

@@ -124,7 +124,7 @@ def test_a_survey_ends_when_no_worker_is_left(tmp_path):
     """A worker of this machine that did not start again had the survey wait for ever."""
     prepared = prepare_here(tmp_path, make_rough_map(40, 40), make_request(step=4), chunk=16)
     settings = dask_cluster.SETTINGS | {"distributed.scheduler.no-workers-timeout": "1s"}
-    assert settings.keys() == dask_cluster.SETTINGS.keys()
+    assert settings.keys() == dask_cluster.SETTINGS.keys()  # it is one of the survey's own
     with dask.config.set(settings), start_cluster(1) as started:
 
         def lose_the_worker() -> Iterator[Index]:
