@@ -17,7 +17,8 @@ pytestmark = [needs_browser, pytest.mark.long]
 MINUTES, ROUNDS = 10.0, 4
 """Time of all visits, and the least number of rounds of each: in the first, memory grows."""
 STEADY = 1.02
-"""Least memory in the second half of a visit over the most in the first: it goes up and down."""
+"""Least memory in the last third of a visit over the most in the rounds after the first and up to
+the second third: it goes up and down."""
 FRICTION, RADIUS, HEIGHT = "friction [-]", "radius [m]", "wheels z [m]"
 
 
@@ -134,8 +135,8 @@ def test_a_long_visit_keeps_path_comparison_and_memory(ground, browser, tmp_path
         change(visitor, friction="0.7")
         wait_for_rest(visitor)
     assert max(memory) < MOST_MEMORY, memory
-    half = len(memory) // 2
-    assert min(memory[half:]) < STEADY * max(memory[:half]), memory
+    third = len(memory) // 3
+    assert min(memory[-third:]) < STEADY * max(memory[1 : third + 2]), memory
     visitor.wait_for("No connection to the program")
     with open_view(*arguments, port=int(url.rsplit(":", 1)[1])):
         visitor.wait_for("The program was started again; what you had changed is taken up.")
