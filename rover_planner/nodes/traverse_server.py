@@ -141,11 +141,11 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         super().destroy_node()
 
     def _create_subscriptions(self) -> None:
-        hear_joints = partial(self._take_joints, SensorReader())
-        self.heard.subscribe(JointState, "joint_states", hear_joints, polled_qos(), raw=True)
-        self.heard.subscribe(Odometry, "odometry", self._take_odometry, newest_qos())
+        hear, reader = partial(self.heard.subscribe, raw=True), SensorReader()
+        hear(JointState, "joint_states", partial(self._take_joints, reader), polled_qos())
+        hear(Odometry, "odometry", partial(self._take_odometry, reader), newest_qos())
         if self.values.imu_attitude:
-            self.heard.subscribe(Imu, "imu", self._take_imu, polled_qos())
+            hear(Imu, "imu", partial(self._take_imu, reader), newest_qos())
         reliability = self.values.input_reliability
         subscribe_to_requests(self, Path, "~/path", self._take_path, reliability, raw=True)
         qos = replace_reliability(topic_qos(), reliability)
@@ -200,18 +200,18 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
                 f"{error}; the angles known before stay", throttle_duration_sec=5.0
             )
 
-    def _take_odometry(self, odometry: Odometry, _arrival: float) -> None:
+    def _take_odometry(self, reader: SensorReader, message: bytes, _arrival: float) -> None:
         try:
-            self._inputs.take_odometry(odometry)
+            self._inputs.take_odometry(reader.read(message, Odometry))
             self._maps.look_under_rover()
         except RoverError as error:
             self.get_logger().warning(
                 f"odometry not used, the suspension is not compared: {error}", once=True
             )
 
-    def _take_imu(self, imu: Imu, _arrival: float) -> None:
+    def _take_imu(self, reader: SensorReader, message: bytes, _arrival: float) -> None:
         try:
-            self._inputs.take_imu(imu)
+            self._inputs.take_imu(reader.read(message, Imu))
         except MessageError as error:
             self.get_logger().warning(f"imu not used: {error}", throttle_duration_sec=10.0)
 

@@ -4,14 +4,16 @@
 import copy
 from collections.abc import Callable
 from functools import partial
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import Pose, PoseStamped, TransformStamped
-from nav_msgs.msg import Odometry, Path
+from nav_msgs.msg import Path
 from numpy.typing import NDArray
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import Header
 
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame, read_transform
@@ -81,7 +83,7 @@ class Frames:
         at = read_transform(transform)
         self._tree.take(at.parent, at.child, at.stamp, Rigid.of(at), is_static=is_static)
 
-    def take_odometry(self, odometry: Odometry) -> None:
+    def take_odometry(self, odometry: Any) -> None:
         """Keep the pose of the body that odometry in the map frame tells, for the sensors."""
         assert self._sensors is not None
         stamp, robot = stamp_to_ns(odometry.header.stamp), read_pose(odometry.pose.pose)
@@ -142,20 +144,11 @@ class Frames:
             MessageError: The pose is not finite, or no unit quaternion.
             TransformError: As `TransformTree.find`.
         """
-        frame = stamped.header.frame_id
-        is_here = frame == self._map or not self._tree.knows(frame)
-        if is_here and self._offset is None:
+        moved = self._move(stamped.header, stamped.pose, what)
+        if moved is None:
             return stamped
-        pose_to_array(stamped.pose, what)  # refuses what is no pose
-        rigid = read_pose(stamped.pose)
-        if not is_here:
-            stamp = stamp_to_ns(stamped.header.stamp)
-            rigid = self._tree.find(self._map, frame, stamp, self.now()).then(rigid)
-        moved = PoseStamped(pose=Pose())
-        write_pose(self._to_body(rigid), moved.pose)
-        moved.header.stamp = stamped.header.stamp
-        moved.header.frame_id = frame if is_here else self._map
-        return moved
+        frame, pose = moved
+        return PoseStamped(header=Header(stamp=stamped.header.stamp, frame_id=frame), pose=pose)
 
     def localise_path(self, path: Path) -> Path:
         """Return a path of the robot as one of the body in the map frame; see `localise`."""
@@ -172,15 +165,32 @@ class Frames:
             moved.header.frame_id = moved.poses[0].header.frame_id
         return moved
 
-    def localise_odometry(self, odometry: Odometry) -> Odometry:
-        """Return odometry of the body in the map frame; see `localise`."""
-        here = PoseStamped(header=odometry.header, pose=odometry.pose.pose)
-        moved = self.localise(here, "odometry")
-        if moved is here:
+    def localise_odometry(self, odometry: Any) -> Any:
+        """Return odometry, as `SensorReader` reads it, of the body in the map frame."""
+        moved = self._move(odometry.header, odometry.pose.pose, "odometry")
+        if moved is None:
             return odometry
-        result = Odometry(header=moved.header, child_frame_id=odometry.child_frame_id)
-        result.pose.pose, result.pose.covariance = moved.pose, odometry.pose.covariance
-        return result
+        frame, pose = moved
+        return SimpleNamespace(
+            header=SimpleNamespace(stamp=odometry.header.stamp, frame_id=frame),
+            child_frame_id=odometry.child_frame_id,
+            pose=SimpleNamespace(pose=pose, covariance=odometry.pose.covariance),
+        )
+
+    def _move(self, header: Any, pose: Any, what: str) -> tuple[str, Pose] | None:
+        """Return the frame and the pose of the body; None where those of the robot are it."""
+        frame = header.frame_id
+        is_here = frame == self._map or not self._tree.knows(frame)
+        if is_here and self._offset is None:
+            return None
+        pose_to_array(pose, what)  # refuses what is no pose
+        rigid = read_pose(pose)
+        if not is_here:
+            stamp = stamp_to_ns(header.stamp)
+            rigid = self._tree.find(self._map, frame, stamp, self.now()).then(rigid)
+        body = Pose()
+        write_pose(self._to_body(rigid), body)
+        return frame if is_here else self._map, body
 
     def to_base(self, path: Path) -> Path:
         """Change a path of the body into one of the robot, in place, and return it."""

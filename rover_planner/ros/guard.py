@@ -18,9 +18,9 @@ from rclpy.node import Node
 from rover_physics.errors import RoverError
 
 NANOSECONDS = 1e9
-EVENT_PERIOD, EVENT_WINDOW = 1.0, 0.01
+EVENT_PERIOD = 1.0
 """Time between two looks at events of publishers and subscriptions, such as profiles that do not
-match, and the length of a look [s]: they are half of the entities of a wait set."""
+match [s]: they are half of the entities of a wait set, and no wait lasts once one has occurred."""
 PATIENCE, PATIENT_PERIODS = 0.1, 5
 """Time between two looks at all else where a node has a loop [s], or that number of its periods if
 it is more."""
@@ -109,18 +109,19 @@ class GuardedExecutor(SingleThreadedExecutor):
     def __init__(self, **executor_arguments: Any):
         super().__init__(**executor_arguments)
         self._guard_of_node: Guard | None = None
-        self._events_due = self._events_until = 0.0
+        self._events_due, self._looks_at_events = 0.0, False
         self._loop: Any = None
         self._loop_due = self._others_due = 0.0
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Call what is ready next; a loop that is due comes first."""
-        if not self._is_apart(self._loop):
-            super().spin_once(timeout_sec)
-        elif self._others_due <= time.monotonic() < self._loop_due:
-            self._call_other()
-        else:
+        now, has_loop = time.monotonic(), self._is_apart(self._loop)
+        if has_loop and not self._others_due <= now < self._loop_due:
             self._call_loop()
+        elif has_loop or now >= self._events_due:
+            self._call_other(now)
+        else:
+            super().spin_once(timeout_sec)
 
     def _is_apart(self, timer: Any) -> bool:
         """Return whether a timer is a loop; with a simulated clock, /clock comes before loops."""
@@ -137,24 +138,29 @@ class GuardedExecutor(SingleThreadedExecutor):
         except Exception as error:
             self._report("the loop", error)
 
-    def _call_other(self) -> None:
-        """Call one of what is ready besides the loop; look again later if there is nothing."""
+    def _call_other(self, now: float) -> None:
+        """Call one of what is ready besides a loop; look again later if there is nothing."""
+        self._looks_at_events = now >= self._events_due
         try:
             call, _, _ = self.wait_for_ready_callbacks(timeout_sec=0.0)
         except TimeoutException:
-            period = self._loop.timer_period_ns / NANOSECONDS
-            self._others_due = time.monotonic() + max(PATIENCE, PATIENT_PERIODS * period)
+            self._others_due = time.monotonic() + self._find_patience()
+            if self._looks_at_events:
+                self._events_due = now + EVENT_PERIOD
         else:
             call()
+            call.result()  # raises the error of a node without a guard
+        finally:
+            self._looks_at_events = False
+
+    def _find_patience(self) -> float:
+        period = 0.0 if self._loop is None else self._loop.timer_period_ns / NANOSECONDS
+        return max(PATIENCE, PATIENT_PERIODS * period)
 
     def can_execute(self, entity: Any) -> bool:
         """Return whether the next wait is for an entity, too; events wait for their turn."""
-        if isinstance(entity, EventHandler):
-            now = time.monotonic()
-            if now >= self._events_due:
-                self._events_due, self._events_until = now + EVENT_PERIOD, now + EVENT_WINDOW
-            if now >= self._events_until:
-                return False
+        if isinstance(entity, EventHandler) and not self._looks_at_events:
+            return False
         return not self._is_apart(entity) and bool(super().can_execute(entity))
 
     def add_node(self, node: Node) -> bool:

@@ -5,8 +5,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from nav_msgs.msg import Odometry, Path
-from sensor_msgs.msg import Imu, JointState, PointCloud2
+from nav_msgs.msg import Path
+from sensor_msgs.msg import JointState, PointCloud2
 
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
@@ -86,8 +86,8 @@ class ServerInputs:
         """
         self.service.take_joints(self.joint_names.positions(state, self.service.joint_names))
 
-    def take_odometry(self, odometry: Odometry) -> None:
-        """Take the pose of the robot.
+    def take_odometry(self, odometry: Any) -> None:
+        """Take the pose of the robot, as `SensorReader` reads it.
 
         Raises:
             RoverError: A value is wrong, or the frame is not known.
@@ -98,8 +98,8 @@ class ServerInputs:
         self.frames.take_odometry(here)
         self.service.take_pose(pose[[0, 1, 3]], body)
 
-    def take_imu(self, imu: Imu) -> None:
-        """Take roll and pitch, if the parameter imu_attitude is set.
+    def take_imu(self, imu: Any) -> None:
+        """Take roll and pitch, if the parameter imu_attitude is set; see `take_odometry`.
 
         Raises:
             MessageError: A value is wrong.

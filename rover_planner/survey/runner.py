@@ -146,9 +146,7 @@ class _Run:
 
     def _take(self, report: ChunkReport) -> None:
         if report.refusal:
-            raise PlanningError(
-                f"{self._job.store}: cannot be written: {report.refusal}; {KEPT}"
-            )
+            raise PlanningError(f"{self._job.store}: cannot be written: {report.refusal}; {KEPT}")
         self._outcome.done += 1
         self._outcome.poses += report.poses
         self._on_chunk(report)

@@ -4,8 +4,13 @@
 import time
 
 import pytest
+from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.duration import Duration
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.serialization import serialize_message
+from rclpy.subscription import Subscription
+from rclpy.timer import Timer
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
@@ -82,6 +87,43 @@ def test_an_entity_that_cannot_be_read_does_not_block_the_node(ros):
 
     executor._make_handler(next(iter(node.subscriptions)), node, fail)()
     assert node.default_callback_group.can_execute(node.timer)  # rclpy's own blocks it for ever
+    executor.shutdown()
+    node.destroy_node()
+
+
+class CountingExecutor(GuardedExecutor):
+    """Counts its wait sets: each asks once for the timer."""
+
+    wait_sets = 0
+
+    def can_execute(self, entity):
+        self.wait_sets += isinstance(entity, Timer)
+        return super().can_execute(entity)
+
+
+def test_a_message_that_is_left_alone_ends_no_wait(ros):
+    node = Fragile(ros.context)
+    node.timer.cancel()
+
+    class Unread(MutuallyExclusiveCallbackGroup):
+        def can_execute(self, entity):
+            return not isinstance(entity, Subscription) and super().can_execute(entity)
+
+    events = SubscriptionEventCallbacks(incompatible_qos=node.heard.append)
+    node.create_subscription(
+        String, "maps", node.heard.append, 10, callback_group=Unread(), event_callbacks=events
+    )
+    speaker = ros.spin(Node("speaker", context=ros.context))
+    maps = speaker.create_publisher(String, "maps", 10)
+    wait_until(lambda: maps.get_subscription_count() > 0, "the subscription")
+    maps.publish(String(data="large"))
+    assert maps.wait_for_all_acked(Duration(seconds=20.0))
+    executor = CountingExecutor(context=ros.context)
+    executor.add_node(node)
+    end = time.monotonic() + 2.5
+    while time.monotonic() < end:
+        executor.spin_once(0.5)
+    assert not node.heard and 5 <= executor.wait_sets <= 25
     executor.shutdown()
     node.destroy_node()
 

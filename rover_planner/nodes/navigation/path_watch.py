@@ -80,8 +80,8 @@ class PathWatch:
         self._node, self._service = node, service
         self._find_pose, self._report_stop = find_pose, report_stop
         self._monitor = PathMonitor()
-        self.finding = self._monitor.finding
-        """The last finding; belongs to the executor's thread."""
+        self.finding, self._found_idle = self._monitor.finding, False
+        """The last finding."""
         self.enabled = False
         """True while accepted paths are watched."""
         self._reported: PathJudgement | None = None
@@ -138,7 +138,8 @@ class PathWatch:
 
     def look(self) -> None:
         """Have a look taken at once, from any thread: there is a new map."""
-        self._node.handover.call(self.beat)
+        if not self.is_idle:
+            self._node.handover.call(self.beat)
 
     def beat(self) -> None:
         """Have a look taken if one is due, and publish `~/watch`; to be called each PERIOD."""
@@ -247,8 +248,15 @@ class PathWatch:
         return self._monitor.stop(refusal("internal_error", f"internal error: {text}"))
 
     def _hand_over(self, finding: Finding, sight: Sight) -> None:
-        """Publish a finding at once; classes of a stop's waypoints take longer and follow."""
-        self._node.handover.call(lambda: self._take(finding))
+        """Publish a finding at once; classes of a stop's waypoints take longer and follow.
+
+        Where nothing was watched before nor is now, there is nothing to publish.
+        """
+        was_idle, self._found_idle = self._found_idle, finding.state == IDLE
+        if was_idle and self._found_idle:
+            self.finding, self._looked = finding, time.monotonic()
+        else:
+            self._node.handover.call(lambda: self._take(finding))
         judgement = finding.judgement
         if finding.state != STOPPED or judgement is None or judgement is self._reported:
             return

@@ -85,14 +85,15 @@ class TractionInputs:
 
     def _subscribe(self, parameters: TractionControllerParameters) -> None:
         hear = self._node.heard.subscribe
-        for kind, name, take in (
-            (JointState, JOINT_STATES, self._take_joints),
-            (Imu, IMU, self._take_imu),
-            (self._twist, CMD_VEL, self._take_command),
+        merged, newest = sensor_qos(), newest_qos()  # joints may come from several publishers
+        for kind, name, take, qos in (
+            (JointState, JOINT_STATES, self._take_joints, merged),
+            (Imu, IMU, self._take_imu, newest),
+            (self._twist, CMD_VEL, self._take_command, newest),
         ):
-            hear(kind, name, self._guard(name, take), sensor_qos(), raw=True)
+            hear(kind, name, self._guard(name, take), qos, raw=True)
         take_odometry = self._guard(ODOMETRY, self._take_odometry)
-        hear(Odometry, ODOMETRY, take_odometry, newest_qos(), self._needs_odometry)
+        hear(Odometry, ODOMETRY, take_odometry, newest, self._needs_odometry, raw=True)
         hear(Bool, STOP, self._guard(STOP, self._take_stop), topic_qos())
 
     def _needs_odometry(self) -> bool:
@@ -169,7 +170,8 @@ class TractionInputs:
     def _take_stop(self, message: Bool, now: float) -> None:
         self._service.take_stop(message.data, now)
 
-    def _take_odometry(self, odometry: Odometry, now: float) -> None:
+    def _take_odometry(self, message: bytes, now: float) -> None:
+        odometry = self._reader.read(message, Odometry)
         measured = self._find_time(ODOMETRY, _stamp_of(odometry), now)
         if odometry.header.frame_id != self._map_frame:
             self._frames.listen()  # only then: /tf of a whole robot costs the loop time
