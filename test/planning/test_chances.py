@@ -17,7 +17,7 @@ from support.rough_grounds import plane
 
 LSR1 = load_rover("lsr1")
 START, GOAL = (-1.2, 0.0, 0.0), (1.2, 0.0, 0.0)
-LONG = LatticeSettings(budget=60.0)
+LONG = LatticeSettings(budget=60.0, cell=0.3)
 
 
 @pytest.fixture(scope="module")

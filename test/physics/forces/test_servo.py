@@ -235,7 +235,7 @@ grips = st.floats(1e-3, 0.5)
 loads = st.floats(0.01, 0.4)
 droops = st.floats(0.0, 0.9)
 limits = st.floats(0.02, 0.5)
-many = settings(max_examples=50)
+many = settings(max_examples=20)
 
 
 def servo_of(limit, droop, share=1.0):
