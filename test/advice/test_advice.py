@@ -8,7 +8,7 @@ from itertools import permutations, takewhile
 import numpy as np
 import pytest
 
-from rover_physics import SweepOptions, judge_path, load_rover
+from rover_physics import SweepOptions, judge_path
 from rover_planner.advice import refusal, seek
 from rover_planner.advice.advise import Advice, grow_advice, grow_within, path_of
 from rover_planner.advice.case import Case
@@ -18,8 +18,8 @@ from rover_planner.advice.remedy import Remedy
 from rover_planner.advice.seek import TOLERANCE
 from rover_planner.planning.answering.budget import QuestionStoppedError
 from support.grounds import make_terrain
+from support.rovers import LSR1
 
-LSR1 = load_rover("lsr1")
 S = np.arange(-1.5, 1.6, 0.05)
 STRAIGHT = np.column_stack([S, 0.0 * S, 0.0 * S])
 

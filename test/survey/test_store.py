@@ -17,6 +17,7 @@ from rover_planner.errors import PlanningError
 from rover_planner.survey.chunk_survey import compute_chunk
 from rover_planner.survey.store import NOTES, SurveyStore
 from rover_planner.survey.survey import prepare_survey
+from support.rovers import LSR1
 from support.survey_maps import (
     assert_same_bits,
     compute_here,
@@ -26,7 +27,6 @@ from support.survey_maps import (
     survey_here,
 )
 
-LSR1 = load_rover("lsr1")
 HEAVIER = replace(LSR1, wheel=replace(LSR1.wheel, mass=0.36))
 
 

@@ -8,7 +8,7 @@ import numba
 import numpy as np
 import pytest
 
-from rover_physics import Terrain, judge_path, load_rover, load_terrain
+from rover_physics import Terrain, judge_path, load_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
 from rover_planner.planning.search import query
@@ -32,8 +32,8 @@ from rover_planner.planning.search.query import (
 )
 from support.grounds import long_wall, make_terrain, pen, waves
 from support.rough_grounds import rocky
+from support.rovers import LSR1
 
-LSR1 = load_rover("lsr1")
 OPTIONS = PathQueryOptions(waypoint_spacing=0.04)
 LONG = LatticeSettings(budget=60.0)
 START, GOAL = (-2.5, 0.0, 0.0), (2.5, 0.0, 0.0)
