@@ -141,12 +141,12 @@ def test_moves_lead_along_their_headings():
 
 def test_the_command_prints_area_and_longest_way_and_draws_them(tmp_path, capfd):
     request = make_request(headings=8)
-    store = survey_here(tmp_path, Terrain(np.zeros((36, 40)), 0.1), request, chunk=32).store
+    store = survey_here(tmp_path, Terrain(np.zeros((36, 70)), 0.1), request, chunk=64).store
     picture, tif = tmp_path / "area.png", tmp_path / "area.tif"
-    words = ["reachable", str(store.path), "--from", "1.5,2", "--picture", str(picture)]
+    words = ["reachable", str(store.path), "--from", "3,2", "--picture", str(picture)]
     assert main([*words, "--geotiff", str(tif)]) == 0
     report = json.loads(capfd.readouterr().out)
-    area = find_reachable(store, 1.5, 2.0)
+    area = find_reachable(store, 3.0, 2.0)
     assert report["cells"] == area.cells and report["turns"] == "assumed"
     assert report["longest"] == pytest.approx(area.longest, abs=1e-3)
     # At the edge the rover stands along it only, and it drives forwards only.
@@ -158,8 +158,8 @@ def test_the_command_prints_area_and_longest_way_and_draws_them(tmp_path, capfd)
     assert json.loads(capfd.readouterr().out)["chunks_missing"] == 1
     store.mark_failed((0, 0))
     with pytest.raises(PlanningError, match="not surveyed yet"):
-        find_reachable(store, 1.5, 2.0)
-    with pytest.raises(PlanningError, match=r"from \(99, 0\) is off the map; .* x 0 to 3.9"):
+        find_reachable(store, 3.0, 2.0)
+    with pytest.raises(PlanningError, match=r"from \(99, 0\) is off the map; .* x 0 to 6.9"):
         find_reachable(store, 99.0, 0.0)
 
 
