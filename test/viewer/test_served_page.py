@@ -35,8 +35,8 @@ pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
 from rover_planner.viewer.pages import base
 from rover_planner.viewer.pages.page import Page
-from rover_planner.viewer.scene.nodes import Nodes, Strand
-from rover_planner.viewer.scene.rover_visual import RoverVisual
+from rover_planner.viewer.scene.canvas import Canvas, Strand
+from rover_planner.viewer.scene.drawn_rover import DrawnRover
 from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN
 from rover_planner.viewer.state.judging import POLICY
 
@@ -142,7 +142,7 @@ def test_a_rover_file_and_a_preset_are_loaded_and_the_arm_follows(page):
     page.hear({"ask": "upload", "name": "bare.yaml", "text": text}, None)
 
     def meshes() -> dict:
-        return page.scene.rover.visual._meshes
+        return page.scene.rover.meshes
 
     wait_until(lambda: told(page, "sliders")["rover"] == "bare", "the loaded rover")
     wait_until(lambda: "arm" not in meshes() and "body" in meshes(), "no arm")
@@ -201,37 +201,57 @@ def test_the_verdict_is_told_before_its_drawings_and_policies_are_judged_after_t
 
 
 def test_the_ghost_of_a_failure_stays_for_the_next_one_and_hides_without(page):
-    session, mark = session_on(ramp), page.scene.failure
+    session, mark, canvas = session_on(ramp), page.scene.failure, page.scene.canvas
     ghosts = []
     for friction in (0.4, 0.35):
         session.change_rover([("friction",)], friction)
         failure = session.shown.path.failure
         mark.show(LSR1, failure)
-        ghosts.append(mark.ghost.visual)
+        ghosts.append(canvas.nodes["/failure/links"])
         np.testing.assert_allclose(
-            mark.ghost.visual.root.position, page.scene.frame.to_scene(failure.state.position)
+            ghosts[-1].position, canvas.to_scene(failure.state.position), rtol=1e-6
         )
-    assert ghosts[0] is ghosts[1] and mark.ghost.root.visible
-    assert mark.ghost.visual._meshes[failure.link].color == REFUSED
-    assert mark.make_room(failure.state) == failure.link and not mark.ghost.root.visible
-    assert mark.make_room(None) == "" and mark.ghost.root.visible
+    ghost, (wheel, _) = canvas.nodes["/failure"], mark.ghost.meshes[failure.link]
+    assert ghosts[0] is ghosts[1] and ghost.visible
+    assert canvas.nodes[wheel].color == REFUSED
+    assert mark.make_room(failure.state) == failure.link and not ghost.visible
+    assert mark.make_room(None) == "" and ghost.visible
     mark.show(LSR1, None)
-    assert not mark.ghost.root.visible and mark.make_room(failure.state) == ""
+    assert not ghost.visible and mark.make_room(failure.state) == ""
 
 
 def test_the_link_that_fails_has_the_colour_of_that_and_its_own_again_where_none_does(page):
-    state = page.session.shown.path.trajectory.state_at(0.0)
-    visual = RoverVisual(page.server.scene, LSR1, page.scene.frame, "/test/rover", 0.5)
-    before = {link: mesh.color for link, mesh in visual._meshes.items()}
+    state, canvas = page.session.shown.path.trajectory.state_at(0.0), Canvas(page.server.scene)
+    rover = DrawnRover(canvas, "/test/rover", 0.5)
+    rover.take(LSR1, {})
+    meshes = {link: canvas.nodes[name] for link, (name, _) in rover.meshes.items()}
+    before = {link: mesh.color for link, mesh in meshes.items()}
     for link in ("bogie_left", "body", "front_left"):
-        visual.show(state, link)
-        changed = {name for name, mesh in visual._meshes.items() if mesh.color == REFUSED}
-        assert changed == {link} and visual._meshes[link].opacity == 1.0
-    visual.show(state)
+        rover.show(state, link)
+        assert {name for name, mesh in meshes.items() if mesh.color == REFUSED} == {link}
+        assert meshes[link].opacity == 1.0
+    rover.show(state)
     for link, colour in before.items():
-        assert link in WHEELS or visual._meshes[link].color == colour
-        assert visual._meshes[link].opacity == 0.5
-    visual.root.remove()
+        assert link in WHEELS or meshes[link].color == colour
+        assert meshes[link].opacity == 0.5
+    canvas.remove("/test")
+    assert canvas.nodes == {}
+
+
+def test_a_rover_of_another_shape_keeps_the_nodes_that_it_has_too(page):
+    canvas = Canvas(page.server.scene)
+    rover = DrawnRover(canvas, "/test/rover")
+    rover.take(LSR1, {})
+    rover.show(page.session.shown.path.trajectory.state_at(0.0))
+    before = dict(canvas.nodes)
+    suspension = replace(LSR1.suspension, rocker_wheel="front")
+    rover.take(replace(LSR1, suspension=suspension, manipulator=None), {})
+    stays = {name for name in canvas.nodes if canvas.nodes[name] is before.get(name)}
+    assert "/test/rover/links/body" in stays and "/test/rover/links/arm" not in canvas.nodes
+    assert set(before) != set(canvas.nodes) and not any(
+        canvas.nodes[name]._impl.removed for name in canvas.nodes
+    )
+    canvas.remove("/test")
 
 
 def test_a_path_is_drawn_in_the_colour_of_its_verdict_up_to_where_it_is_refused(page):
@@ -257,19 +277,19 @@ def to_screen(light) -> np.ndarray:
 def test_lines_have_the_colours_of_their_strands_and_what_looks_the_same_is_not_sent_again(page):
     line = np.column_stack([np.linspace(0.0, 1.0, 5), np.zeros(5), np.zeros(5)])
     strands = [Strand(line, PASSABLE), Strand(line + 1.0, REFUSED)]
-    nodes = Nodes(page.server.scene)
-    nodes.show_lines("/test/lines", strands, 4.0)
-    node, _ = nodes._shown["/test/lines"]
+    canvas = Canvas(page.server.scene)
+    canvas.show_lines("/test/lines", strands, 4.0)
+    node = canvas.nodes["/test/lines"]
     sent = node.points
     for paint, colours in ((UNKNOWN, [UNKNOWN] * 2), (None, [PASSABLE, REFUSED])):
         again = [replace(one, line=one.line.copy()) for one in strands]
-        nodes.show_lines("/test/lines", again, 4.0, paint)
+        canvas.show_lines("/test/lines", again, 4.0, paint)
         np.testing.assert_allclose(to_screen(node.colors[[0, -1], 0]), colours, atol=6.0)
         assert node.points is sent
-    nodes.show_lines("/test/lines", [replace(strands[0], line=line[:3])], 4.0)
-    assert nodes._shown["/test/lines"][0] is node and len(node.points) == 2
-    nodes.remove("/test")
-    assert nodes._shown == {}
+    canvas.show_lines("/test/lines", [replace(strands[0], line=line[:3])], 4.0)
+    assert canvas.nodes["/test/lines"] is node and len(node.points) == 2
+    canvas.remove("/test")
+    assert canvas.nodes == {}
 
 
 def test_a_trail_has_a_colour_from_blue_to_yellow_at_each_place(page):
@@ -360,9 +380,9 @@ def test_on_a_far_map_the_rover_is_where_it_is_on_a_near_one_and_a_click_lands_w
         page = Page(ViewSession(LSR1, ground, *ends, SURE), port=0)
         try:
             wait_for_rest(page)
-            places[x] = np.array(page.scene.rover.visual.root.position)
+            places[x] = np.array(page.scene.canvas.nodes["/rover/links"].position)
             aim = np.array([x + 1.5, y + 0.5])
-            place = page.scene.frame.to_scene([*aim, float(ground.elevation_at(*aim))])
+            place = page.scene.canvas.to_scene([*aim, float(ground.elevation_at(*aim))])
             away = np.array([-1.0, 0.0, 2.0])
             ray = SimpleNamespace(ray_origin=place + away, ray_direction=-away / np.sqrt(5.0))
             page._request_click(ray, shift=False)

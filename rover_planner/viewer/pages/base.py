@@ -129,7 +129,7 @@ class PageBase(ABC):
         self.errors = Errors(lambda messages: self.channel.tell("errors", messages))
         self._made_of: dict[str, tuple[Any, ...]] = {}
         self.scene = Scene(self.server)
-        self.scene.frame.move_to(terrain)
+        self.scene.canvas.move_to(terrain)
         self.scene.rover.take(rover, {})
         self._add_camera()
         self.painter = self.begin_work(paint, self._draw_ground, "ground")
@@ -300,23 +300,22 @@ class PageBase(ABC):
         self.requests.put(lambda: act([client], name))
 
     def _look(self, clients: Collection[Any], view: str) -> None:
-        self.scene.look(clients, view, self.ground, self.points)
+        self.scene.cameras.look(clients, view, self.ground, self.points)
 
     def _follow(self, _clients: Collection[Any], name: str) -> None:
         """Go along with the rover or not, and name the button by what it does next."""
-        self.scene.follow(name == FOLLOW)
+        self.scene.cameras.follow(name == FOLLOW)
         self._camera.options = (*VIEWS, STAY if name == FOLLOW else FOLLOW)
 
     def _request_click(self, event: Any, shift: bool) -> None:
-        origin, direction = np.array(event.ray_origin), np.array(event.ray_direction)
-
         def click() -> None:
+            origin = self.scene.canvas.to_map(event.ray_origin)
+            direction = np.array(event.ray_direction)
             index = self.scene.paths.find_number(origin, direction)
-            if index is not None:
+            if index is None:
+                self.click(intersect_ground(self.ground, origin, direction), shift)
+            else:
                 self.hear({"ask": "show", "index": index}, None)
-                return
-            start = self.scene.frame.to_map(origin)
-            self.click(intersect_ground(self.ground, start, direction), shift)
 
         self.requests.put(click, "click")
 

@@ -72,7 +72,7 @@ class LivePage(PageBase):
 
     def describe_ground(self) -> PaintRequest | None:
         """Return the ground as it is known."""
-        origin = self.scene.frame.origin
+        origin = self.scene.canvas.origin
         request = PaintRequest(self._rover, self.ground, self.colouring, origin)
         return request if self._ground_name else None
 
@@ -146,7 +146,7 @@ class LivePage(PageBase):
         if terrain is None or not is_new or now - self._ground_at < GROUND_PERIOD:
             return
         self.ground, self._ground_name, self._ground_at = terrain, "elevation_cloud", now
-        if self.scene.frame.move_to(terrain):
+        if self.scene.canvas.move_to(terrain):
             self._first = None
         self.channel.tell("offers", self.list_layers())
         self.paint()

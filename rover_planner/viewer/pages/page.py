@@ -125,7 +125,7 @@ class Page(PageBase):
         """Return the ground with what is shown on it."""
         path, now = self.session.shown.path.poses, self.session.shown.scenario
         return PaintRequest(
-            now.rover, now.terrain, self.colouring, self.scene.frame.origin,
+            now.rover, now.terrain, self.colouring, self.scene.canvas.origin,
             now.asked_options.model, path, self.survey,
         )  # fmt: skip
 

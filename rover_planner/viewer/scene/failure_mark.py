@@ -1,15 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """The place of a failure in the scene: a ghost of the rover, the link that fails, the forces."""
 
-from typing import Any
-
 import numpy as np
 
 from rover_physics.names import WHEELS
 from rover_physics.rover.model import Rover
+from rover_planner.viewer.scene.canvas import Canvas, Strand
 from rover_planner.viewer.scene.drawn_rover import DrawnRover
-from rover_planner.viewer.scene.local_frame import LocalFrame
-from rover_planner.viewer.scene.nodes import Nodes, Strand
 from rover_planner.viewer.state.colours import CASING
 from rover_planner.viewer.state.failure import Failure
 from rover_planner.viewer.state.rover_state import RoverState
@@ -26,10 +23,10 @@ LABEL_HEIGHT = 4.5
 class FailureMark:
     """A ghost of the whole rover where the shown path is refused, until another one is shown."""
 
-    def __init__(self, scene: Any, nodes: Nodes, frame: LocalFrame):
+    def __init__(self, canvas: Canvas):
         """Draw nothing yet."""
-        self._nodes, self._frame = nodes, frame
-        self.ghost = DrawnRover(scene, frame, NAME, OPACITY)
+        self._canvas = canvas
+        self.ghost = DrawnRover(canvas, NAME, OPACITY)
         """The ghost; no forces are drawn where they are not known."""
         self._failure: Failure | None = None
         self._near = 0.0
@@ -38,7 +35,7 @@ class FailureMark:
         """Draw a failure instead of what was drawn before; None draws nothing."""
         self._failure = failure
         if failure is None:
-            self._nodes.remove(REASON)
+            self._canvas.remove(REASON)
             self.ghost.show(None)
             return
         wheels = rover.suspension.wheels
@@ -54,7 +51,7 @@ class FailureMark:
             return ""
         if state is not None:
             away = float(np.linalg.norm(state.position - failure.state.position))
-        self.ghost.root.visible = away > self._near
+        self._canvas.show_frame(NAME, visible=away > self._near)
         return "" if away > self._near else failure.link
 
     def _draw_label(self, failure: Failure, radius: float) -> None:
@@ -66,7 +63,7 @@ class FailureMark:
         place = state.position
         if failure.link in WHEELS:
             place = state.wheel_centres[WHEELS.index(failure.link)]
-        top = self._frame.to_scene(state.position) + np.array([0.0, 0.0, LABEL_HEIGHT * radius])
-        leader = Strand(np.array([top, self._frame.to_scene(place)]), CASING)
-        self._nodes.show_lines(f"{REASON}/leader", [leader], 2.0)
-        self._nodes.show_label(f"{REASON}/words", f"{words}\n{where}", top)
+        top = state.position + np.array([0.0, 0.0, LABEL_HEIGHT * radius])
+        leader = Strand(np.array([top, place]), CASING)
+        self._canvas.show_lines(f"{REASON}/leader", [leader], 2.0)
+        self._canvas.show_label(f"{REASON}/words", f"{words}\n{where}", top)

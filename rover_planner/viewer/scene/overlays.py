@@ -10,8 +10,7 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.path_query import Candidate
-from rover_planner.viewer.scene.local_frame import LocalFrame
-from rover_planner.viewer.scene.nodes import Nodes, Strand
+from rover_planner.viewer.scene.canvas import Canvas, Strand
 from rover_planner.viewer.state.colours import (
     PASSABLE,
     REFUSED,
@@ -49,9 +48,9 @@ SHOWN_SIZE = 1.6
 class PathOverlay:
     """Candidate paths in the colours of their verdicts, with their numbers."""
 
-    def __init__(self, nodes: Nodes, frame: LocalFrame):
+    def __init__(self, canvas: Canvas):
         """Draw nothing yet."""
-        self._nodes, self._frame = nodes, frame
+        self._canvas = canvas
         self.paths: list[Sequence[Strand]] = []
         """The candidate paths as they are drawn."""
         self.lines: dict[str, Sequence[Strand]] = {}
@@ -60,7 +59,7 @@ class PathOverlay:
         self._old: frozenset[int] = frozenset()
         """Indices of the paths that are greyed."""
         self._numbers: dict[int, Floats] = {}
-        """Places of the numbers in the scene by the index of their path [m]."""
+        """Places of the numbers by the index of their path [m]."""
 
     def show(
         self, rover: Rover, terrain: Terrain, candidates: Sequence[Candidate], shown: int
@@ -76,7 +75,7 @@ class PathOverlay:
         radius = rover.wheel.radius
         self.paths = [self._find_strands(terrain, one, radius) for one in candidates]
         self._shown = shown
-        self._nodes.remove(PATHS, [f"{PATHS}/{index}" for index in range(len(candidates))])
+        self._canvas.remove(PATHS, [f"{PATHS}/{index}" for index in range(len(candidates))])
         self._draw_paths()
         poses = candidates[shown].poses
         self._draw_numbers(terrain, candidates, radius, shown)
@@ -115,7 +114,7 @@ class PathOverlay:
         self._draw("trail", strands)
 
     def find_number(self, origin: Floats, direction: Floats) -> int | None:
-        """Return the index of the path whose number a ray (3,) of the scene hits; None for none.
+        """Return the index of the path whose number a ray hits; None for none.
 
         Args:
             origin: (3,) start of the ray, a camera [m].
@@ -139,12 +138,12 @@ class PathOverlay:
         for index, strands in enumerate(self.paths):
             width = WIDE if index == self._shown else NARROW
             paint = UNKNOWN if index in self._old else None
-            self._nodes.show_lines(f"{PATHS}/{index}", strands, width, paint)
+            self._canvas.show_lines(f"{PATHS}/{index}", strands, width, paint)
 
     def _draw(self, name: str, strands: Sequence[Strand]) -> None:
         """Draw some lines instead of those that had the name."""
         self.lines[name] = strands
-        self._nodes.show_lines(f"/lines/{name}", strands, WIDE)
+        self._canvas.show_lines(f"/lines/{name}", strands, WIDE)
 
     def _find_strands(self, terrain: Terrain, candidate: Candidate, radius: float) -> list[Strand]:
         """Return a path in the colour of its verdict, faded from where it is refused."""
@@ -175,7 +174,7 @@ class PathOverlay:
         points = points[_thin(len(points))]
         ground = terrain.elevation_at(points[:, 0], points[:, 1])
         line = np.column_stack([points, ground + height])[np.isfinite(ground)]
-        return [Strand(self._frame.to_scene(line), colour)] if len(line) > 1 else []
+        return [Strand(line, colour)] if len(line) > 1 else []
 
     def _draw_numbers(
         self, terrain: Terrain, candidates: Sequence[Candidate], radius: float, shown: int
@@ -186,25 +185,25 @@ class PathOverlay:
         for index, candidate in enumerate(candidates if len(candidates) > 1 else ()):
             x, y, _ = candidate.poses[round(shares[index] * (len(candidate.poses) - 1))]
             height = _ground_height(terrain, x, y) + NUMBER_HEIGHT * radius
-            self._numbers[index] = self._frame.to_scene(np.array([x, y, height]))
-        self._nodes.remove(NUMBERS, [f"{NUMBERS}/{index}" for index in self._numbers])
+            self._numbers[index] = np.array([x, y, height])
+        self._canvas.remove(NUMBERS, [f"{NUMBERS}/{index}" for index in self._numbers])
         for index, place in self._numbers.items():
             size = SHOWN_SIZE if index == shown else 1.0
-            self._nodes.show_label(
+            self._canvas.show_label(
                 f"{NUMBERS}/{index}", str(index + 1), place, font_screen_scale=size,
                 anchor="center-center",
             )  # fmt: skip
 
     def _draw_flags(self, terrain: Terrain, flags: Mapping[str, Floats], radius: float) -> None:
         """Draw poles of six wheel radii [m] with names at poses (3,)."""
-        self._nodes.remove(FLAGS, [f"{FLAGS}/{name}" for name in flags])
+        self._canvas.remove(FLAGS, [f"{FLAGS}/{name}" for name in flags])
         poles = []
         for name, (x, y, *_) in flags.items():
-            foot = self._frame.to_scene([x, y, _ground_height(terrain, x, y)])
+            foot = np.array([x, y, _ground_height(terrain, x, y)])
             top = foot + np.array([0.0, 0.0, 6.0 * radius])
             poles.append(Strand(np.array([foot, top]), UNKNOWN))
-            self._nodes.show_label(f"{FLAGS}/{name}", name, top)
-        self._nodes.show_lines("/poles", poles, NARROW)
+            self._canvas.show_label(f"{FLAGS}/{name}", name, top)
+        self._canvas.show_lines("/poles", poles, NARROW)
 
 
 def _thin(count: int) -> NDArray[np.intp]:
