@@ -11,9 +11,14 @@ from rover_physics.rover.rover_file import load_rover
 from rover_planner.advice.advise import grow_advice
 from rover_planner.advice.case import Case
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.viewer.documents.advice import PROMISED, describe_advice, list_remedies
+from rover_planner.viewer.documents.advice import (
+    PROMISED,
+    Advised,
+    apply_remedy,
+    describe_advice,
+    seek_advice,
+)
 from rover_planner.viewer.pages.page import Page
-from rover_planner.viewer.state.path_advice import Advised, apply_remedy, seek_advice
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, rock_left
 from support.viewer.sessions import wait_for_rest
@@ -83,7 +88,7 @@ def test_a_search_tells_what_was_found_by_a_promised_time_and_that_it_goes_on():
     first, last = (Advised(path, since, one) for one in (none, replace(some, complete=True)))
     told = describe_advice(first, True, since + 0.5 * PROMISED)
     assert told["words"] == "tried: nothing yet" and not told["can_ask"]
-    for advised, found in ((first, "nothing"), (last, str(len(list_remedies(last))))):
+    for advised, found in ((first, "nothing"), (last, str(len(last.remedies)))):
         words = describe_advice(advised, True, since + PROMISED)["words"]
         assert words.startswith(f"{found} found so far; the search goes on, tried: ")
     stopped, ended = (describe_advice(one, False, since) for one in (first, last))

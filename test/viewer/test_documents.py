@@ -19,8 +19,8 @@ from rover_planner.viewer.documents.limits import (
 )
 from rover_planner.viewer.documents.numbers import plain
 from rover_planner.viewer.documents.rover import compare_drives, describe_sliders, read_values
-from rover_planner.viewer.documents.verdict import Work, describe_verdict, list_paths
-from rover_planner.viewer.state.limits import ShownLimit, write_use
+from rover_planner.viewer.documents.verdict import describe_verdict, list_paths
+from rover_planner.viewer.state.path_limits import ShownLimit, write_use
 from rover_planner.viewer.state.scenario import Judged
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import gap, make_terrain, wall_at, waves
@@ -163,7 +163,7 @@ def test_the_chance_of_failure_is_a_lane_of_its_own_with_its_main_cause():
     assert use["broken"]
     percent = f"{100.0 * verdict.failure_chance:.0f} %"
     assert use["value"] == f"whole path {percent}"
-    words = describe_verdict(shown, Work())
+    words = describe_verdict(shown)
     assert words["chance"] == f"chance of failure {percent}, most often by friction"
     assert words["headline"] == "chance of failure above what is accepted"
     assert describe_limits(shown.path, None, shown.chance)["code"] == "chance"
@@ -259,7 +259,7 @@ def test_a_refusal_on_unknown_ground_is_at_the_time_to_which_the_drive_is_played
     assert path.failure.time == path.trajectory.duration
     assert (path.trajectory.length == 0) == (start > 0.0) == (path.failure.time == 0.0)
     told = [
-        describe_verdict(session.shown, Work()),
+        describe_verdict(session.shown),
         describe_limits(path, None),
         describe_uses(path, 0.0),
         list_paths(session.shown, is_outdated=False, is_judging=False),

@@ -11,7 +11,7 @@ import pytest
 
 from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 from rover_planner.errors import PlanningError
-from rover_planner.viewer.state.link import KEY, PageLink, read_link, write_link
+from rover_planner.viewer.pages.sharing import KEY, PageLink, read_link, write_link
 from support.viewer.sessions import FAR, LSR1
 
 LINK = PageLink(

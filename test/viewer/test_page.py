@@ -23,7 +23,7 @@ pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
 from rover_planner.viewer.documents.limits import describe_uses
 from rover_planner.viewer.pages.page import Page
-from rover_planner.viewer.state.link import KEY
+from rover_planner.viewer.pages.sharing import KEY
 
 pytestmark = [needs_browser, pytest.mark.slow]
 

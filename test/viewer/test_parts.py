@@ -19,7 +19,6 @@ from rover_planner.viewer.state.colours import (
     colour_use,
     map_colours,
 )
-from rover_planner.viewer.state.ground_grid import make_grid
 from rover_planner.viewer.state.inbox import Inbox
 from rover_planner.viewer.state.layers import (
     FRICTION,
@@ -30,6 +29,7 @@ from rover_planner.viewer.state.layers import (
     colour_ground,
     colour_limit,
     list_layers,
+    make_grid,
     predict_use,
 )
 from rover_planner.viewer.state.path_limits import find_path_limits

@@ -14,7 +14,7 @@ from websockets.sync.client import connect
 from rover_physics.names import WHEELS
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import write_rover
-from rover_planner.viewer.state.link import read_link, write_link
+from rover_planner.viewer.pages.sharing import read_link, write_link
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, waves
 from support.viewer.sessions import (

@@ -21,7 +21,7 @@ from rover_planner.command.view import SEED, choose_ends, name_ground
 from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import assume
 from rover_planner.viewer.documents.rover import describe_changes
-from rover_planner.viewer.documents.verdict import Work, describe_verdict, list_paths
+from rover_planner.viewer.documents.verdict import describe_verdict, list_paths
 from rover_planner.viewer.documents.verdict import name_ground as name_by_size
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, wall_at, waves
@@ -53,7 +53,7 @@ def test_a_slider_never_swaps_the_path_that_is_looked_at_and_another_that_passes
     session.change_options(policy="servo")
     assert session.shown.path.poses is poses and session.shown.verdict.policy == "servo"
     session.change_options(policy="equal")
-    [offer] = describe_verdict(session.shown, Work())["offers"]
+    [offer] = describe_verdict(session.shown)["offers"]
     assert offer["words"].startswith(f"path {session.shown.offer + 1} passes")
     session.show_path(offer["ask"]["index"])
     assert session.shown.verdict.traversable and session.shown.offer is None

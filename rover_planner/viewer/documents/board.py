@@ -7,7 +7,7 @@ from typing import Any
 from rover_physics.names import WHEELS
 from rover_planner.viewer.documents.numbers import plain, write
 from rover_planner.viewer.state.colours import colour_use, to_css
-from rover_planner.viewer.state.limits import write_use
+from rover_planner.viewer.state.path_limits import write_use
 from rover_planner.viewer.state.rover_state import RoverState
 
 WHEEL_ROWS = {

@@ -12,8 +12,7 @@ from rover_physics.limits.table import CHANCE
 from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_planner.viewer.documents.numbers import plain
-from rover_planner.viewer.state.limits import MAX_USE, write_use
-from rover_planner.viewer.state.path_limits import Lane, PathLimits
+from rover_planner.viewer.state.path_limits import MAX_USE, Lane, PathLimits, write_use
 from rover_planner.viewer.state.scenario import Judged
 
 MAX_POINTS = 240

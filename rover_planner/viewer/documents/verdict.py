@@ -2,7 +2,6 @@
 """What is judged, the verdict with its reason and age, and those on all paths."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,26 +11,12 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.viewer.documents.limits import write_chance
 from rover_planner.viewer.documents.numbers import write
 from rover_planner.viewer.state.failure import Failure
-from rover_planner.viewer.state.limits import write_use
+from rover_planner.viewer.state.path_limits import write_use
 from rover_planner.viewer.state.scenario import Judged, PolicyVerdict, Scenario, Shown
 
 POLICY_TITLES = {EQUAL: "equal torques", SERVO: "speed servos", OPTIMAL: "traction control"}
 """Names of the torque policies on the page."""
 WORDS = {None: "no verdict", True: "traversable", False: "not traversable"}
-
-
-@dataclass(frozen=True)
-class Work:
-    """What the program does, and what it could not do."""
-
-    judging: str = ""
-    """What is worked on, empty for nothing."""
-    old: str = ""
-    """Why the verdict is one of old values; empty if it is not."""
-    refusal: str = ""
-    """Why the last request was refused; empty if it was not."""
-    is_stopped: bool = False
-    """True if visitors have stopped the work."""
 
 
 def name_ground(terrain: Terrain) -> str:
@@ -55,7 +40,7 @@ def describe_subject(scenario: Scenario, ground: str) -> dict[str, str]:
     }
 
 
-def describe_verdict(shown: Shown, work: Work) -> dict[str, Any]:
+def describe_verdict(shown: Shown) -> dict[str, Any]:
     """Return the verdict on the path that is looked at."""
     failure, verdict = shown.path.failure, shown.verdict
     around = shown.around
@@ -68,10 +53,6 @@ def describe_verdict(shown: Shown, work: Work) -> dict[str, Any]:
         if shown.chance is None
         else f"chance of failure {write_chance(shown.chance)}",
         "details": [*filter(None, (verdict.reason, closed))],
-        "old": work.old,
-        "refusal": work.refusal,
-        "judging": work.judging,
-        "stopped": work.is_stopped,
         "policies": [_describe_policy(one) for one in shown.by_policy],
         "offers": _list_offers(shown),
         "fails": failure is not None,
@@ -90,10 +71,9 @@ def write_place(failure: Failure) -> str:
 
 
 def _describe_policy(one: PolicyVerdict) -> dict[str, Any]:
-    known = one.traversable is not None
-    word = ("passes" if one.traversable else "refused") if known else "not judged"
-    title = POLICY_TITLES[one.policy]
-    passes, reason = one.traversable, one.reason or word
+    title, passes = POLICY_TITLES[one.policy], one.traversable
+    word = {None: "not judged", True: "passes", False: "refused"}[passes]
+    reason = one.reason or word
     return {"title": title, "word": word, "passes": passes, "old": one.is_old, "reason": reason}
 
 

@@ -15,9 +15,9 @@ from rover_planner.viewer.documents.live import choose_answer, describe_learned,
 from rover_planner.viewer.live.listener import LiveListener
 from rover_planner.viewer.live.live_state import LiveData, read_state
 from rover_planner.viewer.pages.base import Answer, PageBase
+from rover_planner.viewer.pages.sharing import read_link
 from rover_planner.viewer.scene.cameras import START
 from rover_planner.viewer.scene.ground_mesh import PaintRequest
-from rover_planner.viewer.state.link import read_link
 from rover_planner.viewer.state.rover_state import RoverState
 
 BOARD_PERIOD = 0.2

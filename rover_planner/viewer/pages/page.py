@@ -15,7 +15,12 @@ from rover_planner.advice.advise import Advice
 from rover_planner.advice.remedy import Remedy
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import read_rover, write_rover
-from rover_planner.viewer.documents.advice import describe_advice, list_remedies
+from rover_planner.viewer.documents.advice import (
+    Advised,
+    apply_remedy,
+    describe_advice,
+    seek_advice,
+)
 from rover_planner.viewer.documents.board import describe_board
 from rover_planner.viewer.documents.limits import (
     describe_limits,
@@ -30,21 +35,25 @@ from rover_planner.viewer.documents.rover import (
 )
 from rover_planner.viewer.documents.verdict import (
     POLICY_TITLES,
-    Work,
     describe_subject,
     describe_verdict,
     list_paths,
     name_ground,
 )
 from rover_planner.viewer.pages.base import Answer, PageBase, Words
-from rover_planner.viewer.pages.sharing import make_link, read_scenario, write_file
+from rover_planner.viewer.pages.sharing import (
+    PageLink,
+    make_link,
+    read_link,
+    read_scenario,
+    write_file,
+    write_link,
+)
 from rover_planner.viewer.scene.cameras import FIT
 from rover_planner.viewer.scene.ground_mesh import PaintRequest
 from rover_planner.viewer.scene.overlays import GHOST
 from rover_planner.viewer.state.judging import JudgeRequest
 from rover_planner.viewer.state.layers import Colouring
-from rover_planner.viewer.state.link import PageLink, read_link, write_link
-from rover_planner.viewer.state.path_advice import Advised, apply_remedy, seek_advice
 from rover_planner.viewer.state.playback import SPEEDS, Playback
 from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
 from rover_planner.viewer.state.session import ViewSession
@@ -229,7 +238,8 @@ class Page(PageBase):
         return self._advised if here else None
 
     def _find_remedy(self, words: str) -> Remedy:
-        for remedy in list_remedies(self._advice_here):
+        here = self._advice_here
+        for remedy in here.remedies if here is not None else ():
             if remedy.describe() == words:
                 return remedy
         raise PlanningError(f"{words!r} is no remedy of the path that is shown")
@@ -349,8 +359,8 @@ class Page(PageBase):
 
     # What is told.
 
-    def _find_work(self) -> Work:
-        """Return what is worked on, and whether the verdict is an old one meanwhile."""
+    def _find_work(self) -> dict[str, Any]:
+        """Return what is worked on, and why the verdict is an old one meanwhile; else empty."""
         session, judging, old = self.session, "", ""
         progress = self._judging.progress
         shown = progress or self.painter.progress
@@ -359,8 +369,12 @@ class Page(PageBase):
             old = f"judging {progress.describe()}" if progress is not None else ""
         elif session.is_stopped:
             old = "the judgement was stopped"
-        old = old if session.is_outdated else ""
-        return Work(judging, old, session.refusal, session.is_stopped)
+        return {
+            "judging": judging,
+            "stopped": session.is_stopped,
+            "old": old if session.is_outdated else "",
+            "refusal": session.refusal,
+        }
 
     def tell(self) -> None:
         """Tell all that is shown, as far as it has changed."""
@@ -368,12 +382,12 @@ class Page(PageBase):
         shown, wanted, work = session.shown, session.wanted, self._find_work()
         path, reference = shown.path, shown.reference
         every = frozenset(range(len(shown.paths)))
-        waits = session.is_outdated or bool(work.old)
-        is_slow = bool(work.judging) or work.is_stopped
-        self.scene.paths.mark_old(every if work.old else shown.old if is_slow else frozenset())
+        waits = session.is_outdated or bool(work["old"])
+        is_slow = work["judging"] or work["stopped"]
+        self.scene.paths.mark_old(every if work["old"] else shown.old if is_slow else frozenset())
         name = self._ground_name
         made("subject", (shown.scenario,), lambda: describe_subject(shown.scenario, name))
-        tell("verdict", describe_verdict(shown, work))
+        tell("verdict", describe_verdict(shown) | work)
         is_judging = self._judging.progress is not None
         made(
             "paths",

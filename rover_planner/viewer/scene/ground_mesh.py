@@ -15,13 +15,14 @@ from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.viewer.state.background_work import Progress
-from rover_planner.viewer.state.ground_grid import GroundGrid, make_grid
 from rover_planner.viewer.state.layers import (
     ColouredGround,
     Colouring,
+    GroundGrid,
     Legend,
     colour_ground,
     colour_limit,
+    make_grid,
 )
 from rover_planner.viewer.state.survey_layers import ShownSurvey
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The limits along a path: how much of each is used, by which wheel, and the worst so far."""
+"""The limits as people read them, and along a path: the use of each, by which wheel, so far."""
 
 from dataclasses import dataclass, replace
 
@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.chance.failure_chance import FailureChance
-from rover_physics.limits.table import CHANCE, Sense
+from rover_physics.limits.table import CHANCE, RATIO, Sense, Unit
 from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_prediction import PathPrediction
@@ -17,7 +17,108 @@ from rover_physics.rover.model import Rover
 from rover_physics.traversability.classification import find_wheel
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.planning.asked_poses import AskedPoses, merge_poses
-from rover_planner.viewer.state.limits import GROUND, ShownLimit, list_limits
+
+GROUND = "ground"
+"""Code of what is no limit of a number: unknown ground, no equilibrium, entrapment, steering."""
+MAX_USE = 99.0
+"""Largest use that is written as a number."""
+MORE_DIGITS = 2
+"""Most digits beyond those of the unit that tell a value from its limit; else words do."""
+
+
+@dataclass(frozen=True)
+class ShownLimit:
+    """One limit of a rover; its numbers are in the unit that people read."""
+
+    code: str
+    """Code of a verdict, or GROUND."""
+    title: str
+    """Short name."""
+    bound: float | None = None
+    """Largest or smallest good value; None if it is not a single number."""
+    unit: Unit = RATIO
+    """Unit of bound and values."""
+    is_lowest: bool = False
+    """True if the bound is the smallest good value, not the largest."""
+    keeps_margin: bool = False
+    """True if a control margin reduces the bound."""
+
+    def keep(self, share: float) -> "ShownLimit":
+        """Return the limit of which a share is kept, if a control margin reduces it."""
+        if self.bound is None or not self.keeps_margin:
+            return self
+        return replace(self, bound=share * self.bound)
+
+    def is_broken_by(self, value: float) -> bool:
+        """Return whether a value is beyond the limit; False if it is no single number.
+
+        The worst case of an uncertain map may break a limit that the value itself keeps.
+        """
+        if self.bound is None:
+            return False
+        return value < self.bound if self.is_lowest else value > self.bound
+
+    def write(self, value: float, more: int = 0) -> str:
+        """Return a value as text, without the unit and with more digits; ? for NaN."""
+        if np.isfinite(value):
+            return f"{value:.{self.unit.digits + more}f}"
+        return "?" if np.isnan(value) else "infinite"
+
+    def compare(self, value: float) -> str:
+        """Return a value beside the limit, such as "friction 1.32 of 1.00", with enough digits.
+
+        Where MORE_DIGITS do not tell them apart, words do: "friction just above 1.00".
+        """
+        if self.bound is None:
+            return self.title
+        unit, bound = f" {self.unit.name}".rstrip(), self.bound
+        for more in range(MORE_DIGITS + 1):
+            shown, limit = self.write(value, more), self.write(bound, more)
+            if shown != limit:
+                least = "at least " if self.is_lowest else ""
+                return f"{self.title} {shown} of {least}{limit}{unit}"
+        side = "at" if value == bound else "just above" if value > bound else "just below"
+        return f"{self.title} {side} {self.write(bound)}{unit}"
+
+    @property
+    def good(self) -> str:
+        """Good values with their unit, such as "max 1.00"; empty if it is no single number."""
+        if self.bound is None:
+            return ""
+        word = "min" if self.is_lowest else "max"
+        return f"{word} {self.write(self.bound)} {self.unit.name}".strip()
+
+
+def write_use(use: float) -> str:
+    """Return the use of a limit as text, such as "76 %"."""
+    if np.isnan(use):
+        return "not asked"
+    if use > MAX_USE:
+        return "fails" if np.isinf(use) else f"over {100.0 * MAX_USE:.0f} %"
+    text = f"{100.0 * use:.0f} %"
+    return "just above 100 %" if use > 1.0 and text == "100 %" else text
+
+
+def list_limits(rover: Rover, prediction: PathPrediction) -> list[ShownLimit]:
+    """Return the limits of a prediction, in the order in which they become reasons.
+
+    Sinkage is left out where nothing sinks. Rows of the table with one code are one limit, which
+    is a number if it is one row's.
+    """
+    asked = limits_of(rover, prediction.policy)
+    found: dict[str, ShownLimit] = {}
+    for row, bound in zip(asked.rows, asked.bounds, strict=True):
+        if row.code == "sinkage" and not np.any(prediction.sinkage > 0.0):
+            continue
+        shown = ShownLimit(row.code, row.title)
+        if row.code not in found and row.sense != Sense.RANGE:
+            unit, is_lowest = row.shown or row.unit, row.sense in (Sense.LEAST, Sense.SHARE)
+            number = unit.factor * bound
+            shown = replace(
+                shown, bound=number, unit=unit, is_lowest=is_lowest, keeps_margin=row.keeps_margin
+            )
+        found[row.code] = shown
+    return [*found.values()]
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,10 +174,8 @@ class PathLimits:
         """Return the limits with a lane for the chance that the path fails there, if known."""
         if chance is None:
             return self
-        waypoint = self.rows.prediction.waypoint
-        unknown, no_wheel = np.full(len(waypoint), np.nan), np.full(len(waypoint), -1)
-        lane = Lane(ShownLimit(CHANCE, "chance"), unknown, chance.at[waypoint], no_wheel)
-        return replace(self, lanes=(*self.lanes, lane))
+        used = chance.at[self.rows.prediction.waypoint]
+        return replace(self, lanes=(*self.lanes, _plain_lane(CHANCE, "chance", used)))
 
 
 def find_path_limits(rover: Rover, prediction: PathPrediction, verdict: Verdict) -> PathLimits:
@@ -92,20 +191,16 @@ def find_path_limits(rover: Rover, prediction: PathPrediction, verdict: Verdict)
         prediction = prediction.cut(verdict.first_failure + 1)
     rows = merge_poses(prediction)
     uses = find_uses(limits_of(rover, prediction.policy), rows.prediction.results)
-    lanes = tuple(
-        _make_ground_lane(limit, rows) if code == GROUND else _make_lane(limit, rows, uses)
-        for code, limit in list_limits(rover, prediction).items()
-    )
-    found = PathLimits(rows, lanes)
+    unjudged = np.where(rows.prediction.settled, 0.0, np.inf)
+    lanes = [_make_lane(limit, rows, uses) for limit in list_limits(rover, prediction)]
+    found = PathLimits(rows, (_plain_lane(GROUND, "ground", unjudged), *lanes))
     _add_refusals(found, verdict)
     return found
 
 
-def _make_ground_lane(limit: ShownLimit, rows: AskedPoses) -> Lane:
-    """Return the lane of poses at which the rover cannot be judged at all."""
-    m = len(rows.distance)
-    used = np.where(rows.prediction.settled, 0.0, np.inf)
-    return Lane(limit, np.full(m, np.nan), used, np.full(m, -1))
+def _plain_lane(code: str, title: str, used: Floats) -> Lane:
+    """Return the lane of a use (m,) that has neither a value nor a wheel."""
+    return Lane(ShownLimit(code, title), np.full(len(used), np.nan), used, np.full(len(used), -1))
 
 
 def _make_lane(limit: ShownLimit, rows: AskedPoses, uses: Uses) -> Lane:

@@ -14,8 +14,8 @@ from rover_planner.nodes.rover_simulator import RoverSimulator
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.viewer.live.listener import LiveLink
 from rover_planner.viewer.pages.live_page import LivePage
+from rover_planner.viewer.pages.sharing import PageLink, write_link
 from rover_planner.viewer.state.colours import UNKNOWN
-from rover_planner.viewer.state.link import PageLink, write_link
 from support.grounds import make_terrain, waves
 from support.viewer.sessions import ask
 from support.viewer.sessions import wait_patiently as wait_until
