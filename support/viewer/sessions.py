@@ -12,8 +12,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.query import LatticeSettings
-from rover_planner.viewer.state.background_work import BackgroundWork, Progress
-from rover_planner.viewer.state.inbox import Inbox
+from rover_planner.viewer.state.background_work import BackgroundWork, Inbox, Progress
 from rover_planner.viewer.state.scenario import Scenario
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, waves

@@ -12,6 +12,7 @@ import pytest
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS
 from rover_physics.results.uses import find_uses, limits_of
 from rover_physics.traversability.judge import judge_path, judge_poses
+from rover_planner.viewer.state.background_work import Inbox
 from rover_planner.viewer.state.colours import (
     PASSABLE,
     REFUSED,
@@ -19,7 +20,7 @@ from rover_planner.viewer.state.colours import (
     colour_use,
     map_colours,
 )
-from rover_planner.viewer.state.inbox import Inbox
+from rover_planner.viewer.state.drive import Playback, Trajectory
 from rover_planner.viewer.state.layers import (
     FRICTION,
     PREDICTED,
@@ -33,8 +34,6 @@ from rover_planner.viewer.state.layers import (
     predict_use,
 )
 from rover_planner.viewer.state.path_limits import find_path_limits
-from rover_planner.viewer.state.playback import Playback
-from rover_planner.viewer.state.trajectory import Trajectory
 from support.grounds import gap, make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, straight
 

@@ -12,7 +12,6 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from rover_physics.names import WHEELS
-from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import write_rover
 from rover_planner.viewer.pages.sharing import read_link, write_link
 from rover_planner.viewer.state.session import ViewSession
@@ -33,7 +32,7 @@ from support.viewer.sessions import wait_patiently as wait_until
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
-from rover_planner.viewer.pages import base
+from rover_planner.viewer.pages import base, sharing
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.scene.canvas import Canvas, Strand
 from rover_planner.viewer.scene.drawn_rover import DrawnRover
@@ -393,11 +392,6 @@ def test_on_a_far_map_the_rover_is_where_it_is_on_a_near_one_and_a_click_lands_w
     np.testing.assert_allclose(places[FAR[0]], places[0.0], atol=1e-6)
 
 
-def test_a_click_beside_the_known_ground_is_refused(page):
-    with pytest.raises(PlanningError, match="beside the known ground"):
-        page.click(None, False)
-
-
 # Links.
 
 
@@ -417,6 +411,13 @@ def test_a_link_with_unknown_names_is_refused_and_nothing_else_changes(page, cha
     page.hear({"ask": "open", "query": f"?{query}"}, None)
     wait_until(lambda: page.session.refusal.startswith(reason), "the reason")
     assert page.session.wanted is wanted and page.errors.messages == {}
+
+
+def test_a_link_that_would_be_longer_than_an_address_may_be_is_refused(page, monkeypatch):
+    monkeypatch.setattr(sharing, "MAX_LENGTH", 100)
+    page.hear({"ask": "link"}, None)
+    wait_until(lambda: "link with the file of lsr1" in page.session.refusal, "the reason")
+    assert write_link(page._link()) == ""
 
 
 def test_path_and_time_of_a_link_come_with_its_paths_and_not_with_a_later_goal(page):

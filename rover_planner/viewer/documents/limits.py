@@ -24,30 +24,37 @@ def describe_limits(
 ) -> dict[str, Any]:
     """Return the curves of a path's lanes, those of the reference, of its chance, and the loads.
 
-    A lane has the use now and before, and six curves where wheels have it.
+    A lane has the use now and before, and six curves where wheels have it. Loads are those of the
+    wheels [N] while the rover stands.
     """
     failure, before = path.failure, None if reference is None else reference.limits
     limits = path.limits.add_chance(chance)
     end = max(limits.end, 0.0 if before is None else before.end)
-    lanes = [
-        {
-            "code": lane.limit.code,
-            "title": lane.limit.title,
-            "now": _pick_points(limits.rows.distance, lane.used[:, None]),
-            "wheels": None
-            if lane.wheels is None
-            else _pick_points(limits.rows.distance, lane.wheels),
-            "before": _find_before(lane, before),
-        }
-        for lane in limits.lanes
-    ]
+    rows, stands = limits.rows, limits.rows.prediction.settled
+    lanes = []
+    for lane in limits.lanes:
+        code, old = lane.limit.code, None
+        if before is not None and code != CHANCE:
+            old = _pick_points(before.rows.distance, before.lane(code).used[:, None])
+        lanes.append(
+            {
+                "code": code,
+                "title": lane.limit.title,
+                "now": _pick_points(rows.distance, lane.used[:, None]),
+                "wheels": None
+                if lane.wheels is None
+                else _pick_points(rows.distance, lane.wheels),
+                "before": old,
+            }
+        )
+    loads = rows.prediction.wheel_loads[stands]
     return {
         "end": round(end, 4),
         "fails": None if failure is None else round(failure.distance, 4),
         "code": "" if failure is None else limits.lane(failure.code).limit.code,
         "compared": reference is not None,
         "lanes": lanes,
-        "loads": _describe_loads(path),
+        "loads": _pick_points(rows.distance[stands], loads, 1),
     }
 
 
@@ -88,20 +95,6 @@ def _describe_use(lane: Lane, limits: PathLimits, worst: int, here: int) -> dict
         "value": "" if np.isnan(value) else f"{limit.write(value)}, {limit.good}",
         "wheel": WHEELS[wheel].replace("_", " ") if wheel >= 0 else "",
     }
-
-
-def _describe_loads(path: Judged) -> dict[str, Any]:
-    """Return the wheel loads [N] along a path while the rover stands."""
-    rows = path.limits.rows
-    stands = rows.prediction.settled
-    return _pick_points(rows.distance[stands], rows.prediction.wheel_loads[stands], 1)
-
-
-def _find_before(lane: Lane, before: PathLimits | None) -> dict[str, Any] | None:
-    """Return the curve of a lane of the reference; None without one."""
-    if before is None or lane.limit.code == CHANCE:
-        return None
-    return _pick_points(before.rows.distance, before.lane(lane.limit.code).used[:, None])
 
 
 def _pick_points(distance: Floats, values: Floats, digits: int = 3) -> dict[str, Any]:

@@ -10,7 +10,6 @@ from rover_physics.names import EQUAL, OPTIMAL, SERVO
 from rover_physics.terrain.grid import Terrain
 from rover_planner.viewer.documents.limits import write_chance
 from rover_planner.viewer.documents.numbers import write
-from rover_planner.viewer.state.failure import Failure
 from rover_planner.viewer.state.path_limits import write_use
 from rover_planner.viewer.state.scenario import Judged, PolicyVerdict, Scenario, Shown
 
@@ -48,7 +47,7 @@ def describe_verdict(shown: Shown) -> dict[str, Any]:
     return {
         **describe_answer(verdict.traversable, f"path {shown.index + 1} of {len(shown.paths)}"),
         "headline": "" if failure is None else failure.headline,
-        "where": "" if failure is None else write_place(failure),
+        "where": "" if failure is None else failure.place,
         "chance": ""
         if shown.chance is None
         else f"chance of failure {write_chance(shown.chance)}",
@@ -62,12 +61,6 @@ def describe_verdict(shown: Shown) -> dict[str, Any]:
 def describe_answer(traversable: bool | None, about: str) -> dict[str, Any]:
     """Return a bare verdict: what it says and what it is about."""
     return {"passes": traversable, "word": WORDS[traversable], "about": about}
-
-
-def write_place(failure: Failure) -> str:
-    """Return where and when a path is refused."""
-    between = ", between waypoints" if failure.is_between else ""
-    return f"after {failure.distance:.2f} m, {failure.time:.0f} s{between}"
 
 
 def _describe_policy(one: PolicyVerdict) -> dict[str, Any]:

@@ -252,8 +252,8 @@ function drawChosen() {
   const rows = [];
   if (offers.policies) rows.push(
     row("A click sets", select("A click sets", [["goal", "goal"], ["start", "start"]], now.sets, (sets) => ({ ask: "click", sets }))),
-    row("Torques", select("Torques", offers.policies, now.policy, (policy) => ({ ask: "options", policy }))),
-    row("Soil", select("Soil", [["", "none (Coulomb)"], ...offers.soils.map((name) => [name, name])], now.soil, (soil) => ({ ask: "options", soil }))));
+    row("Torques", select("Torques", offers.policies, now.policy, (name) => ({ ask: "policy", name }))),
+    row("Soil", select("Soil", [["", "none (Coulomb)"], ...offers.soils.map((name) => [name, name])], now.soil, (name) => ({ ask: "soil", name }))));
   rows.push(row("Colour by", select("Colour by", offers.layers.map((name) => [name, name]), now.layer, (layer) => colour({ layer }))));
   if (offers.predicted.includes(now.layer)) rows.push(
     row("Heading [deg]", make("input", { type: "number", min: -180, max: 180, step: 5, value: now.heading, "aria-label": "Heading [deg]", onchange: (event) => ask(colour({ heading: Number(event.target.value) })) })),

@@ -303,34 +303,31 @@ def _read_nearest(
     return nearest
 
 
-class LiveLink:
-    """A listener that is spun in the background until it is closed."""
+@contextlib.contextmanager
+def listen(context: Context | None = None) -> Iterator[LiveListener]:
+    """Yield a listener that is spun in the background; without a context it has one of its own."""
+    own = context or Context()
+    if context is None:
+        rclpy.init(context=own)
+    listener, executor = LiveListener(context=own), SingleThreadedExecutor(context=own)
+    executor.add_node(listener)
+    ended = threading.Event()
+    thread = threading.Thread(target=_spin, args=(executor, ended), daemon=True)
+    thread.start()
+    try:
+        yield listener
+    finally:
+        ended.set()
+        executor.wake()
+        thread.join(5.0)
+        executor.shutdown()
+        listener.destroy_node()
+        if context is None:
+            own.try_shutdown()
 
-    def __init__(self, map_frame: str = "map", context: Context | None = None):
-        """Start to listen; without a context the link makes one, and shuts it down at its end."""
-        self._owns_context = context is None
-        self._context = context or Context()
-        if self._owns_context:
-            rclpy.init(context=self._context)
-        self.listener = LiveListener(map_frame, context=self._context)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self.listener)
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._spin, daemon=True)
-        self._thread.start()
 
-    def close(self) -> None:
-        """Stop listening."""
-        self._ended.set()
-        self._executor.wake()
-        self._thread.join(5.0)
-        self._executor.shutdown()
-        self.listener.destroy_node()
-        if self._owns_context:
-            self._context.try_shutdown()
-
-    def _spin(self) -> None:
-        # Not executor.spin(): at times that does not return from executor.shutdown().
-        with contextlib.suppress(ExternalShutdownException):
-            while not self._ended.is_set():
-                self._executor.spin_once(timeout_sec=0.2)
+def _spin(executor: SingleThreadedExecutor, ended: threading.Event) -> None:
+    # Not executor.spin(): at times that does not return from executor.shutdown().
+    with contextlib.suppress(ExternalShutdownException):
+        while not ended.is_set():
+            executor.spin_once(timeout_sec=0.2)

@@ -19,16 +19,15 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.viewer.front.channel import Channel, Mailbox, Part
-from rover_planner.viewer.scene.cameras import START, VIEWS
 from rover_planner.viewer.scene.ground_mesh import PaintRequest, intersect_ground, paint
-from rover_planner.viewer.scene.scene import Scene
+from rover_planner.viewer.scene.scene import START, VIEWS, Scene
 from rover_planner.viewer.state.background_work import (
     BackgroundWork,
+    Inbox,
     Progress,
     Request,
     Result,
 )
-from rover_planner.viewer.state.inbox import Inbox
 from rover_planner.viewer.state.layers import PREDICTED, Colouring, Legend, list_layers
 from rover_planner.viewer.state.session import REFUSALS
 from rover_planner.viewer.state.survey_layers import ShownSurvey
@@ -100,7 +99,7 @@ class PageBase(ABC):
         address: tuple[str, int],
         survey: ShownSurvey | None = None,
     ):
-        """Start the servers; `start` starts the thread.
+        """Start the servers; the page of a kind starts the thread when it can tell what it shows.
 
         Args:
             rover: The rover.
@@ -135,7 +134,8 @@ class PageBase(ABC):
         self.painter = self.begin_work(paint, self._draw_ground, "ground")
         self.channel.tell("scene", {"port": self.server.get_port()})
         self._last = time.monotonic()
-        self._thread = threading.Thread(target=self._run, name="page", daemon=True)
+        self.thread = threading.Thread(target=self._run, name="page", daemon=True)
+        """Changes the page."""
 
     def _add_camera(self) -> None:
         """Add what needs to know which visitor looks: the camera and clicks into the scene."""
@@ -145,9 +145,8 @@ class PageBase(ABC):
         self._camera = gui.add_button_group("View", (*VIEWS, FOLLOW))
         self._camera.on_click(self._request_view)
         for key, (label, words) in HOTKEYS.items():
-            command = gui.add_command(label, hotkey=key)
-            command.on_trigger(partial(self._press, words))
-        self.server.on_client_connect(self._aim_camera)
+            gui.add_command(label, hotkey=key).on_trigger(partial(self._press, words))
+        self.server.on_client_connect(lambda client: self._look([client], START))
         self.server.scene.on_click()(partial(self._request_click, shift=False))
         self.server.scene.on_click(modifier="shift")(partial(self._request_click, shift=True))
 
@@ -162,14 +161,10 @@ class PageBase(ABC):
         """True if the page acts on requests, or has still to."""
         return self.requests.wait(0.0) or self._fulfils
 
-    def start(self) -> None:
-        """Start the thread that changes the page."""
-        self._thread.start()
-
     def close(self) -> None:
         """End the page."""
         self._ended.set()
-        self._thread.join(5.0)
+        self.thread.join(5.0)
         self.painter.close()
         self.channel.close()
         self.server.stop()
@@ -287,9 +282,6 @@ class PageBase(ABC):
     def _show_forces(self, words: Words) -> None:
         self.forces = bool(words["shown"])
         self.scene.show_forces(self.forces)
-
-    def _aim_camera(self, client: Any) -> None:
-        self._look([client], START)
 
     def _press(self, words: Words, _event: Any) -> None:
         self.hear(words, None)

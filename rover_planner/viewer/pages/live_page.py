@@ -16,8 +16,8 @@ from rover_planner.viewer.live.listener import LiveListener
 from rover_planner.viewer.live.live_state import LiveData, read_state
 from rover_planner.viewer.pages.base import Answer, PageBase
 from rover_planner.viewer.pages.sharing import read_link
-from rover_planner.viewer.scene.cameras import START
 from rover_planner.viewer.scene.ground_mesh import PaintRequest
+from rover_planner.viewer.scene.scene import START
 from rover_planner.viewer.state.rover_state import RoverState
 
 BOARD_PERIOD = 0.2
@@ -61,7 +61,7 @@ class LivePage(PageBase):
         super().__init__(rover, terrain, (host, port))
         self.channel.tell("offers", self.list_layers())
         self.paint()
-        self.start()
+        self.thread.start()
 
     def list_answers(self) -> Mapping[str, Answer]:
         """Return what the page does by the word `ask`."""

@@ -40,8 +40,9 @@ from rover_planner.viewer.documents.verdict import (
     list_paths,
     name_ground,
 )
-from rover_planner.viewer.pages.base import Answer, PageBase, Words
+from rover_planner.viewer.pages.base import Answer, PageBase
 from rover_planner.viewer.pages.sharing import (
+    MAX_LENGTH,
     PageLink,
     make_link,
     read_link,
@@ -49,12 +50,12 @@ from rover_planner.viewer.pages.sharing import (
     write_file,
     write_link,
 )
-from rover_planner.viewer.scene.cameras import FIT
 from rover_planner.viewer.scene.ground_mesh import PaintRequest
 from rover_planner.viewer.scene.overlays import GHOST
+from rover_planner.viewer.scene.scene import FIT
+from rover_planner.viewer.state.drive import SPEEDS, Playback
 from rover_planner.viewer.state.judging import JudgeRequest
 from rover_planner.viewer.state.layers import Colouring
-from rover_planner.viewer.state.playback import SPEEDS, Playback
 from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.survey_layers import ShownSurvey
@@ -99,13 +100,13 @@ class Page(PageBase):
         self._judging = self.begin_work(session.find_steps, self._take_judged, "judge")
         session.judge = self._judging.ask
         self._advised: Advised | None = None
-        """The path for which advice was asked last, and what was found."""
+        """The path that is looked at and the advice on it; None if it was not asked for."""
         self.channel.tell("offers", self._list_offers())
         self.has_changed("the cameras are not moved", session.wanted.loaded)  # START is theirs
         self._show()
         self.paint()
         session.judge_again()  # with the search that was not made
-        self.start()
+        self.thread.start()
 
     def _list_offers(self) -> dict[str, Any]:
         """Return what the page's boxes offer."""
@@ -148,10 +149,15 @@ class Page(PageBase):
     def list_answers(self) -> Mapping[str, Answer]:
         """Return what the page does by the word `ask`."""
         session, playback = self.session, self.playback
+
+        def find_time(distance: float) -> float:
+            return session.shown.path.limits.time_at(distance)
+
         return {
             "show": lambda words: session.show_path(int(words["index"])),
             "value": lambda words: self._change_value(words["label"], float(words["value"])),
-            "options": lambda words: session.change_options(**_read_options(words)),
+            "policy": lambda words: session.change_options(policy=words["name"]),
+            "soil": lambda words: session.change_options(soil=words["name"] or None),
             "undo": lambda _words: session.undo(),
             "reset": lambda _words: session.reset(),
             "keep": lambda _words: session.keep_reference(session.shown.scenario),
@@ -165,7 +171,7 @@ class Page(PageBase):
             "toggle": lambda _words: playback.toggle(),
             "step": lambda words: playback.step(words["by"]),
             "seek": lambda words: playback.go_to(float(words["time"])),
-            "place": lambda words: self._go_to_place(float(words["distance"])),
+            "place": lambda words: playback.go_to(find_time(float(words["distance"]))),
             "speed": lambda words: setattr(playback, "speed", float(words["times"])),
             "failure": lambda _words: self._go_to_failure(),
             "advise": lambda _words: self._advise(),
@@ -173,7 +179,7 @@ class Page(PageBase):
             "remedy": lambda words: self._take_remedy(words["words"]),
             "save rover": lambda _words: self._save_rover(),
             "save page": lambda words: self._save_page(str(words.get("base", ""))),
-            "link": lambda _words: {"link": write_link(self._link())},
+            "link": lambda _words: self._tell_link(),
         }
 
     def click(self, point: Floats | None, shift: bool) -> None:
@@ -208,9 +214,6 @@ class Page(PageBase):
         self._advice.cancel()
         self.painter.cancel()
 
-    def _go_to_place(self, distance: float) -> None:
-        self.playback.go_to(self.session.shown.path.limits.time_at(distance))
-
     def _go_to_failure(self) -> None:
         failure = self.session.shown.path.failure
         if failure is not None:
@@ -231,15 +234,8 @@ class Page(PageBase):
         if self._advised is not None and path is self._advised.path:
             self._advised = replace(self._advised, advice=found)
 
-    @property
-    def _advice_here(self) -> Advised | None:
-        """The advice on the path that is looked at; None if it was not asked for."""
-        here = self._advised is not None and self._advised.path is self.session.shown.path
-        return self._advised if here else None
-
     def _find_remedy(self, words: str) -> Remedy:
-        here = self._advice_here
-        for remedy in here.remedies if here is not None else ():
+        for remedy in self._advised.remedies if self._advised is not None else ():
             if remedy.describe() == words:
                 return remedy
         raise PlanningError(f"{words!r} is no remedy of the path that is shown")
@@ -267,12 +263,15 @@ class Page(PageBase):
         time_shown = round(self.playback.time, 3)
         return make_link(self.session.shown, self._map_print, time_shown, self.colouring)
 
-    def _write_current(self) -> str:
-        """Return the link that a browser opens on a program that was started again."""
-        try:
-            return write_link(self._link())
-        except PlanningError:  # it would be too long
-            return ""
+    def _tell_link(self) -> dict[str, Any]:
+        """Return the link to what is shown, for the visitor who asks for it."""
+        query, rover = write_link(self._link()), self.session.shown.scenario.rover.name
+        if not query:
+            raise PlanningError(
+                f"the link with the file of {rover} would be longer than an address may be, "
+                f"{MAX_LENGTH} characters; save the rover file and the HTML file instead"
+            )
+        return {"link": query}
 
     def _save_rover(self) -> dict[str, Any]:
         rover = self.session.wanted.rover
@@ -329,7 +328,7 @@ class Page(PageBase):
         """Show what was judged: in words and numbers at once, then in the scene."""
         shown, scene, draw = self.session.shown, self.scene, self.draw_made
         asked, path, rover = shown.scenario, shown.path, shown.scenario.rover
-        if self._advised is not None and self._advice_here is None:
+        if self._advised is not None and self._advised.path is not path:
             self._advice.cancel()  # nobody looks at its path any more
             self._advised = None
             self._show_ghost(None)
@@ -398,8 +397,8 @@ class Page(PageBase):
             },
         )
         is_seeking = self._advice.progress is not None
-        tell("advice", describe_advice(self._advice_here, is_seeking, time.monotonic()))
-        made("current", (shown, self.colouring), self._write_current)
+        tell("advice", describe_advice(self._advised, is_seeking, time.monotonic()))
+        made("current", (shown, self.colouring), lambda: write_link(self._link()))
         made("sliders", (wanted.loaded,), lambda: describe_sliders(wanted.loaded))
         made("values", (wanted, session.refusal), lambda: describe_values(wanted))
         kept = session.kept
@@ -443,16 +442,6 @@ class Page(PageBase):
         self.channel.tell("board", board)
         uses = describe_uses(path, playback.time, self.session.shown.chance)
         self.channel.tell("uses", uses)
-
-
-def _read_options(words: Words) -> dict[str, Any]:
-    """Return the options of the model that a visitor asks for."""
-    found: dict[str, Any] = {}
-    if "policy" in words:
-        found["policy"] = words["policy"]
-    if "soil" in words:
-        found["soil"] = words["soil"] or None
-    return found
 
 
 def _file(name: str, text: str) -> dict[str, Any]:

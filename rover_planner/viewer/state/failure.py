@@ -68,6 +68,12 @@ class Failure:
         return f"{words} wheel" if self.link in WHEELS else words
 
     @property
+    def place(self) -> str:
+        """Where and when it is, in words."""
+        between = ", between waypoints" if self.is_between else ""
+        return f"after {self.distance:.2f} m, {self.time:.0f} s{between}"
+
+    @property
     def headline(self) -> str:
         """The value beside the limit, such as "friction 1.32 of 1.00, middle left wheel"."""
         if not np.isnan(self.value):

@@ -63,7 +63,8 @@ def judge_request(request: JudgeRequest, memory: EdgeMemory | None = None) -> It
         shown = yield from _judge_new(asked)
     else:
         shown = yield from _judge_again(asked, before, request.index)
-    values = _find_reference(asked, request.reference)
+    loaded = replace(asked, rover=asked.loaded, arm_angles={})
+    values = asked.take_values(request.reference or loaded)
     shown = replace(shown, reference=_recall(shown, before, values))
     yield shown
     if shown.reference is None and not shown.path.is_of(shown.path.poses, values):
@@ -131,11 +132,6 @@ def _judge_again(asked: Scenario, before: Shown, index: int) -> Generator[Step, 
     around = before.around if same else None
     chance = before.chance if path is before.path else None
     return Shown(asked, paths, index, generated, None, policies, chance, around)
-
-
-def _find_reference(asked: Scenario, kept: Scenario | None) -> Scenario:
-    """Return the values to compare with: those that were kept, or the rover as it was loaded."""
-    return asked.take_values(kept or replace(asked, rover=asked.loaded, arm_angles={}))
 
 
 def _recall(shown: Shown, before: Shown | None, values: Scenario) -> Judged | None:

@@ -15,10 +15,10 @@ from rover_physics.traversability.verdict import Verdict
 from rover_planner.planning.path_query import Candidate, PathQueryOptions
 from rover_planner.planning.search.path_search import SearchResult
 from rover_planner.planning.search.query import LatticeSettings
+from rover_planner.viewer.state.drive import Trajectory
 from rover_planner.viewer.state.failure import Failure, find_failure
 from rover_planner.viewer.state.path_limits import PathLimits, find_path_limits
 from rover_planner.viewer.state.rover_state import RoverState
-from rover_planner.viewer.state.trajectory import Trajectory
 
 Pose = tuple[float, float, float]
 
@@ -67,10 +67,6 @@ class Scenario:
             and replace(self.options, model=other.options.model) == other.options
             and self.recorded is other.recorded
         )
-
-    def has_rover_of(self, other: "Scenario") -> bool:
-        """Return whether the numbers of the rover and the angles of its arm are the same."""
-        return self.rover == other.rover and self.arm == other.arm
 
     def take_values(self, other: "Scenario") -> "Scenario":
         """Return this scenario with the values of another, and its path between the same ends."""
@@ -129,7 +125,11 @@ class Judged:
     def is_of(self, poses: Floats, values: Scenario) -> bool:
         """Return whether it is a path with these poses under these values."""
         asked = self.scenario
-        same = asked.has_rover_of(values) and asked.options == values.options
+        same = (asked.rover, asked.arm, asked.options) == (
+            values.rover,
+            values.arm,
+            values.options,
+        )
         return same and (self.poses is poses or np.array_equal(self.poses, poses))
 
 

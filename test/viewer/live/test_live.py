@@ -26,7 +26,7 @@ from rover_planner.viewer.documents.live import (
     describe_learned,
     list_topics,
 )
-from rover_planner.viewer.live.listener import LiveLink, LiveListener
+from rover_planner.viewer.live.listener import LiveListener, listen
 from rover_planner.viewer.live.live_state import (
     MAX_AGE,
     MAX_TRAIL,
@@ -221,11 +221,10 @@ def test_a_plan_needs_odometry_and_a_server(listener, talker):
 
 def test_a_closed_link_leaves_no_thread_and_no_context():
     before = set(threading.enumerate())
-    link = LiveLink()
-    assert link.listener.context.ok()
-    assert set(threading.enumerate()) - before
-    link.close()
-    assert not link.listener.context.ok()
+    with listen() as listener:
+        assert listener.context.ok()
+        assert set(threading.enumerate()) - before
+    assert not listener.context.ok()
     wait_until(lambda: set(threading.enumerate()) <= before, "the threads to end")
 
 

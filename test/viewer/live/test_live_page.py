@@ -12,7 +12,7 @@ from rover_physics.terrain.grid import Terrain, save_terrain
 from rover_physics.warm_up import warm_up
 from rover_planner.nodes.rover_simulator import RoverSimulator
 from rover_planner.nodes.traverse_server import TraverseServer
-from rover_planner.viewer.live.listener import LiveLink
+from rover_planner.viewer.live.listener import listen
 from rover_planner.viewer.pages.live_page import LivePage
 from rover_planner.viewer.pages.sharing import PageLink, write_link
 from rover_planner.viewer.state.colours import UNKNOWN
@@ -33,11 +33,10 @@ LEVEL = Terrain(np.zeros((160, 160)), 0.05, (-4.0, -4.0))
 def page(ros):
     """A page that follows the graph of the test."""
     warm_up()
-    link = LiveLink(context=ros.context)
-    served = LivePage(LSR1, LEVEL, link.listener, port=0)
-    yield served
-    served.close()
-    link.close()
+    with listen(ros.context) as listener:
+        served = LivePage(LSR1, LEVEL, listener, port=0)
+        yield served
+        served.close()
 
 
 def test_a_live_page_shows_a_rover_and_the_plan_and_forces_of_its_server_until_they_fall_silent(
