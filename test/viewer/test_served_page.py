@@ -258,8 +258,7 @@ def test_a_path_is_drawn_in_the_colour_of_its_verdict_up_to_where_it_is_refused(
     session.change_rover([("friction",)], 0.4)
     shown, overlay = session.shown, page.scene.paths
     candidates = [path.candidate for path in shown.paths]
-    ground = session.wanted.terrain
-    ask(page, lambda: overlay.show(LSR1, ground, candidates, shown.index))
+    ask(page, lambda: overlay.show(candidates, shown.index))
     driven, beyond, *cross = overlay.paths[shown.index]
     assert driven.colour == REFUSED
     np.testing.assert_array_equal(driven.line[-1], beyond.line[0])
@@ -292,14 +291,14 @@ def test_lines_have_the_colours_of_their_strands_and_what_looks_the_same_is_not_
 
 
 def test_a_trail_has_a_colour_from_blue_to_yellow_at_each_place(page):
-    overlay, ground = page.scene.paths, page.ground
+    overlay = page.scene.paths
     trail = np.array([[0.0, 0.0, 0.5], [0.1, 0.0, 0.0], [0.2, 0.0, 1.0]])
     for known, count in ((None, 0), (trail[:1], 0), (trail, 2)):
-        overlay.show_trail(LSR1, ground, known)
+        overlay.show_trail(known)
         assert len(overlay.lines["trail"]) == count
     low, high = (one.colour for one in overlay.lines["trail"])
     assert low[2] > low[0] and high[0] > high[2]
-    overlay.show_trail(LSR1, ground, None)
+    overlay.show_trail(None)
 
 
 # Errors.

@@ -292,7 +292,7 @@ class PageBase(ABC):
         self.requests.put(lambda: act([client], name))
 
     def _look(self, clients: Collection[Any], view: str) -> None:
-        self.scene.cameras.look(clients, view, self.ground, self.points)
+        self.scene.cameras.look(clients, view, self.points)
 
     def _follow(self, _clients: Collection[Any], name: str) -> None:
         """Go along with the rover or not, and name the button by what it does next."""

@@ -108,12 +108,12 @@ class LivePage(PageBase):
         self.draw_made(
             "the trail is not drawn",
             (trail, terrain),
-            lambda: paths.show_trail(self._rover, terrain, trail),
+            lambda: paths.show_trail(trail),
         )
         self.draw_made(
             "the plan is not drawn",
             (*shown, terrain),
-            lambda: paths.show_plan(self._rover, terrain, *shown),
+            lambda: paths.show_plan(*shown),
         )
 
     def advance(self, seconds: float) -> None:

@@ -243,8 +243,7 @@ class Page(PageBase):
     def _show_ghost(self, words: str | None) -> None:
         """Show where the path of a remedy leads while a person points at it; None ends that."""
         path = None if words is None else self._find_remedy(words).judged.case.poses
-        rover = self.session.shown.scenario.rover
-        self.scene.paths.show_line("ghost", rover, self.ground, path, GHOST)
+        self.scene.paths.show_line("ghost", path, GHOST)
 
     def _take_remedy(self, words: str) -> None:
         """Judge the path with the levers of a remedy set."""
@@ -349,7 +348,7 @@ class Page(PageBase):
         draw(
             "the paths are not drawn",
             [*shown.paths, shown.index],
-            lambda: scene.paths.show(rover, self.ground, candidates, shown.index),
+            lambda: scene.paths.show(candidates, shown.index),
         )
         depends = self.colouring.is_predicted or self.survey is not None
         if self.has_changed("ground", asked) and depends:

@@ -65,6 +65,7 @@ class DrawnRover:
         Of a rover that looks like the last one, only the arm is turned.
         """
         wheel, arm = rover.wheel, rover.manipulator
+        self._canvas.radius = wheel.radius
         looks = wheel.radius, wheel.width, rover.suspension, rover.belly, arm, rover.weight
         is_new = looks != self._looks
         if is_new:

@@ -9,7 +9,6 @@ import numpy as np
 from rover_physics.names import WHEEL_POSITIONS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
-from rover_physics.terrain.grid import Terrain
 from rover_planner.viewer.scene.canvas import Canvas
 from rover_planner.viewer.scene.drawn_rover import DrawnRover, FailureMark
 from rover_planner.viewer.scene.overlays import PathOverlay
@@ -35,7 +34,7 @@ class Cameras:
         self._server, self._canvas, self._drawn = server, canvas, drawn
         self._follows = False
 
-    def look(self, clients: Collection[Any], view: str, terrain: Terrain, points: Floats) -> None:
+    def look(self, clients: Collection[Any], view: str, points: Floats) -> None:
         """Let cameras look at a path, or at the rover on it.
 
         Args:
@@ -43,14 +42,12 @@ class Cameras:
             view: FIT all of the path from behind and beside; TOP the same from above, north at
                 the top; SIDE the rover from the right side of its path; START along the path from
                 behind and beside its start.
-            terrain: The ground; where it is not known, the path has the height 0.
-            points: (n, 2) x and y of the path [m].
+            points: (n, 2) x and y of the path [m]; where the ground is not known, its height is 0.
         """
         rover, state = self._drawn.rover, self._drawn.state
         if rover is None:
             return
-        heights = terrain.elevation_at(points[:, 0], points[:, 1])
-        path = np.column_stack([points, np.nan_to_num(heights)])
+        path = self._canvas.lay(points, 0.0, 0.0)
         ahead = path[-1, :2] - path[0, :2]
         length = float(np.linalg.norm(ahead))
         ahead = ahead / length if length > 0.0 else np.array([1.0, 0.0])
