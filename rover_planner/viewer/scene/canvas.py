@@ -37,14 +37,15 @@ class Canvas:
     through `to_scene`, and rays of visitors come back through `to_map`.
     """
 
+    terrain: Terrain
+    """The ground, since `move_to`."""
+
     def __init__(self, scene: Any):
         """Show nothing yet."""
         self.scene = scene
         """The scene of viser."""
         self.origin: Floats = np.zeros(3)
         """(3,) origin of the scene [m], map frame."""
-        self.terrain: Terrain | None = None
-        """The ground; None before `move_to`."""
         self.radius = 0.0
         """Radius of the wheels of the rover that was drawn last [m]."""
         self.nodes: dict[str, Any] = {}
@@ -60,7 +61,7 @@ class Canvas:
         return np.asarray(points, dtype=float) + self.origin
 
     def move_to(self, terrain: Terrain) -> bool:
-        """Take another ground, and an origin near it and its median height; tell if that has moved.
+        """Take another ground, and an origin near its median height; return whether that moved.
 
         What was drawn before must then be drawn again.
         """
@@ -81,9 +82,7 @@ class Canvas:
             unknown: Height of the ground where it is not known [m].
         """
         x, y = np.reshape(points, (-1, 2)).T
-        ground = (
-            np.full(len(x), np.nan) if self.terrain is None else self.terrain.elevation_at(x, y)
-        )
+        ground = self.terrain.elevation_at(x, y)
         ground = np.where(np.isfinite(ground), ground, unknown)
         return np.column_stack([x, y, ground + height * self.radius])
 

@@ -68,9 +68,8 @@ class PathOverlay:
         self._canvas.remove(PATHS, [f"{PATHS}/{index}" for index in range(len(candidates))])
         self._draw_paths()
         self._draw_numbers(candidates)
-        self._draw_flags(
-            {"start": candidates[shown].poses[0], "goal": candidates[shown].poses[-1]}
-        )
+        poses = candidates[shown].poses
+        self._draw_flags({"start": poses[0], "goal": poses[-1]})
 
     def show_plan(self, plan: Floats | None, is_old: bool = False) -> None:
         """Draw a path (n, 3) without a verdict of ours, or none, instead of what was drawn.

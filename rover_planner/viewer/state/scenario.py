@@ -124,12 +124,8 @@ class Judged:
 
     def is_of(self, poses: Floats, values: Scenario) -> bool:
         """Return whether it is a path with these poses under these values."""
-        asked = self.scenario
-        same = (asked.rover, asked.arm, asked.options) == (
-            values.rover,
-            values.arm,
-            values.options,
-        )
+        mine, others = ((one.rover, one.arm, one.options) for one in (self.scenario, values))
+        same = mine == others
         return same and (self.poses is poses or np.array_equal(self.poses, poses))
 
 
