@@ -10,10 +10,10 @@ from rover_physics.names import EQUAL, OPTIMAL, SERVO, WHEELS
 from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.viewer.documents.board import describe_board
-from rover_planner.viewer.documents.limits import (
+from rover_planner.viewer.documents.drive import (
     MAX_POINTS,
     choose_rows,
+    describe_board,
     describe_limits,
     describe_uses,
 )

@@ -22,7 +22,6 @@ from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import assume
 from rover_planner.viewer.documents.rover import describe_changes
 from rover_planner.viewer.documents.verdict import describe_verdict, list_paths
-from rover_planner.viewer.documents.verdict import name_ground as name_by_size
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, SURE, Judge, blocked_session, ramp, session_on, straight
@@ -253,4 +252,3 @@ def test_every_ground_has_a_name(tmp_path, monkeypatch):
     assert name_ground(None, None) == f"made, seed {SEED}"
     assert name_ground("maps/hill.npz", None) == "hill.npz"
     assert name_ground(None, Path(".")) == name_ground(None, Path("../mars.zarr/")) == "mars.zarr"
-    assert name_by_size(make_terrain(waves)) == "8 x 8 m"

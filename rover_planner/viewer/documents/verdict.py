@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from rover_physics.names import EQUAL, OPTIMAL, SERVO
-from rover_physics.terrain.grid import Terrain
-from rover_planner.viewer.documents.limits import write_chance
+from rover_planner.viewer.documents.drive import write_chance
 from rover_planner.viewer.documents.numbers import write
 from rover_planner.viewer.state.path_limits import write_use
 from rover_planner.viewer.state.scenario import Judged, PolicyVerdict, Scenario, Shown
@@ -16,12 +15,6 @@ from rover_planner.viewer.state.scenario import Judged, PolicyVerdict, Scenario,
 POLICY_TITLES = {EQUAL: "equal torques", SERVO: "speed servos", OPTIMAL: "traction control"}
 """Names of the torque policies on the page."""
 WORDS = {None: "no verdict", True: "traversable", False: "not traversable"}
-
-
-def name_ground(terrain: Terrain) -> str:
-    """Return a name, by its size, for a ground that has none."""
-    x_low, x_high, y_low, y_high = terrain.bounds
-    return f"{x_high - x_low:.3g} x {y_high - y_low:.3g} m"
 
 
 def describe_subject(scenario: Scenario, ground: str) -> dict[str, str]:

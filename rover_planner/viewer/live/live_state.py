@@ -13,7 +13,7 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.learned_ground import LearnedGround
-from rover_planner.viewer.state.rover_state import RoverState, place_state
+from rover_planner.viewer.state.drive import RoverState, place_state
 
 MAX_AGE = 2.0
 """Age from which a topic that is published all the time is stale [s]."""

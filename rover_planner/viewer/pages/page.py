@@ -21,8 +21,8 @@ from rover_planner.viewer.documents.advice import (
     describe_advice,
     seek_advice,
 )
-from rover_planner.viewer.documents.board import describe_board
-from rover_planner.viewer.documents.limits import (
+from rover_planner.viewer.documents.drive import (
+    describe_board,
     describe_limits,
     describe_uses,
 )
@@ -38,7 +38,6 @@ from rover_planner.viewer.documents.verdict import (
     describe_subject,
     describe_verdict,
     list_paths,
-    name_ground,
 )
 from rover_planner.viewer.pages.base import Answer, PageBase
 from rover_planner.viewer.pages.sharing import (
@@ -78,7 +77,7 @@ class Page(PageBase):
         host: str = "127.0.0.1",
         port: int = 8080,
         survey: ShownSurvey | None = None,
-        ground_name: str = "",
+        ground_name: str = "ground",
     ):
         """Start to serve a session.
 
@@ -87,10 +86,10 @@ class Page(PageBase):
             host: Address to serve on.
             port: Port to serve on; 0 takes a free one.
             survey: A survey of rover and ground, whose layers are offered.
-            ground_name: What the page calls the ground (default: its size).
+            ground_name: What the page calls the ground.
         """
         self.session, self.playback = session, Playback()
-        self._ground_name = ground_name or name_ground(session.wanted.terrain)
+        self._ground_name = ground_name
         self._click_sets = "goal"
         self._opening: tuple[PageLink, Scenario] | None = None
         """The link whose path and time are not shown yet, and what it asks for."""

@@ -25,8 +25,8 @@ from rover_planner.viewer.state.colours import (
     Colour,
     colour_use,
 )
+from rover_planner.viewer.state.drive import RoverState
 from rover_planner.viewer.state.failure import Failure
-from rover_planner.viewer.state.rover_state import RoverState
 
 WEIGHT_LENGTH = 4.0
 """Length of the arrow of a sixth of the rover's weight [wheel radii]."""

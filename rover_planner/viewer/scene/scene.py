@@ -12,8 +12,8 @@ from rover_physics.rover.model import Rover
 from rover_planner.viewer.scene.canvas import Canvas
 from rover_planner.viewer.scene.drawn_rover import DrawnRover, FailureMark
 from rover_planner.viewer.scene.overlays import PathOverlay
+from rover_planner.viewer.state.drive import RoverState
 from rover_planner.viewer.state.failure import Failure
-from rover_planner.viewer.state.rover_state import RoverState
 
 FIT, TOP, SIDE, START = "Fit", "Top", "Side", "Start"
 VIEWS = (FIT, TOP, SIDE)

@@ -11,8 +11,8 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.planning.asked_poses import AskedPoses
+from rover_planner.viewer.state.drive import RoverState, place_state
 from rover_planner.viewer.state.path_limits import PathLimits, ShownLimit
-from rover_planner.viewer.state.rover_state import RoverState, place_state
 
 BODY = "body"
 """Name of the body among the links."""

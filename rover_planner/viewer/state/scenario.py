@@ -15,10 +15,9 @@ from rover_physics.traversability.verdict import Verdict
 from rover_planner.planning.path_query import Candidate, PathQueryOptions
 from rover_planner.planning.search.path_search import SearchResult
 from rover_planner.planning.search.query import LatticeSettings
-from rover_planner.viewer.state.drive import Trajectory
+from rover_planner.viewer.state.drive import RoverState, Trajectory
 from rover_planner.viewer.state.failure import Failure, find_failure
 from rover_planner.viewer.state.path_limits import PathLimits, find_path_limits
-from rover_planner.viewer.state.rover_state import RoverState
 
 Pose = tuple[float, float, float]
 
