@@ -2,6 +2,7 @@
 """What the page tells: limits along a path, the failure, the board, paths, and their words."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -294,7 +295,8 @@ def test_the_board_has_all_loads_and_unknown_values_are_none_or_a_question_mark(
         f"{load:.1f} N" for load in state.wheel_loads
     ]
     assert [len(cells) for _, cells in board["table"]] == [6] * 6
-    unknown = state.change(wheel_loads=np.full(6, np.nan), friction_utilisation=np.full(6, np.nan))
+    lost = {"wheel_loads": np.full(6, np.nan), "friction_utilisation": np.full(6, np.nan)}
+    unknown = replace(state, here=state.here.change(**lost))
     board = describe_board(unknown)
     assert {one["load"] for one in board["wheels"]} == {"?"}
     assert {one["bars"][0][1] for one in board["wheels"]} == {None}

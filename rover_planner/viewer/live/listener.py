@@ -83,8 +83,6 @@ class LiveListener(Node):
         self._frame = map_frame
         self._data = LiveData()
         """Without the ages, and without the forces."""
-        self._forces: Mapping[str, Any] = {}
-        """Forces by their field, as the server has predicted them at the rover's place."""
         self._predicted: Mapping[str, np.ndarray] = {}
         self._estimated: Mapping[str, np.ndarray] = {}
         self._ages: dict[str, TopicAge] = {}
@@ -129,16 +127,15 @@ class LiveListener(Node):
 
     def latest(self) -> LiveData:
         """Return the latest data."""
-        data = self._data
-        if data.plan is not None and data.position is not None:
-            self._forces = _read_nearest(self._predicted, data.plan, data.position)
+        data, predicted, silent = self._data, {}, self._ages[SIGN_OF_LIFE].is_stale
+        if data.plan is not None and data.position is not None and not silent:
+            predicted = _read_nearest(self._predicted, data.plan, data.position)
         estimated = {
             field: self._estimated[field]
             for topic, field in ESTIMATED_FIELDS.items()
             if field in self._estimated and not self._ages[f"{CONTROLLER}/{topic}"].is_stale
         }
         is_estimated = not estimated.keys().isdisjoint(PREDICTED_FIELDS.values())
-        predicted = {} if self._ages[SIGN_OF_LIFE].is_stale else self._forces
         source = "forces predicted by the server" if predicted else ""
         source = "forces estimated by the traction controller" if is_estimated else source
         forces, ages = {**predicted, **estimated}, tuple(self._ages.values())

@@ -11,9 +11,14 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.viewer.documents.drive import describe_board
-from rover_planner.viewer.documents.live import choose_answer, describe_learned, list_topics
 from rover_planner.viewer.live.listener import LiveListener
-from rover_planner.viewer.live.live_state import LiveData, read_state
+from rover_planner.viewer.live.live_state import (
+    LiveData,
+    choose_answer,
+    describe_learned,
+    list_topics,
+    read_state,
+)
 from rover_planner.viewer.pages.base import Answer, PageBase
 from rover_planner.viewer.pages.sharing import read_link
 from rover_planner.viewer.scene.ground_mesh import PaintRequest

@@ -26,7 +26,7 @@ from rover_planner.viewer.state.colours import (
     colour_use,
 )
 from rover_planner.viewer.state.drive import RoverState
-from rover_planner.viewer.state.failure import Failure
+from rover_planner.viewer.state.path_limits import Failure
 
 WEIGHT_LENGTH = 4.0
 """Length of the arrow of a sixth of the rover's weight [wheel radii]."""

@@ -13,7 +13,7 @@ from rover_planner.viewer.scene.canvas import Canvas
 from rover_planner.viewer.scene.drawn_rover import DrawnRover, FailureMark
 from rover_planner.viewer.scene.overlays import PathOverlay
 from rover_planner.viewer.state.drive import RoverState
-from rover_planner.viewer.state.failure import Failure
+from rover_planner.viewer.state.path_limits import Failure
 
 FIT, TOP, SIDE, START = "Fit", "Top", "Side", "Start"
 VIEWS = (FIT, TOP, SIDE)

@@ -76,10 +76,6 @@ class RoverState:
         bound = self.rover.limits.torque_saturation * self.kept_share
         return np.asarray(self.torque_saturation / max(bound, LEAST_BOUND))
 
-    def change(self, **values: Any) -> "RoverState":
-        """Return the state with other values of some quantities."""
-        return RoverState(self.rover, self.here.change(**values), self.spin)
-
 
 def place_state(
     rover: Rover,

@@ -16,8 +16,12 @@ from rover_planner.planning.path_query import Candidate, PathQueryOptions
 from rover_planner.planning.search.path_search import SearchResult
 from rover_planner.planning.search.query import LatticeSettings
 from rover_planner.viewer.state.drive import RoverState, Trajectory
-from rover_planner.viewer.state.failure import Failure, find_failure
-from rover_planner.viewer.state.path_limits import PathLimits, find_path_limits
+from rover_planner.viewer.state.path_limits import (
+    Failure,
+    PathLimits,
+    find_failure,
+    find_path_limits,
+)
 
 Pose = tuple[float, float, float]
 

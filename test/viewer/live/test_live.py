@@ -20,22 +20,20 @@ from rover_physics.names import WHEEL_JOINTS
 from rover_physics.rover.rover_file import load_rover
 from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.ros.qos import latched_qos, result_qos, sensor_qos, topic_qos
-from rover_planner.viewer.documents.live import (
-    PATIENCE,
-    choose_answer,
-    describe_learned,
-    list_topics,
-)
 from rover_planner.viewer.live.listener import LiveListener, listen
 from rover_planner.viewer.live.live_state import (
     MAX_AGE,
     MAX_TRAIL,
+    PATIENCE,
     TRAIL_STEP,
     Click,
     LearnedTrail,
     LiveData,
     LiveVerdict,
     TopicAge,
+    choose_answer,
+    describe_learned,
+    list_topics,
     read_state,
 )
 from support.waiting import repeat_until, wait_until
