@@ -23,6 +23,8 @@ from support.viewer.sessions import (
     SURE,
     ask,
     held,
+    is_at_rest,
+    is_busy,
     ramp,
     session_on,
     shift,
@@ -105,14 +107,6 @@ def test_another_site_gets_no_channel(page):
 # What is told and drawn.
 
 
-def test_no_press_of_a_key_is_lost(page):
-    times = page.session.shown.path.trajectory.times
-    ask(page, lambda: page.playback.go_to(0.0))
-    for _ in range(3):
-        page.hear({"ask": "step", "by": 1}, None)
-    wait_until(lambda: abs(page.playback.time - times[3]) < 1e-6, "three steps")
-
-
 def test_a_changed_number_is_told_with_what_it_changes_and_can_be_undone_and_reset(page):
     for friction in (0.75, 0.7):
         change_friction(page, friction)
@@ -192,11 +186,11 @@ def test_the_verdict_is_told_before_its_drawings_and_policies_are_judged_after_t
     change_friction(page, 0.4)
     assert begun.wait(PATIENCE)
     passes = told(page, "verdict")["passes"]
-    assert page.is_busy
+    assert is_busy(page)
     go_on.set()
     assert passes is False and judged[0] != POLICY
-    wait_until(lambda: not page.is_busy, "the drawings")
-    assert not any(one.is_old for one in page.session.shown.by_policy)
+    wait_until(lambda: is_at_rest(page), "the drawings")
+    assert not any(one["old"] for one in told(page, "verdict")["policies"])
 
 
 def test_the_ghost_of_a_failure_stays_for_the_next_one_and_hides_without(page):
@@ -321,20 +315,11 @@ def test_a_drawing_that_fails_is_told_and_stops_no_other_and_what_is_drawn_is_no
 
 
 def test_a_failed_request_is_told_until_a_request_succeeds(page):
-    ask(page, fail)
+    page.requests.put(fail)
     error = ["the last request failed", "ValueError: a line of <no> points"]
     wait_until(lambda: told(page, "errors") == [error], "the notice")
     ask(page, lambda: None)
     wait_until(lambda: told(page, "errors") == [], "the notice to go")
-
-
-def test_a_failed_picture_is_told_until_the_next_one_that_is_drawn(page, monkeypatch):
-    with monkeypatch.context() as patch:
-        patch.setattr(page.scene, "show", fail)
-        page.hear({"ask": "toggle"}, None)
-        wait_until(lambda: told(page, "errors"), "the notice")
-    wait_until(lambda: not told(page, "errors"), "the notice to go")
-    ask(page, lambda: page.playback.go_to(0.0))
 
 
 def test_a_closed_page_leaves_no_thread_behind():

@@ -116,7 +116,6 @@ class PageBase(ABC):
         self.requests: Inbox[Action] = Inbox()
         self.colouring, self.forces = Colouring(self.layers[0]), True
         self._ended = threading.Event()
-        self._fulfils = False
         own: dict[str, Answer] = {"colour": self._colour, "forces": self._show_forces}
         self._answers = {**own, **self.list_answers()}
         try:
@@ -155,11 +154,6 @@ class PageBase(ABC):
         """Address of the page."""
         host = "localhost" if self._host in ("0.0.0.0", "::") else self._host
         return f"http://{host}:{self.channel.port}"
-
-    @property
-    def is_acting(self) -> bool:
-        """True if the page acts on requests, or has still to."""
-        return self.requests.wait(0.0) or self._fulfils
 
     def close(self) -> None:
         """End the page."""
@@ -321,11 +315,9 @@ class PageBase(ABC):
         """Fulfil the requests, tell what they have changed, and draw the next picture if due."""
         due = self._last + PERIOD
         self.requests.wait(due - time.monotonic())
-        self._fulfils = True
         for action in self.requests.take().values():
             self.errors.run("the last request failed", partial(self._fulfil, action))
         self.tell_all()
-        self._fulfils = False
         now = time.monotonic()
         passed, self._last = now - self._last, now
         with self.server.atomic():  # one message to wake the server for all that is sent
@@ -337,9 +329,8 @@ class PageBase(ABC):
 
     def has_changed(self, name: str, *made_of: Any) -> bool:
         """Return whether something is made of other objects than when this was asked last."""
-        before, self._made_of[name] = self._made_of.get(name), made_of
-        same = before is not None and len(before) == len(made_of)
-        return not same or any(a is not b for a, b in zip(before or (), made_of, strict=True))
+        before, self._made_of[name] = self._made_of.get(name, ()), made_of
+        return [*map(id, before)] != [*map(id, made_of)]
 
     def tell_made(self, name: str, made_of: Sequence[Any], make: Callable[[], Part]) -> None:
         """Tell a part that is made anew only if one of the objects has changed of which it is."""

@@ -117,13 +117,6 @@ class Page(PageBase):
             "speeds": list(SPEEDS),
         }
 
-    @property
-    def is_busy(self) -> bool:
-        """True if something is judged, or judged and not shown yet."""
-        works = self._judging, self.painter, self._advice
-        is_judging = any(work.progress is not None for work in works)
-        return is_judging or self.is_acting  # in this order: what was found is still shown
-
     def close(self) -> None:
         """End the page and its threads in the background."""
         super().close()

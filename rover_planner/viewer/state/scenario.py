@@ -132,18 +132,16 @@ class Judged:
         return same and (self.poses is poses or np.array_equal(self.poses, poses))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PolicyVerdict:
     """The verdict of a path under one torque policy."""
 
-    policy: str
-    """One of `TORQUE_POLICIES`."""
+    scenario: Scenario
+    """Values for which it was judged; the policy is another."""
     traversable: bool | None
-    """True if the rover can drive the path; None if this policy cannot judge it or did not yet."""
+    """True if the rover can drive the path; None if this policy cannot judge it."""
     reason: str
     """Reason of a refusal; empty if it can."""
-    is_old: bool = False
-    """True if it is of other values than the verdict beside it, or not known yet."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,8 +158,8 @@ class Shown:
     """Number of candidates; paths beyond were searched."""
     reference: Judged | None = None
     """The same path with the values of the reference; None if nothing differs from it."""
-    by_policy: tuple[PolicyVerdict, ...] = ()
-    """Its verdicts under all torque policies; empty for a replay, whose soil is not known."""
+    by_policy: Mapping[str, PolicyVerdict] = field(default_factory=dict)
+    """Its verdicts under torque policies that are known; those for other values are old."""
     chance: FailureChance | None = None
     """The chance that the path fails, up to where a limit is broken; None while it is not known,
     or for a replay."""
