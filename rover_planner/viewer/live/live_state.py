@@ -195,28 +195,19 @@ def read_state(rover: Rover, data: LiveData) -> RoverState | None:
     )
 
 
-@dataclass(frozen=True, eq=False)
-class LiveAnswer:
-    """The one answer that is shown, in words and in the scene."""
-
-    document: dict[str, Any]
-    """As `describe_verdict` returns it."""
-    plan: Floats | None
-    """(n, 3) poses of its plan; None without one."""
-
-    @property
-    def is_old(self) -> bool:
-        """True if nobody stands for it any more."""
-        return bool(self.document["old"])
-
-
-def choose_answer(data: LiveData, now: float, refusal: str = "") -> LiveAnswer:
+def choose_answer(
+    data: LiveData, now: float, refusal: str = ""
+) -> tuple[dict[str, Any], Floats | None]:
     """Return the answer to the last click, or without one the server's newest.
 
     Args:
         data: The latest data.
         now: The monotonic clock [s].
         refusal: Why a visitor's last request was refused; empty if it was not.
+
+    Returns:
+        The answer as `describe_verdict` returns one, old if nobody stands for it any more; (n, 3)
+        poses of its plan, None without one.
     """
     newest, click, server = data.verdict, data.click, data.server
     verdict, offers = (newest if click is None else click.verdict), []
@@ -243,7 +234,7 @@ def choose_answer(data: LiveData, now: float, refusal: str = "") -> LiveAnswer:
         old = f"the server is silent for {server.describe()}"
     shown = data.plan if click is None else click.plan
     document = {**answer, "headline": headline, "old": old, "refusal": refusal, "offers": offers}
-    return LiveAnswer(document, shown)
+    return document, shown
 
 
 def write_age(seconds: float) -> str:

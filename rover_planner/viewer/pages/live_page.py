@@ -100,8 +100,8 @@ class LivePage(PageBase):
     def tell(self) -> None:
         """Tell whose answer is shown and how old it is; the plan has the same age."""
         data, now, tell = self._data, time.monotonic(), self.channel.tell
-        answer = choose_answer(data, now, self._refusal)
-        tell("verdict", answer.document)
+        answer, plan = choose_answer(data, now, self._refusal)
+        tell("verdict", answer)
         soil = ", ".join(self.ground.soil_names)
         ground = self._ground_name or "not known yet"
         facts = {"rover": self._rover.name, "map": ground, "soil": soil, "mode": data.freshness}
@@ -109,7 +109,7 @@ class LivePage(PageBase):
         tell("chosen", self.list_chosen())
         tell("learned", describe_learned(data.learned))
         trail = None if data.learned is None else data.learned.places
-        shown, paths, terrain = (answer.plan, answer.is_old), self.scene.paths, self.ground
+        shown, paths, terrain = (plan, bool(answer["old"])), self.scene.paths, self.ground
         self.draw_made(
             "the trail is not drawn",
             (trail, terrain),

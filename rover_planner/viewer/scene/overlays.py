@@ -34,7 +34,7 @@ WIDE, NARROW = 6.0, 3.5
 """Widths of the shown path and of the others [px]."""
 NUMBER_SHARES = (0.35, 0.65)
 """Shares of a path at which the numbers of the first and the last one stand."""
-PATHS, NUMBERS, FLAGS = "/paths", "/numbers", "/flags"
+PATHS, NUMBERS, FLAGS, LINES = "/paths", "/numbers", "/flags", "/lines"
 """Groups of nodes."""
 NUMBER_HEIGHT = 1.5
 """Height of a path's number above the ground [wheel radii]."""
@@ -54,8 +54,6 @@ class PathOverlay:
         self._canvas = canvas
         self.paths: list[Sequence[Strand]] = []
         """The candidate paths as they are drawn."""
-        self.lines: dict[str, Sequence[Strand]] = {}
-        """What else is drawn, by name: a plan, a ghost, a trail."""
         self._shown = 0
         self._old: frozenset[int] = frozenset()
         """Indices of the paths that are greyed."""
@@ -81,7 +79,8 @@ class PathOverlay:
 
     def show_line(self, name: str, path: Floats | None, colour: Colour) -> None:
         """Draw a path (n, 3), or none, instead of the one that had the name."""
-        self._draw(name, [] if path is None else self._find_strand(path[:, :2], colour))
+        strands = [] if path is None else self._find_strand(path[:, :2], colour)
+        self._canvas.show_lines(f"{LINES}/{name}", strands, WIDE)
 
     def show_trail(self, trail: Floats | None) -> None:
         """Draw where (n, 3) something was learned: x, y [m] and a number from 0 to 1."""
@@ -91,7 +90,8 @@ class PathOverlay:
             self._find_strand(known[k : k + 2, :2], (red, green, blue))
             for k, (red, green, blue) in enumerate(colours)
         ]
-        self._draw("trail", list(itertools.chain.from_iterable(steps)))
+        strands = [*itertools.chain.from_iterable(steps)]
+        self._canvas.show_lines(f"{LINES}/trail", strands, WIDE)
 
     def find_number(self, origin: Floats, direction: Floats) -> int | None:
         """Return the index of the path whose number a ray hits; None for none.
@@ -119,11 +119,6 @@ class PathOverlay:
             width = WIDE if index == self._shown else NARROW
             paint = UNKNOWN if index in self._old else None
             self._canvas.show_lines(f"{PATHS}/{index}", strands, width, paint)
-
-    def _draw(self, name: str, strands: Sequence[Strand]) -> None:
-        """Draw some lines instead of those that had the name."""
-        self.lines[name] = strands
-        self._canvas.show_lines(f"/lines/{name}", strands, WIDE)
 
     def _find_strands(self, candidate: Candidate) -> list[Strand]:
         """Return a path in the colour of its verdict, faded from where it is refused."""

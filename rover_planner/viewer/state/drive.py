@@ -147,11 +147,6 @@ class Trajectory:
         """Energy spent up to its end [J]."""
         return float(self._driven.energy[-1]) if self.length else 0.0
 
-    @property
-    def duration(self) -> float:
-        """Time from the first pose to the last [s]."""
-        return float(self.times[-1])
-
     def state_at(self, time: float) -> RoverState | None:
         """Return the state at a time [s], linear between poses; None without poses."""
         if not self.length:
@@ -185,16 +180,19 @@ class Playback:
     """(n,) times of the poses of the drive [s]."""
     places: Floats = field(default_factory=lambda: np.zeros(1))
     """(n,) their places along the path, whole numbers at waypoints."""
-    time: float = 0.0
-    """Time that is shown [s]."""
+    place: float = 0.0
+    """Where the rover is along the path; a drive may end before."""
     speed: float = 10.0
     """Chosen speed, one of SPEEDS."""
     is_playing: bool = False
     """True if the time moves on."""
     moved: bool = True
     """True if it has changed since it was shown; whoever shows it sets this to False."""
-    _place: float | None = None
-    """Where the rover is by `set_drive` until the time is moved; None if the time tells."""
+
+    @property
+    def time(self) -> float:
+        """Time that is shown [s]."""
+        return float(np.interp(self.place, self.places, self.times))
 
     @property
     def duration(self) -> float:
@@ -209,8 +207,7 @@ class Playback:
 
     def seek(self, time: float) -> None:
         """Go to a time [s], limited to the drive."""
-        self.time = float(np.clip(time, 0.0, self.duration))
-        self._place, self.moved = None, True
+        self.place, self.moved = float(np.interp(time, self.times, self.places)), True
 
     def go_to(self, time: float) -> None:
         """Pause, and go to a time [s], limited to the drive."""
@@ -238,18 +235,10 @@ class Playback:
         )
 
     def set_drive(self, times: Floats, places: Floats) -> None:
-        """Take another drive, and go to the place where the rover is.
-
-        A drive that ends before that place is shown at its end, and the place is kept for the
-        next one until the time is moved.
+        """Take another drive, and stay at the place, or at the end of a drive that ends before.
 
         Args:
             times: (n,) times of its poses [s], ascending, n >= 1.
             places: (n,) their places along the path, ascending.
         """
-        place = self._place
-        if place is None:
-            place = float(np.interp(self.time, self.times, self.places))
-        self.times, self.places = times, places
-        self.seek(float(np.interp(place, places, times)))
-        self._place = place
+        self.times, self.places, self.moved = times, places, True

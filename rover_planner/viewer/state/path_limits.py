@@ -276,8 +276,6 @@ class Failure:
     """The broken limit."""
     value: float
     """The value that breaks it, in its unit; NaN if there is none."""
-    use: float
-    """Use of the limit there."""
     link: str
     """The link that fails: a name of WHEELS, BODY, rocker_left, bogie_right and so on; empty if
     it is none."""
@@ -339,7 +337,6 @@ def find_failure(rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathL
         reason=verdict.reason,
         limit=limit,
         value=value if explains else np.nan,
-        use=float(lane.used[at]),
         link=_find_link(rover, terrain, verdict.code, rows, at)
         or (WHEELS[lane.wheel[at]] if explains and lane.wheel[at] >= 0 else ""),
         distance=float(rows.distance[at]),
