@@ -106,7 +106,7 @@ def wait_patiently(condition: Callable[[], Any], what: str) -> None:
 
 def is_busy(page: Any) -> bool:
     """Return whether a page judges, paints or seeks advice."""
-    return any(work.progress for work in (page._judging, page.painter, page._advice))
+    return any(work.progress for work in page.works)
 
 
 def is_at_rest(page: Any) -> bool:

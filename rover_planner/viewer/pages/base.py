@@ -125,6 +125,8 @@ class PageBase(ABC):
         scene_port = self.channel.port + 1 if port and self.channel.port < MAX_PORT else 0
         self.server = viser.ViserServer(self._host, scene_port, label="camera", verbose=False)
         self.errors = Errors(lambda messages: self.channel.tell("errors", messages))
+        self.works: list[BackgroundWork] = []
+        """What works in the background."""
         self._made_of: dict[str, tuple[Any, ...]] = {}
         self.scene = Scene(self.server)
         self.scene.canvas.move_to(terrain)
@@ -159,7 +161,8 @@ class PageBase(ABC):
         """End the page."""
         self._ended.set()
         self.thread.join(5.0)
-        self.painter.close()
+        for work in self.works:
+            work.close()
         self.channel.close()
         self.server.stop()
 
@@ -204,7 +207,9 @@ class PageBase(ABC):
             self.requests.put(take_and_tell)
             drawn.wait(DRAWING_TIME)
 
-        return BackgroundWork(work, hand_over, name)
+        begun = BackgroundWork(work, hand_over, name)
+        self.works.append(begun)
+        return begun
 
     @abstractmethod
     def list_answers(self) -> Mapping[str, Answer]:

@@ -100,28 +100,18 @@ class Page(PageBase):
         session.judge = self._judging.ask
         self._advised: Advised | None = None
         """The path that is looked at and the advice on it; None if it was not asked for."""
-        self.channel.tell("offers", self._list_offers())
-        self.has_changed("the cameras are not moved", session.wanted.loaded)  # START is theirs
-        self._show()
-        self.paint()
-        session.judge_again()  # with the search that was not made
-        self.thread.start()
-
-    def _list_offers(self) -> dict[str, Any]:
-        """Return what the page's boxes offer."""
-        return {
-            **self.list_layers(),
+        offers = {
             "presets": list(preset_names()),
             "soils": list(load_soils()),
             "policies": [[name, title] for name, title in POLICY_TITLES.items()],
             "speeds": list(SPEEDS),
         }
-
-    def close(self) -> None:
-        """End the page and its threads in the background."""
-        super().close()
-        self._judging.close()
-        self._advice.close()
+        self.channel.tell("offers", self.list_layers() | offers)
+        self.has_changed("the cameras are not moved", session.wanted.loaded)  # START is theirs
+        self._show()
+        self.paint()
+        session.judge_again()  # with the search that was not made
+        self.thread.start()
 
     def describe_ground(self) -> PaintRequest:
         """Return the ground with what is shown on it."""
