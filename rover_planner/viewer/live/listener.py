@@ -23,7 +23,6 @@ from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64MultiArray, String
 
 from msg_adapters.elevation import terrain_from_point_cloud
-from msg_adapters.errors import MessageError
 from msg_adapters.identity import plan_request_hash
 from msg_adapters.paths import path_to_poses, stamped_pose, yaw_from_quaternion
 from msg_adapters.results.diagnostics import HEALTH
@@ -121,9 +120,16 @@ class LiveListener(Node):
 
         def hear(message: Any) -> None:
             self._ages[topic] = TopicAge(topic, time.monotonic(), is_stream)
-            take(message)
+            self._hear(topic, take, message)
 
         self.create_subscription(kind, topic, hear, qos)
+
+    def _hear(self, what: str, take: Take, message: Any) -> None:
+        """Take a message, or warn of one that is bad."""
+        try:
+            take(message)
+        except RoverError as error:
+            self.get_logger().warning(f"{what} not shown: {error}", throttle_duration_sec=1.0)
 
     def latest(self) -> LiveData:
         """Return the latest data."""
@@ -160,7 +166,8 @@ class LiveListener(Node):
         click = Click(plan_request_hash(request.start, request.goal, 0.0), time.monotonic())
         with self._click_lock:
             self._click = click
-        self._planner.call_async(request).add_done_callback(partial(self._on_answer, click))
+        take = partial(self._on_answer, click)
+        self._planner.call_async(request).add_done_callback(partial(self._hear, "plan", take))
         return ""
 
     def forget_click(self) -> None:
@@ -171,7 +178,7 @@ class LiveListener(Node):
     def _on_answer(self, asked: Click, future: Any) -> None:
         """Take the plan of a click, unless there was another one since."""
         response = future.result()
-        with self._skipping("plan"), self._click_lock:
+        with self._click_lock:
             click = self._click
             if click is not None and click.asked == asked.asked and response.plan.poses:
                 plan = path_to_poses(response.plan, self._frame)
@@ -207,10 +214,7 @@ class LiveListener(Node):
 
     def _on_odometry(self, odometry: Odometry) -> None:
         point, q = odometry.pose.pose.position, odometry.pose.pose.orientation
-        try:
-            yaw = yaw_from_quaternion(q)
-        except MessageError:
-            return
+        yaw = yaw_from_quaternion(q)
         roll, pitch, _ = rpy_from_xyzw((q.x, q.y, q.z, q.w))
         position, known = np.array([point.x, point.y, point.z]), self._data
         if not np.isfinite(position).all():
@@ -227,20 +231,17 @@ class LiveListener(Node):
         )
 
     def _on_cloud(self, cloud: PointCloud2) -> None:
-        with self._skipping("elevation_cloud"):
-            self._data = replace(self._data, terrain=terrain_from_point_cloud(cloud))
+        self._data = replace(self._data, terrain=terrain_from_point_cloud(cloud))
 
     def _on_ground(self, message: String) -> None:
-        with self._skipping("ground_estimate"):
-            ground, known = parse_learned(message.data, "ground_estimate"), self._data
-            at = None if known.position is None else known.position[:2]
-            trail = known.learned or LearnedTrail(ground)
-            self._data = replace(known, learned=trail.add(ground, at))
+        ground, known = parse_learned(message.data, "ground_estimate"), self._data
+        at = None if known.position is None else known.position[:2]
+        trail = known.learned or LearnedTrail(ground)
+        self._data = replace(known, learned=trail.add(ground, at))
 
     def _on_plan(self, plan: Path) -> None:
-        with self._skipping("plan"):
-            poses = path_to_poses(plan, self._frame) if plan.poses else None
-            self._data = replace(self._data, plan=poses)
+        poses = path_to_poses(plan, self._frame) if plan.poses else None
+        self._data = replace(self._data, plan=poses)
 
     def _on_verdict(self, message: DiagnosticArray) -> None:
         """Take a verdict; it is that of the last click, too, if that asked the same."""
@@ -260,20 +261,11 @@ class LiveListener(Node):
                 self._click = replace(click, verdict=verdict)
 
     def _on_prediction(self, field: str, message: Float64MultiArray) -> None:
-        with self._skipping(field):
-            self._predicted = {**self._predicted, field: array_values(message).copy()}
+        self._predicted = {**self._predicted, field: array_values(message).copy()}
 
     def _on_estimate(self, field: str, message: Float64MultiArray) -> None:
         if len(message.data) >= 6:  # deviations may follow
             self._estimated = {**self._estimated, field: np.array(message.data[:6])}
-
-    @contextlib.contextmanager
-    def _skipping(self, what: str) -> Iterator[None]:
-        """Warn of a bad message instead of taking it."""
-        try:
-            yield
-        except RoverError as error:
-            self.get_logger().warning(f"{what} not shown: {error}")
 
 
 def _name_finite(names: Sequence[str], values: Sequence[float]) -> dict[str, float]:

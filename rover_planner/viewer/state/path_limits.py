@@ -118,28 +118,6 @@ def write_use(use: float) -> str:
     return "just above 100 %" if use > 1.0 and text == "100 %" else text
 
 
-def list_limits(rover: Rover, prediction: PathPrediction) -> list[ShownLimit]:
-    """Return the limits of a prediction, in the order in which they become reasons.
-
-    Sinkage is left out where nothing sinks. Rows of the table with one code are one limit, which
-    is a number if it is one row's.
-    """
-    asked = limits_of(rover, prediction.policy)
-    found: dict[str, ShownLimit] = {}
-    for row, bound in zip(asked.rows, asked.bounds, strict=True):
-        if row.code == "sinkage" and not np.any(prediction.sinkage > 0.0):
-            continue
-        shown = ShownLimit(row.code, row.title)
-        if row.code not in found and row.sense != Sense.RANGE:
-            unit, is_lowest = row.shown or row.unit, row.sense in (Sense.LEAST, Sense.SHARE)
-            number = unit.factor * bound
-            shown = replace(
-                shown, bound=number, unit=unit, is_lowest=is_lowest, keeps_margin=row.keeps_margin
-            )
-        found[row.code] = shown
-    return [*found.values()]
-
-
 @dataclass(frozen=True, eq=False)
 class Lane:
     """One limit along the path; arrays (m,) as in `AskedPoses`."""
@@ -200,6 +178,8 @@ class PathLimits:
 def find_path_limits(rover: Rover, prediction: PathPrediction, verdict: Verdict) -> PathLimits:
     """Return how a prediction uses the limits, up to and including the first failure.
 
+    Sinkage is left out where nothing sinks.
+
     Args:
         rover: The rover.
         prediction: The prediction of the path.
@@ -210,8 +190,13 @@ def find_path_limits(rover: Rover, prediction: PathPrediction, verdict: Verdict)
         prediction = prediction.cut(verdict.first_failure + 1)
     rows = merge_poses(prediction)
     uses = find_uses(limits_of(rover, prediction.policy), rows.prediction.results)
+    of_code: dict[str, list[int]] = {}
+    for k, row in enumerate(uses.limits.rows):
+        of_code.setdefault(row.code, []).append(k)
+    if not np.any(prediction.sinkage > 0.0):
+        of_code.pop("sinkage", None)
     unjudged = np.where(rows.prediction.settled, 0.0, np.inf)
-    lanes = [_make_lane(limit, rows, uses) for limit in list_limits(rover, prediction)]
+    lanes = [_make_lane(rows, uses, np.array(one)) for one in of_code.values()]
     found = PathLimits(rows, (_plain_lane(GROUND, "ground", unjudged), *lanes))
     _add_refusals(found, verdict)
     return found
@@ -222,14 +207,23 @@ def _plain_lane(code: str, title: str, used: Floats) -> Lane:
     return Lane(ShownLimit(code, title), np.full(len(used), np.nan), used, np.full(len(used), -1))
 
 
-def _make_lane(limit: ShownLimit, rows: AskedPoses, uses: Uses) -> Lane:
-    """Return the lane of a limit; of several rows of the table that which is used most counts."""
+def _show_limit(uses: Uses, of_limit: NDArray[np.int64]) -> ShownLimit:
+    """Return the limit of some rows of the table, which is a number if it is one row's."""
+    row, bound = uses.limits.rows[of_limit[0]], uses.limits.bounds[of_limit[0]]
+    if len(of_limit) > 1 or row.sense == Sense.RANGE:
+        return ShownLimit(row.code, row.title)
+    unit, is_lowest = row.shown or row.unit, row.sense in (Sense.LEAST, Sense.SHARE)
+    number = unit.factor * bound
+    return ShownLimit(row.code, row.title, number, unit, is_lowest, row.keeps_margin)
+
+
+def _make_lane(rows: AskedPoses, uses: Uses, of_limit: NDArray[np.int64]) -> Lane:
+    """Return the lane of some rows of the table, of which that which is used most counts."""
     prediction, every = rows.prediction, np.arange(len(rows.distance))
-    of_limit = np.array([k for k, row in enumerate(uses.limits.rows) if row.code == limit.code])
+    limit, values = _show_limit(uses, of_limit), np.full(len(every), np.nan)
     asked = np.where(np.isnan(uses.use[:, of_limit]), -np.inf, uses.use[:, of_limit])
     decides = of_limit[asked.argmax(axis=1)]
     used = np.where(prediction.settled, uses.use[every, decides], np.nan)
-    values = np.full(len(every), np.nan)
     if limit.bound is not None:
         column = find_column(uses.limits.rows[of_limit[0]].reads)[0]
         element = np.maximum(uses.element[every, decides], 0)
