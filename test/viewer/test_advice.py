@@ -11,9 +11,14 @@ from rover_physics.rover.rover_file import load_rover
 from rover_planner.advice.advise import grow_advice
 from rover_planner.advice.case import Case
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.viewer.documents.advice import PROMISED, describe_advice, list_remedies
+from rover_planner.viewer.documents.advice import (
+    PROMISED,
+    Advised,
+    apply_remedy,
+    describe_advice,
+    seek_advice,
+)
 from rover_planner.viewer.pages.page import Page
-from rover_planner.viewer.state.path_advice import Advised, apply_remedy, seek_advice
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, rock_left
 from support.viewer.sessions import wait_for_rest
@@ -68,10 +73,10 @@ def test_advice_is_sought_when_it_is_asked_for_shown_as_a_ghost_and_taken(page):
 
     place = wait_until(find_path, "another path", 60.0)
     page.hear({"ask": "ghost", "words": place}, None)
-    wait_until(lambda: page.scene.paths.lines.get("ghost"), "the ghost")
+    wait_until(lambda: "/lines/ghost" in page.scene.canvas.nodes, "the ghost")
     page.hear({"ask": "remedy", "words": place}, None)
     wait_until(lambda: page.channel.parts["verdict"]["passes"], "the verdict with the remedy")
-    assert not page.scene.paths.lines["ghost"]
+    assert "/lines/ghost" not in page.scene.canvas.nodes
     assert page.errors.messages == {}
 
 
@@ -83,7 +88,7 @@ def test_a_search_tells_what_was_found_by_a_promised_time_and_that_it_goes_on():
     first, last = (Advised(path, since, one) for one in (none, replace(some, complete=True)))
     told = describe_advice(first, True, since + 0.5 * PROMISED)
     assert told["words"] == "tried: nothing yet" and not told["can_ask"]
-    for advised, found in ((first, "nothing"), (last, str(len(list_remedies(last))))):
+    for advised, found in ((first, "nothing"), (last, str(len(last.remedies)))):
         words = describe_advice(advised, True, since + PROMISED)["words"]
         assert words.startswith(f"{found} found so far; the search goes on, tried: ")
     stopped, ended = (describe_advice(one, False, since) for one in (first, last))

@@ -8,7 +8,7 @@ import pytest
 
 from rover_physics.traversability.judge import judge_path
 from rover_planner.planning.search.path_search import FOUND, NO_WAY
-from rover_planner.viewer.documents.verdict import Work, describe_verdict
+from rover_planner.viewer.documents.verdict import describe_verdict
 from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.judging import BETTER, SEARCH, JudgeRequest, judge_request
 from rover_planner.viewer.state.session import ViewSession
@@ -36,7 +36,7 @@ def test_beyond_a_wall_with_a_gap_a_way_is_offered_and_the_path_looked_at_stays(
     *direct, way = shown.paths
     assert len(direct) == 5 and not any(one.verdict.traversable for one in direct)
     assert shown.around.outcome == FOUND and shown.path is not way and shown.offer == 5
-    [offer] = describe_verdict(shown, Work())["offers"]
+    [offer] = describe_verdict(shown)["offers"]
     assert offer["words"].startswith("way around, path 6 passes")
     poses = way.poses
     np.testing.assert_allclose(poses[[0, -1], :2], [shown.scenario.start[:2], BEYOND], atol=1e-9)
@@ -55,7 +55,7 @@ def test_where_there_is_no_way_the_reason_is_told():
     session.judge_again()
     shown = session.shown
     assert shown.around.outcome == NO_WAY and len(shown.paths) == 5
-    details = describe_verdict(shown, Work())["details"]
+    details = describe_verdict(shown)["details"]
     assert details[0] == shown.verdict.reason
     assert details[1].startswith("no way: no path within the map: ") and "closed in" in details[1]
 
@@ -115,10 +115,3 @@ def test_a_search_can_be_cancelled_and_begun_again_and_a_chosen_path_stays_meanw
     session.judge_again()
     judge.finish()
     assert session.shown.around.outcome == FOUND and session.shown.index == other
-
-
-def test_a_session_that_begins_before_a_wall_searches_when_it_is_asked_to():
-    session = walled_session(wall_with_gap, GOAL)
-    assert session.shown.needs_search and len(session.shown.paths) == 5
-    session.judge_again()
-    assert session.shown.offer == 5

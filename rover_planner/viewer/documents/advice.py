@@ -1,13 +1,74 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The list of remedies beside the reason of a refusal."""
+"""Advice on the path that is looked at: sought, told beside the reason of a refusal, and taken."""
 
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Any
 
+from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
+from rover_planner.advice.advise import Advice, grow_advice
+from rover_planner.advice.case import Case
 from rover_planner.advice.remedy import Remedy
-from rover_planner.viewer.state.path_advice import Advised
+from rover_planner.viewer.state.scenario import Judged, Scenario
 
 PROMISED = 20.0
 """Time after which the page tells what was found so far, and that the search goes on [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Advised:
+    """A path and the advice on it."""
+
+    path: Judged
+    """The path."""
+    since: float
+    """When a visitor asked for advice, on the monotonic clock [s]."""
+    advice: Advice | None = None
+    """What was found so far; None while the first lever is tried."""
+
+    @property
+    def remedies(self) -> list[Remedy]:
+        """The remedies in the order of the list."""
+        return [] if self.advice is None else [*self.advice.remedies, *self.advice.others]
+
+    @property
+    def is_complete(self) -> bool:
+        """True if all levers were tried."""
+        return self.advice is not None and self.advice.complete
+
+
+def apply_remedy(scenario: Scenario, remedy: Remedy) -> Scenario:
+    """Return a scenario with the levers of a remedy set, where the page has its own values.
+
+    Friction, torque, payload and limits are numbers of the rover there, which sliders show.
+    """
+    case, told = remedy.judged.case, remedy.options()
+    rover = replace(case.rover, friction=told.get("friction", case.rover.friction))
+    most = told.get("max_torque", rover.wheel.max_torque)
+    rover = replace(rover, wheel=replace(rover.wheel, max_torque=most))
+    if rover.manipulator is not None:
+        carried = told.get("payload", rover.manipulator.payload)
+        rover = replace(rover, manipulator=replace(rover.manipulator, payload=carried))
+    has_path = case.poses is not remedy.refusal.case.poses
+    return replace(
+        scenario,
+        rover=rover,
+        arm_angles=told.get("joint_angles", scenario.arm_angles),
+        options=scenario.options.change(
+            policy=case.options.policy, backward=case.options.backward
+        ),
+        recorded=case.poses if has_path else scenario.recorded,
+    )
+
+
+def seek_advice(path: Judged) -> Iterator[Advice]:
+    """Yield advice on a path that grows."""
+    asked = path.scenario
+    options = asked.asked_options
+    chance = min(options.accepted_chance, ACCEPTED_CHANCE)
+    return grow_advice(
+        Case(asked.rover, asked.terrain, path.poses, options.model, options.map_sigmas, chance)
+    )
 
 
 def describe_advice(advised: Advised | None, is_seeking: bool, now: float) -> dict[str, Any]:
@@ -20,23 +81,14 @@ def describe_advice(advised: Advised | None, is_seeking: bool, now: float) -> di
         is_seeking: True if levers are still tried.
         now: The monotonic clock [s].
     """
-    rows = list_remedies(advised)
+    if advised is None:
+        return {"can_ask": not is_seeking, "seeking": is_seeking, "words": "", "rows": []}
     return {
-        "can_ask": not is_seeking and not _is_complete(advised),
+        "can_ask": not is_seeking and not advised.is_complete,
         "seeking": is_seeking,
-        "words": "" if advised is None else _write_progress(advised, is_seeking, now),
-        "rows": [_describe(remedy) for remedy in rows],
+        "words": _write_progress(advised, is_seeking, now),
+        "rows": [_describe(remedy) for remedy in advised.remedies],
     }
-
-
-def _is_complete(advised: Advised | None) -> bool:
-    return advised is not None and advised.advice is not None and advised.advice.complete
-
-
-def list_remedies(advised: Advised | None) -> list[Remedy]:
-    """Return the remedies in the order of the list."""
-    advice = None if advised is None else advised.advice
-    return [] if advice is None else [*advice.remedies, *advice.others]
 
 
 def _write_progress(advised: Advised, is_seeking: bool, now: float) -> str:
@@ -49,7 +101,7 @@ def _write_progress(advised: Advised, is_seeking: bool, now: float) -> str:
     tried = " and ".join(advice.tried).replace("_", " ") if advice is not None else ""
     if now - advised.since < PROMISED:
         return f"tried: {tried or 'nothing yet'}"
-    found = len(list_remedies(advised)) or "nothing"
+    found = len(advised.remedies) or "nothing"
     return f"{found} found so far; the search goes on, tried: {tried or 'nothing yet'}"
 
 

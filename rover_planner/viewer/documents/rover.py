@@ -12,7 +12,7 @@ from rover_physics.rover.rover_file import rover_to_dict
 from rover_planner.studies.rover_values import RoverValue, get_value, list_values
 from rover_planner.viewer.documents.numbers import write
 from rover_planner.viewer.documents.verdict import POLICY_TITLES
-from rover_planner.viewer.state.limits import write_use
+from rover_planner.viewer.state.path_limits import write_use
 from rover_planner.viewer.state.scenario import Judged, Scenario
 
 JOINTS = "joints"

@@ -2,42 +2,19 @@
 """What is judged, the verdict with its reason and age, and those on all paths."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from rover_physics.names import EQUAL, OPTIMAL, SERVO
-from rover_physics.terrain.grid import Terrain
-from rover_planner.viewer.documents.limits import write_chance
+from rover_planner.viewer.documents.drive import write_chance
 from rover_planner.viewer.documents.numbers import write
-from rover_planner.viewer.state.failure import Failure
-from rover_planner.viewer.state.limits import write_use
-from rover_planner.viewer.state.scenario import Judged, PolicyVerdict, Scenario, Shown
+from rover_planner.viewer.state.path_limits import write_use
+from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
 
 POLICY_TITLES = {EQUAL: "equal torques", SERVO: "speed servos", OPTIMAL: "traction control"}
 """Names of the torque policies on the page."""
 WORDS = {None: "no verdict", True: "traversable", False: "not traversable"}
-
-
-@dataclass(frozen=True)
-class Work:
-    """What the program does, and what it could not do."""
-
-    judging: str = ""
-    """What is worked on, empty for nothing."""
-    old: str = ""
-    """Why the verdict is one of old values; empty if it is not."""
-    refusal: str = ""
-    """Why the last request was refused; empty if it was not."""
-    is_stopped: bool = False
-    """True if visitors have stopped the work."""
-
-
-def name_ground(terrain: Terrain) -> str:
-    """Return a name, by its size, for a ground that has none."""
-    x_low, x_high, y_low, y_high = terrain.bounds
-    return f"{x_high - x_low:.3g} x {y_high - y_low:.3g} m"
 
 
 def describe_subject(scenario: Scenario, ground: str) -> dict[str, str]:
@@ -55,7 +32,7 @@ def describe_subject(scenario: Scenario, ground: str) -> dict[str, str]:
     }
 
 
-def describe_verdict(shown: Shown, work: Work) -> dict[str, Any]:
+def describe_verdict(shown: Shown) -> dict[str, Any]:
     """Return the verdict on the path that is looked at."""
     failure, verdict = shown.path.failure, shown.verdict
     around = shown.around
@@ -63,16 +40,12 @@ def describe_verdict(shown: Shown, work: Work) -> dict[str, Any]:
     return {
         **describe_answer(verdict.traversable, f"path {shown.index + 1} of {len(shown.paths)}"),
         "headline": "" if failure is None else failure.headline,
-        "where": "" if failure is None else write_place(failure),
+        "where": "" if failure is None else failure.place,
         "chance": ""
         if shown.chance is None
         else f"chance of failure {write_chance(shown.chance)}",
         "details": [*filter(None, (verdict.reason, closed))],
-        "old": work.old,
-        "refusal": work.refusal,
-        "judging": work.judging,
-        "stopped": work.is_stopped,
-        "policies": [_describe_policy(one) for one in shown.by_policy],
+        "policies": _list_policies(shown),
         "offers": _list_offers(shown),
         "fails": failure is not None,
     }
@@ -83,18 +56,17 @@ def describe_answer(traversable: bool | None, about: str) -> dict[str, Any]:
     return {"passes": traversable, "word": WORDS[traversable], "about": about}
 
 
-def write_place(failure: Failure) -> str:
-    """Return where and when a path is refused."""
-    between = ", between waypoints" if failure.is_between else ""
-    return f"after {failure.distance:.2f} m, {failure.time:.0f} s{between}"
-
-
-def _describe_policy(one: PolicyVerdict) -> dict[str, Any]:
-    known = one.traversable is not None
-    word = ("passes" if one.traversable else "refused") if known else "not judged"
-    title = POLICY_TITLES[one.policy]
-    passes, reason = one.traversable, one.reason or word
-    return {"title": title, "word": word, "passes": passes, "old": one.is_old, "reason": reason}
+def _list_policies(shown: Shown) -> list[dict[str, Any]]:
+    """Return the verdicts under all policies; none for a replay, whose soil is not known."""
+    rows = []
+    for policy, title in POLICY_TITLES.items() if shown.scenario.recorded is None else ():
+        one = shown.by_policy.get(policy)
+        passes, reason = (None, "") if one is None else (one.traversable, one.reason)
+        word = {None: "not judged", True: "passes", False: "refused"}[passes]
+        old = one is None or one.scenario is not shown.scenario
+        row = {"title": title, "word": word, "passes": passes, "old": old}
+        rows.append({**row, "reason": reason or word})
+    return rows
 
 
 def _list_offers(shown: Shown) -> Sequence[dict[str, Any]]:

@@ -1,114 +1,301 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A rover in the scene with the forces on its wheels: the one that is played, or a ghost."""
+"""A rover in the scene with the forces on its wheels: the one that is played, and its ghost."""
 
+import itertools
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
+import trimesh
 
-from rover_physics.rover.model import Rover
-from rover_planner.viewer.scene.local_frame import LocalFrame
-from rover_planner.viewer.scene.rover_visual import RoverVisual
-from rover_planner.viewer.state.colours import LOAD, TRACTION
-from rover_planner.viewer.state.rover_state import RoverState
+from rover_physics.names import SIDES, WHEEL_POSITIONS, WHEELS
+from rover_physics.numerics.arrays import Floats
+from rover_physics.numerics.quaternions import wxyz_about_y, wxyz_from_rpy
+from rover_physics.rover.manipulator import link_points
+from rover_physics.rover.model import Manipulator, Rover
+from rover_planner.viewer.scene.canvas import Canvas, Strand
+from rover_planner.viewer.state.colours import (
+    BODY,
+    CASING,
+    DARK,
+    LOAD,
+    METAL,
+    REFUSED,
+    TRACTION,
+    Colour,
+    colour_use,
+)
+from rover_planner.viewer.state.drive import RoverState
+from rover_planner.viewer.state.path_limits import Failure
 
 WEIGHT_LENGTH = 4.0
 """Length of the arrow of a sixth of the rover's weight [wheel radii]."""
-
-
-class ForceArrows:
-    """An arrow for each normal force, and one for each force along the ground."""
-
-    def __init__(self, scene: Any, rover: Rover, frame: LocalFrame, name: str):
-        """Add arrows of no length to the scene, below a node `name`."""
-        self._frame = frame
-        self.root = scene.add_frame(name, show_axes=False)
-        """The node of which all others are parts."""
-        self._scale = WEIGHT_LENGTH * rover.wheel.radius / (rover.weight / 6.0)
-        radius = rover.wheel.radius
-        no_arrows = np.zeros((6, 2, 3))
-        sizes = {
-            "shaft_radius": 0.07 * radius,
-            "head_radius": 0.16 * radius,
-            "head_length": 0.35 * radius,
-        }
-        self._normal = scene.add_arrows(f"{name}/normal", no_arrows, LOAD, **sizes)
-        self._along = scene.add_arrows(f"{name}/along", no_arrows, TRACTION, **sizes)
-
-    def show(self, state: RoverState) -> None:
-        """Draw the forces of a state, in proportion; one that is not known has no length."""
-        axis, outwards = state.axles, state.wheel_centres - state.contact_points
-        normal = outwards - (outwards * axis).sum(axis=1, keepdims=True) * axis
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
-        along = np.cross(axis, normal)
-        points = self._frame.to_scene(state.contact_points)
-        N, T, S = (
-            self._scale * np.nan_to_num(values)[:, None]
-            for values in (state.wheel_loads, state.tangential, state.lateral)
-        )
-        self._normal.points = np.stack([points, points + N * normal], axis=1)
-        self._along.points = np.stack([points, points + (T * along + S * axis)], axis=1)
+GROUSERS = 16
+"""Grousers of a wheel as it is drawn."""
+NAME, REASON = "/failure", "/reason"
+OPACITY = 0.55
+"""Opacity of the ghost."""
+NEAR = 0.5
+"""Distance of the played rover at which the ghost makes room for it [wheelbases]."""
+LABEL_HEIGHT = 4.5
+"""Height of the label above the body [wheel radii]."""
 
 
 class DrawnRover:
-    """Nodes of a rover, which stay for the next rover that looks the same."""
+    """Body, rockers, bogies, wheels, arm and forces of a rover, which stay for the next one."""
 
-    root: Any
-    """The node of which all others are parts."""
-    visual: RoverVisual
-    """Body, suspension, wheels and arm."""
-
-    def __init__(self, scene: Any, frame: LocalFrame, name: str, opacity: float | None = None):
+    def __init__(self, canvas: Canvas, name: str, opacity: float | None = None):
         """Draw nothing yet; nodes will be below a node `name`, opaque without an opacity."""
-        self._scene, self._frame, self._name, self._opacity = scene, frame, name, opacity
+        self._canvas, self._name, self._opacity = canvas, name, opacity
+        self._links, self._forces = f"{name}/links", f"{name}/forces"
         self.rover: Rover | None = None
         """The rover; None before the first."""
-        self._arm: dict[str, float] = {}
-        self._forces_shown = True
         self.state: RoverState | None = None
         """The state that is shown; None hides the rover."""
+        self._looks: tuple[Any, ...] = ()
+        """What the shape of the rover and the length of its arrows depend on."""
+        self._arm: dict[str, float] = {}
+        self._joints: dict[str, str] = {}
+        self.meshes: dict[str, tuple[str, Colour]] = {}
+        """Node and colour of each link by its name; that of a wheel is its tyre."""
 
     def take(self, rover: Rover, arm_angles: Mapping[str, float]) -> None:
         """Draw another rover, with its arm at angles [rad] by joint name.
 
         Of a rover that looks like the last one, only the arm is turned.
         """
-        if self.rover is None or not look_alike(self.rover, rover):
-            if self.rover is not None:
-                self.root.remove()  # what is below it goes with it
-            self.rover = None  # an error must not leave half a rover
-            self.root = self._scene.add_frame(self._name, show_axes=False)
-            links, forces = f"{self._name}/links", f"{self._name}/forces"
-            self.visual = RoverVisual(self._scene, rover, self._frame, links, self._opacity)
-            self._arrows = ForceArrows(self._scene, rover, self._frame, forces)
-            self.rover, self._arm = rover, {}
-            self.show_forces(self._forces_shown)
+        wheel, arm = rover.wheel, rover.manipulator
+        self._canvas.radius = wheel.radius
+        looks = wheel.radius, wheel.width, rover.suspension, rover.belly, arm, rover.weight
+        is_new = looks != self._looks
+        if is_new:
+            self._looks, self.rover = (), None  # an error must not leave half a rover
+            self._draw(rover)
+        if arm is not None and (is_new or arm_angles != self._arm):
+            self._put("arm", "arm", make_arm(arm, arm_angles, wheel.radius), DARK)
+        self._looks, self._arm, self.rover = looks, dict(arm_angles), rover
+        if is_new:
             self.show(self.state)
-        if dict(arm_angles) != self._arm:
-            self.visual.turn_arm(rover, arm_angles)
-            self._arm = dict(arm_angles)
+
+    def _draw(self, rover: Rover) -> None:
+        """Put all links and joints of a rover, and take away those that it lacks."""
+        self._joints, self.meshes = {}, {}
+        self._canvas.show_frame(self._name, visible=self.state is not None)
+        for name in (self._links, self._forces):
+            self._canvas.show_frame(name)
+        self._put("body", "body", make_body(rover), BODY)
+        wheel = make_wheel(rover)
+        for side in SIDES:
+            self._put_side(rover, side, wheel)
+        nodes = [*self._joints.values(), *(node for node, _ in self.meshes.values())]
+        self._canvas.remove(self._links, [self._links, *nodes])
+
+    def _put(self, link: str, path: str, mesh: trimesh.Trimesh, colour: Colour) -> None:
+        """Put the mesh of a link."""
+        name, opacity = f"{self._links}/{path}", self._opacity
+        self.meshes[link] = name, colour
+        self._canvas.show(
+            self._canvas.scene.add_mesh_simple, name, vertices=mesh.vertices, faces=mesh.faces,
+            color=colour, flat_shading=True, opacity=opacity, cast_shadow=opacity is None,
+        )  # fmt: skip
+
+    def _put_joint(self, link: str, path: str, position: Floats) -> None:
+        self._joints[link] = f"{self._links}/{path}"
+        self._canvas.show_frame(self._joints[link], position=position)
+
+    def _put_side(
+        self, rover: Rover, side: str, wheel: tuple[trimesh.Trimesh, trimesh.Trimesh]
+    ) -> None:
+        """Put rocker, bogie and wheels of a side; `wheel` is as `make_wheel` returns it."""
+        suspension = rover.suspension
+        rocker = on_side(suspension.rocker_pivot, side)
+        bogie = on_side(suspension.bogie_pivot, side)
+        wheels = {name: on_side(suspension.wheels[name], side) for name in WHEEL_POSITIONS}
+        rocker_path, bogie_path = f"rocker_{side}", f"rocker_{side}/bogie"
+        self._put_joint(f"rocker_{side}", rocker_path, rocker)
+        self._put_joint(f"bogie_{side}", bogie_path, bogie - rocker)
+        radius = 0.16 * rover.wheel.radius
+        ends = [bogie - rocker, wheels[suspension.rocker_wheel] - rocker]
+        self._put(f"rocker_{side}", f"{rocker_path}/beams", make_beams(ends, radius), METAL)
+        ends = [wheels[name] - bogie for name in suspension.bogie_wheels]
+        self._put(f"bogie_{side}", f"{bogie_path}/beams", make_beams(ends, radius), METAL)
+        for position, centre in wheels.items():
+            on_bogie, name = position in suspension.bogie_wheels, f"{position}_{side}"
+            path = f"{bogie_path if on_bogie else rocker_path}/{position}"
+            self._put_joint(name, path, centre - (bogie if on_bogie else rocker))
+            self._put(name, f"{path}/tyre", wheel[0], METAL)
+            self._put(f"{name} grousers", f"{path}/grousers", wheel[1], DARK)
 
     def show(self, state: RoverState | None, failing: str = "") -> None:
-        """Show rover and forces in a state, with a failing link as in `RoverVisual.show`."""
+        """Show rover and forces in a state.
+
+        Args:
+            state: The state; None hides the rover.
+            failing: A link that fails there and has the colour of that: a name of WHEELS, body,
+                or rocker or bogie with its side, such as bogie_left; empty for none.
+        """
         self.state = state
-        if self.rover is not None:
-            self.root.visible = state is not None
-            if state is not None:
-                self.visual.show(state, failing)
-                self._arrows.show(state)
+        if self.rover is None:
+            return
+        self._canvas.show_frame(self._name, visible=state is not None)
+        if state is not None:
+            self._turn(state)
+            self._colour(state, failing)
+            self._draw_forces(state, self.rover)
+
+    def _turn(self, state: RoverState) -> None:
+        """Bring the joints to a state."""
+        turns = {wheel: wxyz_from_rpy(0.0, float(state.spin[k]), float(state.steering_angle[k]))
+                 for k, wheel in enumerate(WHEELS)}  # fmt: skip
+        for k, side in enumerate(SIDES):
+            turns[f"rocker_{side}"] = wxyz_about_y(float(state.rocker_angle[k]))
+            turns[f"bogie_{side}"] = wxyz_about_y(float(state.bogie_angle[k]))
+        for link, turn in turns.items():
+            self._canvas.show_frame(self._joints[link], wxyz=turn)
+        place, turn = self._canvas.to_scene(state.position), wxyz_from_rpy(*state.attitude)
+        self._canvas.show_frame(self._links, position=place, wxyz=turn)
+
+    def _colour(self, state: RoverState, failing: str) -> None:
+        """Give wheels the colours of their use of friction, and a failing link that of that."""
+        used = dict(zip(WHEELS, map(colour_use, state.friction_use), strict=True))
+        for link, (node, own) in self.meshes.items():
+            fails = link == failing
+            colour, opacity = used.get(link, own), 1.0 if fails else self._opacity
+            add = self._canvas.scene.add_mesh_simple
+            self._canvas.show(add, node, color=REFUSED if fails else colour, opacity=opacity)
+
+    def _draw_forces(self, state: RoverState, rover: Rover) -> None:
+        """Draw the normal forces and those along the ground, of no length if not known."""
+        axis, outwards = state.axles, state.wheel_centres - state.contact_points
+        normal = outwards - (outwards * axis).sum(axis=1, keepdims=True) * axis
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-9)
+        along, radius = np.cross(axis, normal), rover.wheel.radius
+        points = self._canvas.to_scene(state.contact_points)
+        N, T, S = (
+            WEIGHT_LENGTH * radius / (rover.weight / 6.0) * np.nan_to_num(values)[:, None]
+            for values in (state.wheel_loads, state.tangential, state.lateral)
+        )
+        arrows = {
+            "normal": (points + N * normal, LOAD),
+            "along": (points + (T * along + S * axis), TRACTION),
+        }
+        for name, (tips, colour) in arrows.items():
+            self._canvas.show(
+                self._canvas.scene.add_arrows, f"{self._forces}/{name}",
+                points=np.stack([points, tips], axis=1), colors=colour,
+                shaft_radius=0.07 * radius, head_radius=0.16 * radius, head_length=0.35 * radius,
+            )  # fmt: skip
 
     def show_forces(self, visible: bool) -> None:
         """Show or hide the arrows."""
-        self._forces_shown = visible
-        if self.rover is not None:
-            self._arrows.root.visible = visible
+        self._canvas.show_frame(self._forces, visible=visible)
 
 
-def look_alike(one: Rover, other: Rover) -> bool:
-    """Return whether two rovers are drawn the same, with their forces."""
-    wheel = replace(one.wheel, max_torque=other.wheel.max_torque)
-    friction, speed, limits = other.friction, other.nominal_speed, other.limits
-    return (
-        replace(one, wheel=wheel, friction=friction, nominal_speed=speed, limits=limits) == other
-    )
+class FailureMark:
+    """A ghost of the whole rover where the shown path is refused, until another one is shown."""
+
+    def __init__(self, canvas: Canvas):
+        """Draw nothing yet."""
+        self._canvas = canvas
+        self.ghost = DrawnRover(canvas, NAME, OPACITY)
+        """The ghost; no forces are drawn where they are not known."""
+        self._failure: Failure | None = None
+        self._near = 0.0
+
+    def show(self, rover: Rover, failure: Failure | None) -> None:
+        """Draw a failure instead of what was drawn before; None draws nothing."""
+        self._failure = failure
+        if failure is None:
+            self._canvas.remove(REASON)
+            self.ghost.show(None)
+            return
+        wheels = rover.suspension.wheels
+        self._near = NEAR * (wheels["front"][0] - wheels["rear"][0])
+        self.ghost.take(rover, {})
+        self.ghost.show(failure.state, failure.link)
+        self._draw_label(failure, rover.wheel.radius)
+
+    def make_room(self, state: RoverState | None) -> str:
+        """Hide the ghost while the played rover stands there; return the link of it that fails."""
+        failure, away = self._failure, np.inf
+        if failure is None:
+            return ""
+        if state is not None:
+            away = float(np.linalg.norm(state.position - failure.state.position))
+        self._canvas.show_frame(NAME, visible=away > self._near)
+        return "" if away > self._near else failure.link
+
+    def _draw_label(self, failure: Failure, radius: float) -> None:
+        """Draw what is broken, with a line from a place above the rover to the wheel or body."""
+        words, state = failure.headline.replace(", ", "\n", 1), failure.state
+        place = state.position
+        if failure.link in WHEELS:
+            place = state.wheel_centres[WHEELS.index(failure.link)]
+        top = state.position + np.array([0.0, 0.0, LABEL_HEIGHT * radius])
+        leader = Strand(np.array([top, place]), CASING)
+        self._canvas.show_lines(f"{REASON}/leader", [leader], 2.0)
+        self._canvas.show_label(f"{REASON}/words", f"{words}\n{failure.place}", top)
+
+
+def on_side(point: tuple[float, float, float], side: str) -> Floats:
+    """Return a point (3,) [m] of the left side as it is on a side, "left" or "right"."""
+    x, y, z = point
+    return np.array([x, y if side == "left" else -y, z])
+
+
+def join_meshes(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
+    """Return one mesh of several."""
+    return cast(trimesh.Trimesh, trimesh.util.concatenate(parts))
+
+
+def make_bar(start: Floats, end: Floats, radius: float) -> trimesh.Trimesh:
+    """Return a round bar of a radius between two points (3,) [m]; a ball if they coincide."""
+    if np.linalg.norm(end - start) < 1e-6:
+        return trimesh.creation.icosphere(1, radius)
+    return trimesh.creation.cylinder(radius=radius, segment=[start, end], sections=10)
+
+
+def make_beams(ends: list[Floats], radius: float) -> trimesh.Trimesh:
+    """Return bars of a radius from the origin to ends (3,) [m]."""
+    return join_meshes([make_bar(np.zeros(3), end, radius) for end in ends])
+
+
+def make_body(rover: Rover) -> trimesh.Trimesh:
+    """Return a box on the belly rectangle, 1.4 wheel radii high, and the axle of the rockers."""
+    belly, pivot, radius = rover.belly, rover.suspension.rocker_pivot, rover.wheel.radius
+    low = np.array([belly.x[0], belly.y[0], belly.z])
+    high = np.array([belly.x[1], belly.y[1], belly.z + 1.4 * radius])
+    box = trimesh.creation.box(high - low)
+    box.apply_translation(0.5 * (low + high))
+    axle = make_bar(on_side(pivot, "right"), on_side(pivot, "left"), 0.12 * radius)
+    return join_meshes([box, axle])
+
+
+def make_wheel(rover: Rover) -> tuple[trimesh.Trimesh, trimesh.Trimesh]:
+    """Return tyre and grousers of a wheel about its centre, with its axis along y."""
+    radius, width = rover.wheel.radius, rover.wheel.width
+    across = [[0.0, -0.5 * width, 0.0], [0.0, 0.5 * width, 0.0]]
+    tyre = trimesh.creation.cylinder(radius=0.96 * radius, segment=across, sections=32)
+    grousers = []
+    for k in range(GROUSERS):
+        grouser = trimesh.creation.box([0.06 * radius, 1.01 * width, 0.5 * radius])
+        grouser.apply_translation([0.0, 0.0, 0.75 * radius])
+        turn = trimesh.transformations.rotation_matrix(2 * np.pi * k / GROUSERS, [0, 1, 0])
+        grouser.apply_transform(turn)
+        grousers.append(grouser)
+    return tyre, join_meshes(grousers)
+
+
+def make_arm(
+    arm: Manipulator, angles: Mapping[str, float], wheel_radius: float
+) -> trimesh.Trimesh:
+    """Return the arm at angles [rad] by joint name, body frame; the wheel radius sets its width.
+
+    Joints without an angle are stowed.
+    """
+    joint_angles = [angles.get(name, at) for name, at in zip(arm.joints, arm.stowed, strict=True)]
+    points = link_points(arm, np.array(joint_angles))
+    links = [make_bar(a, b, 0.12 * wheel_radius) for a, b in itertools.pairwise(points)]
+    tip = trimesh.creation.icosphere(1, 0.25 * wheel_radius)
+    tip.apply_translation(points[-1])
+    return join_meshes([*links, tip])

@@ -15,13 +15,14 @@ from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.viewer.state.background_work import Progress
-from rover_planner.viewer.state.ground_grid import GroundGrid, make_grid
 from rover_planner.viewer.state.layers import (
     ColouredGround,
     Colouring,
+    GroundGrid,
     Legend,
     colour_ground,
     colour_limit,
+    make_grid,
 )
 from rover_planner.viewer.state.survey_layers import ShownSurvey
 
@@ -48,7 +49,7 @@ class PaintRequest:
     """The rover, for layers that are predicted."""
     terrain: Terrain
     """The ground."""
-    colouring: Colouring
+    how: Colouring
     """The layer."""
     origin: Floats
     """(3,) origin of the scene [m], map frame."""
@@ -66,9 +67,7 @@ def paint(request: PaintRequest) -> Iterator[Progress | tuple[bytes, Legend]]:
     A layer that is predicted for the rover takes seconds.
     """
     yield Progress("ground")
-    how, rover, terrain, options = (
-        request.colouring, request.rover, request.terrain, request.options
-    )  # fmt: skip
+    how, rover, terrain, options = request.how, request.rover, request.terrain, request.options
     grid = make_grid(terrain)
     if request.survey is not None and how.layer in request.survey.names:
         ground = request.survey.colour(how.layer, rover, options, grid)

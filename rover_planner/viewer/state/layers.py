@@ -3,9 +3,12 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from scipy import ndimage
 
 from rover_physics.limits.table import LIMITS
 from rover_physics.numerics.arrays import Floats
@@ -16,8 +19,11 @@ from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 from rover_planner.viewer.state.colours import REFUSED, UNKNOWN, map_colours, to_css
-from rover_planner.viewer.state.ground_grid import GroundGrid
 
+MAX_CELLS = 250
+"""Most cells along a side of the mesh; of more, every second, third, ... is drawn."""
+MAX_PIXELS, MOST_IN_CELL = 1200, 8
+"""Most pixels along a side of the picture, and of a cell of the mesh."""
 STEEP = 35.0
 """Slope of the last colour [deg]."""
 MAX_PREDICTED = 100
@@ -31,6 +37,75 @@ PREDICTED: Mapping[str, str] = {"use of all limits": ""} | {
     f"use of {row.title}": row.code for row in LIMITS[::-1] if row.reads not in _OF_PATHS
 }
 """Layers that the model predicts for the rover: the code of the limit, empty for all of them."""
+
+
+@dataclass(frozen=True, eq=False)
+class GroundGrid:
+    """Heights at some cells of a map, and between them; map frame."""
+
+    x: Floats
+    """(nx,) of the cells [m]."""
+    y: Floats
+    """(ny,) of the cells [m]."""
+    heights: Floats
+    """(ny, nx) of the cells [m], NaN where unknown."""
+
+    @property
+    def factor(self) -> int:
+        """Number of pixels along a side of a cell."""
+        return max(1, min(MOST_IN_CELL, MAX_PIXELS // max(self.heights.shape)))
+
+    @cached_property
+    def pixels(self) -> tuple[Floats, Floats]:
+        """X (mx,) and y (my,) [m] of the pixels."""
+        x, y = (
+            at[0]
+            + (at[1] - at[0]) * ((np.arange(self.factor * len(at)) + 0.5) / self.factor - 0.5)
+            for at in (self.x, self.y)
+        )
+        return x, y
+
+    @cached_property
+    def slopes(self) -> tuple[Floats, Floats]:
+        """Rises (ny, nx) of the cells along x and along y."""
+        heights = self.heights
+        return np.gradient(heights, self.x, axis=1), np.gradient(heights, self.y, axis=0)
+
+    def refine(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Return values (ny, nx, ...) of the cells as those of the pixels (my, mx, ...)."""
+        factors = [self.factor] * 2 + [1] * (values.ndim - 2)
+        return np.asarray(ndimage.zoom(values, factors, order=1, mode="nearest", grid_mode=True))
+
+
+def make_grid(terrain: Terrain) -> GroundGrid:
+    """Return at most MAX_CELLS cells a side of a ground."""
+    stride = -(-max(terrain.elevation.shape) // MAX_CELLS)
+    heights = terrain.elevation[::stride, ::stride]
+    step, (x, y), (ny, nx) = stride * terrain.resolution, terrain.origin, heights.shape
+    return GroundGrid(x + step * np.arange(nx), y + step * np.arange(ny), heights)
+
+
+def sample(
+    values: NDArray[Any], origin: Sequence[float], step: ArrayLike, at: Sequence[Floats]
+) -> tuple[NDArray[Any], NDArray[np.bool_]]:
+    """Return the nearest values of a grid, and which places are on it.
+
+    Args:
+        values: (ny, nx, ...) values.
+        origin: x and y of the first [m].
+        step: Distance of the values [m]; two if x and y differ.
+        at: x (mx,) and y (my,) of the places [m].
+
+    Returns:
+        Values (my, mx, ...), off the grid those at its edge; (my, mx) True on it.
+    """
+    columns, rows = (
+        np.rint((places - first) / distance).astype(int)
+        for places, first, distance in zip(at, origin, np.broadcast_to(step, 2), strict=True)
+    )
+    ny, nx = values.shape[:2]
+    is_on = ((rows >= 0) & (rows < ny))[:, None] & (columns >= 0) & (columns < nx)
+    return values[np.ix_(rows.clip(0, ny - 1), columns.clip(0, nx - 1))], is_on
 
 
 @dataclass(frozen=True)
@@ -94,13 +169,8 @@ def colour_ground(layer: str, terrain: Terrain, grid: GroundGrid) -> ColouredGro
         values = np.degrees(np.arctan(np.hypot(*grid.slopes)))
         low, high, ends = 0.0, STEEP, ("0 deg", f"{STEEP:.0f} deg")
     elif layer == FRICTION and terrain.friction is not None:
-        columns, rows = (
-            np.clip(np.rint((at - first) / terrain.resolution).astype(int), 0, count - 1)
-            for at, first, count in zip(
-                (grid.x, grid.y), terrain.origin, terrain.friction.shape[::-1], strict=True
-            )
-        )
-        values, low, high = terrain.friction[np.ix_(rows, columns)], 0.0, 1.0
+        at, low, high = (grid.x, grid.y), 0.0, 1.0
+        values, _ = sample(terrain.friction, terrain.origin, terrain.resolution, at)
         ends = "0.00", "1.00"
     return ColouredGround(grid.refine(map_colours(values, low, high)), _grade(layer, ends))
 
@@ -133,17 +203,13 @@ def colour_limit(
     used = predict_use(PREDICTED[how.layer], rover, terrain, heading, asked, options)
     colours = map_colours(used, 0.0, 1.0)
     colours[used > 1.0] = REFUSED
-    columns, rows = (
-        np.rint(np.linspace(0, len(few) - 1, len(many))).astype(int)
-        for few, many in zip(asked, grid.pixels, strict=True)
-    )
-    nearest = np.ix_(rows, columns)
+    corner, step = [one[0] for one in asked], [one[1] - one[0] for one in asked]
     words = "along the path" if how.along else f"at heading {how.heading:g} deg"
     hatched = ("hatched", "beyond the limit")
     return ColouredGround(
-        colours[nearest],
+        sample(colours, corner, step, grid.pixels)[0],
         _grade(f"{how.layer} {words}", ("0 %", "100 %"), hatched),
-        (used > 1.0)[nearest],
+        sample(used > 1.0, corner, step, grid.pixels)[0],
     )
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The limits along a path: how much of each is used, by which wheel, and the worst so far."""
+"""The limits as people read them, their use along a path, and where the path first fails."""
 
 from dataclasses import dataclass, replace
 
@@ -7,17 +7,115 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.chance.failure_chance import FailureChance
-from rover_physics.limits.table import CHANCE, Sense
-from rover_physics.names import WHEELS
+from rover_physics.limits.table import CHANCE, RATIO, Sense, Unit
+from rover_physics.names import SIDES, WHEEL_POSITIONS, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.record import find_column, numbers_of
 from rover_physics.results.uses import ABOVE, Uses, find_uses, limits_of
 from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.classification import find_wheel
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.planning.asked_poses import AskedPoses, merge_poses
-from rover_planner.viewer.state.limits import GROUND, ShownLimit, list_limits
+from rover_planner.viewer.state.drive import RoverState, place_state
+
+GROUND = "ground"
+"""Code of what is no limit of a number: unknown ground, no equilibrium, entrapment, steering."""
+MAX_USE = 99.0
+"""Largest use that is written as a number."""
+MORE_DIGITS = 2
+"""Most digits beyond those of the unit that tell a value from its limit; else words do."""
+BODY = "body"
+"""Name of the body among the links."""
+BODY_CODES = ("tilt", "tip_over", "belly")
+"""Codes of limits of the body."""
+TITLES = {
+    "steering": "steering",
+    "off_map": "off the map",
+    "unknown_ground": "unknown ground",
+    "not_settled": "does not settle",
+    "no_equilibrium": "no equilibrium",
+    "not_computable": "not computable",
+    "trapped": "trapped",
+    CHANCE: "chance of failure above what is accepted",
+}
+"""Short names of the codes of a verdict that have no number."""
+ON_THE_WAY = "on the way here: "
+"""Beginning of the reason of a failure between waypoints."""
+
+
+@dataclass(frozen=True)
+class ShownLimit:
+    """One limit of a rover; its numbers are in the unit that people read."""
+
+    code: str
+    """Code of a verdict, or GROUND."""
+    title: str
+    """Short name."""
+    bound: float | None = None
+    """Largest or smallest good value; None if it is not a single number."""
+    unit: Unit = RATIO
+    """Unit of bound and values."""
+    is_lowest: bool = False
+    """True if the bound is the smallest good value, not the largest."""
+    keeps_margin: bool = False
+    """True if a control margin reduces the bound."""
+
+    def keep(self, share: float) -> "ShownLimit":
+        """Return the limit of which a share is kept, if a control margin reduces it."""
+        if self.bound is None or not self.keeps_margin:
+            return self
+        return replace(self, bound=share * self.bound)
+
+    def is_broken_by(self, value: float) -> bool:
+        """Return whether a value is beyond the limit; False if it is no single number.
+
+        The worst case of an uncertain map may break a limit that the value itself keeps.
+        """
+        if self.bound is None:
+            return False
+        return value < self.bound if self.is_lowest else value > self.bound
+
+    def write(self, value: float, more: int = 0) -> str:
+        """Return a value as text, without the unit and with more digits; ? for NaN."""
+        if np.isfinite(value):
+            return f"{value:.{self.unit.digits + more}f}"
+        return "?" if np.isnan(value) else "infinite"
+
+    def compare(self, value: float) -> str:
+        """Return a value beside the limit, such as "friction 1.32 of 1.00", with enough digits.
+
+        Where MORE_DIGITS do not tell them apart, words do: "friction just above 1.00".
+        """
+        if self.bound is None:
+            return self.title
+        unit, bound = f" {self.unit.name}".rstrip(), self.bound
+        for more in range(MORE_DIGITS + 1):
+            shown, limit = self.write(value, more), self.write(bound, more)
+            if shown != limit:
+                least = "at least " if self.is_lowest else ""
+                return f"{self.title} {shown} of {least}{limit}{unit}"
+        side = "at" if value == bound else "just above" if value > bound else "just below"
+        return f"{self.title} {side} {self.write(bound)}{unit}"
+
+    @property
+    def good(self) -> str:
+        """Good values with their unit, such as "max 1.00"; empty if it is no single number."""
+        if self.bound is None:
+            return ""
+        word = "min" if self.is_lowest else "max"
+        return f"{word} {self.write(self.bound)} {self.unit.name}".strip()
+
+
+def write_use(use: float) -> str:
+    """Return the use of a limit as text, such as "76 %"."""
+    if np.isnan(use):
+        return "not asked"
+    if use > MAX_USE:
+        return "fails" if np.isinf(use) else f"over {100.0 * MAX_USE:.0f} %"
+    text = f"{100.0 * use:.0f} %"
+    return "just above 100 %" if use > 1.0 and text == "100 %" else text
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,14 +171,14 @@ class PathLimits:
         """Return the limits with a lane for the chance that the path fails there, if known."""
         if chance is None:
             return self
-        waypoint = self.rows.prediction.waypoint
-        unknown, no_wheel = np.full(len(waypoint), np.nan), np.full(len(waypoint), -1)
-        lane = Lane(ShownLimit(CHANCE, "chance"), unknown, chance.at[waypoint], no_wheel)
-        return replace(self, lanes=(*self.lanes, lane))
+        used = chance.at[self.rows.prediction.waypoint]
+        return replace(self, lanes=(*self.lanes, _plain_lane(CHANCE, "chance", used)))
 
 
 def find_path_limits(rover: Rover, prediction: PathPrediction, verdict: Verdict) -> PathLimits:
     """Return how a prediction uses the limits, up to and including the first failure.
+
+    Sinkage is left out where nothing sinks.
 
     Args:
         rover: The rover.
@@ -92,30 +190,40 @@ def find_path_limits(rover: Rover, prediction: PathPrediction, verdict: Verdict)
         prediction = prediction.cut(verdict.first_failure + 1)
     rows = merge_poses(prediction)
     uses = find_uses(limits_of(rover, prediction.policy), rows.prediction.results)
-    lanes = tuple(
-        _make_ground_lane(limit, rows) if code == GROUND else _make_lane(limit, rows, uses)
-        for code, limit in list_limits(rover, prediction).items()
-    )
-    found = PathLimits(rows, lanes)
+    of_code: dict[str, list[int]] = {}
+    for k, row in enumerate(uses.limits.rows):
+        of_code.setdefault(row.code, []).append(k)
+    if not np.any(prediction.sinkage > 0.0):
+        of_code.pop("sinkage", None)
+    unjudged = np.where(rows.prediction.settled, 0.0, np.inf)
+    lanes = [_make_lane(rows, uses, np.array(one)) for one in of_code.values()]
+    found = PathLimits(rows, (_plain_lane(GROUND, "ground", unjudged), *lanes))
     _add_refusals(found, verdict)
     return found
 
 
-def _make_ground_lane(limit: ShownLimit, rows: AskedPoses) -> Lane:
-    """Return the lane of poses at which the rover cannot be judged at all."""
-    m = len(rows.distance)
-    used = np.where(rows.prediction.settled, 0.0, np.inf)
-    return Lane(limit, np.full(m, np.nan), used, np.full(m, -1))
+def _plain_lane(code: str, title: str, used: Floats) -> Lane:
+    """Return the lane of a use (m,) that has neither a value nor a wheel."""
+    return Lane(ShownLimit(code, title), np.full(len(used), np.nan), used, np.full(len(used), -1))
 
 
-def _make_lane(limit: ShownLimit, rows: AskedPoses, uses: Uses) -> Lane:
-    """Return the lane of a limit; of several rows of the table that which is used most counts."""
+def _show_limit(uses: Uses, of_limit: NDArray[np.int64]) -> ShownLimit:
+    """Return the limit of some rows of the table, which is a number if it is one row's."""
+    row, bound = uses.limits.rows[of_limit[0]], uses.limits.bounds[of_limit[0]]
+    if len(of_limit) > 1 or row.sense == Sense.RANGE:
+        return ShownLimit(row.code, row.title)
+    unit, is_lowest = row.shown or row.unit, row.sense in (Sense.LEAST, Sense.SHARE)
+    number = unit.factor * bound
+    return ShownLimit(row.code, row.title, number, unit, is_lowest, row.keeps_margin)
+
+
+def _make_lane(rows: AskedPoses, uses: Uses, of_limit: NDArray[np.int64]) -> Lane:
+    """Return the lane of some rows of the table, of which that which is used most counts."""
     prediction, every = rows.prediction, np.arange(len(rows.distance))
-    of_limit = np.array([k for k, row in enumerate(uses.limits.rows) if row.code == limit.code])
+    limit, values = _show_limit(uses, of_limit), np.full(len(every), np.nan)
     asked = np.where(np.isnan(uses.use[:, of_limit]), -np.inf, uses.use[:, of_limit])
     decides = of_limit[asked.argmax(axis=1)]
     used = np.where(prediction.settled, uses.use[every, decides], np.nan)
-    values = np.full(len(every), np.nan)
     if limit.bound is not None:
         column = find_column(uses.limits.rows[of_limit[0]].reads)[0]
         element = np.maximum(uses.element[every, decides], 0)
@@ -148,3 +256,128 @@ def _add_refusals(limits: PathLimits, verdict: Verdict) -> None:
         lane, here = limits.lane(code), rows.prediction.waypoint == waypoint
         if code not in ("", CHANCE) and not np.any(lane.used[here] > 1.0):
             lane.used[here & ~rows.is_between] = ABOVE
+
+
+@dataclass(frozen=True, eq=False)
+class Failure:
+    """The first failure of a path."""
+
+    code: str
+    """Code of the verdict."""
+    reason: str
+    """Reason of the verdict."""
+    limit: ShownLimit
+    """The broken limit."""
+    value: float
+    """The value that breaks it, in its unit; NaN if there is none."""
+    link: str
+    """The link that fails: a name of WHEELS, BODY, rocker_left, bogie_right and so on; empty if
+    it is none."""
+    distance: float
+    """Distance since the start [m]."""
+    time: float
+    """Time since the start [s]."""
+    is_between: bool
+    """True if it is between two waypoints."""
+    row: int
+    """Its row of the limits along the path."""
+    state: RoverState
+    """The rover there; a level one of unknown forces above the ground if it does not stand."""
+
+    @property
+    def where(self) -> str:
+        """The link in words, such as "middle left wheel"; empty for none."""
+        words = self.link.replace("_", " ")
+        return f"{words} wheel" if self.link in WHEELS else words
+
+    @property
+    def place(self) -> str:
+        """Where and when it is, in words."""
+        between = ", between waypoints" if self.is_between else ""
+        return f"after {self.distance:.2f} m, {self.time:.0f} s{between}"
+
+    @property
+    def headline(self) -> str:
+        """The value beside the limit, such as "friction 1.32 of 1.00, middle left wheel"."""
+        if not np.isnan(self.value):
+            words = self.limit.compare(self.value)
+        elif self.code in TITLES:
+            words = TITLES[self.code]
+        else:
+            return self.reason.removeprefix(ON_THE_WAY)
+        return f"{words}, {self.where}" if self.where else words
+
+
+def find_failure(rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathLimits) -> Failure:
+    """Return the first failure of a path that is refused.
+
+    Args:
+        rover: The rover.
+        terrain: The ground.
+        verdict: The verdict on the path.
+        limits: Its limits, as `find_path_limits` returns them.
+    """
+    lane, rows = limits.lane(verdict.code), limits.rows
+    is_there = rows.prediction.waypoint == verdict.first_failure
+    broken = np.flatnonzero(is_there & (lane.used > 1.0))
+    if not broken.size:  # a recorded refusal that this rover does not explain
+        broken = np.flatnonzero(is_there & ~rows.is_between)
+    at = int(broken[np.argmin(rows.is_between[broken])])
+    here, value = rows.prediction.select([at]), float(lane.values[at])
+    limit = lane.limit.keep(float(here.results["kept_share"][0]))
+    explains = limit.is_broken_by(value)
+    return Failure(
+        code=verdict.code,
+        reason=verdict.reason,
+        limit=limit,
+        value=value if explains else np.nan,
+        link=_find_link(rover, terrain, verdict.code, rows, at)
+        or (WHEELS[lane.wheel[at]] if explains and lane.wheel[at] >= 0 else ""),
+        distance=float(rows.distance[at]),
+        time=float(rows.time[at]),
+        is_between=bool(rows.is_between[at]),
+        row=at,
+        state=RoverState(rover, here, np.zeros(6))
+        if here.settled[0]
+        else level_state(rover, terrain, rows, at),
+    )
+
+
+def level_state(rover: Rover, terrain: Terrain, rows: AskedPoses, at: int) -> RoverState:
+    """Return a level rover of unknown forces at a row, above the ground below its origin."""
+    x, y, yaw = rows.prediction.poses[at].tolist()
+    height = float(np.nan_to_num(terrain.elevation_at(x, y)))
+    standing = rover.wheel.radius - rover.suspension.wheels["middle"][2]
+    driven = {"distance": rows.distance[at], "time": rows.time[at]}
+    position = np.array([x, y, height + standing])
+    return place_state(rover, position, np.array([0.0, 0.0, yaw]), **driven)
+
+
+def _find_link(rover: Rover, terrain: Terrain, code: str, rows: AskedPoses, at: int) -> str:
+    """Return the link that fails at a row; empty if the wheel that decides the limit does."""
+    part = rows.prediction
+    if code in BODY_CODES:
+        return BODY
+    if code == "suspension":
+        joints = np.hstack([part.rocker_angle[at], part.bogie_angle[at]])
+        limits = rover.suspension.rocker_limits, rover.suspension.bogie_limits
+        low, high = np.repeat(limits, 2, axis=0).T
+        joint = int(np.argmin(np.minimum(joints - low, high - joints)))
+        return f"{('rocker', 'bogie')[joint // 2]}_{SIDES[joint % 2]}"
+    if code in ("off_map", "unknown_ground"):
+        return _find_lost_wheel(rover, terrain, level_state(rover, terrain, rows, at))
+    if code == "steering" and rover.steering is not None:
+        turns = np.tile([name in rover.steering.wheels for name in WHEEL_POSITIONS], 2)
+        allowed = np.where(turns, rover.steering.limit, 0.0)
+        return WHEELS[int(np.argmax(np.abs(part.steering_angle[at]) - allowed))]
+    return ""
+
+
+def _find_lost_wheel(rover: Rover, terrain: Terrain, state: RoverState) -> str:
+    """Return the wheel with the most of its footprint beyond known ground; empty for none."""
+    offsets = rover.wheel.radius * np.linspace(-1.0, 1.0, 5)
+    x = state.wheel_centres[:, 0, None, None] + offsets[:, None]
+    y = state.wheel_centres[:, 1, None, None] + offsets
+    lost = ~np.isfinite(terrain.elevation_at(x + 0.0 * y, y + 0.0 * x)).reshape(6, -1)
+    counts = lost.sum(axis=1)
+    return WHEELS[int(np.argmax(counts))] if counts.any() else ""

@@ -7,11 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rover_physics.files.validation import show_file
 from rover_physics.names import OPTIMAL
-from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.fingerprint import fingerprint
@@ -28,9 +26,8 @@ from rover_planner.survey.layers import (
     read_drawn_classes,
 )
 from rover_planner.survey.store import SurveyStore
-from rover_planner.viewer.state.colours import UNKNOWN, Colour, from_css, to_css
-from rover_planner.viewer.state.ground_grid import GroundGrid
-from rover_planner.viewer.state.layers import ColouredGround, Legend
+from rover_planner.viewer.state.colours import UNKNOWN, from_css, to_css
+from rover_planner.viewer.state.layers import ColouredGround, GroundGrid, Legend, sample
 
 MAX_READ = 1200
 """Most cells along a side that are read of a layer; of more, every second, third, ..."""
@@ -49,6 +46,7 @@ class ShownSurvey:
     def __init__(self, store: SurveyStore):
         """Show a survey; `open_survey` also compares it with rover and map."""
         self._store = store
+        self._every = count_skipped(store, MAX_READ)
 
     def colour(
         self, name: str, rover: Rover, options: SweepOptions, grid: GroundGrid
@@ -57,13 +55,16 @@ class ShownSurvey:
 
         Each pixel has the colour of the nearest surveyed cell that is read.
         """
+        from matplotlib import colormaps
+
         if name == CLASS:
             numbers = read_drawn_classes(self._store, self._every)
             colours, labels = [from_css(one) for one in CLASS_COLOURS], [*CLASS_LABELS]
         else:
             numbers = np.asarray(self._store.layer("first_limit")[:: self._every, :: self._every])
-            colours = list_limit_colours()
             labels = [c.replace("_", " ") or "none: all headings pass" for c in number_limits()]
+            palette = colormaps["tab20"](np.arange(len(labels) - 1) % 20, bytes=True)
+            colours = [from_css(CLASS_COLOURS[0]), *((r, g, b) for r, g, b, _ in palette.tolist())]
         table = np.full((256, 3), UNKNOWN, np.uint8)
         table[: len(colours)] = colours
         found = np.unique(numbers)
@@ -73,7 +74,12 @@ class ShownSurvey:
         differences = self.find_differences(rover, options)
         changed = [f"not as on the page: {'; '.join(differences)}"] if differences else []
         legend = Legend(name, tuple(keys), notes=(self._describe(name), *changed))
-        return ColouredGround(self._place(table[numbers], *grid.pixels), legend)
+        notes = self._store.notes
+        step, origin = notes.cell * self._every, notes.frame.origin
+        placed, is_on = sample(table[numbers], origin, step, grid.pixels)
+        return ColouredGround(
+            np.where(is_on[..., None], placed, np.array(UNKNOWN, np.uint8)), legend
+        )
 
     def find_differences(self, rover: Rover, options: SweepOptions) -> tuple[str, ...]:
         """Return in what the survey differs from a rover and options that are shown."""
@@ -100,23 +106,6 @@ class ShownSurvey:
         rover, options = notes.description["rover"]["name"], notes.description["options"]
         margin = f", control margin {options['control_margin']:g}" if name == CLASS else ""
         return f"{rover}, {notes.headings} headings, a cell every {notes.cell:g} m{margin}"
-
-    @property
-    def _every(self) -> int:
-        """Of how many cells along a side one is read."""
-        return count_skipped(self._store, MAX_READ)
-
-    def _place(self, colours: NDArray[np.uint8], x: Floats, y: Floats) -> NDArray[np.uint8]:
-        """Return the colours of cells at x and y, grey off the survey."""
-        notes, cell = self._store.notes, self._store.notes.cell * self._every
-        left, low = notes.frame.origin
-        columns, rows = (
-            np.rint((at - start) / cell).astype(int) for at, start in ((x, left), (y, low))
-        )
-        ny, nx = colours.shape[:2]
-        inside = ((rows >= 0) & (rows < ny))[:, None] & ((columns >= 0) & (columns < nx))
-        placed = colours[rows.clip(0, ny - 1)][:, columns.clip(0, nx - 1)]
-        return np.where(inside[..., None], placed, np.array(UNKNOWN, np.uint8))
 
 
 def open_survey(path: Path, rover: Rover, terrain: Terrain | None) -> ShownSurvey:
@@ -175,14 +164,6 @@ def load_map(path: Path, max_cells: int) -> Terrain:
     return Terrain(
         **grids, resolution=frame.resolution, origin=frame.origin, soil_names=source.soil_names
     )
-
-
-def list_limit_colours() -> list[Colour]:
-    """Return the colours of the limits by number, the first of which is no limit."""
-    from matplotlib import colormaps
-
-    palette = colormaps["tab20"](np.arange(len(number_limits()) - 1) % 20, bytes=True)
-    return [from_css(CLASS_COLOURS[0]), *((r, g, b) for r, g, b, _ in palette.tolist())]
 
 
 def _as_json(value: Any) -> Any:
