@@ -87,10 +87,10 @@ class LivePage(PageBase):
         first = np.zeros(2) if self._first is None else self._first
         return np.array([first, first + AHEAD])
 
-    def click(self, point: Floats | None, shift: bool) -> None:
+    def click(self, point: Floats, shift: bool) -> None:
         """Ask the server for a plan to a point."""
-        if point is None or not self._ground_name:
-            raise PlanningError("the click is beside the known ground")
+        if not self._ground_name:
+            raise PlanningError("the ground is not known yet")
         self._refusal = self._listener.request_plan(point)
 
     def show_refusal(self, reason: str) -> None:
