@@ -142,7 +142,7 @@ class LivePage(PageBase):
         self.channel.tell("board", describe_board(state, has_slip=slips))
         words = f"{data.freshness}; {data.forces_from or 'forces not known'}"
         self.channel.tell("drive", {"duration": None, "words": words})
-        self.channel.tell("topics", list_topics(data.ages))
+        self.channel.tell("topics", list_topics(data.ages.values()))
 
     def _take_terrain(self, data: LiveData, now: float) -> None:
         """Show a new map, at most every GROUND_PERIOD."""
