@@ -16,9 +16,9 @@ from support.viewer.browser import (
     Visitor,
     needs_browser,
     open_browser,
-    wait_until,
 )
 from support.viewer.sessions import LSR1, ask, blocked_session, held, wait_for_rest
+from support.viewer.sessions import wait_patiently as wait_until
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
