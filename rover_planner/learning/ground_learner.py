@@ -251,7 +251,7 @@ class GroundLearner:
         still = 1e-3 * self._rover.wheel.max_speed
         self._forward = np.where(np.abs(rates) > still, np.sign(rates), self._forward)
         measured = known[TORQUES] > 0.5 * count
-        if measured.any():
+        if measured.any() and not measured.all():
             row[TORQUES] = np.where(measured, row[TORQUES], np.nanmean(row[TORQUES]))
         state = self._sense.feel(row, self._forward)
         if state is None:

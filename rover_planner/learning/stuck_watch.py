@@ -79,8 +79,10 @@ class StuckWatch:
             rolled = float(find_median(np.abs(np.mean(speeds, axis=0))))
             if rolling.min() > self._slowest and moved < NO_PROGRESS * rolled:
                 self.reason = "wheels turn and the rover stays"
-            elif all(wishes) and max(moved, rolling.max()) < self._slowest:
+            elif all(wishes) and rolling.max() < self._slowest and moved < self._slowest:
                 self.reason = "wheels push and do not turn"
+            elif all(wishes) and self._slowest < rolling.max() > moved / NO_PROGRESS:
+                self.reason = "some wheels turn and the rover stays"
         return bool(self.reason)
 
 
