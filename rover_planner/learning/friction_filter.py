@@ -32,7 +32,7 @@ WORTHLESS = 0.01
 """Share of measurements that tell nothing."""
 CHANGE = 0.05
 """Chance that the ground changes on a metre."""
-MEMORY = 3.0
+MEMORY = 2.0
 """Way after which a bound has lost a factor e [m]."""
 BOUNDED = 0.975
 """Chance of what is below the upper end of an interval; 1 minus this is below the lower end."""

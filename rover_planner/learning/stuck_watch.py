@@ -77,12 +77,13 @@ class StuckWatch:
             rolling = find_median(np.abs(speeds))
             # There and back a rover rolls and stays, too: what counts is where it rolls to.
             rolled = float(find_median(np.abs(np.mean(speeds, axis=0))))
+            # Wheels that push may begin to spin, so what they turned at first tells nothing.
+            turns = rolling.max() > self._slowest
+            least = NO_PROGRESS * rolling.max() if turns else self._slowest
             if rolling.min() > self._slowest and moved < NO_PROGRESS * rolled:
                 self.reason = "wheels turn and the rover stays"
-            elif all(wishes) and rolling.max() < self._slowest and moved < self._slowest:
-                self.reason = "wheels push and do not turn"
-            elif all(wishes) and self._slowest < rolling.max() > moved / NO_PROGRESS:
-                self.reason = "some wheels turn and the rover stays"
+            elif all(wishes) and moved < least:
+                self.reason = "wheels push and the rover stays"
         return bool(self.reason)
 
 

@@ -99,12 +99,11 @@ class RowCollector:
     def motion(self, time: float) -> WheelMotion | None:
         """Return what wheels and IMU measure at a time [s]; None until both were heard."""
         row = self._row
-        if math.isnan(self._yaw_rate) or np.isnan(row[RATES]).all():
+        rates, steering = row[RATES].copy(), row[STEERING].copy()
+        if math.isnan(self._yaw_rate) or np.isnan(rates).all():
             return None
-        steering = np.where(np.isnan(row[STEERING]), 0.0, row[STEERING])
-        return WheelMotion(
-            time, row[RATES].copy(), steering, row[ROLL], row[PITCH], self._yaw_rate
-        )
+        steering[np.isnan(steering)] = 0.0
+        return WheelMotion(time, rates, steering, row[ROLL], row[PITCH], self._yaw_rate)
 
     def take_odometry(self, message: Any, time: float, frame: str = "") -> Floats:
         """Take a pose; return the row of its time [s].
