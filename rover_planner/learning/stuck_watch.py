@@ -77,12 +77,11 @@ class StuckWatch:
             rolling = find_median(np.abs(speeds))
             # There and back a rover rolls and stays, too: what counts is where it rolls to.
             rolled = float(find_median(np.abs(np.mean(speeds, axis=0))))
-            # Wheels that push may begin to spin, so what they turned at first tells nothing.
             turns = rolling.max() > self._slowest
-            least = NO_PROGRESS * rolling.max() if turns else self._slowest
-            if rolling.min() > self._slowest and moved < NO_PROGRESS * rolled:
+            stays = moved < (NO_PROGRESS * rolled if turns else self._slowest)
+            if stays and rolling.min() > self._slowest:
                 self.reason = "wheels turn and the rover stays"
-            elif all(wishes) and moved < least:
+            elif stays and all(wishes):  # wheels that push may begin to spin
                 self.reason = "wheels push and the rover stays"
         return bool(self.reason)
 
