@@ -174,12 +174,11 @@ def _follow(
     ground_name: str,
 ) -> "PageBase":
     """Serve a page that follows a live graph."""
-    from rover_planner.viewer.live.listener import LiveLink
+    from rover_planner.viewer.live.listener import listen
     from rover_planner.viewer.pages.live_page import LivePage
 
-    link = LiveLink()
-    closing.callback(link.close)
-    return LivePage(rover, ground, link.listener, *address, ground_name=ground_name)
+    listener = closing.enter_context(listen())
+    return LivePage(rover, ground, listener, *address, ground_name=ground_name)
 
 
 def _load_or_make(name: str | None, follow: bool, max_cells: int) -> "Terrain":

@@ -17,6 +17,7 @@ from rover_planner.viewer.state.scenario import Pose
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.viewer.browser import ARGUMENTS, PROGRAM, Visitor, sync_api, wait_until
+from support.viewer.sessions import is_at_rest
 
 SETTLE = 10.0
 """Time for the browser to draw before a picture is taken [s]."""
@@ -64,7 +65,7 @@ def _write(browser: Any, file: Path) -> str:
     session = ViewSession(rover, ground, *(ends or choose_ends(rover, ground)))
     page = Page(session, port=0, ground_name=name)
     try:
-        wait_until(lambda: not page.is_busy, "the verdicts")
+        wait_until(lambda: is_at_rest(page), "the verdicts")
         visitor = Visitor(browser, page.url, scale=1.0)
         _close_notice(visitor)
         shows = _show_drive(page) if file.name == "viewer.png" else _show_failure(page, visitor)
@@ -93,7 +94,7 @@ def _show_failure(page: Page, visitor: Visitor) -> str:
             continue
         page.hear({"ask": "show", "index": index}, None)
         wait_until(lambda index=index: session.shown.index == index, "the path")
-        wait_until(lambda: not page.is_busy, "its verdicts")
+        wait_until(lambda: is_at_rest(page), "its verdicts")
         failure = session.shown.path.failure
         if failure is not None and failure.link in WHEELS:
             visitor.press("Go to the failure")

@@ -12,8 +12,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.query import LatticeSettings
-from rover_planner.viewer.state.background_work import BackgroundWork, Progress
-from rover_planner.viewer.state.inbox import Inbox
+from rover_planner.viewer.state.background_work import BackgroundWork, Inbox, Progress
 from rover_planner.viewer.state.scenario import Scenario
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, waves
@@ -66,18 +65,18 @@ def shift(terrain: Terrain, by: tuple[float, float]) -> Terrain:
 
 
 def ask(page: Any, action: Callable[[], Any]) -> None:
-    """Let the page's own thread act, and wait until it has; what fails shows on the page."""
-    done = threading.Event()
+    """Let the page's own thread act, and wait until it has told what that has changed."""
+    for one in (action, lambda: None):  # it tells before it takes what comes next
+        done = threading.Event()
 
-    def act() -> None:
-        try:
-            action()
-        finally:
-            done.set()
+        def act(one: Callable[[], Any] = one, done: threading.Event = done) -> None:
+            try:
+                one()
+            finally:
+                done.set()
 
-    page.requests.put(act)
-    assert done.wait(PATIENCE), "the page's thread does nothing"
-    wait_until(lambda: not page._fulfils, "what the action makes the page say", PATIENCE)
+        page.requests.put(act)
+        assert done.wait(PATIENCE), "the page's thread does nothing"
 
 
 class Judge:
@@ -105,11 +104,23 @@ def wait_patiently(condition: Callable[[], Any], what: str) -> None:
     wait_until(condition, what, PATIENCE)
 
 
+def is_busy(page: Any) -> bool:
+    """Return whether a page judges, paints or seeks advice."""
+    return any(work.progress for work in page.works)
+
+
+def is_at_rest(page: Any) -> bool:
+    """Return whether nothing is judged, and what was found is shown."""
+    if not is_busy(page):
+        ask(page, lambda: None)
+    return not is_busy(page)
+
+
 def wait_for_rest(page: Any) -> None:
     """Wait until everything that is wanted is judged and shown."""
     session = page.session
     wait_until(
-        lambda: (session.is_complete or session.refusal) and not page.is_busy,
+        lambda: (session.is_complete or session.refusal) and is_at_rest(page),
         "all judgements",
         PATIENCE,
     )

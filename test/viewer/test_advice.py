@@ -73,10 +73,10 @@ def test_advice_is_sought_when_it_is_asked_for_shown_as_a_ghost_and_taken(page):
 
     place = wait_until(find_path, "another path", 60.0)
     page.hear({"ask": "ghost", "words": place}, None)
-    wait_until(lambda: page.scene.paths.lines.get("ghost"), "the ghost")
+    wait_until(lambda: "/lines/ghost" in page.scene.canvas.nodes, "the ghost")
     page.hear({"ask": "remedy", "words": place}, None)
     wait_until(lambda: page.channel.parts["verdict"]["passes"], "the verdict with the remedy")
-    assert not page.scene.paths.lines["ghost"]
+    assert "/lines/ghost" not in page.scene.canvas.nodes
     assert page.errors.messages == {}
 
 

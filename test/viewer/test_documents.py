@@ -2,6 +2,7 @@
 """What the page tells: limits along a path, the failure, the board, paths, and their words."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,10 +11,10 @@ from rover_physics.names import EQUAL, OPTIMAL, SERVO, WHEELS
 from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.viewer.documents.board import describe_board
-from rover_planner.viewer.documents.limits import (
+from rover_planner.viewer.documents.drive import (
     MAX_POINTS,
     choose_rows,
+    describe_board,
     describe_limits,
     describe_uses,
 )
@@ -85,22 +86,23 @@ def test_a_limit_is_broken_on_a_lane_exactly_where_the_verdict_refuses_the_path(
 @pytest.mark.parametrize("policy", [EQUAL, OPTIMAL])
 def test_board_lanes_curves_and_verdict_show_one_number_for_the_wheel_that_fails(policy):
     path = judged_on(ramp, friction=0.3, policy=policy)
-    failure, end = path.failure, path.trajectory.duration
+    failure, end = path.failure, path.trajectory.times[-1]
     assert failure.code == "friction" and failure.link in WHEELS
+    use = float(path.limits.lane("friction").used[failure.row])
     words = ShownLimit("friction", "friction", 1.0).compare(failure.value)
     assert failure.headline == f"{words}, {failure.where}"
     told = words.replace("friction", "utilisation").replace(" of ", ", limit ")
     assert failure.link in path.verdict.reason and told in path.verdict.reason
     wheel, codes = WHEELS.index(failure.link), [lane.limit.code for lane in path.limits.lanes]
     board = describe_board(failure.state, failure.link)["wheels"][wheel]
-    assert board["fails"] and board["bars"][0][2] == write_use(failure.use)
+    assert board["fails"] and board["bars"][0][2] == write_use(use)
     used = describe_uses(path, end)[codes.index("friction")]
-    assert used["now"] == used["worst"] == write_use(failure.use) and used["broken"]
+    assert used["now"] == used["worst"] == write_use(use) and used["broken"]
     assert used["wheel"] == failure.link.replace("_", " ") and used["wheel"] in failure.headline
     lane = describe_limits(path, None)["lanes"][codes.index("friction")]
-    assert max(lane["wheels"]["y"][wheel]) == pytest.approx(failure.use, abs=1e-3)
-    assert max(lane["now"]["y"][0]) == pytest.approx(failure.use, abs=1e-3)
-    assert list_paths_of(path)["use"] == write_use(failure.use)
+    assert max(lane["wheels"]["y"][wheel]) == pytest.approx(use, abs=1e-3)
+    assert max(lane["now"]["y"][0]) == pytest.approx(use, abs=1e-3)
+    assert list_paths_of(path)["use"] == write_use(use)
 
 
 def list_paths_of(path: Judged) -> dict:
@@ -113,7 +115,7 @@ def list_paths_of(path: Judged) -> dict:
 
 def test_the_worst_so_far_grows_and_has_all_limits_in_one_unit():
     path = judged_on(waves)
-    uses = [describe_uses(path, time) for time in np.linspace(0.0, path.trajectory.duration, 5)]
+    uses = [describe_uses(path, time) for time in np.linspace(0.0, path.trajectory.times[-1], 5)]
     shares = np.array([[one["share"] for one in row] for row in uses])
     assert (np.diff(shares, axis=0) >= 0.0).all()
     assert len(uses[0]) == len(path.limits.lanes)
@@ -256,7 +258,7 @@ def test_a_refusal_on_unknown_ground_is_at_the_time_to_which_the_drive_is_played
     session = session_on(gap, start=(start, 0.0, 0.0), goal=(1.9, 0.0, 0.0))
     path = session.shown.path
     assert path.failure is not None and path.failure.code == "unknown_ground"
-    assert path.failure.time == path.trajectory.duration
+    assert path.failure.time == path.trajectory.times[-1]
     assert (path.trajectory.length == 0) == (start > 0.0) == (path.failure.time == 0.0)
     told = [
         describe_verdict(session.shown),
@@ -294,7 +296,8 @@ def test_the_board_has_all_loads_and_unknown_values_are_none_or_a_question_mark(
         f"{load:.1f} N" for load in state.wheel_loads
     ]
     assert [len(cells) for _, cells in board["table"]] == [6] * 6
-    unknown = state.change(wheel_loads=np.full(6, np.nan), friction_utilisation=np.full(6, np.nan))
+    lost = {"wheel_loads": np.full(6, np.nan), "friction_utilisation": np.full(6, np.nan)}
+    unknown = replace(state, here=state.here.change(**lost))
     board = describe_board(unknown)
     assert {one["load"] for one in board["wheels"]} == {"?"}
     assert {one["bars"][0][1] for one in board["wheels"]} == {None}

@@ -75,10 +75,9 @@ def test_a_damaged_or_huge_link_is_refused(query, names):
         read_link(query)
 
 
-def test_a_changed_rover_comes_back_from_a_link_exactly_and_a_huge_one_is_refused():
+def test_a_changed_rover_comes_back_from_a_link_exactly_and_of_a_huge_one_there_is_no_link():
     query = write_link(LINK)
     assert len(query) < 1500
     assert rover_from_dict(read_link(query).rover, "link").friction == 1.0 / 3.0
     letters = "".join(chr(33 + k % 90) for k in np.random.default_rng(1).integers(0, 90, 20_000))
-    with pytest.raises(PlanningError, match="of bob; an address holds 8000. Save the rover file"):
-        write_link(replace(LINK, loaded={**LINK.loaded, "name": letters}))
+    assert write_link(replace(LINK, loaded={**LINK.loaded, "name": letters})) == ""

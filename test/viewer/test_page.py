@@ -21,7 +21,7 @@ from support.viewer.sessions import LSR1, ask, blocked_session, held, wait_for_r
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
-from rover_planner.viewer.documents.limits import describe_uses
+from rover_planner.viewer.documents.drive import describe_uses
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.pages.sharing import KEY
 

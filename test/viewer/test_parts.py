@@ -12,6 +12,7 @@ import pytest
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS
 from rover_physics.results.uses import find_uses, limits_of
 from rover_physics.traversability.judge import judge_path, judge_poses
+from rover_planner.viewer.state.background_work import Inbox
 from rover_planner.viewer.state.colours import (
     PASSABLE,
     REFUSED,
@@ -19,7 +20,7 @@ from rover_planner.viewer.state.colours import (
     colour_use,
     map_colours,
 )
-from rover_planner.viewer.state.inbox import Inbox
+from rover_planner.viewer.state.drive import Playback, Trajectory
 from rover_planner.viewer.state.layers import (
     FRICTION,
     PREDICTED,
@@ -33,8 +34,6 @@ from rover_planner.viewer.state.layers import (
     predict_use,
 )
 from rover_planner.viewer.state.path_limits import find_path_limits
-from rover_planner.viewer.state.playback import Playback
-from rover_planner.viewer.state.trajectory import Trajectory
 from support.grounds import gap, make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, straight
 
@@ -68,7 +67,7 @@ def test_states_are_those_of_the_prediction_and_between_poses_their_mean():
     x, *x_ends = (trajectory.state_at(time).position[0] for time in (np.mean(ends), *ends))
     assert x == pytest.approx(np.mean(x_ends), abs=1e-9)
     level = trajectory_on(lambda x, y: 0.0 * x)
-    end = level.state_at(level.duration)
+    end = level.state_at(level.times[-1])
     np.testing.assert_allclose(end.spin, 2.0 / LSR1.wheel.radius, rtol=1e-6)
 
 
@@ -86,7 +85,7 @@ TIMES = np.linspace(0.0, 10.0, 11)
 
 
 def test_playing_stops_at_the_end_and_starts_again_from_the_beginning():
-    playback = Playback(TIMES, speed=2.0)
+    playback = Playback(TIMES, TIMES, speed=2.0)
     playback.toggle()
     playback.advance(1.0)
     assert (playback.time, playback.is_playing, playback.moved) == (2.0, True, True)
@@ -100,7 +99,7 @@ def test_playing_stops_at_the_end_and_starts_again_from_the_beginning():
 
 
 def test_a_drive_that_ends_early_does_not_forget_where_the_rover_was():
-    playback = Playback(TIMES, TIMES, time=8.0)
+    playback = Playback(TIMES, TIMES, place=8.0)
     playback.set_drive(TIMES[:4], TIMES[:4])
     assert playback.time == playback.duration == 3.0
     playback.set_drive(2.0 * TIMES, TIMES)
@@ -112,7 +111,7 @@ def test_a_drive_that_ends_early_does_not_forget_where_the_rover_was():
 
 
 def test_steps_go_from_waypoint_to_waypoint():
-    playback, seen = Playback(TIMES[:4], time=1.4), []
+    playback, seen = Playback(TIMES[:4], TIMES[:4], place=1.4), []
     for by in (1, 1, 1, -1, -1, -1, -1):
         playback.step(by)
         seen.append(playback.time)
@@ -235,7 +234,7 @@ def arc(radius, length=1.0, count=41):
 
 def test_the_axles_are_those_of_the_model_on_rough_ground():
     trajectory = trajectory_on(waves, arc(1.0))
-    state = trajectory.state_at(0.5 * trajectory.duration)
+    state = trajectory.state_at(0.5 * trajectory.times[-1])
     outwards = state.wheel_centres - state.contact_points
     away = np.abs((outwards * state.axles).sum(axis=1))
     assert (away <= 0.5 * LSR1.wheel.width + 1e-6).all()

@@ -22,7 +22,6 @@ from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import assume
 from rover_planner.viewer.documents.rover import describe_changes
 from rover_planner.viewer.documents.verdict import describe_verdict, list_paths
-from rover_planner.viewer.documents.verdict import name_ground as name_by_size
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, SURE, Judge, blocked_session, ramp, session_on, straight
@@ -155,15 +154,15 @@ def test_undo_goes_back_change_by_change_and_never_to_another_rover():
 def test_a_path_is_judged_under_all_policies_and_one_that_cannot_judge_says_so():
     session = session_on(ramp)
     session.change_rover(FRICTION, 0.1)
-    by_policy = session.shown.by_policy
-    assert [one.traversable for one in by_policy] == [False] * 3
-    assert all(one.reason and not one.is_old for one in by_policy)
+    judged = describe_verdict(session.shown)["policies"]
+    assert [one["word"] for one in judged] == ["refused"] * 3
+    assert not any(one["old"] for one in judged)
     ground = make_terrain(ramp)
     ground = replace(ground, elevation_std=np.full(ground.elevation.shape, 1e-3))
     session = ViewSession(LSR1, ground, (-2.0, 0.0, 0.0), (1.0, 0.0, 0.0), SURE)
     session.judge_again()
-    judged = {one.policy: one for one in session.shown.by_policy}
-    assert judged["servo"].traversable is None and "no bounds" in judged["servo"].reason
+    _, servo, _ = describe_verdict(session.shown)["policies"]
+    assert servo["word"] == "not judged" and "no bounds" in servo["reason"] and not servo["old"]
 
 
 def recorded(folder, poses):
@@ -253,4 +252,3 @@ def test_every_ground_has_a_name(tmp_path, monkeypatch):
     assert name_ground(None, None) == f"made, seed {SEED}"
     assert name_ground("maps/hill.npz", None) == "hill.npz"
     assert name_ground(None, Path(".")) == name_ground(None, Path("../mars.zarr/")) == "mars.zarr"
-    assert name_by_size(make_terrain(waves)) == "8 x 8 m"

@@ -115,10 +115,3 @@ def test_a_search_can_be_cancelled_and_begun_again_and_a_chosen_path_stays_meanw
     session.judge_again()
     judge.finish()
     assert session.shown.around.outcome == FOUND and session.shown.index == other
-
-
-def test_a_session_that_begins_before_a_wall_searches_when_it_is_asked_to():
-    session = walled_session(wall_with_gap, GOAL)
-    assert session.shown.needs_search and len(session.shown.paths) == 5
-    session.judge_again()
-    assert session.shown.offer == 5

@@ -7,22 +7,14 @@ from typing import Any
 import numpy as np
 
 from rover_physics.names import EQUAL, OPTIMAL, SERVO
-from rover_physics.terrain.grid import Terrain
-from rover_planner.viewer.documents.limits import write_chance
+from rover_planner.viewer.documents.drive import write_chance
 from rover_planner.viewer.documents.numbers import write
-from rover_planner.viewer.state.failure import Failure
 from rover_planner.viewer.state.path_limits import write_use
-from rover_planner.viewer.state.scenario import Judged, PolicyVerdict, Scenario, Shown
+from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
 
 POLICY_TITLES = {EQUAL: "equal torques", SERVO: "speed servos", OPTIMAL: "traction control"}
 """Names of the torque policies on the page."""
 WORDS = {None: "no verdict", True: "traversable", False: "not traversable"}
-
-
-def name_ground(terrain: Terrain) -> str:
-    """Return a name, by its size, for a ground that has none."""
-    x_low, x_high, y_low, y_high = terrain.bounds
-    return f"{x_high - x_low:.3g} x {y_high - y_low:.3g} m"
 
 
 def describe_subject(scenario: Scenario, ground: str) -> dict[str, str]:
@@ -48,12 +40,12 @@ def describe_verdict(shown: Shown) -> dict[str, Any]:
     return {
         **describe_answer(verdict.traversable, f"path {shown.index + 1} of {len(shown.paths)}"),
         "headline": "" if failure is None else failure.headline,
-        "where": "" if failure is None else write_place(failure),
+        "where": "" if failure is None else failure.place,
         "chance": ""
         if shown.chance is None
         else f"chance of failure {write_chance(shown.chance)}",
         "details": [*filter(None, (verdict.reason, closed))],
-        "policies": [_describe_policy(one) for one in shown.by_policy],
+        "policies": _list_policies(shown),
         "offers": _list_offers(shown),
         "fails": failure is not None,
     }
@@ -64,17 +56,17 @@ def describe_answer(traversable: bool | None, about: str) -> dict[str, Any]:
     return {"passes": traversable, "word": WORDS[traversable], "about": about}
 
 
-def write_place(failure: Failure) -> str:
-    """Return where and when a path is refused."""
-    between = ", between waypoints" if failure.is_between else ""
-    return f"after {failure.distance:.2f} m, {failure.time:.0f} s{between}"
-
-
-def _describe_policy(one: PolicyVerdict) -> dict[str, Any]:
-    title, passes = POLICY_TITLES[one.policy], one.traversable
-    word = {None: "not judged", True: "passes", False: "refused"}[passes]
-    reason = one.reason or word
-    return {"title": title, "word": word, "passes": passes, "old": one.is_old, "reason": reason}
+def _list_policies(shown: Shown) -> list[dict[str, Any]]:
+    """Return the verdicts under all policies; none for a replay, whose soil is not known."""
+    rows = []
+    for policy, title in POLICY_TITLES.items() if shown.scenario.recorded is None else ():
+        one = shown.by_policy.get(policy)
+        passes, reason = (None, "") if one is None else (one.traversable, one.reason)
+        word = {None: "not judged", True: "passes", False: "refused"}[passes]
+        old = one is None or one.scenario is not shown.scenario
+        row = {"title": title, "word": word, "passes": passes, "old": old}
+        rows.append({**row, "reason": reason or word})
+    return rows
 
 
 def _list_offers(shown: Shown) -> Sequence[dict[str, Any]]:

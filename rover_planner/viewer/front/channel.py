@@ -13,7 +13,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 from websockets.sync.server import ServerConnection, serve
 
-from rover_planner.viewer.state.inbox import Inbox
+from rover_planner.viewer.state.background_work import Inbox
 
 CHANNEL = "/channel"
 """Path of the channel; all others are files."""
@@ -45,33 +45,26 @@ class Channel:
         """Take the port; `hear` is called in a thread of the visitor and must be quick."""
         self._hear = hear
         self._lock = threading.Lock()
-        self._parts: dict[str, Part] = {"program": uuid4().hex}
+        self.parts: Mapping[str, Part] = {"program": uuid4().hex}
+        """What is shown, by name."""
         self._mailboxes: set[Mailbox] = set()
         self._server = serve(
             self._serve, host, port, process_request=_answer, max_size=MAX_MESSAGE
         )
+        self.port = int(self._server.socket.getsockname()[1])
+        """The port."""
         self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
 
     def open(self) -> None:
         """Serve those who wait, and who come: what they get first is all that was told so far."""
         self._thread.start()
 
-    @property
-    def port(self) -> int:
-        """The port."""
-        return int(self._server.socket.getsockname()[1])
-
-    @property
-    def parts(self) -> Mapping[str, Part]:
-        """What is shown, by name."""
-        return self._parts
-
     def tell(self, name: str, part: Part) -> None:
         """Show a part, if it differs from what is shown."""
-        if name in self._parts and self._parts[name] == part:
+        if name in self.parts and self.parts[name] == part:
             return
         with self._lock:
-            self._parts = {**self._parts, name: part}
+            self.parts = {**self.parts, name: part}
             for mailbox in self._mailboxes:
                 mailbox.put(part, name)
 
@@ -84,7 +77,7 @@ class Channel:
 
     def _serve(self, connection: ServerConnection) -> None:
         with self._lock:
-            mailbox: Mailbox = Inbox(self._parts)
+            mailbox: Mailbox = Inbox(self.parts)
             self._mailboxes.add(mailbox)
         sender = threading.Thread(target=_send, args=(connection, mailbox), daemon=True)
         sender.start()

@@ -38,7 +38,6 @@ const button = (words, question, attributes = {}) =>
 // ---- The channel.
 
 let socket = null;
-let heard = 0;
 let held = null; // parts that wait while something is pressed: drawn anew, it would lose the click
 let pressed = 0; // timer that ends the press
 
@@ -64,8 +63,6 @@ function take(parts) {
   if ("program" in parts) greet(parts.program);
   for (const name of Object.keys(parts)) if (DRAW[name]) DRAW[name](parts[name]);
   if ("offers" in parts) openTab(chosen.tab);
-  heard += 1;
-  document.body.dataset.heard = heard;
 }
 
 // A program that was started again knows nothing of what was changed: take that up.
@@ -252,8 +249,8 @@ function drawChosen() {
   const rows = [];
   if (offers.policies) rows.push(
     row("A click sets", select("A click sets", [["goal", "goal"], ["start", "start"]], now.sets, (sets) => ({ ask: "click", sets }))),
-    row("Torques", select("Torques", offers.policies, now.policy, (policy) => ({ ask: "options", policy }))),
-    row("Soil", select("Soil", [["", "none (Coulomb)"], ...offers.soils.map((name) => [name, name])], now.soil, (soil) => ({ ask: "options", soil }))));
+    row("Torques", select("Torques", offers.policies, now.policy, (name) => ({ ask: "policy", name }))),
+    row("Soil", select("Soil", [["", "none (Coulomb)"], ...offers.soils.map((name) => [name, name])], now.soil, (name) => ({ ask: "soil", name }))));
   rows.push(row("Colour by", select("Colour by", offers.layers.map((name) => [name, name]), now.layer, (layer) => colour({ layer }))));
   if (offers.predicted.includes(now.layer)) rows.push(
     row("Heading [deg]", make("input", { type: "number", min: -180, max: 180, step: 5, value: now.heading, "aria-label": "Heading [deg]", onchange: (event) => ask(colour({ heading: Number(event.target.value) })) })),
@@ -373,7 +370,7 @@ function drawBoard(board) {
       make("i", { class: kindOf(use), style: `width:${100 * Math.min((use ?? 1.5) / 1.5, 1)}%` }),
       make("i", { class: "limit" })));
   const wheels = [5, 2, 4, 1, 3, 0].map((k) => board.wheels[k]).map((wheel) =>
-    make("div", { class: "wheel", "data-wheel": wheel.name, "data-fails": wheel.fails },
+    make("div", { class: "wheel", "data-fails": wheel.fails },
       make("div", {}, make("div", { class: "tyre", style: `background:${wheel.colour};transform:rotate(${-(wheel.turn || 0)}deg)` }), make("small", {}, wheel.load)),
       make("div", {}, make("div", {}, wheel.name, wheel.slip ? make("small", {}, `, ${wheel.slip}`) : ""), ...wheel.bars.map(bar))));
   at("board").replaceChildren(
@@ -431,7 +428,7 @@ function drawLearned(lines) {
 
 function drawTopics(topics) {
   at("topics").replaceChildren(make("h2", {}, "age of the last message"), make("table", {},
-    ...topics.map(({ topic, age, stale }) => make("tr", { "data-topic": topic, "data-stale": String(stale), ...(stale ? { "data-old": true } : {}) },
+    ...topics.map(({ topic, age, stale }) => make("tr", { "data-old": stale },
       make("td", {}, topic), make("td", {}, `${stale ? "stale, " : ""}${age}`)))));
 }
 

@@ -23,7 +23,6 @@ from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64MultiArray, String
 
 from msg_adapters.elevation import terrain_from_point_cloud
-from msg_adapters.errors import MessageError
 from msg_adapters.identity import plan_request_hash
 from msg_adapters.paths import path_to_poses, stamped_pose, yaw_from_quaternion
 from msg_adapters.results.diagnostics import HEALTH
@@ -83,8 +82,6 @@ class LiveListener(Node):
         self._frame = map_frame
         self._data = LiveData()
         """Without the ages, and without the forces."""
-        self._forces: Mapping[str, Any] = {}
-        """Forces by their field, as the server has predicted them at the rover's place."""
         self._predicted: Mapping[str, np.ndarray] = {}
         self._estimated: Mapping[str, np.ndarray] = {}
         self._ages: dict[str, TopicAge] = {}
@@ -123,22 +120,28 @@ class LiveListener(Node):
 
         def hear(message: Any) -> None:
             self._ages[topic] = TopicAge(topic, time.monotonic(), is_stream)
-            take(message)
+            self._hear(topic, take, message)
 
         self.create_subscription(kind, topic, hear, qos)
 
+    def _hear(self, what: str, take: Take, message: Any) -> None:
+        """Take a message, or warn of one that is bad."""
+        try:
+            take(message)
+        except RoverError as error:
+            self.get_logger().warning(f"{what} not shown: {error}", throttle_duration_sec=1.0)
+
     def latest(self) -> LiveData:
         """Return the latest data."""
-        data = self._data
-        if data.plan is not None and data.position is not None:
-            self._forces = _read_nearest(self._predicted, data.plan, data.position)
+        data, predicted, silent = self._data, {}, self._ages[SIGN_OF_LIFE].is_stale
+        if data.plan is not None and data.position is not None and not silent:
+            predicted = _read_nearest(self._predicted, data.plan, data.position)
         estimated = {
             field: self._estimated[field]
             for topic, field in ESTIMATED_FIELDS.items()
             if field in self._estimated and not self._ages[f"{CONTROLLER}/{topic}"].is_stale
         }
         is_estimated = not estimated.keys().isdisjoint(PREDICTED_FIELDS.values())
-        predicted = {} if self._ages[SIGN_OF_LIFE].is_stale else self._forces
         source = "forces predicted by the server" if predicted else ""
         source = "forces estimated by the traction controller" if is_estimated else source
         forces, ages = {**predicted, **estimated}, tuple(self._ages.values())
@@ -163,7 +166,8 @@ class LiveListener(Node):
         click = Click(plan_request_hash(request.start, request.goal, 0.0), time.monotonic())
         with self._click_lock:
             self._click = click
-        self._planner.call_async(request).add_done_callback(partial(self._on_answer, click))
+        take = partial(self._on_answer, click)
+        self._planner.call_async(request).add_done_callback(partial(self._hear, "plan", take))
         return ""
 
     def forget_click(self) -> None:
@@ -174,7 +178,7 @@ class LiveListener(Node):
     def _on_answer(self, asked: Click, future: Any) -> None:
         """Take the plan of a click, unless there was another one since."""
         response = future.result()
-        with self._skipping("plan"), self._click_lock:
+        with self._click_lock:
             click = self._click
             if click is not None and click.asked == asked.asked and response.plan.poses:
                 plan = path_to_poses(response.plan, self._frame)
@@ -210,10 +214,7 @@ class LiveListener(Node):
 
     def _on_odometry(self, odometry: Odometry) -> None:
         point, q = odometry.pose.pose.position, odometry.pose.pose.orientation
-        try:
-            yaw = yaw_from_quaternion(q)
-        except MessageError:
-            return
+        yaw = yaw_from_quaternion(q)
         roll, pitch, _ = rpy_from_xyzw((q.x, q.y, q.z, q.w))
         position, known = np.array([point.x, point.y, point.z]), self._data
         if not np.isfinite(position).all():
@@ -230,20 +231,17 @@ class LiveListener(Node):
         )
 
     def _on_cloud(self, cloud: PointCloud2) -> None:
-        with self._skipping("elevation_cloud"):
-            self._data = replace(self._data, terrain=terrain_from_point_cloud(cloud))
+        self._data = replace(self._data, terrain=terrain_from_point_cloud(cloud))
 
     def _on_ground(self, message: String) -> None:
-        with self._skipping("ground_estimate"):
-            ground, known = parse_learned(message.data, "ground_estimate"), self._data
-            at = None if known.position is None else known.position[:2]
-            trail = known.learned or LearnedTrail(ground)
-            self._data = replace(known, learned=trail.add(ground, at))
+        ground, known = parse_learned(message.data, "ground_estimate"), self._data
+        at = None if known.position is None else known.position[:2]
+        trail = known.learned or LearnedTrail(ground)
+        self._data = replace(known, learned=trail.add(ground, at))
 
     def _on_plan(self, plan: Path) -> None:
-        with self._skipping("plan"):
-            poses = path_to_poses(plan, self._frame) if plan.poses else None
-            self._data = replace(self._data, plan=poses)
+        poses = path_to_poses(plan, self._frame) if plan.poses else None
+        self._data = replace(self._data, plan=poses)
 
     def _on_verdict(self, message: DiagnosticArray) -> None:
         """Take a verdict; it is that of the last click, too, if that asked the same."""
@@ -263,20 +261,11 @@ class LiveListener(Node):
                 self._click = replace(click, verdict=verdict)
 
     def _on_prediction(self, field: str, message: Float64MultiArray) -> None:
-        with self._skipping(field):
-            self._predicted = {**self._predicted, field: array_values(message).copy()}
+        self._predicted = {**self._predicted, field: array_values(message).copy()}
 
     def _on_estimate(self, field: str, message: Float64MultiArray) -> None:
         if len(message.data) >= 6:  # deviations may follow
             self._estimated = {**self._estimated, field: np.array(message.data[:6])}
-
-    @contextlib.contextmanager
-    def _skipping(self, what: str) -> Iterator[None]:
-        """Warn of a bad message instead of taking it."""
-        try:
-            yield
-        except RoverError as error:
-            self.get_logger().warning(f"{what} not shown: {error}")
 
 
 def _name_finite(names: Sequence[str], values: Sequence[float]) -> dict[str, float]:
@@ -303,34 +292,31 @@ def _read_nearest(
     return nearest
 
 
-class LiveLink:
-    """A listener that is spun in the background until it is closed."""
+@contextlib.contextmanager
+def listen(context: Context | None = None) -> Iterator[LiveListener]:
+    """Yield a listener that is spun in the background; without a context it has one of its own."""
+    own = context or Context()
+    if context is None:
+        rclpy.init(context=own)
+    listener, executor = LiveListener(context=own), SingleThreadedExecutor(context=own)
+    executor.add_node(listener)
+    ended = threading.Event()
+    thread = threading.Thread(target=_spin, args=(executor, ended), daemon=True)
+    thread.start()
+    try:
+        yield listener
+    finally:
+        ended.set()
+        executor.wake()
+        thread.join(5.0)
+        executor.shutdown()
+        listener.destroy_node()
+        if context is None:
+            own.try_shutdown()
 
-    def __init__(self, map_frame: str = "map", context: Context | None = None):
-        """Start to listen; without a context the link makes one, and shuts it down at its end."""
-        self._owns_context = context is None
-        self._context = context or Context()
-        if self._owns_context:
-            rclpy.init(context=self._context)
-        self.listener = LiveListener(map_frame, context=self._context)
-        self._executor = SingleThreadedExecutor(context=self._context)
-        self._executor.add_node(self.listener)
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._spin, daemon=True)
-        self._thread.start()
 
-    def close(self) -> None:
-        """Stop listening."""
-        self._ended.set()
-        self._executor.wake()
-        self._thread.join(5.0)
-        self._executor.shutdown()
-        self.listener.destroy_node()
-        if self._owns_context:
-            self._context.try_shutdown()
-
-    def _spin(self) -> None:
-        # Not executor.spin(): at times that does not return from executor.shutdown().
-        with contextlib.suppress(ExternalShutdownException):
-            while not self._ended.is_set():
-                self._executor.spin_once(timeout_sec=0.2)
+def _spin(executor: SingleThreadedExecutor, ended: threading.Event) -> None:
+    # Not executor.spin(): at times that does not return from executor.shutdown().
+    with contextlib.suppress(ExternalShutdownException):
+        while not ended.is_set():
+            executor.spin_once(timeout_sec=0.2)

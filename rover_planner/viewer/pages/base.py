@@ -19,16 +19,15 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.viewer.front.channel import Channel, Mailbox, Part
-from rover_planner.viewer.scene.cameras import START, VIEWS
 from rover_planner.viewer.scene.ground_mesh import PaintRequest, intersect_ground, paint
-from rover_planner.viewer.scene.scene import Scene
+from rover_planner.viewer.scene.scene import START, VIEWS, Scene
 from rover_planner.viewer.state.background_work import (
     BackgroundWork,
+    Inbox,
     Progress,
     Request,
     Result,
 )
-from rover_planner.viewer.state.inbox import Inbox
 from rover_planner.viewer.state.layers import PREDICTED, Colouring, Legend, list_layers
 from rover_planner.viewer.state.session import REFUSALS
 from rover_planner.viewer.state.survey_layers import ShownSurvey
@@ -100,7 +99,7 @@ class PageBase(ABC):
         address: tuple[str, int],
         survey: ShownSurvey | None = None,
     ):
-        """Start the servers; `start` starts the thread.
+        """Start the servers; the page of a kind starts the thread when it can tell what it shows.
 
         Args:
             rover: The rover.
@@ -117,7 +116,6 @@ class PageBase(ABC):
         self.requests: Inbox[Action] = Inbox()
         self.colouring, self.forces = Colouring(self.layers[0]), True
         self._ended = threading.Event()
-        self._fulfils = False
         own: dict[str, Answer] = {"colour": self._colour, "forces": self._show_forces}
         self._answers = {**own, **self.list_answers()}
         try:
@@ -127,6 +125,8 @@ class PageBase(ABC):
         scene_port = self.channel.port + 1 if port and self.channel.port < MAX_PORT else 0
         self.server = viser.ViserServer(self._host, scene_port, label="camera", verbose=False)
         self.errors = Errors(lambda messages: self.channel.tell("errors", messages))
+        self.works: list[BackgroundWork] = []
+        """What works in the background."""
         self._made_of: dict[str, tuple[Any, ...]] = {}
         self.scene = Scene(self.server)
         self.scene.canvas.move_to(terrain)
@@ -135,7 +135,8 @@ class PageBase(ABC):
         self.painter = self.begin_work(paint, self._draw_ground, "ground")
         self.channel.tell("scene", {"port": self.server.get_port()})
         self._last = time.monotonic()
-        self._thread = threading.Thread(target=self._run, name="page", daemon=True)
+        self.thread = threading.Thread(target=self._run, name="page", daemon=True)
+        """Changes the page."""
 
     def _add_camera(self) -> None:
         """Add what needs to know which visitor looks: the camera and clicks into the scene."""
@@ -145,9 +146,8 @@ class PageBase(ABC):
         self._camera = gui.add_button_group("View", (*VIEWS, FOLLOW))
         self._camera.on_click(self._request_view)
         for key, (label, words) in HOTKEYS.items():
-            command = gui.add_command(label, hotkey=key)
-            command.on_trigger(partial(self._press, words))
-        self.server.on_client_connect(self._aim_camera)
+            gui.add_command(label, hotkey=key).on_trigger(partial(self._press, words))
+        self.server.on_client_connect(lambda client: self._look([client], START))
         self.server.scene.on_click()(partial(self._request_click, shift=False))
         self.server.scene.on_click(modifier="shift")(partial(self._request_click, shift=True))
 
@@ -157,20 +157,12 @@ class PageBase(ABC):
         host = "localhost" if self._host in ("0.0.0.0", "::") else self._host
         return f"http://{host}:{self.channel.port}"
 
-    @property
-    def is_acting(self) -> bool:
-        """True if the page acts on requests, or has still to."""
-        return self.requests.wait(0.0) or self._fulfils
-
-    def start(self) -> None:
-        """Start the thread that changes the page."""
-        self._thread.start()
-
     def close(self) -> None:
         """End the page."""
         self._ended.set()
-        self._thread.join(5.0)
-        self.painter.close()
+        self.thread.join(5.0)
+        for work in self.works:
+            work.close()
         self.channel.close()
         self.server.stop()
 
@@ -215,7 +207,9 @@ class PageBase(ABC):
             self.requests.put(take_and_tell)
             drawn.wait(DRAWING_TIME)
 
-        return BackgroundWork(work, hand_over, name)
+        begun = BackgroundWork(work, hand_over, name)
+        self.works.append(begun)
+        return begun
 
     @abstractmethod
     def list_answers(self) -> Mapping[str, Answer]:
@@ -288,9 +282,6 @@ class PageBase(ABC):
         self.forces = bool(words["shown"])
         self.scene.show_forces(self.forces)
 
-    def _aim_camera(self, client: Any) -> None:
-        self._look([client], START)
-
     def _press(self, words: Words, _event: Any) -> None:
         self.hear(words, None)
 
@@ -300,7 +291,7 @@ class PageBase(ABC):
         self.requests.put(lambda: act([client], name))
 
     def _look(self, clients: Collection[Any], view: str) -> None:
-        self.scene.cameras.look(clients, view, self.ground, self.points)
+        self.scene.cameras.look(clients, view, self.points)
 
     def _follow(self, _clients: Collection[Any], name: str) -> None:
         """Go along with the rover or not, and name the button by what it does next."""
@@ -329,11 +320,9 @@ class PageBase(ABC):
         """Fulfil the requests, tell what they have changed, and draw the next picture if due."""
         due = self._last + PERIOD
         self.requests.wait(due - time.monotonic())
-        self._fulfils = True
         for action in self.requests.take().values():
             self.errors.run("the last request failed", partial(self._fulfil, action))
         self.tell_all()
-        self._fulfils = False
         now = time.monotonic()
         passed, self._last = now - self._last, now
         with self.server.atomic():  # one message to wake the server for all that is sent
@@ -345,9 +334,8 @@ class PageBase(ABC):
 
     def has_changed(self, name: str, *made_of: Any) -> bool:
         """Return whether something is made of other objects than when this was asked last."""
-        before, self._made_of[name] = self._made_of.get(name), made_of
-        same = before is not None and len(before) == len(made_of)
-        return not same or any(a is not b for a, b in zip(before or (), made_of, strict=True))
+        before, self._made_of[name] = self._made_of.get(name, ()), made_of
+        return [*map(id, before)] != [*map(id, made_of)]
 
     def tell_made(self, name: str, made_of: Sequence[Any], make: Callable[[], Part]) -> None:
         """Tell a part that is made anew only if one of the objects has changed of which it is."""

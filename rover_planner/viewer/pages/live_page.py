@@ -10,15 +10,20 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
-from rover_planner.viewer.documents.board import describe_board
-from rover_planner.viewer.documents.live import choose_answer, describe_learned, list_topics
+from rover_planner.viewer.documents.drive import describe_board
 from rover_planner.viewer.live.listener import LiveListener
-from rover_planner.viewer.live.live_state import LiveData, read_state
+from rover_planner.viewer.live.live_state import (
+    LiveData,
+    choose_answer,
+    describe_learned,
+    list_topics,
+    read_state,
+)
 from rover_planner.viewer.pages.base import Answer, PageBase
 from rover_planner.viewer.pages.sharing import read_link
-from rover_planner.viewer.scene.cameras import START
 from rover_planner.viewer.scene.ground_mesh import PaintRequest
-from rover_planner.viewer.state.rover_state import RoverState
+from rover_planner.viewer.scene.scene import START
+from rover_planner.viewer.state.drive import RoverState
 
 BOARD_PERIOD = 0.2
 """Time between two updates of the board [s]."""
@@ -61,7 +66,7 @@ class LivePage(PageBase):
         super().__init__(rover, terrain, (host, port))
         self.channel.tell("offers", self.list_layers())
         self.paint()
-        self.start()
+        self.thread.start()
 
     def list_answers(self) -> Mapping[str, Answer]:
         """Return what the page does by the word `ask`."""
@@ -95,8 +100,8 @@ class LivePage(PageBase):
     def tell(self) -> None:
         """Tell whose answer is shown and how old it is; the plan has the same age."""
         data, now, tell = self._data, time.monotonic(), self.channel.tell
-        answer = choose_answer(data, now, self._refusal)
-        tell("verdict", answer.document)
+        answer, plan = choose_answer(data, now, self._refusal)
+        tell("verdict", answer)
         soil = ", ".join(self.ground.soil_names)
         ground = self._ground_name or "not known yet"
         facts = {"rover": self._rover.name, "map": ground, "soil": soil, "mode": data.freshness}
@@ -104,16 +109,16 @@ class LivePage(PageBase):
         tell("chosen", self.list_chosen())
         tell("learned", describe_learned(data.learned))
         trail = None if data.learned is None else data.learned.places
-        shown, paths, terrain = (answer.plan, answer.is_old), self.scene.paths, self.ground
+        shown, paths, terrain = (plan, bool(answer["old"])), self.scene.paths, self.ground
         self.draw_made(
             "the trail is not drawn",
             (trail, terrain),
-            lambda: paths.show_trail(self._rover, terrain, trail),
+            lambda: paths.show_trail(trail),
         )
         self.draw_made(
             "the plan is not drawn",
             (*shown, terrain),
-            lambda: paths.show_plan(self._rover, terrain, *shown),
+            lambda: paths.show_plan(*shown),
         )
 
     def advance(self, seconds: float) -> None:

@@ -21,8 +21,8 @@ from rover_planner.viewer.documents.advice import (
     describe_advice,
     seek_advice,
 )
-from rover_planner.viewer.documents.board import describe_board
-from rover_planner.viewer.documents.limits import (
+from rover_planner.viewer.documents.drive import (
+    describe_board,
     describe_limits,
     describe_uses,
 )
@@ -38,10 +38,10 @@ from rover_planner.viewer.documents.verdict import (
     describe_subject,
     describe_verdict,
     list_paths,
-    name_ground,
 )
-from rover_planner.viewer.pages.base import Answer, PageBase, Words
+from rover_planner.viewer.pages.base import Answer, PageBase
 from rover_planner.viewer.pages.sharing import (
+    MAX_LENGTH,
     PageLink,
     make_link,
     read_link,
@@ -49,12 +49,12 @@ from rover_planner.viewer.pages.sharing import (
     write_file,
     write_link,
 )
-from rover_planner.viewer.scene.cameras import FIT
 from rover_planner.viewer.scene.ground_mesh import PaintRequest
 from rover_planner.viewer.scene.overlays import GHOST
+from rover_planner.viewer.scene.scene import FIT
+from rover_planner.viewer.state.drive import SPEEDS, Playback
 from rover_planner.viewer.state.judging import JudgeRequest
 from rover_planner.viewer.state.layers import Colouring
-from rover_planner.viewer.state.playback import SPEEDS, Playback
 from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.survey_layers import ShownSurvey
@@ -77,7 +77,7 @@ class Page(PageBase):
         host: str = "127.0.0.1",
         port: int = 8080,
         survey: ShownSurvey | None = None,
-        ground_name: str = "",
+        ground_name: str = "ground",
     ):
         """Start to serve a session.
 
@@ -86,10 +86,10 @@ class Page(PageBase):
             host: Address to serve on.
             port: Port to serve on; 0 takes a free one.
             survey: A survey of rover and ground, whose layers are offered.
-            ground_name: What the page calls the ground (default: its size).
+            ground_name: What the page calls the ground.
         """
         self.session, self.playback = session, Playback()
-        self._ground_name = ground_name or name_ground(session.wanted.terrain)
+        self._ground_name = ground_name
         self._click_sets = "goal"
         self._opening: tuple[PageLink, Scenario] | None = None
         """The link whose path and time are not shown yet, and what it asks for."""
@@ -99,36 +99,19 @@ class Page(PageBase):
         self._judging = self.begin_work(session.find_steps, self._take_judged, "judge")
         session.judge = self._judging.ask
         self._advised: Advised | None = None
-        """The path for which advice was asked last, and what was found."""
-        self.channel.tell("offers", self._list_offers())
-        self.has_changed("the cameras are not moved", session.wanted.loaded)  # START is theirs
-        self._show()
-        self.paint()
-        session.judge_again()  # with the search that was not made
-        self.start()
-
-    def _list_offers(self) -> dict[str, Any]:
-        """Return what the page's boxes offer."""
-        return {
-            **self.list_layers(),
+        """The path that is looked at and the advice on it; None if it was not asked for."""
+        offers = {
             "presets": list(preset_names()),
             "soils": list(load_soils()),
             "policies": [[name, title] for name, title in POLICY_TITLES.items()],
             "speeds": list(SPEEDS),
         }
-
-    @property
-    def is_busy(self) -> bool:
-        """True if something is judged, or judged and not shown yet."""
-        works = self._judging, self.painter, self._advice
-        is_judging = any(work.progress is not None for work in works)
-        return is_judging or self.is_acting  # in this order: what was found is still shown
-
-    def close(self) -> None:
-        """End the page and its threads in the background."""
-        super().close()
-        self._judging.close()
-        self._advice.close()
+        self.channel.tell("offers", self.list_layers() | offers)
+        self.has_changed("the cameras are not moved", session.wanted.loaded)  # START is theirs
+        self._show()
+        self.paint()
+        session.judge_again()  # with the search that was not made
+        self.thread.start()
 
     def describe_ground(self) -> PaintRequest:
         """Return the ground with what is shown on it."""
@@ -148,10 +131,15 @@ class Page(PageBase):
     def list_answers(self) -> Mapping[str, Answer]:
         """Return what the page does by the word `ask`."""
         session, playback = self.session, self.playback
+
+        def find_time(distance: float) -> float:
+            return session.shown.path.limits.time_at(distance)
+
         return {
             "show": lambda words: session.show_path(int(words["index"])),
             "value": lambda words: self._change_value(words["label"], float(words["value"])),
-            "options": lambda words: session.change_options(**_read_options(words)),
+            "policy": lambda words: session.change_options(policy=words["name"]),
+            "soil": lambda words: session.change_options(soil=words["name"] or None),
             "undo": lambda _words: session.undo(),
             "reset": lambda _words: session.reset(),
             "keep": lambda _words: session.keep_reference(session.shown.scenario),
@@ -165,7 +153,7 @@ class Page(PageBase):
             "toggle": lambda _words: playback.toggle(),
             "step": lambda words: playback.step(words["by"]),
             "seek": lambda words: playback.go_to(float(words["time"])),
-            "place": lambda words: self._go_to_place(float(words["distance"])),
+            "place": lambda words: playback.go_to(find_time(float(words["distance"]))),
             "speed": lambda words: setattr(playback, "speed", float(words["times"])),
             "failure": lambda _words: self._go_to_failure(),
             "advise": lambda _words: self._advise(),
@@ -173,7 +161,7 @@ class Page(PageBase):
             "remedy": lambda words: self._take_remedy(words["words"]),
             "save rover": lambda _words: self._save_rover(),
             "save page": lambda words: self._save_page(str(words.get("base", ""))),
-            "link": lambda _words: {"link": write_link(self._link())},
+            "link": lambda _words: self._tell_link(),
         }
 
     def click(self, point: Floats | None, shift: bool) -> None:
@@ -208,9 +196,6 @@ class Page(PageBase):
         self._advice.cancel()
         self.painter.cancel()
 
-    def _go_to_place(self, distance: float) -> None:
-        self.playback.go_to(self.session.shown.path.limits.time_at(distance))
-
     def _go_to_failure(self) -> None:
         failure = self.session.shown.path.failure
         if failure is not None:
@@ -231,15 +216,8 @@ class Page(PageBase):
         if self._advised is not None and path is self._advised.path:
             self._advised = replace(self._advised, advice=found)
 
-    @property
-    def _advice_here(self) -> Advised | None:
-        """The advice on the path that is looked at; None if it was not asked for."""
-        here = self._advised is not None and self._advised.path is self.session.shown.path
-        return self._advised if here else None
-
     def _find_remedy(self, words: str) -> Remedy:
-        here = self._advice_here
-        for remedy in here.remedies if here is not None else ():
+        for remedy in self._advised.remedies if self._advised is not None else ():
             if remedy.describe() == words:
                 return remedy
         raise PlanningError(f"{words!r} is no remedy of the path that is shown")
@@ -247,8 +225,7 @@ class Page(PageBase):
     def _show_ghost(self, words: str | None) -> None:
         """Show where the path of a remedy leads while a person points at it; None ends that."""
         path = None if words is None else self._find_remedy(words).judged.case.poses
-        rover = self.session.shown.scenario.rover
-        self.scene.paths.show_line("ghost", rover, self.ground, path, GHOST)
+        self.scene.paths.show_line("ghost", path, GHOST)
 
     def _take_remedy(self, words: str) -> None:
         """Judge the path with the levers of a remedy set."""
@@ -267,12 +244,15 @@ class Page(PageBase):
         time_shown = round(self.playback.time, 3)
         return make_link(self.session.shown, self._map_print, time_shown, self.colouring)
 
-    def _write_current(self) -> str:
-        """Return the link that a browser opens on a program that was started again."""
-        try:
-            return write_link(self._link())
-        except PlanningError:  # it would be too long
-            return ""
+    def _tell_link(self) -> dict[str, Any]:
+        """Return the link to what is shown, for the visitor who asks for it."""
+        query, rover = write_link(self._link()), self.session.shown.scenario.rover.name
+        if not query:
+            raise PlanningError(
+                f"the link with the file of {rover} would be longer than an address may be, "
+                f"{MAX_LENGTH} characters; save the rover file and the HTML file instead"
+            )
+        return {"link": query}
 
     def _save_rover(self) -> dict[str, Any]:
         rover = self.session.wanted.rover
@@ -329,7 +309,7 @@ class Page(PageBase):
         """Show what was judged: in words and numbers at once, then in the scene."""
         shown, scene, draw = self.session.shown, self.scene, self.draw_made
         asked, path, rover = shown.scenario, shown.path, shown.scenario.rover
-        if self._advised is not None and self._advice_here is None:
+        if self._advised is not None and self._advised.path is not path:
             self._advice.cancel()  # nobody looks at its path any more
             self._advised = None
             self._show_ghost(None)
@@ -350,7 +330,7 @@ class Page(PageBase):
         draw(
             "the paths are not drawn",
             [*shown.paths, shown.index],
-            lambda: scene.paths.show(rover, self.ground, candidates, shown.index),
+            lambda: scene.paths.show(candidates, shown.index),
         )
         depends = self.colouring.is_predicted or self.survey is not None
         if self.has_changed("ground", asked) and depends:
@@ -398,8 +378,8 @@ class Page(PageBase):
             },
         )
         is_seeking = self._advice.progress is not None
-        tell("advice", describe_advice(self._advice_here, is_seeking, time.monotonic()))
-        made("current", (shown, self.colouring), self._write_current)
+        tell("advice", describe_advice(self._advised, is_seeking, time.monotonic()))
+        made("current", (shown, self.colouring), lambda: write_link(self._link()))
         made("sliders", (wanted.loaded,), lambda: describe_sliders(wanted.loaded))
         made("values", (wanted, session.refusal), lambda: describe_values(wanted))
         kept = session.kept
@@ -443,16 +423,6 @@ class Page(PageBase):
         self.channel.tell("board", board)
         uses = describe_uses(path, playback.time, self.session.shown.chance)
         self.channel.tell("uses", uses)
-
-
-def _read_options(words: Words) -> dict[str, Any]:
-    """Return the options of the model that a visitor asks for."""
-    found: dict[str, Any] = {}
-    if "policy" in words:
-        found["policy"] = words["policy"]
-    if "soil" in words:
-        found["soil"] = words["soil"] or None
-    return found
 
 
 def _file(name: str, text: str) -> dict[str, Any]:

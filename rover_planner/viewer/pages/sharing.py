@@ -79,17 +79,11 @@ LINK = TypeAdapter(PageLink)
 def write_link(link: PageLink) -> str:
     """Return a link as the query of an address: compressed JSON in letters that it may hold.
 
-    Raises:
-        PlanningError: It would have more than MAX_LENGTH characters.
+    It is empty if it would have more than MAX_LENGTH characters.
     """
     packed = base64.urlsafe_b64encode(zlib.compress(LINK.dump_json(link), 9))
     query = f"{KEY}={packed.decode().rstrip('=')}"
-    if len(query) >= MAX_LENGTH:
-        raise PlanningError(
-            f"the link would have {len(query)} characters with the file of {link.rover['name']}; "
-            f"an address holds {MAX_LENGTH}. Save the rover file and the HTML file instead"
-        )
-    return query
+    return query if len(query) < MAX_LENGTH else ""
 
 
 def read_link(query: str) -> PageLink | None:
@@ -190,10 +184,7 @@ def write_file(
     for client in server.get_clients().values():
         server.initial_camera.position = client.camera.position
         server.initial_camera.look_at = client.camera.look_at
-    try:
-        query = write_link(link)
-    except PlanningError:  # it would be too long; the file has the rover itself
-        query = ""
+    query = write_link(link)
     written = {
         "versions": _versions(),
         "written": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),

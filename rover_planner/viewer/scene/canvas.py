@@ -37,12 +37,17 @@ class Canvas:
     through `to_scene`, and rays of visitors come back through `to_map`.
     """
 
+    terrain: Terrain
+    """The ground, since `move_to`."""
+
     def __init__(self, scene: Any):
         """Show nothing yet."""
         self.scene = scene
         """The scene of viser."""
         self.origin: Floats = np.zeros(3)
         """(3,) origin of the scene [m], map frame."""
+        self.radius = 0.0
+        """Radius of the wheels of the rover that was drawn last [m]."""
         self.nodes: dict[str, Any] = {}
         """What is shown, by name."""
         self._values: dict[str, dict[str, Any]] = {}
@@ -56,7 +61,7 @@ class Canvas:
         return np.asarray(points, dtype=float) + self.origin
 
     def move_to(self, terrain: Terrain) -> bool:
-        """Move the origin near a ground and its median height; return whether it has moved.
+        """Take another ground, and an origin near its median height; return whether that moved.
 
         What was drawn before must then be drawn again.
         """
@@ -65,7 +70,21 @@ class Canvas:
         height = float(np.median(known)) if known.size else 0.0
         middle = np.array([0.5 * (x_low + x_high), 0.5 * (y_low + y_high), height])
         before, self.origin = self.origin, STEP * np.round(middle / STEP)
+        self.terrain = terrain
         return not np.array_equal(self.origin, before)
+
+    def lay(self, points: ArrayLike, height: float, unknown: float = np.nan) -> Floats:
+        """Return points (n, 3) at a height above the ground, map frame.
+
+        Args:
+            points: (n, 2) x and y [m].
+            height: The height [wheel radii].
+            unknown: Height of the ground where it is not known [m].
+        """
+        x, y = np.reshape(points, (-1, 2)).T
+        ground = self.terrain.elevation_at(x, y)
+        ground = np.where(np.isfinite(ground), ground, unknown)
+        return np.column_stack([x, y, ground + height * self.radius])
 
     def show_lines(
         self, name: str, strands: Sequence[Strand], width: float, paint: Colour | None = None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A rover in the scene with the forces on its wheels: the one that is played, or a ghost."""
+"""A rover in the scene with the forces on its wheels: the one that is played, and its ghost."""
 
 import itertools
 from collections.abc import Mapping
@@ -13,9 +13,10 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import wxyz_about_y, wxyz_from_rpy
 from rover_physics.rover.manipulator import link_points
 from rover_physics.rover.model import Manipulator, Rover
-from rover_planner.viewer.scene.canvas import Canvas
+from rover_planner.viewer.scene.canvas import Canvas, Strand
 from rover_planner.viewer.state.colours import (
     BODY,
+    CASING,
     DARK,
     LOAD,
     METAL,
@@ -24,12 +25,20 @@ from rover_planner.viewer.state.colours import (
     Colour,
     colour_use,
 )
-from rover_planner.viewer.state.rover_state import RoverState
+from rover_planner.viewer.state.drive import RoverState
+from rover_planner.viewer.state.path_limits import Failure
 
 WEIGHT_LENGTH = 4.0
 """Length of the arrow of a sixth of the rover's weight [wheel radii]."""
 GROUSERS = 16
 """Grousers of a wheel as it is drawn."""
+NAME, REASON = "/failure", "/reason"
+OPACITY = 0.55
+"""Opacity of the ghost."""
+NEAR = 0.5
+"""Distance of the played rover at which the ghost makes room for it [wheelbases]."""
+LABEL_HEIGHT = 4.5
+"""Height of the label above the body [wheel radii]."""
 
 
 class DrawnRover:
@@ -56,6 +65,7 @@ class DrawnRover:
         Of a rover that looks like the last one, only the arm is turned.
         """
         wheel, arm = rover.wheel, rover.manipulator
+        self._canvas.radius = wheel.radius
         looks = wheel.radius, wheel.width, rover.suspension, rover.belly, arm, rover.weight
         is_new = looks != self._looks
         if is_new:
@@ -179,6 +189,52 @@ class DrawnRover:
     def show_forces(self, visible: bool) -> None:
         """Show or hide the arrows."""
         self._canvas.show_frame(self._forces, visible=visible)
+
+
+class FailureMark:
+    """A ghost of the whole rover where the shown path is refused, until another one is shown."""
+
+    def __init__(self, canvas: Canvas):
+        """Draw nothing yet."""
+        self._canvas = canvas
+        self.ghost = DrawnRover(canvas, NAME, OPACITY)
+        """The ghost; no forces are drawn where they are not known."""
+        self._failure: Failure | None = None
+        self._near = 0.0
+
+    def show(self, rover: Rover, failure: Failure | None) -> None:
+        """Draw a failure instead of what was drawn before; None draws nothing."""
+        self._failure = failure
+        if failure is None:
+            self._canvas.remove(REASON)
+            self.ghost.show(None)
+            return
+        wheels = rover.suspension.wheels
+        self._near = NEAR * (wheels["front"][0] - wheels["rear"][0])
+        self.ghost.take(rover, {})
+        self.ghost.show(failure.state, failure.link)
+        self._draw_label(failure, rover.wheel.radius)
+
+    def make_room(self, state: RoverState | None) -> str:
+        """Hide the ghost while the played rover stands there; return the link of it that fails."""
+        failure, away = self._failure, np.inf
+        if failure is None:
+            return ""
+        if state is not None:
+            away = float(np.linalg.norm(state.position - failure.state.position))
+        self._canvas.show_frame(NAME, visible=away > self._near)
+        return "" if away > self._near else failure.link
+
+    def _draw_label(self, failure: Failure, radius: float) -> None:
+        """Draw what is broken, with a line from a place above the rover to the wheel or body."""
+        words, state = failure.headline.replace(", ", "\n", 1), failure.state
+        place = state.position
+        if failure.link in WHEELS:
+            place = state.wheel_centres[WHEELS.index(failure.link)]
+        top = state.position + np.array([0.0, 0.0, LABEL_HEIGHT * radius])
+        leader = Strand(np.array([top, place]), CASING)
+        self._canvas.show_lines(f"{REASON}/leader", [leader], 2.0)
+        self._canvas.show_label(f"{REASON}/words", f"{words}\n{failure.place}", top)
 
 
 def on_side(point: tuple[float, float, float], side: str) -> Floats:

@@ -49,7 +49,7 @@ class PaintRequest:
     """The rover, for layers that are predicted."""
     terrain: Terrain
     """The ground."""
-    colouring: Colouring
+    how: Colouring
     """The layer."""
     origin: Floats
     """(3,) origin of the scene [m], map frame."""
@@ -67,9 +67,7 @@ def paint(request: PaintRequest) -> Iterator[Progress | tuple[bytes, Legend]]:
     A layer that is predicted for the rover takes seconds.
     """
     yield Progress("ground")
-    how, rover, terrain, options = (
-        request.colouring, request.rover, request.terrain, request.options
-    )  # fmt: skip
+    how, rover, terrain, options = request.how, request.rover, request.terrain, request.options
     grid = make_grid(terrain)
     if request.survey is not None and how.layer in request.survey.names:
         ground = request.survey.colour(how.layer, rover, options, grid)

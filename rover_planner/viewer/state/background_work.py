@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One worker thread that does the newest request: progress, cancel, and results as values."""
+"""Between threads: a worker that does the newest request, and the newest values by name."""
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from rover_physics.numerics.interruption import interruptible
 
@@ -17,6 +17,7 @@ END_TIME = 20.0
 
 Request = TypeVar("Request")
 Result = TypeVar("Result")
+Value = TypeVar("Value")
 
 
 @dataclass(frozen=True)
@@ -50,16 +51,6 @@ class _StoppedError(Exception):
     """Leaves work that was cancelled or replaced."""
 
 
-@dataclass(eq=False)
-class _Job(Generic[Request]):
-    """A request in the thread."""
-
-    request: Request
-    began: float
-    is_stopped: bool = False
-    has_result: bool = False
-
-
 class BackgroundWork(Generic[Request, Result]):
     """Does one request at a time, the newest; those that a newer one replaces are dropped.
 
@@ -83,7 +74,7 @@ class BackgroundWork(Generic[Request, Result]):
         self._changed = threading.Condition()
         # The lock of _changed guards all that follows.
         self._waiting: Request | None = None
-        self._job: _Job[Request] | None = None
+        self._in_work: Request | None = None
         self._progress = Progress()
         self._since = 0.0
         self._ending = False
@@ -102,9 +93,7 @@ class BackgroundWork(Generic[Request, Result]):
         """Stop all work; what it finds after this is dropped. Return whether there was any."""
         with self._changed:
             was_busy = self._is_busy()
-            self._waiting = None
-            if self._job is not None:
-                self._job.is_stopped = True
+            self._waiting = self._in_work = None
         return was_busy
 
     @property
@@ -125,46 +114,89 @@ class BackgroundWork(Generic[Request, Result]):
         return not self._thread.is_alive()
 
     def _is_busy(self) -> bool:
-        in_work = self._job is not None and not self._job.is_stopped
-        return in_work or self._waiting is not None
+        return self._in_work is not None or self._waiting is not None
 
     def _run(self) -> None:
         while True:
             with self._changed:
-                self._job = None
+                self._in_work = None
                 self._changed.wait_for(lambda: self._waiting is not None or self._ending)
                 if self._ending or self._waiting is None:
                     return
-                job = self._job = _Job(self._waiting, time.monotonic())
+                request = self._in_work = self._waiting
                 self._waiting = None
-            self._do(job)
+            self._do(request)
 
-    def _do(self, job: _Job[Request]) -> None:
+    def _do(self, request: Request) -> None:
+        begun, has_result = time.monotonic(), False
+
         def check() -> None:
-            has_time = not job.has_result and time.monotonic() - job.began < PATIENCE
-            if job.is_stopped or (self._waiting is not None and not has_time):
+            has_time = not has_result and time.monotonic() - begun < PATIENCE
+            if self._in_work is not request or (self._waiting is not None and not has_time):
                 raise _StoppedError("a newer request or a visitor stopped the work")
 
         try:
             with interruptible(check):
-                for found in self._work(job.request):
+                for found in self._work(request):
                     if isinstance(found, Progress):
                         check()
                         with self._changed:
                             self._progress = found
                     else:
-                        self._deliver(job, found)
+                        has_result = True
+                        self._deliver(request, found)
                         check()
         except _StoppedError:
             return
         except BaseException as error:  # the thread must go on; whoever takes it tells of it
             if self._waiting is None:
-                self._deliver(job, error)
+                self._deliver(request, error)
 
-    def _deliver(self, job: _Job[Request], found: Result | BaseException) -> None:
+    def _deliver(self, request: Request, found: Result | BaseException) -> None:
         """Hand over what was found, unless it was cancelled."""
         with self._changed:
-            if job.is_stopped:
+            if self._in_work is not request:
                 return
-            self._since, job.has_result = time.monotonic(), True
-        self._take(job.request, found)
+            self._since = time.monotonic()
+        self._take(request, found)
+
+
+class Inbox(Generic[Value]):
+    """A queue in which a later value replaces an earlier one of the same name.
+
+    A slider that is dragged sends dozens of values a second. Only the last one that came while the
+    page was busy is worth judging; and of what a slow browser is told, only the last is worth
+    sending.
+    """
+
+    def __init__(self, values: Mapping[str, Value] | None = None):
+        """Begin with some values."""
+        self._values: dict[Any, Value] = {**(values or {})}
+        self._changed = threading.Condition()
+        self._is_open = True
+
+    def put(self, value: Value, name: str = "") -> None:
+        """Add a value, which replaces that of the same name; without a name it replaces none."""
+        with self._changed:
+            self._values.pop(name, None)
+            self._values[name or object()] = value
+            self._changed.notify()
+
+    def wait(self, seconds: float | None = None) -> bool:
+        """Wait for a value, at most for a time [s] or until it is closed; tell if there is one."""
+        with self._changed:
+            ready = lambda: self._values or not self._is_open  # noqa: E731
+            self._changed.wait_for(ready, None if seconds is None else max(seconds, 0.0))
+            return bool(self._values)
+
+    def take(self) -> dict[Any, Value]:
+        """Return all values in their order, and empty it."""
+        with self._changed:
+            values, self._values = self._values, {}
+        return values
+
+    def close(self) -> None:
+        """Wake whoever waits, for ever."""
+        with self._changed:
+            self._is_open, self._values = False, {}
+            self._changed.notify()

@@ -32,7 +32,7 @@ class JudgeRequest:
     scenario: Scenario
     """Rover, ground, ends and options."""
     before: Shown | None = None
-    """What was shown, whose paths are judged again if they are those of the scenario."""
+    """What was shown, whose paths are judged again; None: other paths are wanted."""
     index: int | None = None
     """Index of the path that is looked at; None: the one that is chosen."""
     reference: Scenario | None = None
@@ -47,9 +47,8 @@ def judge_request(request: JudgeRequest, memory: EdgeMemory | None = None) -> It
     """Yield what is shown with the verdict on the path looked at, then with more and more.
 
     Its reference, the other paths, its verdicts under all policies and its chance of failure
-    follow. If all candidates
-    are refused, so do the first path around obstacles and the best of the search's budget, or why
-    there is none. The path that is looked at stays the same.
+    follow. If all candidates are refused, so do the first path around obstacles and the best of
+    the search's budget, or why there is none. The path that is looked at stays the same.
 
     Args:
         request: What to judge.
@@ -59,11 +58,12 @@ def judge_request(request: JudgeRequest, memory: EdgeMemory | None = None) -> It
         RoverError, PlanningError: The rover, the poses or the options are invalid.
     """
     before, asked = request.before, request.scenario
-    if before is None or request.index is None or not asked.has_paths_of(before.scenario):
+    if before is None or request.index is None:
         shown = yield from _judge_new(asked)
     else:
         shown = yield from _judge_again(asked, before, request.index)
-    values = _find_reference(asked, request.reference)
+    loaded = replace(asked, rover=asked.loaded, arm_angles={})
+    values = asked.take_values(request.reference or loaded)
     shown = replace(shown, reference=_recall(shown, before, values))
     yield shown
     if shown.reference is None and not shown.path.is_of(shown.path.poses, values):
@@ -125,17 +125,11 @@ def _judge_again(asked: Scenario, before: Shown, index: int) -> Generator[Step, 
         yield Progress(PATH)
         path = _judge(asked, path.poses)
     paths = (*paths[:index], path, *paths[index + 1 :])
-    is_same_path = path.poses is before.path.poses
-    old = before.by_policy if is_same_path else ()
-    policies = old if same and is_same_path else _own_policy(path, old)
+    old = before.by_policy if path.poses is before.path.poses else {}
+    policies = {**old, **_own_policy(path)}
     around = before.around if same else None
     chance = before.chance if path is before.path else None
     return Shown(asked, paths, index, generated, None, policies, chance, around)
-
-
-def _find_reference(asked: Scenario, kept: Scenario | None) -> Scenario:
-    """Return the values to compare with: those that were kept, or the rover as it was loaded."""
-    return asked.take_values(kept or replace(asked, rover=asked.loaded, arm_angles={}))
 
 
 def _recall(shown: Shown, before: Shown | None, values: Scenario) -> Judged | None:
@@ -155,30 +149,26 @@ def _judge_others(shown: Shown) -> Generator[Step, None, Shown]:
     return replace(shown, paths=tuple(paths))
 
 
-def _own_policy(path: Judged, old: tuple[PolicyVerdict, ...] = ()) -> tuple[PolicyVerdict, ...]:
-    """Return the verdicts under all policies that are known with a path; others are old."""
-    if path.scenario.recorded is not None:
-        return ()
-    known = {policy: PolicyVerdict(policy, None, "") for policy in TORQUE_POLICIES}
-    known |= {one.policy: one for one in old}
-    known = {policy: replace(one, is_old=True) for policy, one in known.items()}
-    return tuple((known | {path.verdict.policy: _policy_verdict(path.candidate)}).values())
-
-
-def _policy_verdict(candidate: Candidate) -> PolicyVerdict:
-    verdict = candidate.verdict
-    return PolicyVerdict(verdict.policy, verdict.traversable, verdict.reason)
+def _own_policy(path: Judged) -> dict[str, PolicyVerdict]:
+    """Return the verdict on a path under the policy for which it was judged."""
+    verdict = path.verdict
+    return {verdict.policy: PolicyVerdict(path.scenario, verdict.traversable, verdict.reason)}
 
 
 def _add_policies(shown: Shown) -> Generator[Step, None, Shown]:
     """Return what is shown with the path's verdicts under all policies."""
-    if shown.by_policy and not any(one.is_old for one in shown.by_policy):
-        return shown
-    found = []
+    found, asked = dict(shown.by_policy), shown.scenario
     for k, policy in enumerate(TORQUE_POLICIES):
+        if policy in found and found[policy].scenario is asked:
+            continue
         yield Progress(POLICY, k + 1, len(TORQUE_POLICIES))
-        found.append(_judge_under(policy, shown.path))
-    return replace(shown, by_policy=tuple(found))
+        try:
+            options = asked.options.change(policy=policy)
+            verdict = _judge(replace(asked, options=options), shown.path.poses).verdict
+            found[policy] = PolicyVerdict(asked, verdict.traversable, verdict.reason)
+        except RoverError as error:
+            found[policy] = PolicyVerdict(asked, None, str(error))
+    return replace(shown, by_policy=found)
 
 
 def _add_chance(shown: Shown) -> Shown:
@@ -219,19 +209,6 @@ def _add_way(shown: Shown, around: SearchResult) -> Shown:
     """Return what is shown with a way as one more path, which nobody looks at yet."""
     way = () if around.path is None else (Judged(shown.scenario, around.path),)
     return replace(shown, paths=(*shown.paths, *way), around=around)
-
-
-def _judge_under(policy: str, path: Judged) -> PolicyVerdict:
-    """Return the verdict on a judged path under a policy, up to the first failure."""
-    if path.verdict.policy == policy:
-        return _policy_verdict(path.candidate)
-    try:
-        options = path.scenario.options.change(policy=policy)
-        return _policy_verdict(
-            _judge(replace(path.scenario, options=options), path.poses).candidate
-        )
-    except RoverError as error:
-        return PolicyVerdict(policy, None, str(error))
 
 
 def _judge(scenario: Scenario, poses: Floats) -> Judged:

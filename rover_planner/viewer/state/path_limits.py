@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The limits as people read them, and along a path: the use of each, by which wheel, so far."""
+"""The limits as people read them, their use along a path, and where the path first fails."""
 
 from dataclasses import dataclass, replace
 
@@ -8,15 +8,17 @@ from numpy.typing import NDArray
 
 from rover_physics.chance.failure_chance import FailureChance
 from rover_physics.limits.table import CHANCE, RATIO, Sense, Unit
-from rover_physics.names import WHEELS
+from rover_physics.names import SIDES, WHEEL_POSITIONS, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.record import find_column, numbers_of
 from rover_physics.results.uses import ABOVE, Uses, find_uses, limits_of
 from rover_physics.rover.model import Rover
+from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.classification import find_wheel
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.planning.asked_poses import AskedPoses, merge_poses
+from rover_planner.viewer.state.drive import RoverState, place_state
 
 GROUND = "ground"
 """Code of what is no limit of a number: unknown ground, no equilibrium, entrapment, steering."""
@@ -24,6 +26,23 @@ MAX_USE = 99.0
 """Largest use that is written as a number."""
 MORE_DIGITS = 2
 """Most digits beyond those of the unit that tell a value from its limit; else words do."""
+BODY = "body"
+"""Name of the body among the links."""
+BODY_CODES = ("tilt", "tip_over", "belly")
+"""Codes of limits of the body."""
+TITLES = {
+    "steering": "steering",
+    "off_map": "off the map",
+    "unknown_ground": "unknown ground",
+    "not_settled": "does not settle",
+    "no_equilibrium": "no equilibrium",
+    "not_computable": "not computable",
+    "trapped": "trapped",
+    CHANCE: "chance of failure above what is accepted",
+}
+"""Short names of the codes of a verdict that have no number."""
+ON_THE_WAY = "on the way here: "
+"""Beginning of the reason of a failure between waypoints."""
 
 
 @dataclass(frozen=True)
@@ -99,28 +118,6 @@ def write_use(use: float) -> str:
     return "just above 100 %" if use > 1.0 and text == "100 %" else text
 
 
-def list_limits(rover: Rover, prediction: PathPrediction) -> list[ShownLimit]:
-    """Return the limits of a prediction, in the order in which they become reasons.
-
-    Sinkage is left out where nothing sinks. Rows of the table with one code are one limit, which
-    is a number if it is one row's.
-    """
-    asked = limits_of(rover, prediction.policy)
-    found: dict[str, ShownLimit] = {}
-    for row, bound in zip(asked.rows, asked.bounds, strict=True):
-        if row.code == "sinkage" and not np.any(prediction.sinkage > 0.0):
-            continue
-        shown = ShownLimit(row.code, row.title)
-        if row.code not in found and row.sense != Sense.RANGE:
-            unit, is_lowest = row.shown or row.unit, row.sense in (Sense.LEAST, Sense.SHARE)
-            number = unit.factor * bound
-            shown = replace(
-                shown, bound=number, unit=unit, is_lowest=is_lowest, keeps_margin=row.keeps_margin
-            )
-        found[row.code] = shown
-    return [*found.values()]
-
-
 @dataclass(frozen=True, eq=False)
 class Lane:
     """One limit along the path; arrays (m,) as in `AskedPoses`."""
@@ -181,6 +178,8 @@ class PathLimits:
 def find_path_limits(rover: Rover, prediction: PathPrediction, verdict: Verdict) -> PathLimits:
     """Return how a prediction uses the limits, up to and including the first failure.
 
+    Sinkage is left out where nothing sinks.
+
     Args:
         rover: The rover.
         prediction: The prediction of the path.
@@ -191,8 +190,13 @@ def find_path_limits(rover: Rover, prediction: PathPrediction, verdict: Verdict)
         prediction = prediction.cut(verdict.first_failure + 1)
     rows = merge_poses(prediction)
     uses = find_uses(limits_of(rover, prediction.policy), rows.prediction.results)
+    of_code: dict[str, list[int]] = {}
+    for k, row in enumerate(uses.limits.rows):
+        of_code.setdefault(row.code, []).append(k)
+    if not np.any(prediction.sinkage > 0.0):
+        of_code.pop("sinkage", None)
     unjudged = np.where(rows.prediction.settled, 0.0, np.inf)
-    lanes = [_make_lane(limit, rows, uses) for limit in list_limits(rover, prediction)]
+    lanes = [_make_lane(rows, uses, np.array(one)) for one in of_code.values()]
     found = PathLimits(rows, (_plain_lane(GROUND, "ground", unjudged), *lanes))
     _add_refusals(found, verdict)
     return found
@@ -203,14 +207,23 @@ def _plain_lane(code: str, title: str, used: Floats) -> Lane:
     return Lane(ShownLimit(code, title), np.full(len(used), np.nan), used, np.full(len(used), -1))
 
 
-def _make_lane(limit: ShownLimit, rows: AskedPoses, uses: Uses) -> Lane:
-    """Return the lane of a limit; of several rows of the table that which is used most counts."""
+def _show_limit(uses: Uses, of_limit: NDArray[np.int64]) -> ShownLimit:
+    """Return the limit of some rows of the table, which is a number if it is one row's."""
+    row, bound = uses.limits.rows[of_limit[0]], uses.limits.bounds[of_limit[0]]
+    if len(of_limit) > 1 or row.sense == Sense.RANGE:
+        return ShownLimit(row.code, row.title)
+    unit, is_lowest = row.shown or row.unit, row.sense in (Sense.LEAST, Sense.SHARE)
+    number = unit.factor * bound
+    return ShownLimit(row.code, row.title, number, unit, is_lowest, row.keeps_margin)
+
+
+def _make_lane(rows: AskedPoses, uses: Uses, of_limit: NDArray[np.int64]) -> Lane:
+    """Return the lane of some rows of the table, of which that which is used most counts."""
     prediction, every = rows.prediction, np.arange(len(rows.distance))
-    of_limit = np.array([k for k, row in enumerate(uses.limits.rows) if row.code == limit.code])
+    limit, values = _show_limit(uses, of_limit), np.full(len(every), np.nan)
     asked = np.where(np.isnan(uses.use[:, of_limit]), -np.inf, uses.use[:, of_limit])
     decides = of_limit[asked.argmax(axis=1)]
     used = np.where(prediction.settled, uses.use[every, decides], np.nan)
-    values = np.full(len(every), np.nan)
     if limit.bound is not None:
         column = find_column(uses.limits.rows[of_limit[0]].reads)[0]
         element = np.maximum(uses.element[every, decides], 0)
@@ -243,3 +256,128 @@ def _add_refusals(limits: PathLimits, verdict: Verdict) -> None:
         lane, here = limits.lane(code), rows.prediction.waypoint == waypoint
         if code not in ("", CHANCE) and not np.any(lane.used[here] > 1.0):
             lane.used[here & ~rows.is_between] = ABOVE
+
+
+@dataclass(frozen=True, eq=False)
+class Failure:
+    """The first failure of a path."""
+
+    code: str
+    """Code of the verdict."""
+    reason: str
+    """Reason of the verdict."""
+    limit: ShownLimit
+    """The broken limit."""
+    value: float
+    """The value that breaks it, in its unit; NaN if there is none."""
+    link: str
+    """The link that fails: a name of WHEELS, BODY, rocker_left, bogie_right and so on; empty if
+    it is none."""
+    distance: float
+    """Distance since the start [m]."""
+    time: float
+    """Time since the start [s]."""
+    is_between: bool
+    """True if it is between two waypoints."""
+    row: int
+    """Its row of the limits along the path."""
+    state: RoverState
+    """The rover there; a level one of unknown forces above the ground if it does not stand."""
+
+    @property
+    def where(self) -> str:
+        """The link in words, such as "middle left wheel"; empty for none."""
+        words = self.link.replace("_", " ")
+        return f"{words} wheel" if self.link in WHEELS else words
+
+    @property
+    def place(self) -> str:
+        """Where and when it is, in words."""
+        between = ", between waypoints" if self.is_between else ""
+        return f"after {self.distance:.2f} m, {self.time:.0f} s{between}"
+
+    @property
+    def headline(self) -> str:
+        """The value beside the limit, such as "friction 1.32 of 1.00, middle left wheel"."""
+        if not np.isnan(self.value):
+            words = self.limit.compare(self.value)
+        elif self.code in TITLES:
+            words = TITLES[self.code]
+        else:
+            return self.reason.removeprefix(ON_THE_WAY)
+        return f"{words}, {self.where}" if self.where else words
+
+
+def find_failure(rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathLimits) -> Failure:
+    """Return the first failure of a path that is refused.
+
+    Args:
+        rover: The rover.
+        terrain: The ground.
+        verdict: The verdict on the path.
+        limits: Its limits, as `find_path_limits` returns them.
+    """
+    lane, rows = limits.lane(verdict.code), limits.rows
+    is_there = rows.prediction.waypoint == verdict.first_failure
+    broken = np.flatnonzero(is_there & (lane.used > 1.0))
+    if not broken.size:  # a recorded refusal that this rover does not explain
+        broken = np.flatnonzero(is_there & ~rows.is_between)
+    at = int(broken[np.argmin(rows.is_between[broken])])
+    here, value = rows.prediction.select([at]), float(lane.values[at])
+    limit = lane.limit.keep(float(here.results["kept_share"][0]))
+    explains = limit.is_broken_by(value)
+    return Failure(
+        code=verdict.code,
+        reason=verdict.reason,
+        limit=limit,
+        value=value if explains else np.nan,
+        link=_find_link(rover, terrain, verdict.code, rows, at)
+        or (WHEELS[lane.wheel[at]] if explains and lane.wheel[at] >= 0 else ""),
+        distance=float(rows.distance[at]),
+        time=float(rows.time[at]),
+        is_between=bool(rows.is_between[at]),
+        row=at,
+        state=RoverState(rover, here, np.zeros(6))
+        if here.settled[0]
+        else level_state(rover, terrain, rows, at),
+    )
+
+
+def level_state(rover: Rover, terrain: Terrain, rows: AskedPoses, at: int) -> RoverState:
+    """Return a level rover of unknown forces at a row, above the ground below its origin."""
+    x, y, yaw = rows.prediction.poses[at].tolist()
+    height = float(np.nan_to_num(terrain.elevation_at(x, y)))
+    standing = rover.wheel.radius - rover.suspension.wheels["middle"][2]
+    driven = {"distance": rows.distance[at], "time": rows.time[at]}
+    position = np.array([x, y, height + standing])
+    return place_state(rover, position, np.array([0.0, 0.0, yaw]), **driven)
+
+
+def _find_link(rover: Rover, terrain: Terrain, code: str, rows: AskedPoses, at: int) -> str:
+    """Return the link that fails at a row; empty if the wheel that decides the limit does."""
+    part = rows.prediction
+    if code in BODY_CODES:
+        return BODY
+    if code == "suspension":
+        joints = np.hstack([part.rocker_angle[at], part.bogie_angle[at]])
+        limits = rover.suspension.rocker_limits, rover.suspension.bogie_limits
+        low, high = np.repeat(limits, 2, axis=0).T
+        joint = int(np.argmin(np.minimum(joints - low, high - joints)))
+        return f"{('rocker', 'bogie')[joint // 2]}_{SIDES[joint % 2]}"
+    if code in ("off_map", "unknown_ground"):
+        return _find_lost_wheel(rover, terrain, level_state(rover, terrain, rows, at))
+    if code == "steering" and rover.steering is not None:
+        turns = np.tile([name in rover.steering.wheels for name in WHEEL_POSITIONS], 2)
+        allowed = np.where(turns, rover.steering.limit, 0.0)
+        return WHEELS[int(np.argmax(np.abs(part.steering_angle[at]) - allowed))]
+    return ""
+
+
+def _find_lost_wheel(rover: Rover, terrain: Terrain, state: RoverState) -> str:
+    """Return the wheel with the most of its footprint beyond known ground; empty for none."""
+    offsets = rover.wheel.radius * np.linspace(-1.0, 1.0, 5)
+    x = state.wheel_centres[:, 0, None, None] + offsets[:, None]
+    y = state.wheel_centres[:, 1, None, None] + offsets
+    lost = ~np.isfinite(terrain.elevation_at(x + 0.0 * y, y + 0.0 * x)).reshape(6, -1)
+    counts = lost.sum(axis=1)
+    return WHEELS[int(np.argmax(counts))] if counts.any() else ""

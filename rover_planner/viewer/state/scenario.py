@@ -15,10 +15,13 @@ from rover_physics.traversability.verdict import Verdict
 from rover_planner.planning.path_query import Candidate, PathQueryOptions
 from rover_planner.planning.search.path_search import SearchResult
 from rover_planner.planning.search.query import LatticeSettings
-from rover_planner.viewer.state.failure import Failure, find_failure
-from rover_planner.viewer.state.path_limits import PathLimits, find_path_limits
-from rover_planner.viewer.state.rover_state import RoverState
-from rover_planner.viewer.state.trajectory import Trajectory
+from rover_planner.viewer.state.drive import RoverState, Trajectory
+from rover_planner.viewer.state.path_limits import (
+    Failure,
+    PathLimits,
+    find_failure,
+    find_path_limits,
+)
 
 Pose = tuple[float, float, float]
 
@@ -67,10 +70,6 @@ class Scenario:
             and replace(self.options, model=other.options.model) == other.options
             and self.recorded is other.recorded
         )
-
-    def has_rover_of(self, other: "Scenario") -> bool:
-        """Return whether the numbers of the rover and the angles of its arm are the same."""
-        return self.rover == other.rover and self.arm == other.arm
 
     def take_values(self, other: "Scenario") -> "Scenario":
         """Return this scenario with the values of another, and its path between the same ends."""
@@ -128,23 +127,21 @@ class Judged:
 
     def is_of(self, poses: Floats, values: Scenario) -> bool:
         """Return whether it is a path with these poses under these values."""
-        asked = self.scenario
-        same = asked.has_rover_of(values) and asked.options == values.options
+        mine, others = ((one.rover, one.arm, one.options) for one in (self.scenario, values))
+        same = mine == others
         return same and (self.poses is poses or np.array_equal(self.poses, poses))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PolicyVerdict:
     """The verdict of a path under one torque policy."""
 
-    policy: str
-    """One of `TORQUE_POLICIES`."""
+    scenario: Scenario
+    """Values for which it was judged; the policy is another."""
     traversable: bool | None
-    """True if the rover can drive the path; None if this policy cannot judge it or did not yet."""
+    """True if the rover can drive the path; None if this policy cannot judge it."""
     reason: str
     """Reason of a refusal; empty if it can."""
-    is_old: bool = False
-    """True if it is of other values than the verdict beside it, or not known yet."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,8 +158,8 @@ class Shown:
     """Number of candidates; paths beyond were searched."""
     reference: Judged | None = None
     """The same path with the values of the reference; None if nothing differs from it."""
-    by_policy: tuple[PolicyVerdict, ...] = ()
-    """Its verdicts under all torque policies; empty for a replay, whose soil is not known."""
+    by_policy: Mapping[str, PolicyVerdict] = field(default_factory=dict)
+    """Its verdicts under torque policies that are known; those for other values are old."""
     chance: FailureChance | None = None
     """The chance that the path fails, up to where a limit is broken; None while it is not known,
     or for a replay."""

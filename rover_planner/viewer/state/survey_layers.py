@@ -26,7 +26,7 @@ from rover_planner.survey.layers import (
     read_drawn_classes,
 )
 from rover_planner.survey.store import SurveyStore
-from rover_planner.viewer.state.colours import UNKNOWN, Colour, from_css, to_css
+from rover_planner.viewer.state.colours import UNKNOWN, from_css, to_css
 from rover_planner.viewer.state.layers import ColouredGround, GroundGrid, Legend, sample
 
 MAX_READ = 1200
@@ -55,13 +55,16 @@ class ShownSurvey:
 
         Each pixel has the colour of the nearest surveyed cell that is read.
         """
+        from matplotlib import colormaps
+
         if name == CLASS:
             numbers = read_drawn_classes(self._store, self._every)
             colours, labels = [from_css(one) for one in CLASS_COLOURS], [*CLASS_LABELS]
         else:
             numbers = np.asarray(self._store.layer("first_limit")[:: self._every, :: self._every])
-            colours = list_limit_colours()
             labels = [c.replace("_", " ") or "none: all headings pass" for c in number_limits()]
+            palette = colormaps["tab20"](np.arange(len(labels) - 1) % 20, bytes=True)
+            colours = [from_css(CLASS_COLOURS[0]), *((r, g, b) for r, g, b, _ in palette.tolist())]
         table = np.full((256, 3), UNKNOWN, np.uint8)
         table[: len(colours)] = colours
         found = np.unique(numbers)
@@ -161,14 +164,6 @@ def load_map(path: Path, max_cells: int) -> Terrain:
     return Terrain(
         **grids, resolution=frame.resolution, origin=frame.origin, soil_names=source.soil_names
     )
-
-
-def list_limit_colours() -> list[Colour]:
-    """Return the colours of the limits by number, the first of which is no limit."""
-    from matplotlib import colormaps
-
-    palette = colormaps["tab20"](np.arange(len(number_limits()) - 1) % 20, bytes=True)
-    return [from_css(CLASS_COLOURS[0]), *((r, g, b) for r, g, b, _ in palette.tolist())]
 
 
 def _as_json(value: Any) -> Any:

@@ -20,22 +20,20 @@ from rover_physics.names import WHEEL_JOINTS
 from rover_physics.rover.rover_file import load_rover
 from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.ros.qos import latched_qos, result_qos, sensor_qos, topic_qos
-from rover_planner.viewer.documents.live import (
-    PATIENCE,
-    choose_answer,
-    describe_learned,
-    list_topics,
-)
-from rover_planner.viewer.live.listener import LiveLink, LiveListener
+from rover_planner.viewer.live.listener import LiveListener, listen
 from rover_planner.viewer.live.live_state import (
     MAX_AGE,
     MAX_TRAIL,
+    PATIENCE,
     TRAIL_STEP,
     Click,
     LearnedTrail,
     LiveData,
     LiveVerdict,
     TopicAge,
+    choose_answer,
+    describe_learned,
+    list_topics,
     read_state,
 )
 from support.waiting import repeat_until, wait_until
@@ -221,11 +219,10 @@ def test_a_plan_needs_odometry_and_a_server(listener, talker):
 
 def test_a_closed_link_leaves_no_thread_and_no_context():
     before = set(threading.enumerate())
-    link = LiveLink()
-    assert link.listener.context.ok()
-    assert set(threading.enumerate()) - before
-    link.close()
-    assert not link.listener.context.ok()
+    with listen() as listener:
+        assert listener.context.ok()
+        assert set(threading.enumerate()) - before
+    assert not listener.context.ok()
     wait_until(lambda: set(threading.enumerate()) <= before, "the threads to end")
 
 
@@ -263,18 +260,17 @@ def test_an_answer_to_a_click_belongs_to_the_click_and_the_newest_is_one_click_a
     refusal, mission = verdict_on("1", False, 5.0), verdict_on("2", True, 3.0)
     clicked, planned = np.zeros((2, 3)), np.ones((3, 3))
     click = Click("1", NOW - 6.0, refusal)
-    shown = choose_answer(data_of(mission, planned, click), NOW)
-    told = shown.document
+    told, plan = choose_answer(data_of(mission, planned, click), NOW)
     assert told["passes"] is False and told["headline"] == "a wheel slips"
-    assert told["about"] == "your click, 5 s ago" and shown.plan is None
+    assert told["about"] == "your click, 5 s ago" and plan is None
     [offer] = told["offers"]
     assert offer["words"] == "question 2: traversable, 3 s ago"
     assert offer["ask"] == {"ask": "newest"}
-    newest = choose_answer(data_of(mission, planned), NOW)
-    assert newest.document["passes"] and newest.document["about"] == "question 2, 3 s ago"
-    assert newest.plan is planned and not newest.is_old
+    told, plan = choose_answer(data_of(mission, planned), NOW)
+    assert told["passes"] and told["about"] == "question 2, 3 s ago"
+    assert plan is planned and not told["old"]
     again = Click("2", NOW - 4.0, mission, clicked)
-    assert choose_answer(data_of(mission, planned, again), NOW).plan is clicked
+    assert choose_answer(data_of(mission, planned, again), NOW)[1] is clicked
 
 
 def test_a_click_without_an_answer_says_so_in_2_s_and_shows_no_older_verdict():
@@ -283,17 +279,16 @@ def test_a_click_without_an_answer_says_so_in_2_s_and_shows_no_older_verdict():
         (PATIENCE + 1.0, "no answer from the server"),
     ):
         click = Click("1", NOW - waited)
-        told = choose_answer(data_of(verdict_on("2", True, 9.0), None, click), NOW).document
+        told = choose_answer(data_of(verdict_on("2", True, 9.0), None, click), NOW)[0]
         assert told["passes"] is None and told["headline"].startswith(words)
 
 
 def test_a_verdict_of_a_server_that_fell_silent_is_old_in_words_and_in_the_scene():
     silent = TopicAge("traverse_server", time.monotonic() - 20.0, True)
-    shown = choose_answer(
-        data_of(verdict_on("1", True, 25.0), np.zeros((2, 3)), None, silent), NOW
-    )
-    assert shown.is_old and shown.document["old"] == "the server is silent for 20 s"
-    assert shown.document["about"] == "question 1, 25 s ago"
+    data = data_of(verdict_on("1", True, 25.0), np.zeros((2, 3)), None, silent)
+    told, _ = choose_answer(data, NOW)
+    assert told["old"] == "the server is silent for 20 s"
+    assert told["about"] == "question 1, 25 s ago"
     click = Click("1", NOW - 26.0, verdict_on("1", True, 25.0))
-    older = choose_answer(data_of(verdict_on("2", True, 24.0), None, click, silent), NOW)
-    assert older.document["offers"][0]["words"] == "question 2: traversable, 24 s ago, old"
+    told, _ = choose_answer(data_of(verdict_on("2", True, 24.0), None, click, silent), NOW)
+    assert told["offers"][0]["words"] == "question 2: traversable, 24 s ago, old"

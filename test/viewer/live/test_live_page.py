@@ -12,10 +12,10 @@ from rover_physics.terrain.grid import Terrain, save_terrain
 from rover_physics.warm_up import warm_up
 from rover_planner.nodes.rover_simulator import RoverSimulator
 from rover_planner.nodes.traverse_server import TraverseServer
-from rover_planner.viewer.live.listener import LiveLink
+from rover_planner.viewer.live.listener import listen
 from rover_planner.viewer.pages.live_page import LivePage
 from rover_planner.viewer.pages.sharing import PageLink, write_link
-from rover_planner.viewer.state.colours import UNKNOWN
+from rover_planner.viewer.state.colours import UNKNOWN, to_linear
 from support.grounds import make_terrain, waves
 from support.viewer.sessions import ask
 from support.viewer.sessions import wait_patiently as wait_until
@@ -26,6 +26,7 @@ LSR1 = load_rover("lsr1")
 QUERY = write_link(
     PageLink({}, {}, "0", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), "equal", "", 1, 0.0, "height", 0.0)
 )
+PLAN = "/lines/plan"
 LEVEL = Terrain(np.zeros((160, 160)), 0.05, (-4.0, -4.0))
 
 
@@ -33,11 +34,10 @@ LEVEL = Terrain(np.zeros((160, 160)), 0.05, (-4.0, -4.0))
 def page(ros):
     """A page that follows the graph of the test."""
     warm_up()
-    link = LiveLink(context=ros.context)
-    served = LivePage(LSR1, LEVEL, link.listener, port=0)
-    yield served
-    served.close()
-    link.close()
+    with listen(ros.context) as listener:
+        served = LivePage(LSR1, LEVEL, listener, port=0)
+        yield served
+        served.close()
 
 
 def test_a_live_page_shows_a_rover_and_the_plan_and_forces_of_its_server_until_they_fall_silent(
@@ -78,12 +78,12 @@ def test_a_live_page_shows_a_rover_and_the_plan_and_forces_of_its_server_until_t
     loads = [float(wheel["load"].split()[0]) for wheel in told("board")["wheels"]]
     assert sum(loads) == pytest.approx(LSR1.weight, rel=0.05)
     assert not topic("odometry")["stale"] and words().startswith("live")
-    wait_until(lambda: page.scene.paths.lines["plan"], "the plan")
+    wait_until(lambda: PLAN in page.scene.canvas.nodes, "the plan")
     ask(page, lambda: page.click(np.array([3.9, 0.0]), False))
     wait_until(lambda: told("verdict")["passes"] is False, "the refusal of what is off the map")
-    wait_until(lambda: not page.scene.paths.lines["plan"], "no plan")
+    wait_until(lambda: PLAN not in page.scene.canvas.nodes, "no plan")
     ask(page, lambda: page.click(np.array([1.0, 0.0]), False))
-    wait_until(lambda: page.scene.paths.lines["plan"], "the plan again")
+    wait_until(lambda: PLAN in page.scene.canvas.nodes, "the plan again")
     page.hear({"ask": "newest"}, None)
     wait_until(lambda: told("verdict")["about"].startswith("question"), "the newest verdict")
 
@@ -91,8 +91,8 @@ def test_a_live_page_shows_a_rover_and_the_plan_and_forces_of_its_server_until_t
         timer.cancel()
     wait_until(lambda: told("verdict")["old"].startswith("the server is silent"), "its silence")
     assert "the server is silent" in told("subject")["mode"]
-    strands = lambda: {one.colour for one in page.scene.paths.lines["plan"]}  # noqa: E731
-    wait_until(lambda: strands() == {UNKNOWN}, "the grey plan")
+    grey = to_linear(np.array(UNKNOWN))
+    wait_until(lambda: (page.scene.canvas.nodes[PLAN].colors == grey).all(), "the grey plan")
     for timer in simulator.timers:
         timer.cancel()
     wait_until(lambda: "not live: odometry is " in told("subject")["mode"], "the silence")

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The limits along a path as curves of their uses, beside those of the reference."""
+"""A drive: the uses of the limits along it, beside those of the reference, and the board."""
 
 import itertools
+import math
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,23 @@ from rover_physics.chance.failure_chance import FailureChance
 from rover_physics.limits.table import CHANCE
 from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
-from rover_planner.viewer.documents.numbers import plain
+from rover_planner.viewer.documents.numbers import plain, write
+from rover_planner.viewer.state.colours import colour_use, to_css
+from rover_planner.viewer.state.drive import RoverState
 from rover_planner.viewer.state.path_limits import MAX_USE, Lane, PathLimits, write_use
 from rover_planner.viewer.state.scenario import Judged
 
 MAX_POINTS = 240
 """Most points of a curve."""
+WHEEL_ROWS = {
+    "normal force N [N]": ("wheel_loads", 1.0, 1),
+    "traction T [N]": ("tangential", 1.0, 1),
+    "lateral force S [N]": ("lateral", 1.0, 1),
+    "use of friction [%]": ("friction_use", 100.0, 0),
+    "use of torque [%]": ("torque_use", 100.0, 0),
+    "slip ratio [%]": ("slip_ratio", 100.0, 0),
+}
+"""Rows of the table of wheels: field of the state, factor and digits."""
 
 
 def describe_limits(
@@ -24,30 +36,37 @@ def describe_limits(
 ) -> dict[str, Any]:
     """Return the curves of a path's lanes, those of the reference, of its chance, and the loads.
 
-    A lane has the use now and before, and six curves where wheels have it.
+    A lane has the use now and before, and six curves where wheels have it. Loads are those of the
+    wheels [N] while the rover stands.
     """
     failure, before = path.failure, None if reference is None else reference.limits
     limits = path.limits.add_chance(chance)
     end = max(limits.end, 0.0 if before is None else before.end)
-    lanes = [
-        {
-            "code": lane.limit.code,
-            "title": lane.limit.title,
-            "now": _pick_points(limits.rows.distance, lane.used[:, None]),
-            "wheels": None
-            if lane.wheels is None
-            else _pick_points(limits.rows.distance, lane.wheels),
-            "before": _find_before(lane, before),
-        }
-        for lane in limits.lanes
-    ]
+    rows, stands = limits.rows, limits.rows.prediction.settled
+    lanes = []
+    for lane in limits.lanes:
+        code, old = lane.limit.code, None
+        if before is not None and code != CHANCE:
+            old = _pick_points(before.rows.distance, before.lane(code).used[:, None])
+        lanes.append(
+            {
+                "code": code,
+                "title": lane.limit.title,
+                "now": _pick_points(rows.distance, lane.used[:, None]),
+                "wheels": None
+                if lane.wheels is None
+                else _pick_points(rows.distance, lane.wheels),
+                "before": old,
+            }
+        )
+    loads = rows.prediction.wheel_loads[stands]
     return {
         "end": round(end, 4),
         "fails": None if failure is None else round(failure.distance, 4),
         "code": "" if failure is None else limits.lane(failure.code).limit.code,
         "compared": reference is not None,
         "lanes": lanes,
-        "loads": _describe_loads(path),
+        "loads": _pick_points(rows.distance[stands], loads, 1),
     }
 
 
@@ -90,20 +109,6 @@ def _describe_use(lane: Lane, limits: PathLimits, worst: int, here: int) -> dict
     }
 
 
-def _describe_loads(path: Judged) -> dict[str, Any]:
-    """Return the wheel loads [N] along a path while the rover stands."""
-    rows = path.limits.rows
-    stands = rows.prediction.settled
-    return _pick_points(rows.distance[stands], rows.prediction.wheel_loads[stands], 1)
-
-
-def _find_before(lane: Lane, before: PathLimits | None) -> dict[str, Any] | None:
-    """Return the curve of a lane of the reference; None without one."""
-    if before is None or lane.limit.code == CHANCE:
-        return None
-    return _pick_points(before.rows.distance, before.lane(lane.limit.code).used[:, None])
-
-
 def _pick_points(distance: Floats, values: Floats, digits: int = 3) -> dict[str, Any]:
     """Return x (j,) and curves y (k, j) of values (m, k) with all peaks and dips.
 
@@ -131,3 +136,48 @@ def choose_rows(values: Floats) -> NDArray[np.intp]:
         for pick in (np.argmax(high[first:end]), np.argmin(low[first:end]))
     ]
     return np.unique([0, *chosen, m - 1])
+
+
+def describe_board(
+    state: RoverState | None, failing: str = "", *, has_slip: bool = False
+) -> dict[str, Any] | None:
+    """Return the wheels in wheel order, and the numbers of a state; None without a state.
+
+    Args:
+        state: The rover.
+        failing: The link that fails, empty for none.
+        has_slip: True if slip is predicted, on yielding soil or with speed servos.
+    """
+    if state is None:
+        return None
+    wheels = []
+    for k, name in enumerate(WHEELS):
+        friction, torque = float(state.friction_use[k]), float(state.torque_use[k])
+        bars = (("friction", friction), ("torque", torque))
+        slip = abs(float(state.slip_ratio[k]))
+        wheels.append(
+            {
+                "name": name.replace("_", " "),
+                "bars": [[title, plain(use), write_use(use)] for title, use in bars],
+                "colour": to_css(colour_use(friction)),
+                "load": write(float(state.wheel_loads[k]), 1, "N"),
+                "slip": write(100.0 * slip, 0, "% slip") if has_slip else "",
+                "turn": plain(math.degrees(float(state.steering_angle[k])), 1),
+                "fails": failing == name,
+            }
+        )
+    numbers = {
+        "time": write(state.time, 1, "s"),
+        "distance": write(100.0 * state.distance, 1, "cm"),
+        "speed": write(100.0 * state.speed, 1, "cm/s"),
+        "energy": write(state.energy, 2, "J"),
+        "tilt": write(math.degrees(state.tilt), 1, "deg"),
+        "belly": write(100.0 * state.belly_clearance, 1, "cm"),
+        "margin": write(state.tip_over_ratio, 2),
+        "x, y": f"{state.position[0]:.2f}, {state.position[1]:.2f} m",
+    }
+    table = [
+        [title, [write(scale * float(value), digits) for value in getattr(state, name)]]
+        for title, (name, scale, digits) in WHEEL_ROWS.items()
+    ]
+    return {"wheels": wheels, "numbers": numbers, "table": table}

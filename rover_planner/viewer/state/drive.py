@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The drive along a predicted path: the rover at any time of it, and the clock that plays it."""
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rover_physics.names import SERVO, WHEELS
+from rover_physics.numerics.arrays import Floats
+from rover_physics.numerics.records import new_record
+from rover_physics.results.path_prediction import PathPrediction, prediction_of
+from rover_physics.results.record import RESULT, numbers_of
+from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place
+from rover_physics.rover.manipulator import body_mass_and_com
+from rover_physics.rover.model import Rover
+from rover_physics.status import PoseStatus
+from rover_planner.planning.asked_poses import AskedPoses
+from rover_planner.simulator.driving_forces import find_axles
+
+LEAST_BOUND = 1e-9
+"""Bound in place of 0 where a use is computed."""
+MAX_SLIP = 0.95
+"""Slip ratio at which the shown rate of a wheel is limited."""
+MAX_VALUE = 1e9
+"""Largest magnitude that is shown: a wheel that lifts off has infinite friction utilisation."""
+SPEEDS = (1, 2, 5, 10, 20, 50, 100)
+"""Speeds to choose from, in seconds of the drive per second of the visitor."""
+
+
+@dataclass(frozen=True, eq=False)
+class RoverState:
+    """The rover at one time; its attributes are those of a `PathPrediction`, of one pose.
+
+    Such as `wheel_loads` (6,) [N], NaN where they are not known.
+    """
+
+    rover: Rover
+    """The rover."""
+    here: PathPrediction
+    """What is predicted or measured, one row."""
+    spin: Floats
+    """(6,) angles by which the wheels have turned [rad]."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name == "here":  # while a copy is made, which has nothing yet
+            raise AttributeError(name)
+        return getattr(self.here, name)[0]
+
+    @property
+    def attitude(self) -> Floats:
+        """(3,) roll, pitch, yaw [rad]."""
+        return np.array([self.roll, self.pitch, self.here.poses[0, 2]])
+
+    @property
+    def axles(self) -> Floats:
+        """Directions (6, 3) of the wheels' axles, map frame, positive to the left."""
+        on_rocker = self.rover.suspension.rocker_wheel
+        return find_axles(self.here, np.array([not w.startswith(on_rocker) for w in WHEELS]))
+
+    @property
+    def speed(self) -> float:
+        """Speed along the path [m/s]."""
+        return float(np.hypot(*self.motion[:2]))
+
+    @property
+    def friction_use(self) -> Floats:
+        """(6,) friction utilisation over its limit."""
+        bound = self.rover.limits.friction_utilisation * self.kept_share
+        return np.asarray(self.friction_utilisation / max(bound, LEAST_BOUND))
+
+    @property
+    def torque_use(self) -> Floats:
+        """(6,) torque saturation over its limit."""
+        bound = self.rover.limits.torque_saturation * self.kept_share
+        return np.asarray(self.torque_saturation / max(bound, LEAST_BOUND))
+
+
+def place_state(
+    rover: Rover,
+    position: Floats,
+    attitude: Floats,
+    joints: Floats | None = None,
+    contact_angles: Floats | None = None,
+    **known: Any,
+) -> RoverState:
+    """Return a rover as it is measured, or assumed, to stand; what is not known is NaN.
+
+    Args:
+        rover: The rover.
+        position: (3,) body origin [m], map frame.
+        attitude: (3,) roll, pitch, yaw [rad].
+        joints: (4,) right and left rocker and bogie angles [rad] (default: 0).
+        contact_angles: (6,) angles of the contacts from the wheels' lowest points [rad]
+            (default: 0).
+        known: Quantities of a prediction, and `spin` (6,) [rad].
+    """
+    angles = np.zeros(4) if joints is None else np.asarray(joints)
+    contact = np.zeros(6) if contact_angles is None else contact_angles
+    (x, y, z), (roll, pitch, yaw) = position, attitude
+    placement, pose = new_record(PLACEMENT), np.array([x, y, yaw])
+    q = np.array([z, roll, pitch, 0.5 * (angles[0] - angles[1]), *angles[2:]])
+    place(pack_linkage(rover, *body_mass_and_com(rover)), pose, q, placement)
+    sine, cosine = np.sin(contact)[:, None], np.cos(contact)[:, None]
+    down = sine * placement.forward - cosine * placement.up
+    values = {
+        "position": position, "roll": roll, "pitch": pitch, "rocker_angle": angles[:2],
+        "bogie_angle": angles[2:], "steering_angle": placement.steering, "motion": np.zeros(3),
+        "wheel_centres": placement.centres,
+        "contact_points": placement.centres + rover.wheel.radius * down, **known,
+    }  # fmt: skip
+    spin = np.asarray(values.pop("spin", np.zeros(6)))
+    rows = {name: np.asarray(value, float)[None] for name, value in values.items()}
+    status: NDArray[np.int8] = np.array([PoseStatus.SETTLED], np.int8)
+    return RoverState(rover, prediction_of(pose[None], status, rows, "measured"), spin)
+
+
+class Trajectory:
+    """The drive along a path: the poses at which the model was asked, up to the first failure."""
+
+    def __init__(self, rover: Rover, rows: AskedPoses):
+        """Take the poses that settle, of those up to and including the first failure."""
+        unsettled = np.flatnonzero(~rows.prediction.settled)
+        end = int(unsettled[0]) if unsettled.size else len(rows.place)
+        self.length = end
+        """Number of poses; 0 where the rover does not settle at the start."""
+        shown = slice(max(end, 1))
+        self.places, self.distance, self.times = (
+            rows.place[shown], rows.distance[shown], rows.time[shown]
+        )  # fmt: skip
+        """Places as in `AskedPoses`, distances [m] and times [s] of the poses; without poses those
+        of the start."""
+        self._rover, self._driven = rover, rows.prediction.select(slice(end))
+        self._yaw = np.unwrap(self._driven.poses[:, 2])
+        self._numbers = np.clip(numbers_of(self._driven.results), -MAX_VALUE, MAX_VALUE)
+        self._spin = _roll_wheels(rover, self._driven) if end else np.zeros((0, 6))
+
+    @property
+    def has_slip(self) -> bool:
+        """True if slip is predicted: on yielding soil, or with speed servos."""
+        driven = self._driven
+        return driven.policy == SERVO or bool(np.any(driven.sinkage > 0.0))
+
+    @property
+    def energy(self) -> float:
+        """Energy spent up to its end [J]."""
+        return float(self._driven.energy[-1]) if self.length else 0.0
+
+    def state_at(self, time: float) -> RoverState | None:
+        """Return the state at a time [s], linear between poses; None without poses."""
+        if not self.length:
+            return None
+        place = float(np.interp(time, self.times, np.arange(self.length)))
+        before = int(place)
+        rows, shares = [before, min(before + 1, self.length - 1)], [1.0 - place % 1.0, place % 1.0]
+        poses = self._driven.poses[rows].copy()
+        poses[:, 2] = self._yaw[rows]
+        results = (shares @ self._numbers[rows])[None].view(RESULT)[:, 0]
+        results["status"] = PoseStatus.SETTLED
+        here = replace(
+            self._driven.select([before]), poses=(shares @ poses)[None], results=results
+        )
+        return RoverState(self._rover, here, np.asarray(shares @ self._spin[rows]))
+
+
+def _roll_wheels(rover: Rover, driven: PathPrediction) -> Floats:
+    """Return the angles (n, 6) [rad] by which the wheels have turned at n waypoints."""
+    moves = np.linalg.norm(np.diff(driven.wheel_centres, axis=0), axis=2)
+    rolled = moves / rover.wheel.radius / (1.0 - np.clip(driven.slip_ratio, 0, MAX_SLIP))[1:]
+    rolled *= np.where(driven.wheel_speed[1:] < 0.0, -1.0, 1.0)
+    return np.vstack([np.zeros(6), np.cumsum(np.nan_to_num(rolled), axis=0)])
+
+
+@dataclass
+class Playback:
+    """The time of a drive that is shown, and how it moves on."""
+
+    times: Floats = field(default_factory=lambda: np.zeros(1))
+    """(n,) times of the poses of the drive [s]."""
+    places: Floats = field(default_factory=lambda: np.zeros(1))
+    """(n,) their places along the path, whole numbers at waypoints."""
+    place: float = 0.0
+    """Where the rover is along the path; a drive may end before."""
+    speed: float = 10.0
+    """Chosen speed, one of SPEEDS."""
+    is_playing: bool = False
+    """True if the time moves on."""
+    moved: bool = True
+    """True if it has changed since it was shown; whoever shows it sets this to False."""
+
+    @property
+    def time(self) -> float:
+        """Time that is shown [s]."""
+        return float(np.interp(self.place, self.places, self.times))
+
+    @property
+    def duration(self) -> float:
+        """Duration of the drive [s]."""
+        return float(self.times[-1])
+
+    def toggle(self) -> None:
+        """Pause if it plays; else play, from the start if the shown time is the end."""
+        self.is_playing, self.moved = not self.is_playing, True
+        if self.is_playing and self.time >= self.duration:
+            self.seek(0.0)
+
+    def seek(self, time: float) -> None:
+        """Go to a time [s], limited to the drive."""
+        self.place, self.moved = float(np.interp(time, self.times, self.places)), True
+
+    def go_to(self, time: float) -> None:
+        """Pause, and go to a time [s], limited to the drive."""
+        self.is_playing = False
+        self.seek(time)
+
+    def step(self, by: int = 1) -> None:
+        """Pause, and go to the next pose, or to the previous one if `by` is -1."""
+        if by > 0:
+            index = int(np.searchsorted(self.times, self.time + 1e-9, side="right"))
+        else:
+            index = int(np.searchsorted(self.times, self.time - 1e-9, side="left")) - 1
+        self.go_to(float(self.times[np.clip(index, 0, len(self.times) - 1)]))
+
+    def advance(self, seconds: float) -> None:
+        """Move on by the visitor's time [s] if it plays."""
+        if self.is_playing:
+            self.seek(self.time + self.speed * seconds)
+            self.is_playing = self.time < self.duration
+
+    def describe(self) -> str:
+        """Return how it moves, in words."""
+        return (
+            f"playing, {self.speed:g} times as fast as the rover" if self.is_playing else "paused"
+        )
+
+    def set_drive(self, times: Floats, places: Floats) -> None:
+        """Take another drive, and stay at the place, or at the end of a drive that ends before.
+
+        Args:
+            times: (n,) times of its poses [s], ascending, n >= 1.
+            places: (n,) their places along the path, ascending.
+        """
+        self.times, self.places, self.moved = times, places, True
