@@ -63,8 +63,10 @@ def bouldered(seed: int, half: float = 3.0, count: int = 150, highest: float = 0
     for _ in range(count):
         (cx, cy), height = rng.uniform(-half, half, 2), rng.uniform(0.02, highest)
         width = height * rng.uniform(1.0, 2.0)
-        inside = np.clip(1.0 - ((x - cx) ** 2 + (y - cy) ** 2) / width**2, 0.0, None)
-        z = np.maximum(z, relief + height * np.sqrt(inside))
+        near = np.ix_(np.abs(y[:, 0] - cy) < width, np.abs(x[0] - cx) < width)
+        away = (x[near] - cx) ** 2 + (y[near] - cy) ** 2
+        inside = np.clip(1.0 - away / width**2, 0.0, None)
+        z[near] = np.maximum(z[near], relief[near] + height * np.sqrt(inside))
     return Terrain(z, RESOLUTION, (x[0, 0], y[0, 0]))
 
 

@@ -4,7 +4,7 @@
 import ast
 import runpy
 import shutil
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -29,14 +29,17 @@ def console_scripts() -> dict[str, tuple[str, str]]:
     }
 
 
-def imported_names(path: Path) -> Iterator[str]:
-    """Yield the dotted names that a file imports, wherever in the file it does."""
+@cache
+def imported_names(path: Path) -> tuple[str, ...]:
+    """Return the dotted names that a file imports, wherever in the file it does."""
+    names = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            names += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0, f"{path}: relative import"
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+            names += [f"{node.module}.{alias.name}" for alias in node.names]
+    return tuple(names)
 
 
 def copy_checkout(folder: Path) -> Path:

@@ -8,8 +8,8 @@ from itertools import permutations, takewhile
 import numpy as np
 import pytest
 
-from rover_physics import SweepOptions, judge_path, load_rover
-from rover_planner.advice import refusal
+from rover_physics import SweepOptions, judge_path
+from rover_planner.advice import refusal, seek
 from rover_planner.advice.advise import Advice, grow_advice, grow_within, path_of
 from rover_planner.advice.case import Case
 from rover_planner.advice.levers import Choice
@@ -18,8 +18,8 @@ from rover_planner.advice.remedy import Remedy
 from rover_planner.advice.seek import TOLERANCE
 from rover_planner.planning.answering.budget import QuestionStoppedError
 from support.grounds import make_terrain
+from support.rovers import LSR1
 
-LSR1 = load_rover("lsr1")
 S = np.arange(-1.5, 1.6, 0.05)
 STRAIGHT = np.column_stack([S, 0.0 * S, 0.0 * S])
 
@@ -191,11 +191,14 @@ def test_a_piece_fails_only_where_the_path_does():
 
 def test_a_gap_that_coarse_steps_miss_is_found(monkeypatch):
     """The path has to go 0.40 m aside within 4 cm; coarse steps are 16 cm."""
-    monkeypatch.setattr(refusal, "SEARCH", replace(refusal.SEARCH, budget=1e-6))
+    curve = tuple(one for one in seek.LEVERS if one.name == "curve")
+    monkeypatch.setattr(seek, "LEVERS", curve)
 
     def gate(x, y):
         return 1.0 * ((np.abs(x) < 0.2) & (np.abs(y - 0.4) > 0.42))
 
     case = replace(refused_by(gate), terrain=make_terrain(gate, resolution=0.02, half=2.4))
-    found = next(one for one in grow_advice(case) if one.found).found[0]
-    assert len(found.levers) == 1 and found.levers[0].value == pytest.approx(0.4, abs=0.04)
+    _, coarse, fine, _ = grow_advice(case)
+    assert not coarse.found and coarse.tried == fine.tried == ("curve",)
+    (setting,) = fine.found[0].levers
+    assert setting.value == pytest.approx(0.4, abs=0.04)

@@ -6,13 +6,13 @@ import pytest
 
 pytest.importorskip("matplotlib", reason="needs matplotlib")
 
-from rover_physics import judge_path, load_rover
+from rover_physics import judge_path
 from rover_planner.cli import main
 from rover_planner.figures.figure4 import HELD, load_changes, loads_under_torque
 from support.rough_grounds import plane
 from support.rover_geometry import balance_matrix, turned_round
+from support.rovers import LSR1, M2020
 
-LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
 PNG = b"\x89PNG"
 
 

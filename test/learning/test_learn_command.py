@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from rover_physics.names import WHEEL_JOINTS
-from rover_physics.rover.rover_file import load_rover, save_rover
+from rover_physics.rover.rover_file import save_rover
 from rover_physics.terrain.grid import load_terrain, save_terrain
 from rover_planner.cli import main
 from support.command_line import assert_refused
 from support.learning_drives import NAMES, climb, ramp, write_csv
+from support.rovers import LSR1 as ROVER
 
-ROVER = load_rover("lsr1")
 SLOPE = 0.3
 
 

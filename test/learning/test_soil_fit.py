@@ -5,15 +5,13 @@ import numpy as np
 import pytest
 
 from rover_physics.errors import SoilError
-from rover_physics.rover.rover_file import load_rover
 from rover_physics.traction.balance import BalanceWriter
 from rover_planner.learning.drive_log import PITCH, RATES, ROLL, TORQUES, X, Y
 from rover_planner.learning.ground_learner import GroundLearner
 from rover_planner.learning.soil_fit import SoilEstimate, SoilFit
 from support.grounds import make_terrain
 from support.learning_drives import drive_over_soil
-
-ROVER = load_rover("lsr1")
+from support.rovers import LSR1 as ROVER
 
 
 def expect(soil: str) -> SoilEstimate:

@@ -4,10 +4,9 @@
 import numpy as np
 import pytest
 
-from rover_physics.rover.rover_file import load_rover
 from rover_planner.learning.wheel_odometry import WheelMotion, WheelOdometry
+from support.rovers import LSR1 as ROVER
 
-ROVER = load_rover("lsr1")
 SPEED, RATE = 0.06, 10.0
 CREEP, DRIFT, SCATTER = 0.12, 0.18, 0.02
 """Share of the way that is lost per slope, gone aside per side slope, and its scatter."""

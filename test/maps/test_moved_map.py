@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from rover_physics import Terrain, load_rover
+from rover_physics import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.maps.cells import CellGrid
 from rover_planner.maps.layers import lay_onto
@@ -15,9 +15,9 @@ from rover_planner.maps.moved_map import MAX_LEAN, MapMove, move_map
 from rover_planner.parameters.traverse_server import MERGE, TraverseServerParameters
 from rover_planner.planning.navigation.transforms import Rigid
 from support.grounds import make_terrain, waves
+from support.rovers import LSR1
 
 CELL = 0.05
-LSR1 = load_rover("lsr1")
 RNG = np.random.default_rng(5)
 
 

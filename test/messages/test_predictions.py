@@ -18,13 +18,13 @@ from msg_adapters.paths import PoseStock, settled_path
 from msg_adapters.results.diagnostics import to_json, verdict_to_diagnostics
 from msg_adapters.results.markers import IMPASSABLE, PASSABLE, WITH_SPEED_SERVOS, path_markers
 from msg_adapters.results.predictions import JOINTS, array_values, joint_trajectory, waypoint_array
-from rover_physics import PoseStatus, Terrain, judge_path, load_rover
+from rover_physics import PoseStatus, Terrain, judge_path
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.rover.steering_joints import steered_wheels, steering_joints
 from rover_physics.traversability import classification
+from support.rovers import LSR1
 
-LSR1 = load_rover("lsr1")
 STAMP = Time(sec=12, nanosec=34)
 
 

@@ -8,16 +8,15 @@ from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cloud
 from msg_adapters.errors import MessageError
-from rover_physics import load_rover
 from rover_physics.errors import ModelError
 from rover_physics.traction.map_contacts import MapContactFinder
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.ros.frames import Frames
 from rover_planner.ros.map_intake import MapIntake, read_message
 from support.rough_grounds import plane
+from support.rovers import LSR1
 from support.waiting import wait_until
 
-LSR1 = load_rover("lsr1")
 FRAMES = Frames(TraverseServerParameters(), lambda: 0)
 
 

@@ -21,14 +21,14 @@ from trajectory_msgs.msg import JointTrajectory
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.stamps import ns_to_stamp
-from rover_physics import Terrain, judge_path, load_rover, load_terrain
+from rover_physics import Terrain, judge_path, load_terrain
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.cli import main
 from rover_planner.nodes.result_topics import RESULT_KINDS
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.bags.bag_reader import GRID_MAP, GRID_MAP_FIELDS, GRID_MAP_INFO_FIELDS
+from support.rovers import LSR1
 
-LSR1 = load_rover("lsr1")
 BEGIN = 1_700_000_000_000_000_000
 """Time of the first message [ns]."""
 STORAGES = {"sqlite": StoragePlugin.SQLITE3, "mcap": StoragePlugin.MCAP}

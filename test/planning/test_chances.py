@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics import load_rover
 from rover_physics.limits.table import CHANCE
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.service_settings import load_service_settings
@@ -14,10 +13,10 @@ from rover_planner.planning.path_query import PathQueryOptions, answer_path_quer
 from rover_planner.planning.search.path_search import FOUND, find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from support.rough_grounds import plane
+from support.rovers import LSR1
 
-LSR1 = load_rover("lsr1")
 START, GOAL = (-1.2, 0.0, 0.0), (1.2, 0.0, 0.0)
-LONG = LatticeSettings(budget=60.0)
+LONG = LatticeSettings(budget=60.0, cell=0.3)
 
 
 @pytest.fixture(scope="module")

@@ -6,12 +6,11 @@ import math
 import numpy as np
 import pytest
 
-from rover_physics import Terrain, load_rover, load_terrain
+from rover_physics import Terrain, load_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.planning.goals import choose_mission, footprint_radius
 from rover_planner.worlds.mars_terrain import make_mars_terrain
-
-LSR1 = load_rover("lsr1")
+from support.rovers import LSR1
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,6 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rover_physics import load_rover
 from rover_planner.planning.path_query import (
     PathQueryOptions,
     answer_path_query,
@@ -14,8 +13,8 @@ from rover_planner.planning.path_query import (
     choose,
 )
 from support.grounds import make_terrain
+from support.rovers import LSR1
 
-LSR1 = load_rover("lsr1")
 COARSE = PathQueryOptions(count=5, spacing=0.4, waypoint_spacing=0.1)
 FLAT = make_terrain(lambda x, y: 0.0 * x)
 

@@ -22,8 +22,8 @@ from rover_planner.studies.rover_values import (
 )
 from rover_planner.studies.runner import describe_ties, find_rover, run_study
 from rover_planner.studies.study_file import study_from_dict
+from support.rovers import LSR1
 
-LSR1 = load_rover("lsr1")
 PIVOT_X = {"name": "suspension.bogie_pivot.x", "from": 0.10, "to": 0.30, "count": 9}
 
 

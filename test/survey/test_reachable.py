@@ -88,7 +88,7 @@ def compare_with_scipy(open_at, turns_at, numbers, distance):
     assert numbers.longest == distance[np.isfinite(distance)].max() == distance[numbers.farthest]
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=30)
 @given(
     shape=st.tuples(st.integers(1, 13), st.integers(1, 13)),
     headings=st.sampled_from([1, 2, 3, 4, 8, 16, 24]),

@@ -17,6 +17,7 @@ from rover_planner.errors import PlanningError
 from rover_planner.survey.chunk_survey import compute_chunk
 from rover_planner.survey.store import NOTES, SurveyStore
 from rover_planner.survey.survey import prepare_survey
+from support.rovers import LSR1
 from support.survey_maps import (
     assert_same_bits,
     compute_here,
@@ -26,18 +27,17 @@ from support.survey_maps import (
     survey_here,
 )
 
-LSR1 = load_rover("lsr1")
 HEAVIER = replace(LSR1, wheel=replace(LSR1.wheel, mass=0.36))
 
 
 @pytest.fixture(scope="module")
 def surveyed(tmp_path_factory):
     """Return a folder with a map, whose first chunk of 16 cells is unknown, and its survey."""
-    ground = make_rough_map(140, 140)
+    ground, request = make_rough_map(140, 140), make_request(step=4, headings=2)
     elevation = ground.elevation.copy()
     elevation[:100, :100] = np.nan
     folder = tmp_path_factory.mktemp("surveyed")
-    survey_here(folder, replace(ground, elevation=elevation), make_request(step=4), chunk=16)
+    survey_here(folder, replace(ground, elevation=elevation), request, chunk=16)
     return folder
 
 
@@ -61,7 +61,7 @@ def prepare(files, request=None, **changes):
 
 def test_finished_chunks_are_not_done_again_and_half_written_ones_are(surveyed, tmp_path):
     shutil.copy(surveyed / "map.npz", tmp_path)
-    request = make_request(step=4)
+    request = make_request(step=4, headings=2)
     prepared = prepare(tmp_path, request, chunk=16)
     assert len(prepared.chunks) == 9 and prepared.finished == 0
     compute_here(replace(prepared, chunks=prepared.chunks[:4]))
@@ -167,7 +167,7 @@ def test_a_missing_layer_is_named(files):
 
 
 def test_a_chunk_that_lost_a_file_is_done_again(finished):
-    request = make_request(step=4)
+    request = make_request(step=4, headings=2)
     prepared = prepare(finished, request)
     before = layers_of(prepared)
     assert prepared.chunks == []
@@ -192,7 +192,7 @@ def test_a_damaged_file_is_one_line(finished, capfd, content):
     for name, words in (
         (
             "best_class",
-            ["survey", "lsr1", str(finished / "map.npz"), str(path), "--headings=4", "--step=4"],
+            ["survey", "lsr1", str(finished / "map.npz"), str(path), "--headings=2", "--step=4"],
         ),
         ("passable_headings", ["reachable", str(path), "--from", "1213.3,-326.7"]),
     ):
@@ -205,7 +205,7 @@ def test_a_damaged_file_is_one_line(finished, capfd, content):
 
 
 def test_files_are_on_the_disk_before_a_chunk_counts_as_finished(files, monkeypatch):
-    prepared = prepare(files, chunk=64)
+    prepared = prepare(files, make_request(step=4), chunk=64)
     chunk, path = prepared.chunks[0], prepared.store.path
     layers = compute_chunk(prepared.job.request, prepared.store, chunk)
     forced, fsync = [], os.fsync
@@ -231,4 +231,4 @@ def count_finished(path: Path) -> int:
 def test_a_file_that_was_not_renamed_is_not_seen(finished):
     folder = finished / "out" / "seconds" / "c" / "0"
     (folder / "1").rename(folder / ".1.0123.partial")
-    assert prepare(finished, make_request(step=4)).chunks == [(0, 1)]
+    assert prepare(finished, make_request(step=4, headings=2)).chunks == [(0, 1)]

@@ -17,9 +17,9 @@ from rover_planner.errors import PlanningError
 from rover_planner.survey.layers import CLASS_COLOURS, CLASS_NUMBERS
 from rover_planner.viewer.state.colours import UNKNOWN, from_css
 from rover_planner.viewer.state.survey_layers import CLASS, load_map, open_survey
+from support.rovers import LSR1
 from support.survey_maps import make_request, survey_here
 
-LSR1 = load_rover("lsr1")
 PASSABLE, WALL, HOLE = (1.5, 1.5), (4.55, 3.0), (1.5, 4.5)
 """Places on the map [m]."""
 

@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("zarr", reason="install the extra survey")
 
-from rover_physics import SweepOptions, Terrain, judge_poses, load_rover
+from rover_physics import SweepOptions, Terrain, judge_poses
 from rover_physics.traversability.classification import classify_judged
 from rover_planner.survey.layers import (
     CLASS_NUMBERS,
@@ -20,6 +20,7 @@ from rover_planner.survey.layers import (
 )
 from rover_planner.survey.layout import choose_chunk, find_halo
 from rover_planner.survey.tile_survey import outline_of, survey_tile
+from support.rovers import LSR1
 from support.survey_maps import (
     assert_same_bits,
     layers_of,
@@ -28,7 +29,6 @@ from support.survey_maps import (
     survey_here,
 )
 
-LSR1 = load_rover("lsr1")
 TOP_HEAVY = replace(
     LSR1, masses=replace(LSR1.masses, body=replace(LSR1.masses.body, com=(0.0, 0.0, 0.6)))
 )

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rover_physics import load_rover
 from rover_planner.nodes.mission import drive
 from rover_planner.nodes.mission.drive import Drive, DriveFailedError, DriveSettings
 from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlace, MarkedPlaces
@@ -15,8 +14,8 @@ from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from support.grounds import make_terrain
 from support.rough_grounds import plane
+from support.rovers import LSR1
 
-LSR1 = load_rover("lsr1")
 MAP = plane(0.0, 0.0, half=4.0)
 STEP = 0.1
 COARSE = PathQueryOptions(count=1, waypoint_spacing=0.05)

@@ -17,6 +17,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from msg_adapters.paths import poses_path
+from rover_planner.advice import seek
+from rover_planner.advice.levers import LEVERS
 from rover_planner.nodes.mission.drive import DriveFailedError
 from rover_planner.nodes.mission.options import MissionOptions
 from rover_planner.nodes.mission_planner import MissionPlanner, NoAnswerError, main, spin_until
@@ -128,12 +130,16 @@ def slope(x, y):
 
 
 @pytest.mark.parametrize(
-    ("ground", "parameters", "words", "policy"),
-    [(rock, {}, " m ", "equal"), (slope, {"friction": 0.45}, "by speed servos", "servo")],
+    ("ground", "parameters", "lever", "words", "policy"),
+    [
+        (rock, {}, "shift", " m ", "equal"),
+        (slope, {"friction": 0.45}, "policy", "by speed servos", "servo"),
+    ],
 )
 def test_advice_that_needs_nobody_else_is_taken(
-    start_server, run_planner, ground, parameters, words, policy
+    start_server, run_planner, monkeypatch, ground, parameters, lever, words, policy
 ):
+    monkeypatch.setattr(seek, "LEVERS", [one for one in LEVERS if one.name == lever])
     patient = {"planner": "fan", "candidate_count": 1, "advice_time": 60.0, "time_budget": 60.0}
     server = start_server(**patient, **parameters)
     server.service.take_terrain(make_terrain(ground, half=3.0))
@@ -145,8 +151,9 @@ def test_advice_that_needs_nobody_else_is_taken(
     assert server.get_parameter("policy").value == policy
 
 
-def test_where_advice_needs_others_the_refusal_stays(start_server, run_planner):
-    server = start_server(planner="fan", candidate_count=1, advice_time=1.0)
+def test_where_advice_needs_others_the_refusal_stays(start_server, run_planner, monkeypatch):
+    monkeypatch.setattr(seek, "LEVERS", [one for one in LEVERS if one.needs_others])
+    server = start_server(planner="fan", candidate_count=1, advice_time=60.0)
     server.service.take_terrain(make_terrain(wall_at(0.5)))
     code, out, _ = run_planner(BEYOND, "--advise")
     assert code == 3 and "advice: none that a mission planner can take; " in out

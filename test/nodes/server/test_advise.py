@@ -10,6 +10,8 @@ from std_srvs.srv import Trigger
 
 from msg_adapters.paths import stamped_pose
 from rover_physics import judge_path
+from rover_planner.advice import seek
+from rover_planner.advice.levers import LEVERS
 from rover_planner.ros.qos import latched_qos
 from support.grounds import make_terrain, rock_left
 from support.planner_client import SERVER
@@ -25,7 +27,9 @@ def send_request(client, kind, name, request) -> Future:
     return service.call_async(request)
 
 
-def test_advice_is_about_the_path_that_was_refused_last(start_server, client, ros):
+def test_advice_is_about_the_path_that_was_refused_last(start_server, client, ros, monkeypatch):
+    few = [one for one in LEVERS if one.name in ("policy", "shift", "curve")]
+    monkeypatch.setattr(seek, "LEVERS", few)
     server = start_server(planner="fan", candidate_count=1, advice_time=60.0)
     advise = client.create_client(Trigger, f"{SERVER}/advise")
     grown: list[dict] = []

@@ -56,7 +56,7 @@ def is_free(grids, *part):
 @pytest.fixture
 def mapping(start_server, client):
     server = start_server(hazard_map=True, hazard_headings=2)
-    client.send_terrain(make_terrain(waves, half=3.0))
+    client.send_terrain(make_terrain(waves, half=3.0, resolution=0.1))
     return server
 
 
@@ -68,8 +68,8 @@ def test_a_late_subscriber_gets_the_map_and_a_change_changes_the_grid_around_it(
         wait_until(lambda grids=grids: is_free(grids), "the whole map", 60.0)
     worst, best = costmap.grids["worst"], costmap.grids["best"]
     grid, terrain = worst[-1], mapping.service.terrain
-    assert grid.header.frame_id == "map" and grid.info.resolution == pytest.approx(0.05)
-    assert grid.info.origin.position.x == pytest.approx(terrain.origin[0] - 0.025)
+    assert grid.header.frame_id == "map" and grid.info.resolution == pytest.approx(0.1)
+    assert grid.info.origin.position.x == pytest.approx(terrain.origin[0] - 0.05)
     assert (grid.info.height, grid.info.width) == terrain.elevation.shape
     assert (cells(grid, y=(-3.0, -2.9)) == UNKNOWN).all()  # wheels would leave the known ground
     wait_until(
@@ -80,7 +80,7 @@ def test_a_late_subscriber_gets_the_map_and_a_change_changes_the_grid_around_it(
     # A grid may be published before all its cells are judged.
     wait_until(lambda: is_free(worst, *away) and is_free(best, *away), "the map", 60.0)
     before = cells(worst[-1], *away)
-    client.send_terrain(make_terrain(rock_at(2.0), half=3.0))
+    client.send_terrain(make_terrain(rock_at(2.0), half=3.0, resolution=0.1))
     wait_until(lambda: (cells(worst[-1], *there) == IMPASSABLE).any(), "the rock", 60.0)
     np.testing.assert_array_equal(cells(worst[-1], *away), before)
     wait_until(lambda: (cells(best[-1], *there) == IMPASSABLE).any(), "the rock", 60.0)
@@ -97,7 +97,7 @@ def test_switched_off_no_cell_is_free_and_switched_on_it_is_that_of_the_newest_m
     assert client.set_parameter("hazard_map", False)[0]
     for grids in (worst, first):
         wait_until(lambda grids=grids: set(grids[-1].data) == {UNKNOWN}, "the withdrawal")
-    client.send_terrain(make_terrain(rock_at(2.0), half=3.0))
+    client.send_terrain(make_terrain(rock_at(2.0), half=3.0, resolution=0.1))
     wait_until(lambda: mapping.service.terrain.elevation.max() > 0.4, "the rock in the map")
     assert client.set_parameter("hazard_map", True)[0]
     asked = []
@@ -125,11 +125,11 @@ def test_what_was_judged_before_a_withdrawal_is_not_shown_after_it(
         show(*given)
 
     monkeypatch.setattr(HazardTopics, "_show", show_late)
-    client.send_terrain(make_terrain(lambda x, y: waves(x, y) + 0.001, half=3.0))
+    client.send_terrain(make_terrain(lambda x, y: waves(x, y) + 0.001, half=3.0, resolution=0.1))
     assert judged.wait(60.0), "the classes on the second map"
     assert client.set_parameter("hazard_map", False)[0]
     wait_until(lambda: set(worst[-1].data) == {UNKNOWN}, "the withdrawal")
-    client.send_terrain(make_terrain(rock_at(0.0), half=3.0))
+    client.send_terrain(make_terrain(rock_at(0.0), half=3.0, resolution=0.1))
     assert client.set_parameter("hazard_map", True)[0]
     before = len(worst)
     go_on.set()

@@ -12,13 +12,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import bdtrik
 
-from rover_physics import Rover, SweepOptions, judge_path, load_rover
+from rover_physics import Rover, SweepOptions, judge_path
 from rover_physics.bounds.path import bound_path, forget_terrains, prepare_bounds
 from rover_physics.errors import ModelError
 from rover_physics.results.path_bounds import BOUNDED_VALUES
 from rover_physics.status import BoundStatus
 from rover_physics.traversability.verdict import hold_against_limits, refuse_worst_case
 from support.rough_grounds import fractal, plane, rocky
+from support.rovers import LSR1, M2020
 from support.uncertain_grounds import (
     arc_across,
     draw_path,
@@ -29,7 +30,6 @@ from support.uncertain_grounds import (
 )
 
 SLOPE = plane(0.2, 0.1, half=3.0)
-LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
 PATH = path_across(4)
 
 

@@ -9,12 +9,12 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from rover_physics import PathPrediction, PoseStatus, Terrain, judge_path, judge_poses, load_rover
+from rover_physics import PathPrediction, PoseStatus, Terrain, judge_path, judge_poses
 from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import bouldered, fractal, random_poses
 from support.rover_geometry import wheel_axes, wheel_gap, wheel_gaps
+from support.rovers import LSR1
 
-LSR1 = load_rover("lsr1")
 few_and_all = pytest.mark.parametrize("seeds", [1, pytest.param(10, marks=pytest.mark.long)])
 EVERY = 50
 """Of so many poses one wheel of one pose is looked at by brute force."""

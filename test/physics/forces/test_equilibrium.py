@@ -24,8 +24,8 @@ from support.rover_geometry import (
     place_rover,
     turned_round,
 )
+from support.rovers import LSR1, M2020
 
-LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
 ROVERS = (LSR1, M2020, turned_round(LSR1), turned_round(M2020))
 seeds = st.integers(0, 10_000)
 headings = st.floats(-np.pi, np.pi)

@@ -11,11 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rover_physics import PathPrediction, Rover, judge_path, load_rover
+from rover_physics import PathPrediction, Rover, judge_path
 from support.rough_grounds import fractal, random_poses, rocky, smooth
 from support.rover_geometry import attitude_of
-
-LSR1 = load_rover("lsr1")
+from support.rovers import LSR1
 
 
 class Links(NamedTuple):

@@ -12,7 +12,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from rover_physics import SweepOptions, judge_path, judge_poses, load_rover
+from rover_physics import SweepOptions, judge_path, judge_poses
 from rover_physics.forces.servo import CREEP, write_residual
 from rover_physics.forces.servo_motion import SERVO as SERVO_RECORD
 from rover_physics.forces.servo_soil import roll_on_soil
@@ -33,8 +33,8 @@ from rover_physics.status import Stall
 from rover_physics.traversability.torque_ranges import evaluate_in_turn
 from support.rough_grounds import fractal, plane, random_poses, rocky, smooth
 from support.rover_geometry import balance_residuals
+from support.rovers import LSR1, M2020
 
-LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
 FIXED = replace(LSR1, steering=None)
 SERVO = SweepOptions(policy="servo")
 SOFT = ("lunar_nominal", "mars_simulant", "dry_sand", "lete_sand")
@@ -235,7 +235,7 @@ grips = st.floats(1e-3, 0.5)
 loads = st.floats(0.01, 0.4)
 droops = st.floats(0.0, 0.9)
 limits = st.floats(0.02, 0.5)
-many = settings(max_examples=50)
+many = settings(max_examples=20)
 
 
 def servo_of(limit, droop, share=1.0):

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rover_physics import SweepOptions, Terrain, judge_poses, load_rover
+from rover_physics import SweepOptions, Terrain, judge_poses
 from support.rough_grounds import (
     mirrored,
     plane,
@@ -19,8 +19,8 @@ from support.rough_grounds import (
     smooth,
 )
 from support.rover_geometry import turned_round
+from support.rovers import LSR1, M2020
 
-LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
 FIXED = replace(LSR1, steering=None)
 GAP = 3e-5
 """What a settled pose may leave open [m]."""

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rover_physics import SweepOptions, find_torque_ranges, judge_path, load_rover
+from rover_physics import SweepOptions, find_torque_ranges, judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from support.best_torques import INSIDE, can_stand, solve_forces
 from support.reference_cases import reference_ground
 from support.rough_grounds import fractal, plane, random_poses, rocky, smooth
 from support.rover_geometry import balance_matrix
+from support.rovers import LSR1
 
-LSR1 = load_rover("lsr1")
 STEP = reference_ground("settled_a/step")
 few = settings(max_examples=10)
 

@@ -14,15 +14,14 @@ from rover_physics import (
     Terrain,
     Verdict,
     judge_path,
-    load_rover,
 )
 from rover_physics.prediction.drops import FACE
 from rover_physics.traversability.verdict import hold_against_limits
 from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import plane, smooth
 from support.rover_geometry import balance_residuals
+from support.rovers import LSR1
 
-LSR1 = load_rover("lsr1")
 FREE = unlimited(LSR1)
 RADIUS = LSR1.wheel.radius
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rover_physics import PoseStatus, SweepOptions, Terrain, judge_path, judge_poses, load_rover
+from rover_physics import PoseStatus, SweepOptions, Terrain, judge_path, judge_poses
 from rover_physics.errors import PoseError
 from rover_physics.names import TORQUE_POLICIES
 from rover_physics.prediction.packed_model import pack_model
@@ -16,8 +16,8 @@ from rover_physics.prediction.path_motion import motions_of
 from rover_physics.rover.model import Steering
 from rover_physics.traversability.judge import PartwiseJudge
 from support.rough_grounds import plane, random_poses
+from support.rovers import LSR1, M2020
 
-LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
 ALL_STEER = replace(LSR1, steering=Steering(("rear", "middle", "front"), 1.57, 0.35))
 FIXED = replace(LSR1, steering=None)
 LEVEL = Terrain(np.zeros((401, 401)), 0.02, (-4.0, -4.0))

@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics import SweepOptions, Terrain, judge_path, load_rover
+from rover_physics import SweepOptions, Terrain, judge_path
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.sweep import predict_in_parts
 from rover_physics.traversability.verdict import hold_against_limits
 from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import plane
+from support.rovers import LSR1
 
-LSR1 = load_rover("lsr1")
 ROVER = unlimited(LSR1)
 SERVO = SweepOptions(policy="servo")
 

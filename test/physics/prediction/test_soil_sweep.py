@@ -6,15 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics import SweepOptions, Terrain, judge_path, load_rover
+from rover_physics import SweepOptions, Terrain, judge_path
 from rover_physics.errors import SoilError
 from rover_physics.rover.model import Part
 from rover_physics.terrain.soil_file import load_soils
 from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import plane, random_poses, smooth
 from support.rover_geometry import turned_round
+from support.rovers import LSR1
 
-LSR1 = load_rover("lsr1")
 POSE = [[0.0, 0.0, 0.0]]
 AHEAD = np.column_stack([np.linspace(-0.5, 0.5, 51), np.zeros(51), np.zeros(51)])
 ON_SOIL = (

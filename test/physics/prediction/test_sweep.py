@@ -16,7 +16,6 @@ from rover_physics import (
     Terrain,
     judge_path,
     judge_paths,
-    load_rover,
     score_poses,
     sweep_map,
 )
@@ -28,9 +27,9 @@ from rover_physics.traversability.verdict import hold_against_limits
 from support.grounds import gap, make_terrain, waves
 from support.grounds import rocky as low_rock
 from support.rough_grounds import plane, random_poses, rocky
+from support.rovers import LSR1
 from support.uncertain_grounds import with_std
 
-LSR1 = load_rover("lsr1")
 LEVEL = plane(0.0, 0.0)
 POSE = [[0.0, 0.0, 0.0]]
 NAN, INF = float("nan"), float("inf")

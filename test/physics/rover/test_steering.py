@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rover_physics import Rover, load_rover
+from rover_physics import Rover
 from rover_physics.errors import ModelError
 from rover_physics.rover.linkage import pack_linkage
 from rover_physics.rover.model import Steering
@@ -21,8 +21,8 @@ from rover_physics.rover.steering_joints import (
     steering_joints,
     tightest_radius,
 )
+from support.rovers import LSR1, M2020
 
-LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
 ALL_STEER = replace(LSR1, steering=Steering(("rear", "middle", "front"), np.pi / 2, 0.35))
 FIXED = replace(LSR1, steering=None)
 speeds = st.floats(-0.1, 0.1)

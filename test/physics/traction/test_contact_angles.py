@@ -12,9 +12,8 @@ from rover_physics.traction.map_contacts import MapContactFinder
 from support.reference_drives import drive_ground
 from support.rough_grounds import fractal, plane, rocky
 from support.rover_geometry import turned_round
+from support.rovers import LSR1
 from support.traction_states import drive_states, state_of
-
-LSR1 = load_rover("lsr1")
 
 
 def follow(rover, motions, duration):

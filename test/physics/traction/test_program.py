@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics import judge_path, judge_poses, load_rover
+from rover_physics import judge_path, judge_poses
 from rover_physics.errors import ModelError
 from rover_physics.traction.balance import BalanceWriter, MeasuredState
 from rover_physics.traction.contact_ekf import Motion, MotionContactEstimator
@@ -17,9 +17,9 @@ from rover_physics.traction.solver import TractionWorkspace, solve_traction
 from support.best_torques import can_stand
 from support.rough_grounds import fractal, plane, random_poses
 from support.rover_geometry import balance_matrix, free_balance_matrix, place_rover
+from support.rovers import LSR1, M2020
 from support.traction_states import rough_states, state_of
 
-LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
 FRICTION = np.full(6, 0.8)
 INPUTS = ProgramInputs(FRICTION, LSR1.wheel.max_torque, LSR1.wheel.radius)
 

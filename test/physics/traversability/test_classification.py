@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics import SweepOptions, classify_path, judge_path, load_rover
+from rover_physics import SweepOptions, classify_path, judge_path
 from rover_physics.errors import ModelError
 from rover_physics.names import WHEELS
 from rover_physics.traversability.classification import (
@@ -21,8 +21,8 @@ from rover_physics.traversability.classification import (
 from rover_physics.traversability.verdict import hold_against_limits
 from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import bowl, plane, random_poses, rocky
+from support.rovers import LSR1
 
-LSR1 = load_rover("lsr1")
 POSE = [[0.0, 0.0, 0.0]]
 ONTO_A_BUMP = drive_path()[54:59]
 """Waypoints at which the right front wheel climbs a bump; the third one follows the climb."""

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics import SweepOptions, Terrain, judge_path, load_rover
+from rover_physics import SweepOptions, Terrain, judge_path
 from support.rough_grounds import bowl
+from support.rovers import LSR1
 
 RESOLUTION = 0.02
-LSR1 = load_rover("lsr1")
 DEEP_DROPS = replace(LSR1, limits=replace(LSR1.limits, wheel_drop=1.0))
 X = np.tile(-3.0 + RESOLUTION * np.arange(301), (301, 1))
 

@@ -17,7 +17,6 @@ from rover_physics import (
     classify_path,
     find_torque_ranges,
     judge_path,
-    load_rover,
     score_poses,
 )
 from rover_physics.errors import ModelError
@@ -30,8 +29,8 @@ from rover_physics.results.record import QUANTITIES
 from rover_physics.traversability.verdict import hold_against_limits, refuse_worst_case
 from rover_planner.planning.path_query import path_cost
 from support.rough_grounds import plane
+from support.rovers import LSR1
 
-LSR1 = load_rover("lsr1")
 POSES = np.column_stack([np.linspace(-0.2, 0.2, 5), np.zeros(5), np.zeros(5)])
 LEVEL = plane(0.0, 0.0)
 DECISIVE = (

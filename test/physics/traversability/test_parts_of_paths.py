@@ -27,8 +27,8 @@ from rover_physics.traversability.judge import PartwiseJudge
 from rover_physics.traversability.pieces import SAFE, find_exposure
 from rover_physics.traversability.verdict import hold_against_limits
 from support.rough_grounds import bouldered, bowl, fractal, rocky
+from support.rovers import LSR1 as ROVER
 
-ROVER = load_rover("lsr1")
 GROUND = bouldered(3, half=6.0, count=600)
 OPTIONS = {
     "equal": SweepOptions(),

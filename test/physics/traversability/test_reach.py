@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rover_physics import Rover, SweepOptions, judge_path, judge_reach, load_rover
+from rover_physics import Rover, SweepOptions, judge_path, judge_reach
 from rover_physics.errors import ModelError
 from rover_physics.rover.manipulator import arm_angles, inverse_kinematics, link_points
 from support.rough_grounds import plane, smooth
 from support.rover_geometry import attitude_of
+from support.rovers import LSR1, M2020
 
-LSR1, M2020 = load_rover("lsr1"), load_rover("m2020")
 ARM = LSR1.manipulator
 UNEQUAL = replace(ARM, link_lengths=(0.2, 0.5, 0.2))
 LIMITED = replace(ARM, joint_limits=((-3.2, 3.2), (-1.0, 1.0), (0.0, 2.5)))

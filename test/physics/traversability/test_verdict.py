@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics import PoseStatus, judge_path, load_rover
+from rover_physics import PoseStatus, judge_path
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.results.record import numbers_of
 from rover_physics.traversability.verdict import codes_of_verdicts, hold_against_limits
 from support.rough_grounds import plane
+from support.rovers import LSR1
 
-LSR1 = load_rover("lsr1")
 POSES = np.column_stack([np.linspace(-0.2, 0.2, 5), np.zeros(5), np.zeros(5)])
 
 

@@ -18,6 +18,9 @@ from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.path_geometry import densify
 from support.grounds import make_terrain, rocky, wall_at, waves
 
+FAN = {"planner": "fan", "candidate_count": 1}
+"""Parameters of a service that does not search."""
+
 
 def load(**parameters):
     return load_service_settings(TraverseServerParameters(**parameters))
@@ -34,17 +37,17 @@ def test_an_uncertain_map_is_judged_by_its_bounds_as_the_settings_say():
     certain = make_terrain(waves)
     uncertain = replace(certain, elevation_std=np.full(certain.elevation.shape, 0.005))
     start, goal = (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
-    service = make_service(uncertain)
+    service = make_service(uncertain, **FAN)
     refused = service.answer(start, goal).report.to_dict()
     assert not refused["traversable"]
     assert refused["reason"].endswith("at worst within 3 sigma of the map")
     assert refused["map_sigmas"] == 3.0
     assert refused["friction_utilisation_bound"] > refused["max_friction_utilisation"]
-    service.settings = load(map_sigmas=0.0)
+    service.settings = load(map_sigmas=0.0, **FAN)
     passed = service.answer(start, goal).report.to_dict()
     assert passed["traversable"] and passed["map_sigmas"] == 0.0
     assert passed["friction_utilisation_bound"] is None
-    assert passed == make_service(certain).answer(start, goal).report.to_dict()
+    assert passed == make_service(certain, **FAN).answer(start, goal).report.to_dict()
 
 
 def test_a_goal_far_off_the_map_costs_no_more_than_the_way_to_its_edge():

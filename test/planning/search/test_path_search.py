@@ -8,9 +8,10 @@ import numba
 import numpy as np
 import pytest
 
-from rover_physics import Terrain, judge_path, load_rover, load_terrain
+from rover_physics import Terrain, judge_path, load_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
+from rover_planner.planning.search import query
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.ground_estimate import FULL_DOUBT, estimate_ground
 from rover_planner.planning.search.judge import PathJudge
@@ -31,8 +32,8 @@ from rover_planner.planning.search.query import (
 )
 from support.grounds import long_wall, make_terrain, pen, waves
 from support.rough_grounds import rocky
+from support.rovers import LSR1
 
-LSR1 = load_rover("lsr1")
 OPTIONS = PathQueryOptions(waypoint_spacing=0.04)
 LONG = LatticeSettings(budget=60.0)
 START, GOAL = (-2.5, 0.0, 0.0), (2.5, 0.0, 0.0)
@@ -74,19 +75,19 @@ def test_a_search_that_ends_by_itself_is_near_the_best_and_judges_few_edges(arou
 
 
 def test_the_same_query_has_the_same_path_to_the_bit_with_any_number_of_threads(around):
-    query, answer, memory = around
+    question, answer, memory = around
     threads, memory = numba.get_num_threads(), deepcopy(memory)
     try:
         numba.set_num_threads(1)
-        again = find_path(query, LONG)
+        again = find_path(question, LONG)
     finally:
         numba.set_num_threads(threads)
     np.testing.assert_array_equal(again.path.poses, answer.path.poses)
     assert (again.edges_judged, again.cost) == (answer.edges_judged, answer.cost)
-    known = find_path(query, LONG, memory)  # hardly anything is judged again
+    known = find_path(question, LONG, memory)  # hardly anything is judged again
     assert known.edges_judged < 0.5 * answer.edges_judged
     assert known.bound <= 1.0201 and known.cost == pytest.approx(answer.cost, rel=0.03)
-    assert find_path(ask(query.terrain, friction=0.5), LONG, memory).edges_judged > 0
+    assert find_path(ask(question.terrain, friction=0.5), LONG, memory).edges_judged > 0
 
 
 def test_of_a_closed_pen_the_answer_tells_its_area_and_what_closes_it():
@@ -196,21 +197,22 @@ def test_nodes_where_tilt_moves_a_wheel_off_unknown_ground_are_only_doubted():
     assert (stands & (estimate.doubt == FULL_DOUBT)).any()
 
 
-def test_only_the_heights_around_the_window_are_looked_at():
-    wide = Terrain(np.zeros((2000, 2000), np.float32), 0.1, (-100.0, -100.0))
-    question = ask(wide, (50.0, 60.0, 0.0), (60.0, 60.0, 0.0))
+def test_only_the_heights_around_the_window_are_looked_at(monkeypatch):
+    monkeypatch.setattr(query, "MAX_NODES", 150_000)
+    wide = Terrain(np.zeros((600, 600), np.float32), 0.1, (-30.0, -30.0))
+    question = ask(wide, (10.0, 12.0, 0.0), (14.0, 12.0, 0.0))
     nodes, is_limited = choose_window(question, 0.2)
-    assert is_limited and nodes.count <= 1_500_000
+    assert is_limited and nodes.count <= 150_000
     row, column = np.array(nodes.shape) / 2
     centre = nodes.cell * (nodes.first[0] + column), nodes.cell * (nodes.first[1] + row)
-    np.testing.assert_allclose(centre, (55.0, 60.0), atol=0.5)
+    np.testing.assert_allclose(centre, (12.0, 12.0), atol=0.5)
     part = cut_out(question, nodes)
     assert part.elevation.size < 0.15 * wide.elevation.size
     estimate = estimate_ground(LSR1, part, nodes)
     assert not estimate.groundless.any() and not estimate.doubt.any()
     assert find_path(question, LONG).outcome == FOUND
     wall = np.array(wide.elevation)
-    wall[:, 1550] = 3.0
+    wall[:, 430] = 3.0
     enclosed = replace(wide, elevation=wall)
     refused = find_path(replace(question, terrain=enclosed), LatticeSettings(budget=0.3))
     assert refused.outcome in (OUT_OF_TIME, NO_WAY)

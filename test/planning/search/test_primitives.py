@@ -11,9 +11,9 @@ from rover_physics.rover.steering_joints import tightest_radius
 from rover_planner.planning.angles import wrap
 from rover_planner.planning.search.nodes import HEADINGS, YAWS
 from rover_planner.planning.search.primitives import Gear, make_primitives
+from support.rovers import LSR1
 
 SPACING = 0.02
-LSR1 = load_rover("lsr1")
 FIXED = replace(LSR1, steering=None)
 
 

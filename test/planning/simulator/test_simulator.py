@@ -18,8 +18,8 @@ from rover_planner.simulator.second_try import SecondTry
 from rover_planner.simulator.simulation import Simulation, SimulationSettings
 from support.grounds import make_terrain, waves
 from support.rough_grounds import plane
+from support.rovers import LSR1
 
-LSR1 = load_rover("lsr1")
 STEP = 0.02
 AHEAD = (0.06, 0.0)
 """Command that keeps the wheels straight: speed [m/s] and yaw rate [rad/s]."""
