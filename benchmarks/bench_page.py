@@ -25,7 +25,8 @@ from rover_planner.viewer.state.judging import JudgeRequest, judge_request
 from rover_planner.viewer.state.scenario import Shown
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.worlds.mars_terrain import make_mars_terrain
-from support.viewer.browser import Visitor, open_browser, wait_until
+from support.viewer.browser import Visitor, open_browser
+from support.viewer.sessions import wait_patiently as wait_until
 
 TRIES = 15
 """Values that are typed, of which the median counts."""

@@ -72,8 +72,11 @@ NOISE = {
 }
 """Standard deviations: position [m], its drift over the way, attitude and yaw [rad], suspension
 [rad], torque [N m], wheel rates [rad/s]."""
-STAYED, STUCK_FOR = 0.02, 4.0
-"""A rover that goes no farther than this [m] in more than that time [s], to the end, is stuck."""
+STAYED, HALTED, STUCK_FOR = 0.02, 0.1, 4.0
+"""A rover that goes no farther than this [m], slower than this share of the commanded speed at
+first, in more than this time [s] to the end, is stuck; one that slides along a step is not."""
+MOTION_TIME = 0.5
+"""Time over which its speed is taken [s]."""
 
 
 @dataclass(frozen=True)
@@ -260,6 +263,7 @@ def learn(drive: LearningDrive, keep: Path | None = None) -> Learned | None:
         return None
     rover = told_rover()
     learner = GroundLearner(rover, drive.obstacle.ground)
+    learner.commanded = SPEED
     rows = drive.add_noise(recorded.rows)
     early = None
     began = time.process_time()
@@ -351,11 +355,16 @@ def told_rover() -> Rover:
 
 
 def find_stuck(recorded: Recorded) -> float | None:
-    """Return the time [s] from which a rover stayed to the end, None if it passed."""
-    times, x = recorded.rows[:, TIME], recorded.rows[:, X]
-    if recorded.passed:
+    """Return the time [s] from which a rover stayed to the end, None if it did not."""
+    times, places = recorded.rows[:, TIME], recorded.rows[:, [X, Y]]
+    away = np.hypot(*(places - places[-1]).T) >= STAYED
+    half = round(0.5 * MOTION_TIME / PERIOD)
+    before, after = slice(None, -2 * half), slice(2 * half, None)
+    speeds = np.hypot(*(places[after] - places[before]).T) / (times[after] - times[before])
+    stays = (speeds < HALTED * SPEED) & ~np.logical_or.accumulate(away[::-1])[::-1][half:-half]
+    if recorded.passed or not stays.any():
         return None
-    since = float(times[np.argmax(x > x[-1] - STAYED)])
+    since = float(times[half + np.argmax(stays)])
     return since if times[-1] - since > STUCK_FOR else None
 
 

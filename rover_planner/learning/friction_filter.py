@@ -6,6 +6,7 @@ the chance of each coefficient, so that an interval is as wide as what was felt 
 above where nothing slipped.
 """
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -31,7 +32,7 @@ WORTHLESS = 0.01
 """Share of measurements that tell nothing."""
 CHANGE = 0.05
 """Chance that the ground changes on a metre."""
-MEMORY = 3.0
+MEMORY = 2.0
 """Way after which a bound has lost a factor e [m]."""
 BOUNDED = 0.975
 """Chance of what is below the upper end of an interval; 1 minus this is below the lower end."""
@@ -64,17 +65,21 @@ class FrictionFilter:
         prior = np.exp(-0.5 * spread**2)
         self._prior = prior / prior.sum()
         self._chances = self._prior.copy()
-        self._bound = 0.0
+        self._bound, self._driven = 0.0, 0.0
         self._slips = np.zeros_like(GRID)
         """Number of independent slips since the ground changed, given each coefficient."""
 
     def drive(self, distance: float) -> None:
         """Take that the rover has driven a distance [m]: the ground may have changed."""
-        kept = float(np.exp(-CHANGE * distance))
-        same = kept * self._chances
+        self._driven += distance
+        self._bound *= math.exp(-distance / MEMORY)
+
+    def _doubt(self) -> None:
+        """Let chances return to those of the beginning by the distance that was driven."""
+        kept = math.exp(-CHANGE * self._driven)
+        same, self._driven = kept * self._chances, 0.0
         self._chances = same + (1.0 - kept) * self._prior
         self._slips *= same / np.maximum(self._chances, 1e-300)
-        self._bound *= float(np.exp(-distance / MEMORY))
 
     def slip(self, use: float, noise: float, weight: float) -> None:
         """Take the shear over the load of wheels that slip.
@@ -100,12 +105,14 @@ class FrictionFilter:
             self._bound = use
 
     def _update(self, likelihood: Floats) -> None:
+        self._doubt()
         chances = self._chances * likelihood
         self._chances = chances / chances.sum()
 
     @property
     def estimate(self) -> FrictionEstimate:
         """Mean, standard deviation and interval."""
+        self._doubt()
         is_bounded = self._chances[self._slips >= ENOUGH].sum() > 0.5
         chances = self._chances / self._prior if is_bounded else self._chances
         chances = chances / chances.sum()

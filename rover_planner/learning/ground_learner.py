@@ -92,6 +92,7 @@ SPIKE = 1.3
 Flags = NDArray[np.bool_]
 _RATES, _TORQUES = RATES.start, TORQUES.start
 _ANGLES = tuple(range(SUSPENSION.start, SUSPENSION.stop))
+_STEPS = np.linspace(-0.5, 0.5, WINDOW)
 _SIDE_WHEELS = tuple(np.array([wheel.endswith(side) for wheel in WHEELS]) for side in SIDES)
 
 
@@ -247,11 +248,11 @@ class GroundLearner:
         """Take a block of measurements, _SUMS; return whether it ends a window."""
         known, count = block["known"], block["count"]
         row = np.where(known > 0.0, block["sums"], np.nan) / np.maximum(known, 1.0)
-        rates = np.nan_to_num(row[RATES])
+        rates = np.where(known[RATES] > 0.0, row[RATES], 0.0)
         still = 1e-3 * self._rover.wheel.max_speed
         self._forward = np.where(np.abs(rates) > still, np.sign(rates), self._forward)
         measured = known[TORQUES] > 0.5 * count
-        if measured.any():
+        if measured.any() and not measured.all():
             row[TORQUES] = np.where(measured, row[TORQUES], np.nanmean(row[TORQUES]))
         state = self._sense.feel(row, self._forward)
         if state is None:
@@ -444,10 +445,9 @@ def _add(row, elapsed, rates, turned, blocks):
 
 
 def _find_change(values: Floats) -> float:
-    """Return the largest change of columns (k, n) along a straight line, less its noise."""
-    steps = np.linspace(-0.5, 0.5, len(values))
-    spread = float(steps @ steps)
+    """Return the largest change of columns (WINDOW, n) along a line, less its noise."""
+    spread = float(_STEPS @ _STEPS)
     rest = values - values.mean(axis=0)
-    slopes = steps @ rest / spread
-    noise = np.sqrt(((rest - steps[:, None] * slopes) ** 2).sum(axis=0) / (len(values) - 2))
+    slopes = _STEPS @ rest / spread
+    noise = np.sqrt(((rest - _STEPS[:, None] * slopes) ** 2).sum(axis=0) / (WINDOW - 2))
     return float((np.abs(slopes) - CHANGE_CERTAIN * noise / np.sqrt(spread)).max())

@@ -77,10 +77,12 @@ class StuckWatch:
             rolling = find_median(np.abs(speeds))
             # There and back a rover rolls and stays, too: what counts is where it rolls to.
             rolled = float(find_median(np.abs(np.mean(speeds, axis=0))))
-            if rolling.min() > self._slowest and moved < NO_PROGRESS * rolled:
+            turns = rolling.max() > self._slowest
+            stays = moved < (NO_PROGRESS * rolled if turns else self._slowest)
+            if stays and rolling.min() > self._slowest:
                 self.reason = "wheels turn and the rover stays"
-            elif all(wishes) and max(moved, rolling.max()) < self._slowest:
-                self.reason = "wheels push and do not turn"
+            elif stays and all(wishes):  # wheels that push may begin to spin
+                self.reason = "wheels push and the rover stays"
         return bool(self.reason)
 
 

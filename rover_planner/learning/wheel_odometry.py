@@ -95,9 +95,10 @@ class WheelOdometry:
         self.speed_deviation = 0.0
         """Standard deviation of it [m/s]."""
         self._last: WheelMotion | None = None
-        self._forward_ways, self._side_way = np.zeros((2, 2)), np.zeros(2)
-        self._slide, self._noise, self._elapsed = np.zeros(2), np.zeros((2, 2)), 0.0
-        self._piece_ways, self._way = np.zeros(3), 0.0
+        self._sums = np.zeros(15)
+        self._forward_ways, self._noise = self._sums[:8].reshape(2, 2, 2)
+        self._side_way, self._slide = self._sums[8:12].reshape(2, 2)
+        self._piece_ways, self._way, self._elapsed = self._sums[12:], 0.0, 0.0
         self._begin: Floats | None = None
 
     def take(self, motion: WheelMotion) -> None:
@@ -109,7 +110,7 @@ class WheelOdometry:
         ahead = self._find_speeds(motion)
         if not len(ahead):
             return
-        # Plain numbers: arrays of two elements take several times as long.
+        # Plain numbers and one sum: arrays of two elements take several times as long.
         slope, aside = -math.tan(motion.pitch), math.tan(motion.roll)
         raw = float(ahead.sum()) / len(ahead) * math.cos(motion.pitch)
         step = raw * elapsed
@@ -125,17 +126,19 @@ class WheelOdometry:
         self.speed_deviation = abs(raw) * math.hypot(math.sqrt(along), slide)
         self.pose[2] += 0.5 * elapsed * (motion.yaw_rate + last.yaw_rate)
         c, s = math.cos(self.pose[2]), math.sin(self.pose[2])
-        heading, left = np.array([c, s]), np.array([-s, c])
-        self.pose[:2] += step * ((1.0 - lost) * heading - drift * left)
-        self._forward_ways += step * np.array([[c, c * uphill], [s, s * uphill]])
-        self._side_way += left * (aside * step)
-        self._slide += heading * (slide * step)
-        mixed = (along - across) * c * s
-        self._noise += (abs(step) * self._piece) * np.array(
-            [[along * c**2 + across * s**2, mixed], [mixed, along * s**2 + across * c**2]]
-        )
+        self.pose[0] += step * ((1.0 - lost) * c + drift * s)
+        self.pose[1] += step * ((1.0 - lost) * s - drift * c)
+        piece = math.copysign(self._piece, step)
+        mixed = piece * (along - across) * c * s
+        ahead_noise = piece * (along * c**2 + across * s**2)
+        aside_noise = piece * (along * s**2 + across * c**2)
+        self._sums += step * np.array([
+            c, c * uphill, s, s * uphill,  # forward ways
+            ahead_noise, mixed, mixed, aside_noise,
+            -s * aside, c * aside, c * slide, s * slide,  # way aside, slide
+            1.0, uphill, aside,  # ways of the piece
+        ])  # fmt: skip
         self._elapsed += elapsed
-        self._piece_ways += step * np.array([1.0, uphill, aside])
         self._way += abs(step)
 
     def _find_speeds(self, motion: WheelMotion) -> Floats:

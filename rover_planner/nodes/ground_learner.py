@@ -35,7 +35,7 @@ from rover_planner.nodes.warm_up import LEARNING
 from rover_planner.parameters.ground_learner import GroundLearnerParameters
 from rover_planner.ros.map_intake import CLOUD, read_message
 from rover_planner.ros.node import RoverNode
-from rover_planner.ros.qos import latched_qos, polled_qos, sensor_qos
+from rover_planner.ros.qos import latched_qos, newest_qos, polled_qos, sensor_qos
 from rover_planner.ros.row_collector import RowCollector
 from rover_planner.ros.subscriptions import subscribe_to_map
 from rover_planner.shell.kernels import load_kernels
@@ -77,15 +77,14 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
         self._reader, self._wheels = SensorReader(), WheelOdometry(self._rover)
         self._motion: WheelMotion | None = None  # what the wheels' odometry went on by last
         self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", sensor_qos())
-        take_command = self._refusing("cmd_vel", self._take_command)
-        self.heard.subscribe(TwistStamped, "cmd_vel", take_command, polled_qos())
-        for kind, name, take in (
-            (JointState, "joint_states", self._rows.take_joints),
-            (Imu, "imu", self._take_imu),
-            (Odometry, "odometry", self._take_odometry),
+        for kind, name, take, qos in (
+            (TwistStamped, "cmd_vel", self._take_command, newest_qos()),
+            (JointState, "joint_states", self._rows.take_joints, polled_qos()),
+            (Imu, "imu", self._take_imu, polled_qos()),
+            (Odometry, "odometry", self._take_odometry, polled_qos()),
         ):
             read = self._refusing(name, partial(self._read_and_take, kind, take))
-            self.heard.subscribe(kind, name, read, polled_qos(), raw=True)
+            self.heard.subscribe(kind, name, read, qos, raw=True)
         self.loop = self.create_timer(POLLING, self._read_sensors)
         subscribe_to_map(self, PointCloud2, CLOUD, self._refusing(CLOUD, self._take_map))
         self.follow_changes(lambda _: None, lambda _: None)

@@ -2,8 +2,8 @@
 """Merges joint states, attitude and odometry into the rows that the ground is learned from."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -40,7 +40,7 @@ _COLUMNS = (
 
 @dataclass(frozen=True)
 class _Selection:
-    """The values of a field of joint states that are measurements, and what becomes of them."""
+    """The measurements among all values of joint states, and what becomes of them."""
 
     places: NDArray[np.intp]
     columns: NDArray[np.intp]
@@ -54,33 +54,33 @@ class RowCollector:
     def __init__(self, names: JointNames = OWN_NAMES) -> None:
         """Start without measurements; `names` are those of the joints in messages."""
         self._row, self._names, self._has_imu = np.full(WIDTH, np.nan), names, False
-        self._listed: tuple[str, ...] = ()
-        self._selections: list[_Selection] = []
+        self._form: tuple[Any, ...] = ()
+        self._chosen = self._select((), ())
         self._yaw_rate = math.nan
 
     def take_joints(self, message: Any) -> None:
         """Take joint states by name; a value that is missing or not finite was not measured."""
-        listed = tuple(message.name)
-        if listed != self._listed:
-            self._listed = listed
-            self._selections = [self._select(listed, columns) for columns in _COLUMNS]
         fields = message.position, message.velocity, message.effort
-        for values, chosen in zip(fields, self._selections, strict=False):
-            if len(values) == len(listed):
-                measured = chosen.signs * np.array(values)[chosen.places] + chosen.offsets
-                self._row[chosen.columns] = np.where(np.isfinite(measured), measured, np.nan)
+        form = tuple(message.name), tuple(map(len, fields))
+        if form != self._form:
+            self._form, self._chosen = form, self._select(*form)
+        chosen = self._chosen
+        values = np.fromiter(chain(*fields), float)[chosen.places]
+        measured = chosen.signs * values + chosen.offsets
+        self._row[chosen.columns] = np.where(np.isfinite(measured), measured, np.nan)
 
-    def _select(self, listed: tuple[str, ...], columns: Mapping[str, int]) -> _Selection:
+    def _select(self, listed: tuple[str, ...], lengths: tuple[int, ...]) -> _Selection:
+        """Return what is measured in messages with such names and lengths of their fields."""
         links = [self._names.link(self._names.model_name(name)) for name in listed]
-        places = [place for place, link in enumerate(links) if link.model in columns]
-        links = [links[place] for place in places]
-        has_offset = columns is _COLUMNS[0]
-        return _Selection(
-            np.array(places, dtype=int),
-            np.array([columns[link.model] for link in links], dtype=int),
-            np.array([link.sign for link in links]),
-            np.array([link.offset * has_offset for link in links]),
-        )
+        found, begin = [], 0
+        for columns, length in zip(_COLUMNS, lengths, strict=False):
+            for place, link in enumerate(links if length == len(listed) else ()):
+                if link.model in columns:
+                    offset = link.offset if columns is _COLUMNS[0] else 0.0
+                    found.append((begin + place, columns[link.model], link.sign, offset))
+            begin += length
+        places, own_columns, signs, offsets = np.array(found).reshape(-1, 4).T
+        return _Selection(places.astype(int), own_columns.astype(int), signs, offsets)
 
     def take_imu(self, message: Any) -> None:
         """Take roll and pitch.
@@ -99,12 +99,11 @@ class RowCollector:
     def motion(self, time: float) -> WheelMotion | None:
         """Return what wheels and IMU measure at a time [s]; None until both were heard."""
         row = self._row
-        if math.isnan(self._yaw_rate) or np.isnan(row[RATES]).all():
+        rates, steering = row[RATES].copy(), row[STEERING].copy()
+        if math.isnan(self._yaw_rate) or np.isnan(rates).all():
             return None
-        steering = np.where(np.isnan(row[STEERING]), 0.0, row[STEERING])
-        return WheelMotion(
-            time, row[RATES].copy(), steering, row[ROLL], row[PITCH], self._yaw_rate
-        )
+        steering[np.isnan(steering)] = 0.0
+        return WheelMotion(time, rates, steering, row[ROLL], row[PITCH], self._yaw_rate)
 
     def take_odometry(self, message: Any, time: float, frame: str = "") -> Floats:
         """Take a pose; return the row of its time [s].

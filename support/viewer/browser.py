@@ -2,13 +2,13 @@
 """A real browser for tests: finds and starts it, and operates the page as a user does."""
 
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import pytest
 
-from support import waiting
+from support.viewer.sessions import PATIENCE as WAIT
 
 viser = pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 sync_api = pytest.importorskip(
@@ -30,8 +30,6 @@ ARGUMENTS = [
 """Options of the browser: WebGL without a graphics card, and no network requests."""
 LAPTOP = {"width": 1280, "height": 720}
 """Size of a laptop's window [px]."""
-WAIT = 120.0
-"""Longest wait for the page [s]; rendering takes seconds on a busy machine."""
 SCALE = 0.1
 """Pixels of the screen for each of the page: without a graphics card rendering is slow."""
 SCALE_SCENE = """
@@ -46,11 +44,6 @@ MEASURE = "selector => document.querySelector(selector)?.getBoundingClientRect()
 needs_browser = pytest.mark.skipif(
     PROGRAM is None, reason=f"no browser installed: none of {', '.join(NAMES)} is on the path"
 )
-
-
-def wait_until(condition: Callable[[], Any], what: str) -> Any:
-    """Return the condition's first true value; fail with `what` after WAIT."""
-    return waiting.wait_until(condition, what, WAIT)
 
 
 @contextmanager

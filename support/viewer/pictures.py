@@ -16,8 +16,9 @@ from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.state.scenario import Pose
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.worlds.mars_terrain import make_mars_terrain
-from support.viewer.browser import ARGUMENTS, PROGRAM, Visitor, sync_api, wait_until
+from support.viewer.browser import ARGUMENTS, PROGRAM, Visitor, sync_api
 from support.viewer.sessions import is_at_rest
+from support.viewer.sessions import wait_patiently as wait_until
 
 SETTLE = 10.0
 """Time for the browser to draw before a picture is taken [s]."""

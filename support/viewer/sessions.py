@@ -99,9 +99,9 @@ class Judge:
         self.take()
 
 
-def wait_patiently(condition: Callable[[], Any], what: str) -> None:
-    """Wait for what a busy machine's page does late."""
-    wait_until(condition, what, PATIENCE)
+def wait_patiently(condition: Callable[[], Any], what: str) -> Any:
+    """Return the first true value of what a busy machine's page does late."""
+    return wait_until(condition, what, PATIENCE)
 
 
 def is_busy(page: Any) -> bool:

@@ -55,6 +55,14 @@ def test_a_rover_that_stands_while_its_wheels_turn_or_push_is_stuck_within_two_s
     assert noticed is not None and noticed <= 2.0
 
 
+def test_a_rover_whose_wheels_stand_and_then_spin_is_stuck_from_when_it_stands():
+    watch = StuckWatch(SPEED, MAX_TORQUE)
+    for time in PERIOD * np.arange(1, 20):
+        one = window(float(time), 0.0, 0.0 if time < 1.0 else SPEED, deviation=0.02)
+        stuck = watch.update(one, np.ones(6), 0.0, commanded=SPEED)
+        assert stuck == (time > 1.25)
+
+
 @pytest.mark.parametrize(("speed", "rolling"), [(0.2 * SPEED, SPEED), (0.2 * SPEED, 0.2 * SPEED)])
 def test_a_rover_that_creeps_is_not_stuck_however_noisy_its_speed_is(speed, rolling):
     assert first_notice(speed, rolling, MAX_TORQUE) is None

@@ -10,7 +10,8 @@ from benchmarks.bench_page import MOST_MEMORY, open_view
 from benchmarks.grounds import made_reef
 from benchmarks.processes import memory_of
 from rover_physics.terrain.grid import save_terrain
-from support.viewer.browser import Visitor, needs_browser, open_browser, sync_api, wait_until
+from support.viewer.browser import Visitor, needs_browser, open_browser, sync_api
+from support.viewer.sessions import wait_patiently as wait_until
 
 pytestmark = [needs_browser, pytest.mark.long]
 

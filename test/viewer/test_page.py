@@ -3,6 +3,7 @@
 
 from dataclasses import replace
 from io import BytesIO
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,9 +16,9 @@ from support.viewer.browser import (
     Visitor,
     needs_browser,
     open_browser,
-    wait_until,
 )
 from support.viewer.sessions import LSR1, ask, blocked_session, held, wait_for_rest
+from support.viewer.sessions import wait_patiently as wait_until
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
@@ -228,7 +229,8 @@ def test_a_click_into_the_scene_sets_the_goal_and_one_into_the_sky_is_refused(vi
     wait_until(lambda: page.session.wanted.goal != goal, "another goal")
     assert max(map(abs, page.session.wanted.goal[:2])) < 4.0
     wait_for_rest(page)
-    page.requests.put(lambda: page.click(None, False))
+    up = SimpleNamespace(ray_origin=(0.0, 0.0, 2.0), ray_direction=(0.0, 0.0, 1.0))
+    page._request_click(up, shift=False)
     visitor.wait_for("refused: the click is beside the known ground")
 
 

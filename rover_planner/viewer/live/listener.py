@@ -144,7 +144,7 @@ class LiveListener(Node):
         is_estimated = not estimated.keys().isdisjoint(PREDICTED_FIELDS.values())
         source = "forces predicted by the server" if predicted else ""
         source = "forces estimated by the traction controller" if is_estimated else source
-        forces, ages = {**predicted, **estimated}, tuple(self._ages.values())
+        forces, ages = {**predicted, **estimated}, dict(self._ages)
         return replace(data, forces=forces, forces_from=source, ages=ages, click=self._click)
 
     def request_plan(self, goal: np.ndarray) -> str:

@@ -2,7 +2,7 @@
 """A live rover: the latest values of its topics, their ages, and what is told of them."""
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,7 +13,7 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.learned_ground import LearnedGround
-from rover_planner.viewer.documents.verdict import describe_answer
+from rover_planner.viewer.documents.verdict import WORDS, describe_answer
 from rover_planner.viewer.state.drive import RoverState, place_state
 
 MAX_AGE = 2.0
@@ -138,18 +138,18 @@ class LiveData:
     """The last question of a visitor; None without one."""
     learned: LearnedTrail | None = None
     """What was learned of the ground."""
-    ages: tuple[TopicAge, ...] = ()
-    """The ages of all topics."""
+    ages: Mapping[str, TopicAge] = field(default_factory=dict)
+    """The ages of all topics by name."""
 
     @property
     def odometry(self) -> TopicAge:
         """The age of the odometry, without which nothing here is live."""
-        return self._age_of(ODOMETRY)
+        return self.ages.get(ODOMETRY, TopicAge(ODOMETRY, None, True))
 
     @property
     def server(self) -> TopicAge:
         """The age of the server's last sign of life."""
-        return self._age_of(SIGN_OF_LIFE)
+        return self.ages.get(SIGN_OF_LIFE, TopicAge(SIGN_OF_LIFE, None, True))
 
     @property
     def freshness(self) -> str:
@@ -162,10 +162,6 @@ class LiveData:
         if server.is_stale:
             return f"the rover is live; the server is silent for {server.describe()}"
         return "live"
-
-    def _age_of(self, topic: str) -> TopicAge:
-        known = {one.topic: one for one in self.ages}
-        return known.get(topic, TopicAge(topic, None, True))
 
 
 def read_state(rover: Rover, data: LiveData) -> RoverState | None:
@@ -224,11 +220,9 @@ def choose_answer(
         answer = describe_answer(None, "")
         headline = "click the ground to ask for a plan"
     if click is not None and newest is not None and newest is not click.verdict:
-        word = "traversable" if newest.traversable else "not traversable"
-        words = f"{newest.question}: {word}, {write_age(now - newest.heard)}"
-        offers = [
-            {"words": words + (", old" if server.is_stale else ""), "ask": {"ask": "newest"}}
-        ]
+        age = write_age(now - newest.heard) + (", old" if server.is_stale else "")
+        words = f"{newest.question}: {WORDS[newest.traversable]}, {age}"
+        offers = [{"words": words, "ask": {"ask": "newest"}}]
     old = ""
     if verdict is not None and server.is_stale:
         old = f"the server is silent for {server.describe()}"
@@ -253,6 +247,6 @@ def describe_learned(learned: LearnedTrail | None) -> list[str]:
     return [words, "where: the trail in the scene, from blue (0) to yellow (1)"]
 
 
-def list_topics(ages: Sequence[TopicAge]) -> list[dict[str, Any]]:
+def list_topics(ages: Iterable[TopicAge]) -> list[dict[str, Any]]:
     """Return the topics of a live rover with their ages."""
     return [{"topic": one.topic, "age": one.describe(), "stale": one.is_stale} for one in ages]

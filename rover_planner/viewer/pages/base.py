@@ -225,8 +225,8 @@ class PageBase(ABC):
         """X and y (n, 2) [m] of what a view of everything shows, the start first."""
 
     @abstractmethod
-    def click(self, point: Floats | None, shift: bool) -> None:
-        """Act on a click at a point of the ground (2,) [m]; None beside known ground."""
+    def click(self, point: Floats, shift: bool) -> None:
+        """Act on a click at a point of the ground (2,) [m]."""
 
     @abstractmethod
     def advance(self, seconds: float) -> None:
@@ -303,10 +303,13 @@ class PageBase(ABC):
             origin = self.scene.canvas.to_map(event.ray_origin)
             direction = np.array(event.ray_direction)
             index = self.scene.paths.find_number(origin, direction)
-            if index is None:
-                self.click(intersect_ground(self.ground, origin, direction), shift)
-            else:
+            if index is not None:
                 self.hear({"ask": "show", "index": index}, None)
+                return
+            point = intersect_ground(self.ground, origin, direction)
+            if point is None:
+                raise PlanningError("the click is beside the known ground")
+            self.click(point, shift)
 
         self.requests.put(click, "click")
 

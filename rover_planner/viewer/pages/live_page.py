@@ -87,10 +87,10 @@ class LivePage(PageBase):
         first = np.zeros(2) if self._first is None else self._first
         return np.array([first, first + AHEAD])
 
-    def click(self, point: Floats | None, shift: bool) -> None:
+    def click(self, point: Floats, shift: bool) -> None:
         """Ask the server for a plan to a point."""
-        if point is None or not self._ground_name:
-            raise PlanningError("the click is beside the known ground")
+        if not self._ground_name:
+            raise PlanningError("the ground is not known yet")
         self._refusal = self._listener.request_plan(point)
 
     def show_refusal(self, reason: str) -> None:
@@ -142,7 +142,7 @@ class LivePage(PageBase):
         self.channel.tell("board", describe_board(state, has_slip=slips))
         words = f"{data.freshness}; {data.forces_from or 'forces not known'}"
         self.channel.tell("drive", {"duration": None, "words": words})
-        self.channel.tell("topics", list_topics(data.ages))
+        self.channel.tell("topics", list_topics(data.ages.values()))
 
     def _take_terrain(self, data: LiveData, now: float) -> None:
         """Show a new map, at most every GROUND_PERIOD."""

@@ -164,10 +164,8 @@ class Page(PageBase):
             "link": lambda _words: self._tell_link(),
         }
 
-    def click(self, point: Floats | None, shift: bool) -> None:
+    def click(self, point: Floats, shift: bool) -> None:
         """Set goal or start, and plan."""
-        if point is None:
-            raise PlanningError("the click is beside the known ground")
         if shift or self._click_sets == "start":
             self.session.plan_from(point)
         else:

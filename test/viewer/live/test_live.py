@@ -253,7 +253,7 @@ def verdict_on(question_hash: str, passes: bool, age: float) -> LiveVerdict:
 
 
 def data_of(verdict, plan, click=None, server=ALIVE) -> LiveData:
-    return LiveData(verdict=verdict, plan=plan, click=click, ages=(server,))
+    return LiveData(verdict=verdict, plan=plan, click=click, ages={server.topic: server})
 
 
 def test_an_answer_to_a_click_belongs_to_the_click_and_the_newest_is_one_click_away():
