@@ -242,6 +242,22 @@ def test_a_failure_between_waypoints_has_the_pose_at_which_the_model_was_asked()
     assert np.isclose(places, failure.state.position).all(axis=1).any()
 
 
+def test_of_several_states_at_the_place_of_a_failure_that_which_fails_is_shown():
+    path = judged_on(stepped, friction=0.4)
+    prediction, failure = path.candidate.prediction, path.failure
+    between = prediction.between
+    again = between.select([*range(len(between.poses)), 0])  # as where a wheel rolls off an edge
+    poses = np.vstack([between.poses, failure.state.here.poses])
+    waypoints = np.append(between.waypoint, path.verdict.first_failure)
+    again = replace(again, poses=poses, waypoint=waypoints)
+    candidate = replace(path.candidate, prediction=replace(prediction, between=again))
+    twin = Judged(path.scenario, candidate)
+    assert twin.failure.time == failure.time and twin.failure.headline == failure.headline
+    shown = twin.state_at(failure.time)
+    np.testing.assert_array_equal(shown.wheel_loads, failure.state.wheel_loads)
+    assert twin.state_at(failure.time - 1.0).time < failure.time
+
+
 def test_where_the_rover_does_not_settle_a_level_one_stands_and_the_wheel_beyond_is_named():
     failure = judged_on(gap).failure
     assert failure is not None and failure.code == "unknown_ground"

@@ -76,7 +76,7 @@ def describe_uses(
     limits, failure = path.limits.add_chance(chance), path.failure
     rows = limits.rows_until(time)
     here = rows - 1
-    if failure is not None and time >= failure.time - 1e-6:
+    if failure is not None and failure.is_reached(time):
         rows, here = max(rows, failure.row + 1), failure.row
     uses = [_describe_use(lane, limits, lane.worst_until(rows), here) for lane in limits.lanes]
     if chance is not None:
