@@ -103,7 +103,7 @@ def test_controller_and_simulator_turn_on_a_slope():
     plant = QuasiStaticPlant(LSR1, plane(0.1, 0.0, half=3.0), (0.0, 0.0, 0.0))
     service, command = TractionService(with_policy("equal")), (0.0, -0.1)
     service.take_terrain(plane(0.1, 0.0, half=3.0))
-    for step in range(round(8.0 / PERIOD)):
+    for step in range(round(5.0 / PERIOD)):
         now, state = step * PERIOD, plant.state()
         service.take_joints(state.joint_positions, state.joint_velocities, now)
         x, y, z, w = state.orientation
@@ -116,5 +116,5 @@ def test_controller_and_simulator_turn_on_a_slope():
         assert update.fault == "" and update.warning == ""
         plant.pull(update.torques, command, PERIOD)
     # Two seconds go into steering and the start.
-    assert plant.pose()[2] == pytest.approx(command[1] * 7.0, abs=0.2 * abs(command[1] * 7.0))
+    assert plant.pose()[2] == pytest.approx(command[1] * 4.0, abs=0.2 * abs(command[1] * 4.0))
     assert plant.pose()[:2] == pytest.approx([0.0, 0.0], abs=0.05)
