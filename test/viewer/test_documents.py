@@ -116,7 +116,8 @@ def list_paths_of(path: Judged) -> dict:
 def test_the_worst_so_far_grows_and_has_all_limits_in_one_unit():
     path = judged_on(waves)
     uses = [describe_uses(path, time) for time in np.linspace(0.0, path.trajectory.times[-1], 5)]
-    shares = np.array([[one["share"] for one in row] for row in uses])
+    worst = [[one["worst"].replace("not asked", "-1") for one in row] for row in uses]
+    shares = np.array([[float(words.split()[0]) for words in row] for row in worst])
     assert (np.diff(shares, axis=0) >= 0.0).all()
     assert len(uses[0]) == len(path.limits.lanes)
     assert all(one["worst"].endswith("%") for one in uses[-1])
@@ -128,7 +129,7 @@ def test_a_path_that_fails_at_its_first_pose_has_a_lane_and_a_use_for_each_limit
     path = session.shown.path
     assert path.verdict.first_failure == 0
     told = describe_limits(path, None)
-    assert told["fails"] == told["end"] == 0.0
+    assert path.failure.distance == told["end"] == 0.0
     assert all(len(lane["now"]["x"]) == 1 for lane in told["lanes"])
     uses = {
         lane["code"]: one
@@ -241,6 +242,22 @@ def test_a_failure_between_waypoints_has_the_pose_at_which_the_model_was_asked()
     assert np.isclose(places, failure.state.position).all(axis=1).any()
 
 
+def test_of_several_states_at_the_place_of_a_failure_that_which_fails_is_shown():
+    path = judged_on(stepped, friction=0.4)
+    prediction, failure = path.candidate.prediction, path.failure
+    between = prediction.between
+    again = between.select([*range(len(between.poses)), 0])  # as where a wheel rolls off an edge
+    poses = np.vstack([between.poses, failure.state.here.poses])
+    waypoints = np.append(between.waypoint, path.verdict.first_failure)
+    again = replace(again, poses=poses, waypoint=waypoints)
+    candidate = replace(path.candidate, prediction=replace(prediction, between=again))
+    twin = Judged(path.scenario, candidate)
+    assert twin.failure.time == failure.time and twin.failure.headline == failure.headline
+    shown = twin.state_at(failure.time)
+    np.testing.assert_array_equal(shown.wheel_loads, failure.state.wheel_loads)
+    assert twin.state_at(failure.time - 1.0).time < failure.time
+
+
 def test_where_the_rover_does_not_settle_a_level_one_stands_and_the_wheel_beyond_is_named():
     failure = judged_on(gap).failure
     assert failure is not None and failure.code == "unknown_ground"
@@ -319,7 +336,7 @@ def test_a_row_of_a_path_has_the_numbers_of_its_verdict():
 
 def test_each_number_of_the_rover_has_a_slider_and_what_it_changes_of_the_drive_is_listed():
     session = session_on(ramp)
-    labels = [one[0] for part in describe_sliders(LSR1)["parts"] for one in part["sliders"]]
+    labels = [one[0] for part in describe_sliders(LSR1) for one in part["sliders"]]
     assert labels == list(read_values(session.wanted))
     before = session.shown.path
     session.change_rover([("friction",)], 0.4)

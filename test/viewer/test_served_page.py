@@ -122,7 +122,7 @@ def test_a_changed_number_is_told_with_what_it_changes_and_can_be_undone_and_res
 
 
 def test_a_number_or_an_angle_beyond_the_ends_of_its_slider_is_that_at_its_end(page):
-    sliders = {one[0]: one for part in told(page, "sliders")["parts"] for one in part["sliders"]}
+    sliders = {one[0]: one for part in told(page, "sliders") for one in part["sliders"]}
     for label in (FRICTION, "arm_yaw [rad]"):
         page.hear({"ask": "value", "label": label, "value": 9999.0}, None)
         most = sliders[label][2]
@@ -137,11 +137,11 @@ def test_a_rover_file_and_a_preset_are_loaded_and_the_arm_follows(page):
     def meshes() -> dict:
         return page.scene.rover.meshes
 
-    wait_until(lambda: told(page, "sliders")["rover"] == "bare", "the loaded rover")
+    wait_until(lambda: told(page, "chosen")["preset"] == "bare", "the loaded rover")
     wait_until(lambda: "arm" not in meshes() and "body" in meshes(), "no arm")
     page.hear({"ask": "preset", "name": "lsr1"}, None)
     wait_until(lambda: "arm" in meshes(), "the arm")
-    titles = [part["title"] for part in told(page, "sliders")["parts"]]
+    titles = [part["title"] for part in told(page, "sliders")]
     assert titles[-1] == "Arm"
 
 

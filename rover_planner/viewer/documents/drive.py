@@ -62,7 +62,6 @@ def describe_limits(
     loads = rows.prediction.wheel_loads[stands]
     return {
         "end": round(end, 4),
-        "fails": None if failure is None else round(failure.distance, 4),
         "code": "" if failure is None else limits.lane(failure.code).limit.code,
         "compared": reference is not None,
         "lanes": lanes,
@@ -77,7 +76,7 @@ def describe_uses(
     limits, failure = path.limits.add_chance(chance), path.failure
     rows = limits.rows_until(time)
     here = rows - 1
-    if failure is not None and time >= failure.time - 1e-6:
+    if failure is not None and failure.is_reached(time):
         rows, here = max(rows, failure.row + 1), failure.row
     uses = [_describe_use(lane, limits, lane.worst_until(rows), here) for lane in limits.lanes]
     if chance is not None:
@@ -102,7 +101,6 @@ def _describe_use(lane: Lane, limits: PathLimits, worst: int, here: int) -> dict
     return {
         "now": write_use(float(lane.used[here])),
         "worst": write_use(used),
-        "share": plain(min(used, 1.0), 2),
         "broken": bool(used > 1.0),
         "value": "" if np.isnan(value) else f"{limit.write(value)}, {limit.good}",
         "wheel": WHEELS[wheel].replace("_", " ") if wheel >= 0 else "",

@@ -35,16 +35,12 @@ def list_sliders(rover: Rover) -> dict[str, list[RoverValue]]:
     return parts
 
 
-def describe_sliders(loaded: Rover) -> dict[str, Any]:
+def describe_sliders(loaded: Rover) -> list[dict[str, Any]]:
     """Return the sliders of a rover that was loaded: label, ends and step, by part."""
-    parts = [
-        {
-            "title": title,
-            "sliders": [[one.label, one.low, one.high, one.step] for one in values],
-        }
+    return [
+        {"title": title, "sliders": [[one.label, one.low, one.high, one.step] for one in values]}
         for title, values in list_sliders(loaded).items()
     ]
-    return {"rover": loaded.name, "parts": parts}
 
 
 def read_values(scenario: Scenario) -> dict[str, float]:
@@ -63,9 +59,8 @@ def describe_values(scenario: Scenario) -> dict[str, list[float]]:
 
 def describe_changes(path: Judged, reference: Judged | None, *, is_kept: bool) -> dict[str, Any]:
     """Return what differs from the reference: numbers of the rover and the arm, and the drive."""
-    title = "reference" if is_kept else "loaded"
     if reference is None:
-        return {"title": title, "kept": is_kept, "rover": [], "drive": []}
+        return {"kept": is_kept, "rover": [], "drive": []}
     before, now = read_values(reference.scenario), read_values(path.scenario)
     rows = [
         [label, f"{before[label]:g}", f"{value:g}"]
@@ -77,12 +72,7 @@ def describe_changes(path: Judged, reference: Judged | None, *, is_kept: bool) -
         rows.append(["torques", POLICY_TITLES[was.policy], POLICY_TITLES[here.policy]])
     if was.soil != here.soil:
         rows.append(["soil", was.soil or "none", here.soil or "none"])
-    return {
-        "title": title,
-        "kept": is_kept,
-        "rover": rows,
-        "drive": compare_drives(reference, path),
-    }
+    return {"kept": is_kept, "rover": rows, "drive": compare_drives(reference, path)}
 
 
 def compare_drives(before: Judged, now: Judged) -> list[list[str]]:

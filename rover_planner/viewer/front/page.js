@@ -179,7 +179,7 @@ function pressRow(event) {
 
 // ---- The rover.
 
-function drawSliders({ parts }) {
+function drawSliders(parts) {
   at("sliders").replaceChildren(...parts.map((part, k) => make("details", { open: k < 2 },
     make("summary", {}, make("b", {}, part.title)),
     ...part.sliders.map(([label, low, high, step]) => {
@@ -210,11 +210,11 @@ function drawValues(values) {
   }
 }
 
-function drawChanges({ title, kept, rover, drive }) {
+function drawChanges({ kept, rover, drive }) {
   const rows = (lines) => lines.map(([name, was, now]) =>
     make("tr", {}, make("td", {}, name), make("td", {}, was), make("td", {}, make("b", {}, now))));
   const table = rover.length || drive.length
-    ? make("table", {}, make("tr", {}, ...["", title, "now"].map((head) => make("th", {}, head))), ...rows(rover), ...rows(drive))
+    ? make("table", {}, make("tr", {}, ...["", kept ? "reference" : "loaded", "now"].map((head) => make("th", {}, head))), ...rows(rover), ...rows(drive))
     : make("div", { class: "quiet" }, `nothing differs from the rover as ${kept ? "kept" : "loaded"}`);
   const offers = state.offers || { presets: [] };
   at("changes").replaceChildren(

@@ -191,8 +191,8 @@ class Page(PageBase):
 
     def _cancel(self) -> None:
         self.session.is_stopped |= self._judging.cancel()
-        self._advice.cancel()
-        self.painter.cancel()
+        for work in self.works:
+            work.cancel()
 
     def _go_to_failure(self) -> None:
         failure = self.session.shown.path.failure

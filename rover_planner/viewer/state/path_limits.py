@@ -284,6 +284,10 @@ class Failure:
     state: RoverState
     """The rover there; a level one of unknown forces above the ground if it does not stand."""
 
+    def is_reached(self, time: float) -> bool:
+        """Return whether it is reached at a time [s]."""
+        return time >= self.time - 1e-6
+
     @property
     def where(self) -> str:
         """The link in words, such as "middle left wheel"; empty for none."""

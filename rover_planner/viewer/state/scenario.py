@@ -121,9 +121,17 @@ class Judged:
         return find_failure(asked.rover, asked.terrain, self.verdict, self.limits)
 
     def state_at(self, time: float) -> RoverState | None:
-        """Return the rover at a time [s]; where it does not stand at the start, as it fails."""
-        state = self.trajectory.state_at(time)
-        return self.failure.state if state is None and self.failure is not None else state
+        """Return the rover at a time [s]; from where it fails on, as it fails.
+
+        Where a wheel rolls off an edge, the model is asked for several states at one time.
+        """
+        state, failure = self.trajectory.state_at(time), self.failure
+        if failure is None or not failure.is_reached(time):
+            return state
+        if state is None:
+            return failure.state
+        stands = self.limits.rows.prediction.settled[failure.row]
+        return replace(failure.state, spin=state.spin) if stands else state
 
     def is_of(self, poses: Floats, values: Scenario) -> bool:
         """Return whether it is a path with these poses under these values."""
