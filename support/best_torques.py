@@ -6,7 +6,7 @@ from scipy.optimize import linprog
 
 from support.rover_geometry import balance_matrix, free_balance_matrix
 
-SIDES = 48
+SIDES = 96
 """Sides of the pyramid that replaces a friction cone."""
 INSIDE = float(np.cos(np.pi / SIDES))
 """Share of the friction at which a pyramid lies inside the cone; at 1 it is around the cone."""

@@ -113,11 +113,8 @@ def test_the_area_is_kept_in_the_store_until_more_is_surveyed(tmp_path):
     first = found.distance[:].tobytes()
     other = find_reachable(prepared.store, 2.5, 2.5)
     kept = open_area(prepared.store)
-    assert (kept.cells, kept.longest, kept.farthest) == (
-        found.cells,
-        found.longest,
-        found.farthest,
-    )
+    for name in ("cells", "longest", "farthest"):
+        assert getattr(kept, name) == getattr(found, name)
     assert kept.distance[:].tobytes() == other.distance[:].tobytes() == first
     assert kept.from_place == (2.5, 2.5) and kept.cells == np.isfinite(kept.distance).sum()
     assert not [path for path in prepared.store.path.iterdir() if path.name.startswith(".reach")]

@@ -37,11 +37,8 @@ def test_questions_before_any_map_or_path_are_refused_and_answered_after_it(serv
 
 
 def test_bad_requests_maps_and_paths_are_refused_with_their_reason_and_the_node_lives_on(shared):
-    server, client, before = (
-        shared.server,
-        shared.client,
-        shared.server.service.known_map.fingerprint,
-    )
+    server, client = shared.server, shared.client
+    before = server.service.known_map.fingerprint
     for arguments, text in [
         ({"frame": "odom"}, "start is in frame 'odom'"),
         ({"tolerance": -0.5}, "tolerance is -0.5"),
@@ -67,11 +64,8 @@ def test_bad_requests_maps_and_paths_are_refused_with_their_reason_and_the_node_
 
 
 def test_files_that_may_not_or_cannot_be_read_are_told_apart(shared, tmp_path):
-    server, client, before = (
-        shared.server,
-        shared.client,
-        shared.server.service.known_map.fingerprint,
-    )
+    server, client = shared.server, shared.client
+    before = server.service.known_map.fingerprint
     maps = tmp_path / "maps"
     maps.mkdir()
     save_terrain(maps / "large.npz", make_terrain(waves))

@@ -157,13 +157,8 @@ def test_the_measured_suspension_is_compared_with_the_predicted_one():
     free = service.check_last_path()
     assert free.suspension is None and "suspension_mismatch" not in free.report.to_dict()
     prediction = free.candidate.prediction
-    predicted = dict(
-        zip(
-            SUSPENSION_JOINTS,
-            [*prediction.rocker_angle[0], *prediction.bogie_angle[0]],
-            strict=True,
-        )
-    )
+    angles = [*prediction.rocker_angle[0], *prediction.bogie_angle[0]]
+    predicted = dict(zip(SUSPENSION_JOINTS, angles, strict=True))
     assert abs(predicted["rocker_left"]) > 0.001
     service.take_joints(predicted)
     assert service.check_last_path().suspension is None  # where the rover stands is not known
