@@ -176,6 +176,18 @@ def test_imports_run_one_way_between_rooms():
     assert_no_circle(arrows)
 
 
+def test_torques_are_computed_without_ros():
+    reached, ahead = set(), ["rover_planner.traction.supervisor"]
+    while ahead:
+        module = ahead.pop()
+        if module not in reached:
+            reached.add(module)
+            ahead += imports().get(module, ())
+    used = {name.split(".")[0] for one in reached for name in imported_names(modules()[one])}
+    assert "osqp" in used
+    assert not {name for name in used if name == "rclpy" or name.endswith(("_msgs", "_srvs"))}
+
+
 def test_the_checkout_keeps_no_downloaded_or_built_file():
     listed = subprocess.run(["git", "ls-files"], cwd=TOP, capture_output=True, text=True)
     if listed.returncode != 0:

@@ -30,7 +30,7 @@ def surveyed(tmp_path_factory):
     heights = np.zeros((60, 60))
     heights[:, 44:48] = 1.0
     heights[44:47, 14:17] = np.nan
-    request = make_request(headings=8)
+    request = make_request(headings=2)
     folder = tmp_path_factory.mktemp("survey")
     return survey_here(folder, Terrain(heights, 0.1), request).store.path
 
@@ -58,7 +58,7 @@ def test_classes_have_the_colours_of_the_picture_and_a_legend_of_those_that_are_
     assert colour_at(shown, CLASS, (-3.0, 1.0)) == UNKNOWN
     legend = str(colour(shown, CLASS, np.array([1.0]), np.array([1.0])).legend)
     assert "impassable" in legend and "traction control" not in legend
-    assert "8 headings" in legend and "not as on the page" not in legend
+    assert "2 headings" in legend and "not as on the page" not in legend
 
 
 def test_what_differs_from_the_page_is_said(shown):
