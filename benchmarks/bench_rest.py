@@ -1,41 +1,87 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measures the CPU time of the programs of simulation.launch.py while the rover stands."""
+"""Measures the CPU time of programs while the rover stands, and of the learner in a drive."""
 
 import os
 import time
+from collections.abc import Mapping
 from pathlib import Path
+
+from geometry_msgs.msg import TwistStamped
+from rclpy.node import Node
 
 from benchmarks.measure import Figure
 from benchmarks.processes import START_TIME, open_nodes
 from rover_physics import save_terrain
+from rover_planner.demo.child_process import ChildProcess
+from rover_planner.ros.qos import topic_qos
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.project.launch_files import simulation_commands
 from support.waiting import wait_until
 
 SETTLING, SECONDS = 8.0, 30.0
 """Time before the measurement, and its length [s]."""
-MOST = {"traverse_server": 3.0, "traction_controller": 8.0, "rover_simulator": 15.0}
+LEARNER = "ground_learner"
+MOST = {"traverse_server": 3.0, "traction_controller": 8.0, "rover_simulator": 15.0, LEARNER: 5.0}
 """Aimed at, in percent of a core."""
+SPEED, COMMAND_PERIOD = 0.06, 0.1
+"""Speed of the drive [m/s], and the time between two commands [s]."""
+GROUND = make_mars_terrain(1, 24.0, 0.05, rock_cover=0.01)
 
 
 def measure() -> list[Figure]:
-    """Start the programs, leave them alone and measure them."""
+    """Measure programs at rest, then the learner in a drive."""
+    return [*_measure_rest(), _measure_learner()]
+
+
+def _measure_rest() -> list[Figure]:
     with open_nodes() as nodes:
         terrain = nodes.folder / "ground.npz"
-        save_terrain(terrain, make_mars_terrain(1, 24.0, 0.05, rock_cover=0.01))
+        save_terrain(terrain, GROUND)
         commands = simulation_commands(terrain_file=str(terrain))
         found = {name: nodes.start_module(*words[2:]) for name, words in commands.items()}
         graph = nodes.client().connect().node
         wait_until(lambda: set(found) <= set(graph.get_node_names()), "all programs", START_TIME)
-        time.sleep(SETTLING)
-        before, begin = {name: cpu_time(one.pid) for name, one in found.items()}, time.monotonic()
-        time.sleep(SECONDS)
-        used = {name: cpu_time(one.pid) - before[name] for name, one in found.items()}
-        taken = time.monotonic() - begin
+        return _watch(found, "at rest", None)
+
+
+def _measure_learner() -> Figure:
+    with open_nodes() as nodes:
+        start = {"start_x": -6.0, "start_y": 0.0, "follow_commands": False}
+        nodes.start("rover_simulator", terrain_file=GROUND, **start)
+        found = {LEARNER: nodes.start(LEARNER)}
+        driver = Node("driver", context=nodes.ros.context)
+        try:
+            wait_until(lambda: LEARNER in driver.get_node_names(), "the learner", START_TIME)
+            return _watch(found, "in a drive", driver)[0]
+        finally:
+            driver.destroy_node()
+
+
+def _watch(found: Mapping[str, ChildProcess], when: str, driver: Node | None) -> list[Figure]:
+    """Return the CPU time of programs; a driver drives the rover meanwhile."""
+    _wait(SETTLING, driver)
+    before, begin = {name: cpu_time(one.pid) for name, one in found.items()}, time.monotonic()
+    _wait(SECONDS, driver)
+    used = {name: cpu_time(one.pid) - before[name] for name, one in found.items()}
+    taken = time.monotonic() - begin
     return [
-        Figure("rest", f"{name}: CPU at rest", 100.0 * one / taken, "%", MOST[name], repeats=1)
+        Figure("rest", f"{name}: CPU {when}", 100.0 * one / taken, "%", MOST[name], repeats=1)
         for name, one in used.items()
     ]
+
+
+def _wait(seconds: float, driver: Node | None) -> None:
+    if driver is None:
+        time.sleep(seconds)
+        return
+    commands = driver.create_publisher(TwistStamped, "cmd_vel", topic_qos())
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        command = TwistStamped()
+        command.header.stamp = driver.get_clock().now().to_msg()
+        command.twist.linear.x = SPEED
+        commands.publish(command)
+        time.sleep(COMMAND_PERIOD)
 
 
 def cpu_time(pid: int) -> float:
