@@ -45,6 +45,8 @@ DIAGNOSTICS_PERIOD = 1.0
 """Time between two diagnostic messages [s]."""
 STANDING_RATE = 0.01
 """Wheel rate below which a wheel stands [rad/s]."""
+MOST_REPEATS = 2
+"""Number of updates in a row that send the last command of a rover at rest again."""
 MIN_WATCHDOG_PERIODS = 2.0
 """Shortest time without an update after which the watchdog acts, in periods."""
 STALE_PERIODS = 1.5
@@ -69,7 +71,7 @@ class TractionController(RoverNode[TractionControllerParameters]):
         self.statistics = TractionStatistics(1.0 / values.rate)
         """Update times, counts and the last update."""
         self._command: TractionCommand | None = None
-        self._repeats = False
+        self._repeats = 0
         self._log = TransitionLog(self.get_logger())
         self._warning = ""
         self._trips = 0
@@ -143,7 +145,7 @@ class TractionController(RoverNode[TractionControllerParameters]):
         response.success, response.message = done, message
         if self._supervisor.permission.enabled != before or not done:
             self.get_logger().info(message)
-            self._repeats = True  # the next update is a whole one
+            self._repeats = MOST_REPEATS  # the next update is a whole one
             self.update()
         return response
 
@@ -159,13 +161,14 @@ class TractionController(RoverNode[TractionControllerParameters]):
     def update(self) -> None:
         """Estimate, build, solve and publish; called by the timer.
 
-        While the rover stands, each second update sends the last command again: to read and to
+        While the rover stands, two updates of three send the last command again: to read and to
         judge the inputs takes most of the time.
         """
-        start, repeated = time.perf_counter(), self._find_repeated()
+        start, now = time.perf_counter(), time.monotonic()
+        repeated = self._find_repeated(now)
         if repeated is None:
             self.heard.poll()
-        now = time.monotonic()
+            now = time.monotonic()
         command = repeated or self._find_command(now)
         sent = self._watchdog.send(
             lambda: self._write(command),
@@ -191,13 +194,19 @@ class TractionController(RoverNode[TractionControllerParameters]):
             if angles is not None:
                 self._topics.publish_steering(self._inputs.to_robot_steering(angles))
 
-    def _find_repeated(self) -> TractionCommand | None:
+    def _find_repeated(self, now: float) -> TractionCommand | None:
         """Return the last command if this update is to send it again, else None."""
         last, rates = self._command, self.service.joints.wheel_rates
-        stands = last is not None and last.state != DRIVING and max(abs(rates)) < STANDING_RATE
-        tripped = self._watchdog.trips != self._trips
-        self._repeats = stands and not tripped and not self._repeats
-        return last if self._repeats else None
+        repeats = (
+            last is not None
+            and last.state != DRIVING
+            and max(abs(rates)) < STANDING_RATE
+            and self._watchdog.trips == self._trips
+            and self._repeats < MOST_REPEATS
+            and now + 1.0 / self.values.rate < last.expiry
+        )
+        self._repeats = self._repeats + 1 if repeats else 0
+        return last if repeats else None
 
     def _find_command(self, now: float) -> TractionCommand:
         """Return the command of the supervisor, or that of an internal error.
