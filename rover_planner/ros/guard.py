@@ -20,7 +20,8 @@ from rover_physics.errors import RoverError
 NANOSECONDS = 1e9
 EVENT_PERIOD = 1.0
 """Time between two looks at events of publishers and subscriptions, such as profiles that do not
-match [s]: they are half of the entities of a wait set, and no wait lasts once one has occurred."""
+match [s]: they are half of the entities of a wait set, and with those of a subscription that
+leaves a message unread no wait lasts."""
 PATIENCE, PATIENT_PERIODS = 0.1, 5
 """Time between two looks at all else where a node has a loop [s], or that number of its periods if
 it is more."""
