@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Enabling, emergency stop, rest and the end of the node over DDS."""
 
+import math
 import os
 import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
+from rover_planner.nodes.traction_controller import TractionController
 from support.driven_rover import RATE, DrivenRover
 from support.ros_fixtures import PATIENT, call, domain_id, run_in_executor
 from support.waiting import wait_until
@@ -32,7 +35,7 @@ def test_a_node_starts_disabled_and_drives_once_it_is_enabled(
     wait_until(lambda: rover.state == "disabled", "the state")
     wait_until(lambda: len(rover.commands) > 20, "commands")
     assert not any(torque for _, torque, _ in rover.commands)
-    # At rest inputs are read at half the rate; commands come at the whole one.
+    # At rest inputs are read at a third of the rate; commands come at the whole one.
     spacing = np.median(np.diff([sent for sent, _, _ in rover.commands])) / 1e9
     assert spacing == pytest.approx(1.0 / RATE, rel=0.3)
     answer = enable(True)
@@ -44,6 +47,26 @@ def test_a_node_starts_disabled_and_drives_once_it_is_enabled(
     wait_until(lambda: rover.state == "disabled" and rover.torque == 0.0, "rest")
     wait_until(lambda: rover.status.message.startswith("disabled: call"), "the diagnostics")
     assert rover.status.level == rover.status.OK
+
+
+def test_at_rest_inputs_are_read_with_each_third_update_or_before_they_are_old(ros, monkeypatch):
+    node = TractionController(context=ros.context)
+    read, expiry = [], math.inf
+    monkeypatch.setattr(node.heard, "poll", lambda: read.append(node.statistics.updates))
+
+    def find(now):
+        command = node._supervisor.update(now)
+        return replace(command, expiry=expiry)
+
+    monkeypatch.setattr(node, "_find_command", find)
+    for _ in range(6):
+        node.update()
+    assert read == [0, 3]
+    expiry = 0.0  # what the next commands follow from is old at once
+    for _ in range(3):
+        node.update()
+    assert read == [0, 3, 6, 7, 8]
+    node.destroy_node()
 
 
 @pytest.mark.parametrize(
