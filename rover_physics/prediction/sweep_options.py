@@ -7,12 +7,7 @@ from typing import Any
 
 from rover_physics.errors import ModelError
 from rover_physics.names import EQUAL, OPTIMAL, SERVO
-from rover_physics.numerics.plausible import (
-    MAX_FRICTION,
-    MAX_TORQUE,
-    MIN_FRICTION,
-    MIN_TORQUE,
-)
+from rover_physics.numerics import plausible as known
 from rover_physics.rover.manipulator import as_vector
 from rover_physics.status import TorquePolicy
 
@@ -71,8 +66,8 @@ class SweepOptions:
         if not 0.0 <= margin < 1.0:
             raise ModelError(f"control_margin is {margin}; it must be at least 0 and below 1")
         for name, least, most in (
-            ("friction", MIN_FRICTION, MAX_FRICTION),
-            ("max_torque", MIN_TORQUE, MAX_TORQUE),
+            ("friction", known.MIN_FRICTION, known.MAX_FRICTION),
+            ("max_torque", known.MIN_TORQUE, known.MAX_TORQUE),
         ):
             value = getattr(self, name)
             if value is not None and not least <= value <= most:

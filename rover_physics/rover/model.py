@@ -7,37 +7,23 @@ from typing import Annotated
 
 from rover_physics.files.rules import Keys, Radians, Rule, Text, choice, interval, number
 from rover_physics.names import WHEEL_POSITIONS
-from rover_physics.numerics.plausible import (
-    MAX_COORDINATE,
-    MAX_FRICTION,
-    MAX_GRAVITY,
-    MAX_LENGTH,
-    MAX_MASS,
-    MAX_SPEED,
-    MAX_TORQUE,
-    MIN_FRICTION,
-    MIN_GRAVITY,
-    MIN_LENGTH,
-    MIN_SPEED,
-    MIN_STEERING,
-    MIN_TORQUE,
-)
+from rover_physics.numerics import plausible as known
 from rover_physics.rover.uncertainty import Uncertainty
 
-Metres = Annotated[float, number("m", least=-MAX_LENGTH, most=MAX_LENGTH)]
+Metres = Annotated[float, number("m", least=-known.MAX_LENGTH, most=known.MAX_LENGTH)]
 Point = Annotated[
     tuple[Metres, Metres, Metres],
     Rule(
         "a list of 3 numbers in m, [x, y, z] in the body frame, each from "
-        f"{-MAX_LENGTH:g} to {MAX_LENGTH:g}"
+        f"{-known.MAX_LENGTH:g} to {known.MAX_LENGTH:g}"
     ),
 ]
 """A position on the rover in [m]."""
-Size = Annotated[float, number("m", least=MIN_LENGTH, most=MAX_LENGTH)]
-Speed = Annotated[float, number("m/s", least=MIN_SPEED, most=MAX_SPEED)]
+Size = Annotated[float, number("m", least=known.MIN_LENGTH, most=known.MAX_LENGTH)]
+Speed = Annotated[float, number("m/s", least=known.MIN_SPEED, most=known.MAX_SPEED)]
 Angles = Annotated[tuple[Radians, Radians], interval("rad")]
 Edges = Annotated[tuple[Metres, Metres], interval("m")]
-Mass = Annotated[float, number("kg", least=0.0, most=MAX_MASS)]
+Mass = Annotated[float, number("kg", least=0.0, most=known.MAX_MASS)]
 Share = Annotated[float, number("", above=0.0, most=1.0)]
 DEFAULT_SERVO_DROOP = 0.3
 """Droop of a wheel's speed servo if the rover file has none."""
@@ -45,7 +31,7 @@ DEFAULT_SERVO_DROOP = 0.3
 
 def _is_arm(lengths: tuple[float, float, float]) -> bool:
     """Return whether three lengths are valid for column, upper arm and forearm."""
-    return min(lengths) >= 0.0 and lengths[1] + lengths[2] >= MIN_LENGTH
+    return min(lengths) >= 0.0 and lengths[1] + lengths[2] >= known.MIN_LENGTH
 
 
 def _are_axles(names: tuple[str, ...]) -> bool:
@@ -68,14 +54,14 @@ class Wheel:
     """Width of the tread in [m]."""
     mass: Mass
     """Mass with drive in [kg]."""
-    max_torque: Annotated[float, number("N m", least=MIN_TORQUE, most=MAX_TORQUE)]
+    max_torque: Annotated[float, number("N m", least=known.MIN_TORQUE, most=known.MAX_TORQUE)]
     """Largest torque of the drive in [N m]."""
-    max_speed: Annotated[float, number("rad/s", least=MIN_SPEED, most=MAX_SPEED)]
+    max_speed: Annotated[float, number("rad/s", least=known.MIN_SPEED, most=known.MAX_SPEED)]
     """Largest speed of the drive in [rad/s]."""
     servo_droop: Annotated[float, number("", least=0.0, below=1.0)] = DEFAULT_SERVO_DROOP
     """Share of the commanded speed that the drive's servo loses at full torque; 0 is stiff."""
     torque_per_current: (
-        Annotated[float, number("N m/A", least=MIN_TORQUE, most=MAX_TORQUE)] | None
+        Annotated[float, number("N m/A", least=known.MIN_TORQUE, most=known.MAX_TORQUE)] | None
     ) = None
     """Torque at the wheel over the motor's current in [N m/A], for logs of currents; None if it is
     not known."""
@@ -92,9 +78,9 @@ class Steering:
         ),
     ]
     """Positions of the wheels that turn: ``"rear"``, ``"middle"``, ``"front"``."""
-    limit: Annotated[float, number("rad", least=MIN_STEERING, most=math.pi)]
+    limit: Annotated[float, number("rad", least=known.MIN_STEERING, most=math.pi)]
     """Largest steering angle to either side in [rad]."""
-    rate: Annotated[float, number("rad/s", least=MIN_SPEED, most=MAX_SPEED)]
+    rate: Annotated[float, number("rad/s", least=known.MIN_SPEED, most=known.MAX_SPEED)]
     """Largest speed of the steering in [rad/s]."""
 
 
@@ -167,9 +153,9 @@ class Limits:
     """Largest friction utilisation of a wheel."""
     torque_saturation: Share
     """Largest torque saturation of a wheel: |torque| over the drive's largest torque."""
-    belly_clearance: Annotated[float, number("m", least=0.0, most=MAX_COORDINATE)]
+    belly_clearance: Annotated[float, number("m", least=0.0, most=known.MAX_COORDINATE)]
     """Smallest height of the belly over the ground in [m]."""
-    wheel_drop: Annotated[float, number("m", least=0.0, most=MAX_COORDINATE)]
+    wheel_drop: Annotated[float, number("m", least=0.0, most=known.MAX_COORDINATE)]
     """Largest height that a wheel may drop when it rolls off an edge in [m]."""
     further: Annotated[dict[str, float], Keys({})] = field(default_factory=dict)
     """Numbers of limits that a rover file may leave out, by the keys of the table of limits; in a
@@ -220,7 +206,7 @@ class Rover:
 
     name: Text
     """Name of the rover."""
-    gravity: Annotated[float, number("m/s^2", least=MIN_GRAVITY, most=MAX_GRAVITY)]
+    gravity: Annotated[float, number("m/s^2", least=known.MIN_GRAVITY, most=known.MAX_GRAVITY)]
     """Acceleration of gravity in [m/s^2]."""
     wheel: Wheel
     """Each of the six wheels."""
@@ -230,7 +216,7 @@ class Rover:
     """Body, rockers and bogies."""
     belly: Belly
     """Underside of the body, for its clearance."""
-    friction: Annotated[float, number("", least=MIN_FRICTION, most=MAX_FRICTION)]
+    friction: Annotated[float, number("", least=known.MIN_FRICTION, most=known.MAX_FRICTION)]
     """Coulomb friction coefficient where the terrain has none."""
     nominal_speed: Speed
     """Driving speed in [m/s]."""

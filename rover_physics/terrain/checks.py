@@ -11,13 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rover_physics.errors import TerrainError
 from rover_physics.files.validation import describe
-from rover_physics.numerics.plausible import (
-    MAX_COORDINATE,
-    MAX_FRICTION,
-    MAX_RESOLUTION,
-    MIN_FRICTION,
-    MIN_RESOLUTION,
-)
+from rover_physics.numerics import plausible as known
 
 MAX_CLASS = 65535
 """Largest class of ground."""
@@ -25,7 +19,7 @@ MAX_CLASS = 65535
 
 def as_elevation(values: ArrayLike) -> NDArray[np.float64]:
     """Return heights (ny, nx) [m]; at least one must be known."""
-    elevation = _as_grid("elevation", values, MAX_COORDINATE)
+    elevation = _as_grid("elevation", values, known.MAX_COORDINATE)
     if np.isnan(elevation).all():
         ny, nx = elevation.shape
         raise TerrainError(
@@ -36,10 +30,10 @@ def as_elevation(values: ArrayLike) -> NDArray[np.float64]:
 
 def as_friction(values: ArrayLike, elevation: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return friction coefficients (ny, nx), each above 0 or NaN."""
-    friction = _as_grid("friction", values, MAX_FRICTION)
+    friction = _as_grid("friction", values, known.MAX_FRICTION)
     _check_shape("friction", friction, elevation)
-    must = f"above 0, at least {MIN_FRICTION:g}, or NaN for the default"
-    _refuse_first(friction, friction < MIN_FRICTION, "friction", must)
+    must = f"above 0, at least {known.MIN_FRICTION:g}, or NaN for the default"
+    _refuse_first(friction, friction < known.MIN_FRICTION, "friction", must)
     return friction
 
 
@@ -86,7 +80,7 @@ def as_soil_names(values: Any) -> tuple[str, ...]:
 
 def as_elevation_std(values: ArrayLike, elevation: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return standard deviations (ny, nx) [m], at least 0 and known where the height is known."""
-    std = _as_grid("elevation_std", values, MAX_COORDINATE)
+    std = _as_grid("elevation_std", values, known.MAX_COORDINATE)
     _check_shape("elevation_std", std, elevation)
     _refuse_first(std, std < 0.0, "elevation_std", "at least 0")
     missing = np.isnan(std) & np.isfinite(elevation)
@@ -99,11 +93,11 @@ def as_resolution(value: Any) -> float:
     number = np.asarray(value)
     if number.dtype.kind in "fiu" and number.size == 1:
         resolution = float(number.reshape(()))
-        if MIN_RESOLUTION <= resolution <= MAX_RESOLUTION:
+        if known.MIN_RESOLUTION <= resolution <= known.MAX_RESOLUTION:
             return resolution
     raise TerrainError(
         f"resolution is {value!s:.60}; it must be one number above 0 in m, from "
-        f"{MIN_RESOLUTION:g} to {MAX_RESOLUTION:g}"
+        f"{known.MIN_RESOLUTION:g} to {known.MAX_RESOLUTION:g}"
     )
 
 
@@ -115,11 +109,11 @@ def as_origin(value: Any) -> tuple[float, float]:
         point = np.empty(0)
     if point.dtype.kind in "fiu" and point.shape == (2,):
         x, y = float(point[0]), float(point[1])
-        if abs(x) <= MAX_COORDINATE and abs(y) <= MAX_COORDINATE:
+        if abs(x) <= known.MAX_COORDINATE and abs(y) <= known.MAX_COORDINATE:
             return (x, y)
     raise TerrainError(
         f"origin is {value!s:.60}; it must be two numbers in m, x and y of the centre of cell "
-        f"[0, 0], within {MAX_COORDINATE:g}"
+        f"[0, 0], within {known.MAX_COORDINATE:g}"
     )
 
 
