@@ -114,10 +114,6 @@ def choice(*names: str) -> Rule:
 Text = Annotated[str, Rule("a text that is not empty", holds=str.strip)]
 Metres = Annotated[float, number("m")]
 Radians = Annotated[float, number("rad")]
-Point = Annotated[
-    tuple[Metres, Metres, Metres], Rule("a list of 3 numbers in m, [x, y, z] in the body frame")
-]
-"""A position in [m]."""
 
 
 def _list_to_tuple(value: Any) -> Any:

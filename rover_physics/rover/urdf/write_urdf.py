@@ -107,10 +107,8 @@ def _body(rover: Rover) -> str:
     low = np.array([belly.x[0], belly.y[0], belly.z])
     height = max(BAR, 2.0 * (com[2] - belly.z))
     high = np.array([belly.x[1], belly.y[1], belly.z + height])
-    box = f'<box size="{_text(high - low)}"/>'
-    shapes = _shape("visual", 0.5 * (low + high), box) + _shape(
-        "collision", 0.5 * (low + high), box
-    )
+    middle, box = 0.5 * (low + high), f'<box size="{_text(high - low)}"/>'
+    shapes = _shape("visual", middle, box) + _shape("collision", middle, box)
     return _link(ROOT, mass, com, high - low, shapes)
 
 

@@ -12,13 +12,17 @@ from rover_physics.files.rules import (
     Keys,
     ListOfMappings,
     Metres,
-    Point,
+    Rule,
     Text,
     choice,
     interval,
     number,
 )
 from rover_physics.files.validation import describe, errors_of, read_as, show_key
+
+Point = Annotated[
+    tuple[Metres, Metres, Metres], Rule("a list of 3 numbers in m, [x, y, z] in the body frame")
+]
 
 
 @dataclass(frozen=True)
