@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from msg_adapters.errors import MessageError
+from rover_physics.numerics.arrays import seal_array
 from rover_physics.numerics.plausible import MAX_COORDINATE, MIN_RESOLUTION
-from rover_physics.numerics.read_only import seal_array
 from rover_physics.terrain.grid import Terrain
 
 MAX_CELLS = 25_000_000

@@ -9,7 +9,7 @@ from scipy.ndimage import gaussian_filter
 
 from rover_physics import Rover, SweepOptions, Terrain, judge_path
 from rover_physics.bounds.path import bound_path
-from rover_physics.results.path_bounds import BOUNDED_VALUES
+from rover_physics.results.path_prediction import BOUNDED_VALUES
 from support.rough_grounds import RESOLUTION, fractal, plane, rocky
 
 ROUNDING = 1e-6

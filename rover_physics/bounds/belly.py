@@ -5,7 +5,7 @@ import numpy as np
 
 from rover_physics.contact.clearance import POINTS, point_of_underside
 from rover_physics.numerics.kernels import kernel
-from rover_physics.terrain.ground import elevation_of, height_at_cell, look_up
+from rover_physics.terrain.ground import elevation_of, height_at_cell, look_up, to_cells
 
 
 @kernel
@@ -78,8 +78,7 @@ def _bound_points(uncertain, work, shift, bend, least):
         height, slope_x, slope_y = look_up(ground, x, y)
         if height != height:
             continue
-        gx = (x - ground.x0) * ground.inverse_resolution
-        gy = (y - ground.y0) * ground.inverse_resolution
+        gx, gy = to_cells(ground, x, y)
         wrong = height_at_cell(uncertain.error, gx, gy) + bend
         wrong = wrong + shift * (abs(slope_x) + abs(slope_y))
         lowered, raised = _plane_change(

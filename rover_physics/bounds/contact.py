@@ -11,11 +11,11 @@ on a slope.
 import numpy as np
 
 from rover_physics.contact.circle_search import search_circle
+from rover_physics.contact.contact_record import MAX_ANGLES, MAX_CIRCLES
 from rover_physics.contact.wheel import COMPLIANCE
-from rover_physics.contact.wheel_samples import MAX_ANGLES, MAX_CIRCLES
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import record_type
-from rover_physics.terrain.ground import elevation_of, height_at_cell, is_cell_on_map
+from rover_physics.terrain.ground import elevation_of, height_at_cell, is_cell_on_map, to_cells
 
 RUNGS = 4
 """Number of places between a point and the nearest point with which the point is compared."""
@@ -80,10 +80,9 @@ def bound_contacts(uncertain, work, nominal):
 def _find_largest_error(uncertain, work, wheel):
     """Return the largest error [m] of a height near a wheel."""
     ground, samples = uncertain.nominal.ground, uncertain.nominal.samples
-    error, placement = uncertain.error, work.rover.placement
+    error, centres = uncertain.error, work.rover.placement.centres
     extent = samples.extent * ground.inverse_resolution
-    gx = (placement.centres[wheel, 0] - ground.x0) * ground.inverse_resolution
-    gy = (placement.centres[wheel, 1] - ground.y0) * ground.inverse_resolution
+    gx, gy = to_cells(ground, centres[wheel, 0], centres[wheel, 1])
     largest = 0.0
     for i in range(max(int(gy - extent), 0), min(int(gy + extent) + 2, error.rows)):
         for j in range(max(int(gx - extent), 0), min(int(gx + extent) + 2, error.columns)):
@@ -138,16 +137,14 @@ def _gap_at(model, rover, circle, turn):
     `circle` is (wheel, index of its circle), `turn` (sine, cosine) of the contact angle.
     """
     ground, samples, placement = model.ground, model.samples, rover.placement
-    wheel, m = circle
-    s, c = turn
+    (wheel, m), (s, c) = circle, turn
     axis, centres = placement.axis[wheel], placement.centres
     forward, up = placement.forward[wheel], placement.up[wheel]
     across, radius = samples.laterals[m], samples.radius
     x = centres[wheel, 0] + across * axis[0] + radius * (s * forward[0] - c * up[0])
     y = centres[wheel, 1] + across * axis[1] + radius * (s * forward[1] - c * up[1])
     z = centres[wheel, 2] + across * axis[2] - radius * c * up[2]
-    gx = (x - ground.x0) * ground.inverse_resolution
-    gy = (y - ground.y0) * ground.inverse_resolution
+    gx, gy = to_cells(ground, x, y)
     if not is_cell_on_map(ground, gx, gy):
         return np.nan, (gx, gy)
     return z - height_at_cell(ground, gx, gy), (gx, gy)

@@ -14,12 +14,13 @@ of the Engineering Mechanics Division 100(1), 1974.
 
 import numpy as np
 
+from rover_physics.contact.contact_record import write_point
 from rover_physics.forces.equilibrium import FREE_FORCES, balance_forces
 from rover_physics.forces.shares import has_turned_wheels
 from rover_physics.forces.soil import SoilWheel, solve_wheel
 from rover_physics.forces.soil_sharing import rolling_direction
 from rover_physics.forces.stability import CORNERS, measure_edge
-from rover_physics.forces.torques import apply_torques, minimise_friction, take_equal_torques
+from rover_physics.forces.torques import apply_torques, minimise_friction
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import record_type
 from rover_physics.prediction.evaluation import find_tip_over
@@ -194,8 +195,7 @@ def _choose_torques(model, work):
 def _evaluate(model, work):
     """Write the outputs at the inputs `box.at`; return False if the balance is singular."""
     linkage, rover, spread, box = model.linkage, work.rover, work.spread, work.box
-    placement, contacts, search = rover.placement, rover.contacts, rover.search
-    q = spread.trial
+    placement, search, q = rover.placement, rover.search, spread.trial
     for i in range(6):
         q[i] = spread.q[i]
         for wheel in range(6):
@@ -203,30 +203,17 @@ def _evaluate(model, work):
     place(linkage, rover.pose, q, placement)
     place_masses(linkage, q, placement)
     for wheel in range(6):
-        s, c = np.sin(box.at[ANGLE_INPUTS + wheel]), np.cos(box.at[ANGLE_INPUTS + wheel])
-        contacts.sine[wheel], contacts.cosine[wheel] = s, c
-        for i in range(3):
-            radial = s * placement.forward[wheel, i] - c * placement.up[wheel, i]
-            aside = box.at[PLACE_INPUTS + wheel] * placement.axis[wheel, i]
-            contacts.point[wheel, i] = (
-                placement.centres[wheel, i] + aside + linkage.radius * radial
-            )
-    if not balance_forces(linkage, placement, contacts, box.columns, rover.balance):
+        turn = np.sin(box.at[ANGLE_INPUTS + wheel]), np.cos(box.at[ANGLE_INPUTS + wheel])
+        write_point(linkage.radius, rover, wheel, turn, box.at[PLACE_INPUTS + wheel])
+    if not balance_forces(linkage, placement, rover.contacts, box.columns, rover.balance):
         return False
-    if box.columns == 1:
-        take_equal_torques(rover.balance, search)
-    else:
-        apply_torques(rover.balance, FREE_FORCES, search)
+    apply_torques(rover.balance, box.columns - 1, search)
     for wheel in range(6):
         N, T, S = search.wheel_loads[wheel], search.tangential[wheel], search.lateral[wheel]
-        (
-            box.value[LOAD_OUTPUTS + wheel],
-            box.value[PULL_OUTPUTS + wheel],
-            box.value[SIDE_OUTPUTS + wheel],
-        ) = N, T, S
-        box.value[USE_OUTPUTS + wheel] = _worst_use(
-            model, box, wheel, (N, rolling_direction(rover, wheel) * T, S)
-        )
+        box.value[LOAD_OUTPUTS + wheel], box.value[PULL_OUTPUTS + wheel] = N, T
+        box.value[SIDE_OUTPUTS + wheel] = S
+        as_it_rolls = N, rolling_direction(rover, wheel) * T, S
+        box.value[USE_OUTPUTS + wheel] = _worst_use(model, box, wheel, as_it_rolls)
     find_tip_over(linkage, rover)
     for edge in range(CORNERS):
         angle, measure = measure_edge(rover.corners, edge, rover.centre, rover.force, rover.moment)

@@ -28,17 +28,21 @@ from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES
 from rover_physics.forces.soil import SoilWheel, solve_wheel
 from rover_physics.forces.stability import CORNERS
 from rover_physics.names import EQUAL, OPTIMAL, SERVO
+from rover_physics.numerics.arrays import seal_array, view_read_only
 from rover_physics.numerics.interruption import slices
 from rover_physics.numerics.kernels import kernel
-from rover_physics.numerics.read_only import seal_array, view_read_only
 from rover_physics.numerics.records import record_type
 from rover_physics.numerics.threads import limit_threads, run_chunks
 from rover_physics.prediction.evaluation import CHUNK, MAX_CHUNKS, MODEL, WORK, set_pose
 from rover_physics.prediction.packed_model import PackedModel, forget_models, pack_model
 from rover_physics.prediction.sweep import check_poses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
-from rover_physics.results.path_bounds import BOUNDED_VALUES, BOUNDS, PathBounds
-from rover_physics.results.path_prediction import PathPrediction
+from rover_physics.results.path_prediction import (
+    BOUNDED_VALUES,
+    BOUNDS,
+    PathBounds,
+    PathPrediction,
+)
 from rover_physics.rover.linkage import place
 from rover_physics.rover.model import Rover
 from rover_physics.status import BoundStatus, PoseStatus, TorquePolicy

@@ -15,7 +15,12 @@ Robotics 37(5), 2020.
 import numpy as np
 
 from rover_physics.contact.contact_record import SearchScope
-from rover_physics.contact.gap_rates import GroundSlope, write_gap_rates
+from rover_physics.contact.settling import (
+    GroundSlope,
+    find_step,
+    limit_step,
+    write_gap_rates,
+)
 from rover_physics.contact.wheel import find_contact
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_solve import solve_in_place
@@ -281,15 +286,9 @@ def _approach(uncertain, work):
             return outcome, worst
         if attempt == EXTREME_STEPS - 1:
             break
-        write_gap_rates(linkage, rover.placement, rover.contacts, GroundSlope.SLOPED, rover.J)
-        for wheel in range(6):
-            rover.step[wheel, 0] = rover.contacts.gap[wheel]
-        if not solve_in_place(rover.J, rover.step, 6, 1):
+        if not find_step(linkage, rover, GroundSlope.SLOPED):
             return BoundStatus.ON_EDGE, worst
-        turn = 0.0
-        for i in range(1, 6):
-            turn = max(turn, abs(rover.step[i, 0]))
-        share = min(1.0, MAX_TURN / turn) if turn > 0.0 else 1.0
+        share = limit_step(rover.step, MAX_TURN)
         if attempt > 3:
             share *= 0.5
         for i in range(6):

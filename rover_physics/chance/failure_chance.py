@@ -12,13 +12,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.chance.ground import change_heights, cut_around
-from rover_physics.chance.samples import Sample, draw_samples, sort_by_strength, worst_of
+from rover_physics.chance.samples import (
+    Sample,
+    change_heights,
+    cut_around,
+    draw_samples,
+    sort_by_strength,
+    worst_of,
+)
 from rover_physics.errors import ModelError
 from rover_physics.names import OPTIMAL
-from rover_physics.numerics.arrays import Floats
+from rover_physics.numerics.arrays import Floats, freeze_fields
 from rover_physics.numerics.interruption import check_interruption
-from rover_physics.numerics.read_only import freeze_fields
 from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import Crossings, join_crossings, none_held
 from rover_physics.prediction.servo_path import write_servo_path

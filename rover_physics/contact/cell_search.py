@@ -11,11 +11,10 @@ or where a rim cuts the cell. `intrusion.py` explains the terms; lengths are in 
 import numpy as np
 from numba import int64
 
-from rover_physics.contact.cell_peaks import look_into_cell
+from rover_physics.contact.cell_peaks import LEVEL, away_from_zero, look_along_rim, look_into_cell
 from rover_physics.contact.circle_search import search_circle
 from rover_physics.contact.contact_record import NOTICED
 from rover_physics.contact.intrusion import ROUNDING, begin_search, is_below, is_beside, take_point
-from rover_physics.contact.rim_search import LEVEL, away_from_zero, look_along_rim
 from rover_physics.contact.tracking import keep_contact, take_circle
 from rover_physics.numerics.kernels import kernel
 from rover_physics.status import ContactStatus

@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Record of the wheel contacts, and the scopes of the contact search."""
+"""Records of the wheel contacts and of the samples of a wheel, and the scopes of the search."""
 
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 
 from rover_physics.numerics.kernels import kernel
-from rover_physics.numerics.records import record_type
+from rover_physics.numerics.records import new_record, record_type
+from rover_physics.rover.model import Rover
 
 
 class SearchScope(IntEnum):
@@ -28,6 +30,24 @@ NOTICED = 1e-4
 """Difference of gaps [wheel radii] up to which a contact elsewhere is not taken."""
 KEPT = 4
 """Earlier contacts of a wheel that are looked at again."""
+
+MAX_ANGLES, MAX_CIRCLES = 49, 9
+"""Largest numbers of angles and circles, which fix the sizes of the records."""
+RIMS = 3
+"""Scanned circles: both rims and the middle one."""
+WHEEL_SAMPLES = record_type(
+    ("radius", float),  # wheel radius [m]
+    ("extent", float),  # largest horizontal distance of a sample from the wheel's centre [m]
+    ("rows", np.int64),  # number k of contact angles
+    ("circles", np.int64),  # number m of circles
+    ("sines", float, (MAX_ANGLES,)),  # (k,) sines of the contact angles, ascending
+    ("cosines", float, (MAX_ANGLES,)),  # (k,) their cosines
+    ("spacing_sine", float),  # sine of the angle between neighbouring samples
+    ("spacing_cosine", float),  # cosine of the angle between neighbouring samples
+    ("half_width", float),  # distance of the outer circles from the middle plane [m]
+    ("laterals", float, (MAX_CIRCLES,)),  # (m,) distances from the middle plane [m], ascending
+)
+"""Samples of a wheel's cylinder: k angles on each of m circles."""
 
 CONTACTS = record_type(
     ("gap", float, (6,)),  # smallest vertical gap, negative inside the ground [m]
@@ -75,9 +95,51 @@ CELL_SEARCH = record_type(
 """Work space of `look_everywhere`."""
 
 
+def sample_wheel(rover: Rover, resolution: float) -> Any:
+    """Return WHEEL_SAMPLES about as dense as the cells of a terrain of `resolution` [m].
+
+    There are 21 to 49 angles and 5 to 9 circles.
+    """
+    wheel = rover.wheel
+    half_angles = int(np.clip(np.ceil(0.5 * np.pi * wheel.radius / resolution), 10, 24))
+    half_laterals = int(np.clip(np.ceil(0.5 * wheel.width / resolution), 2, 4))
+    angles = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 2 * half_angles + 1)
+    samples = new_record(
+        WHEEL_SAMPLES,
+        radius=wheel.radius,
+        extent=np.hypot(wheel.radius, 0.5 * wheel.width),
+        rows=angles.size,
+        circles=2 * half_laterals + 1,
+        half_width=0.5 * wheel.width,
+        spacing_sine=np.sin(angles[1] - angles[0]),
+        spacing_cosine=np.cos(angles[1] - angles[0]),
+    )
+    samples.sines[: angles.size], samples.cosines[: angles.size] = np.sin(angles), np.cos(angles)
+    half = samples.half_width
+    samples.laterals[: samples.circles] = np.linspace(-half, half, samples.circles)
+    return samples
+
+
 @kernel
 def hold_wheels(held, i, contacts):
     """Copy height and contact angle of the held wheels at pose i into the contacts."""
     for wheel in range(6 if held.shape[0] > 0 else 0):
         contacts.held_height[wheel] = held[i, wheel, 0]
         contacts.held_angle[wheel] = held[i, wheel, 1]
+
+
+@kernel
+def write_point(radius, work, wheel, turn, across):
+    """Write a point of a wheel's cylinder [m], map frame, and its contact angle into the contacts.
+
+    `turn` is (sine, cosine) of the contact angle, `across` the distance from the middle plane
+    [m], positive to the left.
+    """
+    placement, contacts = work.placement, work.contacts
+    axis, centres = placement.axis[wheel], placement.centres
+    forward, up = placement.forward[wheel], placement.up[wheel]
+    s, c = turn
+    contacts.sine[wheel], contacts.cosine[wheel] = s, c
+    for i in range(3):
+        radial = radius * (s * forward[i] - c * up[i])
+        contacts.point[wheel, i] = centres[wheel, i] + across * axis[i] + radial

@@ -10,6 +10,7 @@ import numpy as np
 
 from rover_physics.contact.contact_record import NOTICED
 from rover_physics.numerics.kernels import kernel
+from rover_physics.terrain.ground import to_cells
 
 ROUNDING = 1e-9
 """Bound of rounding errors of places and intrusions [cells]."""
@@ -23,8 +24,7 @@ def begin_search(model, work, wheel):
     scale = ground.inverse_resolution
     search.cell = 1.0 / scale
     search.radius = samples.radius * scale
-    search.x = (centres[wheel, 0] - ground.x0) * scale
-    search.y = (centres[wheel, 1] - ground.y0) * scale
+    search.x, search.y = to_cells(ground, centres[wheel, 0], centres[wheel, 1])
     search.z = centres[wheel, 2]
     search.ahead_x, search.ahead_y = placement.forward[wheel, 0], placement.forward[wheel, 1]
     search.cosine, search.sine = placement.up[wheel, 2], placement.axis[wheel, 2]

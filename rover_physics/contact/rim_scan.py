@@ -3,8 +3,7 @@
 
 import numpy as np
 
-from rover_physics.contact.contact_record import SearchScope
-from rover_physics.contact.wheel_samples import RIMS
+from rover_physics.contact.contact_record import RIMS, SearchScope
 from rover_physics.numerics.kernels import kernel
 from rover_physics.status import ContactStatus
 from rover_physics.terrain.ground import (
@@ -12,6 +11,7 @@ from rover_physics.terrain.ground import (
     height_at_cell,
     height_inside,
     is_cell_on_map,
+    to_cells,
 )
 
 
@@ -133,8 +133,7 @@ def scan_carefully(model, work, wheel, scope):
         first, last, stride = 1, 1, 2
     axis, centres = placement.axis[wheel], placement.centres
     forward, up = placement.forward[wheel], placement.up[wheel]
-    scale, radius = ground.inverse_resolution, samples.radius
-    middle = samples.rows // 2
+    radius, middle = samples.radius, samples.rows // 2
     status, best, best_rim, best_row = ContactStatus.IN_CONTACT, np.inf, first, middle
     for visit in range((samples.rows - 1) // stride + 1):
         k = middle + stride * ((visit + 1) // 2) * (1 - 2 * (visit % 2))
@@ -143,7 +142,7 @@ def scan_carefully(model, work, wheel, scope):
             across = (rim - 1) * samples.half_width
             x = centres[wheel, 0] + across * axis[0] + radius * (s * forward[0] - c * up[0])
             y = centres[wheel, 1] + across * axis[1] + radius * (s * forward[1] - c * up[1])
-            gx, gy = (x - ground.x0) * scale, (y - ground.y0) * scale
+            gx, gy = to_cells(ground, x, y)
             if not is_cell_on_map(ground, gx, gy):
                 status = ContactStatus.OFF_MAP
                 continue

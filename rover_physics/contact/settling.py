@@ -13,14 +13,15 @@ bracketing finds it whatever the shape of the ground. The wheels are closed in t
 lift shifts the other wheels sideways.
 """
 
+from enum import IntEnum
+
 import numpy as np
 
 from rover_physics.contact.contact_record import SearchScope
-from rover_physics.contact.gap_rates import GroundSlope, write_gap_rates
 from rover_physics.contact.wheel import blend_contact, find_contact
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_solve import solve_in_place
-from rover_physics.rover.linkage import place
+from rover_physics.rover.linkage import place, rocker_sign
 from rover_physics.status import ContactStatus, PoseStatus
 
 GAP_TOLERANCE = 3e-5
@@ -29,6 +30,8 @@ NEWTON_TOLERANCE = 5e-6
 """Largest gap at which Newton's method stops [m]."""
 MAX_NEWTON_STEPS = 6
 """Largest number of Newton steps."""
+MAX_STEP = 0.5
+"""Largest change of an angle in one of them [rad]."""
 QUICK_ATTEMPTS = 5
 """Newton's method runs up to this often; after each time, all ground is looked at."""
 PROMISING = 2.0
@@ -50,6 +53,15 @@ CLOSER = 0.1
 """Share of the largest gap to which each gap is closed."""
 MAX_TURN = 0.3
 """Largest change of an angle in one trial [rad]."""
+
+
+class GroundSlope(IntEnum):
+    """Slope of the ground that the derivatives of the gaps assume."""
+
+    LEVEL = 0
+    """Level ground under each wheel."""
+    SLOPED = 1
+    """The slope at the contact."""
 
 
 @kernel
@@ -75,8 +87,8 @@ def settle(model, work):
     if np.isnan(worst):
         return _refuse(status)
     _lower_to_ground(work)
-    if _find_step(model.linkage, work, GroundSlope.LEVEL):
-        share = _limit_step(work.step)
+    if find_step(model.linkage, work, GroundSlope.LEVEL):
+        share = limit_step(work.step, MAX_STEP)
         for i in range(6):
             work.q[i] -= share * work.step[i, 0]
     place(model.linkage, work.pose, work.q, work.placement)
@@ -270,9 +282,9 @@ def _newton(model, work):
     for _ in range(MAX_NEWTON_STEPS):
         if worst <= NEWTON_TOLERANCE or np.isnan(worst):
             return
-        if not _find_step(model.linkage, work, GroundSlope.SLOPED):
+        if not find_step(model.linkage, work, GroundSlope.SLOPED):
             return
-        fraction = _limit_step(step)
+        fraction = limit_step(step, MAX_STEP)
         improved = np.inf
         taken = 0.0
         for _ in range(6):
@@ -307,18 +319,70 @@ def _lower_to_ground(work):
 
 
 @kernel
-def _limit_step(step):
-    """Return the fraction of `step` that changes no angle by more than 0.5 rad."""
+def limit_step(step, most):
+    """Return the fraction of `step` (6, 1) that changes no angle by more than `most` [rad]."""
     largest = 0.0
     for i in range(1, 6):
         largest = max(largest, abs(step[i, 0]))
-    return min(1.0, 0.5 / largest) if largest > 0.0 else 1.0
+    return min(1.0, most / largest) if largest > 0.0 else 1.0
 
 
 @kernel
-def _find_step(linkage, work, ground_is):
+def find_step(linkage, work, ground_is):
     """Solve J step = gaps; `ground_is` is a GroundSlope. Return False if J is singular."""
     write_gap_rates(linkage, work.placement, work.contacts, ground_is, work.J)
     for i in range(6):
         work.step[i, 0] = work.contacts.gap[i]
     return solve_in_place(work.J, work.step, 6, 1)
+
+
+@kernel
+def write_gap_rates(linkage, placement, contacts, ground_is, J):
+    """Write the derivatives of the gaps by q into J (6, 6) [m/m or m/rad].
+
+    Args:
+        linkage: LINKAGE.
+        placement: PLACEMENT at q.
+        contacts: CONTACTS with points and normals.
+        ground_is: A GroundSlope.
+        J: (6, 6), row per wheel, column per element of q; written.
+    """
+    J[:, :] = 0.0
+    R, origin = placement.R, placement.origin
+    point, normal = contacts.point, contacts.normal
+    length = np.sqrt(R[0, 0] * R[0, 0] + R[1, 0] * R[1, 0])
+    body_x = R[0, 0], R[1, 0], R[2, 0]
+    body_y = R[0, 1], R[1, 1], R[2, 1]
+    level_y = -(R[1, 0] / length), R[0, 0] / length, 0.0
+    slope = 0.0, 0.0
+    for i in range(6):
+        side = i // 3
+        if ground_is == GroundSlope.SLOPED:
+            slope = normal[i, 0], normal[i, 1]
+        arm = _arm_from(origin, point[i])
+        J[i, 0] = 1.0
+        J[i, 1] = _gap_rate(body_x, arm, slope)
+        J[i, 2] = _gap_rate(level_y, arm, slope)
+        arm = _arm_from(placement.rocker_pivots[side], point[i])
+        J[i, 3] = rocker_sign(side) * _gap_rate(body_y, arm, slope)
+        if linkage.on_bogie[i]:
+            arm = _arm_from(placement.bogie_pivots[side], point[i])
+            J[i, 4 + side] = _gap_rate(body_y, arm, slope)
+
+
+@kernel
+def _arm_from(pivot, point):
+    """Return the vector (x, y, z) [m] from a pivot (3,) to a point (3,)."""
+    return point[0] - pivot[0], point[1] - pivot[1], point[2] - pivot[2]
+
+
+@kernel
+def _gap_rate(axis, arm, slope):
+    """Return the change of the gap at the end of `arm` per rotation about an axis [m/rad].
+
+    `axis` and `arm` are (x, y, z), `slope` the (x, y) of the contact normal.
+    """
+    ax, ay, az = axis
+    dx, dy, dz = arm
+    nx, ny = slope
+    return nx * (ay * dz - az * dy) + ny * (az * dx - ax * dz) + (ax * dy - ay * dx)

@@ -12,12 +12,12 @@ import numpy as np
 
 from rover_physics.contact.cell_search import look_everywhere
 from rover_physics.contact.circle_search import search_circle_below
-from rover_physics.contact.contact_record import SearchScope
+from rover_physics.contact.contact_record import SearchScope, write_point
 from rover_physics.contact.rim_scan import find_tops, scan_carefully, scan_rims
 from rover_physics.contact.tracking import follow_contact, keep_contact, look_at_kept
 from rover_physics.numerics.kernels import kernel
 from rover_physics.status import ContactStatus
-from rover_physics.terrain.ground import height_inside
+from rover_physics.terrain.ground import height_inside, to_cells
 
 COMPLIANCE = 2e-3
 """Deformation of real wheels and ground [wheel radii]. Circles whose gaps differ by less share the
@@ -85,7 +85,7 @@ def _guess(model, work, wheel):
     ground, samples, placement = model.ground, model.samples, work.placement
     forward, up, centres = placement.forward[wheel], placement.up[wheel], placement.centres
     scale, radius = ground.inverse_resolution, samples.radius
-    gx, gy = (centres[wheel, 0] - ground.x0) * scale, (centres[wheel, 1] - ground.y0) * scale
+    gx, gy = to_cells(ground, centres[wheel, 0], centres[wheel, 1])
     size = radius * scale
     if not (
         gx >= size
@@ -109,7 +109,7 @@ def _guess(model, work, wheel):
         return False
     work.contacts.gap[wheel] = centres[wheel, 2] + nearest
     work.contacts.across[wheel], work.contacts.inside[wheel] = 0.0, 0
-    write_point(samples, work, wheel, (samples.sines[row], samples.cosines[row]), 0.0)
+    write_point(samples.radius, work, wheel, (samples.sines[row], samples.cosines[row]), 0.0)
     return True
 
 
@@ -131,7 +131,7 @@ def _write_contact(work, wheel, samples):
     """
     contacts = work.contacts
     turn = contacts.sine[wheel], contacts.cosine[wheel]
-    write_point(samples, work, wheel, turn, contacts.across[wheel])
+    write_point(samples.radius, work, wheel, turn, contacts.across[wheel])
     if contacts.inside[wheel]:
         _write_radial_normal(work, wheel, turn)
     else:
@@ -172,7 +172,7 @@ def blend_contact(model, work, wheel):
     samples, contacts = model.samples, work.contacts
     if contacts.held_height[wheel] == contacts.held_height[wheel]:
         s, c = np.sin(contacts.held_angle[wheel]), np.cos(contacts.held_angle[wheel])
-        write_point(samples, work, wheel, (s, c), 0.0)
+        write_point(samples.radius, work, wheel, (s, c), 0.0)
         return
     allowance = COMPLIANCE * samples.radius
     largest_gap = contacts.gap[wheel] + CIRCLE_GAP * samples.radius
@@ -198,24 +198,7 @@ def blend_contact(model, work, wheel):
     if total > 0.0:
         length = np.sqrt(sine_sum * sine_sum + cosine_sum * cosine_sum)
         turn = sine_sum / length, cosine_sum / length
-        write_point(samples, work, wheel, turn, across_sum / total)
-
-
-@kernel
-def write_point(samples, work, wheel, turn, lateral):
-    """Write a point of the cylinder [m], map frame, and its contact angle into the contacts.
-
-    `turn` is (sine, cosine) of the contact angle, `lateral` the distance from the middle plane
-    [m], positive to the left.
-    """
-    placement, contacts = work.placement, work.contacts
-    axis, centres = placement.axis[wheel], placement.centres
-    forward, up = placement.forward[wheel], placement.up[wheel]
-    s, c = turn
-    contacts.sine[wheel], contacts.cosine[wheel] = s, c
-    for i in range(3):
-        radial = samples.radius * (s * forward[i] - c * up[i])
-        contacts.point[wheel, i] = centres[wheel, i] + lateral * axis[i] + radial
+        write_point(samples.radius, work, wheel, turn, across_sum / total)
 
 
 @kernel

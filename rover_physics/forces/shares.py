@@ -166,15 +166,13 @@ def _write_creeps(shares):
 @kernel
 def _choose_free_wheels(shares):
     """Choose the two wheels that are not free: rear and front right if these are well apart."""
-    rear, front, largest = 0, 2, 0.0
+    rear, front, one, other = 0, 2, 0, 2
     for i in range(5):
         for k in range(i + 1, 6):
-            largest = max(largest, _apart(shares, i, k))
-    if _apart(shares, rear, front) < WELL_APART * largest:
-        for i in range(5):
-            for k in range(i + 1, 6):
-                if _apart(shares, i, k) > _apart(shares, rear, front):
-                    rear, front = i, k
+            if _apart(shares, i, k) > _apart(shares, one, other):
+                one, other = i, k
+    if _apart(shares, rear, front) < WELL_APART * _apart(shares, one, other):
+        rear, front = one, other
     row = 0
     for wheel in range(6):
         if wheel != rear and wheel != front:

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Wheel forces on soil, where friction and resistance depend on the wheel loads."""
 
+import numpy as np
+
 from rover_physics.forces.soil import SoilWheel, effective_friction, solve_wheel
-from rover_physics.forces.torques import minimise_friction, take_equal_torques
+from rover_physics.forces.torques import apply_torques, minimise_friction
 from rover_physics.numerics.kernels import kernel
 from rover_physics.status import TorquePolicy
 from rover_physics.terrain.ground import copy_soil, soil_row_at
@@ -29,7 +31,7 @@ def share_forces_on_soil(model, work):
     for wheel in range(6):
         x, y = work.contacts.point[wheel, 0], work.contacts.point[wheel, 1]
         copy_soil(ground, soil_row_at(ground, x, y), work.soils[wheel])
-    take_equal_torques(work.balance, search)
+    apply_torques(work.balance, np.int64(0), search)
     if settings.policy == TorquePolicy.EQUAL:
         return
     least = _needed(linkage, settings, work)

@@ -63,7 +63,10 @@ TORQUE_SEARCH = record_type(
 
 @kernel
 def apply_torques(balance, free, search):
-    """Write the wheel forces at y into the search; only the first `free` elements of y count."""
+    """Write the wheel forces at y into the search; only the first `free` elements of y count.
+
+    With none of them, the forces are those of equal torques.
+    """
     y = search.y
     for i in range(6):
         N, T, S = balance.normal[i, 0], balance.tangential[i, 0], balance.lateral[i, 0]
@@ -72,15 +75,6 @@ def apply_torques(balance, free, search):
             T += balance.tangential[i, 1 + k] * y[k]
             S += balance.lateral[i, 1 + k] * y[k]
         search.wheel_loads[i], search.tangential[i], search.lateral[i] = N, T, S
-
-
-@kernel
-def take_equal_torques(balance, search):
-    """Write the wheel forces of equal torques into the search."""
-    for wheel in range(6):
-        search.wheel_loads[wheel] = balance.normal[wheel, 0]
-        search.tangential[wheel] = balance.tangential[wheel, 0]
-        search.lateral[wheel] = balance.lateral[wheel, 0]
 
 
 @kernel

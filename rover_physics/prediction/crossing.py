@@ -70,7 +70,9 @@ def find_crossings(
     ends = np.vstack([np.arange(len(rows)).reshape(-1, 2), len(rows) + jumps_in_turns])
     while len(ends):
         known = join_crossings([known, _divide(model, known, ends)])
-        ends, closed = _sort_pieces(model, known, ends)
+        pieces = np.empty((2, len(ends) * PIECES, 2), np.int64)
+        n_open, n_closed = sort_pieces(ends, PIECES, known.views, model.wheels, pieces)
+        ends, closed = pieces[0, :n_open], pieces[1, :n_closed]
         if len(closed):
             known = join_crossings([known, climb_faces(model, known, closed)])
     kept = (known.results["status"] != PoseStatus.NOT_SETTLED) | known.climbing
@@ -148,46 +150,21 @@ def _steps(here: np.ndarray, there: np.ndarray) -> Floats:
     return steps
 
 
-def divide_stretches(
-    known: Crossings, ends: np.ndarray
-) -> tuple[Floats, np.ndarray, Floats, Floats]:
-    """Return PIECES - 1 poses in each stretch between the rows `ends` (k, 2), evenly.
-
-    They are places, next waypoints, poses and motions, stretch by stretch. The motions are those
-    of the end of the stretch, which lead there.
-    """
-    (before, after), share = ends.T, np.arange(1, PIECES) / PIECES
-    first, steps = known.place[before], _steps(known.poses[before], known.poses[after])
-    place = first[:, None] + share * (known.place[after] - first)[:, None]
-    poses = known.poses[before][:, None] + share[:, None] * steps[:, None]
-    waypoint, motions = known.waypoint[before], known.results["motion"][after]
-    within = PIECES - 1
-    return (
-        place.ravel(),
-        np.repeat(waypoint, within),
-        poses.reshape(-1, 3),
-        np.repeat(motions, within, axis=0),
-    )
-
-
 def _divide(model: PackedModel, known: Crossings, ends: np.ndarray) -> Crossings:
-    """Return the poses of `divide_stretches`, evaluated."""
-    place, waypoint, poses, motions = divide_stretches(known, ends)
-    results = model.evaluate(poses, motions=motions)
-    return Crossings(place, waypoint, none_held(len(place)), poses, results)
+    """Evaluate PIECES - 1 poses in each stretch between the rows `ends` (k, 2), evenly.
 
-
-def _sort_pieces(
-    model: PackedModel, known: Crossings, ends: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the pieces in which a contact still jumps, as rows (j, 2): open ones, closed ones.
-
-    The last rows of `known` are the poses within the stretches `ends`. `sort_pieces` defines open
-    and closed.
+    They are in the order of the stretches. Their motions are those of the end of the stretch,
+    which lead there.
     """
-    pieces = np.empty((2, len(ends) * PIECES, 2), np.int64)
-    n_open, n_closed = sort_pieces(ends, PIECES, known.views, model.wheels, pieces)
-    return pieces[0, :n_open], pieces[1, :n_closed]
+    (before, after), within = ends.T, PIECES - 1
+    share, first = np.arange(1, PIECES) / PIECES, known.place[before]
+    place = first[:, None] + share * (known.place[after] - first)[:, None]
+    steps = _steps(known.poses[before], known.poses[after])
+    poses = known.poses[before][:, None] + share[:, None] * steps[:, None]
+    at, motions = poses.reshape(-1, 3), np.repeat(known.results["motion"][after], within, axis=0)
+    waypoint = np.repeat(known.waypoint[before], within)
+    results = model.evaluate(at, motions=motions)
+    return Crossings(place.ravel(), waypoint, none_held(len(at)), at, results)
 
 
 def climb_faces(model: PackedModel, known: Crossings, ends: np.ndarray) -> Crossings:

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from rover_physics.numerics.arrays import view_read_only
 from rover_physics.numerics.kernels import allocating_kernel, exact_kernel
-from rover_physics.numerics.read_only import view_read_only
 from rover_physics.prediction.path_kernels import (
     FACE,
     HEIGHT_JUMP,
@@ -24,6 +24,7 @@ from rover_physics.prediction.path_kernels import (
     ROUNDING,
     Crossings,
     Wheels,
+    angle_ahead,
     distance_between,
     force_limit,
 )
@@ -80,7 +81,9 @@ def _find_drops(wheels, poses, results, between):
         here = poses[i] if i < n else between.poses[i - n]
         result = results[i] if i < n else between.results[i - n]
         steps[k] = distance_between(last, here, wheels.swing_radius)
-        _read_contacts(result, angle[k], height[k])
+        for wheel in range(6):
+            angle[k, wheel] = angle_ahead(result, wheel)
+            height[k, wheel] = result.wheel_centres[wheel, 2]
         last = here
     for k in range(n + m):
         i = order[k]
@@ -90,8 +93,7 @@ def _find_drops(wheels, poses, results, between):
         if lowest < -MIN_ANGLE:
             result = results[i] if i < n else between.results[i - n]
             _find_rolling_off_edge(angle[k], result, wheels, rolling_off_edge[k])
-    first_open = _find_first_open(rolling_off_edge)
-    _clear_open_runs(rolling_off_edge)
+    first_open = _clear_open_runs(rolling_off_edge)
     _clear_slides(height, angle, wheels.drop_limit, rolling_off_edge)
     descents, drops = np.zeros((n + m, 6)), np.zeros((n, 6))
     _measure_drops(wheels.radius, (height, angle, steps), rolling_off_edge, descents)
@@ -128,23 +130,6 @@ def _is_held(result, wheels, wheel):
 
 
 @exact_kernel
-def _find_first_open(rolling_off_edge):
-    """Return the first row (of k) whose drops depend on poses after the last row.
-
-    These are the rows of a run in `rolling_off_edge` (k, 6) that may still end with a landing.
-    """
-    rows = rolling_off_edge.shape[0]
-    first = rows
-    for wheel in range(6):
-        start = rows
-        while start > 0 and rolling_off_edge[start - 1, wheel]:
-            start -= 1
-        if 0 < start < first:
-            first = start
-    return first
-
-
-@exact_kernel
 def _merge(n, place, order):
     """Write the rows in path order into `order`: waypoint i as i, the i-th place as n + i."""
     i = 0
@@ -155,16 +140,6 @@ def _merge(n, place, order):
             i += 1
         else:
             order[k] = waypoint
-
-
-@exact_kernel
-def _read_contacts(result, angle, height):
-    """Write contact angles [rad], positive where each wheel rolls to, and heights [m]."""
-    for wheel in range(6):
-        angle[wheel] = result.contact_angle[wheel]
-        if result.wheel_speed[wheel] < 0.0:
-            angle[wheel] = -angle[wheel]
-        height[wheel] = result.wheel_centres[wheel, 2]
 
 
 @exact_kernel
@@ -193,17 +168,24 @@ def _find_rolling_off_edge(angle, result, wheels, rolling_off_edge):
 
 @exact_kernel
 def _clear_open_runs(rolling_off_edge):
-    """Clear runs in `rolling_off_edge` (k, 6) at an end of the path: no edge, or no landing."""
+    """Clear runs in `rolling_off_edge` (k, 6) at an end of the path: no edge, or no landing.
+
+    Return the first row whose drops depend on poses after the last row: the first one of the runs
+    that may still end with a landing.
+    """
     rows = rolling_off_edge.shape[0]
+    first_open = rows
     for wheel in range(6):
         k = 0
         while k < rows and rolling_off_edge[k, wheel]:
             rolling_off_edge[k, wheel] = False
             k += 1
-        k = rows - 1
-        while k >= 0 and rolling_off_edge[k, wheel]:
-            rolling_off_edge[k, wheel] = False
+        k = rows
+        while k > 0 and rolling_off_edge[k - 1, wheel]:
             k -= 1
+            rolling_off_edge[k, wheel] = False
+        first_open = min(first_open, k)
+    return first_open
 
 
 @exact_kernel

@@ -6,25 +6,20 @@ from typing import Any
 import numpy as np
 
 from rover_physics.contact.clearance import belly_clearance
-from rover_physics.contact.contact_record import CELL_SEARCH, CONTACTS, hold_wheels
+from rover_physics.contact.contact_record import CELL_SEARCH, CONTACTS, WHEEL_SAMPLES, hold_wheels
 from rover_physics.contact.settling import settle
-from rover_physics.contact.wheel_samples import WHEEL_SAMPLES
 from rover_physics.forces.equilibrium import BALANCE, FREE_FORCES, balance_forces, tool_load
 from rover_physics.forces.servo import balance_servos, write_servo_forces
 from rover_physics.forces.servo_motion import SERVO
 from rover_physics.forces.soil import SoilWheel, coulomb_slip, effective_friction, solve_wheel
 from rover_physics.forces.soil_sharing import rolling_direction, share_forces_on_soil
 from rover_physics.forces.stability import CORNERS, find_support, tip_over_angles
-from rover_physics.forces.torques import (
-    TORQUE_SEARCH,
-    minimise_friction,
-    take_equal_torques,
-)
+from rover_physics.forces.torques import TORQUE_SEARCH, apply_torques, minimise_friction
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import new_record, record_type
-from rover_physics.results.uses import passes
+from rover_physics.results.uses import find_broken
 from rover_physics.rover.linkage import LINKAGE, PLACEMENT, place_masses
-from rover_physics.rover.steering import steer_wheels
+from rover_physics.rover.steered_drive import steer_wheels
 from rover_physics.status import PoseStatus, Stall, TorquePolicy
 from rover_physics.terrain.ground import GROUND, SOIL_NUMBERS, friction_at
 
@@ -175,7 +170,7 @@ def evaluate_row(models, limits, work, written, i):
         evaluate_stance(models[k], work, status, results[i])
         if k + 1 == models.size or status != PoseStatus.SETTLED:
             break
-        if passes(results, numbers, i, limits):
+        if results[i].status == PoseStatus.SETTLED and find_broken(numbers, i, limits)[0] < 0:
             break
 
 
@@ -331,7 +326,7 @@ def _write_forces(model, work, result):
     if settings.on_soil:
         share_forces_on_soil(model, work)
     elif settings.policy == TorquePolicy.EQUAL:
-        take_equal_torques(work.balance, search)
+        apply_torques(work.balance, np.int64(0), search)
     else:
         largest = settings.allowed_torque / (linkage.radius * weight)
         minimise_friction(work.balance, largest, search)

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rover_physics.numerics.arrays import Floats, SingleFloats
+from rover_physics.numerics.arrays import Floats, SingleFloats, freeze_fields
 from rover_physics.numerics.quiet import quiet
-from rover_physics.numerics.read_only import freeze_fields
 from rover_physics.numerics.threads import limit_threads
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.sweep import check_poses

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.contact.wheel_samples import sample_wheel
+from rover_physics.contact.contact_record import sample_wheel
 from rover_physics.errors import ModelError
 from rover_physics.forces.soil import pack_soils
 from rover_physics.limits import table

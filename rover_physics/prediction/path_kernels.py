@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rover_physics.numerics.arrays import view_read_only
 from rover_physics.numerics.kernels import exact_kernel
-from rover_physics.numerics.read_only import view_read_only
 from rover_physics.results.record import join_results, new_results, select_results
 from rover_physics.status import PoseStatus
 
@@ -187,21 +187,21 @@ def sort_pieces(ends, pieces, known, wheels, sorted_ends):
             if results[after].status == PoseStatus.NOT_SETTLED:
                 skipped = True
                 continue
+            distance = distance_between(poses[before], poses[after], wheels.swing_radius)
+            closes = opens = False
             if _jumps(results[before], results[after], wheels):
-                distance = distance_between(poses[before], poses[after], wheels.swing_radius)
-                if skipped or distance < MIN_SPACING:
-                    sorted_ends[1, n_closed, 0], sorted_ends[1, n_closed, 1] = before, after
-                    n_closed += 1
-                elif distance > JUMP_SPACING * wheels.radius or _decides(
+                closes = skipped or distance < MIN_SPACING
+                opens = distance > JUMP_SPACING * wheels.radius or _decides(
                     results[before], results[after], wheels
-                ):
-                    sorted_ends[0, n_open, 0], sorted_ends[0, n_open, 1] = before, after
-                    n_open += 1
+                )
             elif not skipped:
-                finest = _finest(results[before], results[after], wheels)
-                if finest < distance_between(poses[before], poses[after], wheels.swing_radius):
-                    sorted_ends[0, n_open, 0], sorted_ends[0, n_open, 1] = before, after
-                    n_open += 1
+                opens = _finest(results[before], results[after], wheels) < distance
+            if closes:
+                sorted_ends[1, n_closed, 0], sorted_ends[1, n_closed, 1] = before, after
+                n_closed += 1
+            elif opens:
+                sorted_ends[0, n_open, 0], sorted_ends[0, n_open, 1] = before, after
+                n_open += 1
             before, skipped = after, False
         row += pieces - 1
     return n_open, n_closed
@@ -223,6 +223,13 @@ def turn_between(here, there):
     if there[2] == here[2]:
         return 0.0
     return (there[2] - here[2] + np.pi) % (2.0 * np.pi) - np.pi
+
+
+@exact_kernel
+def angle_ahead(result, wheel):
+    """Return the contact angle [rad] of a wheel, positive where it rolls to."""
+    angle = result.contact_angle[wheel]
+    return -angle if result.wheel_speed[wheel] < 0.0 else angle
 
 
 @exact_kernel
@@ -316,12 +323,11 @@ def add_up(poses, results, rate, start, sums):
         settled = result.status == PoseStatus.SETTLED
         if i > 0:
             before = results[i - 1]
-            step = _distance(poses[i - 1], poses[i])
+            here, there = poses[i - 1], poses[i]
+            step = np.hypot(there[0] - here[0], there[1] - here[1])
             both = settled and before.status == PoseStatus.SETTLED
             climb = result.q[0] - before.q[0] if both else 0.0
-            duration = _drive_time(
-                step, climb, turn_between(poses[i - 1], poses[i]), result.motion
-            )
+            duration = _drive_time(step, climb, turn_between(here, there), result.motion)
             duration /= 0.5 * (_speed_share(result) + _speed_share(before))
             distance += step
             energy += 0.5 * (_power(result) + _power(before)) * duration
@@ -333,8 +339,10 @@ def add_up(poses, results, rate, start, sums):
 
 
 @exact_kernel
-def _distance(here, there):
-    return np.hypot(there[0] - here[0], there[1] - here[1])
+def bulge(turn):
+    """Return the length of an arc over that of its chord; `turn` is its angle [rad]."""
+    half = 0.5 * abs(turn)
+    return half / np.sin(half) if half > 1e-8 else 1.0
 
 
 @exact_kernel
@@ -343,9 +351,8 @@ def _drive_time(step, climb, turn, motion):
     speed, rate = np.hypot(motion[0], motion[1]), motion[2]
     if speed == 0.0:
         return abs(turn / rate)
-    half = 0.5 * abs(turn)
-    if rate != 0.0 and half > 1e-8:
-        step *= half / np.sin(half)
+    if rate != 0.0:
+        step *= bulge(turn)
     return np.hypot(step, climb) / speed
 
 

@@ -21,7 +21,8 @@ from numpy.typing import ArrayLike
 from rover_physics.errors import PoseError
 from rover_physics.numerics.kernels import kernel
 from rover_physics.prediction.packed_model import PackedModel
-from rover_physics.rover.steering import fastest_wheel
+from rover_physics.prediction.path_kernels import bulge, turn_between
+from rover_physics.rover.steered_drive import fastest_wheel
 
 SIDEWAYS = np.radians(10.0)
 """Angle between heading and direction of travel [rad] up to which there is no sideways motion:
@@ -187,7 +188,7 @@ def _is_line_ahead(here, there):
     Headings may be interpolated along the line, such as between waypoints that are far apart.
     """
     dx, dy = there[0] - here[0], there[1] - here[1]
-    turn = (there[2] - here[2] + np.pi) % (2.0 * np.pi) - np.pi
+    turn = turn_between(here, there)
     c, s = np.cos(here[2] + 0.5 * turn), np.sin(here[2] + 0.5 * turn)
     aside = np.arctan2(abs(dy * c - dx * s), abs(dx * c + dy * s))
     return abs(turn) <= MAX_TURN and aside <= SIDEWAYS + 0.5 * abs(turn)
@@ -200,7 +201,7 @@ def _find_motion(linkage, here, there, is_ahead, motion):
     `is_ahead` tells whether the line that the step is on leads ahead or back as a whole.
     """
     dx, dy = there[0] - here[0], there[1] - here[1]
-    turn = (there[2] - here[2] + np.pi) % (2.0 * np.pi) - np.pi
+    turn = turn_between(here, there)
     length, swing = np.hypot(dx, dy), linkage.swing_radius * abs(turn)
     motion[0] = motion[1] = motion[2] = 0.0
     if max(length, swing) <= AT_REST * linkage.length:
@@ -242,13 +243,6 @@ def _swings_out(linkage, motion, turn):
     if fixed == 0 or fixed == 6:
         return False
     return np.arctan2(abs(aside + rate * x / fixed), abs(ahead)) <= allowed
-
-
-@kernel
-def bulge(turn):
-    """Return the length of an arc over that of its chord; `turn` is its angle [rad]."""
-    half = 0.5 * abs(turn)
-    return half / np.sin(half) if half > 1e-8 else 1.0
 
 
 @kernel

@@ -16,16 +16,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rover_physics.errors import PoseError
+from rover_physics.numerics.arrays import view_read_only
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.numerics.plausible import MAX_COORDINATE
 from rover_physics.numerics.quiet import quiet
-from rover_physics.numerics.read_only import view_read_only
 from rover_physics.numerics.threads import limit_threads
-from rover_physics.prediction.crossing import find_crossings
+from rover_physics.prediction.crossing import climb_faces, find_crossings
 from rover_physics.prediction.drops import MIN_ANGLE, Drops, find_drops
 from rover_physics.prediction.packed_model import PackedModel
-from rover_physics.prediction.path_kernels import Crossings, add_up, join_crossings
+from rover_physics.prediction.path_kernels import (
+    Crossings,
+    add_up,
+    angle_ahead,
+    find_remaining_jumps,
+    join_crossings,
+    none_held,
+)
 from rover_physics.prediction.path_motion import path_motions
 from rover_physics.prediction.servo_path import (
     climb_costs,
@@ -34,7 +41,12 @@ from rover_physics.prediction.servo_path import (
     write_servo_path,
 )
 from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.results.record import join_results, place_results, unwritten_results
+from rover_physics.results.record import (
+    join_results,
+    place_results,
+    select_results,
+    unwritten_results,
+)
 from rover_physics.results.uses import RoverLimits, find_broken, find_uses, readable
 from rover_physics.status import PoseStatus
 
@@ -175,6 +187,47 @@ def predict_steered(
     return make_prediction(model, places, results, crossings)[0].prediction
 
 
+def predict_way_back(model: PackedModel, swept: SweptPath, waypoints: slice) -> PathPrediction:
+    """Predict the way back over waypoints of a path on ground without soil.
+
+    On Coulomb ground the forces at rest are the same in both directions. Only faces differ: a
+    wheel that dropped off an edge on the way in climbs it on the way back. Only these climbs are
+    evaluated.
+
+    Args:
+        model: The model of the way back, on ground without soils: that of the path, driven the
+            other way.
+        swept: The path.
+        waypoints: The waypoints of the way back, in the order of the way in.
+
+    Returns:
+        The prediction, as a sweep over the reversed poses gives it, apart from rounding. `power`
+        and `energy` are those of the way in.
+    """
+    first, end = waypoints.start, waypoints.stop
+    n, wheels = end - first, model.wheels
+    poses = np.ascontiguousarray(swept.prediction.poses[first:end][::-1])
+    results = _reverse(select_results(swept.prediction.results, np.arange(first, end)[::-1]))
+    crossings = swept.crossings.select(~swept.crossings.climbing).between(first, end - 1)
+    crossings = crossings.reversed(n)
+    _reverse(crossings.results)
+    path = Crossings(np.arange(float(n)), np.arange(n) + 1, none_held(n), poses, results)
+    pairs = np.empty((n + len(crossings.place), 2), np.int64)
+    count = find_remaining_jumps(path.views, crossings.views, wheels, pairs)
+    if count:
+        ends = join_crossings([path, crossings]).select(pairs[:count].ravel())
+        climbs = climb_faces(model, ends, np.arange(2 * count).reshape(-1, 2))
+        crossings = join_crossings([crossings, climbs]).in_order()
+    return make_prediction(model, poses, results, crossings)[0].prediction
+
+
+def _reverse(results: Any) -> Any:
+    """Reverse the motions in RESULTs (n,) of the way in, and return them."""
+    results["motion"] *= -1.0
+    results["wheel_speed"] *= -1.0
+    return results
+
+
 def predict_poses(model: PackedModel, places: np.ndarray, motions: np.ndarray) -> PathPrediction:
     """Return the prediction of single poses (n, 3) that form no path, with motions (n, 3)."""
     results = model.evaluate(places, motions=motions)
@@ -276,8 +329,7 @@ def _may_roll_off_edge(result):
     """Return whether a contact is so far behind its wheel that the wheel may roll off an edge."""
     steepest = 0.0
     for wheel in range(6):
-        angle = result.contact_angle[wheel]
-        steepest = min(steepest, -angle if result.wheel_speed[wheel] < 0.0 else angle)
+        steepest = min(steepest, angle_ahead(result, wheel))
     return steepest < -MIN_ANGLE
 
 

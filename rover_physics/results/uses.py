@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from rover_physics.limits import table
 from rover_physics.limits.table import NOT_COMPUTABLE, TOLERANCE, Limit, Sense
 from rover_physics.names import EQUAL, TORQUE_POLICIES
-from rover_physics.numerics.arrays import Floats
+from rover_physics.numerics.arrays import Floats, freeze_fields, view_read_only
 from rover_physics.numerics.kernels import exact_kernel
-from rover_physics.numerics.read_only import freeze_fields, view_read_only
 from rover_physics.numerics.records import new_record, record_type
 from rover_physics.results.record import find_column, numbers_of
 from rover_physics.rover.model import Rover
@@ -27,6 +26,8 @@ from rover_physics.status import PoseStatus
 ABOVE = 1.0 + 2.0**-23
 """Least use of a broken limit, so that it is above 1 in single precision, too."""
 MOST, LEAST, RANGE, SHARE = (int(sense) for sense in Sense)
+FLAGS = ("needs_forces", "exempt_on_edge", "keeps_margin", "is_risk", "may_be_unknown")
+"""Fields of a `Limit` that a LIMIT has, too."""
 KEPT, ROLLING_OFF_EDGE = find_column("kept_share")[0], find_column("falling")[0]
 
 LIMIT = record_type(
@@ -37,11 +38,7 @@ LIMIT = record_type(
     ("most", float),  # largest good value
     ("if_column", np.int64),  # column of the quantity that decides whether it is asked, or -1
     ("if_value", float),  # value of that quantity where it is asked
-    ("needs_forces", np.int64),
-    ("exempt_on_edge", np.int64),
-    ("keeps_margin", np.int64),
-    ("is_risk", np.int64),
-    ("may_be_unknown", np.int64),
+    *((flag, np.int64) for flag in FLAGS),
 )
 """One row of the table with the bound of a rover, as kernels read it."""
 
@@ -111,11 +108,7 @@ def _pack(row: Limit, bound: Any) -> Any:
         most=most,
         if_column=find_column(if_quantity)[0] if if_quantity else -1,
         if_value=float(if_value),
-        needs_forces=row.needs_forces,
-        exempt_on_edge=row.exempt_on_edge,
-        keeps_margin=row.keeps_margin,
-        is_risk=row.is_risk,
-        may_be_unknown=row.may_be_unknown,
+        **{flag: getattr(row, flag) for flag in FLAGS},
     )
 
 
@@ -245,13 +238,6 @@ def find_broken(numbers, row, limits):
             if in_any_case < 0 and not limits[k].exempt_on_edge:
                 in_any_case = k
     return first, in_any_case
-
-
-@exact_kernel
-def passes(results, numbers, row, limits):
-    """Return whether a row of results is settled and breaks no limit."""
-    settled = results[row].status == PoseStatus.SETTLED
-    return settled and find_broken(numbers, row, limits)[0] < 0
 
 
 @exact_kernel

@@ -17,10 +17,7 @@ LINKAGE = record_type(
     ("steers", np.uint8, (6,)),  # 1 for the wheels that steer
     ("steering_limit", float),  # largest steering angle [rad], 0 if all wheels are fixed
     ("steering_rate", float),  # largest speed of the steering [rad/s]
-    (
-        "swing_radius",
-        float,
-    ),  # distance of the outermost wheel from the body origin, seen from above [m]
+    ("swing_radius", float),  # distance of the outermost wheel from the origin, from above [m]
     ("rocker_pivots", float, (2, 3)),  # rocker pivots [m]
     ("bogie_pivots", float, (2, 3)),  # bogie pivots [m]
     ("gravity", float),  # gravity [m/s^2]
@@ -80,9 +77,7 @@ def pack_linkage(
         rocker_coms=_both_sides(masses.rocker.com),
         bogie_mass=float(masses.bogie.mass),
         bogie_coms=_both_sides(masses.bogie.com),
-        mass=float(
-            body_mass + 2 * (masses.rocker.mass + masses.bogie.mass) + 6 * rover.wheel.mass
-        ),
+        mass=body_mass + 2 * (masses.rocker.mass + masses.bogie.mass) + 6 * rover.wheel.mass,
         length=float(suspension.wheels["front"][0] - suspension.wheels["rear"][0]),
         belly=np.array([belly.z, *belly.x, *belly.y], dtype=float),
         has_tool_load=bool(np.any(tool[1:])),

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Terrain: an elevation grid with unknown cells and layers of friction, soil and more."""
 
+import hashlib
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +14,7 @@ from rover_physics.errors import TerrainError
 from rover_physics.files.npz_file import write_npz
 from rover_physics.files.user_file import open_regular_file
 from rover_physics.files.validation import errors_of, show_file
-from rover_physics.numerics.read_only import freeze_array, seal_array
+from rover_physics.numerics.arrays import freeze_array, seal_array
 from rover_physics.terrain.checks import (
     as_elevation,
     as_elevation_std,
@@ -30,6 +31,10 @@ from rover_physics.terrain.terrain_file import (
     read_entries,
 )
 
+LAYERS = ("elevation", "friction", "elevation_std", "soil", "ground_class")
+"""Grids of a terrain, in the order in which they count for a fingerprint."""
+DIGITS = 16
+"""Hexadecimal digits of a fingerprint."""
 _EDGE_TOLERANCE = 1e-9  # cells; for rounding of (x - origin) / resolution at the map's edge
 
 
@@ -235,16 +240,39 @@ def save_terrain(path: str | Path, terrain: Terrain, **notes: Any) -> None:
         TerrainError: The file cannot be written.
     """
     entries: dict[str, Any] = dict(notes)
-    entries["elevation"] = terrain.elevation
     entries["resolution"] = np.float64(terrain.resolution)
     entries["origin"] = np.asarray(terrain.origin)
-    for layer in ("friction", "soil", "elevation_std", "ground_class"):
+    for layer in LAYERS:
         if getattr(terrain, layer) is not None:
             entries[layer] = getattr(terrain, layer)
     if terrain.soil_names:
         entries["soil_names"] = np.array(terrain.soil_names)
     with errors_of(path, TerrainError):
         write_npz(path, entries)
+
+
+def fingerprint(terrain: Terrain) -> str:
+    """Return 16 hexadecimal digits of SHA-256 over all that defines a terrain.
+
+    The bytes are: resolution, origin x and y as 64-bit floats; then per layer its name, its shape
+    and its values; then the names of the soils. Unknown cells of all kinds of NaN count alike.
+    """
+    digest = hashlib.sha256(np.array([terrain.resolution, *terrain.origin], "<f8").tobytes())
+    for name in LAYERS:
+        layer = getattr(terrain, name)
+        if layer is not None:
+            digest.update(f"{name} {layer.shape} ".encode())
+            digest.update(_bytes(layer).data)
+    digest.update("\n".join(terrain.soil_names).encode())
+    return digest.hexdigest()[:DIGITS]
+
+
+def _bytes(layer: np.ndarray) -> np.ndarray:
+    """Return the values of a layer, little-endian, with one kind of NaN."""
+    values = np.ascontiguousarray(layer)
+    if values.dtype.kind == "f":
+        values = np.where(np.isnan(values), np.nan, values).astype("<f8", copy=False)
+    return values
 
 
 def _small_gaps(unknown: NDArray[np.bool_], max_cells: int) -> NDArray[np.bool_]:

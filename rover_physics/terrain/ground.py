@@ -127,7 +127,11 @@ def new_ground(terrain: Terrain) -> Ground:
     }
     record = new_record(
         GROUND,
-        **{name: _address_of_layer(name, array) for name, array in arrays.items()},
+        **{
+            name: address_of(array, np.int32 if name == "soil" else np.float64)
+            for name, array in arrays.items()
+            if array is not None
+        },
         rows=elevation.shape[0],
         columns=elevation.shape[1],
         block_rows=highest.shape[0],
@@ -137,10 +141,6 @@ def new_ground(terrain: Terrain) -> Ground:
         inverse_resolution=1.0 / float(terrain.resolution),
     )
     return Ground(array_of(record), arrays)
-
-
-def _address_of_layer(name: str, array: np.ndarray | None) -> int:
-    return 0 if array is None else address_of(array, np.int32 if name == "soil" else np.float64)
 
 
 def with_soils(ground: Ground, soils: np.ndarray) -> Ground:
@@ -231,10 +231,17 @@ def _interpolate(elevation, at, columns, u, v):
 
 
 @kernel
+def to_cells(ground, x, y):
+    """Return a place (x, y) [m], map frame, in cells from cell [0, 0]."""
+    scale = ground.inverse_resolution
+    return (x - ground.x0) * scale, (y - ground.y0) * scale
+
+
+@kernel
 def look_up(ground, x, y):
     """Return elevation [m] and slopes along x and y at (x, y) [m]; NaN if unknown or off map."""
-    scale = ground.inverse_resolution
-    return look_up_cell(ground, (x - ground.x0) * scale, (y - ground.y0) * scale)
+    gx, gy = to_cells(ground, x, y)
+    return look_up_cell(ground, gx, gy)
 
 
 @kernel

@@ -11,7 +11,7 @@ from rover_physics.errors import RoverFileError, TerrainError
 from rover_physics.files.config_files import find_config
 from rover_physics.files.npz_file import NUMBERS, NpzReader
 from rover_physics.files.validation import errors_of, show_file
-from rover_physics.numerics.read_only import seal_array
+from rover_physics.numerics.arrays import seal_array
 
 MAX_CELLS = 25_000_000
 """Default of the largest terrain [cells]."""

@@ -22,9 +22,14 @@ from rover_physics.forces.soil import use_of_shear
 from rover_physics.limits.table import TRAPPED
 from rover_physics.names import EQUAL, OPTIMAL, SERVO
 from rover_physics.prediction.packed_model import PackedModel
-from rover_physics.prediction.sweep import PART, SweptPath, predict_in_parts, predict_paths
+from rover_physics.prediction.sweep import (
+    PART,
+    SweptPath,
+    predict_in_parts,
+    predict_paths,
+    predict_way_back,
+)
 from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.prediction.way_back import predict_way_back
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.uses import find_uses
 from rover_physics.traversability.verdict import Verdict, hold_against_limits, with_refusals

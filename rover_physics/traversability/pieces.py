@@ -18,13 +18,13 @@ from numpy.typing import ArrayLike
 
 from rover_physics.bounds.path import SIGMAS
 from rover_physics.limits.table import MAX_SLIDE, MAX_TURN_OFF
+from rover_physics.numerics.arrays import view_read_only
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.numerics.quiet import quiet
-from rover_physics.numerics.read_only import view_read_only
 from rover_physics.prediction.crossing import find_crossings, find_turns, list_jumps, turn_wheels
 from rover_physics.prediction.drops import MIN_ANGLE, find_drops
 from rover_physics.prediction.packed_model import PackedModel, pack_model
-from rover_physics.prediction.path_kernels import Crossings, add_up, distance_between
+from rover_physics.prediction.path_kernels import Crossings, add_up, angle_ahead, distance_between
 from rover_physics.prediction.path_motion import path_motions
 from rover_physics.prediction.sweep import check_poses, find_suspects, joined_paths
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
@@ -271,12 +271,9 @@ def _is_easy(results, numbers, limits, wheels):
     if not wheels.on_servos:
         return True
     for row in range(results.size):
-        result = results[row]
         for wheel in range(6):
-            angle = result.contact_angle[wheel]
-            if result.wheel_speed[wheel] < 0.0:
-                angle = -angle
-            if angle < -MIN_ANGLE or result.lift_rate[wheel] > 0.0:
+            angle = angle_ahead(results[row], wheel)
+            if angle < -MIN_ANGLE or results[row].lift_rate[wheel] > 0.0:
                 return False
     return True
 

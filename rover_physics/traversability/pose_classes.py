@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from rover_physics.bounds.path import SIGMAS
 from rover_physics.limits import table
 from rover_physics.names import CONTROL_POLICIES, TORQUE_POLICIES
+from rover_physics.numerics.arrays import view_read_only
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.quiet import quiet
-from rover_physics.numerics.read_only import view_read_only
 from rover_physics.numerics.threads import CALLS_IN_WORK, limit_threads, run_in_turn
 from rover_physics.prediction.evaluation import (
     AHEAD,

@@ -18,8 +18,7 @@ from numpy.typing import ArrayLike
 
 from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES
 from rover_physics.limits.table import WHEEL_CONSTRAINTS
-from rover_physics.numerics.arrays import Floats
-from rover_physics.numerics.read_only import freeze_fields
+from rover_physics.numerics.arrays import Floats, freeze_fields
 from rover_physics.prediction.evaluation import NONE_HELD, evaluate_poses, new_works
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_motion import motions_of

@@ -14,8 +14,7 @@ from rover_physics.names import WHEEL_POSITIONS, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.plain_values import to_plain
-from rover_physics.results.path_bounds import BOUNDED_VALUES, PathBounds
-from rover_physics.results.path_prediction import PathPrediction
+from rover_physics.results.path_prediction import BOUNDED_VALUES, PathBounds, PathPrediction
 from rover_physics.results.record import find_column, numbers_of
 from rover_physics.results.uses import Uses, find_uses, limits_of
 from rover_physics.rover.model import Rover

@@ -13,8 +13,7 @@ from numpy.typing import DTypeLike, NDArray
 from rover_physics.errors import RoverFileError
 from rover_physics.files.npz_file import FLAGS, NUMBERS, TEXTS, NpzParts, open_npz, write_npz
 from rover_physics.files.validation import errors_of, show_file
-from rover_physics.results.path_bounds import BOUNDED_VALUES
-from rover_physics.results.path_prediction import PathPrediction, prediction_of
+from rover_physics.results.path_prediction import BOUNDED_VALUES, PathPrediction, prediction_of
 from rover_physics.results.record import QUANTITIES
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.errors import PlanningError

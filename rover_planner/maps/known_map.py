@@ -29,7 +29,7 @@ class KnownMap:
     """Time of arrival [s], steady clock."""
 
     fingerprint: str
-    """The content of the received map, see `rover_physics.terrain.fingerprint`."""
+    """The content of the received map, see `rover_physics.terrain.grid.fingerprint`."""
     cells: CellSources | None = None
     """Source and time of each cell; None: all known cells are from `source`."""
     frame: str = ""

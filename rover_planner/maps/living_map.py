@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rover_physics.numerics.read_only import seal_array
+from rover_physics.numerics.arrays import seal_array
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.maps.cells import CellBox, CellGrid, grid_of

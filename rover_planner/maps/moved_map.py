@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.numerics.read_only import seal_array
+from rover_physics.numerics.arrays import seal_array
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.errors import PlanningError

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from rover_physics.files.validation import show_file
+from rover_physics.numerics.arrays import seal_array
 from rover_physics.numerics.plausible import MAX_FRICTION, MIN_FRICTION
-from rover_physics.numerics.read_only import seal_array
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.terrain.fingerprint import fingerprint
-from rover_physics.terrain.grid import Terrain, load_terrain
+from rover_physics.terrain.grid import Terrain, fingerprint, load_terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES
 from rover_planner.errors import PlanningError

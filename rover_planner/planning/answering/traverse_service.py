@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rover_physics.bounds.path import forget_terrains, prepare_bounds
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
-from rover_physics.terrain.fingerprint import fingerprint
-from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.grid import Terrain, fingerprint
 from rover_physics.terrain.ground import pack_ground
 from rover_planner.maps.known_map import KnownMap
 from rover_planner.maps.layers import CellSources

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.chance.ground import cut_around
+from rover_physics.chance.samples import cut_around
 from rover_physics.errors import TerrainError
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.grid import Terrain

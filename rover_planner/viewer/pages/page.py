@@ -9,7 +9,7 @@ from typing import Any
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.rover_file import load_rover, preset_names
-from rover_physics.terrain.fingerprint import fingerprint
+from rover_physics.terrain.grid import fingerprint
 from rover_physics.terrain.soil_file import load_soils
 from rover_planner.advice.advise import Advice
 from rover_planner.advice.remedy import Remedy

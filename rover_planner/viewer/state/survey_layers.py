@@ -12,8 +12,7 @@ from rover_physics.files.validation import show_file
 from rover_physics.names import OPTIMAL
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
-from rover_physics.terrain.fingerprint import fingerprint
-from rover_physics.terrain.grid import Terrain
+from rover_physics.terrain.grid import Terrain, fingerprint
 from rover_planner.errors import PlanningError
 from rover_planner.shell.extras import need
 from rover_planner.survey.geotiff import GeoTiffMap

@@ -15,7 +15,7 @@ from scipy.special import bdtrik
 from rover_physics import Rover, SweepOptions, judge_path
 from rover_physics.bounds.path import bound_path, forget_terrains, prepare_bounds
 from rover_physics.errors import ModelError
-from rover_physics.results.path_bounds import BOUNDED_VALUES
+from rover_physics.results.path_prediction import BOUNDED_VALUES
 from rover_physics.status import BoundStatus
 from rover_physics.traversability.verdict import hold_against_limits, refuse_worst_case
 from support.rough_grounds import fractal, plane, rocky

@@ -12,8 +12,7 @@ from rover_physics import Rover
 from rover_physics.errors import ModelError
 from rover_physics.rover.linkage import pack_linkage
 from rover_physics.rover.model import Steering
-from rover_physics.rover.steered_drive import STAND_ERROR, SteeredDrive
-from rover_physics.rover.steering import steer_wheels
+from rover_physics.rover.steered_drive import STAND_ERROR, SteeredDrive, steer_wheels
 from rover_physics.rover.steering_joints import (
     can_turn_on_the_spot,
     check_joint_limit,

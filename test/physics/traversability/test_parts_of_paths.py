@@ -21,7 +21,7 @@ from rover_physics import (
 )
 from rover_physics.prediction import sweep
 from rover_physics.prediction.packed_model import PackedModel, pack_model
-from rover_physics.results.path_bounds import BOUNDED_VALUES
+from rover_physics.results.path_prediction import BOUNDED_VALUES
 from rover_physics.results.record import QUANTITIES
 from rover_physics.traversability.judge import PartwiseJudge
 from rover_physics.traversability.pieces import SAFE, find_exposure

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rover_physics import Terrain
-from rover_physics.terrain.fingerprint import fingerprint
+from rover_physics.terrain.grid import fingerprint
 from rover_planner.maps.known_map import KnownMap
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.server_health import LATENCIES, OK, WARN, ServerHealth
