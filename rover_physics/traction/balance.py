@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rover_physics.contact.contact_record import CONTACTS
+from rover_physics.contact.contact_record import CONTACTS, write_point
 from rover_physics.errors import ModelError
 from rover_physics.forces.equilibrium import (
     BALANCE,
@@ -33,18 +33,37 @@ from rover_physics.numerics.records import array_of, new_record, record_type
 from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place, place_masses
 from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
-from rover_physics.traction.layout import (
-    EQUATIONS,
-    FORCES,
-    LAST_WHEEL,
-    LATERAL_SHARE,
-    LATERAL_SHARE_EQUATION,
-    LATERAL_SLOPE,
-    LOAD,
-    TRACTION,
-    TRACTION_EQUATION,
-    TRACTIONS,
-)
+
+# Indices of the forces x and of their equations. After the "first of" some, the entries of the six
+# wheels follow in wheel order: `x[LOAD + wheel]`.
+LAST_WHEEL = WHEEL_COUNT - 1
+"""The wheel whose traction follows from the balance and the other wheels' differences to it."""
+
+# Variables; those of the traction control's program begin with them.
+TRACTION = 0
+"""First of the tractions T (6): forces along the ground in the wheels' headings."""
+LOAD = TRACTION + WHEEL_COUNT
+"""First of the wheel loads N (6): forces normal to the ground, positive if the ground pushes."""
+LATERAL_SHARE = LOAD + WHEEL_COUNT
+"""s0 of the lateral forces; straight ahead it is the same for all wheels."""
+LATERAL_SLOPE = LATERAL_SHARE + 1
+"""s1 of the lateral forces; straight ahead their change along the body per rover length."""
+FORCES = LATERAL_SLOPE + 1
+"""Number of forces: tractions, loads and the two lateral terms."""
+TRACTIONS = slice(TRACTION, TRACTION + WHEEL_COUNT)
+"""The six tractions."""
+LOADS = slice(LOAD, LOAD + WHEEL_COUNT)
+"""The six loads."""
+
+# Equations of the balance. The first six determine the loads of the wheels.
+LATERAL_SHARE_EQUATION = LATERAL_SHARE - LOAD
+"""The equation that determines s0."""
+LATERAL_SLOPE_EQUATION = LATERAL_SLOPE - LOAD
+"""The equation that determines s1."""
+TRACTION_EQUATION = LATERAL_SLOPE_EQUATION + 1
+"""The equation that determines the traction of LAST_WHEEL, by the principle of virtual work."""
+EQUATIONS = TRACTION_EQUATION + 1
+"""Number of equations of the balance."""
 
 FORCE_ROW, MOMENT_ROW = 0, 3
 """First row of the forces and of the moments in the equations of `equilibrium`."""
@@ -75,7 +94,7 @@ class MeasuredState:
 class BalanceRows(NamedTuple):
     """Nine equations A x = b with x = tractions (6), loads (6), s0, s1, all in `force_unit`.
 
-    `layout` names the variables and equations.
+    TRACTION and the constants after it name the variables and equations.
     """
 
     A: Floats
@@ -266,7 +285,9 @@ def write_balance(linkages, works, rows):
     columns = 1 + FREE_TORQUES
     _place_wheels(linkages, works)
     place_masses(linkage, measured.q, placement)
-    _write_contacts(linkage.radius, work)
+    for wheel in range(WHEEL_COUNT):
+        angle, offset = measured.contact_angles[wheel], measured.contact_offsets[wheel]
+        write_point(linkage.radius, work, wheel, (np.sin(angle), np.cos(angle)), offset)
     write_equations(linkage, placement, work.contacts, columns, balance)
     _add_push(linkage, work)
     if not solve_equations(columns, balance):
@@ -274,23 +295,6 @@ def write_balance(linkages, works, rows):
     _write_rows(balance, rows)
     _add_resistance(measured.resistance / rows.force_unit, rows)
     return True
-
-
-@kernel
-def _write_contacts(radius, work):
-    """Write the contacts of wheels from their measured contact angles."""
-    placement, contacts, measured = work.placement, work.contacts, work.measured
-    for wheel in range(WHEEL_COUNT):
-        axis, forward, up = placement.axis[wheel], placement.forward[wheel], placement.up[wheel]
-        angle, offset = measured.contact_angles[wheel], measured.contact_offsets[wheel]
-        s, c = np.sin(angle), np.cos(angle)
-        contacts.sine[wheel], contacts.cosine[wheel] = s, c
-        for k in range(3):
-            contacts.point[wheel, k] = (
-                placement.centres[wheel, k]
-                + radius * (s * forward[k] - c * up[k])
-                + offset * axis[k]
-            )
 
 
 @kernel

@@ -17,10 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rover_physics.forces.shares import has_turned_wheels
 from rover_physics.names import WHEEL_COUNT, WHEEL_POSITIONS
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import array_of, new_record, record_type
-from rover_physics.rover.linkage import pack_linkage, rocker_sign
+from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place, rocker_sign
 from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
 
@@ -87,8 +88,9 @@ FILTER = record_type(
     ("angles", float, (WHEEL_COUNT,)),  # contact angles [rad]
     ("covariance", float, (WHEEL_COUNT, WHEEL_COUNT)),  # their covariance [rad^2]
     ("prior", float, (WHEEL_COUNT,)),  # angles before a correction [rad]
-    ("places", float, (WHEEL_COUNT, 2)),  # wheel centres, body x and z [m]
-    ("bogies", float, (2, 2)),  # bogie pivots, body x and z [m]
+    ("pose", float, (3,)),  # of the body in its own frame: zeros
+    ("q", float, (6,)),  # zeros, and the angles of right rocker, right and left bogie [rad]
+    ("placement", PLACEMENT),  # of the links in the body frame
     ("turning", float, (WHEEL_COUNT,)),  # turning rate of the link that carries each wheel [rad/s]
     ("speeds", float, (WHEEL_COUNT,)),  # rolling speeds [m/s]
     ("slopes", float, (WHEEL_COUNT,)),  # slopes of the ground between wheels, see `_write_slopes`
@@ -178,47 +180,37 @@ def _update(linkages, motions, duration, filters):
 @kernel
 def _place(linkage, motion, state):
     """Write places, turning rates, slopes and the velocity differences given by the links."""
-    wheels, places, known = linkage.wheels, state.places, state.known
+    wheels, known, placement = linkage.wheels, state.known, state.placement
+    centres, pivots = placement.centres, placement.bogie_pivots
+    for k in range(3):
+        state.q[3 + k] = motion.joints[k]
+    for wheel in range(WHEEL_COUNT):
+        placement.steering[wheel] = motion.steering[wheel]
+    place(linkage, state.pose, state.q, placement)
     roll, pitch = motion.attitude[0], motion.attitude[1]
     level = np.arctan2(np.sin(pitch), np.cos(pitch) * np.cos(roll))  # in the body's x-z plane
     for side in range(2):
-        angle = rocker_sign(side) * motion.joints[0]
         rocker_rate = motion.body_rates[1] + rocker_sign(side) * motion.joint_rates[0]
         bogie_rate = rocker_rate + motion.joint_rates[1 + side]
-        px, pz = linkage.rocker_pivots[side, 0], linkage.rocker_pivots[side, 2]
-        bx, bz = linkage.bogie_pivots[side, 0], linkage.bogie_pivots[side, 2]
-        dx, dz = _rotate(angle, bx - px, bz - pz)
-        state.bogies[side, 0], state.bogies[side, 1] = px + dx, pz + dz
         for wheel in range(3 * side, 3 * side + 3):
-            if linkage.on_bogie[wheel]:
-                turn = angle + motion.joints[1 + side]
-                dx, dz = _rotate(turn, wheels[wheel, 0] - bx, wheels[wheel, 2] - bz)
-                dx, dz = dx + state.bogies[side, 0], dz + state.bogies[side, 1]
-                state.turning[wheel] = bogie_rate
-            else:
-                dx, dz = _rotate(angle, wheels[wheel, 0] - px, wheels[wheel, 2] - pz)
-                dx, dz = dx + px, dz + pz
-                state.turning[wheel] = rocker_rate
-            places[wheel, 0], places[wheel, 1] = dx, dz
+            state.turning[wheel] = bogie_rate if linkage.on_bogie[wheel] else rocker_rate
         _write_slopes(roll, level, side, state)
         low, high = state.second[2 * side], state.first[2 * side]
         own = state.first[2 * side + 1]
         for i, sign in ((0, 1.0), (1, -1.0)):
-            j, pivot = 1 - i, state.bogies[side, 1 - i]
-            known[2 * side, i] = sign * bogie_rate * (places[high, j] - places[low, j])
+            j = 2 * (1 - i)
+            pivot = pivots[side, j]
+            known[2 * side, i] = sign * bogie_rate * (centres[high, j] - centres[low, j])
             known[2 * side + 1, i] = sign * (
-                bogie_rate * (pivot - places[low, j]) + rocker_rate * (places[own, j] - pivot)
+                bogie_rate * (pivot - centres[low, j]) + rocker_rate * (centres[own, j] - pivot)
             )
-            arm = places[own, j] - (pz if i == 0 else px)
+            arm = centres[own, j] - linkage.rocker_pivots[side, j]
             known[ROCKER_PAIR, i] = sign * rocker_rate * arm - (
                 known[ROCKER_PAIR, i] if side == 1 else 0.0
             )
     width = linkage.rocker_pivots[1, 1] - linkage.rocker_pivots[0, 1]
     known[ROCKER_PAIR, 1] += width * motion.body_rates[0]
-    turned = False
-    for wheel in range(WHEEL_COUNT):
-        turned |= motion.steering[wheel] != 0.0
-    if not turned:
+    if not has_turned_wheels(placement):
         known[ROCKER_PAIR, 0] -= width * motion.body_rates[2]
         return
     # In a curve the yaw rate is more than noise: the places of the wheels themselves count.
@@ -228,27 +220,17 @@ def _place(linkage, motion, state):
 
 
 @kernel
-def _rotate(angle, x, z):
-    """Return the vector (x, z), body frame, rotated about body +y by an angle [rad]."""
-    c, s = np.cos(angle), np.sin(angle)
-    return c * x + s * z, c * z - s * x
-
-
-@kernel
 def _write_slopes(roll, level, side, state):
     """Write for each wheel of a side the slope [rad] of the ground in its heading.
 
     Along the body it is the mean slope of the lines to the neighbouring wheels against the
     horizontal, `level`; across the body it is the roll.
     """
-    places, slopes, headings = state.places, state.slopes, state.headings
+    centres, slopes, headings = state.placement.centres, state.slopes, state.headings
     rear = 3 * side
-    behind = np.arctan2(
-        places[rear + 1, 1] - places[rear, 1], places[rear + 1, 0] - places[rear, 0]
-    )
-    before = np.arctan2(
-        places[rear + 2, 1] - places[rear + 1, 1], places[rear + 2, 0] - places[rear + 1, 0]
-    )
+    back, middle, front = centres[rear], centres[rear + 1], centres[rear + 2]
+    behind = np.arctan2(middle[2] - back[2], middle[0] - back[0])
+    before = np.arctan2(front[2] - middle[2], front[0] - middle[0])
     slopes[rear], slopes[rear + 1], slopes[rear + 2] = behind, 0.5 * (behind + before), before
     for wheel in range(rear, rear + 3):
         slopes[wheel] = headings[wheel, 0] * (slopes[wheel] - level) + headings[wheel, 1] * roll

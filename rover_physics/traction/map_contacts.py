@@ -18,7 +18,7 @@ from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place
 from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
-from rover_physics.terrain.ground import height_at_cell, is_cell_on_map, pack_ground
+from rover_physics.terrain.ground import height_at_cell, is_cell_on_map, pack_ground, to_cells
 from rover_physics.traction.balance import MeasuredState
 from rover_physics.traction.contact_ekf import ContactEstimate
 
@@ -111,8 +111,10 @@ def find_contacts(grounds, linkages, searches):
     NaN are those of wheels over unknown ground, perhaps of these alone.
     """
     ground, linkage, search = grounds[0], linkages[0], searches[0]
-    _measure_gaps(ground, linkage, search)
+    place(linkage, search.pose, search.q, search.placement)
     for wheel in range(WHEEL_COUNT):
+        _scan_profile(ground, linkage, search, wheel, MIDDLE_PROFILE)
+        search.gaps[wheel] = search.distance[MIDDLE_PROFILE, 0] - linkage.radius
         search.angles[wheel] = search.gaps[wheel]
     gap = median_of_wheels(search.gaps)
     if gap == gap:
@@ -134,15 +136,6 @@ def median_of_wheels(values):
         if smaller == WHEEL_COUNT // 2 - 1 or smaller == WHEEL_COUNT // 2:
             middle += 0.5 * value
     return middle
-
-
-@kernel
-def _measure_gaps(ground, linkage, search):
-    """Write gaps at the given height [m]: from each wheel's middle circle to the ground."""
-    place(linkage, search.pose, search.q, search.placement)
-    for wheel in range(WHEEL_COUNT):
-        _scan_profile(ground, linkage, search, wheel, MIDDLE_PROFILE)
-        search.gaps[wheel] = search.distance[MIDDLE_PROFILE, 0] - linkage.radius
 
 
 @kernel
@@ -190,8 +183,7 @@ def _scan_profile(ground, linkage, search, wheel, profile):
     count, approaches, last, last_angle = 0, False, np.inf, 0.0
     for k in range(-PROFILE_STEPS, PROFILE_STEPS + 1):
         x1 = k * step
-        gx = (cx + x1 * forward[0] - ground.x0) * ground.inverse_resolution
-        gy = (cy + x1 * forward[1] - ground.y0) * ground.inverse_resolution
+        gx, gy = to_cells(ground, cx + x1 * forward[0], cy + x1 * forward[1])
         height = np.nan
         if is_cell_on_map(ground, gx, gy):
             height = height_at_cell(ground, gx, gy)

@@ -7,7 +7,7 @@ contact and of the torque limit. T and S are along and across each wheel's own h
 nine equations of the balance; for each wheel the friction cone that u opens; u <= 1, N >= 0 and
 |T| <= largest torque over wheel radius, each with its slack; u and slacks >= 0. So an answer
 always exists, and the slacks say by how much a limit is exceeded. `scale` makes tractions and peak
-of order one: a peak of 0.1 matters as much as one of 1. `layout.py` names all variables and rows.
+of order one: a peak of 0.1 matters as much as one of 1. The constants name all variables and rows.
 
 A quadratic program cannot hold the cone sqrt(T^2 + S^2) <= u mu N itself:
 
@@ -39,28 +39,45 @@ from rover_physics.errors import ModelError
 from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.kernels import kernel
-from rover_physics.traction.layout import (
-    BACKWARD_PULL_ROWS,
-    BALANCE_ROWS,
-    CONE_ROWS,
-    CONE_SIDES,
+from rover_physics.traction.balance import (
     EQUATIONS,
     FORCES,
-    FORWARD_PULL_ROWS,
-    FRICTION_SLACK,
     LATERAL_SHARE,
     LATERAL_SLOPE,
     LOAD,
-    LOAD_ROWS,
-    LOAD_SLACK,
-    PEAK,
-    PEAK_LIMIT_ROW,
-    ROWS,
-    SIGN_ROWS,
-    TORQUE_SLACK,
     TRACTION,
-    VARIABLES,
 )
+
+# Variables after the FORCES of the balance, and rows; "First of" is meant as there.
+PEAK = FORCES
+"""The largest friction utilisation u of all wheels."""
+FRICTION_SLACK = PEAK + 1
+"""Excess of the peak over 1."""
+LOAD_SLACK = FRICTION_SLACK + 1
+"""Amount by which the smallest load is below 0."""
+TORQUE_SLACK = LOAD_SLACK + 1
+"""Excess of the largest traction over the largest pull of a motor."""
+VARIABLES = TORQUE_SLACK + 1
+"""Number of variables."""
+
+CONE_SIDES = 4
+"""Number of tangents that replace the friction cone of one wheel."""
+BALANCE_ROWS = 0
+"""First of the EQUATIONS rows of the balance."""
+CONE_ROWS = BALANCE_ROWS + EQUATIONS
+"""First of the tangents of the friction cones: CONE_SIDES of the first wheel, then the next."""
+PEAK_LIMIT_ROW = CONE_ROWS + WHEEL_COUNT * CONE_SIDES
+"""Row that limits the peak utilisation to 1 plus its slack."""
+LOAD_ROWS = PEAK_LIMIT_ROW + 1
+"""First of the six rows that keep a load at or above 0 minus its slack."""
+FORWARD_PULL_ROWS = LOAD_ROWS + WHEEL_COUNT
+"""First of the six rows that limit a traction to the motor's largest pull plus its slack."""
+BACKWARD_PULL_ROWS = FORWARD_PULL_ROWS + WHEEL_COUNT
+"""First of the six rows that limit a backward traction in the same way."""
+SIGN_ROWS = BACKWARD_PULL_ROWS + WHEEL_COUNT
+"""First of the rows that keep the variables from PEAK on at or above 0."""
+ROWS = SIGN_ROWS + VARIABLES - PEAK
+"""Number of rows."""
 
 # Weights of the objective, for scaled variables: tractions and peak are of order one.
 # 1/2 peak u^2 + 1/2 effort |T|^2 + 1/2 change |(T, s0, s1) - last|^2 + slack * (slacks).
@@ -113,7 +130,7 @@ SLACK_CURVATURE = 0.1
 
 
 class TractionQP(NamedTuple):
-    """Minimise 1/2 y'Py + q'y subject to lower <= A y <= upper; `layout` names y and the rows."""
+    """Minimise 1/2 y'Py + q'y subject to lower <= A y <= upper."""
 
     P: Floats
     """(18,) diagonal of the cost's matrix."""

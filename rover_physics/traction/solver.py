@@ -16,24 +16,24 @@ from scipy import sparse
 
 from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.kernels import kernel
-from rover_physics.traction.balance import BalanceRows
-from rover_physics.traction.layout import (
+from rover_physics.traction.balance import (
     EQUATIONS,
     FORCES,
     LATERAL_SHARE,
     LATERAL_SLOPE,
     LOAD,
-    ROWS,
     TRACTION,
     TRACTIONS,
-    VARIABLES,
+    BalanceRows,
 )
 from rover_physics.traction.program import (
     EFFORT_WEIGHT,
     MIN_LOAD,
     MIN_PEAK,
     PEAK_WEIGHT,
+    ROWS,
     SLACK_PRICE,
+    VARIABLES,
     ProgramInputs,
     TractionQP,
     new_program,

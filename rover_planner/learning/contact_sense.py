@@ -17,8 +17,15 @@ from rover_physics.rover.linkage import place, rocker_sign
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import look_up, pack_ground
-from rover_physics.traction.balance import BalanceWriter, complete_forces, write_balance
-from rover_physics.traction.layout import EQUATIONS, FORCES, LOAD, TRACTION
+from rover_physics.traction.balance import (
+    EQUATIONS,
+    FORCES,
+    LOAD,
+    TRACTION,
+    BalanceWriter,
+    complete_forces,
+    write_balance,
+)
 from rover_physics.traction.map_contacts import MAP_SEARCH, find_contacts, median_of_wheels
 from rover_planner.learning import drive_log
 from rover_planner.learning.drive_log import PITCH, ROLL, YAW, X, Y

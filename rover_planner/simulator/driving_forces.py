@@ -11,8 +11,7 @@ from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_rpy
 from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.traction.balance import BalanceWriter, MeasuredState
-from rover_physics.traction.layout import LOADS, TRACTIONS
+from rover_physics.traction.balance import LOADS, TRACTIONS, BalanceWriter, MeasuredState
 
 ROUNDS = 6
 """Fixed-point iterations of loads and tractions, which depend on each other by friction."""

@@ -8,9 +8,8 @@ import pytest
 
 from rover_physics import judge_path, judge_poses
 from rover_physics.errors import ModelError
-from rover_physics.traction.balance import BalanceWriter, MeasuredState
+from rover_physics.traction.balance import LOADS, TRACTIONS, BalanceWriter, MeasuredState
 from rover_physics.traction.contact_ekf import Motion, MotionContactEstimator
-from rover_physics.traction.layout import LOADS, TRACTIONS
 from rover_physics.traction.map_contacts import MapContactFinder
 from rover_physics.traction.program import ProgramInputs
 from rover_physics.traction.solver import TractionWorkspace, solve_traction
