@@ -5,6 +5,7 @@ import numpy as np
 
 from rover_physics.contact.clearance import POINTS, point_of_underside
 from rover_physics.numerics.kernels import kernel
+from rover_physics.numerics.linear_algebra import cross, dot
 from rover_physics.terrain.ground import elevation_of, height_at_cell, look_up, to_cells
 
 
@@ -97,12 +98,10 @@ def _plane_change(R, spread, dx, dy, z):
     above a fixed place is the component of this along the plane's normal, over the normal's z.
     """
     length = np.sqrt(R[0, 0] * R[0, 0] + R[1, 0] * R[1, 0])
-    nx, ny = R[0, 2] / R[2, 2], R[1, 2] / R[2, 2]
+    place, normal = (dx, dy, z), (R[0, 2] / R[2, 2], R[1, 2] / R[2, 2], 1.0)
     # Roll rotates about the body's x axis, pitch about the horizontal axis across the heading.
-    ax, ay, az = R[0, 0], R[1, 0], R[2, 0]
-    by_roll = nx * (ay * z - az * dy) + ny * (az * dx - ax * z) + (ax * dy - ay * dx)
-    ax, ay = -R[1, 0] / length, R[0, 0] / length
-    by_pitch = nx * (ay * z) + ny * (-ax * z) + (ax * dy - ay * dx)
+    by_roll = dot(normal, cross((R[0, 0], R[1, 0], R[2, 0]), place))
+    by_pitch = dot(normal, cross((-R[1, 0] / length, R[0, 0] / length, 0.0), place))
     lowered, raised = 0.0, 0.0
     for wheel in range(6):
         rate = spread.response[0, wheel]

@@ -23,7 +23,7 @@ from rover_physics.contact.settling import (
 )
 from rover_physics.contact.wheel import find_contact
 from rover_physics.numerics.kernels import kernel
-from rover_physics.numerics.linear_solve import solve_in_place
+from rover_physics.numerics.linear_algebra import solve_in_place
 from rover_physics.numerics.records import record_type
 from rover_physics.rover.linkage import place, rocker_sign
 from rover_physics.status import BoundStatus, ContactStatus

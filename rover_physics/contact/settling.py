@@ -20,7 +20,7 @@ import numpy as np
 from rover_physics.contact.contact_record import SearchScope
 from rover_physics.contact.wheel import blend_contact, find_contact
 from rover_physics.numerics.kernels import kernel
-from rover_physics.numerics.linear_solve import solve_in_place
+from rover_physics.numerics.linear_algebra import solve_in_place
 from rover_physics.rover.linkage import place, rocker_sign
 from rover_physics.status import ContactStatus, PoseStatus
 

@@ -15,8 +15,9 @@ system are of order 1 for any rover.
 
 from rover_physics.forces.shares import FREE_LATERAL_WHEELS, SHARES, write_shares
 from rover_physics.numerics.kernels import kernel
-from rover_physics.numerics.linear_solve import solve_in_place
+from rover_physics.numerics.linear_algebra import cross, difference, dot, solve_in_place
 from rover_physics.numerics.records import record_type
+from rover_physics.rover.linkage import rocker_sign
 
 UNKNOWNS = 9
 """Number of equations and unknowns of the equilibrium."""
@@ -102,29 +103,20 @@ def write_equations(linkage, placement, contacts, columns, balance):
     common, free = balance.shares.common, balance.shares.free
     A[:, :] = 0.0
     B[:, :] = 0.0
-    origin, length = placement.origin, linkage.length
-    R, point = placement.R, contacts.point
-    bogie_pivots, rocker_pivots = placement.bogie_pivots, placement.rocker_pivots
+    R, length = placement.R, linkage.length
     for wheel in range(6):
-        side = wheel // 3
-        sign = 1.0 if side == 0 else -1.0
-        rx = (point[wheel, 0] - origin[0]) / length
-        ry = (point[wheel, 1] - origin[1]) / length
-        rz = (point[wheel, 2] - origin[2]) / length
+        side, (x, y, z) = wheel // 3, difference(contacts.point[wheel], placement.origin)
+        arm = x / length, y / length, z / length
         for kind in range(3):
             force = frames[wheel, kind, 0], frames[wheel, kind, 1], frames[wheel, kind, 2]
-            fx, fy, fz = force
-            mx, my, mz = ry * fz - rz * fy, rz * fx - rx * fz, rx * fy - ry * fx
-            about_axis = mx * R[0, 1] + my * R[1, 1] + mz * R[2, 1]
-            about_rocker = about_axis - _moment_about(
-                linkage, placement, rocker_pivots[side], force
-            )
-            about_bogie = 0.0
+            moment = cross(arm, force)
+            about_axis = dot(moment, (R[0, 1], R[1, 1], R[2, 1]))
+            about = _moment_about(linkage, placement, placement.rocker_pivots[side], force)
+            about_rocker, about_bogie = about_axis - about, 0.0
             if linkage.on_bogie[wheel]:
-                about_bogie = about_axis - _moment_about(
-                    linkage, placement, bogie_pivots[side], force
-                )
-            wrench = fx, fy, fz, mx, my, mz, about_bogie, sign * about_rocker
+                about = _moment_about(linkage, placement, placement.bogie_pivots[side], force)
+                about_bogie = about_axis - about
+            wrench = *force, *moment, about_bogie, rocker_sign(side) * about_rocker
             column, share = wheel, 1.0  # variables: literals would be types of their own
             if kind == 1:
                 column, share = 8, common[wheel, 2]
@@ -169,15 +161,8 @@ def _add_column(matrix, column, share, wrench, side):
 def _moment_about(linkage, placement, pivot, force):
     """Return the moment about the origin along the wheel axes of a force (x, y, z) at a pivot."""
     R, origin, length = placement.R, placement.origin, linkage.length
-    fx, fy, fz = force
-    px = (pivot[0] - origin[0]) / length
-    py = (pivot[1] - origin[1]) / length
-    pz = (pivot[2] - origin[2]) / length
-    return (
-        (py * fz - pz * fy) * R[0, 1]
-        + (pz * fx - px * fz) * R[1, 1]
-        + (px * fy - py * fx) * R[2, 1]
-    )
+    x, y, z = difference(pivot, origin)
+    return dot(cross((x / length, y / length, z / length), force), (R[0, 1], R[1, 1], R[2, 1]))
 
 
 @kernel

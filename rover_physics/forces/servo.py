@@ -36,7 +36,7 @@ from rover_physics.forces.soil import (
 )
 from rover_physics.limits.table import MIN_SPEED_SHARE, TOLERANCE
 from rover_physics.numerics.kernels import kernel
-from rover_physics.numerics.linear_solve import solve_in_place
+from rover_physics.numerics.linear_algebra import solve_in_place
 from rover_physics.status import Stall
 from rover_physics.terrain.ground import copy_soil, friction_at, soil_row_at
 

@@ -13,7 +13,7 @@ regular: "one unit forward" means that the treads travel as far as on level grou
 import numpy as np
 
 from rover_physics.numerics.kernels import kernel
-from rover_physics.numerics.linear_solve import solve_in_place
+from rover_physics.numerics.linear_algebra import cross, difference, dot, solve_in_place
 from rover_physics.numerics.records import record_type
 from rover_physics.terrain.ground import SOIL_NUMBERS
 
@@ -163,7 +163,7 @@ def _write_wheel(linkage, placement, contact, wheel, X):
     side = wheel // 3
     sign = 1.0 if side == 0 else -1.0
     ax, ay, az = R[0, 1], R[1, 1], R[2, 1]
-    rx, ry, rz = point[0] - origin[0], point[1] - origin[1], point[2] - origin[2]
+    arm = difference(point, origin)
     for kind in range(3):
         column = SCRUB + wheel if kind == 2 else 6 * kind + wheel
         for row in range(UNKNOWNS):
@@ -172,12 +172,10 @@ def _write_wheel(linkage, placement, contact, wheel, X):
             mx, my, mz = -frame[0, 0], -frame[0, 1], -frame[0, 2]
             about_bogie = about_rocker = mx * ax + my * ay + mz * az
         else:
-            fx, fy, fz = frame[1 + kind, 0], frame[1 + kind, 1], frame[1 + kind, 2]
-            X[0, column], X[1, column], X[2, column] = fx, fy, fz
-            mx = (ry * fz - rz * fy) / length
-            my = (rz * fx - rx * fz) / length
-            mz = (rx * fy - ry * fx) / length
-            force = fx, fy, fz
+            force = frame[1 + kind, 0], frame[1 + kind, 1], frame[1 + kind, 2]
+            X[0, column], X[1, column], X[2, column] = force
+            mx, my, mz = cross(arm, force)
+            mx, my, mz = mx / length, my / length, mz / length
             about_rocker = _moment(placement, placement.rocker_pivots[side], point, force) / length
             about_bogie = _moment(placement, placement.bogie_pivots[side], point, force) / length
         X[3, column], X[4, column], X[5, column] = mx, my, mz
@@ -190,9 +188,7 @@ def _write_wheel(linkage, placement, contact, wheel, X):
 def _moment(placement, pivot, point, force):
     """Return the moment of a force at a point about the pivot axis through `pivot`."""
     R = placement.R
-    fx, fy, fz = force
-    x, y, z = point[0] - pivot[0], point[1] - pivot[1], point[2] - pivot[2]
-    return (y * fz - z * fy) * R[0, 1] + (z * fx - x * fz) * R[1, 1] + (x * fy - y * fx) * R[2, 1]
+    return dot(cross(difference(point, pivot), force), (R[0, 1], R[1, 1], R[2, 1]))
 
 
 @kernel

@@ -19,6 +19,7 @@ can be balanced for any steering angles.
 import numpy as np
 
 from rover_physics.numerics.kernels import kernel
+from rover_physics.numerics.linear_algebra import cross, dot
 from rover_physics.numerics.records import record_type
 
 REFINEMENTS = 3
@@ -64,7 +65,7 @@ def write_shares(linkage, placement, shares):
     if not has_turned_wheels(placement):
         for wheel in range(6):
             common[wheel, 0], common[wheel, 2] = 1.0, 1.0
-            common[wheel, 1] = _place_along(linkage, placement, wheel, 0)
+            common[wheel, 1] = place_of(placement, wheel)[0] / linkage.length
         return
     _write_axles(linkage, placement, shares)
     _find_rolling_motion(shares)
@@ -75,8 +76,8 @@ def write_shares(linkage, placement, shares):
             common[wheel, term] = 0.0
             for k in range(3):
                 common[wheel, term] += shares.creeps[term, k] * axles[wheel, k]
-        x = _place_along(linkage, placement, wheel, 0)
-        y = _place_along(linkage, placement, wheel, 1)
+        x, y = place_of(placement, wheel)
+        x, y = x / linkage.length, y / linkage.length
         # The wheel's heading is (a_y, -a_x).
         push = (rolling[0] - rolling[2] * y) * axles[wheel, 1]
         push -= (rolling[1] + rolling[2] * x) * axles[wheel, 0]
@@ -85,13 +86,14 @@ def write_shares(linkage, placement, shares):
 
 
 @kernel
-def _place_along(linkage, placement, wheel, k):
-    """Return the position of a wheel along axis k of the body [reference lengths]."""
+def place_of(placement, wheel):
+    """Return the position of a wheel along body x and y [m]."""
     R, origin, centres = placement.R, placement.origin, placement.centres
-    along = 0.0
+    x = y = 0.0
     for i in range(3):
-        along += R[i, k] * (centres[wheel, i] - origin[i])
-    return along / linkage.length
+        x += R[i, 0] * (centres[wheel, i] - origin[i])
+        y += R[i, 1] * (centres[wheel, i] - origin[i])
+    return x, y
 
 
 @kernel
@@ -102,8 +104,8 @@ def _write_axles(linkage, placement, shares):
         for i in range(3):
             ahead += R[i, 0] * axis[wheel, i]
             left += R[i, 1] * axis[wheel, i]
-        x = _place_along(linkage, placement, wheel, 0)
-        y = _place_along(linkage, placement, wheel, 1)
+        x, y = place_of(placement, wheel)
+        x, y = x / linkage.length, y / linkage.length
         shares.axles[wheel, 0], shares.axles[wheel, 1] = ahead, left
         shares.axles[wheel, 2] = x * left - y * ahead
 
@@ -123,10 +125,7 @@ def _find_rolling_motion(shares):
                 G[i, k] += shares.axles[wheel, i] * shares.axles[wheel, k]
     best = 0
     for i in range(3):
-        a, b = (i + 1) % 3, (i + 2) % 3
-        for k in range(3):
-            c, d = (k + 1) % 3, (k + 2) % 3
-            adjugate[i, k] = G[a, c] * G[b, d] - G[a, d] * G[b, c]
+        adjugate[i, 0], adjugate[i, 1], adjugate[i, 2] = cross(G[(i + 1) % 3], G[(i + 2) % 3])
     for i in range(1, 3):
         if adjugate[i, i] > adjugate[best, best]:
             best = i
@@ -134,15 +133,15 @@ def _find_rolling_motion(shares):
         m[i] = adjugate[i, best]
     _normalise(m)
     for _ in range(REFINEMENTS):
-        x, y, z = m[0], m[1], m[2]
+        last = m[0], m[1], m[2]
         for i in range(3):
-            m[i] = adjugate[i, 0] * x + adjugate[i, 1] * y + adjugate[i, 2] * z
+            m[i] = dot(adjugate[i], last)
         _normalise(m)
 
 
 @kernel
 def _normalise(vector):
-    length = np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+    length = np.sqrt(dot(vector, vector))
     for i in range(3):
         vector[i] /= length
 
@@ -158,9 +157,7 @@ def _write_creeps(shares):
     for i in range(3):
         first[i] = (1.0 if i == least else 0.0) - m[least] * m[i]
     _normalise(first)
-    for i in range(3):
-        a, b = (i + 1) % 3, (i + 2) % 3
-        second[i] = m[a] * first[b] - m[b] * first[a]
+    second[0], second[1], second[2] = cross(m, first)
 
 
 @kernel

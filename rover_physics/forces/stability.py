@@ -15,6 +15,7 @@ IEEE ICRA 1996: eqs for a_i, l_i, f_i*, theta_i, d_i and alpha = min theta_i |d_
 import numpy as np
 
 from rover_physics.numerics.kernels import kernel
+from rover_physics.numerics.linear_algebra import cross, difference, dot
 
 CORNERS = 4
 """Corners of the support polygon."""
@@ -84,43 +85,33 @@ def measure_edge(corners, edge, centre, force, moment):
     The edge is from corner `edge` to the next one. The other arguments are as for
     `tip_over_angles`.
     """
-    start, end = edge, (edge + 1) % corners.shape[0]
-    ax = corners[end, 0] - corners[start, 0]
-    ay = corners[end, 1] - corners[start, 1]
-    az = corners[end, 2] - corners[start, 2]
-    length = np.sqrt(ax * ax + ay * ay + az * az)
+    start, end = corners[edge], corners[(edge + 1) % corners.shape[0]]
+    side = difference(end, start)
+    length = np.sqrt(dot(side, side))
     if not length > 0.0:
         return np.inf, np.inf
-    ax, ay, az = ax / length, ay / length, az / length
-    axis = ax, ay, az
-    from_centre = (
-        corners[end, 0] - centre[0],
-        corners[end, 1] - centre[1],
-        corners[end, 2] - centre[2],
-    )
-    lx, ly, lz = _normal_to(axis, from_centre)
-    fx, fy, fz = _normal_to(axis, (force[0], force[1], force[2]))
-    about = ax * moment[0] + ay * moment[1] + az * moment[2]
-    arm = lx * lx + ly * ly + lz * lz
-    if not arm > 0.0:
+    axis = side[0] / length, side[1] / length, side[2] / length
+    arm, (fx, fy, fz) = _normal_to(axis, difference(end, centre)), _normal_to(axis, force)
+    square = dot(arm, arm)
+    if not square > 0.0:
         return 0.0, 0.0
-    fx += about * (ly * az - lz * ay) / arm
-    fy += about * (lz * ax - lx * az) / arm
-    fz += about * (lx * ay - ly * ax) / arm
-    size = np.sqrt(fx * fx + fy * fy + fz * fz)
+    about, (px, py, pz) = dot(axis, moment), cross(arm, axis)
+    net = fx + about * px / square, fy + about * py / square, fz + about * pz / square
+    size = np.sqrt(dot(net, net))
     if not size > 0.0:
         return np.inf, np.inf
-    along = lx * fx + ly * fy + lz * fz
-    across = ax * (fy * lz - fz * ly) + ay * (fz * lx - fx * lz) + az * (fx * ly - fy * lx)
-    angle = np.arctan2(-across, along)
+    across = dot(axis, cross(net, arm))
+    angle = np.arctan2(-across, dot(arm, net))
     distance = abs(across) / size
     return angle, angle * distance * size
 
 
 @kernel
 def _normal_to(axis, vector):
-    """Return the component of a vector (x, y, z) normal to a unit vector (x, y, z)."""
-    ax, ay, az = axis
-    x, y, z = vector
-    along = ax * x + ay * y + az * z
-    return x - along * ax, y - along * ay, z - along * az
+    """Return the component of a vector (3,) normal to a unit vector (3,)."""
+    along = dot(axis, vector)
+    return (
+        vector[0] - along * axis[0],
+        vector[1] - along * axis[1],
+        vector[2] - along * axis[2],
+    )

@@ -17,7 +17,7 @@ import numpy as np
 
 from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES
 from rover_physics.numerics.kernels import kernel
-from rover_physics.numerics.linear_solve import solve_in_place
+from rover_physics.numerics.linear_algebra import solve_in_place
 from rover_physics.numerics.records import record_type
 
 MAX_LEVELS = 60

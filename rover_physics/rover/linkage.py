@@ -155,30 +155,22 @@ def place(linkage, pose, q, placement):
             angle [rad].
         placement: PLACEMENT with the steering angles; the rest is written.
     """
-    R, origin, wheels = placement.R, placement.origin, linkage.wheels
-    pivots, bogie_pivots = linkage.rocker_pivots, linkage.bogie_pivots
+    R, origin = placement.R, placement.origin
     attitude_matrix(q[1], q[2], pose[2], R)
     origin[0], origin[1], origin[2] = pose[0], pose[1], q[0]
     for side in range(2):
-        px, py, pz = pivots[side, 0], pivots[side, 1], pivots[side, 2]
-        angle = rocker_sign(side) * q[3]
-        rocker_c, rocker_s = np.cos(angle), np.sin(angle)
-        bogie_c, bogie_s = np.cos(angle + q[4 + side]), np.sin(angle + q[4 + side])
-        to_map(placement, (px, py, pz), placement.rocker_pivots, side)
-        dx, dz = bogie_pivots[side, 0] - px, bogie_pivots[side, 2] - pz
-        bx, bz = px + rocker_c * dx + rocker_s * dz, pz - rocker_s * dx + rocker_c * dz
-        to_map(placement, (bx, bogie_pivots[side, 1], bz), placement.bogie_pivots, side)
+        rocker, bogie, pivot, hung = _turn_links(linkage, q, side)
+        to_map(placement, pivot, placement.rocker_pivots, side)
+        to_map(placement, hung, placement.bogie_pivots, side)
         for i in range(3 * side, 3 * side + 3):
-            link_c, link_s = rocker_c, rocker_s
+            link, wheel = rocker, linkage.wheels[i]
             if linkage.on_bogie[i]:
-                link_c, link_s = bogie_c, bogie_s
-                dx, dz = wheels[i, 0] - bogie_pivots[side, 0], wheels[i, 2] - bogie_pivots[side, 2]
-                wx, wz = bx + bogie_c * dx + bogie_s * dz, bz - bogie_s * dx + bogie_c * dz
+                link = bogie
+                centre = _swing(wheel, linkage.bogie_pivots[side], hung, bogie)
             else:
-                dx, dz = wheels[i, 0] - px, wheels[i, 2] - pz
-                wx, wz = px + rocker_c * dx + rocker_s * dz, pz - rocker_s * dx + rocker_c * dz
-            to_map(placement, (wx, wheels[i, 1], wz), placement.centres, i)
-            _write_axis(placement, i, (link_s, link_c))
+                centre = _swing(wheel, pivot, pivot, rocker)
+            to_map(placement, centre, placement.centres, i)
+            _write_axis(placement, i, link)
             _span_wheel_plane(placement, i)
     length = np.sqrt(R[0, 1] * R[0, 1] + R[1, 1] * R[1, 1])
     placement.ahead[0], placement.ahead[1], placement.ahead[2] = (
@@ -192,30 +184,39 @@ def place(linkage, pose, q, placement):
 def place_masses(linkage, q, placement):
     """Write the centres of mass into a placement that `place` has written with q (6,)."""
     coms, body = placement.part_coms, linkage.body_com
-    pivots, bogie_pivots = linkage.rocker_pivots, linkage.bogie_pivots
     to_map(placement, (body[0], body[1], body[2]), coms, 0)
     for side in range(2):
-        px, pz = pivots[side, 0], pivots[side, 2]
-        angle = rocker_sign(side) * q[3]
-        c, s = np.cos(angle), np.sin(angle)
-        point = linkage.rocker_coms
-        dx, dz = point[side, 0] - px, point[side, 2] - pz
-        com = px + c * dx + s * dz, point[side, 1], pz - s * dx + c * dz
-        to_map(placement, com, coms, 1 + side)
-        dx, dz = bogie_pivots[side, 0] - px, bogie_pivots[side, 2] - pz
-        bx, bz = px + c * dx + s * dz, pz - s * dx + c * dz
-        c, s = np.cos(angle + q[4 + side]), np.sin(angle + q[4 + side])
-        point = linkage.bogie_coms
-        dx, dz = point[side, 0] - bogie_pivots[side, 0], point[side, 2] - bogie_pivots[side, 2]
-        com = bx + c * dx + s * dz, point[side, 1], bz - s * dx + c * dz
-        to_map(placement, com, coms, 3 + side)
+        rocker, bogie, pivot, hung = _turn_links(linkage, q, side)
+        to_map(placement, _swing(linkage.rocker_coms[side], pivot, pivot, rocker), coms, 1 + side)
+        own = _swing(linkage.bogie_coms[side], linkage.bogie_pivots[side], hung, bogie)
+        to_map(placement, own, coms, 3 + side)
+
+
+@kernel
+def _turn_links(linkage, q, side):
+    """Return (cosine, sine) of a side's rocker and bogie, and their pivots, body frame [m]."""
+    angle, pivot = rocker_sign(side) * q[3], linkage.rocker_pivots[side]
+    rocker = np.cos(angle), np.sin(angle)
+    bogie = np.cos(angle + q[4 + side]), np.sin(angle + q[4 + side])
+    own = pivot[0], pivot[1], pivot[2]
+    return rocker, bogie, own, _swing(linkage.bogie_pivots[side], own, own, rocker)
+
+
+@kernel
+def _swing(point, pivot, moved, turn):
+    """Return a point (3,) of a link that turns about its pivot, which has moved; body frame [m].
+
+    `turn` is (cosine, sine) of the link's angle about body y.
+    """
+    (c, s), dx, dz = turn, point[0] - pivot[0], point[2] - pivot[2]
+    return moved[0] + c * dx + s * dz, point[1], moved[2] - s * dx + c * dz
 
 
 @kernel
 def _write_axis(placement, wheel, link):
     """Write the axle of a wheel, turned about the z axis of its link.
 
-    `link` is the (sine, cosine) of the link's angle about body y.
+    `link` is the (cosine, sine) of the link's angle about body y.
     """
     R, axis = placement.R, placement.axis
     angle = placement.steering[wheel]
@@ -223,7 +224,7 @@ def _write_axis(placement, wheel, link):
         for i in range(3):
             axis[wheel, i] = R[i, 1]
         return
-    link_s, link_c = link
+    link_c, link_s = link
     s, c = np.sin(angle), np.cos(angle)
     for i in range(3):
         axis[wheel, i] = c * R[i, 1] - s * (link_c * R[i, 0] - link_s * R[i, 2])

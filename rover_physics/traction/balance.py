@@ -25,7 +25,7 @@ from rover_physics.forces.equilibrium import (
     solve_equations,
     write_equations,
 )
-from rover_physics.forces.shares import has_turned_wheels, write_shares
+from rover_physics.forces.shares import has_turned_wheels, place_of, write_shares
 from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.kernels import kernel
@@ -382,7 +382,7 @@ def _write_rolling(linkage, placement, com, shares, rolling):
         motion[2] = shares.rolling[2] / length
     mean = 0.0
     for wheel in range(WHEEL_COUNT):
-        x, y = _place_of(placement, wheel)
+        x, y = place_of(placement, wheel)
         ahead, left = 1.0, 0.0
         if turned:
             # The heading is a quarter turn to the right of the axle.
@@ -403,14 +403,3 @@ def _write_rolling(linkage, placement, com, shares, rolling):
     rolling.inertia = inertia
     rolling.thrust[0], rolling.thrust[1] = ahead / inertia, left / inertia
     rolling.thrust[2] = squared_radius * motion[2] / inertia
-
-
-@kernel
-def _place_of(placement, wheel):
-    """Return the position of a wheel along body x and y [m]."""
-    R, origin, centres = placement.R, placement.origin, placement.centres
-    x = y = 0.0
-    for i in range(3):
-        x += R[i, 0] * (centres[wheel, i] - origin[i])
-        y += R[i, 1] * (centres[wheel, i] - origin[i])
-    return x, y

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Solver for small dense linear systems inside kernels."""
+"""Vectors in space and small dense linear systems, for kernels.
+
+Vectors are tuples (x, y, z) or arrays (3,); products that are vectors are tuples.
+"""
 
 from rover_physics.numerics.kernels import kernel
 
@@ -39,3 +42,21 @@ def solve_in_place(A, B, n, m):
                 total -= A[i, k] * B[k, j]
             B[i, j] = total / A[i, i]
     return True
+
+
+@kernel
+def difference(point, origin):
+    """Return the vector to a point from an origin."""
+    return point[0] - origin[0], point[1] - origin[1], point[2] - origin[2]
+
+
+@kernel
+def dot(a, b):
+    """Return the scalar product of two vectors."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def cross(a, b):
+    """Return the vector product of two vectors."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
