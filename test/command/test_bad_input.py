@@ -42,6 +42,7 @@ REFUSED = [
     (predict("--arm", "arm_yaw=0.1", "--arm", "arm_yaw=0.2"), "twice"),
     (["reach", "lsr1", "terrain.npz", "here", "2", "0.5", "2.5", "2.3", "0.3"], "'X'"),
     (["plan", "lsr1", "terrain.npz", "o.npz", "--start=1,2", "--goal=1,0,0"], "'1,2' is no pose"),
+    (["replay-plan", "terrain.npz", "o.npz"], "terrain.npz holds no question for a path"),
     (["rover", "out.yaml"], "--from-urdf"),
     (["terrain", "t.npz", "--seed", DIGITS * 20], "--seed"),
     (["study", "\x1b[2J\n\udcff"], "no study file \\x1b[2J\\n\\udcff"),

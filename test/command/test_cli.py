@@ -139,7 +139,7 @@ def ground(tmp_path_factory):
 
 def test_a_way_is_written_with_its_predictions_and_predict_passes_it(ground, tmp_path, capfd):
     out, picture, dump = (tmp_path / name for name in ("way.npz", "way.png", "asked.npz"))
-    words = ["plan", "lsr1", str(ground), str(out), *ENDS, "--budget", "60"]
+    words = ["plan", "lsr1", str(ground), str(out), *ENDS, "--budget=60", "--friction=0.7"]
     assert main([*words, "--picture", str(picture), "--dump", str(dump)]) == 0
     report = json.loads(capfd.readouterr().out)
     assert report["found"] is True and report["reason"] == ""
@@ -153,7 +153,8 @@ def test_a_way_is_written_with_its_predictions_and_predict_passes_it(ground, tmp
         assert steps.sum() == pytest.approx(report["length"], rel=1e-3)
         poses = way["poses"]
     assert picture.stat().st_size > 10_000
-    assert main(["predict", "lsr1", str(ground), str(out), str(tmp_path / "p.npz")]) == 0
+    words = ["predict", "lsr1", str(ground), str(out), str(tmp_path / "p.npz"), "--friction=0.7"]
+    assert main(words) == 0
     assert "traversable" in capfd.readouterr().out
     assert main(["replay-plan", str(dump), str(tmp_path / "again.npz")]) == 0
     again = json.loads(capfd.readouterr().out)
