@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from sensor_msgs.msg import PointCloud2, PointField
 
@@ -106,7 +106,6 @@ def test_a_terrain_comes_back_as_it_was_with_all_its_layers(datatype, shuffled):
     np.testing.assert_array_equal(back.ground_class[known], classes[known])
 
 
-@settings(max_examples=20)
 @given(
     rows=st.integers(2, 40),
     columns=st.integers(2, 40),
@@ -387,7 +386,6 @@ def take_or_refuse(cloud, resolution):
             assert len(str(error)) <= MAX_TEXT
 
 
-@settings(max_examples=60)
 @given(
     rows=st.lists(st.tuples(*[st.floats(width=32)] * 3), min_size=1, max_size=12),
     resolution=st.sampled_from((0.0, 0.05, 1e-3, 1e5)),

@@ -35,7 +35,7 @@ POSE = [[0.0, 0.0, 0.0]]
 NAN, INF = float("nan"), float("inf")
 GROWING = {"energy", "time", "distance"}
 ALONG_THE_PATH = GROWING | {"wheel_drop", "falling", "between", "waypoint", "bounds"}
-few = settings(max_examples=8, deadline=None)
+few = settings(max_examples=8)
 
 
 def line(start: float, end: float, count: int = 41, yaw: float = 0.0) -> np.ndarray:

@@ -60,7 +60,7 @@ def assert_same(one, other) -> None:
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(courses(), st.sampled_from(sorted(OPTIONS)))
 def test_a_stopped_sweep_is_the_beginning_of_the_whole_one_to_the_last_bit(course, option):
     ground, poses = course
