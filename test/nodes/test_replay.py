@@ -238,13 +238,6 @@ def test_what_is_no_bag_and_a_damaged_one_are_refused(tmp_path, capsys):
     assert err.startswith("rover_planner: ") and err.count("\n") == 1
 
 
-def test_an_answer_is_never_written_over(tmp_path, capsys):
-    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves()))])
-    (tmp_path / "out").mkdir()
-    assert main(["replay", str(bag), str(tmp_path / "out")]) == 2
-    assert "exists already" in capsys.readouterr().err
-
-
 def test_recorded_transforms_place_odometry_and_clouds_on_the_map(tmp_path, capsys):
     map_odom = Rigid.from_rpy(2.0, -1.0, 0.3, 0.0, 0.0, 1.1)
     mount = Rigid.from_rpy(0.4, 0.0, 0.6, 0.0, 0.5, 0.0)
@@ -306,16 +299,15 @@ def test_paths_goals_and_answers_are_those_of_the_robot_with_its_offset_and_join
         assert "bogie_r" in joints.joint_names and "bogie_right" not in joints.joint_names
 
 
-def test_a_goal_without_a_start_is_told(tmp_path, capsys):
+def test_what_lacks_to_ask_a_question_is_told_and_an_answer_is_never_written_over(
+    tmp_path, capsys
+):
     bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves()))])
-    assert main(["replay", str(bag), str(tmp_path / "out"), "--goal", "2,0,0"]) == 0
-    assert "no odometry before them tells where it starts" in capsys.readouterr().err
-    assert main(["replay", str(bag), str(tmp_path / "no"), "--start", "2,0,0"]) == 2
-    assert "--goal, which is not given" in capsys.readouterr().err
-
-
-def test_a_bag_that_asks_nothing_says_what_it_lacks(tmp_path, capsys):
-    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves()))])
-    assert main(["replay", str(bag), str(tmp_path / "out")]) == 0
-    said = capsys.readouterr().err
-    assert "nothing was asked: the bag has no path and no odometry; give --goal" in said
+    for words, code, said in (
+        (["nothing"], 0, "nothing was asked: the bag has no path and no odometry; give --goal"),
+        (["goal", "--goal=2,0,0"], 0, "no odometry before them tells where it starts"),
+        (["start", "--start=2,0,0"], 2, "--goal, which is not given"),
+        (["nothing"], 2, "exists already"),
+    ):
+        assert main(["replay", str(bag), str(tmp_path / words[0]), *words[1:]]) == code
+        assert said in capsys.readouterr().err
