@@ -26,9 +26,9 @@ pytest.importorskip("matplotlib", reason="needs matplotlib")
 @pytest.fixture
 def map_file(tmp_path):
     """A small terrain of gentle ground with a corner that was never seen."""
-    made = make_mars_terrain(4, 9.0, 0.1, rock_cover=0.005, crater_density=0.0)
+    made = make_mars_terrain(4, 6.0, 0.1, rock_cover=0.0, crater_density=0.0)
     elevation = made.elevation.copy()
-    elevation[60:, 60:] = np.nan
+    elevation[40:, 40:] = np.nan
     path = tmp_path / "map.npz"
     save_terrain(path, Terrain(elevation, made.resolution, made.origin))
     return path

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import Point, PoseStamped, Quaternion
+from geometry_msgs.msg import Point, Quaternion
 from nav_msgs.msg import Odometry
 from nav_msgs.msg import Path as PathMessage
 from rclpy.serialization import deserialize_message, serialize_message
@@ -20,6 +20,7 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory
 
 from msg_adapters.elevation import terrain_to_point_cloud
+from msg_adapters.paths import poses_path
 from msg_adapters.stamps import ns_to_stamp
 from rover_physics import Terrain, judge_path, load_terrain
 from rover_physics.names import SUSPENSION_JOINTS
@@ -49,11 +50,6 @@ def odometry_at(x: float, frame: str = "map") -> Odometry:
     return message
 
 
-def joints_of(angles: dict[str, float]) -> JointState:
-    """Return joint angles [rad] by name."""
-    return JointState(name=list(angles), position=list(angles.values()))
-
-
 def drive(length: float) -> list[tuple[str, object]]:
     """Return the messages of a drive along x: odometry and the model's suspension each 2 cm."""
     x = np.arange(0.5, 0.5 + length, 0.02)
@@ -62,8 +58,8 @@ def drive(length: float) -> list[tuple[str, object]]:
     messages: list[tuple[str, object]] = []
     for k, place in enumerate(x.tolist()):
         values = np.concatenate([prediction.rocker_angle[k], prediction.bogie_angle[k]])
-        angles = dict(zip(SUSPENSION_JOINTS, values.tolist(), strict=True))
-        messages += [("/joint_states", joints_of(angles)), ("/odometry", odometry_at(place))]
+        joints = JointState(name=list(SUSPENSION_JOINTS), position=values.tolist())
+        messages += [("/joint_states", joints), ("/odometry", odometry_at(place))]
     return messages
 
 
@@ -74,15 +70,7 @@ def cloud(terrain: Terrain, stamp: int = BEGIN, frame: str = "map") -> PointClou
 
 def path_to(x: float) -> PathMessage:
     """Return a path along the x axis from 1 m to x [m]."""
-    message = PathMessage()
-    message.header.frame_id = "map"
-    message.header.stamp = ns_to_stamp(BEGIN + 5)
-    for place in (1.0, x):
-        pose = PoseStamped()
-        pose.pose.position.x = place
-        pose.pose.orientation = Quaternion(w=1.0)
-        message.poses.append(pose)
-    return message
+    return poses_path([(1.0, 0.0, 0.0), (x, 0.0, 0.0)], "map", ns_to_stamp(BEGIN + 5))
 
 
 def record(folder: Path, messages: list[tuple[str, Any]], storage: str = "mcap") -> Path:

@@ -15,7 +15,7 @@ from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.traction.settings import load_traction_settings
 from rover_planner.traction.traction_service import TractionService
 from support.rough_grounds import plane
-from support.rovers import LSR1
+from support.rovers import FIXED, LSR1
 
 STEERED = steering_joints(LSR1)
 STANDING = dict.fromkeys(WHEEL_JOINTS, 0.0)
@@ -209,8 +209,8 @@ def test_steering_joints_that_are_missing_are_named_and_nothing_is_guessed():
 
 
 def test_a_new_rover_with_steering_asks_for_its_joints():
-    rig, fixed = Rig(), replace(settings(), rover=replace(LSR1, steering=None))
-    rig.service = TractionService(fixed)
+    rig = Rig()
+    rig.service = TractionService(replace(settings(), rover=FIXED))
     known = {name: rig.positions.pop(name) for name in STEERED}
     assert rig.run(5).fault == ""
     rig.service.settings = settings()

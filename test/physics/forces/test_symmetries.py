@@ -19,9 +19,8 @@ from support.rough_grounds import (
     smooth,
 )
 from support.rover_geometry import turned_round
-from support.rovers import LSR1, M2020
+from support.rovers import FIXED, LSR1, M2020
 
-FIXED = replace(LSR1, steering=None)
 GAP = 3e-5
 """What a settled pose may leave open [m]."""
 ANGLE = 4.0 * GAP / 0.4

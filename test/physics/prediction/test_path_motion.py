@@ -16,10 +16,9 @@ from rover_physics.prediction.path_motion import motions_of
 from rover_physics.rover.model import Steering
 from rover_physics.traversability.judge import PartwiseJudge
 from support.rough_grounds import plane, random_poses
-from support.rovers import LSR1, M2020
+from support.rovers import FIXED, LSR1, M2020
 
 ALL_STEER = replace(LSR1, steering=Steering(("rear", "middle", "front"), 1.57, 0.35))
-FIXED = replace(LSR1, steering=None)
 LEVEL = Terrain(np.zeros((401, 401)), 0.02, (-4.0, -4.0))
 SPEED = LSR1.nominal_speed
 

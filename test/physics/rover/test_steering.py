@@ -21,10 +21,9 @@ from rover_physics.rover.steering_joints import (
     steering_joints,
     tightest_radius,
 )
-from support.rovers import LSR1, M2020
+from support.rovers import FIXED, LSR1, M2020
 
 ALL_STEER = replace(LSR1, steering=Steering(("rear", "middle", "front"), np.pi / 2, 0.35))
-FIXED = replace(LSR1, steering=None)
 speeds = st.floats(-0.1, 0.1)
 
 
