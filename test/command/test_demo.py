@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 
 import numpy as np
 import pytest
@@ -34,57 +35,43 @@ def map_file(tmp_path):
     return path
 
 
-class Demo:
-    """The demo as a process whose descendants are known by a token in their environment."""
-
-    def __init__(self, *words):
-        self.token = ProcessToken()
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "rover_planner", "demo", *map(str, words)],
-            cwd=TOP,
-            env=os.environ | self.token.environment | {"PYTHONPATH": str(TOP)},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-        )
-
-    def finish(self):
-        """Wait for the end; return exit code, stdout and stderr."""
-        out, err = self.process.communicate(timeout=300)
-        return self.process.returncode, out, err
+@pytest.fixture
+def token(monkeypatch):
+    """Return what all processes are known by that a test starts."""
+    made = ProcessToken()
+    for name, value in made.environment.items():
+        monkeypatch.setenv(name, value)
+    return made
 
 
 @pytest.mark.slow
-def test_demo_prints_answers_and_writes_a_picture(tmp_path, map_file):
+def test_demo_prints_answers_and_writes_a_picture(tmp_path, map_file, token, capsys):
     picture = tmp_path / "made" / "demo.png"
-    demo = Demo("--map", map_file, "--out", picture)
-    code, out, err = demo.finish()
-    assert (code, err) == (0, "")
-    assert "compile" in out
-    assert "publish the map" in out
+    assert main(["demo", "--map", str(map_file), "--out", str(picture)]) == 0
+    out, err = capsys.readouterr()
+    assert err == "" and "compile" in out and "publish the map" in out and "[m]" in out
     rows = [line for line in out.splitlines() if line.startswith("│")]
     plain = [row for row in rows if " plain " in row]
     assert any("traversable" in row for row in plain)
     assert "refused" in next(row for row in rows if " off the map " in row)
     assert "refused" in next(row for row in rows if " unknown ground " in row)
-    assert "[m]" in out
     goals = sum("traversable" in row or "refused" in row for row in rows)
     assert f"{goals} of {goals} verdicts" in out
-    assert picture.read_bytes().startswith(b"\x89PNG")
-    assert picture.stat().st_size > 50_000
-    assert demo.token.wait_until_gone() == []
+    assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 50_000
+    assert token.wait_until_gone() == []
 
 
 @pytest.mark.long
-def test_a_server_that_dies_fails_the_demo_with_one_line(tmp_path, map_file):
-    demo = Demo("--map", map_file, "--out", tmp_path / "demo.png")
-    server = "rover_planner.nodes.traverse_server"
-    number = wait_until(lambda: demo.token.find(server), "the server", 240.0)[0]
-    os.kill(number, signal.SIGKILL)
-    code, _, err = demo.finish()
-    assert (code, err.count("\n")) == (1, 1) and "traverse_server" in err
-    assert demo.token.wait_until_gone() == []
+def test_a_server_that_dies_fails_the_demo_with_one_line(tmp_path, map_file, token, capsys):
+    def kill_the_server():
+        server = "rover_planner.nodes.traverse_server"
+        os.kill(wait_until(lambda: token.find(server), server, 240.0)[0], signal.SIGKILL)
+
+    threading.Thread(target=kill_the_server).start()
+    assert main(["demo", "--map", str(map_file), "--out", str(tmp_path / "demo.png")]) == 1
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and "traverse_server" in err
+    assert token.wait_until_gone() == []
 
 
 @pytest.mark.long
