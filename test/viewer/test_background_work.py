@@ -70,6 +70,26 @@ def test_a_newer_request_stops_at_once_what_follows_a_result(found):
     assert work.close()
 
 
+def test_a_first_result_waits_for_no_older_work_and_what_follows_it_does(found):
+    go_on = threading.Event()
+
+    def work_on(request):
+        yield "verdict"
+        if request == "old":
+            go_on.wait()
+        yield "rest"
+
+    work, asked = BackgroundWork(work_on, lambda *one: found.append(one)), ["old", "new", "old"]
+    for count, request in enumerate(asked, 1):
+        work.ask(request)
+        wait_until(lambda count=count: len(found) == count, "the verdict")
+    assert found == [(request, "verdict") for request in asked] and work.progress
+    go_on.set()
+    wait_for_idle(work)
+    assert found[3:] == [("old", "rest")]
+    assert work.close()
+
+
 @pytest.mark.timed
 def test_cancelled_work_stops_soon_and_is_never_delivered(busy_judge, found):
     quick = session_on(ramp).wanted

@@ -3,7 +3,7 @@
 
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
@@ -54,14 +54,15 @@ class _StoppedError(Exception):
 class BackgroundWork(Generic[Request, Result]):
     """Does one request at a time, the newest; those that a newer one replaces are dropped.
 
-    A newer request stops work that has had PATIENCE, or has given its first result. The methods
-    may be called from any thread.
+    A newer request stops work that has had PATIENCE, or has given its first result. The first
+    result of the newer one does not wait for work that only ends its last step: on rough ground
+    that takes longer than the result. The methods may be called from any thread.
     """
 
     def __init__(
         self, work: Work[Request, Result], take: Take[Request, Result], name: str = "background"
     ):
-        """Start the thread.
+        """Start a thread.
 
         Args:
             work: Does a request. Between the slices of the model's sweeps it may be stopped by
@@ -70,7 +71,7 @@ class BackgroundWork(Generic[Request, Result]):
                 may wait until that was used.
             name: Name of the thread.
         """
-        self._work, self._take = work, take
+        self._work, self._take, self._name = work, take, name
         self._changed = threading.Condition()
         # The lock of _changed guards all that follows.
         self._waiting: Request | None = None
@@ -78,8 +79,12 @@ class BackgroundWork(Generic[Request, Result]):
         self._progress = Progress()
         self._since = 0.0
         self._ending = False
-        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
-        self._thread.start()
+        self._is_left = False
+        """True if the newest thread does what nobody waits for: it was cancelled, or follows a
+        result."""
+        self._threads: list[threading.Thread] = []
+        """The newest thread is the last; those before it end their last steps."""
+        self._start_thread()
 
     def ask(self, request: Request) -> None:
         """Do a request instead of the one that waits, and soon instead of the one in work."""
@@ -87,12 +92,15 @@ class BackgroundWork(Generic[Request, Result]):
             if not self._is_busy():
                 self._progress, self._since = Progress(), time.monotonic()
             self._waiting = request
+            if self._is_left:
+                self._start_thread()
             self._changed.notify()
 
     def cancel(self) -> bool:
         """Stop all work; what it finds after this is dropped. Return whether there was any."""
         with self._changed:
             was_busy = self._is_busy()
+            self._is_left |= self._in_work is not None
             self._waiting = self._in_work = None
         return was_busy
 
@@ -105,34 +113,51 @@ class BackgroundWork(Generic[Request, Result]):
             return replace(self._progress, seconds=time.monotonic() - self._since)
 
     def close(self) -> bool:
-        """Stop all work and end the thread; return whether it has ended within END_TIME."""
+        """Stop all work and end its threads; return whether they end within END_TIME each."""
         self.cancel()
         with self._changed:
             self._ending = True
             self._changed.notify()
-        self._thread.join(END_TIME)
-        return not self._thread.is_alive()
+        for thread in self._threads:
+            thread.join(END_TIME)
+        return not any(thread.is_alive() for thread in self._threads)
 
     def _is_busy(self) -> bool:
         return self._in_work is not None or self._waiting is not None
 
-    def _run(self) -> None:
-        while True:
-            with self._changed:
-                self._in_work = None
-                self._changed.wait_for(lambda: self._waiting is not None or self._ending)
-                if self._ending or self._waiting is None:
-                    return
-                request = self._in_work = self._waiting
-                self._waiting = None
-            self._do(request)
+    def _is_wanted(self) -> bool:
+        """Return whether what this thread does was neither cancelled nor replaced."""
+        return self._in_work is not None and self._threads[-1] is threading.current_thread()
 
-    def _do(self, request: Request) -> None:
+    def _start_thread(self) -> None:
+        """Let a new thread do what waits, and what comes; earlier ones do nothing new."""
+        self._is_left, earlier = False, [one for one in self._threads if one.is_alive()]
+        thread = threading.Thread(target=self._run, args=(earlier,), name=self._name, daemon=True)
+        self._threads = [*earlier, thread]
+        thread.start()
+
+    def _run(self, earlier: Sequence[threading.Thread]) -> None:
+        while (request := self._next()) is not None:
+            self._do(request, earlier)
+
+    def _next(self) -> Request | None:
+        """Wait for the next request of this thread, and return it; None if there will be none."""
+        with self._changed:
+            if self._threads[-1] is not threading.current_thread():
+                return None
+            self._in_work, self._is_left = None, False
+            self._changed.wait_for(lambda: self._waiting is not None or self._ending)
+            if not self._ending:
+                self._in_work, self._waiting = self._waiting, None
+            return self._in_work
+
+    def _do(self, request: Request, earlier: Sequence[threading.Thread]) -> None:
+        """Do a request; what follows its first result begins after the earlier threads."""
         begun, has_result = time.monotonic(), False
 
         def check() -> None:
             has_time = not has_result and time.monotonic() - begun < PATIENCE
-            if self._in_work is not request or (self._waiting is not None and not has_time):
+            if not self._is_wanted() or (self._waiting is not None and not has_time):
                 raise _StoppedError("a newer request or a visitor stopped the work")
 
         try:
@@ -145,6 +170,8 @@ class BackgroundWork(Generic[Request, Result]):
                     else:
                         has_result = True
                         self._deliver(request, found)
+                        for thread in earlier:
+                            thread.join()
                         check()
         except _StoppedError:
             return
@@ -155,9 +182,9 @@ class BackgroundWork(Generic[Request, Result]):
     def _deliver(self, request: Request, found: Result | BaseException) -> None:
         """Hand over what was found, unless it was cancelled."""
         with self._changed:
-            if self._in_work is not request:
+            if not self._is_wanted():
                 return
-            self._since = time.monotonic()
+            self._since, self._is_left = time.monotonic(), True
         self._take(request, found)
 
 
