@@ -21,9 +21,9 @@ from rover_planner.viewer.live.live_state import (
 )
 from rover_planner.viewer.pages.base import Answer, PageBase
 from rover_planner.viewer.pages.sharing import read_link
-from rover_planner.viewer.scene.ground_mesh import PaintRequest
 from rover_planner.viewer.scene.scene import START
 from rover_planner.viewer.state.drive import RoverState
+from rover_planner.viewer.state.layers import PaintRequest
 
 BOARD_PERIOD = 0.2
 """Time between two updates of the board [s]."""

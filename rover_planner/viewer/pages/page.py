@@ -49,12 +49,11 @@ from rover_planner.viewer.pages.sharing import (
     write_file,
     write_link,
 )
-from rover_planner.viewer.scene.ground_mesh import PaintRequest
 from rover_planner.viewer.scene.overlays import GHOST
 from rover_planner.viewer.scene.scene import FIT
 from rover_planner.viewer.state.drive import SPEEDS, Playback
 from rover_planner.viewer.state.judging import JudgeRequest
-from rover_planner.viewer.state.layers import Colouring
+from rover_planner.viewer.state.layers import Colouring, PaintRequest
 from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.survey_layers import ShownSurvey

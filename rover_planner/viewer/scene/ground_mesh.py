@@ -3,7 +3,6 @@
 
 import gc
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,20 +10,17 @@ import trimesh
 from numpy.typing import NDArray
 
 from rover_physics.numerics.arrays import Floats
-from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
-from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.layers import (
     ColouredGround,
-    Colouring,
     GroundGrid,
     Legend,
+    PaintRequest,
     colour_ground,
     colour_limit,
     make_grid,
 )
-from rover_planner.viewer.state.survey_layers import ShownSurvey
 
 LIGHT = (-0.6, 0.5, 1.0)
 """Direction to the light of the hillshade."""
@@ -41,40 +37,19 @@ UNLIT = "KHR_materials_unlit"
 the screen takes most of the time of a picture."""
 
 
-@dataclass(frozen=True, eq=False)
-class PaintRequest:
-    """Ground and layer to draw."""
-
-    rover: Rover
-    """The rover, for layers that are predicted."""
-    terrain: Terrain
-    """The ground."""
-    how: Colouring
-    """The layer."""
-    origin: Floats
-    """(3,) origin of the scene [m], map frame."""
-    options: SweepOptions = DEFAULT_OPTIONS
-    """Options of the model for predicted layers."""
-    path: Floats | None = None
-    """(n, 3) poses whose yaw the rover has if predicted layers are for the path."""
-    survey: ShownSurvey | None = None
-    """The survey; None if there is none."""
-
-
 def paint(request: PaintRequest) -> Iterator[Progress | tuple[bytes, Legend]]:
     """Yield what is begun, and the painted ground as a file for the scene, with its legend.
 
     A layer that is predicted for the rover takes seconds.
     """
     yield Progress("ground")
-    how, rover, terrain, options = request.how, request.rover, request.terrain, request.options
-    grid = make_grid(terrain)
-    if request.survey is not None and how.layer in request.survey.names:
-        ground = request.survey.colour(how.layer, rover, options, grid)
-    elif how.is_predicted:
-        ground = colour_limit(how, rover, terrain, request.path, options, grid)
+    layer, survey, grid = request.how.layer, request.survey, make_grid(request.terrain)
+    if survey is not None and layer in survey.names:
+        ground = survey.colour(layer, request.rover, request.options, grid)
+    elif request.how.is_predicted:
+        ground = colour_limit(request, grid)
     else:
-        ground = colour_ground(how.layer, terrain, grid)
+        ground = colour_ground(layer, request.terrain, grid)
     yield write_ground(grid, ground, request.origin), ground.legend
 
 
