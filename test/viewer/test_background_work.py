@@ -112,7 +112,7 @@ def test_cancelled_work_stops_soon_and_is_never_delivered(busy_judge, found):
 
 
 @pytest.mark.parametrize("error", [MemoryError(), SystemExit(3)])
-def test_no_error_ends_the_thread(error, found):
+def test_an_error_is_delivered_and_what_is_asked_next_is_done(error, found):
     def fail_or_answer(request):
         if request:
             raise error

@@ -196,7 +196,7 @@ class PageBase(ABC):
         take: Callable[[Request, Result | BaseException], object],
         name: str,
     ) -> BackgroundWork[Request, Result]:
-        """Return work in a thread of a name; what it finds is taken by the page's thread.
+        """Return work in threads of a name; what it finds is taken by the page's thread.
 
         The work waits until that is drawn: what it finds next would slow down the drawings.
         """
