@@ -251,8 +251,7 @@ def test_a_path_is_drawn_in_the_colour_of_its_verdict_up_to_where_it_is_refused(
     session = session_on(ramp)
     session.change_rover([("friction",)], 0.4)
     shown, overlay = session.shown, page.scene.paths
-    candidates = [path.candidate for path in shown.paths]
-    ask(page, lambda: overlay.show(candidates, shown.index))
+    ask(page, lambda: overlay.show(shown.paths, shown.index))
     driven, beyond, *cross = overlay.paths[shown.index]
     assert driven.colour == REFUSED
     np.testing.assert_array_equal(driven.line[-1], beyond.line[0])
@@ -305,10 +304,10 @@ def test_a_drawing_that_fails_is_told_and_stops_no_other_and_what_is_drawn_is_no
     done, ground, rover = [], object(), object()
 
     def ask_for_four() -> None:
-        page.draw_made("the paths", [ground], lambda: done.append("paths"))
-        page.draw_made("the plots", [ground], lambda: 1 / 0)
-        page.draw_made("the paths", [ground], lambda: done.append("paths again"))
-        page.draw_made("the rover", [ground, rover], lambda: done.append("rover"))
+        page.draw_made("the paths", lambda _: done.append("paths"), ground)
+        page.draw_made("the plots", lambda _: 1 / 0, ground)
+        page.draw_made("the paths", lambda _: done.append("paths again"), ground)
+        page.draw_made("the rover", lambda *_: done.append("rover"), ground, rover)
 
     ask(page, ask_for_four)
     assert done == ["paths", "rover"]

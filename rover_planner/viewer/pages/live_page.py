@@ -109,17 +109,15 @@ class LivePage(PageBase):
         tell("chosen", self.list_chosen())
         tell("learned", describe_learned(data.learned))
         trail = None if data.learned is None else data.learned.places
-        shown, paths, terrain = (plan, bool(answer["old"])), self.scene.paths, self.ground
-        self.draw_made(
-            "the trail is not drawn",
-            (trail, terrain),
-            lambda: paths.show_trail(trail),
-        )
-        self.draw_made(
-            "the plan is not drawn",
-            (*shown, terrain),
-            lambda: paths.show_plan(*shown),
-        )
+        draw, old = self.draw_made, bool(answer["old"])
+        draw("the trail is not drawn", self._draw_trail, trail, self.ground)
+        draw("the plan is not drawn", self._draw_plan, plan, old, self.ground)
+
+    def _draw_trail(self, trail: Floats | None, _ground: Terrain) -> None:
+        self.scene.paths.show_trail(trail)
+
+    def _draw_plan(self, plan: Floats | None, is_old: bool, _ground: Terrain) -> None:
+        self.scene.paths.show_plan(plan, is_old)
 
     def advance(self, seconds: float) -> None:
         """Show the latest data."""

@@ -8,6 +8,7 @@ from functools import cached_property, partial
 from typing import Any
 
 from rover_physics.numerics.arrays import Floats
+from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover, preset_names
 from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.soil_file import load_soils
@@ -35,9 +36,9 @@ from rover_planner.viewer.documents.rover import (
 )
 from rover_planner.viewer.documents.verdict import (
     POLICY_TITLES,
+    describe_paths,
     describe_subject,
     describe_verdict,
-    list_paths,
 )
 from rover_planner.viewer.pages.base import Answer, PageBase
 from rover_planner.viewer.pages.sharing import (
@@ -305,7 +306,7 @@ class Page(PageBase):
     def _show(self) -> None:
         """Show what was judged: in words and numbers at once, then in the scene."""
         shown, scene, draw = self.session.shown, self.scene, self.draw_made
-        asked, path, rover = shown.scenario, shown.path, shown.scenario.rover
+        asked, path = shown.scenario, shown.path
         if self._advised is not None and self._advised.path is not path:
             self._advice.cancel()  # nobody looks at its path any more
             self._advised = None
@@ -316,23 +317,18 @@ class Page(PageBase):
         if self.has_changed("drive", path):
             self.playback.set_drive(path.trajectory.times, path.trajectory.places)
         self._tell_drive()
-        arm, candidates = asked.arm_angles, [one.candidate for one in shown.paths]
-        draw("the failure is not shown", [path], lambda: scene.failure.show(rover, path.failure))
-        draw("the rover is not drawn", [rover, arm], lambda: scene.rover.take(rover, arm))
-        draw(
-            "the cameras are not moved",
-            [asked.loaded],
-            lambda: self._look(self.server.get_clients().values(), FIT),
-        )
-        draw(
-            "the paths are not drawn",
-            [*shown.paths, shown.index],
-            lambda: scene.paths.show(candidates, shown.index),
-        )
+        draw("the failure is not shown", scene.failure.show, asked.rover, path.failure)
+        draw("the rover is not drawn", scene.rover.take, asked.rover, asked.arm_angles)
+        draw("the cameras are not moved", self._fit, asked.loaded)
+        draw("the paths are not drawn", scene.paths.show, shown.paths, shown.index)
         depends = self.colouring.is_predicted or self.survey is not None
         if self.has_changed("ground", asked) and depends:
             self.paint()
         self.playback.moved = True
+
+    def _fit(self, _loaded: Rover) -> None:
+        """Let all cameras look at all of the path of a rover that was loaded."""
+        self._look(self.server.get_clients().values(), FIT)
 
     # What is told.
 
@@ -362,31 +358,16 @@ class Page(PageBase):
         waits = session.is_outdated or bool(work["old"])
         is_slow = work["judging"] or work["stopped"]
         self.scene.paths.mark_old(every if work["old"] else shown.old if is_slow else frozenset())
-        name = self._ground_name
-        made("subject", (shown.scenario,), lambda: describe_subject(shown.scenario, name))
+        made("subject", describe_subject, shown.scenario, self._ground_name)
         tell("verdict", describe_verdict(shown) | work)
-        is_judging = self._judging.progress is not None
-        made(
-            "paths",
-            (shown, waits, is_judging),
-            lambda: {
-                "rows": list_paths(shown, is_outdated=waits, is_judging=is_judging),
-                "shown": shown.index,
-            },
-        )
+        made("paths", describe_paths, shown, waits, self._judging.progress is not None)
         is_seeking = self._advice.progress is not None
         tell("advice", describe_advice(self._advised, is_seeking, time.monotonic()))
-        made("current", (shown, self.colouring), lambda: write_link(self._link()))
-        made("sliders", (wanted.loaded,), lambda: describe_sliders(wanted.loaded))
-        made("values", (wanted, session.refusal), lambda: describe_values(wanted))
-        kept = session.kept
-        made(
-            "changes",
-            (path, reference, kept),
-            lambda: describe_changes(path, reference, is_kept=kept is not None),
-        )
-        along = path, reference, shown.chance
-        made("limits", along, lambda: describe_limits(*along))
+        made("current", lambda *_: write_link(self._link()), shown, self.colouring)
+        made("sliders", describe_sliders, wanted.loaded)
+        made("values", describe_values, wanted)
+        made("changes", describe_changes, path, reference, session.kept is not None)
+        made("limits", describe_limits, path, reference, shown.chance)
         model = wanted.options.model
         tell("chosen", {
             **self.list_chosen(), "policy": model.policy, "soil": model.soil or "",
