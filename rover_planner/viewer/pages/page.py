@@ -3,13 +3,13 @@
 
 import time
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cached_property, partial
 from typing import Any
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_file import load_rover, preset_names
+from rover_physics.rover.rover_file import load_rover, preset_names, rover_to_dict
 from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.soil_file import load_soils
 from rover_planner.advice.advise import Advice
@@ -44,7 +44,6 @@ from rover_planner.viewer.pages.base import Answer, PageBase
 from rover_planner.viewer.pages.sharing import (
     MAX_LENGTH,
     PageLink,
-    make_link,
     read_link,
     read_scenario,
     write_file,
@@ -239,8 +238,21 @@ class Page(PageBase):
         return fingerprint(self.ground)
 
     def _link(self) -> PageLink:
-        time_shown = round(self.playback.time, 3)
-        return make_link(self.session.shown, self._map_print, time_shown, self.colouring)
+        """Return the link to what is shown."""
+        shown, now = self.session.shown, self.session.shown.scenario
+        return PageLink(
+            loaded=rover_to_dict(now.loaded),
+            rover=rover_to_dict(now.rover),
+            ground=self._map_print,
+            start=now.start,
+            goal=now.goal,
+            policy=now.options.model.policy,
+            soil=now.options.model.soil or "",
+            path=shown.index + 1,
+            time=round(self.playback.time, 3),
+            joints=dict(now.arm_angles),
+            **asdict(self.colouring),
+        )
 
     def _tell_link(self) -> dict[str, Any]:
         """Return the link to what is shown, for the visitor who asks for it."""
@@ -355,12 +367,12 @@ class Page(PageBase):
         shown, wanted, work = session.shown, session.wanted, self._find_work()
         path, reference = shown.path, shown.reference
         every = frozenset(range(len(shown.paths)))
-        waits = session.is_outdated or bool(work["old"])
         is_slow = work["judging"] or work["stopped"]
         self.scene.paths.mark_old(every if work["old"] else shown.old if is_slow else frozenset())
         made("subject", describe_subject, shown.scenario, self._ground_name)
         tell("verdict", describe_verdict(shown) | work)
-        made("paths", describe_paths, shown, waits, self._judging.progress is not None)
+        is_old, is_judging = bool(work["old"]), self._judging.progress is not None
+        made("paths", describe_paths, shown, is_old, is_judging)
         is_seeking = self._advice.progress is not None
         tell("advice", describe_advice(self._advised, is_seeking, time.monotonic()))
         made("current", lambda *_: write_link(self._link()), shown, self.colouring)
