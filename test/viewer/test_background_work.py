@@ -90,6 +90,25 @@ def test_a_first_result_waits_for_no_older_work_and_what_follows_it_does(found):
     assert work.close()
 
 
+def test_the_time_of_a_newer_request_does_not_count_from_the_result_of_an_older_one(found):
+    go_on = threading.Event()
+
+    def work_on(request):
+        if request == "new":
+            go_on.wait()
+        yield "verdict"
+        go_on.wait()
+
+    work = BackgroundWork(work_on, lambda *one: found.append(one))
+    work.ask("old")
+    wait_until(lambda: found and work.progress.seconds > 0.5, "time without a result")
+    work.ask("new")
+    assert work.progress.seconds < 0.5
+    go_on.set()
+    wait_for_idle(work)
+    assert work.close()
+
+
 @pytest.mark.timed
 def test_cancelled_work_stops_soon_and_is_never_delivered(busy_judge, found):
     quick = session_on(ramp).wanted

@@ -31,7 +31,7 @@ class Progress:
     steps: int = 0
     """Number of all."""
     seconds: float = 0.0
-    """Time since the work began, or since its last result [s]."""
+    """Time since the work was asked for, or since its last result [s]."""
 
     def describe(self) -> str:
         """Return the progress in words, such as "judging path 2 of 5"."""
@@ -86,9 +86,8 @@ class BackgroundWork(Generic[Request, Result]):
     def ask(self, request: Request) -> None:
         """Do a request instead of the one that waits, and soon instead of the one in work."""
         with self._lock:
-            if not self._is_busy():
-                self._progress, self._since = Progress(), time.monotonic()
             if self._in_work is None or self._has_result:
+                self._progress, self._since = Progress(), time.monotonic()
                 self._begin(request)
             else:
                 self._waiting = request
@@ -96,7 +95,7 @@ class BackgroundWork(Generic[Request, Result]):
     def cancel(self) -> bool:
         """Stop all work; what it finds after this is dropped. Return whether there was any."""
         with self._lock:
-            was_busy = self._is_busy()
+            was_busy = self._in_work is not None
             self._waiting = self._in_work = None
         return was_busy
 
@@ -104,7 +103,7 @@ class BackgroundWork(Generic[Request, Result]):
     def progress(self) -> Progress | None:
         """Progress of the work; None if there is none."""
         with self._lock:
-            if not self._is_busy():
+            if self._in_work is None:
                 return None
             return replace(self._progress, seconds=time.monotonic() - self._since)
 
@@ -114,9 +113,6 @@ class BackgroundWork(Generic[Request, Result]):
         for thread in self._threads:
             thread.join(END_TIME)
         return not any(thread.is_alive() for thread in self._threads)
-
-    def _is_busy(self) -> bool:
-        return self._in_work is not None or self._waiting is not None
 
     def _is_wanted(self) -> bool:
         """Return whether what this thread does was neither cancelled nor replaced."""
