@@ -3,6 +3,7 @@
 
 import json
 import threading
+import time
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -173,8 +174,14 @@ def test_the_verdict_is_told_before_its_drawings_and_policies_are_judged_after_t
     page, monkeypatch
 ):
     begun, go_on, judged, show = threading.Event(), threading.Event(), [], page.scene.paths.show
+    tell, told_at, drawn_at = page.channel.tell, {}, []
+
+    def tell_and_note(name: str, part) -> None:
+        told_at[name] = told_at.get(name, time.monotonic())
+        tell(name, part)
 
     def draw_slowly(*arguments) -> None:
+        drawn_at.append(time.monotonic())
         progress = page._judging.progress
         judged.append(progress.what if progress else "")
         begun.set()
@@ -183,8 +190,10 @@ def test_the_verdict_is_told_before_its_drawings_and_policies_are_judged_after_t
 
     monkeypatch.setattr(base, "DRAWING_TIME", PATIENCE)  # or it would give up the wait
     monkeypatch.setattr(page.scene.paths, "show", draw_slowly)
+    monkeypatch.setattr(page.channel, "tell", tell_and_note)
     change_friction(page, 0.4)
     assert begun.wait(PATIENCE)
+    assert drawn_at[0] - told_at["limits"] >= base.PERIOD  # a picture of the words comes first
     passes = told(page, "verdict")["passes"]
     assert is_busy(page)
     go_on.set()

@@ -40,7 +40,7 @@ from rover_planner.viewer.documents.verdict import (
     describe_subject,
     describe_verdict,
 )
-from rover_planner.viewer.pages.base import Answer, PageBase
+from rover_planner.viewer.pages.base import PERIOD, Answer, PageBase
 from rover_planner.viewer.pages.sharing import (
     MAX_LENGTH,
     PageLink,
@@ -316,7 +316,11 @@ class Page(PageBase):
         self._go_on_opening()
 
     def _show(self) -> None:
-        """Show what was judged: in words and numbers at once, then in the scene."""
+        """Show what was judged: in words and numbers at once, then in the scene.
+
+        A new verdict has a period for itself: without a graphics card, the browser takes longer
+        for a picture of the scene, and words that come with it wait for that.
+        """
         shown, scene, draw = self.session.shown, self.scene, self.draw_made
         asked, path = shown.scenario, shown.path
         if self._advised is not None and self._advised.path is not path:
@@ -326,9 +330,12 @@ class Page(PageBase):
         self.tell_all()
         if self.has_changed("ends", asked.start, asked.goal):
             self.playback.go_to(0.0)
-        if self.has_changed("drive", path):
+        is_new = self.has_changed("drive", path)
+        if is_new:
             self.playback.set_drive(path.trajectory.times, path.trajectory.places)
         self._tell_drive()
+        if is_new:
+            self._ended.wait(PERIOD)
         draw("the failure is not shown", scene.failure.show, asked.rover, path.failure)
         draw("the rover is not drawn", scene.rover.take, asked.rover, asked.arm_angles)
         draw("the cameras are not moved", self._fit, asked.loaded)
