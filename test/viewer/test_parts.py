@@ -26,7 +26,7 @@ from rover_planner.viewer.state.layers import (
     SLOPE,
     ColouredGround,
     Colouring,
-    PaintRequest,
+    LayerRequest,
     colour_ground,
     colour_limit,
     list_layers,
@@ -196,7 +196,7 @@ def test_the_ground_has_a_layer_for_the_use_of_each_limit_of_a_pose_and_one_for_
     ground = make_terrain(lambda x, y: gap(x, y) + 0.3 * x)
     at = np.array([-1.0, 0.75]), np.array([0.0])
     tilt, every = (
-        predict_use(PaintRequest(LSR1, ground, Colouring(layer), np.zeros(3)), at)[0]
+        predict_use(LayerRequest(LSR1, ground, Colouring(layer)), at)[0]
         for layer in ("use of tilt", "use of all limits")
     )
     pose = [[-1.0, 0.0, 0.0]]
@@ -207,7 +207,7 @@ def test_the_ground_has_a_layer_for_the_use_of_each_limit_of_a_pose_and_one_for_
     assert np.isnan([tilt[1], every[1]]).all()  # unknown ground
     steep = make_terrain(lambda x, y: x)
     grid, how = make_grid(steep), Colouring("use of tilt")
-    found = colour_limit(PaintRequest(LSR1, steep, how, np.zeros(3)), grid)
+    found = colour_limit(LayerRequest(LSR1, steep, how), grid)
     picture = draw_picture(grid, found)
     assert np.median(picture[..., 0]) > np.median(picture[..., 2])  # beyond it is vermillion
     assert found.legend.keys[0] == ("hatched", "beyond the limit")

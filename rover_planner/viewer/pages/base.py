@@ -19,7 +19,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.viewer.front.channel import Channel, Mailbox, Part
-from rover_planner.viewer.scene.ground_mesh import intersect_ground, paint
+from rover_planner.viewer.scene.ground_mesh import PaintRequest, intersect_ground, paint
 from rover_planner.viewer.scene.scene import START, VIEWS, Scene
 from rover_planner.viewer.state.background_work import (
     BackgroundWork,
@@ -32,7 +32,6 @@ from rover_planner.viewer.state.layers import (
     PREDICTED,
     Colouring,
     Legend,
-    PaintRequest,
     list_layers,
 )
 from rover_planner.viewer.state.session import REFUSALS

@@ -21,9 +21,10 @@ from rover_planner.viewer.live.live_state import (
 )
 from rover_planner.viewer.pages.base import Answer, PageBase
 from rover_planner.viewer.pages.sharing import read_link
+from rover_planner.viewer.scene.ground_mesh import PaintRequest
 from rover_planner.viewer.scene.scene import START
 from rover_planner.viewer.state.drive import RoverState
-from rover_planner.viewer.state.layers import PaintRequest
+from rover_planner.viewer.state.layers import LayerRequest
 
 BOARD_PERIOD = 0.2
 """Time between two updates of the board [s]."""
@@ -77,9 +78,8 @@ class LivePage(PageBase):
 
     def describe_ground(self) -> PaintRequest | None:
         """Return the ground as it is known."""
-        origin = self.scene.canvas.origin
-        request = PaintRequest(self._rover, self.ground, self.colouring, origin)
-        return request if self._ground_name else None
+        layer = LayerRequest(self._rover, self.ground, self.colouring)
+        return PaintRequest(layer, self.scene.canvas.origin) if self._ground_name else None
 
     @property
     def points(self) -> Floats:

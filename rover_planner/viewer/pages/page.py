@@ -49,11 +49,12 @@ from rover_planner.viewer.pages.sharing import (
     write_file,
     write_link,
 )
+from rover_planner.viewer.scene.ground_mesh import PaintRequest
 from rover_planner.viewer.scene.overlays import GHOST
 from rover_planner.viewer.scene.scene import FIT
 from rover_planner.viewer.state.drive import SPEEDS, Playback
 from rover_planner.viewer.state.judging import JudgeRequest
-from rover_planner.viewer.state.layers import Colouring, PaintRequest
+from rover_planner.viewer.state.layers import Colouring, LayerRequest
 from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.survey_layers import ShownSurvey
@@ -115,10 +116,9 @@ class Page(PageBase):
     def describe_ground(self) -> PaintRequest:
         """Return the ground with what is shown on it."""
         path, now = self.session.shown.path.poses, self.session.shown.scenario
-        return PaintRequest(
-            now.rover, now.terrain, self.colouring, self.scene.canvas.origin,
-            now.asked_options.model, path, self.survey,
-        )  # fmt: skip
+        options = now.asked_options.model
+        layer = LayerRequest(now.rover, now.terrain, self.colouring, options, path)
+        return PaintRequest(layer, self.scene.canvas.origin, self.survey)
 
     @property
     def points(self) -> Floats:

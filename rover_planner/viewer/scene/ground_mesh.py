@@ -3,6 +3,7 @@
 
 import gc
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,12 +16,13 @@ from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.layers import (
     ColouredGround,
     GroundGrid,
+    LayerRequest,
     Legend,
-    PaintRequest,
     colour_ground,
     colour_limit,
     make_grid,
 )
+from rover_planner.viewer.state.survey_layers import ShownSurvey
 
 LIGHT = (-0.6, 0.5, 1.0)
 """Direction to the light of the hillshade."""
@@ -37,19 +39,32 @@ UNLIT = "KHR_materials_unlit"
 the screen takes most of the time of a picture."""
 
 
+@dataclass(frozen=True, eq=False)
+class PaintRequest:
+    """A picture of the ground."""
+
+    layer: LayerRequest
+    """What it shows."""
+    origin: Floats
+    """(3,) origin of the scene [m], map frame."""
+    survey: ShownSurvey | None = None
+    """The survey; None if there is none."""
+
+
 def paint(request: PaintRequest) -> Iterator[Progress | tuple[bytes, Legend]]:
     """Yield what is begun, and the painted ground as a file for the scene, with its legend.
 
     A layer that is predicted for the rover takes seconds.
     """
     yield Progress("ground")
-    layer, survey, grid = request.how.layer, request.survey, make_grid(request.terrain)
-    if survey is not None and layer in survey.names:
-        ground = survey.colour(layer, request.rover, request.options, grid)
-    elif request.how.is_predicted:
-        ground = colour_limit(request, grid)
+    asked, survey = request.layer, request.survey
+    name, grid = asked.how.layer, make_grid(asked.terrain)
+    if survey is not None and name in survey.names:
+        ground = survey.colour(name, asked.rover, asked.options, grid)
+    elif asked.how.is_predicted:
+        ground = colour_limit(asked, grid)
     else:
-        ground = colour_ground(layer, request.terrain, grid)
+        ground = colour_ground(name, asked.terrain, grid)
     yield write_ground(grid, ground, request.origin), ground.legend
 
 

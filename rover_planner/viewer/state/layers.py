@@ -4,7 +4,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,9 +19,6 @@ from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 from rover_planner.viewer.state.colours import REFUSED, UNKNOWN, map_colours, to_css
-
-if TYPE_CHECKING:
-    from rover_planner.viewer.state.survey_layers import ShownSurvey
 
 MAX_CELLS = 250
 """Most cells along a side of the mesh; of more, every second, third, ... is drawn."""
@@ -129,8 +126,8 @@ class Colouring:
 
 
 @dataclass(frozen=True, eq=False)
-class PaintRequest:
-    """Ground and layer to draw."""
+class LayerRequest:
+    """A layer of a ground."""
 
     rover: Rover
     """The rover, for layers that are predicted."""
@@ -138,14 +135,10 @@ class PaintRequest:
     """The ground."""
     how: Colouring
     """The layer."""
-    origin: Floats
-    """(3,) origin of the scene [m], map frame."""
     options: SweepOptions = DEFAULT_OPTIONS
     """Options of the model for predicted layers."""
     path: Floats | None = None
     """(n, 3) poses whose yaw the rover has if predicted layers are for the path."""
-    survey: "ShownSurvey | None" = None
-    """The survey; None if there is none."""
 
 
 @dataclass(frozen=True)
@@ -198,7 +191,7 @@ def colour_ground(layer: str, terrain: Terrain, grid: GroundGrid) -> ColouredGro
     return ColouredGround(grid.refine(map_colours(values, low, high)), _grade(layer, ends))
 
 
-def colour_limit(request: PaintRequest, grid: GroundGrid) -> ColouredGround:
+def colour_limit(request: LayerRequest, grid: GroundGrid) -> ColouredGround:
     """Return the colours of the use of a limit with the rover at each place.
 
     The model is asked at MAX_PREDICTED places along a side; all others are as the nearest.
@@ -227,7 +220,7 @@ def _grade(title: str, ends: tuple[str, ...], *keys: tuple[str, str]) -> Legend:
     return Legend(title, (*keys, unknown), gradient, ends)
 
 
-def predict_use(request: PaintRequest, at: Sequence[Floats]) -> Floats:
+def predict_use(request: LayerRequest, at: Sequence[Floats]) -> Floats:
     """Return the use of the limit of a layer with the rover at each point.
 
     Args:
