@@ -9,26 +9,28 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rover_physics.numerics.read_only import seal_array
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.errors import PlanningError
 from rover_planner.maps.cells import CellBox, CellGrid, grid_of
-from rover_planner.maps.layers import LASTING, MAX_FINER, MAX_OFF_CENTRE, layers_of
+from rover_planner.maps.layers import (
+    MAX_FINER,
+    MAX_OFF_CENTRE,
+    SAME_PLACE,
+    Floats,
+    layers_of,
+    sample_layers,
+)
 
 MAX_LEAN = 0.005
 """Largest lean of a map's frame [rad]. Heights follow it; what neglects it is that cells move
 sideways, by 5 mm for each metre of height."""
 NO_LEAN = 1e-9
 """Lean that is a rounding error [rad]."""
-SAME_PLACE = 1e-6
-"""Distance from the centre of a cell at which its height alone counts [cells]."""
 BAND_CELLS = 16_384
 """Cells that are laid at once, as numpy keeps Python's lock meanwhile, which questions need."""
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,14 +118,18 @@ def _lay_turned(
             f"the map turned into its frame would have {box.rows} x {box.columns} cells; "
             f"at most {max_cells} are taken"
         )
-    layers = {name: layer for name, layer in layers_of(terrain).items() if name != "soil"}
-    laid = {name: np.full((box.rows, box.columns), np.nan) for name in layers}
+    own, (ny, nx) = replace(terrain, soil=None, soil_names=()), terrain.elevation.shape
+    laid = {name: np.full((box.rows, box.columns), np.nan) for name in layers_of(own)}
     band = max(BAND_CELLS // max(box.columns, 1), 1)
     for first in range(0, box.rows, band):
         rows = slice(first, min(first + band, box.rows))
-        around = _find_around(terrain, middle, turn, grid, box, rows)
-        for name, layer in layers.items():
-            laid[name][rows] = _sample(layer, *around, nearest=name in LASTING)
+        columns, lines = np.arange(box.columns), np.arange(rows.start, rows.stop)[:, None]
+        x, y = grid.places(box.column + columns, box.row + lines)
+        dx, dy = (x - middle[0]) / terrain.resolution, (y - middle[1]) / terrain.resolution
+        column = turn[0] * dx + turn[1] * dy + 0.5 * (nx - 1)
+        row = turn[0] * dy - turn[1] * dx + 0.5 * (ny - 1)
+        for name, layer in sample_layers(own, column, row).items():
+            laid[name][rows] = layer
     if not np.isfinite(laid["elevation"]).any():
         raise PlanningError(
             "the map is turned against its cells, and none of them has four known ones around"
@@ -145,50 +151,3 @@ def _find_box(
     column, row = (math.ceil(value - SAME_PLACE) for value in low)
     last_column, last_row = (math.floor(value + SAME_PLACE) for value in high)
     return CellBox.between((row, column), (last_row + 1, last_column + 1))
-
-
-Bracket = tuple[NDArray[np.intp], NDArray[np.intp], Floats, NDArray[np.bool_]]
-"""Lower and upper cell of some places, how far they are beyond the lower one, 0 to 1, and whether
-they are on the map."""
-
-
-def _find_around(
-    terrain: Terrain, middle: Floats, turn: tuple[float, float], grid: CellGrid, box: CellBox,
-    rows: slice,
-) -> tuple[Bracket, Bracket]:  # fmt: skip
-    """Return rows and columns of a map around the cells of some rows of a box."""
-    step, (cosine, sine) = terrain.resolution, turn
-    columns = box.column + np.arange(box.columns)
-    lines = box.row + np.arange(rows.start, rows.stop)[:, None]
-    x = (grid.anchor[0] - middle[0]) + grid.resolution * columns
-    y = (grid.anchor[1] - middle[1]) + grid.resolution * lines
-    ny, nx = terrain.elevation.shape
-    column = (cosine * x + sine * y) / step + 0.5 * (nx - 1)
-    row = (cosine * y - sine * x) / step + 0.5 * (ny - 1)
-    return _bracket(row, ny), _bracket(column, nx)
-
-
-def _bracket(place: Floats, count: int) -> Bracket:
-    """Return the cells around fractional indices, of `count` cells."""
-    whole = np.rint(place)
-    place = np.where(np.abs(place - whole) <= SAME_PLACE, whole, place)
-    inside = (place >= 0.0) & (place <= count - 1)
-    first = np.clip(np.floor(place), 0, max(count - 2, 0)).astype(np.intp)
-    return first, np.minimum(first + 1, count - 1), place - first, inside
-
-
-def _sample(layer: Floats, rows: Bracket, columns: Bracket, *, nearest: bool) -> Floats:
-    """Return the values of the nearest cells, or interpolated ones.
-
-    NaN where a cell that counts is not known, and off the map.
-    """
-    (below, above, up, on_rows), (left, right, along, on_columns) = rows, columns
-    if nearest:
-        found = layer[np.where(up < 0.5, below, above), np.where(along < 0.5, left, right)]
-    else:
-        found = np.zeros(below.shape)
-        for row, of_row in ((below, 1.0 - up), (above, up)):
-            for column, of_column in ((left, 1.0 - along), (right, along)):
-                share = of_row * of_column
-                found += np.where(share == 0.0, 0.0, share * layer[row, column])
-    return np.where(on_rows & on_columns, found, np.nan)
