@@ -18,7 +18,7 @@ import numpy as np
 from rover_physics.numerics.interruption import check_interruption
 from rover_planner.errors import PlanningError
 from rover_planner.planning.angles import wrap
-from rover_planner.planning.dubins import dubins_paths
+from rover_planner.planning.dubins import count_steps, dubins_paths
 
 MIN_RADIUS = 0.8
 """Default smallest radius of a candidate [m]: the wheelbase of the LSR-1 preset.
@@ -39,12 +39,6 @@ _FINE_SAMPLES = 501
 """Samples of a curve from which its waypoints are interpolated."""
 _FINE = np.linspace(0.0, 1.0, 2 * _FINE_SAMPLES - 1)
 """Curve parameters of the fine samples and half-way between them."""
-_FINE_WEIGHTS = np.array(
-    [6 * _FINE * (1 - _FINE), (1 - _FINE) * (1 - 3 * _FINE), _FINE * (3 * _FINE - 2)]
-)
-"""Weights (3, n) of chord, start and end tangent in the derivative at the fine samples."""
-_FINE_BUMP = np.pi * np.sin(2 * np.pi * _FINE)
-"""First derivative at the fine samples of a bump of one metre."""
 _TANGENT_SCALES = (1.0, 1.6, 2.4)
 """Lengths of the end tangents in chords; the first one whose direct curve is drivable is used."""
 
@@ -141,13 +135,10 @@ def _build_fan(start, goal, count, spacing, waypoint_spacing, min_radius) -> lis
     """Sample the direct curve and its neighbours; return [] if the direct one is too tight."""
     for scale in _TANGENT_SCALES:
         direct = _connect(start, goal, scale)
-        slopes = _fine_slopes(direct)
-        curves = [
-            direct._replace(offset=float(offset)) for offset in lateral_offsets(count, spacing)
-        ]
         paths = []
-        for curve in curves:
-            slope = slopes + _FINE_BUMP * (curve.offset * curve.left)[:, None]
+        for offset in lateral_offsets(count, spacing):
+            curve = direct._replace(offset=offset)
+            slope = _find_slopes(curve, _FINE)
             speed = np.hypot(slope[0], slope[1])
             if _is_drivable(slope, speed, min_radius):
                 paths.append(_sample(curve, speed, waypoint_spacing))
@@ -172,11 +163,11 @@ def _connect(start: np.ndarray, goal: np.ndarray, scale: float) -> BumpedCurve:
     )
 
 
-def _fine_slopes(curve: BumpedCurve) -> np.ndarray:
-    """Return the derivative (2, n) of a curve without bump at the fine samples."""
-    along_chord, along_m0, along_m1 = _FINE_WEIGHTS
-    slopes = along_chord * curve.chord[:, None] + along_m0 * curve.m0[:, None]
-    slopes += along_m1 * curve.m1[:, None]
+def _find_slopes(curve: BumpedCurve, t: np.ndarray) -> np.ndarray:
+    """Return the derivative (2, n) of a curve at parameters (n,)."""
+    slopes = 6 * t * (1 - t) * curve.chord[:, None]
+    slopes += (1 - t) * (1 - 3 * t) * curve.m0[:, None] + t * (3 * t - 2) * curve.m1[:, None]
+    slopes += np.pi * np.sin(2 * np.pi * t) * (curve.offset * curve.left)[:, None]
     return slopes
 
 
@@ -203,8 +194,7 @@ def _sample(curve: BumpedCurve, speed: np.ndarray, waypoint_spacing: float) -> n
     ends, middles = speed[::2], speed[1::2]
     pieces = (ends[:-1] + 4 * middles + ends[1:]) / 6 / len(middles)
     driven = np.concatenate([[0.0], np.cumsum(pieces)])
-    steps = max(1, int(np.ceil(driven[-1] / waypoint_spacing - 1e-9)))
-    marks = np.linspace(0.0, driven[-1], steps + 1)
+    marks = np.linspace(0.0, driven[-1], 1 + count_steps(driven[-1], waypoint_spacing))
     return _follow(curve, _interpolate(marks, driven, _FINE[::2], 1 / ends))
 
 
@@ -224,14 +214,11 @@ def _interpolate(at: np.ndarray, x: np.ndarray, y: np.ndarray, slopes: np.ndarra
 def _follow(curve: BumpedCurve, t: np.ndarray) -> np.ndarray:
     """Return the poses (n, 3) of a curve at parameters (n,)."""
     u, rest = t[:, None], 1 - t[:, None]
-    sine, cosine = np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)
     places = curve.start + u * u * (3 - 2 * u) * curve.chord
     places = places + u * (rest * rest) * curve.m0 - u * u * rest * curve.m1
-    places = places + 0.5 * curve.offset * (1 - cosine) * curve.left
-    slope = 6 * u * rest * curve.chord
-    slope = slope + rest * (1 - 3 * u) * curve.m0 + u * (3 * u - 2) * curve.m1
-    slope = slope + np.pi * curve.offset * sine * curve.left
-    return np.column_stack([places, np.arctan2(slope[:, 1], slope[:, 0])])
+    places = places + 0.5 * curve.offset * (1 - np.cos(2 * np.pi * u)) * curve.left
+    slope = _find_slopes(curve, t)
+    return np.column_stack([places, np.arctan2(slope[1], slope[0])])
 
 
 def _build_arcs(start, goal, count, waypoint_spacing, min_radius) -> list[np.ndarray]:
@@ -286,7 +273,7 @@ def turn_and_drive(
     heading = float(np.arctan2(away[1], away[0])) if length > 0.0 else float(start[2])
     first, last = float(wrap(heading - start[2])), float(wrap(goal[2] - heading))
     step = waypoint_spacing / swing_radius
-    shares = np.linspace(0.0, 1.0, 1 + max(1, int(np.ceil(length / waypoint_spacing - 1e-9))))
+    shares = np.linspace(0.0, 1.0, 1 + count_steps(length, waypoint_spacing))
     line = np.column_stack([start[:2] + shares[:, None] * away, np.full(len(shares), heading)])
     parts = [
         turn_on_the_spot(start[:2], start[2], first, step)[:-1],
@@ -307,5 +294,5 @@ def turn_on_the_spot(place: np.ndarray, yaw: float, turn: float, step: float) ->
     """
     if abs(turn) < LEAST_TURN:
         return np.array([[*place, yaw]])
-    count = 1 + max(1, int(np.ceil(abs(turn) / step - 1e-9)))
+    count = 1 + count_steps(abs(turn), step)
     return np.column_stack([np.tile(place, (count, 1)), yaw + np.linspace(0.0, turn, count)])

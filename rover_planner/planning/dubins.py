@@ -98,7 +98,7 @@ def _solve_left(a: Angles, b: Angles, d: Angles) -> list[list[Angles]]:
 def _drive(start, word, pieces, radius, waypoint_spacing):
     """Sample a word from the start; return equidistant x, y, yaw (n,)."""
     ends = np.concatenate([[0.0], np.cumsum(pieces)])
-    steps = max(1, int(np.ceil(ends[-1] * radius / waypoint_spacing - 1e-9)))
+    steps = count_steps(ends[-1] * radius, waypoint_spacing)
     driven = np.linspace(0.0, ends[-1], steps + 1)
     x, y, yaw = np.zeros(steps + 1), np.zeros(steps + 1), np.zeros(steps + 1)
     x0, y0, yaw0 = 0.0, 0.0, start[2]
@@ -107,6 +107,11 @@ def _drive(start, word, pieces, radius, waypoint_spacing):
         x[here], y[here], yaw[here] = _advance(x0, y0, yaw0, _TURN[letter], driven[here] - ends[k])
         x0, y0, yaw0 = _advance(x0, y0, yaw0, _TURN[letter], pieces[k])
     return start[0] + radius * x, start[1] + radius * y, yaw
+
+
+def count_steps(length: float, spacing: float) -> int:
+    """Return into how many steps of at most `spacing` a length is divided, both in m or rad."""
+    return max(1, int(np.ceil(length / spacing - 1e-9)))
 
 
 def _advance(x, y, yaw, turn, s):
