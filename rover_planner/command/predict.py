@@ -41,10 +41,7 @@ def predict(
         ),
     ] = 0.0,
     soil: shared.SoilName = None,
-    arm: Annotated[
-        list[str] | None,
-        option("NAME=RAD", "Angle of a joint of the arm in rad; give all; default: stowed."),
-    ] = None,
+    arm: shared.ArmAngles = None,
     payload: shared.Payload = None,
     tool_force: Annotated[
         shared.Vector | None, option("FX FY FZ", "Force on the arm's tip in N, body frame.")

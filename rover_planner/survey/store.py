@@ -318,7 +318,7 @@ def create_store(path: Path, notes: StoreNotes, terrain: Terrain | None) -> None
             group.create_array(
                 name,
                 shape=layout.shape,
-                chunks=(layout.chunk, layout.chunk) if side == layout.chunk else (side, side),
+                chunks=(side, side),
                 dtype=kind,
                 fill_value=fill_of(name),
             )

@@ -318,7 +318,7 @@ class _PathFinder:
         rover, spacing = query.rover, query.options.waypoint_spacing
         edges = self._memory.recall(query, nodes)
         climb = steepest_climb(rover, query.options.model.friction or rover.friction)
-        terrain = cut_out(query, nodes)
+        terrain = cut_out(query, nodes) if self._is_limited else query.terrain
         ground = estimate_ground(rover, terrain, nodes)
         edges.standing[ground.groundless] = edges.state_of("unknown_ground")
         self._groundless = ground.groundless
