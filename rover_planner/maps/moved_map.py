@@ -5,7 +5,7 @@ Ground is never made up: a cell is known only if all cells that its height comes
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -33,28 +33,13 @@ BAND_CELLS = 16_384
 """Cells that are laid at once, as numpy keeps Python's lock meanwhile, which questions need."""
 
 
-@dataclass(frozen=True, eq=False)
-class MapMove:
-    """The place of a map's frame in that of the server: a point p is at R p + t there."""
-
-    rotation: Floats
-    """(3, 3) R."""
-    translation: Floats
-    """(3,) t [m]."""
-
-    @property
-    def yaw(self) -> float:
-        """Turn about z [rad]."""
-        return math.atan2(self.rotation[1, 0], self.rotation[0, 0])
-
-    @property
-    def lean(self) -> float:
-        """Angle between the two z axes [rad]."""
-        return math.atan2(math.hypot(*self.rotation[2, :2]), self.rotation[2, 2])
+Move = tuple[Floats, Floats]
+"""Place of a map's frame in that of the server, rotation R (3, 3) and translation t (3,) [m]: a
+point p is at R p + t there."""
 
 
 def move_map(
-    terrain: Terrain, move: MapMove, grid: CellGrid | None = None, max_cells: int = MAX_CELLS
+    terrain: Terrain, move: Move, grid: CellGrid | None = None, max_cells: int = MAX_CELLS
 ) -> Terrain:
     """Move a map to another frame.
 
@@ -73,35 +58,34 @@ def move_map(
     Raises:
         PlanningError: The frame leans, or the turned map is too large or has no known cell.
     """
-    if move.lean > MAX_LEAN:
+    rotation, translation = move
+    yaw = math.atan2(rotation[1, 0], rotation[0, 0])
+    lean = math.atan2(math.hypot(*rotation[2, :2]), rotation[2, 2])
+    if lean > MAX_LEAN:
         raise PlanningError(
-            f"the frame of the map leans by {move.lean:.3g} rad (roll and pitch); it must be "
+            f"the frame of the map leans by {lean:.3g} rad (roll and pitch); it must be "
             f"level within {MAX_LEAN:g} rad, as odom is"
         )
-    upright = replace(terrain, elevation=_lean_heights(terrain, move))
-    centre, moved = _find_centres(terrain, move)
-    if abs(move.yaw) * max(terrain.elevation.shape) <= MAX_OFF_CENTRE:
+    upright = replace(terrain, elevation=_lean_heights(terrain, move, lean))
+    x0, x1, y0, y1 = terrain.bounds
+    centre = np.array([0.5 * (x0 + x1), 0.5 * (y0 + y1)])
+    height = 0.0 if lean <= NO_LEAN else float(np.nanmedian(terrain.elevation))
+    moved = (rotation @ (*centre, height) + translation)[:2]
+    if abs(yaw) * max(terrain.elevation.shape) <= MAX_OFF_CENTRE:
         x, y = (terrain.origin + (moved - centre)).tolist()
         return replace(upright, origin=(x, y))
     if grid is None or terrain.resolution < MAX_FINER * grid.resolution:
         grid = CellGrid((0.0, 0.0), terrain.resolution)
-    return _lay_turned(upright, moved, move.yaw, grid, max_cells)
+    return _lay_turned(upright, moved, yaw, grid, max_cells)
 
 
-def _find_centres(terrain: Terrain, move: MapMove) -> tuple[Floats, Floats]:
-    """Return x, y [m] of the middle of a map, in its own frame and in the other one."""
-    x0, x1, y0, y1 = terrain.bounds
-    centre = np.array([0.5 * (x0 + x1), 0.5 * (y0 + y1)])
-    height = 0.0 if move.lean <= NO_LEAN else float(np.nanmedian(terrain.elevation))
-    return centre, (move.rotation @ (*centre, height) + move.translation)[:2]
-
-
-def _lean_heights(terrain: Terrain, move: MapMove) -> Floats:
-    """Return the heights of the cells in the other frame."""
-    z, up = terrain.elevation, float(move.translation[2])
-    if move.lean <= NO_LEAN:
+def _lean_heights(terrain: Terrain, move: Move, lean: float) -> Floats:
+    """Return the heights of the cells in the other frame, which lean by an angle [rad]."""
+    (rotation, translation), z = move, terrain.elevation
+    up = float(translation[2])
+    if lean <= NO_LEAN:
         return z if up == 0.0 else seal_array(z + up)
-    along, across, upright = move.rotation[2]
+    along, across, upright = rotation[2]
     ny, nx = z.shape
     x, y = grid_of(terrain).places(np.arange(nx), np.arange(ny)[:, None])
     return seal_array(upright * z + (along * x + across * y + up))

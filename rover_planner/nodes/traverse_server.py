@@ -31,8 +31,7 @@ from msg_adapters.stamps import NANOSECONDS
 from rover_physics.errors import RoverError
 from rover_physics.numerics.kernel_cache import kernel_cache_note
 from rover_physics.warm_up import EXACT, UNCERTAIN
-from rover_planner.maps.known_map import stamp_text
-from rover_planner.maps.summary import describe_terrain
+from rover_planner.maps.known_map import describe_terrain, stamp_text
 from rover_planner.nodes.advice_topics import AdviceTopics
 from rover_planner.nodes.arm_topics import ArmTopics
 from rover_planner.nodes.maps.map_cloud import MapCloud

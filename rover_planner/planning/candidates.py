@@ -223,8 +223,7 @@ def _follow(curve: BumpedCurve, t: np.ndarray) -> np.ndarray:
 
 def _build_arcs(start, goal, count, waypoint_spacing, min_radius) -> list[np.ndarray]:
     """Sample the Dubins paths that are not much longer than the shortest one."""
-    words = dubins_paths(start, goal, min_radius, waypoint_spacing)
-    paths = [np.column_stack(word) for word in words[:count]]
+    paths = dubins_paths(start, goal, min_radius, waypoint_spacing, count)
     longest = _LONG_WAY_ROUND * path_length(paths[0])
     return [path for path in paths if path_length(path) <= longest]
 
