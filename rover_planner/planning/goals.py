@@ -3,6 +3,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,7 +77,7 @@ class _Ground:
             inside,
         )
 
-    def places(self, rows, columns) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def places(self, rows, columns) -> tuple[Any, Any]:
         """Return x and y [m] of cells."""
         return grid_of(self.terrain).places(np.asarray(columns), np.asarray(rows))
 
@@ -160,22 +161,22 @@ def _choose_start(ground: _Ground, rng: np.random.Generator) -> Pose:
     chosen = rng.permutation(np.nonzero(gentle)[0])[:_STARTS]
     x, y = ground.places(rows[chosen], columns[chosen])
     bearings = np.linspace(-np.pi, np.pi, _RAYS, endpoint=False)
-    sight = _sight(ground, ground.gentle, x, y, bearings)
+    sight = _sight(ground, ground.gentle, np.column_stack([x, y]), bearings)
     cone = round(_HALF_CONE / (2 * np.pi / _RAYS))
     ahead = np.sum([np.roll(sight, k, axis=1) for k in range(-cone, cone + 1)], axis=0)
     best, ray = np.unravel_index(np.argmax(ahead), ahead.shape)
     return (float(x[best]), float(y[best]), float(bearings[ray]))
 
 
-def _sight(ground: _Ground, clear: NDArray[np.bool_], x, y, bearings) -> NDArray[np.float64]:
-    """Return the clear distance (n, m) [m] from points (n,) in directions (m,) [rad].
+def _sight(ground: _Ground, clear: NDArray[np.bool_], places, bearings) -> NDArray[np.float64]:
+    """Return the clear distance (n, m) [m] from places (n, 2) or poses (n, 3), x, y [m].
 
-    `clear` is a mask (ny, nx) of the cells.
+    It is that in directions (m,) [rad]; `clear` is a mask (ny, nx) of the cells.
     """
     step = max(2 * ground.terrain.resolution, ground.far / 60)
     distances = np.arange(0.0, ground.far, step)
-    px = x[:, None, None] + distances * np.cos(bearings)[:, None]
-    py = y[:, None, None] + distances * np.sin(bearings)[:, None]
+    px = places[:, 0, None, None] + distances * np.cos(bearings)[:, None]
+    py = places[:, 1, None, None] + distances * np.sin(bearings)[:, None]
     row, column, inside = ground.cells(px, py)
     return step * np.cumprod(inside & clear[row, column], axis=2).sum(axis=2)
 
@@ -183,7 +184,7 @@ def _sight(ground: _Ground, clear: NDArray[np.bool_], x, y, bearings) -> NDArray
 def _choose_plain(ground: _Ground, start: Pose, count: int, rng) -> list[Pose]:
     """Choose goals in sight of the start, in directions spread over a cone ahead."""
     bearings = start[2] + np.linspace(-_HALF_CONE, _HALF_CONE, 4 * count + 1)
-    sight = _sight(ground, ground.gentle, *np.array(start)[:2, None], bearings)[0]
+    sight = _sight(ground, ground.gentle, np.array([start]), bearings)[0]
     goals: list[Pose] = []
     for sector in np.array_split(np.arange(len(bearings)), count):
         ray = sector[np.argmax(sight[sector])]
@@ -199,7 +200,7 @@ def _choose_plain(ground: _Ground, start: Pose, count: int, rng) -> list[Pose]:
     return goals
 
 
-def _gentlest_near(ground: _Ground, x: float, y: float) -> tuple[float, float]:
+def _gentlest_near(ground: _Ground, x: float, y: float) -> tuple[Any, Any]:
     """Return the place with the least difficulty around a point."""
     row, column, _ = ground.cells(x, y)
     around = max(1, round(0.06 * ground.far / ground.terrain.resolution))
@@ -218,14 +219,12 @@ def _score_cells(ground: _Ground, start: Pose) -> Iterator[tuple[str, NDArray[np
     """
     ny, nx = ground.slope.shape
     x, y = ground.places(np.arange(ny)[:, None], np.arange(nx))
-    distance, bearing = (
-        np.hypot(x - start[0], y - start[1]),
-        np.arctan2(y - start[1], x - start[0]),
-    )
+    dx, dy = x - start[0], y - start[1]
+    distance, bearing = np.hypot(dx, dy), np.arctan2(dy, dx)
     turn = np.abs(np.angle(np.exp(1j * (bearing - start[2]))))
     ahead, known = 1 - turn / (2 * np.pi), np.isfinite(ground.slope)
     bearings = np.linspace(-np.pi, np.pi, _VIEWS)
-    sight = _sight(ground, known, *np.array(start)[:2, None], bearings)[0]
+    sight = _sight(ground, known, np.array([start]), bearings)[0]
     depth = ndimage.distance_transform_edt(np.pad(np.isnan(ground.terrain.elevation), 1))
     depth = depth[1:-1, 1:-1] * ground.terrain.resolution
     for intent, suits, score in (
