@@ -75,7 +75,7 @@ class MapKeeper:
         Raises:
             PlanningError: The window would be too large.
         """
-        if not (self._living.values.fill_under_rover and self._living.has_cells):
+        if not (self._living.values.fill_under_rover and self._living.grid):
             return None
         return self._living.snapshot() if self._fill(standing, time) else None
 

@@ -170,23 +170,17 @@ def tallest_step(rover: Rover, policy: str = "equal", friction: float | None = N
     step that is higher than one that it cannot climb.
     """
     climbed, height = 0.0, SEARCH_STEP
-    while height < min(4.0 * rover.wheel.radius, MAX_STEP) and climbs(
-        rover, height, policy, friction
-    ):
+    highest = min(4.0 * rover.wheel.radius, MAX_STEP)
+    while height < highest and not why_not_climbed(rover, height, policy, friction):
         climbed, height = height, height + SEARCH_STEP
     low, high = climbed, height
     while high - low > STEP_TOLERANCE:
         middle = 0.5 * (low + high)
-        if climbs(rover, middle, policy, friction):
-            low = middle
-        else:
+        if why_not_climbed(rover, middle, policy, friction):
             high = middle
+        else:
+            low = middle
     return low
-
-
-def climbs(rover: Rover, height: float, policy: str, friction: float | None) -> bool:
-    """Return whether a rover climbs a step of a height [m] without belly contact."""
-    return not why_not_climbed(rover, height, policy, friction)
 
 
 def why_not_climbed(rover: Rover, height: float, policy: str, friction: float | None) -> str:

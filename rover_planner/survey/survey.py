@@ -87,7 +87,7 @@ def prepare_survey(
     store = SurveyStore(out)
     store.check(notes.description, None if chunk is None else notes.layout.chunk)
     finished = store.find_finished()
-    left = [one for one in store.notes.layout.all_chunks if one not in finished]
+    left = [one for one in np.ndindex(store.notes.layout.chunks) if one not in finished]
     return PreparedSurvey(SurveyJob(request, out.absolute()), store, left)
 
 

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.errors import ModelError
 from rover_physics.traversability.reach import ReachAnswer, judge_reach
 from rover_planner.maps.known_map import stamp_text
 from rover_planner.parameters.traverse_server import USE
@@ -63,11 +62,9 @@ class ReachQuery:
         if self.wrench_refusal:
             return ReachRefusal("no_wrench", self.wrench_refusal)
         settings = snapshot.settings
-        arm = settings.rover.manipulator
-        if arm is None:
-            raise ModelError(f"rover {settings.rover.name!r} has no manipulator to reach with")
-        unknown = [name for name in arm.joints if name not in snapshot.joints]
-        if 0 < len(unknown) < len(arm.joints):
+        joints = settings.manipulator_joints
+        unknown = [name for name in joints if name not in snapshot.joints]
+        if 0 < len(unknown) < len(joints):
             text = f"joint_states has never had {', '.join(unknown)}, but other joints of the arm"
             return ReachRefusal("missing_joints", f"{text}; it must have all of them, or none")
         assert snapshot.path.poses is not None

@@ -96,10 +96,6 @@ class SuspensionDrift:
         while self._kept and now - self._kept[0][0] > self._seconds:
             self._kept.popleft()
 
-    def forget(self) -> None:
-        """Forget all differences."""
-        self._kept.clear()
-
     @property
     def latest(self) -> Mapping[str, float]:
         """The last difference, measured minus predicted, by joint [rad]; empty without one."""
@@ -144,7 +140,7 @@ class PathMonitor:
                 return False
         self._path, self._judged_on, self._pose_time = path, None, sight.time
         self._joints_time = None
-        self._drift.forget()
+        self._drift = SuspensionDrift(DRIFT_TIME)
         self._finding = Finding(WATCHING, path.hash)
         return True
 
@@ -175,7 +171,8 @@ class PathMonitor:
             refused = self._judge_rest(self._path, sight)
         if refused is not None:
             return self.stop(refused)
-        if self._has_arrived(self._path):
+        place = self._finding.place
+        if place is not None and self._path.is_end(place.index):
             self._finding = replace(self._finding, state=ARRIVED)
         return self._finding
 
@@ -268,10 +265,6 @@ class PathMonitor:
                 if not judgement.traversable:
                     return judgement
         return _check(snapshot, path.poses[first:])
-
-    def _has_arrived(self, path: WatchedPath) -> bool:
-        place = self._finding.place
-        return place is not None and path.is_end(place.index)
 
 
 def rehearse(settings: ServiceSettings) -> None:
