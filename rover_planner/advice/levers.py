@@ -94,8 +94,8 @@ class Lever:
     """Returns what it may be set to; None where it cannot be used."""
     apply: Callable[[Case, JudgedCase, Any], Case | None]
     """Returns a case with the lever set; None where there is no room."""
-    words: Callable[[JudgedCase, Any], str]
-    """Returns what to do, in words."""
+    words: Callable[[JudgedCase, Any, Any], str]
+    """Returns what to do in words, for a value and that of now."""
     keeps_rows: bool = True
     """True if waypoints stay, or are only shifted: row i is near row i of the refused path."""
     changes_path: bool = False
@@ -133,10 +133,8 @@ def _arm_joint(k: int, raised: str, lowered: str) -> Lever:
             return None  # below its foot it may hit the body, which the model does not know
         return case.change(joint_angles=dict(zip(arm.joints, angles.tolist(), strict=True)))
 
-    def words(refusal: JudgedCase, angle: float) -> str:
-        span = settings(refusal)
-        assert span is not None
-        turn = angle - span.now
+    def words(refusal: JudgedCase, angle: float, now: float) -> str:
+        turn = angle - now
         verb = lowered if turn > 0.0 else raised
         return f"{verb.format(f'{abs(turn):.2f} rad')}{_tip_move(refusal, k, angle)}"
 
@@ -162,24 +160,16 @@ def _payload(refusal: JudgedCase) -> Span | None:
     return Span(now, (0.0,)) if now > 0.0 else None
 
 
-def _describe_payload(refusal: JudgedCase, payload: float) -> str:
+def _describe_payload(_refusal: JudgedCase, payload: float, now: float) -> str:
     if payload == 0.0:
         return "Put the payload down"
-    span = _payload(refusal)
-    assert span is not None
-    return f"Carry {span.now - payload:.2f} kg less at the arm's tip"
+    return f"Carry {now - payload:.2f} kg less at the arm's tip"
 
 
-def _aside(share: float) -> Callable[[JudgedCase], Span | None]:
-    """Return the settings of a lever that shifts a path that is driven ahead."""
-
-    def settings(refusal: JudgedCase) -> Span | None:
-        if not is_driven_ahead(refusal.case.poses):
-            return None
-        most = share * refusal.case.rover.wheelbase
-        return Span(0.0, (-most, most))
-
-    return settings
+def _aside(refusal: JudgedCase) -> Span | None:
+    """Return how far a path that is driven ahead may be shifted [m]."""
+    most = ASIDE * refusal.case.rover.wheelbase
+    return Span(0.0, (-most, most)) if is_driven_ahead(refusal.case.poses) else None
 
 
 def _askew(refusal: JudgedCase) -> Span | None:
@@ -187,8 +177,7 @@ def _askew(refusal: JudgedCase) -> Span | None:
 
 
 def _on_the_spot(refusal: JudgedCase) -> Span | None:
-    turns = can_turn_on_the_spot(refusal.case.rover)
-    return _aside(ASIDE)(refusal) if turns else None
+    return _aside(refusal) if can_turn_on_the_spot(refusal.case.rover) else None
 
 
 def _around(refusal: JudgedCase) -> Choice | None:
@@ -199,12 +188,7 @@ def _around(refusal: JudgedCase) -> Choice | None:
     return Choice(float(refusal.distance[-1]), (length,))
 
 
-def _drive_around(case: Case, refusal: JudgedCase) -> Case:
-    assert refusal.path_around is not None
-    return replace(case, poses=refusal.path_around)
-
-
-def _describe_way(refusal: JudgedCase, length: float) -> str:
+def _describe_way(refusal: JudgedCase, length: float, now: float) -> str:
     """Return where a path around is farthest from the refused one, and its length."""
     old, new = refusal.case.poses, refusal.path_around
     assert new is not None
@@ -215,7 +199,7 @@ def _describe_way(refusal: JudgedCase, length: float) -> str:
     farthest = int(np.abs(aside).argmax())
     return (
         f"Drive around, up to {abs(aside[farthest]):.2f} m {_side(aside[farthest])} of the path: "
-        f"{length:.1f} m in place of {refusal.distance[-1]:.1f} m"
+        f"{length:.1f} m in place of {now:.1f} m"
     )
 
 
@@ -292,7 +276,7 @@ def _lower_rock(case: Case, refusal: JudgedCase, depth: float) -> Case:
     return replace(case, terrain=replace(case.terrain, elevation=heights))
 
 
-def _describe_rock(refusal: JudgedCase, depth: float) -> str:
+def _describe_rock(refusal: JudgedCase, depth: float, _now: float) -> str:
     x, y = refusal.place_on_ground
     return f"The ground at ({x:.2f}, {y:.2f}) would have to be {100.0 * depth:.0f} cm lower"
 
@@ -311,8 +295,7 @@ def _limit(row: Limit) -> Lever:
         limits = replace(case.rover.limits, **changed)
         return replace(case, rover=replace(case.rover, limits=limits))
 
-    def words(refusal: JudgedCase, bound: float) -> str:
-        now = float(getattr(refusal.case.rover.limits, row.reads))
+    def words(_refusal: JudgedCase, bound: float, now: float) -> str:
         name = row.reads.replace("_", " ")
         return (
             f"A limit of {row.unit.write(bound)} for {name} would do, in place of "
@@ -328,7 +311,7 @@ def _limit(row: Limit) -> Lever:
 LEVERS: tuple[Lever, ...] = (
     Lever(
         "policy", "", _policies, lambda case, _refusal, policy: case.change(policy=policy),
-        lambda _refusal, policy: TORQUES[policy],
+        lambda _refusal, policy, _now: TORQUES[policy],
     ),
     _arm_joint(1, "Lift the arm by {}", "Lower the arm by {}"),
     _arm_joint(0, "Swing the arm by {} to the right", "Swing the arm by {} to the left"),
@@ -338,10 +321,10 @@ LEVERS: tuple[Lever, ...] = (
         _describe_payload,
     ),
     Lever(
-        "shift", "m", _aside(ASIDE),
+        "shift", "m", _aside,
         _with_path(lambda case, refusal, offset: shift_path(
             case.poses, refusal.place, offset, case.rover.wheelbase)),
-        lambda refusal, offset:
+        lambda refusal, offset, _now:
             f"Drive {abs(offset):.2f} m further {_side(offset)} around {_at(refusal)}",
         changes_path=True,
     ),
@@ -349,14 +332,14 @@ LEVERS: tuple[Lever, ...] = (
         "approach_angle", "rad", _askew,
         _with_path(lambda case, refusal, angle: turn_path(
             case.poses, refusal.place, angle, case.rover.wheelbase)),
-        lambda refusal, angle: f"Cross the place at {_at(refusal)} at an angle of "
+        lambda refusal, angle, _now: f"Cross the place at {_at(refusal)} at an angle of "
             f"{np.degrees(abs(angle)):.0f} degrees to the {_side(angle)}",
         changes_path=True,
     ),
     Lever(
-        "curve", "m", _aside(ASIDE),
+        "curve", "m", _aside,
         _with_path(lambda case, _refusal, offset: bend_path(case.poses, offset)),
-        lambda _refusal, offset:
+        lambda _refusal, offset, _now:
             f"Drive a curve that leads {abs(offset):.2f} m to the {_side(offset)}",
         changes_path=True,
     ),
@@ -364,29 +347,28 @@ LEVERS: tuple[Lever, ...] = (
         "turn_on_the_spot", "m", _on_the_spot,
         _with_path(lambda case, refusal, offset: pass_by(
             case.poses, refusal.place, offset, swing_radius(case.rover), _spacing(case))),
-        lambda refusal, offset: f"Turn on the spot, pass {abs(offset):.2f} m {_side(offset)} of "
-            f"the place at {_at(refusal)}, stop and turn on the spot to the goal",
+        lambda refusal, offset, _now: f"Turn on the spot, pass {abs(offset):.2f} m "
+            f"{_side(offset)} of the place at {_at(refusal)}, stop and turn on the spot to the goal",
         changes_path=True, keeps_rows=False,
     ),
     Lever(
-        "path_around", "m", _around, lambda case, refusal, _value: _drive_around(case, refusal),
-        _describe_way,
+        "path_around", "m", _around,
+        _with_path(lambda _case, refusal, _length: refusal.path_around), _describe_way,
         changes_path=True, keeps_rows=False,
     ),
     Lever(
         "backward", "", _backward, _reverse,
-        lambda _refusal, _value: "Turn round and drive it backwards", keeps_rows=False,
+        lambda _refusal, _value, _now: "Turn round and drive it backwards", keeps_rows=False,
     ),
     Lever(
         "friction", "", _friction, lambda case, _refusal, mu: case.change(friction=mu),
-        lambda refusal, mu: f"A friction of {mu:.2f} would do; "
-            f"{mu - _friction(refusal).now:.2f} is missing",  # type: ignore[union-attr]
+        lambda _refusal, mu, now: f"A friction of {mu:.2f} would do; {mu - now:.2f} is missing",
         needs_others=True,
     ),
     Lever(
         "max_torque", "N m", _torque, lambda case, _refusal, most: case.change(max_torque=most),
-        lambda refusal, most: f"Motors of {most:.2f} N m would do; "
-            f"{most - _torque(refusal).now:.2f} N m are missing",
+        lambda _refusal, most, now: f"Motors of {most:.2f} N m would do; "
+            f"{most - now:.2f} N m are missing",
         needs_others=True,
     ),
     Lever(

@@ -97,7 +97,7 @@ class Remedy:
         todo = " and ".join(
             words if k == 0 else words[0].lower() + words[1:]
             for k, words in enumerate(
-                one.lever.words(self.refusal, one.value) for one in self.levers
+                one.lever.words(self.refusal, one.value, one.now) for one in self.levers
             )
         )
         use, distance = self.judged.largest_use
