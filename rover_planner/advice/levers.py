@@ -348,7 +348,8 @@ LEVERS: tuple[Lever, ...] = (
         _with_path(lambda case, refusal, offset: pass_by(
             case.poses, refusal.place, offset, swing_radius(case.rover), _spacing(case))),
         lambda refusal, offset, _now: f"Turn on the spot, pass {abs(offset):.2f} m "
-            f"{_side(offset)} of the place at {_at(refusal)}, stop and turn on the spot to the goal",
+            f"{_side(offset)} of the place at {_at(refusal)}, stop and turn on the spot to "
+            "the goal",
         changes_path=True, keeps_rows=False,
     ),
     Lever(
