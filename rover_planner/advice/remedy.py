@@ -26,15 +26,6 @@ class SetLever:
     now: Any
     """Its value in the refused case."""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the lever as JSON types."""
-        return {
-            "name": self.lever.name,
-            "value": self.value,
-            "unit": self.lever.unit,
-            "from": self.now,
-        }
-
 
 @dataclass(frozen=True, eq=False)
 class Remedy:
@@ -123,7 +114,10 @@ class Remedy:
         case, use = self.judged.case, self.judged.largest_use[0]
         has_path = case.poses is not self.refusal.case.poses
         found = {
-            "levers": [one.to_dict() for one in self.levers],
+            "levers": [
+                {"name": k.lever.name, "value": k.value, "unit": k.lever.unit, "from": k.now}
+                for k in self.levers
+            ],
             "words": self.describe(),
             "options": self.options(),
             "largest_use": use,

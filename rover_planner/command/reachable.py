@@ -65,7 +65,7 @@ def reachable(
         "cells_without_return": area.reached - area.cells,
         "longest": None if area.longest is None else round(area.longest, 3),
         "farthest": end,
-        "turns": "judged" if notes.turns else "assumed",
+        "turns": "judged" if notes.description["turns"] else "assumed",
         "chunks_missing": math.prod(notes.layout.chunks) - len(opened.find_finished()),
     }
     typer.echo(json.dumps(report))

@@ -147,7 +147,7 @@ def find_reachable(
     passable = store.layer("passable_headings")
     grid = HeadingGrid(
         passable,
-        store.layer("turnable_headings") if notes.turns else passable,
+        store.layer("turnable_headings") if notes.description["turns"] else passable,
         find_moves(notes.headings, notes.cell),
         notes.layout.chunk,
     )
