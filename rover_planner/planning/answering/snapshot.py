@@ -216,10 +216,8 @@ class Snapshot:
         assert self.known_map is not None
         settings, names = self.settings, self.settings.manipulator_joints
         known = {name: self.joints[name] for name in names if name in self.joints}
-        angles = (
-            known if names and len(known) == len(names) else None
-        )  # stowed until all are known
-        options = settings.query.change(joint_angles=angles)
+        is_stowed = not names or len(known) < len(names)  # until all are known
+        options = settings.query.change(joint_angles=None if is_stowed else known)
         rule = settings.parameters.blind_ground
         check = UnobservedCheck(settings.rover, self.known_map.seen, rule)
         return PathJudge(settings.rover, self.known_map.terrain, options, check, self.marked)
