@@ -130,22 +130,14 @@ def _neighbour(graph, node, i, backwards):
     """
     none = np.int64(-1)
     heading, place = node % HEADINGS, node // HEADINGS
-    if backwards:
-        other_heading, k = graph.table.back[heading, i, 0], graph.table.back[heading, i, 1]
-        if other_heading < 0:
-            return none, none, none
-        step, sign = graph.table.step[other_heading, k], -1
-    else:
-        other_heading, k = graph.table.end_heading[heading, i], np.int64(i)
-        if other_heading < 0:
-            return none, none, none
-        step, sign = graph.table.step[heading, k], 1
-    row = place // graph.columns + sign * step[1]
-    column = place % graph.columns + sign * step[0]
+    link = graph.table.links[1 if backwards else 0, heading, i]
+    if link[0] < 0:
+        return none, none, none
+    row, column = place // graph.columns + link[3], place % graph.columns + link[2]
     other = none
     if 0 <= row < graph.rows and 0 <= column < graph.columns:
-        other = np.int64((row * graph.columns + column) * HEADINGS + other_heading)
-    return other, other if backwards else np.int64(node), k
+        other = np.int64((row * graph.columns + column) * HEADINGS + link[0])
+    return other, other if backwards else np.int64(node), link[1]
 
 
 @exact_kernel
@@ -194,7 +186,7 @@ def find_shortest(graph, seeds, exits, backwards, to_goal, tree, slack, most):
         if graph.standing[node] < FAILS and cost < tree.cost[node]:
             _enter(graph, node, cost, -1 - i, backwards, to_goal, tree, heap)
     best, found, expanded = np.inf, np.int64(-1), 0
-    width = graph.table.end_heading.shape[1]
+    width = graph.state.shape[1]
     while len(heap) > 0:
         estimate, negative, node = heapq.heappop(heap)
         if estimate >= slack * best:
@@ -206,7 +198,7 @@ def find_shortest(graph, seeds, exits, backwards, to_goal, tree, slack, most):
         expanded += 1
         if leave[node] >= 0 and -negative + exits.costs[leave[node]] < best:
             best, found = -negative + exits.costs[leave[node]], leave[node]
-        for i in range(graph.table.back.shape[1] if backwards else width):
+        for i in range(graph.table.links.shape[2]):
             other, first, k = _neighbour(graph, node, i, backwards)
             if k < 0:
                 break
@@ -249,7 +241,7 @@ def spread(graph, seeds, backwards, inside, crossing):
         if graph.standing[seeds[i]] < FAILS and not inside[seeds[i]]:
             inside[seeds[i]] = True
             stack.append(seeds[i])
-    most = graph.table.back.shape[1] if backwards else graph.table.end_heading.shape[1]
+    most = graph.table.links.shape[2]
     visited = [np.int64(-1)]
     visited.clear()
     while len(stack) > 0:
