@@ -82,14 +82,10 @@ class Edges:
         """Number of edges, those counted that leave the window."""
         return self.nodes.count * self.width
 
-    def primitive(self, edge: int) -> Primitive:
-        """Return the primitive of an edge."""
-        node, k = divmod(int(edge), self.width)
-        return self.primitives[node % HEADINGS][k]
-
     def piece(self, edge: int) -> Piece:
         """Return an edge as a piece of path, with its cost if it was judged."""
-        node, primitive = int(edge) // self.width, self.primitive(edge)
+        node, k = divmod(int(edge), self.width)
+        primitive = self.primitives[node % HEADINGS][k]
         x, y, _ = self.nodes.poses(np.array([node]))[0]
         cost = float(self.cost.flat[edge])
         return Piece(primitive.poses + np.array([x, y, 0.0]), primitive.gear, cost)
