@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rover_physics.chance.ground import cut_around
+from rover_physics.chance.samples import cut_around
 from rover_physics.errors import TerrainError
 from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import swing_radius
