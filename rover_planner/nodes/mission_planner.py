@@ -395,14 +395,14 @@ def _run(argv: Sequence[str] | None) -> int:
 
 def _carry_out(node: MissionPlanner, terrain: Terrain | None, options: MissionOptions) -> int:
     """Publish the map and query each goal; return the exit code."""
-    report = _print_json if options.json else _print_text
+    report = _print_json if options.as_json else _print_text
     report({"event": "waiting for the server"})
     node.wait_for_server()
     if terrain is not None:
         report({"event": "publishing the map"})
         node.publish_map(terrain)
     codes = set()
-    for number, goal in enumerate(options.goals, start=1):
+    for number, goal in enumerate(options.goal, start=1):
 
         def tell(text: str, goal: int = number) -> None:
             report({"event": text, "goal": goal})

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from rover_planner.errors import PlanningError
-from rover_planner.nodes.mission.options import read_mission
+from rover_planner.nodes.mission.options import MissionOptions
 from rover_planner.parameters.ground_learner import GroundLearnerParameters
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.table import ParameterSpec, specs_of
@@ -104,7 +104,7 @@ PROGRAMS = {
         "subscribes traverse_server/verdict, traverse_server/wheel_loads, "
         "traverse_server/slip_ratios, odometry, path_driven; publishes "
         "elevation_cloud, path, traverse_server/path",
-        read=read_mission,
+        read=MissionOptions,
         exit_codes="Exit code 0: every goal is traversable, and with --drive was reached. 1: a "
         "question was refused before any path was judged, or the rover did not get there. 2: bad "
         "input, or a missing library. 3: a goal is not traversable. 4: no server, or no answer in "

@@ -37,7 +37,7 @@ from rover_planner.nodes.advice_topics import AdviceTopics
 from rover_planner.nodes.arm_topics import ArmTopics
 from rover_planner.nodes.maps.map_cloud import MapCloud
 from rover_planner.nodes.maps.map_topics import MapTopics
-from rover_planner.nodes.nav2_services import PathComputation, PathValidity
+from rover_planner.nodes.nav2_services import Nav2Services
 from rover_planner.nodes.navigation.hazard_topics import HazardTopics
 from rover_planner.nodes.navigation.path_watch import MAX_POSE_AGE, PERIOD, PathWatch
 from rover_planner.nodes.question_desk import QuestionDesk
@@ -111,8 +111,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self._create_subscriptions()
         serve_later(self, GetPlan, "~/can_traverse", self._can_traverse)
         serve_later(self, Trigger, "~/check_path", self._check_path)
-        PathValidity.serve(self, self.desk, self.read_path, self.publish)
-        PathComputation.serve(self, self.desk, self.read_question, self.publish)
+        Nav2Services(self, self.desk, self.read_path, self.read_question, self.publish)
         self._advice = AdviceTopics(self, self.desk)
         self.create_service(Trigger, "~/cancel", self._cancel)
         self.create_service(Trigger, "~/clear_places", self._clear_marks)

@@ -14,82 +14,56 @@ from rover_planner.shell.poses import Pose, pose_option
 
 @dataclass(frozen=True)
 class MissionOptions:
-    """The options of a mission planner."""
+    """The options of a mission planner; typer reads them, and their helps document them.
 
-    start: Pose
-    """Pose of the rover, x, y [m], yaw [rad]."""
-    goals: tuple[Pose, ...]
-    """Its goals; the server is queried once for each."""
-    map_name: str | None
-    """Preset or file of the map to publish first; None publishes none."""
-    drive: bool
-    """True sends plans to the rover."""
-    advise: bool
-    """True takes advice where a path is refused."""
-    map_frame: str
-    """Frame of map and poses."""
-    timeout: float
-    """Longest wait for each answer [s]."""
-    json: bool
-    """True prints JSON."""
-    position_tolerance: float
-    """Distance from a goal that counts as there [m]."""
-    heading_tolerance: float
-    """Difference from its heading that counts as there [rad]."""
+    Raises:
+        PlanningError: The timeout or a tolerance is not above 0.
+    """
 
-
-def read_mission(
-    start: Annotated[Pose, pose_option("Where the rover stands, in m and rad.")],
-    goal: Annotated[list[Pose], pose_option("Goal; may be given repeatedly.")],
+    start: Annotated[Pose, pose_option("Where the rover stands, in m and rad.")]
+    goal: Annotated[list[Pose], pose_option("Goal; may be given repeatedly.")]
     map_name: Annotated[
         str | None,
         typer.Option(
             "--map", metavar="TERRAIN", help="Map to publish first: preset (spirit) or .npz file."
         ),
-    ] = None,
+    ] = None
     drive: Annotated[
         bool,
         typer.Option("--drive", help="Send each plan to the rover and wait until it is there."),
-    ] = False,
+    ] = False
     advise: Annotated[
         bool,
         typer.Option(
             "--advise", help="Where a path is refused, take the first remedy that needs nobody."
         ),
-    ] = False,
-    map_frame: Annotated[
-        str, typer.Option(metavar="FRAME", help="Frame of map and poses.")
-    ] = "map",
+    ] = False
+    map_frame: Annotated[str, typer.Option(metavar="FRAME", help="Frame of map and poses.")] = (
+        "map"
+    )
     timeout: Annotated[
         float,
         typer.Option(
             metavar="S",
             help="Longest wait for an answer in s; a question without one is repeated each 10 s.",
         ),
-    ] = 60.0,
+    ] = 60.0
     as_json: Annotated[
         bool, typer.Option("--json", help="Print a JSON object a line; goals count from 1.")
-    ] = False,
+    ] = False
     position_tolerance: Annotated[
         float, typer.Option(metavar="M", help="Distance from the goal that is there, in m.")
-    ] = DriveSettings.position_tolerance,
+    ] = DriveSettings.position_tolerance
     heading_tolerance: Annotated[
         float, typer.Option(metavar="RAD", help="Difference from its heading that is there.")
-    ] = DriveSettings.heading_tolerance,
-) -> MissionOptions:
-    """Return the options given on the command line.
+    ] = DriveSettings.heading_tolerance
 
-    Raises:
-        PlanningError: The timeout or a tolerance is not above 0.
-    """
-    for name, value, what in (
-        ("timeout", timeout, "a time above 0 in s"),
-        ("position_tolerance", position_tolerance, "a distance above 0 in m"),
-        ("heading_tolerance", heading_tolerance, "an angle above 0 in rad"),
-    ):
-        if not 0.0 < value < math.inf:
-            raise PlanningError(f"{name} is {value}; it must be {what}")
-    return MissionOptions(
-        start, tuple(goal), map_name, drive, advise, map_frame, timeout, as_json,
-        position_tolerance, heading_tolerance,
-    )  # fmt: skip
+    def __post_init__(self) -> None:
+        for name, what in (
+            ("timeout", "a time above 0 in s"),
+            ("position_tolerance", "a distance above 0 in m"),
+            ("heading_tolerance", "an angle above 0 in rad"),
+        ):
+            value = getattr(self, name)
+            if not 0.0 < value < math.inf:
+                raise PlanningError(f"{name} is {value}; it must be {what}")

@@ -81,8 +81,8 @@ def test_negative_numbers_need_no_equals_sign_and_words_of_ros_are_put_aside():
     options = read_arguments("mission_planner", [*words, *ros_words, "--", BEYOND, "--json"])
     assert isinstance(options, MissionOptions)
     assert options.start == Pose(-3.0, 0.0, 0.0)
-    assert options.goals == (Pose(-0.5, -0.1, 0.0), Pose(2.0, 0.0, 0.0))
-    assert options.json and not options.drive
+    assert options.goal == [Pose(-0.5, -0.1, 0.0), Pose(2.0, 0.0, 0.0)]
+    assert options.as_json and not options.drive
 
 
 @pytest.fixture
