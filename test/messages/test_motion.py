@@ -19,8 +19,7 @@ from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_planner.planning.navigation.transforms import Rigid
-from support.messages.tool_messages import make_target, make_wrench
-from support.messages.transforms import transform_message
+from support.messages import make_target, make_wrench, transform_message
 
 NAN, INF = math.nan, math.inf
 

@@ -13,7 +13,7 @@ from support.learning_drives import climb, ramp, write_csv
 
 pytest.importorskip("rosbags", reason="install the extra bags")
 from rover_planner.ros.bags.bag_writer import write_bag
-from support.messages.drives import row_messages
+from support.messages import row_messages
 
 SLOPE = 0.3
 
