@@ -77,6 +77,11 @@ def bowl(depth: float, floor: float, slope: float, half: float = 6.0) -> Terrain
     return Terrain(np.clip((away - floor) * np.tan(slope), 0.0, depth), 0.05, (-half, -half))
 
 
+def with_std(terrain: Terrain, std: float) -> Terrain:
+    """Return the terrain with the same standard deviation [m] everywhere."""
+    return replace(terrain, elevation_std=np.full(terrain.elevation.shape, std))
+
+
 def random_poses(seed: int, count: int, half: float) -> np.ndarray:
     """Return random poses (count, 3) within `half` [m] of the origin, with random headings."""
     rng = np.random.default_rng(seed)
