@@ -20,9 +20,10 @@ from scipy.stats import binomtest
 from benchmarks.measure import print_table
 from rover_physics import Rover, SweepOptions, Terrain, judge_path, load_rover
 from rover_physics.rover.uncertainty import Uncertainty
-from support.reference_drives import DRIVES, drive_ground, unlimited
+from support.reference_cases import DATA
+from support.reference_drives import drive_ground, unlimited
 
-CHANCES = DRIVES.with_name("chances.jsonl")
+CHANCES = DATA / "chances.jsonl"
 """Drives at 0.1 m/s."""
 HELD_OUT = 2
 """Stream of the paths that calibrate nothing."""
