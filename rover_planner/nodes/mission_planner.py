@@ -14,6 +14,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -119,9 +120,8 @@ class MissionPlanner(Node):
         )
         self._verdicts = verdicts.topic_name  # as remapped, which count_publishers does not do
         for name in ("wheel_loads", "slip_ratios"):
-            self.create_subscription(
-                Float64MultiArray, f"{SERVER}/{name}", self._taker(name), result_qos()
-            )
+            take = partial(self._take_array, name)
+            self.create_subscription(Float64MultiArray, f"{SERVER}/{name}", take, result_qos())
 
     def wait_for_server(self) -> None:
         """Wait until the server's service and its verdict topic are connected.
@@ -172,15 +172,12 @@ class MissionPlanner(Node):
             time.sleep(0.2)
 
     def _ask_once(self, start: Sequence[float], goal: Sequence[float]) -> dict[str, Any]:
-        with self._changed:
-            self._arrays.clear()
+        self._arrays.clear()
         request = GetPlan.Request()
         request.start = stamped_pose(start, self._frame)
         request.goal = stamped_pose(goal, self._frame)
-        future = self._client.call_async(request)
-        future.add_done_callback(self._notify)
-        self._wait(future.done, f"the answer of {self._client.service_name}", REPEAT)
-        plan = future.result().plan
+        answered = self._client.call_async(request)
+        plan = self._finish(answered, f"the answer of {self._client.service_name}", REPEAT).plan
         # The hash tells this question from those of other clients, the stamp from earlier ones.
         about = plan.header.stamp, plan_request_hash(request.start, request.goal, 0.0)
         self._wait(
@@ -245,13 +242,11 @@ class MissionPlanner(Node):
         about, deadline = path_hash(path), time.monotonic() + self._timeout
         while time.monotonic() < deadline:
             self._check_publisher.publish(path)
-            future = self._checker.call_async(Trigger.Request())
-            future.add_done_callback(self._notify)
-            with contextlib.suppress(NoAnswerError):
-                self._wait(future.done, "the answer", REPEAT)
-            if not future.done():
+            try:
+                checked = self._checker.call_async(Trigger.Request())
+                answer = json.loads(self._finish(checked, "the answer", REPEAT).message)
+            except NoAnswerError:
                 continue
-            answer = json.loads(future.result().message)
             if answer["path_hash"] == about:  # else it was an earlier one, or another client's
                 return ("", "") if answer["traversable"] else (answer["code"], answer["reason"])
         raise NoAnswerError(
@@ -264,10 +259,9 @@ class MissionPlanner(Node):
         Raises:
             NoAnswerError: The server does not answer in time.
         """
-        future = self._adviser.call_async(Trigger.Request())
-        future.add_done_callback(self._notify)
-        self._wait(future.done, f"the answer of {self._adviser.service_name}")
-        advice: dict[str, Any] = json.loads(future.result().message)
+        advised = self._adviser.call_async(Trigger.Request())
+        response = self._finish(advised, f"the answer of {self._adviser.service_name}")
+        advice: dict[str, Any] = json.loads(response.message)
         return advice
 
     def set_policy(self, policy: str) -> None:
@@ -276,9 +270,8 @@ class MissionPlanner(Node):
         Raises:
             NoAnswerError: The server does not answer in time.
         """
-        future = self._parameters.set_parameters([Parameter("policy", value=policy)])
-        future.add_done_callback(self._notify)
-        self._wait(future.done, f"parameter policy of {SERVER}")
+        changed = self._parameters.set_parameters([Parameter("policy", value=policy)])
+        self._finish(changed, f"parameter policy of {SERVER}")
 
     def wait_for_pose(self, is_wanted: Callable[[np.ndarray], bool], seconds: float) -> np.ndarray:
         """Return the first measured pose (3,) that is wanted, or the last one after some seconds.
@@ -300,14 +293,12 @@ class MissionPlanner(Node):
         except MessageError as error:
             self.get_logger().warning(f"odometry not used: {error}", once=True)
             return
-        with self._changed:
-            self._pose = pose[[0, 1, 3]]
-            self._changed.notify_all()
+        self._pose = pose[[0, 1, 3]]
+        self._wake()
 
     def _take_driven(self, message: String) -> None:
-        with self._changed:
-            self._driven = message.data
-            self._changed.notify_all()
+        self._driven = message.data
+        self._wake()
 
     def _largest(self, name: str, answer: dict[str, Any]) -> float | None:
         """Return the largest value of an array published with the verdict, None if it is empty."""
@@ -320,20 +311,22 @@ class MissionPlanner(Node):
 
     def _take_verdict(self, message: DiagnosticArray) -> None:
         verdict = {entry.key: _value(entry) for entry in message.status[0].values}
-        with self._changed:
-            self._verdict = verdict
-            self._verdict_about = message.header.stamp, verdict.get("question_hash")
-            self._changed.notify_all()
+        self._verdict = verdict
+        self._verdict_about = message.header.stamp, verdict.get("question_hash")
+        self._wake()
 
-    def _taker(self, name: str) -> Callable[[Float64MultiArray], None]:
-        def take(message: Float64MultiArray) -> None:
-            with self._changed:
-                self._arrays[name] = array_values(message)
-                self._changed.notify_all()
+    def _take_array(self, name: str, message: Float64MultiArray) -> None:
+        self._arrays[name] = array_values(message)
+        self._wake()
 
-        return take
+    def _finish(self, future: Any, what: str, timeout: float | None = None) -> Any:
+        """Return the response of a call; raises as `_wait`."""
+        future.add_done_callback(lambda _: self._wake())
+        self._wait(future.done, what, timeout)
+        return future.result()
 
-    def _notify(self, _future: Any) -> None:
+    def _wake(self) -> None:
+        """Wake who waits for what has changed."""
         with self._changed:
             self._changed.notify_all()
 

@@ -16,6 +16,7 @@ from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.joints import read_joint_map
 from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.raw_messages import SensorReader
+from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
@@ -28,7 +29,7 @@ from rover_planner.ros.map_intake import CLOUD, MapIntake
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import newest_qos, sensor_qos, topic_qos
 from rover_planner.ros.subscriptions import PublisherCheck, subscribe_to_map
-from rover_planner.traction.clocks import NANOSECONDS, StampCheck, StampError
+from rover_planner.traction.clocks import StampCheck, StampError
 from rover_planner.traction.traction_service import (
     CMD_VEL,
     IMU,
@@ -140,16 +141,18 @@ class TractionInputs:
         if name == ODOMETRY:  # the others are faults, which the node logs
             self._log.update(name, f"odometry not used: {error}", "odometry is used again", now)
 
-    def _find_time(self, name: str, stamp: int, now: float, *, merged: bool = False) -> float:
+    def _find_time(
+        self, name: str, stamp: int | None, now: float, *, merged: bool = False
+    ) -> float:
         waited = round(NANOSECONDS * (time.monotonic() - now))
         clock = self._node.get_clock().now().nanoseconds - waited
-        return self.stamps.find_time(name, stamp, clock, now, merged=merged)
+        return self.stamps.find_time(name, stamp or 0, clock, now, merged=merged)
 
     def _take_joints(self, message: bytes, now: float) -> None:
         state = self._reader.read(message, JointState)
         if not self._heard.intersection(state.name):  # an arm's message, for example
             return
-        stamp = _stamp_of(state)
+        stamp = stamp_to_ns(state.header.stamp) or 0
         measured = self._find_time(JOINT_STATES, stamp, now, merged=True)
         positions = self.joint_names.positions(state, ANGLES)
         rates = self.joint_names.velocities(state, JOINTS)
@@ -157,14 +160,14 @@ class TractionInputs:
 
     def _take_imu(self, message: bytes, now: float) -> None:
         imu = self._reader.read(message, Imu)
-        measured = self._find_time(IMU, _stamp_of(imu), now)
+        measured = self._find_time(IMU, stamp_to_ns(imu.header.stamp), now)
         attitude = imu_to_attitude(imu, self._mounting)
         self._service.take_attitude(attitude.roll, attitude.pitch, attitude.rates, measured)
 
     def _take_command(self, message: bytes, now: float) -> None:
         twist = self._reader.read(message, self._twist)
         if self._twist is TwistStamped:
-            now = self._find_time(CMD_VEL, _stamp_of(twist), now)
+            now = self._find_time(CMD_VEL, stamp_to_ns(twist.header.stamp), now)
         self._service.take_command(*twist_to_speeds(twist), now)
 
     def _take_stop(self, message: Bool, now: float) -> None:
@@ -172,16 +175,10 @@ class TractionInputs:
 
     def _take_odometry(self, message: bytes, now: float) -> None:
         odometry = self._reader.read(message, Odometry)
-        measured = self._find_time(ODOMETRY, _stamp_of(odometry), now)
+        measured = self._find_time(ODOMETRY, stamp_to_ns(odometry.header.stamp), now)
         if odometry.header.frame_id != self._map_frame:
             self._frames.listen()  # only then: /tf of a whole robot costs the loop time
         here = self._frames.localise_odometry(odometry)
         pose, deviation = odometry_to_pose(here, self._map_frame, self._base_frame)
         self._service.take_odometry(pose, deviation, measured)
         self._log.update(ODOMETRY, "", "odometry is used again", now)
-
-
-def _stamp_of(message: Any) -> int:
-    """Return the header stamp [ns]."""
-    stamp = message.header.stamp
-    return int(stamp.sec * NANOSECONDS + stamp.nanosec)
