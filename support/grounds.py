@@ -39,11 +39,6 @@ def wall_with_gap(x, y, height=0.5):
     return waves(x, y) + height * ((np.abs(x) < 0.2) & (y < 1.0))
 
 
-def long_wall(x, y):
-    """Return waves with a wall of 1 m along y at x = 0, open beyond y = 2."""
-    return waves(x, y) + np.where((np.abs(x) < 0.1) & (y < 2.0), 1.0, 0.0)
-
-
 def pen(x, y):
     """Return waves with a wall of 1 m around a square of 3 m."""
     edge = np.maximum(np.abs(x), np.abs(y))

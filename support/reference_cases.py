@@ -2,7 +2,7 @@
 """The settled cases of test/data, computed with MuJoCo: see test/data/README.md."""
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -102,16 +102,6 @@ def steered_predictions() -> tuple[tuple[ReferenceGround, PathPrediction], ...]:
         (case, judge_poses(rover, case.terrain, case.poses, case.curvature)[0])
         for case in steered_grounds()
     )
-
-
-def angle_errors(predictions: Iterable[tuple[ReferenceGround, PathPrediction]]) -> np.ndarray:
-    """Return the absolute errors (n, 6) of roll, pitch, rocker and bogie angles [rad]."""
-    errors = []
-    for case, prediction in predictions:
-        attitude = np.column_stack([prediction.roll, prediction.pitch])
-        joints = np.hstack([prediction.rocker_angle, prediction.bogie_angle])
-        errors.append(np.abs(np.hstack([attitude - case.attitude, joints - case.joints])))
-    return np.concatenate(errors)
 
 
 def reference_ground(label: str) -> ReferenceGround:

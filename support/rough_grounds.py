@@ -89,15 +89,6 @@ def random_poses(seed: int, count: int, half: float) -> np.ndarray:
     return np.column_stack([places, rng.uniform(-np.pi, np.pi, count)])
 
 
-def quarter_turn(terrain: Terrain, poses: np.ndarray) -> tuple[Terrain, np.ndarray]:
-    """Return ground and poses, both rotated by 90 degrees about the map's z: x -> y, y -> -x."""
-    xmin, xmax, ymin, ymax = terrain.bounds
-    turned = replace(
-        terrain, elevation=np.ascontiguousarray(terrain.elevation.T[:, ::-1]), origin=(-ymax, xmin)
-    )
-    return turned, np.column_stack([-poses[:, 1], poses[:, 0], poses[:, 2] + 0.5 * np.pi])
-
-
 def mirrored(terrain: Terrain, poses: np.ndarray) -> tuple[Terrain, np.ndarray]:
     """Return ground and poses mirrored: y -> -y."""
     ymax = terrain.bounds[3]

@@ -15,7 +15,7 @@ import pytest
 
 import rover_physics
 from rover_planner.nodes.programs import PROGRAMS
-from support.project.checkout import TOP, console_scripts, imported_names, setup_arguments
+from support.project.checkout import TOP, console_scripts, setup_arguments
 
 ROS_FREE = {
     "numpy",
@@ -28,6 +28,19 @@ ROS_FREE = {
     "yaml",
     "rover_physics",
 }
+
+
+@cache
+def imported_names(path: Path) -> tuple[str, ...]:
+    """Return the dotted names that a file imports, wherever in the file it does."""
+    names = []
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names += [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            names += [f"{node.module}.{alias.name}" for alias in node.names]
+    return tuple(names)
 
 
 def sources(package: str) -> list[Path]:
