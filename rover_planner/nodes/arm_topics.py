@@ -13,7 +13,7 @@ from rover_physics.traversability.reach import ReachAnswer
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.questions import Answer, ReachCheck, ReachQuery
-from rover_planner.ros.deferred_service import Reply, serve_later
+from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.subscriptions import subscribe_to_requests
 

@@ -24,7 +24,7 @@ from rover_planner.planning.answering.questions import Answer, BadQuestion, Path
 from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.path_geometry import next_given_poses
 from rover_planner.planning.verdict_report import IdentityReport
-from rover_planner.ros.deferred_service import Reply, serve_later
+from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.optional_types import find_type
 from rover_planner.ros.server_inputs import describe_path
 

@@ -31,7 +31,7 @@ from rover_physics.rover.model import Rover
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.judgement import PathJudgement
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
-from rover_planner.ros.deferred_work import DeferredWork
+from rover_planner.ros.deferred import DeferredWork
 from rover_planner.ros.lazy_publisher import LazyPublisher
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.server_inputs import ServerInputs, describe_path

@@ -15,8 +15,7 @@ from msg_adapters.commands import joint_order
 from msg_adapters.results.diagnostics import traction_diagnostics
 from rover_physics.names import WHEEL_COUNT, WHEEL_JOINTS
 from rover_planner.nodes.running import run_node
-from rover_planner.nodes.traction.inputs import TractionInputs
-from rover_planner.nodes.traction.maps import TractionMaps
+from rover_planner.nodes.traction.inputs import TractionInputs, TractionMaps
 from rover_planner.nodes.traction.topics import TractionTopics
 from rover_planner.nodes.warm_up import TRACTION, update_traction
 from rover_planner.parameters.traction_controller import TractionControllerParameters

@@ -35,8 +35,7 @@ from rover_planner.maps.known_map import stamp_text
 from rover_planner.maps.summary import describe_terrain
 from rover_planner.nodes.advice_topics import AdviceTopics
 from rover_planner.nodes.arm_topics import ArmTopics
-from rover_planner.nodes.maps.map_cloud import MapCloud
-from rover_planner.nodes.maps.map_topics import MapTopics
+from rover_planner.nodes.map_topics import MapCloud, MapTopics
 from rover_planner.nodes.nav2_services import Nav2Services
 from rover_planner.nodes.navigation.hazard_topics import HazardTopics
 from rover_planner.nodes.navigation.path_watch import MAX_POSE_AGE, PERIOD, PathWatch
@@ -65,7 +64,7 @@ from rover_planner.planning.marked_places import NONE_MARKED, parse_place
 from rover_planner.planning.navigation.sensor_mounts import sensor_poses
 from rover_planner.planning.path_query import Pose
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
-from rover_planner.ros.deferred_service import Reply, serve_later
+from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.frames import NodeFrames, is_empty
 from rover_planner.ros.map_intake import read_message
 from rover_planner.ros.node import RoverNode

@@ -12,7 +12,7 @@ from support.command_line import assert_refused
 from support.learning_drives import climb, ramp, write_csv
 
 pytest.importorskip("rosbags", reason="install the extra bags")
-from rover_planner.ros.bags.bag_writer import write_bag
+from rover_planner.ros.bags.bag_files import write_bag
 from support.messages import row_messages
 
 SLOPE = 0.3

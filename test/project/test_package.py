@@ -2,6 +2,7 @@
 """The package: one version, entry points that exist, imports one way only, and its API."""
 
 import ast
+import importlib
 import re
 import subprocess
 import sys
@@ -79,8 +80,7 @@ def test_every_console_script_is_a_function_that_exists():
     scripts = console_scripts()
     assert scripts.keys() == {"rover_planner", *PROGRAMS}
     for module, function in scripts.values():
-        tree = ast.parse((TOP / (module.replace(".", "/") + ".py")).read_text(encoding="utf-8"))
-        assert function in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+        assert callable(getattr(importlib.import_module(module), function))
 
 
 def test_every_package_is_installed():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The subscriptions of the traction controller: checks messages and passes them to its service."""
+"""The subscriptions of the traction controller: checks messages, prepares maps for its service."""
 
 import math
 import time
@@ -12,6 +12,7 @@ from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Bool
 
 from msg_adapters.commands import twist_to_speeds
+from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.joints import read_joint_map
 from msg_adapters.odometry import odometry_to_pose
@@ -20,11 +21,14 @@ from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
+from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import steering_joints
+from rover_physics.traction.map_contacts import MapContactFinder
 from rover_planner.parameters.shared import STOP
 from rover_planner.parameters.traction_controller import TractionControllerParameters
+from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.frames import NodeFrames
-from rover_planner.ros.logs import TransitionLog
+from rover_planner.ros.logs import RepeatLog, TransitionLog
 from rover_planner.ros.map_intake import CLOUD, MapIntake
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import newest_qos, sensor_qos, topic_qos
@@ -182,3 +186,50 @@ class TractionInputs:
         pose, deviation = odometry_to_pose(here, self._map_frame, self._base_frame)
         self._service.take_odometry(pose, deviation, measured)
         self._log.update(ODOMETRY, "", "odometry is used again", now)
+
+
+class TractionMaps(MapIntake[MapContactFinder]):
+    """Prepares clouds for the controller in a thread of their own."""
+
+    def __init__(
+        self,
+        node: RoverNode[TractionControllerParameters],
+        rover: Callable[[], Rover],
+        frames: NodeFrames,
+    ):
+        """Start the thread.
+
+        Args:
+            node: The node.
+            rover: Returns the rover for which maps are prepared.
+            frames: Knows where the frames of clouds are on the map.
+        """
+        self._node, self._rover, self._listen = node, rover, frames.listen
+        self._values = node.values
+        self._refusals = RepeatLog()
+        super().__init__(self._make, self._log_refusal, frames)
+
+    def apply(self) -> None:
+        """Prepare the last map again if a parameter of it has changed."""
+        before, self._values = self._values, self._node.values
+        names = ("map_resolution", "cell_height")
+        if any(getattr(before, name) != getattr(self._values, name) for name in names):
+            self.repeat()
+
+    def look_for_frame(self) -> None:
+        """Listen to /tf if a map needs it, and take it when its frame is known; call it often."""
+        if self.waits_for_frame:
+            self._listen()  # only then: /tf of a whole robot costs the loop time
+            self.retry()
+
+    def _make(self, cloud: PointCloud2, source: Rigid | None) -> MapContactFinder:
+        """Prepare a map from a cloud; called in the thread."""
+        values, move = self._values, None if source is None else source.matrix
+        terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height, move)
+        return MapContactFinder(self._rover(), terrain)
+
+    def _log_refusal(self, error: str) -> None:
+        line = f"{CLOUD} refused, the last map stays: {error}"
+        line = self._refusals.line(line, time.monotonic())
+        if line:
+            self._node.get_logger().error(line)

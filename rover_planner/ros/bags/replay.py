@@ -18,7 +18,7 @@ from rover_planner.planning.answering.questions import Register
 from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.navigation.sensor_mounts import sensor_poses
 from rover_planner.planning.verdict_report import IdentityReport
-from rover_planner.ros.bags.bag_reader import (
+from rover_planner.ros.bags.bag_files import (
     IMU,
     JOINTS,
     MAP,
