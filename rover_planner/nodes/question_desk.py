@@ -27,9 +27,8 @@ from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.deferred import PacedSender
 from rover_planner.ros.guard import refuse_error
-from rover_planner.ros.node import RoverNode
+from rover_planner.ros.node import RoverNode, create_steady_timer
 from rover_planner.ros.qos import topic_qos
-from rover_planner.ros.steady import create_steady_timer
 
 LEAVE_TIME = 0.1
 """Time in which the last answers leave before the node is destroyed [s]."""

@@ -21,9 +21,8 @@ from rover_planner.nodes.warm_up import TRACTION, update_traction
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.ros.frames import NodeFrames
 from rover_planner.ros.logs import TransitionLog
-from rover_planner.ros.node import RoverNode
+from rover_planner.ros.node import RoverNode, create_steady_timer
 from rover_planner.ros.qos import latched_qos, sensor_qos, topic_qos
-from rover_planner.ros.steady import create_steady_timer
 from rover_planner.shell.kernels import load_kernels
 from rover_planner.traction.clocks import ClockWatch
 from rover_planner.traction.settings import TractionSettings, load_traction_settings

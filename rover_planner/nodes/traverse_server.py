@@ -67,10 +67,9 @@ from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
 from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.frames import NodeFrames, is_empty
 from rover_planner.ros.map_intake import read_message
-from rover_planner.ros.node import RoverNode
+from rover_planner.ros.node import RoverNode, create_steady_timer
 from rover_planner.ros.qos import newest_qos, polled_qos, replace_reliability, topic_qos
 from rover_planner.ros.server_inputs import ServerInputs, describe_path
-from rover_planner.ros.steady import create_steady_timer
 from rover_planner.ros.subscriptions import subscribe_to_requests
 from rover_planner.shell.kernels import load_kernels
 

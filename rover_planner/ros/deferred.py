@@ -9,8 +9,8 @@ from typing import Any
 from rclpy.node import Node
 
 from rover_planner.ros.guard import Guard
+from rover_planner.ros.node import create_steady_timer
 from rover_planner.ros.qos import service_qos
-from rover_planner.ros.steady import create_steady_timer
 
 QUIET = 0.03
 """Time after the last answer before the work begins [s]: a client has time to read the answer

@@ -20,8 +20,8 @@ from msg_adapters.stamps import ns_to_stamp
 from rover_physics.names import WHEEL_JOINTS
 from rover_planner.nodes.traction_controller import NODE_NAME, TractionController
 from rover_planner.nodes.warm_up import JOINTS
+from rover_planner.ros.node import create_steady_timer
 from rover_planner.ros.qos import sensor_qos
-from rover_planner.ros.steady import create_steady_timer
 from support.ros_fixtures import PATIENT
 from support.waiting import wait_until
 
