@@ -51,12 +51,6 @@ def reference_grounds() -> tuple[ReferenceGround, ...]:
     return tuple(ground for file in FILES for ground in _read_grounds(file))
 
 
-@lru_cache(maxsize=1)
-def steered_grounds() -> tuple[ReferenceGround, ...]:
-    """Return all grounds with turned wheels, with their cases."""
-    return tuple(_read_grounds(STEERED))
-
-
 def _read_grounds(file: str) -> Iterator[ReferenceGround]:
     with np.load(DATA / file) as entries:
         meta = json.loads(str(entries["meta"]))
@@ -100,7 +94,7 @@ def steered_predictions() -> tuple[tuple[ReferenceGround, PathPrediction], ...]:
     rover = load_rover("lsr1")
     return tuple(
         (case, judge_poses(rover, case.terrain, case.poses, case.curvature)[0])
-        for case in steered_grounds()
+        for case in _read_grounds(STEERED)
     )
 
 
