@@ -11,7 +11,6 @@ the verdict, wheel loads and slip ratios that the server publishes with its answ
 import contextlib
 import json
 import sys
-import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -22,7 +21,7 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, KeyValue
 from nav_msgs.msg import Odometry, Path
 from nav_msgs.srv import GetPlan
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
@@ -85,7 +84,7 @@ class NoAnswerError(Exception):
 class MissionPlanner(Node):
     """Queries the server and collects the results that it publishes with each answer.
 
-    Callbacks run in an executor's thread. Call the blocking methods below from another thread.
+    The methods below take messages while they wait; nothing else is to spin the node.
     """
 
     def __init__(self, map_frame: str = "map", timeout: float = 60.0, **node_arguments: Any):
@@ -93,7 +92,8 @@ class MissionPlanner(Node):
         super().__init__(NODE_NAME, **node_arguments)
         self._frame = map_frame
         self._timeout = timeout
-        self._changed = threading.Condition()
+        self._executor = SingleThreadedExecutor(context=self.context)
+        self._executor.add_node(self)
         self._verdict: dict[str, Any] = {}
         self._verdict_about: tuple[Any, Any] | None = None
         self._arrays: dict[str, np.ndarray] = {}
@@ -294,11 +294,9 @@ class MissionPlanner(Node):
             self.get_logger().warning(f"odometry not used: {error}", once=True)
             return
         self._pose = pose[[0, 1, 3]]
-        self._wake()
 
     def _take_driven(self, message: String) -> None:
         self._driven = message.data
-        self._wake()
 
     def _largest(self, name: str, answer: dict[str, Any]) -> float | None:
         """Return the largest value of an array published with the verdict, None if it is empty."""
@@ -313,27 +311,19 @@ class MissionPlanner(Node):
         verdict = {entry.key: _value(entry) for entry in message.status[0].values}
         self._verdict = verdict
         self._verdict_about = message.header.stamp, verdict.get("question_hash")
-        self._wake()
 
     def _take_array(self, name: str, message: Float64MultiArray) -> None:
         self._arrays[name] = array_values(message)
-        self._wake()
 
     def _finish(self, future: Any, what: str, timeout: float | None = None) -> Any:
         """Return the response of a call; raises as `_wait`."""
-        future.add_done_callback(lambda _: self._wake())
         self._wait(future.done, what, timeout)
         return future.result()
-
-    def _wake(self) -> None:
-        """Wake who waits for what has changed."""
-        with self._changed:
-            self._changed.notify_all()
 
     def _wait(
         self, condition: Callable[[], bool], what: str, timeout: float | None = None
     ) -> None:
-        """Wait until a condition holds.
+        """Take what has come, and what comes until a condition holds.
 
         Raises:
             NoAnswerError: It does not hold in time.
@@ -341,13 +331,26 @@ class MissionPlanner(Node):
         """
         longest = min(timeout or self._timeout, self._timeout)
         deadline = time.monotonic() + longest
-        with self._changed:
-            while not condition():
-                if not self.context.ok():
-                    raise ExternalShutdownException
-                if time.monotonic() > deadline:
-                    raise NoAnswerError(f"waited {longest:.0f} s in vain for {what}")
-                self._changed.wait(0.1)
+        while self._take_next(0.0):
+            pass
+        while not condition():
+            if time.monotonic() > deadline:
+                raise NoAnswerError(f"waited {longest:.0f} s in vain for {what}")
+            self._take_next(0.1)
+
+    def _take_next(self, seconds: float) -> bool:
+        """Take what comes next within some seconds; return whether anything came."""
+        try:
+            call, _, _ = self._executor.wait_for_ready_callbacks(timeout_sec=seconds)
+        except TimeoutException:
+            return False
+        except Exception:
+            if self.context.ok():
+                raise
+            raise ExternalShutdownException from None  # while it began to wait
+        call()
+        call.result()  # raises the error of a callback
+        return True
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -365,11 +368,6 @@ def _run(argv: Sequence[str] | None) -> int:
         return end_with(NODE_NAME, EXIT_BAD_INPUT, str(error))
     init_ros(argv)
     node = MissionPlanner(options.map_frame, options.timeout)
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    ended = threading.Event()
-    thread = threading.Thread(target=spin_until, args=(ended, executor), daemon=True)
-    thread.start()
     try:
         return _carry_out(node, terrain, options)
     except NoAnswerError as error:
@@ -379,9 +377,6 @@ def _run(argv: Sequence[str] | None) -> int:
     except (KeyboardInterrupt, ExternalShutdownException):
         return EXIT_INTERRUPTED
     finally:
-        ended.set()
-        executor.wake()
-        thread.join(2.0)
         rclpy.try_shutdown()
         node.destroy_node()
 
@@ -452,19 +447,6 @@ def _exit_code(answer: dict[str, Any]) -> int:
     if answer["traversable"]:
         return EXIT_OK
     return EXIT_NOT_TRAVERSABLE if _was_judged(answer) else EXIT_FAILED
-
-
-def spin_until(ended: threading.Event, executor: SingleThreadedExecutor) -> None:
-    """Spin until the mission has ended, or a signal has shut ROS down."""
-    while not ended.is_set():
-        try:
-            executor.spin_once(timeout_sec=0.2)
-        except ExternalShutdownException:
-            return
-        except Exception:
-            if executor.context.ok():
-                raise
-            return  # ROS was shut down while the executor began to wait
 
 
 def _print_json(event: dict[str, Any]) -> None:
