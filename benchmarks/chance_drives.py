@@ -15,7 +15,6 @@ import typer
 
 from benchmarks.chance import FAST, ChancePath, draw_path, draw_truths
 from benchmarks.drives import LOOK_AHEAD, MAX_TILT
-from rover_physics.rover.steered_drive import SteeredDrive
 from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.simulator.path_follower import PathFollower
 from support.reference_drives import KEPT
@@ -38,16 +37,11 @@ def passes(path: ChancePath, friction: float, max_torque: float) -> bool:
     plant = MujocoRover(rover, path.ground, tuple(poses[0]), friction)
     follower = PathFollower(np.vstack([poses, beyond]), LOOK_AHEAD)
     length = float(np.hypot(*np.diff(poses[:, :2], axis=0).T).sum())
-    steered, way = SteeredDrive(rover), [0.0]
-    within, is_lost = round(ASKED_WAY / path.speed / PERIOD), False
+    within, is_lost, way = round(ASKED_WAY / path.speed / PERIOD), False, [0.0]
     while follower.driven < length and not is_lost:
         here = plant.pose[[0, 1, 3]]
-        aims = steered.aim(*follower.steer(here, rover.nominal_speed))
-        plant.steer(aims.angles)
-        share = steered.share(plant.steering_angles, aims.angles)
-        plant.servo_with_droop(
-            share * aims.speeds / rover.wheel.radius, rover.wheel.servo_droop, PERIOD
-        )
+        speeds = plant.steer(follower.steer(here, rover.nominal_speed))
+        plant.servo_with_droop(speeds / rover.wheel.radius, rover.wheel.servo_droop, PERIOD)
         way.append(follower.driven)
         stands = len(way) > within and way[-1] - way[-1 - within] < STUCK_WAY
         is_lost = plant.tilt > MAX_TILT or stands
