@@ -106,9 +106,9 @@ class ParameterSpec:
 def parameter(
     default: Value,
     meaning: str,
-    *,
     unit: str = "",
     bounds: tuple[float, float] | None = None,
+    *,
     choices: tuple[str, ...] = (),
     read_only: bool = False,
 ) -> Value:
