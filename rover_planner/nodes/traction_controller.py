@@ -169,9 +169,7 @@ class TractionController(RoverNode[TractionControllerParameters]):
             now = time.monotonic()
         command = repeated or self._find_command(now)
         sent = self._watchdog.send(
-            lambda: self._write(command),
-            now,
-            self._find_deadline(now, command),
+            lambda: self._write(command), now, self._find_deadline(now, command)
         )
         if not sent:
             command = self._supervisor.fail(LOOP_FAULT)

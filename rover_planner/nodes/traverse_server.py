@@ -20,13 +20,7 @@ from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash, plan_request_hash
 from msg_adapters.paths import count_poses, stamped_pose_to_array
 from msg_adapters.raw_messages import SensorReader
-from msg_adapters.results.diagnostics import (
-    HEALTH,
-    MONITOR,
-    diagnostics,
-    make_status,
-    to_json,
-)
+from msg_adapters.results.diagnostics import HEALTH, MONITOR, diagnostics, make_status, to_json
 from msg_adapters.stamps import NANOSECONDS
 from rover_physics.errors import RoverError
 from rover_physics.numerics.kernel_cache import kernel_cache_note
