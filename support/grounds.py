@@ -45,11 +45,6 @@ def pen(x, y):
     return waves(x, y) + np.where(np.abs(edge - 1.5) < 0.1, 1.0, 0.0)
 
 
-def whole_wall(x, y):
-    """Return waves with a wall of 0.5 m along y at x = 0."""
-    return waves(x, y) + 0.5 * (np.abs(x) < 0.2)
-
-
 def rock_left(x, y):
     """Return level ground with a rock below the left wheels of a rover on the x axis."""
     return 0.3 * np.exp(-((x - 0.2) ** 2 + (y - 0.2) ** 2) / 0.02)
