@@ -39,8 +39,7 @@ from msg_adapters.results.predictions import array_values
 from rover_physics.errors import RoverError
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.nodes.mission.drive import Drive, DriveFailedError, DriveSettings
-from rover_planner.nodes.mission.options import MissionOptions
-from rover_planner.nodes.programs import read_arguments
+from rover_planner.nodes.programs import MissionOptions, read_arguments
 from rover_planner.planning.answering.budget import STOPPING
 from rover_planner.ros.process import init_ros
 from rover_planner.ros.qos import (

@@ -20,9 +20,8 @@ from msg_adapters.paths import poses_path
 from rover_planner.advice import seek
 from rover_planner.advice.levers import LEVERS
 from rover_planner.nodes.mission.drive import DriveFailedError
-from rover_planner.nodes.mission.options import MissionOptions
 from rover_planner.nodes.mission_planner import MissionPlanner, NoAnswerError, main
-from rover_planner.nodes.programs import read_arguments
+from rover_planner.nodes.programs import MissionOptions, read_arguments
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.planning.answering.budget import STOPPING
 from rover_planner.shell.poses import Pose
