@@ -70,6 +70,45 @@ def test_a_newer_request_stops_at_once_what_follows_a_result(found):
     assert work.close()
 
 
+def test_a_first_result_waits_for_no_older_work_and_what_follows_it_does(found):
+    go_on = threading.Event()
+
+    def work_on(request):
+        yield "verdict"
+        if request == "old":
+            go_on.wait()
+        yield "rest"
+
+    work, asked = BackgroundWork(work_on, lambda *one: found.append(one)), ["old", "new", "old"]
+    for count, request in enumerate(asked, 1):
+        work.ask(request)
+        wait_until(lambda count=count: len(found) == count, "the verdict")
+    assert found == [(request, "verdict") for request in asked] and work.progress
+    go_on.set()
+    wait_for_idle(work)
+    assert found[3:] == [("old", "rest")]
+    assert work.close()
+
+
+def test_the_time_of_a_newer_request_does_not_count_from_the_result_of_an_older_one(found):
+    go_on = threading.Event()
+
+    def work_on(request):
+        if request == "new":
+            go_on.wait()
+        yield "verdict"
+        go_on.wait()
+
+    work = BackgroundWork(work_on, lambda *one: found.append(one))
+    work.ask("old")
+    wait_until(lambda: found and work.progress.seconds > 0.5, "time without a result")
+    work.ask("new")
+    assert work.progress.seconds < 0.5
+    go_on.set()
+    wait_for_idle(work)
+    assert work.close()
+
+
 @pytest.mark.timed
 def test_cancelled_work_stops_soon_and_is_never_delivered(busy_judge, found):
     quick = session_on(ramp).wanted
@@ -92,7 +131,7 @@ def test_cancelled_work_stops_soon_and_is_never_delivered(busy_judge, found):
 
 
 @pytest.mark.parametrize("error", [MemoryError(), SystemExit(3)])
-def test_no_error_ends_the_thread(error, found):
+def test_an_error_is_delivered_and_what_is_asked_next_is_done(error, found):
     def fail_or_answer(request):
         if request:
             raise error

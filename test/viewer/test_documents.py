@@ -20,7 +20,7 @@ from rover_planner.viewer.documents.drive import (
 )
 from rover_planner.viewer.documents.numbers import plain
 from rover_planner.viewer.documents.rover import compare_drives, describe_sliders, read_values
-from rover_planner.viewer.documents.verdict import describe_verdict, list_paths
+from rover_planner.viewer.documents.verdict import describe_paths, describe_verdict
 from rover_planner.viewer.state.path_limits import ShownLimit, write_use
 from rover_planner.viewer.state.scenario import Judged
 from rover_planner.viewer.state.session import ViewSession
@@ -110,7 +110,7 @@ def list_paths_of(path: Judged) -> dict:
         LSR1, path.scenario.terrain, path.scenario.start, path.scenario.goal,
         path.scenario.options,
     )  # fmt: skip
-    return list_paths(session.shown, is_outdated=False, is_judging=False)[0]
+    return describe_paths(session.shown)["rows"][0]
 
 
 def test_the_worst_so_far_grows_and_has_all_limits_in_one_unit():
@@ -281,7 +281,7 @@ def test_a_refusal_on_unknown_ground_is_at_the_time_to_which_the_drive_is_played
         describe_verdict(session.shown),
         describe_limits(path, None),
         describe_uses(path, 0.0),
-        list_paths(session.shown, is_outdated=False, is_judging=False),
+        describe_paths(session.shown)["rows"],
     ]
     json.dumps(told, allow_nan=False)
 
@@ -325,7 +325,7 @@ def test_the_board_has_all_loads_and_unknown_values_are_none_or_a_question_mark(
 def test_a_row_of_a_path_has_the_numbers_of_its_verdict():
     session = session_on(wall_at(0.5), goal=(1.5, 0.0, 0.0))
     shown = session.shown
-    rows = list_paths(shown, is_outdated=False, is_judging=False)
+    rows = describe_paths(shown)["rows"]
     assert [row["passes"] for row in rows] == [one.verdict.traversable for one in shown.paths]
     assert [row["number"] for row in rows if row["word"].endswith("best")] == (
         [] if shown.best is None else [shown.best + 1]

@@ -6,10 +6,9 @@ import json
 import zlib
 from dataclasses import asdict, replace
 
-import numpy as np
 import pytest
 
-from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
+from rover_physics.rover.rover_file import rover_to_dict
 from rover_planner.errors import PlanningError
 from rover_planner.viewer.pages.sharing import KEY, PageLink, read_link, write_link
 from support.viewer.sessions import FAR, LSR1
@@ -35,8 +34,9 @@ def pack(text: str) -> str:
     return f"{KEY}={base64.urlsafe_b64encode(zlib.compress(text.encode())).decode()}"
 
 
-def test_a_link_gives_back_what_it_was_made_of():
-    assert read_link("?" + write_link(LINK)) == LINK
+def test_a_link_gives_back_exactly_what_it_was_made_of():
+    query = write_link(LINK)
+    assert read_link(f"?{query}") == LINK and len(query) < 1500
 
 
 @pytest.mark.parametrize("query", ["", "?", "?darkMode", "?rover=lsr1", f"?{KEY}="])
@@ -73,11 +73,3 @@ def test_a_link_with_an_invalid_value_is_refused_by_name(changes, names):
 def test_a_damaged_or_huge_link_is_refused(query, names):
     with pytest.raises(PlanningError, match=names):
         read_link(query)
-
-
-def test_a_changed_rover_comes_back_from_a_link_exactly_and_of_a_huge_one_there_is_no_link():
-    query = write_link(LINK)
-    assert len(query) < 1500
-    assert rover_from_dict(read_link(query).rover, "link").friction == 1.0 / 3.0
-    letters = "".join(chr(33 + k % 90) for k in np.random.default_rng(1).integers(0, 90, 20_000))
-    assert write_link(replace(LINK, loaded={**LINK.loaded, "name": letters})) == ""

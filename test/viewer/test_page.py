@@ -22,9 +22,9 @@ from support.viewer.sessions import wait_patiently as wait_until
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
-from rover_planner.viewer.documents.drive import describe_uses
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.pages.sharing import KEY
+from rover_planner.viewer.state.path_limits import write_use
 
 pytestmark = [needs_browser, pytest.mark.slow]
 
@@ -152,11 +152,10 @@ def test_a_refusal_leads_to_its_place_where_all_parts_show_one_number(visitor, p
     visitor.wait_for(path.failure.headline)
     visitor.press("Go to the failure")
     wait_until(lambda: abs(page.playback.time - path.failure.time) < 0.05, "the failure")
-    codes = [lane.limit.code for lane in path.limits.lanes]
-    use = describe_uses(path, path.failure.time)[codes.index(path.failure.code)]
     lane = f'.lane[data-code="{path.failure.code}"][data-broken]'
     wait_until(lambda: visitor.tab.locator(lane).count() == 1, "the broken lane")
-    assert use["worst"] in visitor.text(lane)
+    use = float(np.nanmax(path.limits.lane(path.failure.code).used))
+    assert f"worst {write_use(use)}" in visitor.text(lane)
     wait_until(
         lambda: np.allclose(camera.look_at, path.failure.state.position, atol=1e-3),
         "the camera to look there",
@@ -267,9 +266,8 @@ def test_a_link_brings_back_rover_path_and_time(visitor, page):
     ask(page, lambda: session.plan_to(np.array([0.5, 0.5])))
     wait_for_rest(page)
     visitor.tab.goto(address)
-    wait_until(lambda: session.shown.scenario.rover.friction == 0.6, "the friction")
-    wait_until(lambda: session.shown.index == shown.index, "the path")
     wait_until(lambda: page.playback.time == pytest.approx(at, abs=1e-3), "the time")
+    assert session.shown.scenario.rover.friction == 0.6
     np.testing.assert_array_equal(session.shown.path.poses, shown.path.poses)
 
 

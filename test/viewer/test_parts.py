@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS
 from rover_physics.results.uses import find_uses, limits_of
 from rover_physics.traversability.judge import judge_path, judge_poses
 from rover_planner.viewer.state.background_work import Inbox
@@ -27,6 +26,7 @@ from rover_planner.viewer.state.layers import (
     SLOPE,
     ColouredGround,
     Colouring,
+    LayerRequest,
     colour_ground,
     colour_limit,
     list_layers,
@@ -196,7 +196,8 @@ def test_the_ground_has_a_layer_for_the_use_of_each_limit_of_a_pose_and_one_for_
     ground = make_terrain(lambda x, y: gap(x, y) + 0.3 * x)
     at = np.array([-1.0, 0.75]), np.array([0.0])
     tilt, every = (
-        predict_use(code, LSR1, ground, 0.0, at, DEFAULT_OPTIONS)[0] for code in ("tilt", "")
+        predict_use(LayerRequest(LSR1, ground, Colouring(layer)), at)[0]
+        for layer in ("use of tilt", "use of all limits")
     )
     pose = [[-1.0, 0.0, 0.0]]
     uses = find_uses(limits_of(LSR1, "equal"), judge_poses(LSR1, ground, pose)[0].results)
@@ -205,8 +206,8 @@ def test_the_ground_has_a_layer_for_the_use_of_each_limit_of_a_pose_and_one_for_
     assert every[0] == pytest.approx(np.nanmax(uses.use), rel=1e-6)
     assert np.isnan([tilt[1], every[1]]).all()  # unknown ground
     steep = make_terrain(lambda x, y: x)
-    grid = make_grid(steep)
-    found = colour_limit(Colouring("use of tilt"), LSR1, steep, None, DEFAULT_OPTIONS, grid)
+    grid, how = make_grid(steep), Colouring("use of tilt")
+    found = colour_limit(LayerRequest(LSR1, steep, how), grid)
     picture = draw_picture(grid, found)
     assert np.median(picture[..., 0]) > np.median(picture[..., 2])  # beyond it is vermillion
     assert found.legend.keys[0] == ("hatched", "beyond the limit")

@@ -3,6 +3,7 @@
 
 import json
 import threading
+import time
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -173,8 +174,14 @@ def test_the_verdict_is_told_before_its_drawings_and_policies_are_judged_after_t
     page, monkeypatch
 ):
     begun, go_on, judged, show = threading.Event(), threading.Event(), [], page.scene.paths.show
+    tell, told_at, drawn_at = page.channel.tell, {}, []
+
+    def tell_and_note(name: str, part) -> None:
+        told_at[name] = told_at.get(name, time.monotonic())
+        tell(name, part)
 
     def draw_slowly(*arguments) -> None:
+        drawn_at.append(time.monotonic())
         progress = page._judging.progress
         judged.append(progress.what if progress else "")
         begun.set()
@@ -183,8 +190,10 @@ def test_the_verdict_is_told_before_its_drawings_and_policies_are_judged_after_t
 
     monkeypatch.setattr(base, "DRAWING_TIME", PATIENCE)  # or it would give up the wait
     monkeypatch.setattr(page.scene.paths, "show", draw_slowly)
+    monkeypatch.setattr(page.channel, "tell", tell_and_note)
     change_friction(page, 0.4)
     assert begun.wait(PATIENCE)
+    assert drawn_at[0] - told_at["limits"] >= base.PERIOD  # a picture of the words comes first
     passes = told(page, "verdict")["passes"]
     assert is_busy(page)
     go_on.set()
@@ -251,8 +260,7 @@ def test_a_path_is_drawn_in_the_colour_of_its_verdict_up_to_where_it_is_refused(
     session = session_on(ramp)
     session.change_rover([("friction",)], 0.4)
     shown, overlay = session.shown, page.scene.paths
-    candidates = [path.candidate for path in shown.paths]
-    ask(page, lambda: overlay.show(candidates, shown.index))
+    ask(page, lambda: overlay.show(shown.paths, shown.index))
     driven, beyond, *cross = overlay.paths[shown.index]
     assert driven.colour == REFUSED
     np.testing.assert_array_equal(driven.line[-1], beyond.line[0])
@@ -305,10 +313,10 @@ def test_a_drawing_that_fails_is_told_and_stops_no_other_and_what_is_drawn_is_no
     done, ground, rover = [], object(), object()
 
     def ask_for_four() -> None:
-        page.draw_made("the paths", [ground], lambda: done.append("paths"))
-        page.draw_made("the plots", [ground], lambda: 1 / 0)
-        page.draw_made("the paths", [ground], lambda: done.append("paths again"))
-        page.draw_made("the rover", [ground, rover], lambda: done.append("rover"))
+        page.draw_made("the paths", lambda _: done.append("paths"), ground)
+        page.draw_made("the plots", lambda _: 1 / 0, ground)
+        page.draw_made("the paths", lambda _: done.append("paths again"), ground)
+        page.draw_made("the rover", lambda *_: done.append("rover"), ground, rover)
 
     ask(page, ask_for_four)
     assert done == ["paths", "rover"]

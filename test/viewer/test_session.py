@@ -21,7 +21,7 @@ from rover_planner.command.view import SEED, choose_ends, name_ground
 from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import assume
 from rover_planner.viewer.documents.rover import describe_changes
-from rover_planner.viewer.documents.verdict import describe_verdict, list_paths
+from rover_planner.viewer.documents.verdict import describe_paths, describe_verdict
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, SURE, Judge, blocked_session, ramp, session_on, straight
@@ -67,12 +67,12 @@ def test_before_and_after_stay_while_something_differs_from_the_loaded_rover():
         assert (
             shown.verdict.traversable == passes and shown.reference.candidate is loaded.candidate
         )
-        changes = describe_changes(shown.path, shown.reference, is_kept=False)
+        changes = describe_changes(shown.path, shown.reference, False)
         assert changes["rover"] == [["friction [-]", "0.8", f"{friction:g}"]]
         word = "passes" if passes else "refused"
         assert changes["drive"][0] == ["verdict", "passes", word]
     session.change_arm("arm_yaw", 0.5)
-    changes = describe_changes(session.shown.path, session.shown.reference, is_kept=False)
+    changes = describe_changes(session.shown.path, session.shown.reference, False)
     assert ["arm_yaw [rad]", "3.14159", "0.5"] in changes["rover"]
     session.reset()
     assert session.shown.reference is None
@@ -101,7 +101,7 @@ def test_all_paths_are_judged_again_after_a_value_that_is_refused_and_old_ones_s
             session.change_rover([("wheel", "radius")], -1.0)
         judge.finish()
         assert session.is_complete and session.wanted.rover.suspension.wheels["rear"][2] == -0.19
-        rows = list_paths(session.shown, is_outdated=False, is_judging=False)
+        rows = describe_paths(session.shown)["rows"]
         assert not any(row["waits"] for row in rows)
         session.change_rover(FRICTION, 0.7)
         session.change_options(soil="best")  # it is refused when it is judged
@@ -112,7 +112,7 @@ def test_all_paths_are_judged_again_after_a_value_that_is_refused_and_old_ones_s
     finally:
         assert judge.work.close()
     half = replace(session.shown, scenario=replace(session.wanted))
-    rows = list_paths(half, is_outdated=True, is_judging=False)
+    rows = describe_paths(half, True)["rows"]
     assert {row["waits"] for row in rows} == {"old, was not judged again"}
 
 

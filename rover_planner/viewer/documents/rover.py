@@ -57,7 +57,7 @@ def describe_values(scenario: Scenario) -> dict[str, list[float]]:
     return {label: [value, loaded[label]] for label, value in now.items()}
 
 
-def describe_changes(path: Judged, reference: Judged | None, *, is_kept: bool) -> dict[str, Any]:
+def describe_changes(path: Judged, reference: Judged | None, is_kept: bool) -> dict[str, Any]:
     """Return what differs from the reference: numbers of the rover and the arm, and the drive."""
     if reference is None:
         return {"kept": is_kept, "rover": [], "drive": []}

@@ -79,7 +79,9 @@ def _list_offers(shown: Shown) -> Sequence[dict[str, Any]]:
     return [{"words": words, "ask": {"ask": "show", "index": shown.offer}}]
 
 
-def list_paths(shown: Shown, *, is_outdated: bool, is_judging: bool) -> list[dict[str, Any]]:
+def describe_paths(
+    shown: Shown, is_outdated: bool = False, is_judging: bool = False
+) -> dict[str, Any]:
     """Return a row for each path; the numbers of a refused one are up to its first failure.
 
     Args:
@@ -90,10 +92,11 @@ def list_paths(shown: Shown, *, is_outdated: bool, is_judging: bool) -> list[dic
     every = frozenset(range(len(shown.paths)))
     old = every if is_outdated else shown.old
     waits = "old, is judged" if is_judging else "old, was not judged again"
-    return [
+    rows = [
         _describe_row(path, number=k + 1, waits=waits if k in old else "", best=k == shown.best)
         for k, path in enumerate(shown.paths)
     ]
+    return {"rows": rows, "shown": shown.index}
 
 
 def _describe_row(path: Judged, number: int, waits: str, best: bool) -> dict[str, Any]:

@@ -40,6 +40,9 @@ const button = (words, question, attributes = {}) =>
 let socket = null;
 let held = null; // parts that wait while something is pressed: drawn anew, it would lose the click
 let pressed = 0; // timer that ends the press
+const FIRST = ["subject", "verdict"]; // what a person waits for; a picture of it comes before all else
+const later = new Set(); // names of the parts that are drawn after it
+let waits = false; // true until that picture
 
 function ask(question) {
   if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(question));
@@ -61,8 +64,22 @@ function take(parts) {
   if (held) { Object.assign(held, parts); return; }
   Object.assign(state, parts);
   if ("program" in parts) greet(parts.program);
-  for (const name of Object.keys(parts)) if (DRAW[name]) DRAW[name](parts[name]);
-  if ("offers" in parts) openTab(chosen.tab);
+  const first = FIRST.filter((name) => name in parts);
+  first.forEach((name) => DRAW[name](parts[name]));
+  for (const name of Object.keys(parts)) if (!first.includes(name)) later.add(name);
+  if (first.length && !waits) {
+    waits = true;
+    requestAnimationFrame(() => setTimeout(drawLater));
+  } else if (!waits) drawLater();
+}
+
+function drawLater() {
+  const names = [...later];
+  waits = false;
+  later.clear();
+  if (held) { held = { ...Object.fromEntries(names.map((name) => [name, state[name]])), ...held }; return; }
+  for (const name of names) if (DRAW[name]) DRAW[name](state[name]);
+  if (names.includes("offers")) openTab(chosen.tab);
 }
 
 // A program that was started again knows nothing of what was changed: take that up.

@@ -73,7 +73,7 @@ class LiveListener(Node):
     """Keeps the latest values, map, plan and verdict; it skips bad messages with a warning.
 
     Messages come in one thread and are asked for in another: what they share is frozen, and
-    replaced as a whole.
+    replaced as a whole; of a click, what comes is added.
     """
 
     def __init__(self, map_frame: str = "map", **node_arguments: Any):
@@ -87,7 +87,6 @@ class LiveListener(Node):
         self._ages: dict[str, TopicAge] = {}
         self._first_time: float | None = None
         self._click: Click | None = None
-        self._click_lock = threading.Lock()
         self._planner = self.create_client(
             GetPlan, f"{SERVER}/can_traverse", qos_profile=service_qos()
         )
@@ -164,25 +163,20 @@ class LiveListener(Node):
             start=stamped_pose(start, self._frame), goal=stamped_pose((*goal, yaw), self._frame)
         )
         click = Click(plan_request_hash(request.start, request.goal, 0.0), time.monotonic())
-        with self._click_lock:
-            self._click = click
+        self._click = click
         take = partial(self._on_answer, click)
         self._planner.call_async(request).add_done_callback(partial(self._hear, "plan", take))
         return ""
 
     def forget_click(self) -> None:
         """Follow the server's newest verdict again."""
-        with self._click_lock:
-            self._click = None
+        self._click = None
 
-    def _on_answer(self, asked: Click, future: Any) -> None:
-        """Take the plan of a click, unless there was another one since."""
-        response = future.result()
-        with self._click_lock:
-            click = self._click
-            if click is not None and click.asked == asked.asked and response.plan.poses:
-                plan = path_to_poses(response.plan, self._frame)
-                self._click = replace(click, plan=plan)
+    def _on_answer(self, click: Click, future: Any) -> None:
+        """Take the plan of a click."""
+        plan = future.result().plan
+        if plan.poses:
+            click.plan = path_to_poses(plan, self._frame)
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         if any(status.name == HEALTH for status in message.status):
@@ -255,10 +249,9 @@ class LiveListener(Node):
         reason, hashed = "" if passes else status.message, about.get("question_hash", "")
         verdict = LiveVerdict(passes, reason, question, hashed, now)
         self._data = replace(self._data, verdict=verdict)
-        with self._click_lock:
-            click = self._click
-            if click is not None and click.verdict is None and click.question_hash == hashed:
-                self._click = replace(click, verdict=verdict)
+        click = self._click
+        if click is not None and click.verdict is None and click.question_hash == hashed:
+            click.verdict = verdict
 
     def _on_prediction(self, field: str, message: Float64MultiArray) -> None:
         self._predicted = {**self._predicted, field: array_values(message).copy()}

@@ -70,9 +70,9 @@ class LiveVerdict:
     """Time on the monotonic clock [s]."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(eq=False)
 class Click:
-    """A visitor's question to the server."""
+    """A visitor's question to the server, and its answer as far as it has come."""
 
     question_hash: str
     """As in `LiveVerdict`."""

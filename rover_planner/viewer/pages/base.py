@@ -28,7 +28,12 @@ from rover_planner.viewer.state.background_work import (
     Request,
     Result,
 )
-from rover_planner.viewer.state.layers import PREDICTED, Colouring, Legend, list_layers
+from rover_planner.viewer.state.layers import (
+    PREDICTED,
+    Colouring,
+    Legend,
+    list_layers,
+)
 from rover_planner.viewer.state.session import REFUSALS
 from rover_planner.viewer.state.survey_layers import ShownSurvey
 
@@ -38,7 +43,7 @@ DRAWING_TIME = 0.2
 """Longest time for which work in the background waits for the drawings [s]."""
 FOLLOW, STAY = "Follow", "Stay"
 """The last button of the camera: go along with the rover, or stop that."""
-Action = Callable[[], None]
+Action = Callable[[], object]
 Words = dict[str, Any]
 """What a visitor asks: the word `ask` and its values."""
 Answer = Callable[[Words], Mapping[str, Part] | None]
@@ -190,7 +195,7 @@ class PageBase(ABC):
         take: Callable[[Request, Result | BaseException], object],
         name: str,
     ) -> BackgroundWork[Request, Result]:
-        """Return work in a thread of a name; what it finds is taken by the page's thread.
+        """Return work in threads of a name; what it finds is taken by the page's thread.
 
         The work waits until that is drawn: what it finds next would slow down the drawings.
         """
@@ -340,22 +345,22 @@ class PageBase(ABC):
         before, self._made_of[name] = self._made_of.get(name, ()), made_of
         return [*map(id, before)] != [*map(id, made_of)]
 
-    def tell_made(self, name: str, made_of: Sequence[Any], make: Callable[[], Part]) -> None:
-        """Tell a part that is made anew only if one of the objects has changed of which it is."""
+    def tell_made(self, name: str, make: Callable[..., Part], *made_of: Any) -> None:
+        """Tell a part that is made of objects, anew only if one of them is another object."""
         if self.has_changed(name, *made_of):
-            self.channel.tell(name, make())
+            self.channel.tell(name, make(*made_of))
 
-    def draw_made(self, failure: str, made_of: Sequence[Any], draw: Action) -> None:
-        """Draw something if one of the objects has changed of which it is made.
+    def draw_made(self, failure: str, draw: Callable[..., object], *made_of: Any) -> None:
+        """Draw what is made of objects, anew only if one of them is another object.
 
         Args:
             failure: What is told of an error, such as "the paths are not drawn".
-            made_of: The objects.
             draw: Draws it.
+            made_of: The objects.
         """
         if self.has_changed(failure, *made_of):
             with self.server.atomic():
-                self.errors.run(failure, draw)
+                self.errors.run(failure, partial(draw, *made_of))
 
     def _fulfil(self, request: Action) -> None:
         """Act on a request, or say why not."""

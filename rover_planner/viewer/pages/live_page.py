@@ -24,6 +24,7 @@ from rover_planner.viewer.pages.sharing import read_link
 from rover_planner.viewer.scene.ground_mesh import PaintRequest
 from rover_planner.viewer.scene.scene import START
 from rover_planner.viewer.state.drive import RoverState
+from rover_planner.viewer.state.layers import LayerRequest
 
 BOARD_PERIOD = 0.2
 """Time between two updates of the board [s]."""
@@ -77,9 +78,8 @@ class LivePage(PageBase):
 
     def describe_ground(self) -> PaintRequest | None:
         """Return the ground as it is known."""
-        origin = self.scene.canvas.origin
-        request = PaintRequest(self._rover, self.ground, self.colouring, origin)
-        return request if self._ground_name else None
+        layer = LayerRequest(self._rover, self.ground, self.colouring)
+        return PaintRequest(layer, self.scene.canvas.origin) if self._ground_name else None
 
     @property
     def points(self) -> Floats:
@@ -109,17 +109,15 @@ class LivePage(PageBase):
         tell("chosen", self.list_chosen())
         tell("learned", describe_learned(data.learned))
         trail = None if data.learned is None else data.learned.places
-        shown, paths, terrain = (plan, bool(answer["old"])), self.scene.paths, self.ground
-        self.draw_made(
-            "the trail is not drawn",
-            (trail, terrain),
-            lambda: paths.show_trail(trail),
-        )
-        self.draw_made(
-            "the plan is not drawn",
-            (*shown, terrain),
-            lambda: paths.show_plan(*shown),
-        )
+        draw, old = self.draw_made, bool(answer["old"])
+        draw("the trail is not drawn", self._draw_trail, trail, self.ground)
+        draw("the plan is not drawn", self._draw_plan, plan, old, self.ground)
+
+    def _draw_trail(self, trail: Floats | None, _ground: Terrain) -> None:
+        self.scene.paths.show_trail(trail)
+
+    def _draw_plan(self, plan: Floats | None, is_old: bool, _ground: Terrain) -> None:
+        self.scene.paths.show_plan(plan, is_old)
 
     def advance(self, seconds: float) -> None:
         """Show the latest data."""

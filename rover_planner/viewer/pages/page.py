@@ -3,12 +3,13 @@
 
 import time
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cached_property, partial
 from typing import Any
 
 from rover_physics.numerics.arrays import Floats
-from rover_physics.rover.rover_file import load_rover, preset_names
+from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_file import load_rover, preset_names, rover_to_dict
 from rover_physics.terrain.fingerprint import fingerprint
 from rover_physics.terrain.soil_file import load_soils
 from rover_planner.advice.advise import Advice
@@ -35,15 +36,14 @@ from rover_planner.viewer.documents.rover import (
 )
 from rover_planner.viewer.documents.verdict import (
     POLICY_TITLES,
+    describe_paths,
     describe_subject,
     describe_verdict,
-    list_paths,
 )
-from rover_planner.viewer.pages.base import Answer, PageBase
+from rover_planner.viewer.pages.base import PERIOD, Answer, PageBase
 from rover_planner.viewer.pages.sharing import (
     MAX_LENGTH,
     PageLink,
-    make_link,
     read_link,
     read_scenario,
     write_file,
@@ -54,7 +54,7 @@ from rover_planner.viewer.scene.overlays import GHOST
 from rover_planner.viewer.scene.scene import FIT
 from rover_planner.viewer.state.drive import SPEEDS, Playback
 from rover_planner.viewer.state.judging import JudgeRequest
-from rover_planner.viewer.state.layers import Colouring
+from rover_planner.viewer.state.layers import Colouring, LayerRequest
 from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.survey_layers import ShownSurvey
@@ -116,10 +116,9 @@ class Page(PageBase):
     def describe_ground(self) -> PaintRequest:
         """Return the ground with what is shown on it."""
         path, now = self.session.shown.path.poses, self.session.shown.scenario
-        return PaintRequest(
-            now.rover, now.terrain, self.colouring, self.scene.canvas.origin,
-            now.asked_options.model, path, self.survey,
-        )  # fmt: skip
+        options = now.asked_options.model
+        layer = LayerRequest(now.rover, now.terrain, self.colouring, options, path)
+        return PaintRequest(layer, self.scene.canvas.origin, self.survey)
 
     @property
     def points(self) -> Floats:
@@ -239,8 +238,21 @@ class Page(PageBase):
         return fingerprint(self.ground)
 
     def _link(self) -> PageLink:
-        time_shown = round(self.playback.time, 3)
-        return make_link(self.session.shown, self._map_print, time_shown, self.colouring)
+        """Return the link to what is shown."""
+        shown, now = self.session.shown, self.session.shown.scenario
+        return PageLink(
+            loaded=rover_to_dict(now.loaded),
+            rover=rover_to_dict(now.rover),
+            ground=self._map_print,
+            start=now.start,
+            goal=now.goal,
+            policy=now.options.model.policy,
+            soil=now.options.model.soil or "",
+            path=shown.index + 1,
+            time=round(self.playback.time, 3),
+            joints=dict(now.arm_angles),
+            **asdict(self.colouring),
+        )
 
     def _tell_link(self) -> dict[str, Any]:
         """Return the link to what is shown, for the visitor who asks for it."""
@@ -304,9 +316,13 @@ class Page(PageBase):
         self._go_on_opening()
 
     def _show(self) -> None:
-        """Show what was judged: in words and numbers at once, then in the scene."""
+        """Show what was judged: in words and numbers at once, then in the scene.
+
+        A new verdict has a period for itself: without a graphics card, the browser takes longer
+        for a picture of the scene, and words that come with it wait for that.
+        """
         shown, scene, draw = self.session.shown, self.scene, self.draw_made
-        asked, path, rover = shown.scenario, shown.path, shown.scenario.rover
+        asked, path = shown.scenario, shown.path
         if self._advised is not None and self._advised.path is not path:
             self._advice.cancel()  # nobody looks at its path any more
             self._advised = None
@@ -314,26 +330,24 @@ class Page(PageBase):
         self.tell_all()
         if self.has_changed("ends", asked.start, asked.goal):
             self.playback.go_to(0.0)
-        if self.has_changed("drive", path):
+        is_new = self.has_changed("drive", path)
+        if is_new:
             self.playback.set_drive(path.trajectory.times, path.trajectory.places)
         self._tell_drive()
-        arm, candidates = asked.arm_angles, [one.candidate for one in shown.paths]
-        draw("the failure is not shown", [path], lambda: scene.failure.show(rover, path.failure))
-        draw("the rover is not drawn", [rover, arm], lambda: scene.rover.take(rover, arm))
-        draw(
-            "the cameras are not moved",
-            [asked.loaded],
-            lambda: self._look(self.server.get_clients().values(), FIT),
-        )
-        draw(
-            "the paths are not drawn",
-            [*shown.paths, shown.index],
-            lambda: scene.paths.show(candidates, shown.index),
-        )
+        if is_new:
+            self._ended.wait(PERIOD)
+        draw("the failure is not shown", scene.failure.show, asked.rover, path.failure)
+        draw("the rover is not drawn", scene.rover.take, asked.rover, asked.arm_angles)
+        draw("the cameras are not moved", self._fit, asked.loaded)
+        draw("the paths are not drawn", scene.paths.show, shown.paths, shown.index)
         depends = self.colouring.is_predicted or self.survey is not None
         if self.has_changed("ground", asked) and depends:
             self.paint()
         self.playback.moved = True
+
+    def _fit(self, _loaded: Rover) -> None:
+        """Let all cameras look at all of the path of a rover that was loaded."""
+        self._look(self.server.get_clients().values(), FIT)
 
     # What is told.
 
@@ -360,34 +374,19 @@ class Page(PageBase):
         shown, wanted, work = session.shown, session.wanted, self._find_work()
         path, reference = shown.path, shown.reference
         every = frozenset(range(len(shown.paths)))
-        waits = session.is_outdated or bool(work["old"])
         is_slow = work["judging"] or work["stopped"]
         self.scene.paths.mark_old(every if work["old"] else shown.old if is_slow else frozenset())
-        name = self._ground_name
-        made("subject", (shown.scenario,), lambda: describe_subject(shown.scenario, name))
+        made("subject", describe_subject, shown.scenario, self._ground_name)
         tell("verdict", describe_verdict(shown) | work)
-        is_judging = self._judging.progress is not None
-        made(
-            "paths",
-            (shown, waits, is_judging),
-            lambda: {
-                "rows": list_paths(shown, is_outdated=waits, is_judging=is_judging),
-                "shown": shown.index,
-            },
-        )
+        is_old, is_judging = bool(work["old"]), self._judging.progress is not None
+        made("paths", describe_paths, shown, is_old, is_judging)
         is_seeking = self._advice.progress is not None
         tell("advice", describe_advice(self._advised, is_seeking, time.monotonic()))
-        made("current", (shown, self.colouring), lambda: write_link(self._link()))
-        made("sliders", (wanted.loaded,), lambda: describe_sliders(wanted.loaded))
-        made("values", (wanted, session.refusal), lambda: describe_values(wanted))
-        kept = session.kept
-        made(
-            "changes",
-            (path, reference, kept),
-            lambda: describe_changes(path, reference, is_kept=kept is not None),
-        )
-        along = path, reference, shown.chance
-        made("limits", along, lambda: describe_limits(*along))
+        made("current", lambda *_: write_link(self._link()), shown, self.colouring)
+        made("sliders", describe_sliders, wanted.loaded)
+        made("values", describe_values, wanted)
+        made("changes", describe_changes, path, reference, session.kept is not None)
+        made("limits", describe_limits, path, reference, shown.chance)
         model = wanted.options.model
         tell("chosen", {
             **self.list_chosen(), "policy": model.policy, "soil": model.soil or "",

@@ -18,13 +18,12 @@ from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 
 import rover_physics
 from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
+from rover_physics.rover.rover_file import rover_from_dict
 from rover_physics.terrain.soil_file import soil_named
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import write_rover
 from rover_planner.viewer.front.channel import read_file
-from rover_planner.viewer.state.layers import Colouring
-from rover_planner.viewer.state.scenario import Pose, Scenario, Shown
+from rover_planner.viewer.state.scenario import Pose, Scenario
 
 KEY = "view"
 """Key of a link in the query of an address."""
@@ -109,31 +108,6 @@ def read_link(query: str) -> PageLink | None:
         first = error.errors(include_url=False)[0]
         where = ".".join(map(str, first["loc"])) or "it"
         raise PlanningError(f"the link is invalid: {where}: {first['msg']}") from None
-
-
-def make_link(shown: Shown, ground: str, time: float, colouring: Colouring) -> PageLink:
-    """Return the link to what is shown.
-
-    Args:
-        shown: What is shown.
-        ground: Fingerprint of the map.
-        time: Time of the drive [s].
-        colouring: What the ground is coloured by.
-    """
-    now = shown.scenario
-    return PageLink(
-        loaded=rover_to_dict(now.loaded),
-        rover=rover_to_dict(now.rover),
-        ground=ground,
-        start=now.start,
-        goal=now.goal,
-        policy=now.options.model.policy,
-        soil=now.options.model.soil or "",
-        path=shown.index + 1,
-        time=time,
-        joints=dict(now.arm_angles),
-        **dataclasses.asdict(colouring),
-    )
 
 
 def read_scenario(link: PageLink, wanted: Scenario, ground: str) -> Scenario:

@@ -11,14 +11,12 @@ import trimesh
 from numpy.typing import NDArray
 
 from rover_physics.numerics.arrays import Floats
-from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
-from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.layers import (
     ColouredGround,
-    Colouring,
     GroundGrid,
+    LayerRequest,
     Legend,
     colour_ground,
     colour_limit,
@@ -43,20 +41,12 @@ the screen takes most of the time of a picture."""
 
 @dataclass(frozen=True, eq=False)
 class PaintRequest:
-    """Ground and layer to draw."""
+    """A picture of the ground."""
 
-    rover: Rover
-    """The rover, for layers that are predicted."""
-    terrain: Terrain
-    """The ground."""
-    how: Colouring
-    """The layer."""
+    layer: LayerRequest
+    """What it shows."""
     origin: Floats
     """(3,) origin of the scene [m], map frame."""
-    options: SweepOptions = DEFAULT_OPTIONS
-    """Options of the model for predicted layers."""
-    path: Floats | None = None
-    """(n, 3) poses whose yaw the rover has if predicted layers are for the path."""
     survey: ShownSurvey | None = None
     """The survey; None if there is none."""
 
@@ -67,14 +57,14 @@ def paint(request: PaintRequest) -> Iterator[Progress | tuple[bytes, Legend]]:
     A layer that is predicted for the rover takes seconds.
     """
     yield Progress("ground")
-    how, rover, terrain, options = request.how, request.rover, request.terrain, request.options
-    grid = make_grid(terrain)
-    if request.survey is not None and how.layer in request.survey.names:
-        ground = request.survey.colour(how.layer, rover, options, grid)
-    elif how.is_predicted:
-        ground = colour_limit(how, rover, terrain, request.path, options, grid)
+    asked, survey = request.layer, request.survey
+    name, grid = asked.how.layer, make_grid(asked.terrain)
+    if survey is not None and name in survey.names:
+        ground = survey.colour(name, asked.rover, asked.options, grid)
+    elif asked.how.is_predicted:
+        ground = colour_limit(asked, grid)
     else:
-        ground = colour_ground(how.layer, terrain, grid)
+        ground = colour_ground(name, asked.terrain, grid)
     yield write_ground(grid, ground, request.origin), ground.legend
 
 

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.numerics.arrays import Floats
-from rover_planner.planning.path_query import Candidate
 from rover_planner.viewer.scene.canvas import Canvas, Strand
 from rover_planner.viewer.state.colours import (
     PASSABLE,
@@ -18,6 +17,7 @@ from rover_planner.viewer.state.colours import (
     blend,
     map_colours,
 )
+from rover_planner.viewer.state.scenario import Judged
 
 MAX_POINTS = 250
 """Most points of a path that are drawn."""
@@ -60,13 +60,13 @@ class PathOverlay:
         self._numbers: Floats = np.empty((0, 3))
         """Places of the numbers of the paths [m]; none for a single path."""
 
-    def show(self, candidates: Sequence[Candidate], shown: int) -> None:
-        """Draw candidate paths instead of what was drawn before; `shown` is played, and wider."""
-        self.paths, self._shown = [self._find_strands(one) for one in candidates], shown
-        self._canvas.remove(PATHS, [f"{PATHS}/{index}" for index in range(len(candidates))])
+    def show(self, paths: Sequence[Judged], shown: int) -> None:
+        """Draw paths instead of what was drawn before; `shown` is played, and wider."""
+        self.paths, self._shown = [self._find_strands(one) for one in paths], shown
+        self._canvas.remove(PATHS, [f"{PATHS}/{index}" for index in range(len(paths))])
         self._draw_paths()
-        self._draw_numbers(candidates)
-        poses = candidates[shown].poses
+        self._draw_numbers(paths)
+        poses = paths[shown].poses
         self._draw_flags({"start": poses[0], "goal": poses[-1]})
 
     def show_plan(self, plan: Floats | None, is_old: bool = False) -> None:
@@ -120,9 +120,9 @@ class PathOverlay:
             paint = UNKNOWN if index in self._old else None
             self._canvas.show_lines(f"{PATHS}/{index}", strands, width, paint)
 
-    def _find_strands(self, candidate: Candidate) -> list[Strand]:
+    def _find_strands(self, path: Judged) -> list[Strand]:
         """Return a path in the colour of its verdict, faded from where it is refused."""
-        points, verdict = candidate.poses[:, :2], candidate.verdict
+        points, verdict = path.poses[:, :2], path.verdict
         if verdict.traversable:
             return self._find_strand(points, PASSABLE)
         end = verdict.first_failure
@@ -147,12 +147,12 @@ class PathOverlay:
         line = line[np.isfinite(line[:, 2])]
         return [Strand(line, colour)] if len(line) > 1 else []
 
-    def _draw_numbers(self, candidates: Sequence[Candidate]) -> None:
+    def _draw_numbers(self, paths: Sequence[Judged]) -> None:
         """Write the number of each path on it, one after another if there are several."""
-        shares = np.linspace(*NUMBER_SHARES, len(candidates))
+        shares = np.linspace(*NUMBER_SHARES, len(paths))
         places = [
             one.poses[round(share * (len(one.poses) - 1)), :2]
-            for one, share in zip(candidates, shares, strict=True)
+            for one, share in zip(paths, shares, strict=True)
         ]
         self._numbers = self._canvas.lay(places if len(places) > 1 else [], NUMBER_HEIGHT, 0.0)
         self._canvas.remove(NUMBERS, [f"{NUMBERS}/{k}" for k in range(len(self._numbers))])

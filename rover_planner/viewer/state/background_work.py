@@ -3,7 +3,7 @@
 
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
@@ -31,7 +31,7 @@ class Progress:
     steps: int = 0
     """Number of all."""
     seconds: float = 0.0
-    """Time since the work began, or since its last result [s]."""
+    """Time since the work was asked for, or since its last result [s]."""
 
     def describe(self) -> str:
         """Return the progress in words, such as "judging path 2 of 5"."""
@@ -54,85 +54,85 @@ class _StoppedError(Exception):
 class BackgroundWork(Generic[Request, Result]):
     """Does one request at a time, the newest; those that a newer one replaces are dropped.
 
-    A newer request stops work that has had PATIENCE, or has given its first result. The methods
-    may be called from any thread.
+    A newer request stops work that has had PATIENCE, or has given its first result. Each request
+    has a thread of its own: the newer one does not wait for the last step of work that has given
+    its result, which on rough ground takes longer than a result. The methods may be called from
+    any thread.
     """
 
     def __init__(
         self, work: Work[Request, Result], take: Take[Request, Result], name: str = "background"
     ):
-        """Start the thread.
+        """Do nothing yet.
 
         Args:
             work: Does a request. Between the slices of the model's sweeps it may be stopped by
                 an error, which it must let pass; it is left at what it yields.
             take: Called in the thread with all that is found, in the order of the requests. It
                 may wait until that was used.
-            name: Name of the thread.
+            name: Name of the threads.
         """
-        self._work, self._take = work, take
-        self._changed = threading.Condition()
-        # The lock of _changed guards all that follows.
+        self._work, self._take, self._name = work, take, name
+        self._lock = threading.RLock()
+        # The lock guards all that follows.
         self._waiting: Request | None = None
         self._in_work: Request | None = None
+        self._has_result = False
         self._progress = Progress()
         self._since = 0.0
-        self._ending = False
-        self._thread = threading.Thread(target=self._run, name=name, daemon=True)
-        self._thread.start()
+        self._threads: list[threading.Thread] = []
+        """The last one is that of the request in work; those before it end their last steps."""
 
     def ask(self, request: Request) -> None:
         """Do a request instead of the one that waits, and soon instead of the one in work."""
-        with self._changed:
-            if not self._is_busy():
+        with self._lock:
+            if self._in_work is None or self._has_result:
                 self._progress, self._since = Progress(), time.monotonic()
-            self._waiting = request
-            self._changed.notify()
+                self._begin(request)
+            else:
+                self._waiting = request
 
     def cancel(self) -> bool:
         """Stop all work; what it finds after this is dropped. Return whether there was any."""
-        with self._changed:
-            was_busy = self._is_busy()
+        with self._lock:
+            was_busy = self._in_work is not None
             self._waiting = self._in_work = None
         return was_busy
 
     @property
     def progress(self) -> Progress | None:
         """Progress of the work; None if there is none."""
-        with self._changed:
-            if not self._is_busy():
+        with self._lock:
+            if self._in_work is None:
                 return None
             return replace(self._progress, seconds=time.monotonic() - self._since)
 
     def close(self) -> bool:
-        """Stop all work and end the thread; return whether it has ended within END_TIME."""
+        """Stop all work; return whether its threads end, each within END_TIME."""
         self.cancel()
-        with self._changed:
-            self._ending = True
-            self._changed.notify()
-        self._thread.join(END_TIME)
-        return not self._thread.is_alive()
+        for thread in self._threads:
+            thread.join(END_TIME)
+        return not any(thread.is_alive() for thread in self._threads)
 
-    def _is_busy(self) -> bool:
-        return self._in_work is not None or self._waiting is not None
+    def _is_wanted(self) -> bool:
+        """Return whether what this thread does was neither cancelled nor replaced."""
+        return self._in_work is not None and self._threads[-1] is threading.current_thread()
 
-    def _run(self) -> None:
-        while True:
-            with self._changed:
-                self._in_work = None
-                self._changed.wait_for(lambda: self._waiting is not None or self._ending)
-                if self._ending or self._waiting is None:
-                    return
-                request = self._in_work = self._waiting
-                self._waiting = None
-            self._do(request)
+    def _begin(self, request: Request) -> None:
+        self._in_work, self._waiting, self._has_result = request, None, False
+        earlier = [one for one in self._threads if one.is_alive()]
+        arguments = request, earlier
+        thread = threading.Thread(target=self._do, args=arguments, name=self._name, daemon=True)
+        self._threads = [*earlier, thread]
+        thread.start()
 
-    def _do(self, request: Request) -> None:
-        begun, has_result = time.monotonic(), False
+    def _do(self, request: Request, earlier: Sequence[threading.Thread]) -> None:
+        """Do a request; what follows its first result waits for the end of earlier threads."""
+        begun = time.monotonic()
 
         def check() -> None:
-            has_time = not has_result and time.monotonic() - begun < PATIENCE
-            if self._in_work is not request or (self._waiting is not None and not has_time):
+            gives_way = self._has_result or time.monotonic() - begun >= PATIENCE
+            if not self._is_wanted() or (self._waiting is not None and gives_way):
                 raise _StoppedError("a newer request or a visitor stopped the work")
 
         try:
@@ -140,24 +140,30 @@ class BackgroundWork(Generic[Request, Result]):
                 for found in self._work(request):
                     if isinstance(found, Progress):
                         check()
-                        with self._changed:
+                        with self._lock:
                             self._progress = found
                     else:
-                        has_result = True
                         self._deliver(request, found)
+                        for thread in earlier:
+                            thread.join()
                         check()
         except _StoppedError:
-            return
-        except BaseException as error:  # the thread must go on; whoever takes it tells of it
+            pass
+        except BaseException as error:  # other requests must go on; who takes it tells of it
             if self._waiting is None:
                 self._deliver(request, error)
+        with self._lock:
+            if self._is_wanted():
+                self._in_work = None
+                if self._waiting is not None:
+                    self._begin(self._waiting)
 
     def _deliver(self, request: Request, found: Result | BaseException) -> None:
-        """Hand over what was found, unless it was cancelled."""
-        with self._changed:
-            if self._in_work is not request:
+        """Hand over what was found, unless it was cancelled or replaced."""
+        with self._lock:
+            if not self._is_wanted():
                 return
-            self._since = time.monotonic()
+            self._since, self._has_result = time.monotonic(), True
         self._take(request, found)
 
 

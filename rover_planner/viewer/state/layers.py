@@ -13,7 +13,7 @@ from scipy import ndimage
 from rover_physics.limits.table import LIMITS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.map_sweep import score_poses
-from rover_physics.prediction.sweep_options import SweepOptions
+from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.record import QUANTITIES
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
@@ -125,6 +125,22 @@ class Colouring:
         return self.layer in PREDICTED
 
 
+@dataclass(frozen=True, eq=False)
+class LayerRequest:
+    """A layer of a ground."""
+
+    rover: Rover
+    """The rover, for layers that are predicted."""
+    terrain: Terrain
+    """The ground."""
+    how: Colouring
+    """The layer."""
+    options: SweepOptions = DEFAULT_OPTIONS
+    """Options of the model for predicted layers."""
+    path: Floats | None = None
+    """(n, 3) poses whose yaw the rover has if predicted layers are for the path."""
+
+
 @dataclass(frozen=True)
 class Legend:
     """What the colours of a layer mean."""
@@ -175,32 +191,16 @@ def colour_ground(layer: str, terrain: Terrain, grid: GroundGrid) -> ColouredGro
     return ColouredGround(grid.refine(map_colours(values, low, high)), _grade(layer, ends))
 
 
-def colour_limit(
-    how: Colouring,
-    rover: Rover,
-    terrain: Terrain,
-    path: Floats | None,
-    options: SweepOptions,
-    grid: GroundGrid,
-) -> ColouredGround:
+def colour_limit(request: LayerRequest, grid: GroundGrid) -> ColouredGround:
     """Return the colours of the use of a limit with the rover at each place.
 
     The model is asked at MAX_PREDICTED places along a side; all others are as the nearest.
-
-    Args:
-        how: The layer, and the heading of the rover.
-        rover: The rover.
-        terrain: The ground.
-        path: (n, 3) poses whose yaw at the nearest one the rover has, if `how` says so.
-        options: Options of the model.
-        grid: The places.
 
     Raises:
         RoverError: The model refuses an option.
     """
     asked = [np.linspace(one[0], one[-1], min(len(one), MAX_PREDICTED)) for one in grid.pixels]
-    heading = path if how.along and path is not None else np.radians(how.heading)
-    used = predict_use(PREDICTED[how.layer], rover, terrain, heading, asked, options)
+    used, how = predict_use(request, asked), request.how
     colours = map_colours(used, 0.0, 1.0)
     colours[used > 1.0] = REFUSED
     corner, step = [one[0] for one in asked], [one[1] - one[0] for one in asked]
@@ -220,23 +220,12 @@ def _grade(title: str, ends: tuple[str, ...], *keys: tuple[str, str]) -> Legend:
     return Legend(title, (*keys, unknown), gradient, ends)
 
 
-def predict_use(
-    code: str,
-    rover: Rover,
-    terrain: Terrain,
-    heading: float | Floats,
-    at: Sequence[Floats],
-    options: SweepOptions,
-) -> Floats:
-    """Return the use of a limit with the rover at each point.
+def predict_use(request: LayerRequest, at: Sequence[Floats]) -> Floats:
+    """Return the use of the limit of a layer with the rover at each point.
 
     Args:
-        code: Code of the limit; empty for the largest use of all limits.
-        rover: The rover.
-        terrain: The ground.
-        heading: Yaw of the body [rad]; or a path (n, 3) whose yaw at the nearest waypoint it has.
+        request: Rover, ground, layer and heading.
         at: x (nx,) and y (ny,) of the points [m].
-        options: Options of the model.
 
     Returns:
         Uses (ny, nx), NaN where the rover does not settle or the limit is not asked.
@@ -244,9 +233,12 @@ def predict_use(
     Raises:
         RoverError: The model refuses an option.
     """
-    x, y = np.meshgrid(*at)
-    yaw = np.full_like(x, heading) if np.ndim(heading) == 0 else _follow(np.asarray(heading), x, y)
-    scores = score_poses(rover, terrain, np.stack([x, y, yaw], axis=-1), options)
+    (x, y), how, path = np.meshgrid(*at), request.how, request.path
+    yaw, code = np.full_like(x, np.radians(how.heading)), PREDICTED[how.layer]
+    if how.along and path is not None:
+        yaw = _follow(path, x, y)
+    poses = np.stack([x, y, yaw], axis=-1)
+    scores = score_poses(request.rover, request.terrain, poses, request.options)
     of_limit = [code in ("", row.code) for row in scores.limits.rows]
     used = np.fmax.reduce(scores.uses[..., of_limit], axis=-1, initial=np.nan)
     return np.where(scores.status == PoseStatus.SETTLED, used, np.nan)
