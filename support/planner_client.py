@@ -84,11 +84,11 @@ class PlannerClient(Node):
         """Publish joint positions."""
         self.send(self._joints, JointState(name=list(names), position=list(positions)))
 
-    def send_odometry(self, pose, frame="map") -> None:
+    def send_odometry(self, pose, height=0.0) -> None:
         """Publish odometry of a level pose (3,)."""
-        odometry = Odometry()
-        odometry.header.frame_id, odometry.child_frame_id = frame, "base_link"
-        odometry.pose.pose = stamped_pose(pose, frame).pose
+        odometry = Odometry(child_frame_id="base_link")
+        odometry.header.frame_id, odometry.pose.pose = "map", stamped_pose(pose, "map").pose
+        odometry.pose.pose.position.z = height
         self.send(self._odometry, odometry)
 
     def can_traverse(self, start, goal, tolerance=0.0, frame="map") -> Path:

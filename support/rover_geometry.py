@@ -14,6 +14,10 @@ from rover_physics import PathPrediction, Rover, Terrain
 from rover_physics.rover.model import Part
 
 UP = np.array([0.0, 0.0, 1.0])
+GAP = 3e-5
+"""What a settled pose of the rover lsr1 may leave open [m]."""
+ANGLE = 4.0 * GAP / 0.4
+"""What that may turn [rad]."""
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from rover_planner.advice.path_changes import bend_path
 from rover_planner.advice.remedy import Remedy
 from rover_planner.advice.seek import TOLERANCE
 from rover_planner.planning.answering.budget import QuestionStoppedError
-from support.grounds import make_terrain
+from support.grounds import make_terrain, rock_left
 from support.rovers import LSR1
 
 S = np.arange(-1.5, 1.6, 0.05)
@@ -28,11 +28,6 @@ def slope(x, y):
     return 0.3 * x
 
 
-def rock(x, y):
-    """Return level ground with a rock below the left wheels."""
-    return 0.3 * np.exp(-((x - 0.2) ** 2 + (y - 0.2) ** 2) / 0.02)
-
-
 def wall(x, y):
     """Return level ground with a wall that nothing leads around."""
     return 1.0 * (x > 0.5)
@@ -41,7 +36,7 @@ def wall(x, y):
 CASES = {
     "slippery slope": (slope, {"friction": 0.45}, {"policy", "friction"}),
     "heavy load": (slope, {"payload": 4.0}, {"payload", "arm_shoulder", "policy"}),
-    "rock": (rock, {}, {"shift", "curve", "turn_on_the_spot", "ground"}),
+    "rock": (rock_left, {}, {"shift", "curve", "turn_on_the_spot", "ground"}),
 }
 """Ground, options, and levers that are to be found."""
 
@@ -101,7 +96,7 @@ def test_a_little_less_of_a_remedy_is_refused(advised):
 
 def test_a_path_around_is_searched(monkeypatch):
     monkeypatch.setattr(refusal, "SEARCH", replace(refusal.SEARCH, budget=60.0))
-    case = refused_by(rock)
+    case = refused_by(rock_left)
     around = refusal.Refusal(case.judge()).path_around
     assert around is not None and replace(case, poses=around).judge().passes
     np.testing.assert_allclose(around[[0, -1]], STRAIGHT[[0, -1]], atol=1e-9)
@@ -184,7 +179,7 @@ def test_a_use_of_servos_tells_how_far_away_a_failure_is():
 
 def test_a_piece_fails_only_where_the_path_does():
     """Each waypoint before the first failure passes in its piece, and that one fails in it."""
-    case = replace(refused_by(rock, policy="servo"), poses=bend_path(STRAIGHT, 0.1))
+    case = replace(refused_by(rock_left, policy="servo"), poses=bend_path(STRAIGHT, 0.1))
     refused = refusal.Refusal(case.judge())
     for place in range(refused.place + 1):
         rows = refused.rows_around(place, fails_by_sum=False)

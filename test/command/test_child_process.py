@@ -5,13 +5,12 @@ import os
 import signal
 import subprocess
 import sys
-import time
 
 import pytest
 
 from rover_planner.demo.child_process import ChildProcess, stopping_children
 from support.project.checkout import TOP
-from support.waiting import is_running, wait_until_gone
+from support.waiting import is_running, wait_until, wait_until_gone
 
 STUBBORN = """
 import signal, subprocess, sys, time
@@ -64,8 +63,7 @@ def test_a_child_that_ignores_sigterm_is_killed_with_its_own_child(
 def test_a_failed_child_leaves_its_exit_code_and_last_words(tmp_path, environment):
     child = ChildProcess("failing", (), environment, tmp_path / "log")
     assert list(child.lines(lambda: None)) == []
-    while child.running:
-        time.sleep(0.02)
+    wait_until(lambda: not child.running, "its end")
     assert child.exit_code == 1
     assert child.last_line() == "no luck today"
     child.stop()

@@ -5,7 +5,7 @@ import os
 import signal
 import subprocess
 import sys
-import time
+import threading
 
 import numpy as np
 import pytest
@@ -14,9 +14,11 @@ from rover_physics import Terrain, save_terrain
 from rover_planner.cli import main
 from rover_planner.demo import demo as demo_module
 from rover_planner.worlds.mars_terrain import make_mars_terrain
+from support.command_line import assert_refused
 from support.project.checkout import TOP
 from support.project.processes import ProcessToken
 from support.ros_fixtures import DOMAINS, domain_id
+from support.waiting import wait_until
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 pytest.importorskip("matplotlib", reason="needs matplotlib")
@@ -25,81 +27,51 @@ pytest.importorskip("matplotlib", reason="needs matplotlib")
 @pytest.fixture
 def map_file(tmp_path):
     """A small terrain of gentle ground with a corner that was never seen."""
-    made = make_mars_terrain(4, 9.0, 0.1, rock_cover=0.005, crater_density=0.0)
+    made = make_mars_terrain(4, 6.0, 0.1, rock_cover=0.0, crater_density=0.0)
     elevation = made.elevation.copy()
-    elevation[60:, 60:] = np.nan
+    elevation[40:, 40:] = np.nan
     path = tmp_path / "map.npz"
     save_terrain(path, Terrain(elevation, made.resolution, made.origin))
     return path
 
 
-class Demo:
-    """The demo as a process whose descendants are known by a token in their environment."""
-
-    def __init__(self, folder, *words):
-        self.token = ProcessToken()
-        self.folder = folder
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "rover_planner", "demo", *map(str, words)],
-            cwd=TOP,
-            env=os.environ | self.token.environment | {"PYTHONPATH": str(TOP)},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-        )
-
-    def finish(self):
-        """Wait for the end; return exit code, stdout and stderr."""
-        out, err = self.process.communicate(timeout=300)
-        return self.process.returncode, out, err
-
-    def wait_for(self, module):
-        """Wait until a process of the demo runs a module; return its number."""
-        deadline = time.monotonic() + 240
-        while time.monotonic() < deadline:
-            found = self.token.find(module)
-            if found:
-                return found[0]
-            assert self.process.poll() is None, self.process.communicate()
-            time.sleep(0.05)
-        raise AssertionError(f"{module} was never started")
-
-
-def assert_nothing_left(demo):
-    assert demo.token.wait_until_gone() == []
+@pytest.fixture
+def token(monkeypatch):
+    """Return what all processes are known by that a test starts."""
+    made = ProcessToken()
+    for name, value in made.environment.items():
+        monkeypatch.setenv(name, value)
+    return made
 
 
 @pytest.mark.slow
-def test_demo_prints_answers_and_writes_a_picture(tmp_path, map_file):
+def test_demo_prints_answers_and_writes_a_picture(tmp_path, map_file, token, capsys):
     picture = tmp_path / "made" / "demo.png"
-    demo = Demo(tmp_path, "--map", map_file, "--out", picture)
-    code, out, err = demo.finish()
-    assert (code, err) == (0, "")
-    assert "compile" in out
-    assert "publish the map" in out
+    assert main(["demo", "--map", str(map_file), "--out", str(picture)]) == 0
+    out, err = capsys.readouterr()
+    assert err == "" and "compile" in out and "publish the map" in out and "[m]" in out
     rows = [line for line in out.splitlines() if line.startswith("│")]
     plain = [row for row in rows if " plain " in row]
     assert any("traversable" in row for row in plain)
     assert "refused" in next(row for row in rows if " off the map " in row)
     assert "refused" in next(row for row in rows if " unknown ground " in row)
-    assert "[m]" in out
     goals = sum("traversable" in row or "refused" in row for row in rows)
     assert f"{goals} of {goals} verdicts" in out
-    assert picture.read_bytes().startswith(b"\x89PNG")
-    assert picture.stat().st_size > 50_000
-    assert_nothing_left(demo)
+    assert picture.read_bytes().startswith(b"\x89PNG") and picture.stat().st_size > 50_000
+    assert token.wait_until_gone() == []
 
 
 @pytest.mark.long
-def test_a_server_that_dies_fails_the_demo_with_one_line(tmp_path, map_file):
-    demo = Demo(tmp_path, "--map", map_file, "--out", tmp_path / "demo.png")
-    os.kill(demo.wait_for("rover_planner.nodes.traverse_server"), signal.SIGKILL)
-    code, _, err = demo.finish()
-    assert code == 1
-    assert err.count("\n") == 1
-    assert "traverse_server" in err
-    assert_nothing_left(demo)
+def test_a_server_that_dies_fails_the_demo_with_one_line(tmp_path, map_file, token, capsys):
+    def kill_the_server():
+        server = "rover_planner.nodes.traverse_server"
+        os.kill(wait_until(lambda: token.find(server), server, 240.0)[0], signal.SIGKILL)
+
+    threading.Thread(target=kill_the_server).start()
+    assert main(["demo", "--map", str(map_file), "--out", str(tmp_path / "demo.png")]) == 1
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and "traverse_server" in err
+    assert token.wait_until_gone() == []
 
 
 @pytest.mark.long
@@ -130,17 +102,12 @@ def test_the_kernels_are_compiled_before_the_server_starts(tmp_path):
     environment = os.environ | {"PYTHONPATH": str(TOP), "NUMBA_CACHE_DIR": str(tmp_path)}
     command = [sys.executable, "-m", demo_module.COMPILER]
     with subprocess.Popen(command, env=environment) as compiler:
-        deadline = time.monotonic() + 240.0
-        while not list(tmp_path.rglob("*.nbc")):  # it goes on for more than a minute
-            assert compiler.poll() is None and time.monotonic() < deadline
-            time.sleep(0.2)
+        kept = wait_until(lambda: list(tmp_path.rglob("*.nbc")), "a kernel", 240.0)
+        assert kept and compiler.poll() is None  # it goes on for more than a minute
         compiler.kill()
 
 
 @pytest.mark.parametrize("out", ["picture.txt", "map.npz/demo.png"])
 def test_a_picture_that_cannot_be_written_is_refused_with_one_line(tmp_path, map_file, capfd, out):
     code = main(["demo", "--map", str(map_file), "--out", str(tmp_path / out)])
-    err = capfd.readouterr().err
-    assert code == 2
-    assert err.count("\n") == 1
-    assert "picture" in err
+    assert_refused(capfd, code, "picture")

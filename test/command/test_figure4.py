@@ -13,14 +13,8 @@ from support.rough_grounds import plane
 from support.rover_geometry import balance_matrix, turned_round
 from support.rovers import LSR1, M2020
 
-PNG = b"\x89PNG"
 
-
-def rovers():
-    return [LSR1, turned_round(M2020)]
-
-
-@pytest.mark.parametrize("rover", rovers(), ids=lambda rover: rover.name)
+@pytest.mark.parametrize("rover", [LSR1, turned_round(M2020)], ids=lambda rover: rover.name)
 @pytest.mark.parametrize("axle", [0, 1, 2])
 def test_loads_held_by_all_wheels_are_those_of_the_full_balance(rover, axle):
     prediction = judge_path(rover, plane(0.0, 0.0, half=4.0), [[0.0, 0.0, 0.0]])[0]
@@ -53,7 +47,7 @@ def test_the_command_draws_a_picture_of_nine_panels(tmp_path, monkeypatch):
     )
     out = tmp_path / "loads.png"
     assert main(["figure4", str(out)]) == 0
-    assert out.read_bytes().startswith(PNG)
+    assert out.read_bytes().startswith(b"\x89PNG")
     panels = drawn[0].axes
     assert len(panels) == 9
     assert {axes.get_xlabel() for axes in panels} == {

@@ -9,6 +9,9 @@ import pytest
 from rover_physics import load_terrain, save_terrain
 from rover_physics.names import WHEELS
 from rover_planner.cli import main
+from rover_planner.command.prediction_files import read_prediction, read_recorded_assumptions
+from rover_planner.errors import PlanningError
+from rover_planner.planning.assumptions import read_assumptions
 from support.command_line import N, assert_refused, predict_arguments, write_ground_and_path
 
 
@@ -210,3 +213,40 @@ def test_poses_with_curvature_are_taken_one_by_one_and_part_by_part(files, monke
         assert angles[2] == pytest.approx(-angles[1, [3, 4, 5, 0, 1, 2]])
         assert speeds[3] == pytest.approx(-speeds[4]) and (speeds[3, :3] > 0.0).all()
         assert out["time"].tolist() == [0.0] * 5 == out["energy"].tolist()
+
+
+# Files that hold something else
+
+
+def test_a_file_without_predictions_is_refused_by_name(files):
+    with pytest.raises(PlanningError, match=r"no array reason; it has poses"):
+        read_prediction(files / "poses.npz")
+
+
+@pytest.mark.parametrize(
+    ("changes", "names"),
+    [
+        ({"assumptions": np.float64(1.0)}, "assumptions is of type float64; it must hold texts"),
+        ({"roll": np.float64(1.0)}, r"roll has shape \(\); it must be \(30,\)"),
+        ({"settled": np.zeros(N)}, "settled is of type float64; it must hold bools"),
+        ({"reason": np.zeros(N)}, "reason is of type float64; it must hold texts"),
+        ({"position": np.full((N, 3), np.nan)}, "position has a value that is NaN or beyond"),
+    ],
+)
+def test_a_file_of_other_shapes_or_types_is_refused(files, changes, names):
+    assert main(predict_arguments(files)) == 0
+    with np.load(files / "out.npz") as out:
+        np.savez(files / "bad.npz", **(dict(out) | changes))
+    with pytest.raises(PlanningError, match=names):
+        read_recorded_assumptions(files / "bad.npz")
+        read_prediction(files / "bad.npz")
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", '{"rover": "lsr1"}', '{"rover": "lsr1", "policy": "equal", "friction": NaN}',
+     '{"rover": "lsr1", "policy": "equal", "colour": "red"}'],
+)  # fmt: skip
+def test_damaged_assumptions_are_refused(text):
+    with pytest.raises(PlanningError, match="assumptions are invalid"):
+        read_assumptions(text)

@@ -10,6 +10,7 @@ from rover_physics.names import WHEEL_JOINTS
 from rover_physics.rover.rover_file import save_rover
 from rover_physics.terrain.grid import load_terrain, save_terrain
 from rover_planner.cli import main
+from rover_planner.learning.drive_log import TIME
 from support.command_line import assert_refused
 from support.learning_drives import NAMES, climb, ramp, write_csv
 from support.rovers import LSR1 as ROVER
@@ -121,3 +122,25 @@ def test_a_prediction_takes_what_was_learned(folder, capfd):
     assert used[0.8][1] < 0.05 < used[0.4][1]
     learned.write_text("{}")
     assert_refused(capfd, main([*words, "--learned", str(learned)]), "learned.json")
+
+
+def test_a_bag_tells_the_same_as_a_csv_file(folder, capfd):
+    pytest.importorskip("rosbags", reason="install the extra bags")
+    from rover_planner.ros.bags.bag_files import write_bag
+    from support.messages import row_messages
+
+    with write_bag(folder / "bag") as bag:
+        for row in climb(ROVER, SLOPE, 8.0):
+            joints, odometry = row_messages(row, 0.0)
+            stamp = 1_700_000_000_000_000_000 + round(1e9 * row[TIME])
+            bag.write("/joint_states", joints, stamp)
+            bag.write("/odometry", odometry, stamp + 1)
+    found = []
+    for log in ("bag", "drive.csv"):
+        assert main(arguments(folder, log)) == 0
+        found.append(friction_of(folder))
+    assert found[0]["low"] == pytest.approx(found[1]["low"], rel=0.01)
+    assert found[0]["high"] is None
+    with write_bag(folder / "empty") as bag:
+        bag.write("/odometry", odometry, 1)
+    assert_refused(capfd, main(arguments(folder, "empty")), "joints")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A rover that creeps is not stuck; one that stands while it pushes is, within 2 s."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -16,23 +16,11 @@ def window(
     time: float, x: float, rolling: float, deviation: float, scrub: float = 0.0
 ) -> SlipWindow:
     """Return a window at whose middle the wheels were at x."""
-    none = np.zeros(6)
+    told = {"time": time, "duration": DURATION, "deviation": deviation, "excess": 0.0}
+    told |= {"rolling": np.full(6, rolling), "scrub": np.full(6, scrub), "unsteadiness": 0.0}
+    told |= {"places": np.tile([x, 0.0], (6, 1))}
     return SlipWindow(
-        time=time,
-        duration=DURATION,
-        rolling=np.full(6, rolling),
-        travel=none,
-        aside=none,
-        deviation=deviation,
-        scrub=np.full(6, scrub),
-        uneven=none,
-        places=np.tile([x, 0.0], (6, 1)),
-        loads=none,
-        doubts=none,
-        tractions=none,
-        clear=none,
-        excess=0.0,
-        unsteadiness=0.0,
+        **dict.fromkeys((one.name for one in fields(SlipWindow)), np.zeros(6)) | told
     )
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from sensor_msgs.msg import PointCloud2, PointField
 
@@ -106,7 +106,6 @@ def test_a_terrain_comes_back_as_it_was_with_all_its_layers(datatype, shuffled):
     np.testing.assert_array_equal(back.ground_class[known], classes[known])
 
 
-@settings(max_examples=20)
 @given(
     rows=st.integers(2, 40),
     columns=st.integers(2, 40),
@@ -313,9 +312,6 @@ REFUSED = [
     (far(1.1e9, 2), "elevation[1, 1] is"),
     (cloud_of(grid() * 1e-8), "map_resolution"),
     (with_layer("friction", -0.1), "friction[0, 0] is -0.1"),
-    (with_layer("elevation_std", np.inf), "elevation_std[0, 0] is inf"),
-    (with_layer("class", 2.5), "ground_class[0, 0] is 2.5; it must be a whole number"),
-    (with_layer("class", 1e30), "ground_class[0, 0] is 1"),
     (cloud_of(STD_MISSING, (*XYZ, "elevation_std")), "where the height is known"),
 ]
 
@@ -377,21 +373,15 @@ def test_points_half_way_between_cells_stay_on_the_map(halves, resolution, origi
     assert (np.abs(points[:, 1] - np.clip(points[:, 1], ymin, ymax)) <= half).all()
 
 
-def take_or_refuse(cloud, resolution):
-    """Take a cloud; any other error than those of the input, or a warning, fails."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        try:
-            assert isinstance(terrain_from_point_cloud(cloud, resolution), Terrain)
-        except (MessageError, TerrainError) as error:
-            assert len(str(error)) <= MAX_TEXT
-
-
-@settings(max_examples=60)
 @given(
     rows=st.lists(st.tuples(*[st.floats(width=32)] * 3), min_size=1, max_size=12),
     resolution=st.sampled_from((0.0, 0.05, 1e-3, 1e5)),
     kind=st.sampled_from(("<f4", "<f8")),
 )
 def test_every_set_of_points_becomes_a_terrain_or_a_refusal(rows, resolution, kind):
-    take_or_refuse(cloud_of(rows, kind=kind), resolution)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            assert terrain_from_point_cloud(cloud_of(rows, kind=kind), resolution)
+        except (MessageError, TerrainError) as error:
+            assert len(str(error)) <= MAX_TEXT

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from msg_adapters.errors import MessageError
@@ -37,7 +37,6 @@ def test_heights_ascend_along_x_and_y_from_the_cell_of_smallest_x_and_y():
     assert terrain.friction is None and terrain.elevation_std is None
 
 
-@settings(max_examples=20)
 @given(row=st.integers(0, 4), column=st.integers(0, 6), by_rows=st.booleans())
 def test_a_moved_buffer_start_gives_the_same_terrain_to_the_bit(row, column, by_rows):
     layers = {"elevation": HEIGHTS, "variance": HEIGHTS**2, "friction": 0.5 + 0.0 * HEIGHTS}

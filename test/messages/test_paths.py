@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Quaternion
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from rclpy.serialization import serialize_message
 
@@ -107,7 +107,6 @@ def test_a_path_is_refused_by_its_bad_part(make, text):
         path_to_poses(make(), "map")
 
 
-@settings(max_examples=50)
 @given(numbers=st.lists(st.floats(), min_size=7, max_size=7))
 def test_every_pose_is_read_or_refused(numbers):
     path = poses_path(np.zeros((2, 3)), "map")

@@ -23,7 +23,7 @@ from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.rover.steering_joints import steered_wheels, steering_joints
 from rover_physics.traversability import classification
-from support.rovers import LSR1
+from support.rovers import FIXED, LSR1
 
 STAMP = Time(sec=12, nanosec=34)
 
@@ -109,8 +109,7 @@ def test_a_trajectory_has_the_angles_of_the_steered_wheels_with_the_sign_of_the_
                 sign * prediction.steering_angle[i, steered_wheels(LSR1)]
             )
         assert sign * own["front_left_steering"] > 0.3
-    fixed = replace(LSR1, steering=None)
-    message = joint_trajectory(judge_path(fixed, flat, path)[0], fixed, "map", STAMP)
+    message = joint_trajectory(judge_path(FIXED, flat, path)[0], FIXED, "map", STAMP)
     assert tuple(message.joint_names) == JOINTS and len(message.points[0].positions) == 10
 
 

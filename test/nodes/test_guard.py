@@ -21,14 +21,10 @@ from support.ros_fixtures import call
 from support.waiting import wait_until
 
 
-class Log:
-    """Keeps what is logged as errors."""
+class Lines(list):
+    """A logger that keeps its lines."""
 
-    def __init__(self):
-        self.lines: list[str] = []
-
-    def error(self, text):
-        self.lines.append(text)
+    error = warning = info = list.append
 
 
 class Fragile(Node):
@@ -36,7 +32,7 @@ class Fragile(Node):
 
     def __init__(self, context):
         super().__init__("fragile", context=context)
-        self.guard = Guard(Log())
+        self.guard = Guard(Lines())
         self.heard: list[str] = []
         self.create_subscription(String, "words", self._take, 10)
         self.create_service(Trigger, "~/fail", lambda *_: 1 / 0)
@@ -129,21 +125,21 @@ def test_a_message_that_is_left_alone_ends_no_wait(ros):
 
 
 def test_an_error_is_logged_once_with_its_trace_and_counted():
-    log = Log()
-    guard = Guard(log)
+    lines = Lines()
+    guard = Guard(lines)
     for _ in range(5):
         guard.call(lambda: 1 / 0)
-    assert guard.total == 5 and len(log.lines) == 1
-    assert "Traceback" in log.lines[0] and "ZeroDivisionError" in log.lines[0]
-    assert guard.recent(20.0) and not Guard(log).recent(20.0)
+    assert guard.total == 5 and len(lines) == 1
+    assert "Traceback" in lines[0] and "ZeroDivisionError" in lines[0]
+    assert guard.recent(20.0) and not Guard(lines).recent(20.0)
     assert len(guard.report("x", ValueError("y" * 10_000))) <= 300
 
 
 def test_errors_of_the_input_are_bad_requests_and_others_internal_errors():
-    log = Log()
-    guard = Guard(log)
+    lines = Lines()
+    guard = Guard(lines)
     told = refuse_error(guard, "check", PoseError("no pose"), lambda *both: both)
-    assert told == ("bad_request", "no pose") and not log.lines
+    assert told == ("bad_request", "no pose") and not lines
     code, reason = refuse_error(guard, "check", KeyError("k"), lambda *both: both)
     assert code == "internal_error" and reason.startswith("internal error: KeyError")
     assert guard.total == 1
@@ -160,12 +156,6 @@ def test_functions_of_other_threads_run_in_order_and_an_error_ends_nothing(ros):
         handover.call(lambda: 1 / 0)
     wait_until(lambda: len(told) == 50, "the calls")
     assert told == list(range(50))
-
-
-class Lines(list):
-    """A logger that keeps its lines."""
-
-    warning = info = list.append
 
 
 @pytest.mark.parametrize(

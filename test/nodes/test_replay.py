@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import Point, PoseStamped, Quaternion
+from geometry_msgs.msg import Point, Quaternion
 from nav_msgs.msg import Odometry
 from nav_msgs.msg import Path as PathMessage
 from rclpy.serialization import deserialize_message, serialize_message
@@ -20,6 +20,7 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory
 
 from msg_adapters.elevation import terrain_to_point_cloud
+from msg_adapters.paths import poses_path
 from msg_adapters.stamps import ns_to_stamp
 from rover_physics import Terrain, judge_path, load_terrain
 from rover_physics.names import SUSPENSION_JOINTS
@@ -49,11 +50,6 @@ def odometry_at(x: float, frame: str = "map") -> Odometry:
     return message
 
 
-def joints_of(angles: dict[str, float]) -> JointState:
-    """Return joint angles [rad] by name."""
-    return JointState(name=list(angles), position=list(angles.values()))
-
-
 def drive(length: float) -> list[tuple[str, object]]:
     """Return the messages of a drive along x: odometry and the model's suspension each 2 cm."""
     x = np.arange(0.5, 0.5 + length, 0.02)
@@ -62,8 +58,8 @@ def drive(length: float) -> list[tuple[str, object]]:
     messages: list[tuple[str, object]] = []
     for k, place in enumerate(x.tolist()):
         values = np.concatenate([prediction.rocker_angle[k], prediction.bogie_angle[k]])
-        angles = dict(zip(SUSPENSION_JOINTS, values.tolist(), strict=True))
-        messages += [("/joint_states", joints_of(angles)), ("/odometry", odometry_at(place))]
+        joints = JointState(name=list(SUSPENSION_JOINTS), position=values.tolist())
+        messages += [("/joint_states", joints), ("/odometry", odometry_at(place))]
     return messages
 
 
@@ -74,15 +70,7 @@ def cloud(terrain: Terrain, stamp: int = BEGIN, frame: str = "map") -> PointClou
 
 def path_to(x: float) -> PathMessage:
     """Return a path along the x axis from 1 m to x [m]."""
-    message = PathMessage()
-    message.header.frame_id = "map"
-    message.header.stamp = ns_to_stamp(BEGIN + 5)
-    for place in (1.0, x):
-        pose = PoseStamped()
-        pose.pose.position.x = place
-        pose.pose.orientation = Quaternion(w=1.0)
-        message.poses.append(pose)
-    return message
+    return poses_path([(1.0, 0.0, 0.0), (x, 0.0, 0.0)], "map", ns_to_stamp(BEGIN + 5))
 
 
 def record(folder: Path, messages: list[tuple[str, Any]], storage: str = "mcap") -> Path:
@@ -238,13 +226,6 @@ def test_what_is_no_bag_and_a_damaged_one_are_refused(tmp_path, capsys):
     assert err.startswith("rover_planner: ") and err.count("\n") == 1
 
 
-def test_an_answer_is_never_written_over(tmp_path, capsys):
-    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves()))])
-    (tmp_path / "out").mkdir()
-    assert main(["replay", str(bag), str(tmp_path / "out")]) == 2
-    assert "exists already" in capsys.readouterr().err
-
-
 def test_recorded_transforms_place_odometry_and_clouds_on_the_map(tmp_path, capsys):
     map_odom = Rigid.from_rpy(2.0, -1.0, 0.3, 0.0, 0.0, 1.1)
     mount = Rigid.from_rpy(0.4, 0.0, 0.6, 0.0, 0.5, 0.0)
@@ -306,16 +287,15 @@ def test_paths_goals_and_answers_are_those_of_the_robot_with_its_offset_and_join
         assert "bogie_r" in joints.joint_names and "bogie_right" not in joints.joint_names
 
 
-def test_a_goal_without_a_start_is_told(tmp_path, capsys):
+def test_what_lacks_to_ask_a_question_is_told_and_an_answer_is_never_written_over(
+    tmp_path, capsys
+):
     bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves()))])
-    assert main(["replay", str(bag), str(tmp_path / "out"), "--goal", "2,0,0"]) == 0
-    assert "no odometry before them tells where it starts" in capsys.readouterr().err
-    assert main(["replay", str(bag), str(tmp_path / "no"), "--start", "2,0,0"]) == 2
-    assert "--goal, which is not given" in capsys.readouterr().err
-
-
-def test_a_bag_that_asks_nothing_says_what_it_lacks(tmp_path, capsys):
-    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves()))])
-    assert main(["replay", str(bag), str(tmp_path / "out")]) == 0
-    said = capsys.readouterr().err
-    assert "nothing was asked: the bag has no path and no odometry; give --goal" in said
+    for words, code, said in (
+        (["nothing"], 0, "nothing was asked: the bag has no path and no odometry; give --goal"),
+        (["goal", "--goal=2,0,0"], 0, "no odometry before them tells where it starts"),
+        (["start", "--start=2,0,0"], 2, "--goal, which is not given"),
+        (["nothing"], 2, "exists already"),
+    ):
+        assert main(["replay", str(bag), str(tmp_path / words[0]), *words[1:]]) == code
+        assert said in capsys.readouterr().err

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rover_planner.errors import PlanningError
@@ -20,7 +20,6 @@ from rover_planner.planning.dubins import dubins_paths
 METRES = st.floats(-20.0, 20.0)
 ANGLES = st.floats(-2 * np.pi, 2 * np.pi)
 POSES = st.tuples(METRES, METRES, ANGLES)
-FEW = settings(max_examples=60, deadline=None)
 SWING, SPACING = 0.5, 0.05
 
 
@@ -28,7 +27,6 @@ def angle_between(a, b):
     return np.abs(np.angle(np.exp(1j * (np.asarray(a) - np.asarray(b)))))
 
 
-@FEW
 @given(POSES, POSES)
 def test_every_candidate_begins_at_the_start_and_ends_at_the_goal(start, goal):
     paths = generate_candidates(start, goal)
@@ -41,7 +39,6 @@ def test_every_candidate_begins_at_the_start_and_ends_at_the_goal(start, goal):
             assert angle_between(path[0, 2], start[2]) < 1e-9
 
 
-@FEW
 @given(POSES, POSES)
 def test_paths_point_where_they_lead_and_no_curve_is_too_tight(start, goal):
     for path in generate_candidates(start, goal):
@@ -55,7 +52,6 @@ def test_paths_point_where_they_lead_and_no_curve_is_too_tight(start, goal):
         assert np.all(angle_between(along, middle)[gaps > 1e-3] < 0.02 / MIN_RADIUS / 3)
 
 
-@FEW
 @given(POSES, POSES, st.sampled_from([0.02, 0.05, 0.13]))
 def test_waypoints_are_equally_far_apart(start, goal, waypoint_spacing):
     for path in generate_candidates(start, goal, waypoint_spacing=waypoint_spacing):
@@ -94,7 +90,6 @@ def test_bad_requests_are_refused_by_name(change, names):
         generate_candidates(start, goal, **arguments)
 
 
-@FEW
 @given(POSES, POSES)
 def test_a_point_turn_leads_from_start_to_goal_in_small_steps_that_turn_or_drive(start, goal):
     path, length = turn_and_drive(np.array(start), np.array(goal), SWING, SPACING)

@@ -99,7 +99,6 @@ def test_the_tip_over_margin_is_an_angle_that_tells_wide_rovers_from_narrow_ones
         ({"objective": "worst_utilisation"}, "drives is missing"),
         ({"parameters": [PIVOT_X | {"name": "wheel.radios"}]}, "wheel.radius"),
         ({"parameters": [PIVOT_X | {"to": 0.0}]}, "above from"),
-        ({"parameters": [PIVOT_X | {"steps": 3}]}, "steps"),
         ({"parameters": [PIVOT_X, PIVOT_X]}, "no other parameter varies"),
         ({"parameters": [PIVOT_X | {"also": ["wheel.mass"]}]}, "names of numbers in m"),
         ({"soil": "dry_sand"}, "left out"),

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("zarr", reason="install the extra survey")
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
@@ -88,7 +88,6 @@ def compare_with_scipy(open_at, turns_at, numbers, distance):
     assert numbers.longest == distance[np.isfinite(distance)].max() == distance[numbers.farthest]
 
 
-@settings(max_examples=30)
 @given(
     shape=st.tuples(st.integers(1, 13), st.integers(1, 13)),
     headings=st.sampled_from([1, 2, 3, 4, 8, 16, 24]),

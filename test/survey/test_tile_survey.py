@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("zarr", reason="install the extra survey")
 
 from rover_physics import SweepOptions, Terrain, judge_poses
-from rover_physics.traversability.classification import classify_judged
+from rover_physics.traversability.pose_classes import RoverOnMap, classify_poses
 from rover_planner.survey.layers import (
     CLASS_NUMBERS,
     NO_LIMIT,
@@ -79,14 +79,12 @@ def test_limits_and_classes_are_those_of_predict(ground, policy, std):
             ground, friction=friction, soil=soil.astype(np.int32), soil_names=("dry_sand",)
         )
     layers, poses = survey_tile(request, ground, places), poses_at(places, request)
-    prediction, verdict = judged(request, ground, poses)
-    told = classify_judged(
-        TOP_HEAVY, ground, prediction, verdict, request.options, curvature=np.zeros(len(poses))
-    )
+    verdict = judged(request, ground, poses)[1]
     clear = is_clear(ground, places)
     limits = np.array([number_limits()[code] for code in verdict.codes])
     np.testing.assert_array_equal(layers["first_limit"][clear], limits[clear])
-    classes = np.array([CLASS_NUMBERS[one.traversability_class] for one in told])
+    classes = classify_poses(RoverOnMap(TOP_HEAVY, ground, request.options), poses)
+    classes[classes < 0] = CLASS_NUMBERS["impassable"]  # ground that was not seen
     np.testing.assert_array_equal(layers["best_class"][clear], classes[clear])
     assert clear.any() and not clear.all()
     if std is None:

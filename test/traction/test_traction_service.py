@@ -1,16 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """Torques from measurements: zero at once when anything is missing, back when it is there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.numerics.quaternions import rpy_from_xyzw
+from rover_physics.rover.steered_drive import SteeredDrive
+from rover_physics.rover.steering_joints import steered_wheels, steering_joints
 from rover_planner.parameters.traction_controller import TractionControllerParameters
+from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.traction.settings import load_traction_settings
 from rover_planner.traction.traction_service import TractionService
 from support.rough_grounds import plane
+from support.rovers import FIXED, LSR1
 
-JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
+STEERED = steering_joints(LSR1)
+STANDING = dict.fromkeys(WHEEL_JOINTS, 0.0)
 PERIOD = 0.02
 
 
@@ -21,13 +29,23 @@ def settings(**values):
 class Rig:
     """A service and the measurements of a rover that creeps over level ground."""
 
-    def __init__(self, **values):
-        self.service = TractionService(settings(**values))
+    def __init__(self, command=(0.03, 0.0), **values):
+        self.service, self.command = TractionService(settings(**values)), command
         self.now = 0.0
         self.positions = dict.fromkeys((*SUSPENSION_JOINTS, *STEERING_JOINTS), 0.0)
-        self.velocities = dict.fromkeys(JOINTS, 0.0) | dict.fromkeys(WHEEL_JOINTS, 0.2)
+        self.velocities = dict.fromkeys((*SUSPENSION_JOINTS, *WHEEL_JOINTS), 0.0)
+        self.velocities |= dict.fromkeys(WHEEL_JOINTS, 0.2)
         self.pitch = 0.0
         self.rates = np.zeros(3)
+
+    def roll(self, share):
+        """Turn the wheels for the command, and let them roll at a share of what it asks."""
+        aims = SteeredDrive(LSR1).aim(*self.command)
+        rates = share * aims.speeds / LSR1.wheel.radius
+        self.positions |= dict(zip(STEERED, aims.angles[steered_wheels(LSR1)], strict=True))
+        self.velocities |= dict(zip(WHEEL_JOINTS, rates, strict=True))
+        self.rates = np.array([0.0, 0.0, share * self.command[1]])
+        return rates
 
     def send(self, *names):
         for name in names or ("joint_states", "imu", "cmd_vel"):
@@ -36,7 +54,7 @@ class Rig:
             elif name == "imu":
                 self.service.take_attitude(0.0, self.pitch, self.rates, self.now)
             else:
-                self.service.take_command(0.03, 0.0, self.now)
+                self.service.take_command(*self.command, self.now)
 
     def run(self, count=30, *names):
         for _ in range(count):
@@ -72,7 +90,7 @@ def test_a_missing_joint_stops_the_wheels_within_a_tenth_of_a_second():
 
 def test_what_the_loops_added_up_is_forgotten_in_a_fault():
     rig = Rig()
-    rig.velocities |= dict.fromkeys(WHEEL_JOINTS, 0.0)
+    rig.velocities |= STANDING
     wound = np.abs(rig.run(60).torques).max()
     rig.now += 1.0
     assert not rig.service.update(rig.now).torques.any()
@@ -167,8 +185,82 @@ def test_m2020_has_nine_tenths_of_its_torque_on_a_slope_within_a_fifth_of_a_seco
 
 def test_two_wheels_that_spin_do_not_hide_that_the_rover_stands():
     rig = Rig(speed_gain=0.0, travel_gain=0.0, heading_gain=0.0)
-    rig.velocities |= dict.fromkeys(WHEEL_JOINTS, 0.0)
+    rig.velocities |= STANDING
     rig.velocities |= dict.fromkeys(("front_right_wheel", "front_left_wheel"), 1.0)
     standing = [0, 1, 3, 4]
     before, after = rig.run(10).torques, rig.run(200).torques
     assert after[standing].min() > 2.0 * before[standing].max() > 0.0
+
+
+# Wheels that steer
+
+
+def test_steering_joints_that_are_missing_are_named_and_nothing_is_guessed():
+    rig = Rig()
+    known = {name: rig.positions.pop(name) for name in STEERED}
+    update = rig.run(5)
+    assert not update.torques.any()
+    assert update.fault == f"waiting for joint_states (no position of {', '.join(STEERED)})"
+    rig.positions |= known
+    assert rig.run(5).fault == ""
+    del rig.positions["front_right_steering"]
+    update = rig.run(5)
+    assert "stale" in update.fault and "no position of front_right_steering" in update.fault
+
+
+def test_a_new_rover_with_steering_asks_for_its_joints():
+    rig = Rig()
+    rig.service = TractionService(replace(settings(), rover=FIXED))
+    known = {name: rig.positions.pop(name) for name in STEERED}
+    assert rig.run(5).fault == ""
+    rig.service.settings = settings()
+    assert "rear_right_steering" in rig.run(1).fault
+    rig.positions |= known
+    assert rig.run(2).fault == ""
+
+
+@pytest.mark.parametrize("policy", ["equal", "optimal"])
+def test_a_rover_that_is_too_slow_is_pushed_along_its_curve(policy):
+    for command in ((0.03, 0.03), (0.0, -0.05), (-0.03, 0.02)):
+        rig = Rig(command, policy=policy)
+        wanted = np.sign(rig.roll(1.0))
+        assert np.abs(rig.run(100).torques).max() < 1e-3, command  # it rolls as wanted
+        rig.roll(0.5)
+        torques = rig.run(50).torques
+        assert (wanted * torques > 1e-3).all(), (command, torques)
+
+
+def test_straight_wheels_do_not_push_a_rover_that_is_to_turn_on_the_spot():
+    rig = Rig((0.0, 0.1))
+    rig.velocities |= STANDING
+    update = rig.run(50)
+    assert update.fault == "" and np.abs(update.torques).max() < 1e-6
+    assert not rig.service.wanted_rates.any()
+
+
+def test_a_command_beyond_the_steering_limit_is_named_and_not_driven():
+    rig, narrow = Rig((0.0, 0.1)), replace(LSR1, steering=replace(LSR1.steering, limit=0.4))
+    rig.service = TractionService(replace(settings(), rover=narrow))
+    rig.velocities |= STANDING
+    update = rig.run(5)
+    assert "steering angle of" in update.warning and not update.torques.any()
+
+
+def test_controller_and_simulator_turn_on_a_slope():
+    ground, command = plane(0.1, 0.0, half=3.0), (0.0, -0.1)
+    plant = QuasiStaticPlant(LSR1, ground, (0.0, 0.0, 0.0))
+    service = TractionService(settings(policy="equal"))
+    service.take_terrain(ground)
+    for step in range(round(5.0 / PERIOD)):
+        now, state = step * PERIOD, plant.state()
+        service.take_joints(state.joint_positions, state.joint_velocities, now)
+        roll, pitch, yaw = rpy_from_xyzw(tuple(state.orientation.tolist()))
+        service.take_attitude(roll, pitch, state.body_rates, now)
+        service.take_command(*command, now)
+        service.take_odometry(np.array([*state.position, yaw]), 0.0, now)
+        update = service.update(now)
+        assert update.fault == "" and update.warning == ""
+        plant.pull(update.torques, command, PERIOD)
+    # Two seconds go into steering and the start.
+    assert plant.pose()[2] == pytest.approx(command[1] * 4.0, abs=0.2 * abs(command[1] * 4.0))
+    assert plant.pose()[:2] == pytest.approx([0.0, 0.0], abs=0.05)

@@ -25,7 +25,7 @@ from rover_planner.nodes.programs import MissionOptions, read_arguments
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.planning.answering.budget import STOPPING
 from rover_planner.shell.poses import Pose
-from support.grounds import make_terrain, wall_at, waves
+from support.grounds import make_terrain, rock_left, wall_at, waves
 from support.ros_fixtures import domain_id, run_in_executor
 from support.waiting import wait_until
 
@@ -117,20 +117,11 @@ def test_answers_drives_and_refusals_have_exit_codes_of_their_own(start_server, 
     assert "mission_planner: waited 4 s in vain for a rover on the topic path\n" in err
 
 
-def rock(x, y):
-    """Return level ground with a rock below the left wheels of a rover on the x axis."""
-    return 0.3 * np.exp(-((x + 0.3) ** 2 + (y - 0.2) ** 2) / 0.02)
-
-
-def slope(x, y):
-    return 0.3 * x
-
-
 @pytest.mark.parametrize(
     ("ground", "parameters", "lever", "words", "policy"),
     [
-        (rock, {}, "shift", " m ", "equal"),
-        (slope, {"friction": 0.45}, "policy", "by speed servos", "servo"),
+        (rock_left, {}, "shift", " m ", "equal"),
+        (lambda x, y: 0.3 * x, {"friction": 0.45}, "policy", "by speed servos", "servo"),
     ],
 )
 def test_advice_that_needs_nobody_else_is_taken(

@@ -5,59 +5,43 @@ import json
 from dataclasses import replace
 
 import numpy as np
-from rclpy.node import Node
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from rover_planner.ros.qos import topic_qos
 from support.grounds import make_terrain, waves
-from support.planner_client import GOAL, SERVER, START, verdict_of
-from support.ros_fixtures import RosRun
+from support.planner_client import GOAL, SERVER, START, ask
+from support.ros_fixtures import call
 from support.waiting import wait_until
 
 
-def test_answers_say_which_ground_they_assume_and_since_when(start_server, client, ros: RosRun):
+def test_answers_say_which_ground_they_assume_and_since_when(start_server, client):
     server = start_server(planner="fan", learn="use")
     ground = make_terrain(waves)
     classes = np.full(ground.elevation.shape, 7.0)
     client.send_terrain(replace(ground, ground_class=classes))
-    teller = ros.spin(Node("teller", context=ros.context))
-    sender = teller.create_publisher(String, f"{SERVER}/ground_estimate", topic_qos())
-    wait_until(lambda: sender.get_subscription_count() == 1, "the server's subscription")
-    client.can_traverse(START, GOAL)
-    wait_until(lambda: client.heard["verdict"], "the verdict")
-    assert verdict_of({"verdict": client.heard["verdict"][-1]})["ground"] == "told"
+    sender = client.create_publisher(String, f"{SERVER}/ground_estimate", topic_qos())
+    assert ask(client)[1]["ground"] == "told"
     friction = {"mean": 0.5, "std": 0.05, "low": 0.4, "high": 0.6}
-    for text in ("no JSON", "{}", json.dumps({"friction": friction | {"mean": -1.0}})):
-        sender.publish(String(data=text))
     learned = {"friction": friction, "classes": {"7": friction | {"mean": 0.45}}}
-    sender.publish(String(data=json.dumps(learned)))
+    bad = json.dumps({"friction": friction | {"mean": -1.0}})
+    for text in ("no JSON", "{}", bad, json.dumps(learned)):
+        client.send(sender, String(data=text))
     wait_until(lambda: server.service.snapshot().ground is not None, "the estimate")
-    client.heard["verdict"].clear()
-    client.can_traverse(START, GOAL)
-    wait_until(lambda: client.heard["verdict"], "the verdict")
-    verdict = verdict_of({"verdict": client.heard["verdict"][-1]})
+    verdict = ask(client)[1]
     assert verdict["ground"] == "learned"
     assert float(verdict["ground_friction"]) == 0.5 and verdict["ground_since"]
     assert json.loads(verdict["ground_classes"].replace("'", '"')) == {"7": 0.45}
 
 
-def test_a_marked_place_stays_impassable_until_places_are_cleared(
-    start_server, client, ros: RosRun
-):
-    server = start_server(planner="fan")
-    client.send_terrain(make_terrain(lambda x, y: 0.0 * x * y))
-    teller = ros.spin(Node("teller", context=ros.context))
-    sender = teller.create_publisher(String, f"{SERVER}/mark_place", topic_qos())
-    wait_until(lambda: sender.get_subscription_count() == 1, "the server's subscription")
+def test_a_marked_place_stays_impassable_until_places_are_cleared(shared):
+    server, client = shared.server, shared.client
+    sender = client.create_publisher(String, f"{SERVER}/mark_place", topic_qos())
     place = {"x": GOAL[0], "y": GOAL[1], "radius": 0.3, "reason": "dust", "date": "today"}
     for text in ("no JSON", json.dumps(place)):
-        sender.publish(String(data=text))
+        client.send(sender, String(data=text))
     wait_until(lambda: server.service.marked.places, "the place")
     assert not client.can_traverse(START, GOAL).poses
-    clearer = teller.create_client(Trigger, f"{SERVER}/clear_places")
-    assert clearer.wait_for_service(10.0)
-    done = clearer.call_async(Trigger.Request())
-    wait_until(done.done, "the answer")
-    assert done.result().message == "1 marked places cleared"
+    clearer = client.create_client(Trigger, f"{SERVER}/clear_places")
+    assert call(clearer, Trigger.Request()).message == "1 marked places cleared"
     assert client.can_traverse(START, GOAL).poses

@@ -6,11 +6,9 @@ import time
 
 import numpy as np
 import pytest
-from nav_msgs.msg import Odometry
-from sensor_msgs.msg import JointState, PointCloud2
+from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.elevation import terrain_to_point_cloud
-from msg_adapters.paths import stamped_pose
 from rover_physics import Terrain, save_terrain
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.maps.map_keeper import MapKeeper
@@ -81,16 +79,6 @@ def test_a_question_waits_no_longer_than_20_ms_for_a_map_that_merges(
     assert client.can_traverse(START, GOAL).poses == []
 
 
-def send_standing(client, pose, angles=(0.0, 0.0, 0.0, 0.0)):
-    """Publish odometry and suspension of a rover that stands level on ground of height 0."""
-    odometry = Odometry(child_frame_id="base_link")
-    odometry.header.frame_id = "map"
-    odometry.pose.pose = stamped_pose(pose, "map").pose
-    odometry.pose.pose.position.z = 0.3  # of the body's origin of lsr1 above level ground
-    client._joints.publish(JointState(name=list(SUSPENSION_JOINTS), position=list(angles)))
-    client._odometry.publish(odometry)
-
-
 def test_unknown_ground_under_the_standing_rover_is_filled(start_server, client):
     server = start_server(planner="fan", footprint_margin=0.1)
     ahead = make_terrain(lambda x, y: np.where(x < 0.0, np.nan, 0.0 * x))
@@ -100,7 +88,8 @@ def test_unknown_ground_under_the_standing_rover_is_filled(start_server, client)
     assert verdict["code"] == "unknown_ground"
 
     def is_filled():
-        send_standing(client, start)
+        client.send_joints(SUSPENSION_JOINTS, 4 * [0.0])
+        client.send_odometry(start, height=0.3)  # of the body's origin of lsr1
         time.sleep(0.1)
         return any("ground under the rover filled" in line for line in client.logs)
 

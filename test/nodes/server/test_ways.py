@@ -22,10 +22,6 @@ LONG = {"search_budget": 60.0, "time_budget": 120.0}
 def test_without_a_path_the_code_says_so_and_the_closed_area_is_a_grid(start_server, client):
     start_server(lattice_cell=0.5, waypoint_spacing=0.1, candidate_count=1, **LONG)
     client.send_terrain(make_terrain(pen, half=3.5))
-    assert client.set_parameter("search_budget", 0.05) == (True, "")
-    _, verdict, _ = ask(client, start=INSIDE, goal=BEYOND)
-    assert verdict["code"] == "out_of_time" and "0.05 s" in verdict["reason"]
-    assert client.set_parameter("search_budget", 60.0) == (True, "")
     plan, verdict, results = ask(client, start=INSIDE, goal=BEYOND)
     assert plan.poses == [] and verdict["code"] == "no_way"
     assert "closed in by" in verdict["reason"] and "the best candidate: " in verdict["reason"]

@@ -13,13 +13,9 @@ from rover_physics.results.record import QUANTITIES
 from rover_physics.rover.urdf.read_rover import rover_from_urdf
 from support.reference_cases import reference_predictions, steered_predictions
 from support.rough_grounds import fractal, plane, random_poses, rocky, scaled_for, smooth
-from support.rover_geometry import attitude_of, place_rover, wheel_axes, wheel_gaps
+from support.rover_geometry import ANGLE, GAP, attitude_of, place_rover, wheel_axes, wheel_gaps
 from support.rovers import LSR1
 
-GAP = 3e-5
-"""What a settled pose may leave open [m]."""
-ANGLE = 4.0 * GAP / 0.4
-"""What that may turn [rad]."""
 slopes = st.floats(-0.4, 0.4)
 headings = st.floats(-np.pi, np.pi)
 few = settings(max_examples=10)

@@ -10,7 +10,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
@@ -65,7 +65,6 @@ def refusal(archive: bytes, most=MOST) -> str:
     st.sampled_from("CF"),
     st.booleans(),
 )
-@settings(deadline=None, max_examples=30)
 def test_arrays_are_read_as_numpy_reads_them(array, order, packed):
     buffer = io.BytesIO()
     (np.savez_compressed if packed else np.savez)(buffer, a=np.asarray(array, order=order))

@@ -53,7 +53,6 @@ def test_the_forces_on_the_wheels_are_those_of_mujoco(predict):
 # The balance
 
 
-@settings(max_examples=25)
 @given(
     rover=st.sampled_from(ROVERS),
     make=st.sampled_from([smooth, fractal, rocky]),

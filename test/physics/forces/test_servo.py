@@ -33,9 +33,8 @@ from rover_physics.status import Stall
 from rover_physics.traversability.torque_ranges import evaluate_in_turn
 from support.rough_grounds import fractal, plane, random_poses, rocky, smooth
 from support.rover_geometry import balance_residuals
-from support.rovers import LSR1, M2020
+from support.rovers import FIXED, LSR1, M2020
 
-FIXED = replace(LSR1, steering=None)
 SERVO = SweepOptions(policy="servo")
 SOFT = ("lunar_nominal", "mars_simulant", "dry_sand", "lete_sand")
 SAND = replace(SERVO, soil="lete_sand", max_torque=20.0)

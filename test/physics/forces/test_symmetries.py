@@ -17,14 +17,9 @@ from support.rough_grounds import (
     scaled_for,
     smooth,
 )
-from support.rover_geometry import turned_round
-from support.rovers import LSR1, M2020
+from support.rover_geometry import ANGLE, GAP, turned_round
+from support.rovers import FIXED, LSR1, M2020
 
-FIXED = replace(LSR1, steering=None)
-GAP = 3e-5
-"""What a settled pose may leave open [m]."""
-ANGLE = 4.0 * GAP / 0.4
-"""What that may turn [rad]."""
 SWAP = [3, 4, 5, 0, 1, 2]
 ROUND = [5, 4, 3, 2, 1, 0]
 AHEAD = np.zeros(4)

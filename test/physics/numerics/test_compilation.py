@@ -5,14 +5,13 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
 
 import rover_physics
 from rover_physics.compilation import Compilation, compile_groups
-from support.waiting import wait_until_gone
+from support.waiting import wait_until, wait_until_gone
 
 MODULE = """
 import os, sys, time
@@ -84,12 +83,8 @@ def output_of(folder: Path, **options) -> str:
 
 
 def wait_for_process(folder: Path) -> int:
-    deadline = time.monotonic() + 60.0
-    while time.monotonic() < deadline:
-        if (folder / "pid").exists() and (folder / "pid").read_text():
-            return int((folder / "pid").read_text())
-        time.sleep(0.02)
-    raise AssertionError("no process")
+    file = folder / "pid"
+    return int(wait_until(lambda: file.exists() and file.read_text(), "a process", 60.0))
 
 
 @pytest.mark.long

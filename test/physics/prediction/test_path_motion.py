@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rover_physics import PoseStatus, SweepOptions, Terrain, judge_path, judge_poses
@@ -16,13 +16,11 @@ from rover_physics.prediction.path_motion import motions_of
 from rover_physics.rover.model import Steering
 from rover_physics.traversability.judge import PartwiseJudge
 from support.rough_grounds import plane, random_poses
-from support.rovers import LSR1, M2020
+from support.rovers import FIXED, LSR1, M2020
 
 ALL_STEER = replace(LSR1, steering=Steering(("rear", "middle", "front"), 1.57, 0.35))
-FIXED = replace(LSR1, steering=None)
 LEVEL = Terrain(np.zeros((401, 401)), 0.02, (-4.0, -4.0))
 SPEED = LSR1.nominal_speed
-few = settings(max_examples=25)
 
 
 def motions(poses, rover=LSR1, backward=False, curvature=None):
@@ -57,7 +55,6 @@ def with_chord_headings(poses):
     return np.column_stack([poses[:, :2], np.append(ahead, ahead[-1])])
 
 
-@few
 @given(st.floats(-3.1, 3.1), st.booleans())
 def test_a_straight_path_is_exactly_straight(yaw, backward):
     poses = straight(yaw=yaw)[:: -1 if backward else 1]
@@ -68,7 +65,6 @@ def test_a_straight_path_is_exactly_straight(yaw, backward):
     assert prediction.wheel_speed == pytest.approx(np.full((10, 6), speed / 0.1))
 
 
-@few
 @given(st.floats(0.2, 1.5), st.sampled_from([0.02, 0.05, 0.1, 0.3]), st.sampled_from([1.0, -1.0]))
 def test_an_arc_has_its_curvature_whatever_its_sampling(curvature, spacing, side):
     found = motions(arc(side * curvature, spacing))
@@ -77,7 +73,6 @@ def test_an_arc_has_its_curvature_whatever_its_sampling(curvature, spacing, side
     assert found[:, 2] == pytest.approx(np.full(len(found), side * curvature * SPEED))
 
 
-@few
 @given(st.floats(0.2, 1.5), st.sampled_from([0.05, 0.1, 0.3]))
 def test_an_arc_whose_headings_follow_its_chords_is_an_arc(curvature, spacing):
     found = motions(with_chord_headings(arc(curvature, spacing)))
@@ -170,7 +165,6 @@ def test_no_wheel_is_faster_than_its_drive():
 # Given curvatures
 
 
-@few
 @given(st.floats(-3.0, 3.0))
 def test_a_given_curvature_is_the_one_of_the_arc(curvature):
     found = motions([[0.0, 0.0, 0.3]], curvature=[curvature])[0]

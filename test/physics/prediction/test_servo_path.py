@@ -12,7 +12,7 @@ from rover_physics.prediction.sweep import predict_in_parts
 from rover_physics.traversability.verdict import hold_against_limits
 from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import plane
-from support.rovers import LSR1
+from support.rovers import FIXED, LSR1
 
 ROVER = unlimited(LSR1)
 SERVO = SweepOptions(policy="servo")
@@ -85,9 +85,9 @@ def test_a_rover_that_its_motors_cannot_hold_runs_away_on_a_long_slope_alone():
 
 
 def test_a_rover_that_cannot_steer_turns_off_an_arc_and_one_that_can_does_not():
-    fixed, flat = replace(LSR1, steering=None), plane(0.0, 0.0, half=2.0)
+    flat = plane(0.0, 0.0, half=2.0)
     path = arc(0.6)
-    skidding, refused = judge_path(fixed, flat, path, SERVO)
+    skidding, refused = judge_path(FIXED, flat, path, SERVO)
     drift = skidding.drift[:, 0]
     assert drift[-1] > 0.2 and (np.diff(drift[:40]) >= -1e-9).all()
     assert "turns off its path" in refused.reason

@@ -19,7 +19,7 @@ from rover_physics import (
     score_poses,
     sweep_map,
 )
-from rover_physics.errors import ModelError, PoseError
+from rover_physics.errors import PoseError, RoverError
 from rover_physics.numerics import interruption
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.results.record import QUANTITIES
@@ -34,7 +34,7 @@ POSE = [[0.0, 0.0, 0.0]]
 NAN, INF = float("nan"), float("inf")
 GROWING = {"energy", "time", "distance"}
 ALONG_THE_PATH = GROWING | {"wheel_drop", "falling", "between", "waypoint", "bounds"}
-few = settings(max_examples=8, deadline=None)
+few = settings(max_examples=8)
 
 
 def line(start: float, end: float, count: int = 41, yaw: float = 0.0) -> np.ndarray:
@@ -78,10 +78,11 @@ def test_bad_poses_are_refused_by_what_is_wrong_with_them(poses, words):
         ({"policy": "best"}, "'best'.*equal, servo, optimal"),
         ({"friction": 0.0}, r"friction is 0.0.*above 0"),
         ({"max_torque": NAN}, r"max_torque is nan.*above 0"),
+        ({"soil": "dry_sad"}, "no soil 'dry_sad'"),
     ],
 )
 def test_bad_arguments_are_refused_by_name_and_value(arguments, words):
-    with pytest.raises(ModelError, match=words):
+    with pytest.raises(RoverError, match=words):
         judge_path(LSR1, LEVEL, POSE, SweepOptions(**arguments))[0]
 
 

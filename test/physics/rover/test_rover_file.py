@@ -120,9 +120,6 @@ def test_every_number_is_a_finite_number_of_its_sign(wrong):
 @pytest.mark.parametrize(
     ("key", "value", "must"),
     [
-        ("suspension.wheels.rear", [0.0, 0.3, NAN], "a list of 3 numbers in m"),
-        ("suspension.bogie_limits", [-0.1, NAN], "[lowest, highest]"),
-        ("masses.body", None, "a mapping with "),
         *[("steering.wheels", value, "one or more of rear")
           for value in (["rear", "nose"], ["rear", "rear"], [])],
         ("suspension.rocker_wheel", "middle", "rear or front"),

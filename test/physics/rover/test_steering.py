@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rover_physics import Rover
@@ -21,12 +21,10 @@ from rover_physics.rover.steering_joints import (
     steering_joints,
     tightest_radius,
 )
-from support.rovers import LSR1, M2020
+from support.rovers import FIXED, LSR1, M2020
 
 ALL_STEER = replace(LSR1, steering=Steering(("rear", "middle", "front"), np.pi / 2, 0.35))
-FIXED = replace(LSR1, steering=None)
 speeds = st.floats(-0.1, 0.1)
-few = settings(max_examples=100)
 
 
 def steer(rover: Rover, *motion: float) -> tuple[bool, np.ndarray, np.ndarray]:
@@ -43,7 +41,6 @@ def wheels_of(rover: Rover) -> np.ndarray:
     return np.vstack([left * [1.0, -1.0], left])
 
 
-@few
 @given(st.sampled_from([LSR1, M2020, ALL_STEER, FIXED]), speeds, speeds, st.floats(-0.2, 0.2))
 def test_every_wheel_rolls_where_the_body_takes_it_as_far_as_it_steers(rover, vx, vy, rate):
     steered = rover.steering.wheels if rover.steering else ()

@@ -82,7 +82,7 @@ def assert_computed(prediction, verdict):
     )
 
 
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=120)
 @given(
     places=st.lists(st.sampled_from(NUMBERS), min_size=1, max_size=3),
     number=st.sampled_from(EXTREMES),
@@ -176,7 +176,6 @@ def test_a_path_of_unknown_energy_costs_more_than_any_other():
     assert path_cost(unknown, verdict) == (math.inf, math.inf)
 
 
-@settings(max_examples=40, deadline=None)
 @given(
     x=st.floats(),
     y=st.floats(),

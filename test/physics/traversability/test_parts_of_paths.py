@@ -8,17 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rover_physics import (
-    PathPrediction,
-    Rover,
-    SweepOptions,
-    Terrain,
-    Verdict,
-    judge_path,
-    judge_paths,
-    judge_pieces,
-    load_rover,
-)
+from rover_physics import SweepOptions, Terrain, judge_path, judge_paths, judge_pieces, load_rover
 from rover_physics.prediction import sweep
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.results.path_bounds import BOUNDED_VALUES
@@ -61,16 +51,16 @@ def courses(draw) -> tuple[Terrain, np.ndarray]:
     return ground, straight(draw(places), length, draw(places), yaw, spacing)
 
 
-def first_refusal(verdict: Verdict) -> tuple:
+def first_refusal(verdict) -> tuple:
     return verdict.traversable, verdict.first_failure, verdict.code, verdict.reason
 
 
-def assert_same(one: PathPrediction, other: PathPrediction) -> None:
+def assert_same(one, other) -> None:
     for name in ("poses", "waypoint", "status", *(each.name for each in QUANTITIES)):
         np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(courses(), st.sampled_from(sorted(OPTIONS)))
 def test_a_stopped_sweep_is_the_beginning_of_the_whole_one_to_the_last_bit(course, option):
     ground, poses = course
@@ -255,7 +245,7 @@ TORQUES = (0.3, 0.6, 1.0, 2.0)
 SHIFT = np.array([1234.56, -789.01, 0.0])
 
 
-def random_course(rover: Rover, seed: int) -> tuple[Terrain, np.ndarray]:
+def random_course(rover, seed: int) -> tuple[Terrain, np.ndarray]:
     """Return a rough ground in the rover's size, and a straight path over it in any direction."""
     rng, ground = np.random.default_rng(seed), GROUNDS[seed % len(GROUNDS)](seed)
     size = rover.wheel.radius / 0.1
@@ -267,7 +257,7 @@ def random_course(rover: Rover, seed: int) -> tuple[Terrain, np.ndarray]:
     return terrain, path * [size, size, 1.0] + [x, y, 0.0]
 
 
-def changes_of(rover: Rover, seed: int) -> set[str]:
+def changes_of(rover, seed: int) -> set[str]:
     """Return the names of the changes that the verdict of a course did not stand."""
     terrain, path = random_course(rover, seed)
     options = SweepOptions(friction=FRICTIONS[seed % len(FRICTIONS)])

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from rover_physics import Rover, SweepOptions, judge_path, judge_reach
@@ -21,7 +21,6 @@ LIMITED = replace(ARM, joint_limits=((-3.2, 3.2), (-1.0, 1.0), (0.0, 2.5)))
 LEVEL, POSE = plane(0.0, 0.0), [0.0, 0.0, 0.0]
 HEIGHT = 0.30
 places = st.floats(-1.0, 1.0)
-few = settings(max_examples=20, deadline=None)
 
 
 def limited() -> Rover:
@@ -31,7 +30,6 @@ def limited() -> Rover:
 # Inverse kinematics
 
 
-@settings(max_examples=200, deadline=None)
 @given(st.sampled_from([ARM, UNEQUAL]), places, places, places)
 def test_the_tip_comes_to_every_point_within_reach_in_two_ways(arm, x, y, z):
     solutions = inverse_kinematics(arm, [x, y, z])
@@ -44,7 +42,6 @@ def test_the_tip_comes_to_every_point_within_reach_in_two_ways(arm, x, y, z):
         assert (np.abs(angles) <= np.pi + 1e-12).all()
 
 
-@settings(max_examples=100, deadline=None)
 @given(places, places, places)
 def test_solutions_keep_the_joint_limits(x, y, z):
     free = inverse_kinematics(ARM, [x, y, z])
@@ -67,7 +64,6 @@ def test_an_angle_beyond_its_joint_limits_is_refused_by_name():
 # The query
 
 
-@few
 @given(st.integers(0, 1000), st.floats(-3.0, 3.0), st.floats(0.1, 0.5), st.floats(-1.0, 1.0))
 def test_the_tip_is_at_the_target_in_the_map_frame(seed, yaw, away, side):
     ground = smooth(seed)

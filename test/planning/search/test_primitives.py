@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tests of the motion primitives: they join nodes, and the rover can drive them."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -11,10 +9,9 @@ from rover_physics.rover.steering_joints import tightest_radius
 from rover_planner.planning.angles import wrap
 from rover_planner.planning.search.nodes import HEADINGS, YAWS
 from rover_planner.planning.search.primitives import Gear, make_primitives
-from support.rovers import LSR1
+from support.rovers import FIXED, LSR1
 
 SPACING = 0.02
-FIXED = replace(LSR1, steering=None)
 
 
 def all_of(rover, cell):

@@ -18,15 +18,12 @@ from rover_planner.simulator.second_try import SecondTry
 from rover_planner.simulator.simulation import Simulation, SimulationSettings
 from support.grounds import make_terrain, waves
 from support.rough_grounds import plane
-from support.rovers import LSR1
+from support.rovers import FIXED, LSR1
 
 STEP = 0.02
+WAVY = make_terrain(waves, half=3.0)
 AHEAD = (0.06, 0.0)
 """Command that keeps the wheels straight: speed [m/s] and yaw rate [rad/s]."""
-
-
-def wavy():
-    return make_terrain(waves, half=3.0)
 
 
 def drive(plant, seconds: float, speed: float = 0.06, yaw_rate: float = 0.0):
@@ -36,11 +33,10 @@ def drive(plant, seconds: float, speed: float = 0.06, yaw_rate: float = 0.0):
 
 
 def test_the_rover_is_where_the_model_settles_it():
-    ground = wavy()
-    plant = QuasiStaticPlant(LSR1, ground, (-1.0, 0.0, 0.0))
+    plant = QuasiStaticPlant(LSR1, WAVY, (-1.0, 0.0, 0.0))
     state = drive(plant, 5.0)
     assert plant.pose() == pytest.approx([-1.0 + 5.0 * 0.06, 0.0, 0.0])
-    settled = judge_path(LSR1, ground, plant.pose()[None])[0]
+    settled = judge_path(LSR1, WAVY, plant.pose()[None])[0]
     assert state.position == pytest.approx(settled.position[0])
     angles = [state.joint_positions[name] for name in SUSPENSION_JOINTS]
     assert angles == pytest.approx([*settled.rocker_angle[0], *settled.bogie_angle[0]])
@@ -76,7 +72,7 @@ def test_it_stops_before_a_wall_and_says_why_and_can_go_back():
 
 def test_a_start_on_which_no_rover_stands_is_refused():
     with pytest.raises(PlanningError, match="cannot start at"):
-        QuasiStaticPlant(LSR1, wavy(), (9.0, 0.0, 0.0))
+        QuasiStaticPlant(LSR1, WAVY, (9.0, 0.0, 0.0))
 
 
 def test_torques_that_hold_the_slope_keep_the_speed_and_more_drive_it_up():
@@ -153,7 +149,7 @@ def test_drives_without_commands_are_braked():
 
 def test_a_path_waits_while_the_watch_stops_the_rover_or_is_silent():
     given = RoverSimulatorParameters(start_x=-1.0, stop_timeout=0.4)
-    simulation = Simulation(SimulationSettings(LSR1, wavy(), given))
+    simulation = Simulation(SimulationSettings(LSR1, WAVY, given))
     simulation.take_path(np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
 
     def speeds(begin, seconds):
@@ -172,9 +168,8 @@ def test_a_path_waits_while_the_watch_stops_the_rover_or_is_silent():
 
 
 def test_both_engines_drive_the_same_way():
-    ground = wavy()
     start = (-1.0, 0.2, 0.0)
-    still, moving = QuasiStaticPlant(LSR1, ground, start), MujocoPlant(LSR1, ground, start)
+    still, moving = QuasiStaticPlant(LSR1, WAVY, start), MujocoPlant(LSR1, WAVY, start)
     states = [drive(plant, 3.0) for plant in (still, moving)]
     assert states[1].position == pytest.approx(states[0].position, abs=0.04)
     for name in SUSPENSION_JOINTS:
@@ -287,7 +282,6 @@ def test_a_change_from_forwards_to_backwards_is_driven_to_its_corner():
 
 # Wheels that steer
 
-FIXED = replace(LSR1, steering=None)
 SPEED, LOOK_AHEAD = 0.06, 0.4
 REACH = float(np.hypot(0.4, 0.31))
 ENGINES = pytest.mark.parametrize("engine", [QuasiStaticPlant, MujocoPlant])
