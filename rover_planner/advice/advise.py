@@ -11,7 +11,6 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.rover.model import Rover
 from rover_planner.advice.case import Case, JudgedCase
-from rover_planner.advice.refusal import Refusal
 from rover_planner.advice.remedy import Remedy
 from rover_planner.advice.seek import seek_remedies
 from rover_planner.planning.answering.budget import QuestionStoppedError
@@ -81,7 +80,7 @@ def grow_advice(case: Case) -> Iterator[Advice]:
     advice = Advice(judged)
     if not judged.passes:
         yield advice
-        for levers, remedy in seek_remedies(Refusal(judged)):
+        for levers, remedy in seek_remedies(judged):
             found = advice.found if remedy is None else (*advice.found, remedy)
             tried = tuple(lever.name for lever in levers)
             advice = replace(advice, found=tuple(sorted(found, key=_rank)), tried=tried)

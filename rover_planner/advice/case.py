@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A path with all that its verdict depends on, and the case as it was judged."""
+"""A path with all that its verdict depends on, and the case as it was judged or refused."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -22,7 +22,21 @@ from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.judge import judge_path, judge_paths
 from rover_physics.traversability.verdict import Verdict
+from rover_planner.errors import PlanningError
+from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.path_geometry import distance_along
+from rover_planner.planning.path_query import PathQueryOptions
+from rover_planner.planning.search.path_search import find_path
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery
+
+MOST_FRICTION = 1.5
+"""Largest friction that is asked for."""
+BEFORE = 1.5
+"""Length of path that decides about drift and lifts of servos [wheelbases]: sums over one."""
+EDGE = 2.0
+"""Length of path around a failure that decides whether a wheel falls there [wheel radii]."""
+SEARCH = LatticeSettings(budget=1.0, ends_at_first=True)
+"""Settings of the search of a path around."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +106,7 @@ class Case:
 
 @dataclass(frozen=True, eq=False)
 class JudgedCase:
-    """A case with its prediction and verdict."""
+    """A case with its prediction and verdict; where it is refused, where and by what it fails."""
 
     case: Case
     """The case."""
@@ -161,3 +175,70 @@ class JudgedCase:
         """Return the load [N] of each axle at a waypoint by its name; NaN where unknown."""
         loads = self.prediction.wheel_loads[waypoint]
         return {name: float(loads[k] + loads[k + 3]) for k, name in enumerate(WHEEL_POSITIONS)}
+
+    @property
+    def place(self) -> int:
+        """Index of the waypoint that fails first."""
+        return self.verdict.first_failure
+
+    @property
+    def time(self) -> float:
+        """Time of the path [s], as if the rover could drive on where it fails."""
+        total = self._sum_up("time")
+        length = float(self.distance[-1])
+        return length / self.case.rover.nominal_speed if total is None else total
+
+    @property
+    def energy(self) -> float:
+        """Energy of the path [J] in the same way; 0 if none of it is known."""
+        return self._sum_up("energy") or 0.0
+
+    def _sum_up(self, name: str) -> float | None:
+        """Return the sum at the end of the path: where it is not known, as before by distance."""
+        values, distance = getattr(self._whole, name), self.distance
+        if np.isfinite(values[-1]):
+            return float(values[-1])
+        known = np.flatnonzero(np.isfinite(values) & (distance > 0.0))
+        if not known.size:
+            return None
+        return float(values[known[-1]] * distance[-1] / distance[known[-1]])
+
+    @cached_property
+    def _whole(self) -> PathPrediction:
+        """The prediction of all of the path, on ground that holds if the wheels slip on this."""
+        slips = self.verdict.code == "friction"
+        return (self.case.change(friction=MOST_FRICTION) if slips else self.case).predict()
+
+    @property
+    def place_on_ground(self) -> tuple[float, float]:
+        """Position (x, y) [m] of the highest wheel where the rover last settled before it."""
+        prediction, row = self.prediction, self.place
+        while row > 0 and not prediction.settled[row]:
+            row -= 1
+        centres = prediction.wheel_centres[row]
+        x, y = centres[int(np.argmax(centres[:, 2])), :2]
+        return float(x), float(y)
+
+    @cached_property
+    def path_around(self) -> Floats | None:
+        """Another path (n, 3) from start to goal that passes; None if none is found in time."""
+        case = self.case
+        options = PathQueryOptions(
+            model=case.options, map_sigmas=case.sigmas, accepted_chance=case.accepted_chance
+        )
+        ends = case.poses[0], case.poses[-1]
+        try:
+            found = find_path(SearchQuery(case.rover, case.terrain, *ends, options), SEARCH)
+        except QuestionStoppedError:
+            raise
+        except PlanningError:
+            return None  # an end is not on the map
+        return None if found.path is None else found.path.poses
+
+    def rows_around(self, place: int, fails_by_sum: bool) -> slice:
+        """Return the rows of the path that show whether a waypoint fails, perhaps by a sum."""
+        rover, distance = self.case.rover, self.distance
+        before = BEFORE * rover.wheelbase if fails_by_sum else EDGE * rover.wheel.radius
+        near = distance[place] - before, distance[place] + EDGE * rover.wheel.radius
+        first, last = np.searchsorted(distance, near)
+        return slice(max(0, min(int(first), place - 1)), int(last) + 1)

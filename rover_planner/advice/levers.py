@@ -14,7 +14,7 @@ from rover_physics.limits.table import LIMITS, Limit, Sense
 from rover_physics.names import OPTIMAL, SERVO
 from rover_physics.rover.manipulator import arm_angles, link_points
 from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius
-from rover_planner.advice.case import Case
+from rover_planner.advice.case import MOST_FRICTION, Case, JudgedCase
 from rover_planner.advice.path_changes import (
     bend_path,
     is_driven_ahead,
@@ -23,7 +23,6 @@ from rover_planner.advice.path_changes import (
     shift_path,
     turn_path,
 )
-from rover_planner.advice.refusal import MOST_FRICTION, Refusal
 from rover_planner.planning.path_geometry import distance_along
 
 ASIDE = 2.0
@@ -91,12 +90,12 @@ class Lever:
     """Name of the lever."""
     unit: str
     """Unit of its values; empty for a ratio or a word."""
-    settings: Callable[[Refusal], Span | Choice | None]
+    settings: Callable[[JudgedCase], Span | Choice | None]
     """Returns what it may be set to; None where it cannot be used."""
-    apply: Callable[[Case, Refusal, Any], Case | None]
+    apply: Callable[[Case, JudgedCase, Any], Case | None]
     """Returns a case with the lever set; None where there is no room."""
-    words: Callable[[Refusal, Any], str]
-    """Returns what to do, in words."""
+    words: Callable[[JudgedCase, Any, Any], str]
+    """Returns what to do in words, for a value and that of now."""
     keeps_rows: bool = True
     """True if waypoints stay, or are only shifted: row i is near row i of the refused path."""
     changes_path: bool = False
@@ -107,7 +106,7 @@ class Lever:
     """True if path and options of `predict` hold all that it changes."""
 
 
-def _policies(refusal: Refusal) -> Choice:
+def _policies(refusal: JudgedCase) -> Choice:
     now = refusal.case.options.policy
     return Choice(now, tuple(policy for policy in (SERVO, OPTIMAL) if policy != now))
 
@@ -115,7 +114,7 @@ def _policies(refusal: Refusal) -> Choice:
 def _arm_joint(k: int, raised: str, lowered: str) -> Lever:
     """Return the lever of a joint of the arm; the words are those of a smaller or larger angle."""
 
-    def settings(refusal: Refusal) -> Span | None:
+    def settings(refusal: JudgedCase) -> Span | None:
         arm = refusal.case.rover.manipulator
         if arm is None:
             return None
@@ -124,7 +123,7 @@ def _arm_joint(k: int, raised: str, lowered: str) -> Lever:
             now, tuple(arm.joint_limits[k]) if arm.joint_limits else (now - np.pi, now + np.pi)
         )
 
-    def apply(case: Case, _refusal: Refusal, angle: float) -> Case | None:
+    def apply(case: Case, _refusal: JudgedCase, angle: float) -> Case | None:
         arm = case.rover.manipulator
         assert arm is not None
         angles = arm_angles(arm, case.options.arm_angles)
@@ -134,17 +133,15 @@ def _arm_joint(k: int, raised: str, lowered: str) -> Lever:
             return None  # below its foot it may hit the body, which the model does not know
         return case.change(joint_angles=dict(zip(arm.joints, angles.tolist(), strict=True)))
 
-    def words(refusal: Refusal, angle: float) -> str:
-        span = settings(refusal)
-        assert span is not None
-        turn = angle - span.now
+    def words(refusal: JudgedCase, angle: float, now: float) -> str:
+        turn = angle - now
         verb = lowered if turn > 0.0 else raised
         return f"{verb.format(f'{abs(turn):.2f} rad')}{_tip_move(refusal, k, angle)}"
 
     return Lever(("arm_yaw", "arm_shoulder", "arm_elbow")[k], "rad", settings, apply, words)
 
 
-def _tip_move(refusal: Refusal, k: int, angle: float) -> str:
+def _tip_move(refusal: JudgedCase, k: int, angle: float) -> str:
     """Return where the tip of the arm moves along the body with another angle of joint k."""
     arm = refusal.case.rover.manipulator
     assert arm is not None
@@ -157,55 +154,41 @@ def _tip_move(refusal: Refusal, k: int, angle: float) -> str:
     return f", its tip {abs(ahead):.2f} m to the {'front' if ahead > 0.0 else 'rear'}"
 
 
-def _payload(refusal: Refusal) -> Span | None:
+def _payload(refusal: JudgedCase) -> Span | None:
     arm, told = refusal.case.rover.manipulator, refusal.case.options.payload
     now = told if told is not None else arm.payload if arm is not None else 0.0
     return Span(now, (0.0,)) if now > 0.0 else None
 
 
-def _describe_payload(refusal: Refusal, payload: float) -> str:
+def _describe_payload(_refusal: JudgedCase, payload: float, now: float) -> str:
     if payload == 0.0:
         return "Put the payload down"
-    span = _payload(refusal)
-    assert span is not None
-    return f"Carry {span.now - payload:.2f} kg less at the arm's tip"
+    return f"Carry {now - payload:.2f} kg less at the arm's tip"
 
 
-def _aside(share: float) -> Callable[[Refusal], Span | None]:
-    """Return the settings of a lever that shifts a path that is driven ahead."""
-
-    def settings(refusal: Refusal) -> Span | None:
-        if not is_driven_ahead(refusal.case.poses):
-            return None
-        most = share * refusal.case.rover.wheelbase
-        return Span(0.0, (-most, most))
-
-    return settings
+def _aside(refusal: JudgedCase) -> Span | None:
+    """Return how far a path that is driven ahead may be shifted [m]."""
+    most = ASIDE * refusal.case.rover.wheelbase
+    return Span(0.0, (-most, most)) if is_driven_ahead(refusal.case.poses) else None
 
 
-def _askew(refusal: Refusal) -> Span | None:
+def _askew(refusal: JudgedCase) -> Span | None:
     return Span(0.0, (-ASKEW, ASKEW)) if is_driven_ahead(refusal.case.poses) else None
 
 
-def _on_the_spot(refusal: Refusal) -> Span | None:
-    turns = can_turn_on_the_spot(refusal.case.rover)
-    return _aside(ASIDE)(refusal) if turns else None
+def _on_the_spot(refusal: JudgedCase) -> Span | None:
+    return _aside(refusal) if can_turn_on_the_spot(refusal.case.rover) else None
 
 
-def _around(refusal: Refusal) -> Choice | None:
+def _around(refusal: JudgedCase) -> Choice | None:
     """Return the length of a path around [m], if one is found."""
-    if refusal.judged.distance[-1] < refusal.case.rover.wheelbase or refusal.path_around is None:
+    if refusal.distance[-1] < refusal.case.rover.wheelbase or refusal.path_around is None:
         return None
     length = float(distance_along(refusal.path_around)[-1])
-    return Choice(float(refusal.judged.distance[-1]), (length,))
+    return Choice(float(refusal.distance[-1]), (length,))
 
 
-def _drive_around(case: Case, refusal: Refusal) -> Case:
-    assert refusal.path_around is not None
-    return replace(case, poses=refusal.path_around)
-
-
-def _describe_way(refusal: Refusal, length: float) -> str:
+def _describe_way(refusal: JudgedCase, length: float, now: float) -> str:
     """Return where a path around is farthest from the refused one, and its length."""
     old, new = refusal.case.poses, refusal.path_around
     assert new is not None
@@ -216,17 +199,17 @@ def _describe_way(refusal: Refusal, length: float) -> str:
     farthest = int(np.abs(aside).argmax())
     return (
         f"Drive around, up to {abs(aside[farthest]):.2f} m {_side(aside[farthest])} of the path: "
-        f"{length:.1f} m in place of {refusal.judged.distance[-1]:.1f} m"
+        f"{length:.1f} m in place of {now:.1f} m"
     )
 
 
-def _backward(refusal: Refusal) -> Choice | None:
+def _backward(refusal: JudgedCase) -> Choice | None:
     case = refusal.case
     turns = can_turn_on_the_spot(case.rover) and is_driven_ahead(case.poses)
     return Choice(False, (True,)) if turns and not case.options.backward else None
 
 
-def _reverse(case: Case, _refusal: Refusal, _value: Any) -> Case:
+def _reverse(case: Case, _refusal: JudgedCase, _value: Any) -> Case:
     step = _spacing(case) / swing_radius(case.rover)
     return replace(case.change(backward=True), poses=reverse_rover(case.poses, step))
 
@@ -237,10 +220,10 @@ def _spacing(case: Case) -> float:
     return float(np.median(steps)) if (steps > 0.0).any() else SPACING
 
 
-def _with_path(change: Callable[[Case, Refusal, float], Any]) -> Callable[..., Case | None]:
+def _with_path(change: Callable[[Case, JudgedCase, float], Any]) -> Callable[..., Case | None]:
     """Return what sets a lever by a function that returns a path."""
 
-    def apply(case: Case, refusal: Refusal, value: float) -> Case | None:
+    def apply(case: Case, refusal: JudgedCase, value: float) -> Case | None:
         poses = change(case, refusal, value)
         return None if poses is None else replace(case, poses=poses)
 
@@ -251,11 +234,11 @@ def _side(value: float) -> str:
     return "left" if value > 0.0 else "right"
 
 
-def _at(refusal: Refusal) -> str:
-    return f"{refusal.judged.distance[refusal.place]:.1f} m"
+def _at(refusal: JudgedCase) -> str:
+    return f"{refusal.distance[refusal.place]:.1f} m"
 
 
-def _friction(refusal: Refusal) -> Span | None:
+def _friction(refusal: JudgedCase) -> Span | None:
     case = refusal.case
     if case.terrain.friction is not None or case.terrain.soil is not None or case.options.soil:
         return None  # the ground has its own
@@ -264,13 +247,13 @@ def _friction(refusal: Refusal) -> Span | None:
     return Span(now, (MOST_FRICTION,)) if now < MOST_FRICTION else None
 
 
-def _torque(refusal: Refusal) -> Span:
+def _torque(refusal: JudgedCase) -> Span:
     told = refusal.case.options.max_torque
     now = refusal.case.rover.wheel.max_torque if told is None else told
     return Span(now, (MOST_TORQUE * now,))
 
 
-def _rock(refusal: Refusal) -> Span | None:
+def _rock(refusal: JudgedCase) -> Span | None:
     """Return by how much the ground below the highest wheel may be cut down [m]."""
     heights = refusal.case.terrain.elevation[_disc(refusal.case, refusal)]
     heights = heights[np.isfinite(heights)]
@@ -278,7 +261,7 @@ def _rock(refusal: Refusal) -> Span | None:
     return Span(0.0, (height,)) if height > 0.0 else None
 
 
-def _disc(case: Case, refusal: Refusal) -> Any:
+def _disc(case: Case, refusal: JudgedCase) -> Any:
     """Return the mask (ny, nx) of the cells around the place of the failure."""
     terrain, (x, y) = case.terrain, refusal.place_on_ground
     ny, nx = terrain.elevation.shape
@@ -287,13 +270,13 @@ def _disc(case: Case, refusal: Refusal) -> Any:
     return np.hypot(*np.meshgrid(columns, rows)) <= ROCK_RADIUS * case.rover.wheel.radius
 
 
-def _lower_rock(case: Case, refusal: Refusal, depth: float) -> Case:
+def _lower_rock(case: Case, refusal: JudgedCase, depth: float) -> Case:
     disc, heights = _disc(case, refusal), case.terrain.elevation.copy()
     heights[disc] = np.minimum(heights[disc], np.nanmax(heights[disc]) - depth)
     return replace(case, terrain=replace(case.terrain, elevation=heights))
 
 
-def _describe_rock(refusal: Refusal, depth: float) -> str:
+def _describe_rock(refusal: JudgedCase, depth: float, _now: float) -> str:
     x, y = refusal.place_on_ground
     return f"The ground at ({x:.2f}, {y:.2f}) would have to be {100.0 * depth:.0f} cm lower"
 
@@ -301,19 +284,18 @@ def _describe_rock(refusal: Refusal, depth: float) -> str:
 def _limit(row: Limit) -> Lever:
     """Return the lever that relaxes a limit of the rover file."""
 
-    def settings(refusal: Refusal) -> Span | None:
+    def settings(refusal: JudgedCase) -> Span | None:
         now = float(getattr(refusal.case.rover.limits, row.reads))
-        if row.code not in refusal.judged.verdict.codes:
+        if row.code not in refusal.verdict.codes:
             return None
         return Span(now, (MOST_RELAXED * now if row.sense == Sense.MOST else 0.0,))
 
-    def apply(case: Case, _refusal: Refusal, bound: float) -> Case:
+    def apply(case: Case, _refusal: JudgedCase, bound: float) -> Case:
         changed: dict[str, Any] = {row.reads: bound}
         limits = replace(case.rover.limits, **changed)
         return replace(case, rover=replace(case.rover, limits=limits))
 
-    def words(refusal: Refusal, bound: float) -> str:
-        now = float(getattr(refusal.case.rover.limits, row.reads))
+    def words(_refusal: JudgedCase, bound: float, now: float) -> str:
         name = row.reads.replace("_", " ")
         return (
             f"A limit of {row.unit.write(bound)} for {name} would do, in place of "
@@ -329,7 +311,7 @@ def _limit(row: Limit) -> Lever:
 LEVERS: tuple[Lever, ...] = (
     Lever(
         "policy", "", _policies, lambda case, _refusal, policy: case.change(policy=policy),
-        lambda _refusal, policy: TORQUES[policy],
+        lambda _refusal, policy, _now: TORQUES[policy],
     ),
     _arm_joint(1, "Lift the arm by {}", "Lower the arm by {}"),
     _arm_joint(0, "Swing the arm by {} to the right", "Swing the arm by {} to the left"),
@@ -339,10 +321,10 @@ LEVERS: tuple[Lever, ...] = (
         _describe_payload,
     ),
     Lever(
-        "shift", "m", _aside(ASIDE),
+        "shift", "m", _aside,
         _with_path(lambda case, refusal, offset: shift_path(
             case.poses, refusal.place, offset, case.rover.wheelbase)),
-        lambda refusal, offset:
+        lambda refusal, offset, _now:
             f"Drive {abs(offset):.2f} m further {_side(offset)} around {_at(refusal)}",
         changes_path=True,
     ),
@@ -350,14 +332,14 @@ LEVERS: tuple[Lever, ...] = (
         "approach_angle", "rad", _askew,
         _with_path(lambda case, refusal, angle: turn_path(
             case.poses, refusal.place, angle, case.rover.wheelbase)),
-        lambda refusal, angle: f"Cross the place at {_at(refusal)} at an angle of "
+        lambda refusal, angle, _now: f"Cross the place at {_at(refusal)} at an angle of "
             f"{np.degrees(abs(angle)):.0f} degrees to the {_side(angle)}",
         changes_path=True,
     ),
     Lever(
-        "curve", "m", _aside(ASIDE),
+        "curve", "m", _aside,
         _with_path(lambda case, _refusal, offset: bend_path(case.poses, offset)),
-        lambda _refusal, offset:
+        lambda _refusal, offset, _now:
             f"Drive a curve that leads {abs(offset):.2f} m to the {_side(offset)}",
         changes_path=True,
     ),
@@ -365,29 +347,29 @@ LEVERS: tuple[Lever, ...] = (
         "turn_on_the_spot", "m", _on_the_spot,
         _with_path(lambda case, refusal, offset: pass_by(
             case.poses, refusal.place, offset, swing_radius(case.rover), _spacing(case))),
-        lambda refusal, offset: f"Turn on the spot, pass {abs(offset):.2f} m {_side(offset)} of "
-            f"the place at {_at(refusal)}, stop and turn on the spot to the goal",
+        lambda refusal, offset, _now: f"Turn on the spot, pass {abs(offset):.2f} m "
+            f"{_side(offset)} of the place at {_at(refusal)}, stop and turn on the spot to "
+            "the goal",
         changes_path=True, keeps_rows=False,
     ),
     Lever(
-        "path_around", "m", _around, lambda case, refusal, _value: _drive_around(case, refusal),
-        _describe_way,
+        "path_around", "m", _around,
+        _with_path(lambda _case, refusal, _length: refusal.path_around), _describe_way,
         changes_path=True, keeps_rows=False,
     ),
     Lever(
         "backward", "", _backward, _reverse,
-        lambda _refusal, _value: "Turn round and drive it backwards", keeps_rows=False,
+        lambda _refusal, _value, _now: "Turn round and drive it backwards", keeps_rows=False,
     ),
     Lever(
         "friction", "", _friction, lambda case, _refusal, mu: case.change(friction=mu),
-        lambda refusal, mu: f"A friction of {mu:.2f} would do; "
-            f"{mu - _friction(refusal).now:.2f} is missing",  # type: ignore[union-attr]
+        lambda _refusal, mu, now: f"A friction of {mu:.2f} would do; {mu - now:.2f} is missing",
         needs_others=True,
     ),
     Lever(
         "max_torque", "N m", _torque, lambda case, _refusal, most: case.change(max_torque=most),
-        lambda refusal, most: f"Motors of {most:.2f} N m would do; "
-            f"{most - _torque(refusal).now:.2f} N m are missing",
+        lambda _refusal, most, now: f"Motors of {most:.2f} N m would do; "
+            f"{most - now:.2f} N m are missing",
         needs_others=True,
     ),
     Lever(

@@ -8,7 +8,6 @@ from rover_physics.names import WHEEL_POSITIONS
 from rover_physics.numerics.plain_values import to_plain
 from rover_planner.advice.case import JudgedCase
 from rover_planner.advice.levers import Lever
-from rover_planner.advice.refusal import Refusal
 
 TELLING_LOAD = 0.01
 """Least change of an axle's load that is told [share of the weight]."""
@@ -27,21 +26,12 @@ class SetLever:
     now: Any
     """Its value in the refused case."""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the lever as JSON types."""
-        return {
-            "name": self.lever.name,
-            "value": self.value,
-            "unit": self.lever.unit,
-            "from": self.now,
-        }
-
 
 @dataclass(frozen=True, eq=False)
 class Remedy:
     """Levers whose setting makes a refused path pass, as judged."""
 
-    refusal: Refusal
+    refusal: JudgedCase
     """The refused path."""
     levers: tuple[SetLever, ...]
     """The levers, one or a few."""
@@ -71,7 +61,7 @@ class Remedy:
     @property
     def extra_distance(self) -> float:
         """Length of the path above that of the refused one [m]."""
-        return float(self.judged.distance[-1] - self.refusal.judged.distance[-1])
+        return float(self.judged.distance[-1] - self.refusal.distance[-1])
 
     def describe_costs(self) -> str:
         """Return time, way, energy and chance in words."""
@@ -98,7 +88,7 @@ class Remedy:
         todo = " and ".join(
             words if k == 0 else words[0].lower() + words[1:]
             for k, words in enumerate(
-                one.lever.words(self.refusal, one.value) for one in self.levers
+                one.lever.words(self.refusal, one.value, one.now) for one in self.levers
             )
         )
         use, distance = self.judged.largest_use
@@ -111,9 +101,7 @@ class Remedy:
         """Return how the load of the axle changes most where the refused path fails."""
         if self.judged.case.poses is not self.refusal.case.poses:
             return ""
-        old, new = (
-            one.loads_of_axles(self.refusal.place) for one in (self.refusal.judged, self.judged)
-        )
+        old, new = (one.loads_of_axles(self.refusal.place) for one in (self.refusal, self.judged))
         change = {name: new[name] - old[name] for name in WHEEL_POSITIONS}
         name = max(change, key=lambda one: abs(change[one]))
         if not abs(change[name]) > TELLING_LOAD * self.refusal.case.rover.weight:
@@ -126,11 +114,14 @@ class Remedy:
         case, use = self.judged.case, self.judged.largest_use[0]
         has_path = case.poses is not self.refusal.case.poses
         found = {
-            "levers": [one.to_dict() for one in self.levers],
+            "levers": [
+                {"name": k.lever.name, "value": k.value, "unit": k.lever.unit, "from": k.now}
+                for k in self.levers
+            ],
             "words": self.describe(),
             "options": self.options(),
             "largest_use": use,
-            "use_before": self.refusal.judged.largest_use[0],
+            "use_before": self.refusal.largest_use[0],
             "chance": self.judged.verdict.failure_chance,
             "extra_time": self.extra_time,
             "extra_energy": self.extra_energy,

@@ -18,7 +18,6 @@ from rover_physics.limits.table import CHANCE, TRAPPED
 from rover_physics.names import SERVO
 from rover_planner.advice.case import Case, JudgedCase
 from rover_planner.advice.levers import LEVERS, Choice, Lever, Span
-from rover_planner.advice.refusal import Refusal
 from rover_planner.advice.remedy import Remedy, SetLever
 
 TOLERANCE = 0.02
@@ -46,7 +45,7 @@ class FailedPlace:
 class Combination:
     """A few levers of a refused path, and their ranges."""
 
-    refusal: Refusal
+    refusal: JudgedCase
     """The refused path."""
     levers: tuple[Lever, ...]
     """The levers."""
@@ -73,7 +72,7 @@ class Combination:
         return case
 
 
-def seek_remedies(refusal: Refusal) -> Iterator[tuple[tuple[Lever, ...], Remedy | None]]:
+def seek_remedies(refusal: JudgedCase) -> Iterator[tuple[tuple[Lever, ...], Remedy | None]]:
     """Yield all trials: one lever after the other, and several of them if none helps alone.
 
     Each is a few levers, and the remedy of their least setting that passes, if there is one. Only
@@ -109,11 +108,11 @@ def can_combine(levers: Sequence[Lever]) -> bool:
 class _Seeker:
     """Tries settings of levers on a refused path, and remembers where it failed."""
 
-    def __init__(self, refusal: Refusal):
+    def __init__(self, refusal: JudgedCase):
         self._refusal = refusal
         self._failed: list[FailedPlace] = []
         """Places where cases failed, the last first."""
-        self._note(refusal.judged)
+        self._note(refusal)
 
     def seek(self, asked: Combination, steps: Sequence[float]) -> Remedy | None:
         """Return the remedy of levers in steps [share of the range], None if there is none."""

@@ -14,9 +14,6 @@ from rover_planner.command.shared import argument, option, read_arm_angles
 if TYPE_CHECKING:
     from rover_planner.advice.advise import Advice
 
-SPACING = 0.02
-"""Distance of the waypoints [m] between a start and a goal."""
-
 
 def advise(
     rover: shared.RoverName,
@@ -30,10 +27,7 @@ def advise(
     friction: shared.Friction = None,
     max_torque: shared.MaxTorque = None,
     soil: shared.SoilName = None,
-    arm: Annotated[
-        list[str] | None,
-        option("NAME=RAD", "Angle of a joint of the arm in rad; give all; default: stowed."),
-    ] = None,
+    arm: shared.ArmAngles = None,
     payload: shared.Payload = None,
     sigmas: shared.Sigmas = 3.0,
     accepted_chance: shared.AcceptedChance = ACCEPTED_CHANCE,
@@ -52,6 +46,7 @@ def advise(
     from rover_physics.terrain.grid import load_terrain
     from rover_planner.advice.advise import grow_within, path_of
     from rover_planner.advice.case import Case
+    from rover_planner.advice.levers import SPACING
     from rover_planner.command.prediction_files import read_poses
     from rover_planner.nodes.warm_up import search_paths
     from rover_planner.planning.answering.budget import Budget

@@ -41,10 +41,7 @@ def predict(
         ),
     ] = 0.0,
     soil: shared.SoilName = None,
-    arm: Annotated[
-        list[str] | None,
-        option("NAME=RAD", "Angle of a joint of the arm in rad; give all; default: stowed."),
-    ] = None,
+    arm: shared.ArmAngles = None,
     payload: shared.Payload = None,
     tool_force: Annotated[
         shared.Vector | None, option("FX FY FZ", "Force on the arm's tip in N, body frame.")
@@ -87,8 +84,8 @@ def predict(
     from rover_planner.command.prediction_files import (
         read_curvature,
         read_poses,
+        write_parts,
         write_prediction,
-        writing_parts,
     )
     from rover_planner.planning.assumptions import assume
     from rover_planner.shell.progress import show_progress
@@ -133,14 +130,8 @@ def predict(
         if len(path) > MAX_IN_MEMORY and not (classes or chance):
             from rover_physics.traversability.judge import PartwiseJudge
 
-            with writing_parts(out, len(path), assumed) as file:
-                judge = PartwiseJudge(
-                    model, ground, path, options, curvature=curvature, sigmas=sigmas
-                )
-                for part in judge.parts():
-                    file.take(part)
-                verdict = judge.verdict()
-                file.close(verdict, find_ranges())
+            judge = PartwiseJudge(model, ground, path, options, curvature=curvature, sigmas=sigmas)
+            verdict = write_parts(out, len(path), judge, find_ranges, assumed)
         else:
             asked = accepted_chance if chance else None
             if curvature is None:

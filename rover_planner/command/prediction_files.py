@@ -2,8 +2,7 @@
 """Reads and writes the files of the `predict` command: poses and predictions."""
 
 import math
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +21,7 @@ from rover_planner.planning.assumptions import Assumptions, read_assumptions, wr
 
 if TYPE_CHECKING:
     from rover_physics.traversability.classification import ClassifiedWaypoint
+    from rover_physics.traversability.judge import PartwiseJudge
     from rover_physics.traversability.torque_ranges import TorqueRanges
 
 Shape = tuple[int, ...]
@@ -182,45 +182,38 @@ def write_prediction(
         write_npz(path, arrays, compressed=False)
 
 
-@contextmanager
-def writing_parts(
-    path: Path, count: int, assumptions: Assumptions | None = None
-) -> Iterator["PartsFile"]:
-    """Write a file as `write_prediction`, for a path that is too long to be kept in memory.
+def write_parts(
+    path: Path,
+    count: int,
+    judge: "PartwiseJudge",
+    find_ranges: "Callable[[], TorqueRanges | None]",
+    assumptions: Assumptions | None = None,
+) -> Verdict:
+    """Write a file as `write_prediction`, of a path that is too long to be kept in memory.
 
     Args:
         path: The file; an existing one is overwritten. Temporary files are made beside it.
         count: Number of waypoints.
+        judge: Predicts and judges them part by part.
+        find_ranges: Called at the end for the torque ranges.
         assumptions: As for `write_prediction`.
+
+    Returns:
+        The verdict on all waypoints.
 
     Raises:
         PlanningError: A file cannot be written.
     """
     with errors_of(path, PlanningError), NpzParts(path.absolute().parent, count) as parts:
-        yield PartsFile(path, parts, assumptions)
-
-
-class PartsFile:
-    """A file of a prediction whose waypoints come part by part."""
-
-    def __init__(self, path: Path, parts: NpzParts, assumptions: Assumptions | None):
-        self._path, self._parts, self._assumptions = path, parts, assumptions
-        self._last: PathPrediction | None = None
-
-    def take(self, prediction: PathPrediction) -> None:
-        """Take the prediction of the next waypoints."""
-        self._parts.add(_rows_of(prediction))
-        self._last = prediction
-
-    def close(self, verdict: Verdict, ranges: "TorqueRanges | None" = None) -> None:
-        """Write the file with the verdict on all waypoints; arguments as `write_prediction`."""
-        assert self._last is not None
+        for prediction in judge.parts():
+            parts.add(_rows_of(prediction))
+        verdict = judge.verdict()
         longest = max(1, max(map(len, verdict.reasons)))
-        for first in range(0, len(verdict.reasons), BLOCK):
+        for first in range(0, count, BLOCK):
             block = np.array(verdict.reasons[first : first + BLOCK], f"<U{longest}")
-            self._parts.add({"reason": block})
-        summary = _summary_of(verdict, self._last, self._assumptions, ranges)
-        self._parts.write(self._path, summary)
+            parts.add({"reason": block})
+        parts.write(path, _summary_of(verdict, prediction, assumptions, find_ranges()))
+    return verdict
 
 
 def _rows_of(prediction: PathPrediction) -> dict[str, Any]:

@@ -61,11 +61,11 @@ def reachable(
     report = {
         "cells": area.cells,
         "reason": "" if area.cells else explain_no_area(opened, area.start),
-        "area": round(area.area, 6),
+        "area": round(area.cells * notes.cell**2, 6),
         "cells_without_return": area.reached - area.cells,
         "longest": None if area.longest is None else round(area.longest, 3),
         "farthest": end,
-        "turns": "judged" if notes.turns else "assumed",
+        "turns": "judged" if notes.description["turns"] else "assumed",
         "chunks_missing": math.prod(notes.layout.chunks) - len(opened.find_finished()),
     }
     typer.echo(json.dumps(report))

@@ -56,6 +56,10 @@ SoilName = Annotated[
 Payload = Annotated[
     float | None, option("KG", "Mass at the arm's tip in kg; default: the rover's.")
 ]
+ArmAngles = Annotated[
+    list[str] | None,
+    option("NAME=RAD", "Angle of a joint of the arm in rad; give all; default: stowed."),
+]
 Sigmas = Annotated[
     float,
     option("K", "Standard deviations to allow for where the map has elevation_std; 0: none."),

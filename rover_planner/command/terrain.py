@@ -24,7 +24,7 @@ def terrain(
 ) -> None:
     """Make a Mars-like terrain with fractal relief, craters and rocks."""
     from rover_physics.terrain.grid import save_terrain
-    from rover_planner.maps.summary import describe_terrain
+    from rover_planner.maps.known_map import describe_terrain
     from rover_planner.shell.progress import show_progress
     from rover_planner.worlds.mars_terrain import make_mars_terrain
 

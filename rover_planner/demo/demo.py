@@ -30,7 +30,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
 from rover_planner.demo.child_process import ChildProcess, stopping_children
 from rover_planner.errors import DemoError, PlanningError
-from rover_planner.maps.summary import describe_terrain
+from rover_planner.maps.known_map import describe_terrain
 from rover_planner.planning.goals import Mission, choose_mission
 from rover_planner.shell.progress import Steps
 from rover_planner.shell.run_program import EXIT_OK

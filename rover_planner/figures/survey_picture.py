@@ -28,7 +28,7 @@ from rover_planner.survey.layers import (
     count_skipped,
     read_drawn_classes,
 )
-from rover_planner.survey.reachable_area import ReachableArea
+from rover_planner.survey.reachable import ReachableArea
 from rover_planner.survey.store import SurveyStore
 
 _MAX_CELLS = 1200
@@ -69,12 +69,13 @@ def draw_reachable(path: Path, store: SurveyStore, area: ReachableArea) -> None:
     distance = area.distance[::every, ::every]
     shown = np.where(np.isfinite(distance), distance, np.nan)
     longest = area.longest or 0.0
-    title = f"reached and returned from: {area.area:.1f} m2, longest path {longest:.1f} m"
+    (left, low), cell = store.notes.frame.origin, store.notes.cell
+    size = area.cells * cell**2
+    title = f"reached and returned from: {size:.1f} m2, longest path {longest:.1f} m"
     colours = matplotlib.colormaps["viridis"]
     shares = (0.0, 0.5, 1.0) if longest > 0.0 else ()
     labels = [(f"path of {share * longest:.1f} m", colours(share)) for share in shares]
-    left, low = store.notes.frame.origin
-    start = left + area.start[1] * area.cell, low + area.start[0] * area.cell
+    start = left + area.start[1] * cell, low + area.start[0] * cell
     _draw(path, store, shown, (colours, 0.0, max(longest, 1e-9)), labels, title, start)
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The map that a traverse server knows: its terrain, where it comes from, and its age."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -90,3 +91,13 @@ def stamp_text(stamp: int | None) -> str:
     if stamp is None:
         return ""
     return f"{stamp // NANOSECONDS}.{stamp % NANOSECONDS:09d}"
+
+
+def describe_terrain(terrain: Terrain) -> str:
+    """Return cells, cell size [m] and known share, such as "480 x 480 cells of 0.05 m, ...".
+
+    The share is rounded down to 0.1 %, so that 100 % means that every cell is known.
+    """
+    rows, columns = terrain.elevation.shape
+    known = math.floor(1000.0 * np.isfinite(terrain.elevation).mean()) / 10.0
+    return f"{columns} x {rows} cells of {terrain.resolution:g} m, {known:g} % known"

@@ -18,6 +18,8 @@ MAX_OFF_CENTRE = 0.02
 is taken without interpolation [cells]."""
 MAX_FINER = 0.5
 """Size of a map's cells relative to the grid's below which several of them share a cell."""
+SAME_PLACE = 1e-6
+"""Distance from the centre of a cell at which its height alone counts [cells]."""
 UNKNOWN, LOADED, CONTACT, FOOTPRINT = range(4)
 """Sources of cells: none, a loaded map, a wheel that stands there, and the ground assumed between
 and around the wheels. Higher numbers are topics."""
@@ -41,6 +43,7 @@ LASTING = ("friction", "ground_class")
 """Layers whose values stay where a newer map has none, and are never interpolated."""
 
 Layer = NDArray[Any]
+Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,21 +192,48 @@ def _copy(terrain: Terrain, grid: CellGrid, box: CellBox) -> Patch:
 
 
 def _interpolate(terrain: Terrain, grid: CellGrid, box: CellBox) -> Patch:
-    x, y = grid.places(
-        box.column + np.arange(box.columns), (box.row + np.arange(box.rows))[:, None]
-    )
-    bounds = terrain.bounds
-    x, y = np.clip(x, *bounds[:2]), np.clip(y, *bounds[2:])
-    layers: dict[str, Layer] = {"elevation": terrain.elevation_at(x, y)}
-    if terrain.elevation_std is not None:
-        std = replace(terrain, elevation=terrain.elevation_std, elevation_std=None)
-        layers["elevation_std"] = np.asarray(std.elevation_at(x, y))
-    j, i = (np.rint(at).astype(np.intp) for at in grid_of(terrain).coordinates(x, y))
-    for name in (*LASTING, "soil"):
-        layer = getattr(terrain, name)
-        if layer is not None:
-            layers[name] = layer[i, j]
-    return Patch(box, layers)
+    rows = (box.row + np.arange(box.rows))[:, None]
+    places = grid.places(box.column + np.arange(box.columns), rows)
+    return Patch(box, sample_layers(terrain, *grid_of(terrain).coordinates(*places)))
+
+
+def sample_layers(terrain: Terrain, column: Floats, row: Floats) -> dict[str, Layer]:
+    """Return the layers of a map at fractional columns and rows.
+
+    Heights and deviations are interpolated bilinearly, others are those of the nearest cell. They
+    are unknown off the map, and where a cell that counts is unknown.
+    """
+    ny, nx = terrain.elevation.shape
+    below, above, up, on_rows = _bracket(row, ny)
+    left, right, along, on_columns = _bracket(column, nx)
+    layers: dict[str, Layer] = {}
+    for name, layer in layers_of(terrain).items():
+        kind, unknown = EMPTY[name]
+        if name in ("elevation", "elevation_std"):
+            found = np.zeros(np.broadcast_shapes(below.shape, left.shape))
+            for j, of_row in ((below, 1.0 - up), (above, up)):
+                for i, of_column in ((left, 1.0 - along), (right, along)):
+                    share = of_row * of_column
+                    found += np.where(share == 0.0, 0.0, share * layer[j, i])
+        else:
+            found = layer[np.where(up < 0.5, below, above), np.where(along < 0.5, left, right)]
+        layers[name] = np.where(on_rows & on_columns, found, unknown).astype(kind)
+    return layers
+
+
+def _bracket(
+    place: Floats, count: int
+) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats, NDArray[np.bool_]]:
+    """Return the lower and upper cell around fractional indices, of `count` cells.
+
+    The third is how far they are beyond the lower one, 0 to 1, the last whether they are on the
+    map.
+    """
+    whole = np.rint(place)
+    place = np.where(np.abs(place - whole) <= SAME_PLACE, whole, place)
+    inside = (place >= 0.0) & (place <= count - 1)
+    first = np.clip(np.floor(place), 0, max(count - 2, 0)).astype(np.intp)
+    return first, np.minimum(first + 1, count - 1), place - first, inside
 
 
 def _combine(terrain: Terrain, grid: CellGrid, box: CellBox) -> Patch:

@@ -70,11 +70,6 @@ class LivingMap:
         """True if there is a loaded map."""
         return self._loaded is not None
 
-    @property
-    def has_cells(self) -> bool:
-        """True if there is any map."""
-        return self._window is not None
-
     def load(self, terrain: Terrain, time: float) -> None:
         """Start over with a loaded map; time [s] is that of its loading."""
         self._clear(terrain)
@@ -124,7 +119,8 @@ class LivingMap:
 
     def _lay(self, terrain: Terrain, centre: tuple[float, float] | None) -> tuple[Patch, Patch]:
         """Return a window with room for a local map, and the map on its cells."""
-        self._choose_grid(terrain)
+        if self.grid_for(terrain) is None:
+            self._grid, self._window = grid_of(terrain), None
         assert self._grid is not None
         self._rolls = self.values.map_window > 0.0
         if centre is None:
@@ -223,10 +219,6 @@ class LivingMap:
             and terrain.resolution < FINER * self._grid.resolution
         )
         return None if is_finer else self._grid
-
-    def _choose_grid(self, terrain: Terrain) -> None:
-        if self.grid_for(terrain) is None:
-            self._grid, self._window = grid_of(terrain), None
 
     def _room_for(self, box: CellBox, centre: tuple[float, float]) -> Patch:
         """Return the window with room for a box, or around a place of the rover [m]."""

@@ -5,7 +5,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.maps.ground_beneath import GroundBeneath, Standing, find_ground_beneath
 from rover_planner.maps.living_map import LivingMap, MapSnapshot
-from rover_planner.maps.moved_map import MapMove, move_map
+from rover_planner.maps.moved_map import Move, move_map
 from rover_planner.parameters.traverse_server import AUTO, MERGE, TraverseServerParameters
 
 
@@ -38,7 +38,7 @@ class MapKeeper:
         self._living.load(terrain, time)
         return self._filled(standing, time)
 
-    def place(self, terrain: Terrain, move: MapMove) -> Terrain:
+    def place(self, terrain: Terrain, move: Move) -> Terrain:
         """Return a local map of another frame, moved to that of this map and onto its cells.
 
         Raises:
@@ -75,7 +75,7 @@ class MapKeeper:
         Raises:
             PlanningError: The window would be too large.
         """
-        if not (self._living.values.fill_under_rover and self._living.has_cells):
+        if not (self._living.values.fill_under_rover and self._living.grid):
             return None
         return self._living.snapshot() if self._fill(standing, time) else None
 

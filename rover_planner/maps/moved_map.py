@@ -5,54 +5,41 @@ Ground is never made up: a cell is known only if all cells that its height comes
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rover_physics.numerics.read_only import seal_array
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.terrain_file import MAX_CELLS
 from rover_planner.errors import PlanningError
 from rover_planner.maps.cells import CellBox, CellGrid, grid_of
-from rover_planner.maps.layers import LASTING, MAX_FINER, MAX_OFF_CENTRE, layers_of
+from rover_planner.maps.layers import (
+    MAX_FINER,
+    MAX_OFF_CENTRE,
+    SAME_PLACE,
+    Floats,
+    layers_of,
+    sample_layers,
+)
 
 MAX_LEAN = 0.005
 """Largest lean of a map's frame [rad]. Heights follow it; what neglects it is that cells move
 sideways, by 5 mm for each metre of height."""
 NO_LEAN = 1e-9
 """Lean that is a rounding error [rad]."""
-SAME_PLACE = 1e-6
-"""Distance from the centre of a cell at which its height alone counts [cells]."""
 BAND_CELLS = 16_384
 """Cells that are laid at once, as numpy keeps Python's lock meanwhile, which questions need."""
 
-Floats = NDArray[np.float64]
 
-
-@dataclass(frozen=True, eq=False)
-class MapMove:
-    """The place of a map's frame in that of the server: a point p is at R p + t there."""
-
-    rotation: Floats
-    """(3, 3) R."""
-    translation: Floats
-    """(3,) t [m]."""
-
-    @property
-    def yaw(self) -> float:
-        """Turn about z [rad]."""
-        return math.atan2(self.rotation[1, 0], self.rotation[0, 0])
-
-    @property
-    def lean(self) -> float:
-        """Angle between the two z axes [rad]."""
-        return math.atan2(math.hypot(*self.rotation[2, :2]), self.rotation[2, 2])
+Move = tuple[Floats, Floats]
+"""Place of a map's frame in that of the server, rotation R (3, 3) and translation t (3,) [m]: a
+point p is at R p + t there."""
 
 
 def move_map(
-    terrain: Terrain, move: MapMove, grid: CellGrid | None = None, max_cells: int = MAX_CELLS
+    terrain: Terrain, move: Move, grid: CellGrid | None = None, max_cells: int = MAX_CELLS
 ) -> Terrain:
     """Move a map to another frame.
 
@@ -71,35 +58,34 @@ def move_map(
     Raises:
         PlanningError: The frame leans, or the turned map is too large or has no known cell.
     """
-    if move.lean > MAX_LEAN:
+    rotation, translation = move
+    yaw = math.atan2(rotation[1, 0], rotation[0, 0])
+    lean = math.atan2(math.hypot(*rotation[2, :2]), rotation[2, 2])
+    if lean > MAX_LEAN:
         raise PlanningError(
-            f"the frame of the map leans by {move.lean:.3g} rad (roll and pitch); it must be "
+            f"the frame of the map leans by {lean:.3g} rad (roll and pitch); it must be "
             f"level within {MAX_LEAN:g} rad, as odom is"
         )
-    upright = replace(terrain, elevation=_lean_heights(terrain, move))
-    centre, moved = _find_centres(terrain, move)
-    if abs(move.yaw) * max(terrain.elevation.shape) <= MAX_OFF_CENTRE:
+    upright = replace(terrain, elevation=_lean_heights(terrain, move, lean))
+    x0, x1, y0, y1 = terrain.bounds
+    centre = np.array([0.5 * (x0 + x1), 0.5 * (y0 + y1)])
+    height = 0.0 if lean <= NO_LEAN else float(np.nanmedian(terrain.elevation))
+    moved = (rotation @ (*centre, height) + translation)[:2]
+    if abs(yaw) * max(terrain.elevation.shape) <= MAX_OFF_CENTRE:
         x, y = (terrain.origin + (moved - centre)).tolist()
         return replace(upright, origin=(x, y))
     if grid is None or terrain.resolution < MAX_FINER * grid.resolution:
         grid = CellGrid((0.0, 0.0), terrain.resolution)
-    return _lay_turned(upright, moved, move.yaw, grid, max_cells)
+    return _lay_turned(upright, moved, yaw, grid, max_cells)
 
 
-def _find_centres(terrain: Terrain, move: MapMove) -> tuple[Floats, Floats]:
-    """Return x, y [m] of the middle of a map, in its own frame and in the other one."""
-    x0, x1, y0, y1 = terrain.bounds
-    centre = np.array([0.5 * (x0 + x1), 0.5 * (y0 + y1)])
-    height = 0.0 if move.lean <= NO_LEAN else float(np.nanmedian(terrain.elevation))
-    return centre, (move.rotation @ (*centre, height) + move.translation)[:2]
-
-
-def _lean_heights(terrain: Terrain, move: MapMove) -> Floats:
-    """Return the heights of the cells in the other frame."""
-    z, up = terrain.elevation, float(move.translation[2])
-    if move.lean <= NO_LEAN:
+def _lean_heights(terrain: Terrain, move: Move, lean: float) -> Floats:
+    """Return the heights of the cells in the other frame, which lean by an angle [rad]."""
+    (rotation, translation), z = move, terrain.elevation
+    up = float(translation[2])
+    if lean <= NO_LEAN:
         return z if up == 0.0 else seal_array(z + up)
-    along, across, upright = move.rotation[2]
+    along, across, upright = rotation[2]
     ny, nx = z.shape
     x, y = grid_of(terrain).places(np.arange(nx), np.arange(ny)[:, None])
     return seal_array(upright * z + (along * x + across * y + up))
@@ -116,14 +102,18 @@ def _lay_turned(
             f"the map turned into its frame would have {box.rows} x {box.columns} cells; "
             f"at most {max_cells} are taken"
         )
-    layers = {name: layer for name, layer in layers_of(terrain).items() if name != "soil"}
-    laid = {name: np.full((box.rows, box.columns), np.nan) for name in layers}
+    own, (ny, nx) = replace(terrain, soil=None, soil_names=()), terrain.elevation.shape
+    laid = {name: np.full((box.rows, box.columns), np.nan) for name in layers_of(own)}
     band = max(BAND_CELLS // max(box.columns, 1), 1)
     for first in range(0, box.rows, band):
         rows = slice(first, min(first + band, box.rows))
-        around = _find_around(terrain, middle, turn, grid, box, rows)
-        for name, layer in layers.items():
-            laid[name][rows] = _sample(layer, *around, nearest=name in LASTING)
+        columns, lines = np.arange(box.columns), np.arange(rows.start, rows.stop)[:, None]
+        x, y = grid.places(box.column + columns, box.row + lines)
+        dx, dy = (x - middle[0]) / terrain.resolution, (y - middle[1]) / terrain.resolution
+        column = turn[0] * dx + turn[1] * dy + 0.5 * (nx - 1)
+        row = turn[0] * dy - turn[1] * dx + 0.5 * (ny - 1)
+        for name, layer in sample_layers(own, column, row).items():
+            laid[name][rows] = layer
     if not np.isfinite(laid["elevation"]).any():
         raise PlanningError(
             "the map is turned against its cells, and none of them has four known ones around"
@@ -145,50 +135,3 @@ def _find_box(
     column, row = (math.ceil(value - SAME_PLACE) for value in low)
     last_column, last_row = (math.floor(value + SAME_PLACE) for value in high)
     return CellBox.between((row, column), (last_row + 1, last_column + 1))
-
-
-Bracket = tuple[NDArray[np.intp], NDArray[np.intp], Floats, NDArray[np.bool_]]
-"""Lower and upper cell of some places, how far they are beyond the lower one, 0 to 1, and whether
-they are on the map."""
-
-
-def _find_around(
-    terrain: Terrain, middle: Floats, turn: tuple[float, float], grid: CellGrid, box: CellBox,
-    rows: slice,
-) -> tuple[Bracket, Bracket]:  # fmt: skip
-    """Return rows and columns of a map around the cells of some rows of a box."""
-    step, (cosine, sine) = terrain.resolution, turn
-    columns = box.column + np.arange(box.columns)
-    lines = box.row + np.arange(rows.start, rows.stop)[:, None]
-    x = (grid.anchor[0] - middle[0]) + grid.resolution * columns
-    y = (grid.anchor[1] - middle[1]) + grid.resolution * lines
-    ny, nx = terrain.elevation.shape
-    column = (cosine * x + sine * y) / step + 0.5 * (nx - 1)
-    row = (cosine * y - sine * x) / step + 0.5 * (ny - 1)
-    return _bracket(row, ny), _bracket(column, nx)
-
-
-def _bracket(place: Floats, count: int) -> Bracket:
-    """Return the cells around fractional indices, of `count` cells."""
-    whole = np.rint(place)
-    place = np.where(np.abs(place - whole) <= SAME_PLACE, whole, place)
-    inside = (place >= 0.0) & (place <= count - 1)
-    first = np.clip(np.floor(place), 0, max(count - 2, 0)).astype(np.intp)
-    return first, np.minimum(first + 1, count - 1), place - first, inside
-
-
-def _sample(layer: Floats, rows: Bracket, columns: Bracket, *, nearest: bool) -> Floats:
-    """Return the values of the nearest cells, or interpolated ones.
-
-    NaN where a cell that counts is not known, and off the map.
-    """
-    (below, above, up, on_rows), (left, right, along, on_columns) = rows, columns
-    if nearest:
-        found = layer[np.where(up < 0.5, below, above), np.where(along < 0.5, left, right)]
-    else:
-        found = np.zeros(below.shape)
-        for row, of_row in ((below, 1.0 - up), (above, up)):
-            for column, of_column in ((left, 1.0 - along), (right, along)):
-                share = of_row * of_column
-                found += np.where(share == 0.0, 0.0, share * layer[row, column])
-    return np.where(on_rows & on_columns, found, np.nan)

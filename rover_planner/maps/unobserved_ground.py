@@ -2,7 +2,6 @@
 """Ground under the belly that was never seen: its share of a path, and where it is met first."""
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -60,21 +59,17 @@ class ObservedGround:
         """
         if self._is_seen_around(rover, poses):
             return UnobservedShare(0.0, 0.0, -1, -1)
-        swept = np.zeros(self.kinds.shape, bool)
         poses, waypoints = self._spread_out(rover, poses)
-        near = self._is_near(rover, poses)
-        firsts = {SEEN: waypoints[~near][:1].tolist(), ASSUMED: waypoints[~near][:1].tolist()}
-        waypoints = waypoints[near]
-        for here, kinds, cells in self._kinds_below(rover, poses[near]):
-            swept[cells] = True
-            for best, found in firsts.items():  # a waypoint is bad from a kind beyond `best` on
-                found += waypoints[here][(kinds > best).any(axis=1)][:1].tolist()
+        worst, swept = self._look_below(rover, poses)
         counts = np.bincount(self.kinds[swept], minlength=3)
         if not counts.any():
             return UnobservedShare(1.0, 0.0, 0, 0)
         total, assumed = int(counts.sum()), int(counts[ASSUMED])
         unobserved = (assumed + int(counts[UNSEEN])) / total
-        first, beyond = (min(found, default=-1) for found in firsts.values())
+        first, beyond = (
+            int(waypoints[np.argmax(worst > best)]) if worst.max() > best else -1
+            for best in (SEEN, ASSUMED)
+        )
         return UnobservedShare(unobserved, assumed / total, first, beyond)
 
     def refused_below(
@@ -84,23 +79,10 @@ class ObservedGround:
 
         Ground off the map counts as never seen, as in `share`.
         """
-        refused = np.zeros(len(poses), bool)
         if rule == ALLOW or self._is_seen_around(rover, poses):
-            return refused
-        near = self._is_near(rover, poses)
-        refused[~near] = True
-        rows_near = np.flatnonzero(near)
+            return np.zeros(len(poses), bool)
         best = ASSUMED if rule == ALLOW_FOOTPRINT else SEEN
-        for here, kinds, _ in self._kinds_below(rover, poses[near]):
-            refused[rows_near[here]] = (kinds > best).any(axis=1)
-        return refused
-
-    def _is_near(self, rover: Rover, poses: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Return (n,) True for the poses at which the belly may be over the map."""
-        most = _corner_distance(rover) + self.terrain.resolution
-        x0, x1, y0, y1 = self.terrain.bounds
-        x, y, _ = poses.T
-        return (x >= x0 - most) & (x <= x1 + most) & (y >= y0 - most) & (y <= y1 + most)
+        return self._look_below(rover, poses)[0] > best
 
     def _is_seen_around(self, rover: Rover, poses: NDArray[np.float64]) -> bool:
         """Return whether all ground around a path is on the map and was seen."""
@@ -128,13 +110,13 @@ class ObservedGround:
         kept[-1] = True
         return poses[kept], np.flatnonzero(kept)
 
-    def _kinds_below(
+    def _look_below(
         self, rover: Rover, poses: NDArray[np.float64]
-    ) -> Iterator[tuple[slice, NDArray[np.uint8], tuple[NDArray[np.intp], ...]]]:
-        """Yield some poses, the kinds (k, m) of the ground below the belly, and cells of the map.
+    ) -> tuple[NDArray[np.uint8], NDArray[np.bool_]]:
+        """Return the worst kind (n,) of the ground below the belly at poses (n, 3).
 
-        The cells are the rows and columns of those below the belly there, without shape. Ground
-        off the map is UNSEEN.
+        Ground off the map is UNSEEN. The second is True for the cells (ny, nx) of the map that are
+        below the belly at any of them.
         """
         terrain, belly, (ny, nx) = self.terrain, rover.belly, self.kinds.shape
         step = 0.7 * terrain.resolution  # no cell is narrower than that across its diagonal
@@ -143,16 +125,23 @@ class ObservedGround:
             for low, high in (belly.x, belly.y)
         )
         u, v = (axis.ravel() for axis in np.meshgrid(along, across))
-        count = max(1, CHUNK // len(u))
-        for start in range(0, len(poses), count):
-            x, y, yaw = poses[start : start + count, :, None].transpose(1, 0, 2)
+        worst, swept = np.full(len(poses), UNSEEN, np.uint8), np.zeros(self.kinds.shape, bool)
+        most = _corner_distance(rover) + terrain.resolution
+        low, high = np.reshape(terrain.bounds, (2, 2)).T
+        near = np.flatnonzero(
+            ((poses[:, :2] >= low - most) & (poses[:, :2] <= high + most)).all(1)
+        )
+        for here in np.array_split(near, 1 + len(near) * len(u) // CHUNK):
+            x, y, yaw = poses[here, :, None].transpose(1, 0, 2)
             c, s = np.cos(yaw), np.sin(yaw)
             columns = (x + c * u - s * v - terrain.origin[0]) / terrain.resolution
             rows = (y + s * u + c * v - terrain.origin[1]) / terrain.resolution
             i, j = np.rint(rows).astype(np.intp), np.rint(columns).astype(np.intp)
             on_map = (i >= 0) & (i < ny) & (j >= 0) & (j < nx)
             kinds = np.where(on_map, self.kinds[i.clip(0, ny - 1), j.clip(0, nx - 1)], UNSEEN)
-            yield slice(start, start + len(i)), kinds, (i[on_map], j[on_map])
+            worst[here] = kinds.max(axis=1)
+            swept[i[on_map], j[on_map]] = True
+        return worst, swept
 
 
 def _corner_distance(rover: Rover) -> float:

@@ -12,7 +12,12 @@ from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
 from rover_physics.traversability.reach import ReachAnswer
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.questions import Answer, ReachCheck, ReachQuery
+from rover_planner.planning.answering.questions import (
+    Answer,
+    Question,
+    ReachQuery,
+    ReachRefusal,
+)
 from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.subscriptions import subscribe_to_requests
@@ -59,7 +64,7 @@ class ArmTopics:
             reply(response)
             self._log(answer.judgement)
 
-        self._desk.ask(ReachCheck("check_reach", "", self.query), send)
+        self._desk.ask(Question("check_reach", "", self.query.ask, ReachRefusal), send)
 
     def _log(self, answer: ReachAnswer) -> None:
         logger = self._node.get_logger()

@@ -18,9 +18,8 @@ from msg_adapters.results.grids import terrain_to_occupancy_grid
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.files.validation import show_file
-from rover_planner.maps.known_map import KnownMap
+from rover_planner.maps.known_map import KnownMap, describe_terrain
 from rover_planner.maps.map_file import MapFileError, MapLimits, open_map
-from rover_planner.maps.summary import describe_terrain
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.transforms import Rigid

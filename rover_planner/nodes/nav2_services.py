@@ -20,7 +20,12 @@ from rover_physics.errors import RoverError
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.planning.answering.budget import CANCELLED, STOPPING
 from rover_planner.planning.answering.judgement import PathJudgement
-from rover_planner.planning.answering.questions import Answer, BadQuestion, PathCheck, Question
+from rover_planner.planning.answering.questions import (
+    Answer,
+    Question,
+    ask_about_path,
+    ask_in_vain,
+)
 from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.path_geometry import next_given_poses
 from rover_planner.planning.verdict_report import IdentityReport
@@ -94,12 +99,11 @@ class Nav2Services:
         """
         path: Path = request.path
         about, stamp = describe_path(path)
-        question: Question
         try:
             given = self._read_path(path)
-            question = PathCheck("is_path_valid", about, given)
+            question = ask_about_path("is_path_valid", about, given)
         except RoverError as error:
-            question = BadQuestion("is_path_valid", about, str(error))
+            question = ask_in_vain("is_path_valid", about, str(error))
 
         def send(answer: Answer) -> None:
             judged = answer.judgement

@@ -189,10 +189,10 @@ class ResultMessages:
         )
 
     def _verdict(self) -> DiagnosticArray:
-        report = self.report
+        judgement, report = self.judgement, self.report
         level = "warning" if report.has_warning else "ok"
         return verdict_to_diagnostics(
-            level if report.traversable else "error", report.reason, report.summary(),
+            level if judgement.traversable else "error", judgement.reason, report.summary(),
             self.rover.name, self.frame, self.stamp,
         )  # fmt: skip
 

@@ -31,7 +31,7 @@ from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_
 from msg_adapters.stamps import NANOSECONDS, ns_to_stamp
 from rover_physics.names import WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
-from rover_planner.maps.summary import describe_terrain
+from rover_planner.maps.known_map import describe_terrain
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.warm_up import SIMULATION
 from rover_planner.parameters.rover_simulator import QUASI_STATIC, RoverSimulatorParameters

@@ -25,8 +25,7 @@ from msg_adapters.stamps import NANOSECONDS
 from rover_physics.errors import RoverError
 from rover_physics.numerics.kernel_cache import kernel_cache_note
 from rover_physics.warm_up import EXACT, UNCERTAIN
-from rover_planner.maps.known_map import stamp_text
-from rover_planner.maps.summary import describe_terrain
+from rover_planner.maps.known_map import describe_terrain, stamp_text
 from rover_planner.nodes.advice_topics import AdviceTopics
 from rover_planner.nodes.arm_topics import ArmTopics
 from rover_planner.nodes.map_topics import MapCloud, MapTopics
@@ -42,10 +41,10 @@ from rover_planner.planning.answering.budget import CANCELLED
 from rover_planner.planning.answering.judgement import PathJudgement
 from rover_planner.planning.answering.questions import (
     Answer,
-    BadQuestion,
-    PathCheck,
-    PathQuestion,
     Question,
+    ask_about_path,
+    ask_for_path,
+    ask_in_vain,
 )
 from rover_planner.planning.answering.server_health import MEMORY
 from rover_planner.planning.answering.service_settings import (
@@ -290,9 +289,9 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         """
         about = plan_request_hash(begin, end, tolerance)
         try:
-            return PathQuestion(service, about, *self._read_ends(begin, end), tolerance)
+            return ask_for_path(service, about, *self._read_ends(begin, end), tolerance)
         except RoverError as error:
-            return BadQuestion(service, about, str(error))
+            return ask_in_vain(service, about, str(error))
 
     def _read_ends(self, begin: PoseStamped, end: PoseStamped) -> tuple[Pose, Pose]:
         """Return start and goal (3,) of the body in the map frame; an empty start is here."""
@@ -338,7 +337,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
             response.message = to_json(report().to_dict())
             reply(response)
 
-        self.desk.ask(PathCheck("check_path", path.hash, path), send)
+        self.desk.ask(ask_about_path("check_path", path.hash, path), send)
 
     def publish(
         self, judgement: PathJudgement, identity: IdentityReport

@@ -11,14 +11,12 @@ that at least one candidate exists. A rover that turns on the spot may also turn
 ahead and turn again, if this is shorter than all curves.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from rover_physics.numerics.interruption import check_interruption
 from rover_planner.errors import PlanningError
 from rover_planner.planning.angles import wrap
-from rover_planner.planning.dubins import dubins_paths
+from rover_planner.planning.dubins import count_steps, dubins_paths
 
 MIN_RADIUS = 0.8
 """Default smallest radius of a candidate [m]: the wheelbase of the LSR-1 preset.
@@ -39,31 +37,18 @@ _FINE_SAMPLES = 501
 """Samples of a curve from which its waypoints are interpolated."""
 _FINE = np.linspace(0.0, 1.0, 2 * _FINE_SAMPLES - 1)
 """Curve parameters of the fine samples and half-way between them."""
-_FINE_WEIGHTS = np.array(
-    [6 * _FINE * (1 - _FINE), (1 - _FINE) * (1 - 3 * _FINE), _FINE * (3 * _FINE - 2)]
-)
-"""Weights (3, n) of chord, start and end tangent in the derivative at the fine samples."""
-_FINE_BUMP = np.pi * np.sin(2 * np.pi * _FINE)
-"""First derivative at the fine samples of a bump of one metre."""
+
+
+def _weigh_slopes(t: np.ndarray) -> np.ndarray:
+    """Return the weights (4, n) of chord, end tangents and bump in the derivative of a curve."""
+    bump = np.pi * np.sin(2 * np.pi * t)
+    return np.array([6 * t * (1 - t), (1 - t) * (1 - 3 * t), t * (3 * t - 2), bump])
+
+
+_FINE_SLOPES = _weigh_slopes(_FINE)
+"""These weights at the fine samples."""
 _TANGENT_SCALES = (1.0, 1.6, 2.4)
 """Lengths of the end tangents in chords; the first one whose direct curve is drivable is used."""
-
-
-class BumpedCurve(NamedTuple):
-    """A Hermite cubic between two points plus a cosine bump; vectors (2,) in [m]."""
-
-    start: np.ndarray
-    """Start of the curve."""
-    chord: np.ndarray
-    """Vector from the start to the end of the curve."""
-    m0: np.ndarray
-    """Tangent at the start."""
-    m1: np.ndarray
-    """Tangent at the end."""
-    left: np.ndarray
-    """Unit vector across the chord, to the left."""
-    offset: float
-    """Height of the bump to the left [m]."""
 
 
 def generate_candidates(
@@ -138,46 +123,27 @@ def path_length(poses: np.ndarray) -> float:
 
 
 def _build_fan(start, goal, count, spacing, waypoint_spacing, min_radius) -> list[np.ndarray]:
-    """Sample the direct curve and its neighbours; return [] if the direct one is too tight."""
+    """Sample the direct curve and its neighbours; return [] if the direct one is too tight.
+
+    A curve is the start plus weights of its chord, its end tangents and a bump across the chord.
+    """
+    chord, yaws = goal[:2] - start[:2], np.array([start[2], goal[2]])
+    length = np.hypot(*chord)
+    left = np.array([-chord[1], chord[0]]) / length
     for scale in _TANGENT_SCALES:
-        direct = _connect(start, goal, scale)
-        slopes = _fine_slopes(direct)
-        curves = [
-            direct._replace(offset=float(offset)) for offset in lateral_offsets(count, spacing)
-        ]
+        tangents = scale * length * np.array([np.cos(yaws), np.sin(yaws)])
         paths = []
-        for curve in curves:
-            slope = slopes + _FINE_BUMP * (curve.offset * curve.left)[:, None]
+        for offset in lateral_offsets(count, spacing):
+            curve = np.column_stack([chord, tangents, offset * left])
+            slope = curve @ _FINE_SLOPES
             speed = np.hypot(slope[0], slope[1])
             if _is_drivable(slope, speed, min_radius):
-                paths.append(_sample(curve, speed, waypoint_spacing))
-            elif curve.offset == 0.0:
+                paths.append(_sample(start, curve, speed, waypoint_spacing))
+            elif offset == 0.0:
                 break
         if paths:
             return paths
     return []
-
-
-def _connect(start: np.ndarray, goal: np.ndarray, scale: float) -> BumpedCurve:
-    """Return the curve without bump whose end tangents are `scale` times the chord long."""
-    chord = goal[:2] - start[:2]
-    length = np.hypot(*chord)
-    return BumpedCurve(
-        start=start[:2],
-        chord=chord,
-        m0=scale * length * np.array([np.cos(start[2]), np.sin(start[2])]),
-        m1=scale * length * np.array([np.cos(goal[2]), np.sin(goal[2])]),
-        left=np.array([-chord[1], chord[0]]) / length,
-        offset=0.0,
-    )
-
-
-def _fine_slopes(curve: BumpedCurve) -> np.ndarray:
-    """Return the derivative (2, n) of a curve without bump at the fine samples."""
-    along_chord, along_m0, along_m1 = _FINE_WEIGHTS
-    slopes = along_chord * curve.chord[:, None] + along_m0 * curve.m0[:, None]
-    slopes += along_m1 * curve.m1[:, None]
-    return slopes
 
 
 def _is_drivable(slope: np.ndarray, speed: np.ndarray, min_radius: float) -> bool:
@@ -197,15 +163,19 @@ def _is_drivable(slope: np.ndarray, speed: np.ndarray, min_radius: float) -> boo
     return bool((turned * min_radius <= driven * (1 + 1e-9)).all())
 
 
-def _sample(curve: BumpedCurve, speed: np.ndarray, waypoint_spacing: float) -> np.ndarray:
+def _sample(start, curve: np.ndarray, speed: np.ndarray, waypoint_spacing: float) -> np.ndarray:
     """Sample equidistant poses (n, 3) of a curve, at most `waypoint_spacing` [m] apart."""
     check_interruption()  # a question may have many long candidates
     ends, middles = speed[::2], speed[1::2]
     pieces = (ends[:-1] + 4 * middles + ends[1:]) / 6 / len(middles)
     driven = np.concatenate([[0.0], np.cumsum(pieces)])
-    steps = max(1, int(np.ceil(driven[-1] / waypoint_spacing - 1e-9)))
-    marks = np.linspace(0.0, driven[-1], steps + 1)
-    return _follow(curve, _interpolate(marks, driven, _FINE[::2], 1 / ends))
+    marks = np.linspace(0.0, driven[-1], 1 + count_steps(driven[-1], waypoint_spacing))
+    t = _interpolate(marks, driven, _FINE[::2], 1 / ends)
+    rest = 1 - t
+    bump = 0.5 * (1 - np.cos(2 * np.pi * t))
+    places = curve @ np.array([t * t * (3 - 2 * t), t * rest * rest, -t * t * rest, bump])
+    slopes = curve @ _weigh_slopes(t)
+    return np.column_stack([start[:2] + places.T, np.arctan2(slopes[1], slopes[0])])
 
 
 def _interpolate(at: np.ndarray, x: np.ndarray, y: np.ndarray, slopes: np.ndarray) -> np.ndarray:
@@ -221,23 +191,9 @@ def _interpolate(at: np.ndarray, x: np.ndarray, y: np.ndarray, slopes: np.ndarra
     return np.asarray(y[i] + s * rise + s * (1 - s) * ((1 - s) * first + s * last))
 
 
-def _follow(curve: BumpedCurve, t: np.ndarray) -> np.ndarray:
-    """Return the poses (n, 3) of a curve at parameters (n,)."""
-    u, rest = t[:, None], 1 - t[:, None]
-    sine, cosine = np.sin(2 * np.pi * u), np.cos(2 * np.pi * u)
-    places = curve.start + u * u * (3 - 2 * u) * curve.chord
-    places = places + u * (rest * rest) * curve.m0 - u * u * rest * curve.m1
-    places = places + 0.5 * curve.offset * (1 - cosine) * curve.left
-    slope = 6 * u * rest * curve.chord
-    slope = slope + rest * (1 - 3 * u) * curve.m0 + u * (3 * u - 2) * curve.m1
-    slope = slope + np.pi * curve.offset * sine * curve.left
-    return np.column_stack([places, np.arctan2(slope[:, 1], slope[:, 0])])
-
-
 def _build_arcs(start, goal, count, waypoint_spacing, min_radius) -> list[np.ndarray]:
     """Sample the Dubins paths that are not much longer than the shortest one."""
-    words = dubins_paths(start, goal, min_radius, waypoint_spacing)
-    paths = [np.column_stack(word) for word in words[:count]]
+    paths = dubins_paths(start, goal, min_radius, waypoint_spacing, count)
     longest = _LONG_WAY_ROUND * path_length(paths[0])
     return [path for path in paths if path_length(path) <= longest]
 
@@ -286,7 +242,7 @@ def turn_and_drive(
     heading = float(np.arctan2(away[1], away[0])) if length > 0.0 else float(start[2])
     first, last = float(wrap(heading - start[2])), float(wrap(goal[2] - heading))
     step = waypoint_spacing / swing_radius
-    shares = np.linspace(0.0, 1.0, 1 + max(1, int(np.ceil(length / waypoint_spacing - 1e-9))))
+    shares = np.linspace(0.0, 1.0, 1 + count_steps(length, waypoint_spacing))
     line = np.column_stack([start[:2] + shares[:, None] * away, np.full(len(shares), heading)])
     parts = [
         turn_on_the_spot(start[:2], start[2], first, step)[:-1],
@@ -307,5 +263,5 @@ def turn_on_the_spot(place: np.ndarray, yaw: float, turn: float, step: float) ->
     """
     if abs(turn) < LEAST_TURN:
         return np.array([[*place, yaw]])
-    count = 1 + max(1, int(np.ceil(abs(turn) / step - 1e-9)))
+    count = 1 + count_steps(abs(turn), step)
     return np.column_stack([np.tile(place, (count, 1)), yaw + np.linspace(0.0, turn, count)])

@@ -24,7 +24,7 @@ def dubins_paths(
     radius: float,
     waypoint_spacing: float,
     most: int | None = None,
-) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+) -> list[np.ndarray]:
     """Return the Dubins paths between two poses, the shortest first.
 
     Args:
@@ -35,13 +35,19 @@ def dubins_paths(
         most: Largest number of paths; None returns all.
 
     Returns:
-        One to six paths, each x (n,), y (n,) [m] and yaw (n,) [rad], with equidistant
-        waypoints.
+        One to six paths (n, 3) of x, y [m] and yaw [rad], with equidistant waypoints.
     """
     words = _words_between(start, goal, radius)
     lengths = words.sum(axis=1)
     shortest = np.argsort(lengths, kind="stable")[: np.isfinite(lengths).sum()]
     return [_drive(start, _WORDS[k], words[k], radius, waypoint_spacing) for k in shortest[:most]]
+
+
+def shortest_dubins_path(start, goal, radius, waypoint_spacing) -> np.ndarray:
+    """Return the shortest one of `dubins_paths`; its ends are exact but for the last heading."""
+    poses = dubins_paths(start, goal, radius, waypoint_spacing, 1)[0]
+    poses[0], poses[-1, :2] = start, goal[:2]
+    return poses
 
 
 def dubins_lengths(
@@ -96,9 +102,9 @@ def _solve_left(a: Angles, b: Angles, d: Angles) -> list[list[Angles]]:
 
 
 def _drive(start, word, pieces, radius, waypoint_spacing):
-    """Sample a word from the start; return equidistant x, y, yaw (n,)."""
+    """Sample a word from the start; return equidistant poses (n, 3)."""
     ends = np.concatenate([[0.0], np.cumsum(pieces)])
-    steps = max(1, int(np.ceil(ends[-1] * radius / waypoint_spacing - 1e-9)))
+    steps = count_steps(ends[-1] * radius, waypoint_spacing)
     driven = np.linspace(0.0, ends[-1], steps + 1)
     x, y, yaw = np.zeros(steps + 1), np.zeros(steps + 1), np.zeros(steps + 1)
     x0, y0, yaw0 = 0.0, 0.0, start[2]
@@ -106,7 +112,12 @@ def _drive(start, word, pieces, radius, waypoint_spacing):
         here = (driven >= ends[k]) if k == 2 else (driven >= ends[k]) & (driven < ends[k + 1])
         x[here], y[here], yaw[here] = _advance(x0, y0, yaw0, _TURN[letter], driven[here] - ends[k])
         x0, y0, yaw0 = _advance(x0, y0, yaw0, _TURN[letter], pieces[k])
-    return start[0] + radius * x, start[1] + radius * y, yaw
+    return np.column_stack([start[0] + radius * x, start[1] + radius * y, yaw])
+
+
+def count_steps(length: float, spacing: float) -> int:
+    """Return into how many steps of at most `spacing` a length is divided, both in m or rad."""
+    return max(1, int(np.ceil(length / spacing - 1e-9)))
 
 
 def _advance(x, y, yaw, turn, s):

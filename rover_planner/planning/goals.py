@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Chooses a start and goals on a map for demos: goals on plain ground and difficult goals."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from scipy import ndimage
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
+from rover_planner.maps.cells import grid_of
 
 Pose = tuple[float, float, float]
 
@@ -67,8 +69,7 @@ class _Ground:
     def cells(self, x, y) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.bool_]]:
         """Return row and column of points x, y [m], and a mask of those on the map."""
         ny, nx = self.slope.shape
-        column = np.rint((np.asarray(x) - self.terrain.origin[0]) / self.terrain.resolution)
-        row = np.rint((np.asarray(y) - self.terrain.origin[1]) / self.terrain.resolution)
+        column, row = map(np.rint, grid_of(self.terrain).coordinates(np.asarray(x), np.asarray(y)))
         inside = (column >= 0) & (column < nx) & (row >= 0) & (row < ny)
         return (
             np.clip(row, 0, ny - 1).astype(int),
@@ -76,22 +77,9 @@ class _Ground:
             inside,
         )
 
-    def place(self, row, column) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def places(self, rows, columns) -> tuple[Any, Any]:
         """Return x and y [m] of cells."""
-        x = self.terrain.origin[0] + np.asarray(column) * self.terrain.resolution
-        y = self.terrain.origin[1] + np.asarray(row) * self.terrain.resolution
-        return x, y
-
-
-class _View(NamedTuple):
-    """Places of the cells (ny, nx) of a map as seen from the start."""
-
-    distance: NDArray[np.float64]
-    """Distance [m]."""
-    bearing: NDArray[np.float64]
-    """Direction [rad], map frame."""
-    turn: NDArray[np.float64]
-    """Angle off the start's heading [rad], to either side."""
+        return grid_of(self.terrain).places(np.asarray(columns), np.asarray(rows))
 
 
 def choose_mission(terrain: Terrain, rover: Rover, seed: int = 1, plain_goals: int = 4) -> Mission:
@@ -115,15 +103,10 @@ def choose_mission(terrain: Terrain, rover: Rover, seed: int = 1, plain_goals: i
     ground = _survey(terrain, rover)
     start = _choose_start(ground, rng)
     found = [("plain", pose) for pose in _choose_plain(ground, start, plain_goals, rng)]
-    view = _look_from(ground, start)
-    for intent, score in (
-        ("rough", _score_rough(ground, start, view)),
-        ("steep", _score_steep(ground, view)),
-        ("unknown ground", _score_unknown(ground, view)),
-    ):
-        pose = _choose_cell(ground, start, view, score)
-        if pose is not None:
-            found.append((intent, pose))
+    for intent, score in _score_cells(ground, start):
+        best = np.unravel_index(np.argmax(score), score.shape)
+        if np.isfinite(score[best]):
+            found.append((intent, _facing(start, *ground.places(*best))))
     found.append(("off the map", _choose_off_map(ground, start)))
     goals = (Goal(chr(ord("A") + k), intent, pose) for k, (intent, pose) in enumerate(found))
     return Mission(start, tuple(goals))
@@ -176,41 +159,32 @@ def _choose_start(ground: _Ground, rng: np.random.Generator) -> Pose:
     share = ground.difficulty[rows, columns]
     gentle = share <= max(0.5, np.quantile(share, 0.1))
     chosen = rng.permutation(np.nonzero(gentle)[0])[:_STARTS]
-    x, y = ground.place(rows[chosen], columns[chosen])
+    x, y = ground.places(rows[chosen], columns[chosen])
     bearings = np.linspace(-np.pi, np.pi, _RAYS, endpoint=False)
-    sight = _sight(ground, ground.gentle, x, y, bearings)
+    sight = _sight(ground, ground.gentle, np.column_stack([x, y]), bearings)
     cone = round(_HALF_CONE / (2 * np.pi / _RAYS))
     ahead = np.sum([np.roll(sight, k, axis=1) for k in range(-cone, cone + 1)], axis=0)
     best, ray = np.unravel_index(np.argmax(ahead), ahead.shape)
     return (float(x[best]), float(y[best]), float(bearings[ray]))
 
 
-def _sight(ground: _Ground, clear: NDArray[np.bool_], x, y, bearings) -> NDArray[np.float64]:
-    """Return the clear distance (n, m) [m] from points (n,) in directions (m,) [rad].
+def _sight(ground: _Ground, clear: NDArray[np.bool_], places, bearings) -> NDArray[np.float64]:
+    """Return the clear distance (n, m) [m] from places (n, 2) or poses (n, 3), x, y [m].
 
-    `clear` is a mask (ny, nx) of the cells.
+    It is that in directions (m,) [rad]; `clear` is a mask (ny, nx) of the cells.
     """
     step = max(2 * ground.terrain.resolution, ground.far / 60)
     distances = np.arange(0.0, ground.far, step)
-    px = x[:, None, None] + distances * np.cos(bearings)[:, None]
-    py = y[:, None, None] + distances * np.sin(bearings)[:, None]
+    px = places[:, 0, None, None] + distances * np.cos(bearings)[:, None]
+    py = places[:, 1, None, None] + distances * np.sin(bearings)[:, None]
     row, column, inside = ground.cells(px, py)
     return step * np.cumprod(inside & clear[row, column], axis=2).sum(axis=2)
-
-
-def _look_from(ground: _Ground, start: Pose) -> _View:
-    """Return where the cells of a map are as seen from a start."""
-    ny, nx = ground.slope.shape
-    x, y = ground.place(np.arange(ny)[:, None], np.arange(nx)[None, :])
-    bearing = np.arctan2(y - start[1], x - start[0])
-    turn = np.abs(np.angle(np.exp(1j * (bearing - start[2]))))
-    return _View(np.hypot(x - start[0], y - start[1]), bearing, turn)
 
 
 def _choose_plain(ground: _Ground, start: Pose, count: int, rng) -> list[Pose]:
     """Choose goals in sight of the start, in directions spread over a cone ahead."""
     bearings = start[2] + np.linspace(-_HALF_CONE, _HALF_CONE, 4 * count + 1)
-    sight = _sight(ground, ground.gentle, np.array([start[0]]), np.array([start[1]]), bearings)[0]
+    sight = _sight(ground, ground.gentle, np.array([start]), bearings)[0]
     goals: list[Pose] = []
     for sector in np.array_split(np.arange(len(bearings)), count):
         ray = sector[np.argmax(sight[sector])]
@@ -226,7 +200,7 @@ def _choose_plain(ground: _Ground, start: Pose, count: int, rng) -> list[Pose]:
     return goals
 
 
-def _gentlest_near(ground: _Ground, x: float, y: float) -> tuple[float, float]:
+def _gentlest_near(ground: _Ground, x: float, y: float) -> tuple[Any, Any]:
     """Return the place with the least difficulty around a point."""
     row, column, _ = ground.cells(x, y)
     around = max(1, round(0.06 * ground.far / ground.terrain.resolution))
@@ -234,33 +208,32 @@ def _gentlest_near(ground: _Ground, x: float, y: float) -> tuple[float, float]:
     window = ground.difficulty[j : int(row) + around + 1, i : int(column) + around + 1]
     window = np.where(np.isfinite(window), window, np.inf)
     best = np.unravel_index(np.argmin(window), window.shape)
-    px, py = ground.place(best[0] + j, best[1] + i)
-    return float(px), float(py)
+    return ground.places(best[0] + j, best[1] + i)
 
 
-def _score_rough(ground: _Ground, start: Pose, view: _View) -> NDArray[np.float64]:
-    """Prefer difficult places with known ground all the way, ahead of the start."""
+def _score_cells(ground: _Ground, start: Pose) -> Iterator[tuple[str, NDArray[np.float64]]]:
+    """Yield the intents of hard goals and how well each cell (ny, nx) suits; -inf: it does not.
+
+    Those ahead of the start are preferred: difficult places with known ground all the way, steep
+    known ground, and near places that are well inside unknown ground.
+    """
+    ny, nx = ground.slope.shape
+    x, y = ground.places(np.arange(ny)[:, None], np.arange(nx))
+    dx, dy = x - start[0], y - start[1]
+    distance, bearing = np.hypot(dx, dy), np.arctan2(dy, dx)
+    turn = np.abs(np.angle(np.exp(1j * (bearing - start[2]))))
+    ahead, known = 1 - turn / (2 * np.pi), np.isfinite(ground.slope)
     bearings = np.linspace(-np.pi, np.pi, _VIEWS)
-    known = np.isfinite(ground.slope)
-    sight = _sight(ground, known, np.array([start[0]]), np.array([start[1]]), bearings)[0]
-    in_view = known & (view.distance < np.interp(view.bearing, bearings, sight))
-    return np.where(in_view, ground.difficulty * (1 - view.turn / (2 * np.pi)), -np.inf)
-
-
-def _score_steep(ground: _Ground, view: _View) -> NDArray[np.float64]:
-    """Prefer steep known ground ahead."""
-    score = ground.slope * (1 - view.turn / (2 * np.pi))
-    score = np.where(view.distance <= 1.2 * ground.far, score, -np.inf)
-    return np.where(np.isfinite(score), score, -np.inf)
-
-
-def _score_unknown(ground: _Ground, view: _View) -> NDArray[np.float64]:
-    """Prefer near places ahead that are well inside unknown ground."""
-    unknown = np.isnan(ground.terrain.elevation)
-    depth = ndimage.distance_transform_edt(np.pad(unknown, 1))[1:-1, 1:-1]
-    depth *= ground.terrain.resolution
-    preferred = -view.distance * (1 + 2 * view.turn)
-    return np.where(depth > 0.1 * ground.near, preferred, -np.inf)
+    sight = _sight(ground, known, np.array([start]), bearings)[0]
+    depth = ndimage.distance_transform_edt(np.pad(np.isnan(ground.terrain.elevation), 1))
+    depth = depth[1:-1, 1:-1] * ground.terrain.resolution
+    for intent, suits, score in (
+        ("rough", known & (distance < np.interp(bearing, bearings, sight)), ground.difficulty),
+        ("steep", known & (distance <= 1.2 * ground.far), ground.slope),
+        ("unknown ground", depth > 0.1 * ground.near, None),
+    ):
+        value = -distance * (1 + 2 * turn) if score is None else score * ahead
+        yield intent, np.where(suits & (distance >= ground.near), value, -np.inf)
 
 
 def _choose_off_map(ground: _Ground, start: Pose) -> Pose:
@@ -275,26 +248,14 @@ def _choose_off_map(ground: _Ground, start: Pose) -> Pose:
     distance = max(edge[nearest], 0.5 * ground.near) + 0.5 * ground.near
     x = start[0] + distance * np.cos(bearings[nearest])
     y = start[1] + distance * np.sin(bearings[nearest])
-    return _facing(start, float(x), float(y))
-
-
-def _choose_cell(
-    ground: _Ground, start: Pose, view: _View, score: NDArray[np.float64]
-) -> Pose | None:
-    """Return the cell with the highest score (ny, nx) beyond `near`, None if all are -inf."""
-    allowed = np.where(view.distance >= ground.near, score, -np.inf)
-    best = np.unravel_index(np.argmax(allowed), allowed.shape)
-    if not np.isfinite(allowed[best]):
-        return None
-    x, y = ground.place(*best)
-    return _facing(start, float(x), float(y))
+    return _facing(start, x, y)
 
 
 def _facing(start: Pose, x: float, y: float) -> Pose:
     """Return a pose at x, y [m] with the end heading of a gentle curve from the start."""
     bearing = np.arctan2(y - start[1], x - start[0])
     turn = float(np.angle(np.exp(1j * (bearing - start[2]))))
-    return (x, y, float(bearing + (0.5 * turn if abs(turn) < _WIDE_CONE else 0.0)))
+    return (float(x), float(y), float(bearing + (0.5 * turn if abs(turn) < _WIDE_CONE else 0.0)))
 
 
 def _odd_cells(width: float, resolution: float) -> int:

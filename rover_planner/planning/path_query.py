@@ -101,10 +101,9 @@ class PathAnswer:
 
     candidates: tuple[Candidate, ...]
     """The candidates in the order of their generation, the direct connection first."""
-    best: int
-    """Index of the traversable candidate with the lowest cost, -1 if there is none."""
     nearest: int
-    """Index of the explained candidate: the best, or the one that gets furthest."""
+    """Index of the explained candidate: the best, which is the traversable one with the lowest
+    cost, or the one that gets furthest."""
 
     @property
     def chosen(self) -> Candidate:
@@ -119,7 +118,7 @@ class PathAnswer:
     @property
     def traversable(self) -> bool:
         """True if any candidate is traversable."""
-        return self.best >= 0
+        return self.chosen.verdict.traversable
 
     def explain(self) -> str:
         """Return one sentence: which path was chosen, or why none is traversable."""
@@ -166,7 +165,7 @@ def add_path(search: PathSearch | None, path: Candidate, goal: Pose) -> PathSear
     candidates = (path,) if search is None else (*search.answer.candidates, path)
     last = len(candidates) - 1
     tried = 0 if search is None else search.alternatives_tried
-    return PathSearch(PathAnswer(candidates, last, last), goal, path.poses[-1], tried)
+    return PathSearch(PathAnswer(candidates, last), goal, path.poses[-1], tried)
 
 
 def answer_path_query(
@@ -213,7 +212,7 @@ def choose_by_chance(
     Chances are found in the order of the costs, up to the first that is accepted.
     """
     while (answer := choose(tuple(candidates))).traversable:
-        best = answer.best
+        best = answer.nearest
         if options.accepted_chance >= 1.0 or candidates[best].verdict.failure_chance_at:
             return answer
         candidates[best] = check_path(
@@ -286,9 +285,8 @@ def choose(candidates: tuple[Candidate, ...]) -> PathAnswer:
     indices = range(len(candidates))
     passable = [k for k in indices if candidates[k].verdict.traversable]
     if passable:
-        best = min(passable, key=lambda k: candidates[k].cost)
-        return PathAnswer(candidates, best, best)
-    return PathAnswer(candidates, -1, max(indices, key=lambda k: candidates[k].passable_share))
+        return PathAnswer(candidates, min(passable, key=lambda k: candidates[k].cost))
+    return PathAnswer(candidates, max(indices, key=lambda k: candidates[k].passable_share))
 
 
 def path_cost(prediction: PathPrediction, verdict: Verdict) -> tuple[float, float]:

@@ -72,16 +72,6 @@ class VerdictReport:
     """Its question, path and map; None if it was not asked for over ROS."""
 
     @property
-    def traversable(self) -> bool:
-        """True if the rover may drive the path."""
-        return bool(self.entries["traversable"])
-
-    @property
-    def reason(self) -> str:
-        """Reason why not, in words; empty if traversable."""
-        return str(self.entries["reason"])
-
-    @property
     def has_warning(self) -> bool:
         """True if the measured suspension disagrees with the prediction."""
         return not self.entries.get("suspension_agrees", True)

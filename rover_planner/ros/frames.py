@@ -71,7 +71,7 @@ class Frames:
         """Take the age from which transforms, and odometry for clouds, are refused [s]."""
         self._tree.timeout = timeout
         if self._sensors is not None:
-            self._sensors.timeout = timeout
+            self._sensors.driven.timeout = timeout
 
     def take_transform(self, transform: TransformStamped, *, is_static: bool) -> None:
         """Take a transform of /tf or /tf_static.

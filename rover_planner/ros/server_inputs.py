@@ -22,7 +22,6 @@ from rover_planner.maps.ground_beneath import Standing
 from rover_planner.maps.known_map import stamp_text
 from rover_planner.maps.living_map import MapSnapshot
 from rover_planner.maps.map_keeper import MapKeeper
-from rover_planner.maps.moved_map import MapMove
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.snapshot import GivenPath
@@ -145,7 +144,7 @@ class ServerInputs:
             values.elevation_layer, values.variance_layer, values.friction_layer
         )
         terrain = terrain_from_grid_map(message, layers)
-        return terrain if move is None else self.keeper.place(terrain, MapMove(*move))
+        return terrain if move is None else self.keeper.place(terrain, move)
 
     def keep(self, snapshot: MapSnapshot, source: str, stamp: int | None = None) -> bool:
         """Keep a map in the service; return whether its content is new."""

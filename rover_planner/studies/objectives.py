@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Objectives of studies: utilisation, tip-over margin, energy, tallest step, load imbalance."""
 
-from dataclasses import dataclass, replace
+import operator
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -29,18 +30,10 @@ MAX_WAYPOINTS = 200_000
 """Largest number of waypoints of a drive."""
 
 
-@dataclass(frozen=True)
-class Score:
-    """The value of an objective for a rover."""
+def evaluate(study: Study, rover: Rover) -> tuple[float, str]:
+    """Return the objective of a study for a rover, and a note.
 
-    value: float
-    """Value of the objective; NaN if it cannot be computed."""
-    note: str = ""
-    """Reason why it cannot be computed, or what limits the value."""
-
-
-def evaluate(study: Study, rover: Rover) -> Score:
-    """Return the objective of a study for a rover; if it is impossible, the note has the reason.
+    The note says what limits the value or, where that is NaN, why it is impossible.
 
     Raises:
         RoverError: A terrain cannot be loaded, or the model refuses an argument.
@@ -49,16 +42,16 @@ def evaluate(study: Study, rover: Rover) -> Score:
         height = tallest_step(rover, study.policy, study.friction)
         taller = height + STEP_TOLERANCE
         reason = why_not_climbed(rover, taller, study.policy, study.friction)
-        return Score(height, f"{taller:.3f} m: {reason}")
+        return height, f"{taller:.3f} m: {reason}"
     if study.objective == "load_imbalance":
         shares = load_shares(rover)
-        return Score(float(shares.max() / shares.mean()))
+        return float(shares.max() / shares.mean()), ""
     scores = [_score_drive(study, rover, k) for k in range(len(study.drives))]
-    failed = [score for score in scores if not np.isfinite(score.value)]
+    failed = [score for score in scores if not np.isfinite(score[0])]
     if failed:
         return failed[0]
     choose = min if study.wants_largest else max
-    return choose(scores, key=lambda score: score.value)
+    return choose(scores, key=operator.itemgetter(0))
 
 
 def load_shares(rover: Rover) -> Floats:
@@ -67,8 +60,8 @@ def load_shares(rover: Rover) -> Floats:
     return np.asarray(loads / loads.sum())
 
 
-def _score_drive(study: Study, rover: Rover, k: int) -> Score:
-    """Return the score of drive k; all limits must hold except that of the objective."""
+def _score_drive(study: Study, rover: Rover, k: int) -> tuple[float, str]:
+    """Return objective and note of drive k; all limits must hold except that of the objective."""
     drive, where = study.drives[k], f"drive {k + 1}"
     path = drive.length * np.linspace(0.0, 1.0, _count_steps(drive.length) + 1)
     x, y, yaw = drive.start
@@ -83,14 +76,14 @@ def _score_drive(study: Study, rover: Rover, k: int) -> Score:
         SweepOptions(friction=study.friction, policy=study.policy, soil=study.soil),
     )
     if not verdict.traversable:
-        return Score(float("nan"), f"{where}: {verdict.reason}")
+        return float("nan"), f"{where}: {verdict.reason}"
     if study.objective == "worst_utilisation":
-        return Score(verdict.max_friction_utilisation, where)
+        return verdict.max_friction_utilisation, where
     if study.objective == "drive_energy":
-        return Score(float(prediction.energy[-1] / prediction.distance[-1]), where)
+        return float(prediction.energy[-1] / prediction.distance[-1]), where
     # The verdict's ratio is relative to the same rover on flat ground; it cannot compare rovers.
     flat_angle = float(pack_model(rover, ground).settings.flat_angle)
-    return Score(verdict.min_tip_over_ratio * flat_angle, where)
+    return verdict.min_tip_over_ratio * flat_angle, where
 
 
 def _count_steps(length: float) -> int:
@@ -170,23 +163,17 @@ def tallest_step(rover: Rover, policy: str = "equal", friction: float | None = N
     step that is higher than one that it cannot climb.
     """
     climbed, height = 0.0, SEARCH_STEP
-    while height < min(4.0 * rover.wheel.radius, MAX_STEP) and climbs(
-        rover, height, policy, friction
-    ):
+    highest = min(4.0 * rover.wheel.radius, MAX_STEP)
+    while height < highest and not why_not_climbed(rover, height, policy, friction):
         climbed, height = height, height + SEARCH_STEP
     low, high = climbed, height
     while high - low > STEP_TOLERANCE:
         middle = 0.5 * (low + high)
-        if climbs(rover, middle, policy, friction):
-            low = middle
-        else:
+        if why_not_climbed(rover, middle, policy, friction):
             high = middle
+        else:
+            low = middle
     return low
-
-
-def climbs(rover: Rover, height: float, policy: str, friction: float | None) -> bool:
-    """Return whether a rover climbs a step of a height [m] without belly contact."""
-    return not why_not_climbed(rover, height, policy, friction)
 
 
 def why_not_climbed(rover: Rover, height: float, policy: str, friction: float | None) -> str:

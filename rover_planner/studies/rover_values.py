@@ -6,7 +6,7 @@ import difflib
 import functools
 import math
 import operator
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -154,15 +154,6 @@ def vary(rover: Rover, values: Mapping[Key, float]) -> Rover:
     for key, value in values.items():
         _follow(data, key[:-1])[key[-1]] = float(value)
     return rover_from_dict(data, rover.name)
-
-
-def with_value(rover: Rover, keys: Sequence[Key], value: float) -> Rover:
-    """Return a copy of a rover with the same value at all of the keys.
-
-    Raises:
-        RoverFileError: The changed rover is invalid; the text names the key.
-    """
-    return vary(rover, dict.fromkeys(keys, value))
 
 
 def write_rover(rover: Rover) -> str:

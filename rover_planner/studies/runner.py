@@ -153,10 +153,10 @@ def _try(study: Study, values: tuple[float, ...]) -> Trial:
     try:
         rover = find_rover(study, trial)
         shares = tuple(load_shares(rover).tolist())
-        score = evaluate(study, rover)
+        objective, note = evaluate(study, rover)
     except (RoverFileError, ModelError) as error:
         return replace(trial, note=str(error))
-    return Trial(values, score.value, score.note, shares)
+    return Trial(values, objective, note, shares)
 
 
 class _EnoughError(Exception):

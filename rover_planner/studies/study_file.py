@@ -201,7 +201,10 @@ def study_from_dict(data: object, source: str, folder: Path = Path()) -> Study:
         found = {
             "rover": rover,
             "parameters": _find_parameters(file.parameters, rover),
-            "drives": tuple(_find_file(drive, folder) for drive in file.drives or ()),
+            "drives": tuple(
+                drive if drive.file is None else replace(drive, file=_beside(drive.file, folder))
+                for drive in file.drives or ()
+            ),
         }
         return Study(**{**vars(file), **found})
 
@@ -258,10 +261,6 @@ def _find_parameter(entry: ParameterEntry, contents: Mapping[str, Any], at: str)
         raise refuse(f"{at}.also", entry.also, f"names of numbers in {unit or 'no unit'}")
     keys = (key, *(other for other, _ in others))
     return StudyParameter(**vars(entry), keys=keys, unit=unit, now=get_value(contents, key))
-
-
-def _find_file(drive: StudyDrive, folder: Path) -> StudyDrive:
-    return drive if drive.file is None else replace(drive, file=_beside(drive.file, folder))
 
 
 def _beside(name: str, folder: Path) -> str:

@@ -81,7 +81,9 @@ def _draw_curve(axes: Axes, result: StudyResult) -> None:
         _draw_band(axes, result, points)
     now = result.baseline
     axes.plot(now.values[0], now.objective, "s", color=NOW, markersize=7, label="as it is")
-    axes.plot(*_best_point(result), "o", color=BEST, markersize=8, label="best")
+    axes.plot(
+        result.best.values[0], result.best.objective, "o", color=BEST, markersize=8, label="best"
+    )
     for k, tie in enumerate(result.ties):
         axes.plot(tie.values[0], tie.objective, "o", color=BEST, markerfacecolor="none",
                   markersize=10, label="as good" if k == 0 else None)  # fmt: skip
@@ -106,10 +108,6 @@ def _draw_band(axes: Axes, result: StudyResult, points: Floats) -> None:
             named.add(axle)
             axes.plot(trial.values[0], trial.objective + resolution, "v", markersize=5,
                       color=WHEEL_COLOURS[axle], label=words)  # fmt: skip
-
-
-def _best_point(result: StudyResult) -> tuple[float, float]:
-    return result.best.values[0], result.best.objective
 
 
 def _draw_map(figure: Figure, axes: Axes, result: StudyResult) -> None:

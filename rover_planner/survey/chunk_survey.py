@@ -13,7 +13,6 @@ from rover_physics.results.record import RESULT
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import BLOCK
 from rover_planner.errors import PlanningError
-from rover_planner.survey.layers import types_of_layers
 from rover_planner.survey.layout import Box, Index
 from rover_planner.survey.request import SurveyRequest
 from rover_planner.survey.store import StoreNotes, SurveyStore, is_refusal
@@ -89,10 +88,7 @@ def compute_chunk(
     window = layout.window_of(cells)
     grids, soils = source.read(window), source.soil_names
     shape = tuple(span.stop - span.start for span in cells)
-    layers = {
-        name: np.empty(shape, kind)
-        for name, kind in types_of_layers(request.headings, request.turns, request.chance).items()
-    }
+    layers = {name: np.empty(shape, kind) for name, kind in store.notes.types.items()}
     for tile in layout.tiles_of(chunk):
         part = layout.window_of(tile)
         below = _relative(part, window)
@@ -123,8 +119,7 @@ def estimate_memory(notes: StoreNotes) -> int:
         min((side - 1) * layout.step + 1 + 2 * layout.halo + BLOCK, size)
         for side, size in zip((rows, columns), layout.map_shape, strict=True)
     ]
-    kinds = types_of_layers(notes.headings, notes.turns, notes.chance).values()
-    kept = 2 * rows * columns * sum(kind.itemsize for kind in kinds)
+    kept = 2 * rows * columns * sum(kind.itemsize for kind in notes.types.values())
     poses = 4 * max(BATCH, notes.headings) * RESULT.itemsize
     return BYTES_OF_PROCESS + BYTES_OF_CELL * sides[0] * sides[1] + kept + poses
 

@@ -56,12 +56,6 @@ class SurveyLayout:
         ny, nx = self.shape
         return -(-ny // self.chunk), -(-nx // self.chunk)
 
-    @property
-    def all_chunks(self) -> list[Index]:
-        """Row and column of each chunk."""
-        rows, columns = self.chunks
-        return [(i, j) for i in range(rows) for j in range(columns)]
-
     def cells_of(self, chunk: Index) -> Box:
         """Return the surveyed cells of a chunk."""
         return _cut(chunk, self.chunk, self.shape)

@@ -59,12 +59,6 @@ class StoredMap:
         return zarr.open_group(self.store, mode="r", path=MAP)
 
 
-def frame_of(terrain: Terrain) -> MapFrame:
-    """Return where the cells of a terrain are."""
-    ny, nx = terrain.elevation.shape
-    return MapFrame((ny, nx), terrain.resolution, terrain.origin, "")
-
-
 def keep_map(group: Any, terrain: Terrain) -> None:
     """Write a terrain into a Zarr group, for `StoredMap`."""
     kept = group.create_group(MAP)

@@ -4,27 +4,23 @@
 A rover moves straight ahead from cell to cell: one move for each heading.
 """
 
+import contextlib
 import math
 import os
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from rover_physics.files.validation import show_file
 from rover_physics.numerics.kernels import exact_kernel
 from rover_planner.errors import PlanningError
 from rover_planner.survey.layers import bits_type, number_limits, pack_bits, unpack_bits
 from rover_planner.survey.layout import Index
-from rover_planner.survey.reachable_area import (
-    DISTANCE,
-    AreaNumbers,
-    ReachableArea,
-    new_area,
-    note_area,
-    open_area,
-)
 from rover_planner.survey.store import SurveyStore
 
 ALIGNED = 0.25
@@ -33,6 +29,30 @@ MAX_CELLS = 64
 """Largest length of a move [cells]."""
 CLOSED = -1.0
 """Distance of headings that are not passable."""
+GROUP = "reachable"
+"""Group of the store that holds the last area, with its numbers, and the number of chunks that
+were finished then."""
+DISTANCE = "distance"
+"""Array of the group: (ny, nx) length of the shortest path [m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReachableArea:
+    """The cells that can be reached from a start and returned from."""
+
+    start: Index
+    """Row and column of the surveyed cell nearest to the start."""
+    distance: Any
+    """(ny, nx) array or one of Zarr, length of the shortest path [m], infinite where the rover
+    cannot go or return."""
+    cells: int
+    """Number of cells that can be reached and returned from."""
+    reached: int
+    """Number of cells that can be reached, returned from or not."""
+    longest: float | None
+    """Longest of the shortest paths [m]; None if there is none."""
+    farthest: Index | None
+    """Row and column of its end; None if there is none."""
 
 
 class Moves(NamedTuple):
@@ -120,21 +140,63 @@ def find_reachable(
     Raises:
         PlanningError: The start is off the map or not surveyed, or the store cannot be written.
     """
+    import zarr
+
     notes = store.notes
     start = _cell_at(store, x, y)
     passable = store.layer("passable_headings")
     grid = HeadingGrid(
         passable,
-        store.layer("turnable_headings") if notes.turns else passable,
+        store.layer("turnable_headings") if notes.description["turns"] else passable,
         find_moves(notes.headings, notes.cell),
         notes.layout.chunk,
     )
-    with new_area(store) as (folder, group):
-        numbers = search_area(grid, start, group[DISTANCE], folder, report)
-        note_area(store, group, start, (x, y), numbers)
-    kept = open_area(store)
-    assert kept is not None
-    return kept
+    with _new_group(store) as (folder, group):
+        area = search_area(grid, start, group[DISTANCE], folder, report)
+        numbers = {
+            name: getattr(area, name) for name in ("cells", "reached", "longest", "farthest")
+        }
+        finished = len(store.find_finished())
+        group.attrs.update(
+            {"start": start, "from": (x, y), **numbers, "chunks_finished": finished}
+        )
+    kept: Any = zarr.open_group(store.path, mode="r", path=GROUP)
+    return replace(area, distance=kept[DISTANCE])
+
+
+@contextlib.contextmanager
+def _new_group(store: SurveyStore) -> Iterator[tuple[Path, Any]]:
+    """Yield a folder for work, and a group whose array of distances is to be filled.
+
+    The group takes the place of that of an earlier area at the end, or vanishes after an error.
+
+    Raises:
+        PlanningError: The store cannot be written.
+    """
+    import zarr
+
+    layout = store.notes.layout
+    try:
+        with tempfile.TemporaryDirectory(dir=store.path, prefix=f".{GROUP}.") as folder:
+            work, aside = Path(folder, "work"), Path(folder, GROUP)
+            work.mkdir()
+            group = zarr.open_group(aside, mode="w")
+            group.create_array(
+                DISTANCE,
+                shape=layout.shape,
+                chunks=tuple(min(layout.chunk, size) for size in layout.shape),
+                dtype="f4",
+                fill_value=float("inf"),
+            )
+            yield work, group
+            kept = store.path / GROUP
+            if kept.exists():
+                kept.rename(Path(folder, "before"))
+            os.replace(aside, kept)
+    except OSError as error:
+        raise PlanningError(
+            f"{show_file(store.path)}: cannot be written: {error.strerror}"
+        ) from None
 
 
 def explain_no_area(store: SurveyStore, start: Index) -> str:
@@ -155,7 +217,7 @@ def search_area(
     area: Any,
     folder: Path,
     report: Callable[[str], object] = lambda what: None,
-) -> AreaNumbers:
+) -> ReachableArea:
     """Find the cells that can be reached and returned from.
 
     All that grows with the map is in files that are mapped to memory: the system keeps in memory
@@ -204,9 +266,7 @@ def search_area(
         if np.isfinite(nearest).any():
             area[span] = nearest
             cells += int(np.isfinite(nearest).sum())
-    return AreaNumbers(
-        cells=cells, reached=reached, longest=longest if cells else None, farthest=farthest
-    )
+    return ReachableArea(start, area, cells, reached, longest if cells else None, farthest)
 
 
 def _measure_paths(

@@ -62,17 +62,8 @@ class SurveyRequest:
         Args:
             map_hash: Hash of the map's content.
         """
-        return {
-            "rover": json.loads(json.dumps(asdict(self.rover))),
-            "options": json.loads(json.dumps(asdict(self.options))),
-            "headings": self.headings,
-            "step": self.step,
-            "turns": self.turns,
-            "chance": self.chance,
-            "sigmas": self.sigmas,
-            "map": map_hash,
-            "version": rover_physics.__version__,
-        }
+        asked: dict[str, Any] = json.loads(json.dumps(asdict(self)))
+        return asked | {"map": map_hash, "version": rover_physics.__version__}
 
 
 def hash_of(description: dict[str, Any]) -> str:

@@ -63,14 +63,10 @@ class StoreNotes:
         return int(self.description["headings"])
 
     @property
-    def turns(self) -> bool:
-        """True if turns on the spot were judged."""
-        return bool(self.description["turns"])
-
-    @property
-    def chance(self) -> bool:
-        """True if chances of failure were found."""
-        return bool(self.description["chance"])
+    def types(self) -> dict[str, np.dtype]:
+        """Types of the layers by name."""
+        asked = self.description
+        return types_of_layers(asked["headings"], asked["turns"], asked["chance"])
 
     @property
     def cell(self) -> float:
@@ -263,7 +259,7 @@ class SurveyStore:
 
     def layer_names(self) -> list[str]:
         """Return the names of the layers."""
-        return list(types_of_layers(self.notes.headings, self.notes.turns, self.notes.chance))
+        return list(self.notes.types)
 
     def layer(self, name: str) -> KeptLayer:
         """Return a layer (rows, columns)."""
@@ -314,11 +310,11 @@ def create_store(path: Path, notes: StoreNotes, terrain: Terrain | None) -> None
     try:
         group: Any = zarr.open_group(aside, mode="w")
         side = min(layout.chunk, max(layout.shape))
-        for name, kind in types_of_layers(notes.headings, notes.turns, notes.chance).items():
+        for name, kind in notes.types.items():
             group.create_array(
                 name,
                 shape=layout.shape,
-                chunks=(layout.chunk, layout.chunk) if side == layout.chunk else (side, side),
+                chunks=(side, side),
                 dtype=kind,
                 fill_value=fill_of(name),
             )

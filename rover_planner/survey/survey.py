@@ -17,7 +17,7 @@ from rover_planner.survey.dask_cluster import ClusterSettings, check_machine
 from rover_planner.survey.geotiff import GeoTiffMap, is_geotiff
 from rover_planner.survey.layers import CLASS_NUMBERS, NOT_SURVEYED
 from rover_planner.survey.layout import Index, SurveyLayout, choose_chunk, find_halo
-from rover_planner.survey.map_source import MapFrame, frame_of
+from rover_planner.survey.map_source import MapFrame
 from rover_planner.survey.request import SurveyRequest
 from rover_planner.survey.store import StoreNotes, SurveyStore, create_store
 
@@ -78,7 +78,8 @@ def prepare_survey(
         frame, map_file, content = source.frame, str(source.path), source.hash_content()
     else:
         terrain = load_terrain(map_name, max_cells).fill_gaps(max_gap)
-        frame, map_file, content = frame_of(terrain), "", fingerprint(terrain)
+        frame = MapFrame(terrain.elevation.shape, terrain.resolution, terrain.origin, "")
+        map_file, content = "", fingerprint(terrain)
     notes = _make_notes(request, frame, map_file, content, chunk)
     if not out.exists():
         if settings is not None:
@@ -87,7 +88,7 @@ def prepare_survey(
     store = SurveyStore(out)
     store.check(notes.description, None if chunk is None else notes.layout.chunk)
     finished = store.find_finished()
-    left = [one for one in store.notes.layout.all_chunks if one not in finished]
+    left = [one for one in np.ndindex(store.notes.layout.chunks) if one not in finished]
     return PreparedSurvey(SurveyJob(request, out.absolute()), store, left)
 
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from rover_physics import SweepOptions, judge_path
-from rover_planner.advice import refusal, seek
+from rover_planner.advice import case as case_module
+from rover_planner.advice import seek
 from rover_planner.advice.advise import Advice, grow_advice, grow_within, path_of
 from rover_planner.advice.case import Case
 from rover_planner.advice.levers import Choice
@@ -95,9 +96,9 @@ def test_a_little_less_of_a_remedy_is_refused(advised):
 
 
 def test_a_path_around_is_searched(monkeypatch):
-    monkeypatch.setattr(refusal, "SEARCH", replace(refusal.SEARCH, budget=60.0))
+    monkeypatch.setattr(case_module, "SEARCH", replace(case_module.SEARCH, budget=60.0))
     case = refused_by(rock_left)
-    around = refusal.Refusal(case.judge()).path_around
+    around = case.judge().path_around
     assert around is not None and replace(case, poses=around).judge().passes
     np.testing.assert_allclose(around[[0, -1]], STRAIGHT[[0, -1]], atol=1e-9)
 
@@ -161,7 +162,7 @@ def test_two_poses_far_apart_are_start_and_goal():
 def test_energy_and_time_are_above_those_of_the_path_as_if_it_went_on():
     """The path fails at its first waypoint, so that nothing lies before it."""
     case = refused_by(slope, friction=0.45)
-    refusal_ = refusal.Refusal(case.judge())
+    refusal_ = case.judge()
     assert refusal_.place == 0
     found = next(one for one in grow_advice(case) if one.found).found[0]
     # The climb is the same; what servos slip costs more.
@@ -180,7 +181,7 @@ def test_a_use_of_servos_tells_how_far_away_a_failure_is():
 def test_a_piece_fails_only_where_the_path_does():
     """Each waypoint before the first failure passes in its piece, and that one fails in it."""
     case = replace(refused_by(rock_left, policy="servo"), poses=bend_path(STRAIGHT, 0.1))
-    refused = refusal.Refusal(case.judge())
+    refused = case.judge()
     for place in range(refused.place + 1):
         rows = refused.rows_around(place, fails_by_sum=False)
         assert case.fails_at(place, rows, by_chance=False) == (place == refused.place), place

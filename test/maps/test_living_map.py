@@ -266,7 +266,7 @@ def test_a_window_of_too_many_cells_is_refused_with_one_that_fits():
     living = LivingMap(TraverseServerParameters(map_window=100.0, max_map_cells=10_000))
     with pytest.raises(PlanningError, match=r"map_window is 100 m, set it to at most 5 m"):
         living.merge(local_map((0.0, 0.0)), TOPIC, 1.0)
-    assert not living.has_cells
+    assert living.grid is None
     living.values = TraverseServerParameters(map_window=5.0, max_map_cells=10_000)
     living.merge(local_map((0.0, 0.0)), TOPIC, 2.0)
     assert living.snapshot().terrain.elevation.shape == (100, 100)

@@ -11,7 +11,7 @@ from rover_planner.errors import PlanningError
 from rover_planner.maps.cells import CellGrid
 from rover_planner.maps.layers import lay_onto
 from rover_planner.maps.map_keeper import MapKeeper
-from rover_planner.maps.moved_map import MAX_LEAN, MapMove, move_map
+from rover_planner.maps.moved_map import MAX_LEAN, Move, move_map
 from rover_planner.parameters.traverse_server import MERGE, TraverseServerParameters
 from rover_planner.planning.navigation.transforms import Rigid
 from support.grounds import make_terrain, waves
@@ -21,8 +21,8 @@ CELL = 0.05
 RNG = np.random.default_rng(5)
 
 
-def move_of(x=0.0, y=0.0, z=0.0, roll=0.0, pitch=0.0, yaw=0.0) -> MapMove:
-    return MapMove(*Rigid.from_rpy(x, y, z, roll, pitch, yaw).matrix)
+def move_of(x=0.0, y=0.0, z=0.0, roll=0.0, pitch=0.0, yaw=0.0) -> Move:
+    return Rigid.from_rpy(x, y, z, roll, pitch, yaw).matrix
 
 
 def rough_map(shape=(31, 40), origin=(3.0, -2.0)) -> Terrain:
@@ -53,7 +53,7 @@ def test_a_shift_by_whole_cells_keeps_the_cells_of_the_grid_to_the_bit():
 @pytest.mark.parametrize("quarters", [1, 2])
 def test_quarter_turns_only_rearrange_the_cells(quarters):
     local, yaw = rough_map(), 0.5 * math.pi * quarters
-    x, y, _ = move_of(yaw=yaw).rotation @ (*local.origin, 0.0)
+    x, y, _ = move_of(yaw=yaw)[0] @ (*local.origin, 0.0)
     off = [round(value / CELL) * CELL - value for value in (x, y)]  # cells meet cells then
     moved = move_map(local, move_of(*off, yaw=yaw))
     for name in ("elevation", "elevation_std", "friction", "ground_class"):
@@ -64,7 +64,7 @@ def test_quarter_turns_only_rearrange_the_cells(quarters):
 def test_a_cell_is_known_only_if_the_four_around_it_are():
     local = rough_map()
     here = Rigid.from_rpy(-1.0, 2.0, 0.0, 0.0, 0.0, -2.4)
-    moved = move_map(local, MapMove(*here.matrix))
+    moved = move_map(local, here.matrix)
     back = here.inverse()
     ny, nx = local.elevation.shape
     known = 0
@@ -106,7 +106,7 @@ def test_a_turned_map_is_laid_onto_the_cells_of_the_map_that_it_merges_into():
     keeper.load(prior, 0.0, None)
     local = make_terrain(lambda x, y: 0.02 * np.sin(x) + 0.02 * np.cos(y), half=1.0)
     here = Rigid.from_rpy(0.513, -0.237, 0.1, 0.0, 0.0, 1.234)
-    placed = keeper.place(local, MapMove(*here.matrix))
+    placed = keeper.place(local, here.matrix)
     merged = keeper.take(placed, "elevation_map", 1.0, None).terrain
     assert merged.elevation.shape == prior.elevation.shape and merged.origin == prior.origin
     patch = lay_onto(placed, CellGrid(prior.origin, prior.resolution))

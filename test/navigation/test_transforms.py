@@ -138,7 +138,7 @@ def test_what_is_stale_or_missing_is_refused_with_its_age():
     sensors.take(Rigid.from_rpy(*HERE), 10 * SECOND)
     with pytest.raises(TransformError, match=r"by odometry: .* is stale: it is 3.000 s old"):
         sensors.find("front_camera", 12 * SECOND, 13 * SECOND, tree)
-    sensors.timeout = 5.0
+    sensors.driven.timeout = 5.0
     assert_same(
         sensors.find("front_camera", 12 * SECOND, 13 * SECOND, tree),
         Rigid.from_rpy(*HERE).then(MOUNT),

@@ -117,5 +117,5 @@ def test_a_point_turn_is_a_candidate_where_it_is_shorter_than_all_curves():
 
 def test_the_shortest_dubins_path_of_a_known_case_has_the_known_length():
     # facing each other's back across two radii: half a turn is the whole path
-    x, y, _ = dubins_paths(np.zeros(3), np.array([0.0, 2.0, np.pi]), 1.0, 1e-3)[0]
+    x, y, _ = dubins_paths(np.zeros(3), np.array([0.0, 2.0, np.pi]), 1.0, 1e-3)[0].T
     assert np.hypot(np.diff(x), np.diff(y)).sum() == pytest.approx(np.pi, rel=1e-6)

@@ -24,7 +24,7 @@ def test_level_ground_is_traversable_on_the_straight_connection():
     assert answer.traversable
     assert len(answer.candidates) == 5
     # all are equally safe; the straight one needs the least energy
-    assert answer.best == answer.nearest == 0
+    assert answer.traversable and answer.nearest == 0
     assert answer.chosen.length == pytest.approx(4.0)
     assert answer.chosen.passable_share == 1.0
     assert "5 of 5" in answer.explain()
@@ -38,14 +38,14 @@ def test_a_rock_in_the_way_is_driven_around():
     answer = answer_path_query(LSR1, terrain, (-3, 0, 0), (3, 0, 0), COARSE)
     assert not answer.candidates[0].verdict.traversable
     assert answer.traversable
-    assert answer.best > 0
+    assert answer.traversable and answer.nearest > 0
     assert answer.chosen.verdict.traversable
 
 
 def test_a_ridge_across_all_candidates_is_refused_with_its_reason():
     terrain = make_terrain(lambda x, y: np.where(np.abs(x - 1) < 0.3, 1.0, 0.0))
     answer = answer_path_query(LSR1, terrain, (-3, 0, 0), (3, 0, 0), COARSE)
-    assert answer.best == -1
+    assert not answer.traversable
     assert not answer.traversable
     assert answer.chosen.verdict.reason
     assert answer.chosen.verdict.reason in answer.explain()
@@ -61,11 +61,11 @@ def test_the_safer_path_wins_and_energy_decides_between_equals():
     safe = dataclasses.replace(second, cost=(0.3, 90.0))
     thrifty = dataclasses.replace(third, cost=(0.3, 80.0))
     risky = dataclasses.replace(first, cost=(0.5, 10.0))
-    assert choose((risky, safe, thrifty)).best == 2
+    assert choose((risky, safe, thrifty)).nearest == 2
     refused = dataclasses.replace(
         thrifty, verdict=dataclasses.replace(thrifty.verdict, traversable=False)
     )
-    assert choose((risky, safe, refused)).best == 1
+    assert choose((risky, safe, refused)).nearest == 1
 
 
 def test_on_an_uncertain_map_the_bounds_are_the_risk():

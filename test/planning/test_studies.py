@@ -11,13 +11,12 @@ from rover_physics.errors import RoverFileError
 from rover_physics.rover.rover_file import preset_names, rover_to_dict
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
-from rover_planner.studies.objectives import climbs, tallest_step
+from rover_planner.studies.objectives import tallest_step, why_not_climbed
 from rover_planner.studies.rover_values import (
     get_value,
     list_values,
     read_rover,
     vary,
-    with_value,
     write_rover,
 )
 from rover_planner.studies.runner import describe_ties, find_rover, run_study
@@ -52,8 +51,8 @@ def test_the_tallest_step_is_climbed_and_a_little_more_is_not():
     height = tallest_step(LSR1, "equal", 0.6)
     assert tallest_step(LSR1, "optimal", 0.6) >= height
     assert 0.02 < height < 0.3
-    assert climbs(LSR1, height, "equal", 0.6)
-    assert not climbs(LSR1, height + 0.004, "equal", 0.6)
+    assert not why_not_climbed(LSR1, height, "equal", 0.6)
+    assert why_not_climbed(LSR1, height + 0.004, "equal", 0.6)
 
 
 def test_a_rover_that_cannot_be_is_a_trial_with_a_note_and_no_value():
@@ -147,7 +146,7 @@ def test_every_value_is_within_its_range_and_can_be_set(name):
             now = get_value(data, value.keys[0])
             assert value.low <= now <= value.high and value.low < value.high, value.label
             assert value.label.endswith("]"), value.label
-            assert with_value(rover, value.keys, now) == rover
+            assert vary(rover, dict.fromkeys(value.keys, now)) == rover
 
 
 def test_the_command_writes_a_table_and_a_picture(tmp_path, capsys):

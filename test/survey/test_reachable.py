@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("zarr", reason="install the extra survey")
+import zarr
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse import csr_array
@@ -18,8 +19,14 @@ from rover_physics import Terrain
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.survey.layers import pack_bits, unpack_bits
-from rover_planner.survey.reachable import HeadingGrid, find_moves, find_reachable, search_area
-from rover_planner.survey.reachable_area import open_area
+from rover_planner.survey.reachable import (
+    DISTANCE,
+    GROUP,
+    HeadingGrid,
+    find_moves,
+    find_reachable,
+    search_area,
+)
 from rover_planner.survey.store import NOTES
 from support.survey_maps import make_request, survey_here
 
@@ -101,24 +108,25 @@ def test_areas_of_any_map_are_those_of_scipy(shape, headings, seed, share, chunk
     compare_with_scipy(open_at, turns_at, numbers, distance)
 
 
-def test_the_area_is_kept_in_the_store_until_more_is_surveyed(tmp_path):
+def test_the_area_is_kept_in_the_store_with_what_was_surveyed_then(tmp_path):
     request = make_request(headings=8)
     prepared = survey_here(tmp_path, Terrain(np.zeros((44, 44)), 0.1), request, chunk=64)
-    assert open_area(prepared.store) is None
     found = find_reachable(prepared.store, 2.5, 2.5)
-    assert found.start == (25, 25) and found.area == pytest.approx(found.cells * 0.01)
+    assert found.start == (25, 25) and found.reached > found.cells
     assert found.distance[25, 35] == pytest.approx(1.0)
     assert found.distance[35, 35] == pytest.approx(np.sqrt(2.0))
     first = found.distance[:].tobytes()
     other = find_reachable(prepared.store, 2.5, 2.5)
-    kept = open_area(prepared.store)
-    for name in ("cells", "longest", "farthest"):
-        assert getattr(kept, name) == getattr(found, name)
-    assert kept.distance[:].tobytes() == other.distance[:].tobytes() == first
-    assert kept.from_place == (2.5, 2.5) and kept.cells == np.isfinite(kept.distance).sum()
+    kept = zarr.open_group(prepared.store.path, mode="r", path=GROUP)
+    for name in ("cells", "longest"):
+        assert kept.attrs[name] == getattr(found, name)
+    assert kept.attrs["farthest"] == list(found.farthest)
+    distance = kept[DISTANCE][:]
+    assert distance.tobytes() == other.distance[:].tobytes() == first
+    assert kept.attrs["from"] == [2.5, 2.5] and kept.attrs["start"] == [25, 25]
+    assert kept.attrs["cells"] == np.isfinite(distance).sum()
+    assert kept.attrs["chunks_finished"] == 1
     assert not [path for path in prepared.store.path.iterdir() if path.name.startswith(".reach")]
-    prepared.store.mark_failed((0, 0))
-    assert open_area(prepared.store) is None
 
 
 def test_moves_lead_along_their_headings():
@@ -144,6 +152,7 @@ def test_the_command_prints_area_and_longest_way_and_draws_them(tmp_path, capfd)
     report = json.loads(capfd.readouterr().out)
     area = find_reachable(store, 3.0, 2.0)
     assert report["cells"] == area.cells and report["turns"] == "assumed"
+    assert report["area"] == pytest.approx(area.cells * store.notes.cell**2)
     assert report["longest"] == pytest.approx(area.longest, abs=1e-3)
     # At the edge the rover stands along it only, and it drives forwards only.
     assert report["cells_without_return"] == area.reached - area.cells > 0

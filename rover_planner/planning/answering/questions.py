@@ -2,14 +2,13 @@
 """The questions of the services as plain values, their answers, and what each is about."""
 
 import secrets
-from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.errors import ModelError
 from rover_physics.traversability.reach import ReachAnswer, judge_reach
 from rover_planner.maps.known_map import stamp_text
 from rover_planner.parameters.traverse_server import USE
@@ -63,11 +62,9 @@ class ReachQuery:
         if self.wrench_refusal:
             return ReachRefusal("no_wrench", self.wrench_refusal)
         settings = snapshot.settings
-        arm = settings.rover.manipulator
-        if arm is None:
-            raise ModelError(f"rover {settings.rover.name!r} has no manipulator to reach with")
-        unknown = [name for name in arm.joints if name not in snapshot.joints]
-        if 0 < len(unknown) < len(arm.joints):
+        joints = settings.manipulator_joints
+        unknown = [name for name in joints if name not in snapshot.joints]
+        if 0 < len(unknown) < len(joints):
             text = f"joint_states has never had {', '.join(unknown)}, but other joints of the arm"
             return ReachRefusal("missing_joints", f"{text}; it must have all of them, or none")
         assert snapshot.path.poses is not None
@@ -84,83 +81,38 @@ class ReachQuery:
 
 
 @dataclass(frozen=True, eq=False)
-class Question(ABC):
+class Question:
     """A question; it is judged in a thread."""
 
     service: str
     """Name of the service that was asked."""
     hash: str
     """Hash of the request; empty if it has none."""
-
-    @abstractmethod
-    def judge(self, snapshot: Snapshot) -> Any:
-        """Return the judgement, which has a `code`.
-
-        Raises:
-            PlanningError: The request is invalid.
-            RoverError: The model refuses the request.
-            NewerMapError: It is to be judged again on the newest map.
-        """
-
-    def refuse(self, code: str, reason: str) -> Any:
-        """Return a judgement that refuses the question."""
-        return refusal(code, reason)
+    judge: Callable[[Any], Any]
+    """Returns the judgement by a `Snapshot`, which has a `code`. It may raise a PlanningError or
+    RoverError, as the request is refused, or a NewerMapError, to be asked again on the newest
+    map."""
+    refuse: Callable[[str, str], Any] = refusal
+    """Returns a judgement that refuses the question, by code and reason."""
 
 
-@dataclass(frozen=True, eq=False)
-class PathQuestion(Question):
-    """Is there a path from start to goal?"""
-
-    start: Pose
-    """(3,) x, y [m], yaw [rad] of the body, map frame."""
-    goal: Pose
-    """The same."""
-    tolerance: float = 0.0
-    """As in `Snapshot.answer` [m]."""
-
-    def judge(self, snapshot: Snapshot) -> Any:
-        """Return the judgement of the best path."""
-        return snapshot.answer(self.start, self.goal, self.tolerance).complete()
+def ask_for_path(
+    service: str, about: str, start: Pose, goal: Pose, tolerance: float = 0.0
+) -> Question:
+    """Return the question whether there is a path; `tolerance` as in `Snapshot.answer` [m]."""
+    return Question(service, about, lambda known: known.answer(start, goal, tolerance).complete())
 
 
-@dataclass(frozen=True, eq=False)
-class PathCheck(Question):
-    """Can the rover drive a path?"""
-
-    path: GivenPath
-    """The path."""
-
-    def judge(self, snapshot: Snapshot) -> Any:
-        """Return the judgement of the path."""
-        return replace(snapshot, path=self.path).check_path().complete()
+def ask_about_path(service: str, about: str, path: GivenPath) -> Question:
+    """Return the question whether the rover can drive a path."""
+    return Question(
+        service, about, lambda known: replace(known, path=path).check_path().complete()
+    )
 
 
-@dataclass(frozen=True, eq=False)
-class ReachCheck(Question):
-    """Can the arm reach its target at the end of the last path?"""
-
-    query: ReachQuery
-    """Target and wrench, which do not change."""
-
-    def judge(self, snapshot: Snapshot) -> Any:
-        """Return the judgement of the arm."""
-        return self.query.ask(snapshot)
-
-    def refuse(self, code: str, reason: str) -> Any:
-        """Return a judgement that refuses the question."""
-        return ReachRefusal(code, reason)
-
-
-@dataclass(frozen=True, eq=False)
-class BadQuestion(Question):
-    """A request that cannot be read."""
-
-    reason: str
-    """Reason why not."""
-
-    def judge(self, _snapshot: Snapshot) -> Any:
-        """Return the refusal."""
-        return self.refuse("bad_request", self.reason)
+def ask_in_vain(service: str, about: str, reason: str) -> Question:
+    """Return what a request that cannot be read asks; its answer is the reason."""
+    return Question(service, about, lambda _known: refusal("bad_request", reason))
 
 
 @dataclass(frozen=True, eq=False)

@@ -188,40 +188,17 @@ class Snapshot:
         return refusal("stale_map", self.stale_map) if self.stale_map else None
 
     def compare_standing(self) -> SuspensionReport | None:
-        """Compare measured and predicted suspension where the rover stands, if that is known.
+        """Compare measured and predicted suspension where the rover stands.
+
+        None: it is not known where that is, nothing was measured, or the rover does not settle.
 
         Raises:
             RoverError: The model refuses a setting.
         """
-        if self.known_map is None:
+        if self.known_map is None or self.measured_pose is None:
             return None
-        return self._compare_suspension(self._judge())
-
-    def _judge(self) -> PathJudge:
-        """Return the model on the map, with the settings and the measured arm angles."""
-        assert self.known_map is not None
-        settings = self.settings
-        options = settings.query.change(joint_angles=self._manipulator_angles())
-        rule = settings.parameters.blind_ground
-        check = UnobservedCheck(settings.rover, self.known_map.seen, rule)
-        return PathJudge(settings.rover, self.known_map.terrain, options, check, self.marked)
-
-    def _describe(
-        self, judge: PathJudge, candidate: Candidate, search: PathSearch | None = None
-    ) -> PathJudgement:
-        """Return the judgement of a judged path; classes and the rest of it follow on demand."""
-        code, reason = candidate.verdict.code, candidate.verdict.reason
-        suspension = self._compare_suspension(judge)
-        return PathJudgement(code, reason, candidate, judge, suspension, search)
-
-    def _compare_suspension(self, judge: PathJudge) -> SuspensionReport | None:
-        """Compare measured and predicted suspension where the rover stands.
-
-        None: it is not known where that is, nothing was measured, or the rover does not settle.
-        """
-        if self.measured_pose is None:
-            return None
-        pose, options = self.measured_pose[None, :], judge.options.model
+        judge, pose = self._judge(), self.measured_pose[None, :]
+        options = judge.options.model
         prediction, _ = judge_poses(judge.rover, judge.terrain, pose, None, options, sigmas=0)
         predicted = (*prediction.rocker_angle[0].tolist(), *prediction.bogie_angle[0].tolist())
         mismatch = {
@@ -234,9 +211,20 @@ class Snapshot:
         largest = max(abs(difference) for difference in mismatch.values())
         return SuspensionReport(mismatch, largest <= self.settings.parameters.suspension_tolerance)
 
-    def _manipulator_angles(self) -> dict[str, float] | None:
-        """Return the measured manipulator angles [rad], None (stowed) until all are known."""
-        names = self.settings.manipulator_joints
-        if not names or any(name not in self.joints for name in names):
-            return None
-        return {name: self.joints[name] for name in names}
+    def _judge(self) -> PathJudge:
+        """Return the model on the map, with the settings and the measured arm angles."""
+        assert self.known_map is not None
+        settings, names = self.settings, self.settings.manipulator_joints
+        known = {name: self.joints[name] for name in names if name in self.joints}
+        is_stowed = not names or len(known) < len(names)  # until all are known
+        options = settings.query.change(joint_angles=None if is_stowed else known)
+        rule = settings.parameters.blind_ground
+        check = UnobservedCheck(settings.rover, self.known_map.seen, rule)
+        return PathJudge(settings.rover, self.known_map.terrain, options, check, self.marked)
+
+    def _describe(
+        self, judge: PathJudge, candidate: Candidate, search: PathSearch | None = None
+    ) -> PathJudgement:
+        """Return the judgement of a judged path; classes and the rest of it follow on demand."""
+        code, reason = candidate.verdict.code, candidate.verdict.reason
+        return PathJudgement(code, reason, candidate, judge, self.compare_standing(), search)

@@ -19,7 +19,7 @@ from rover_physics.traversability.pose_classes import (
     RoverOnMap,
     classify_poses,
 )
-from rover_planner.maps.changes import Shift, Window, find_changes, find_overlap, have_same_layers
+from rover_planner.maps.changes import Shift, find_changes, find_overlap, have_same_layers
 
 TILE = 32
 """Cells along the side of a tile; tiles are judged one after another."""
@@ -103,8 +103,12 @@ class HazardMap:
         if self._on_map is None:
             return True
         end = time.monotonic() + seconds
-        for tiles in self._batches(self._on_map.terrain, near):
-            self._judge(self._on_map, tiles)
+        terrain = self._on_map.terrain
+        for heading, row, column in self._batches(terrain, near):
+            (x, y), cell = terrain.origin, terrain.resolution
+            poses = np.column_stack([x + cell * column, y + cell * row, self._yaw[heading]])
+            self._classes[heading, row, column] = classify_poses(self._on_map, poses)
+            self._stale[heading, row, column] = False
             if time.monotonic() > end:
                 break
         return not self._stale.any()
@@ -140,21 +144,11 @@ class HazardMap:
 
     def _batches(
         self, terrain: Terrain, near: tuple[float, float] | None
-    ) -> Iterator[list[Window]]:
-        """Yield tiles with stale poses, the nearest first, at least BATCH poses together."""
-        batch: list[Window] = []
-        count = 0
-        for tile in self._stale_tiles(terrain, near):
-            batch.append(tile)
-            count += int(np.count_nonzero(self._stale[:, *tile]))
-            if count >= BATCH:
-                yield batch
-                batch, count = [], 0
-        if batch:
-            yield batch
+    ) -> Iterator[NDArray[np.intp]]:
+        """Yield heading, row and column (3, n) of stale poses, BATCH or more at a time.
 
-    def _stale_tiles(self, terrain: Terrain, near: tuple[float, float] | None) -> Iterator[Window]:
-        """Yield the cells (rows, columns) of tiles with stale poses, the nearest first."""
+        They come tile by tile, the nearest first.
+        """
         any_heading = self._stale.any(axis=0)
         rows, columns = (math.ceil(n / TILE) for n in any_heading.shape)
         padded = np.zeros((rows * TILE, columns * TILE), bool)
@@ -163,21 +157,15 @@ class HazardMap:
         if near is not None:
             place = (np.array(near) - terrain.origin) / (TILE * terrain.resolution) - 0.5
             tiles = tiles[np.argsort(np.hypot(*(tiles[:, ::-1] - place).T), kind="stable")]
-        for i, j in tiles.tolist():
-            yield slice(i * TILE, (i + 1) * TILE), slice(j * TILE, (j + 1) * TILE)
-
-    def _judge(self, on_map: RoverOnMap, tiles: list[Window]) -> None:
-        """Judge the stale poses of tiles."""
-        found = []
-        for tile in tiles:
-            stale = np.array(np.nonzero(self._stale[:, *tile]))
-            found.append(stale + np.array([[0], [tile[0].start], [tile[1].start]]))
-        heading, row, column = np.concatenate(found, axis=1)
-        x, y = on_map.terrain.origin
-        cell = on_map.terrain.resolution
-        poses = np.column_stack([x + cell * column, y + cell * row, self._yaw[heading]])
-        self._classes[heading, row, column] = classify_poses(on_map, poses)
-        self._stale[heading, row, column] = False
+        batch = np.empty((3, 0), np.intp)
+        for i, j in TILE * tiles:
+            stale = np.nonzero(self._stale[:, i : i + TILE, j : j + TILE])
+            batch = np.concatenate([batch, np.add(stale, [[0], [i], [j]])], axis=1)
+            if batch.shape[1] >= BATCH:
+                yield batch
+                batch = batch[:, :0]
+        if batch.size:
+            yield batch
 
 
 def _grow(cells: NDArray[np.bool_], widths: tuple[int, int]) -> NDArray[np.bool_]:

@@ -96,10 +96,6 @@ class SuspensionDrift:
         while self._kept and now - self._kept[0][0] > self._seconds:
             self._kept.popleft()
 
-    def forget(self) -> None:
-        """Forget all differences."""
-        self._kept.clear()
-
     @property
     def latest(self) -> Mapping[str, float]:
         """The last difference, measured minus predicted, by joint [rad]; empty without one."""
@@ -121,16 +117,12 @@ class PathMonitor:
     def __init__(self) -> None:
         self._path: WatchedPath | None = None
         self._drift = SuspensionDrift(DRIFT_TIME)
-        self._finding = Finding(IDLE)
+        self.finding = Finding(IDLE)
+        """The last finding."""
         self._judged_on: tuple[Terrain | None, ServiceSettings] | None = None
         self._pose_time = 0.0
         self._joints_time: float | None = None
         self._pause_end = 0.0
-
-    @property
-    def finding(self) -> Finding:
-        """The last finding."""
-        return self._finding
 
     def take_path(self, path: WatchedPath, sight: Sight) -> bool:
         """Watch a path from now on; return whether it is watched.
@@ -144,18 +136,18 @@ class PathMonitor:
                 return False
         self._path, self._judged_on, self._pose_time = path, None, sight.time
         self._joints_time = None
-        self._drift.forget()
-        self._finding = Finding(WATCHING, path.hash)
+        self._drift = SuspensionDrift(DRIFT_TIME)
+        self.finding = Finding(WATCHING, path.hash)
         return True
 
     def forget(self) -> None:
         """Watch nothing until the next path."""
-        self._path, self._finding = None, Finding(IDLE, mismatch=self._finding.mismatch)
+        self._path, self.finding = None, Finding(IDLE, mismatch=self.finding.mismatch)
 
     def stop(self, reason: PathJudgement) -> Finding:
         """Stop the rover for a reason that was found elsewhere."""
-        self._finding = replace(self._finding, state=STOPPED, judgement=reason)
-        return self._finding
+        self.finding = replace(self.finding, state=STOPPED, judgement=reason)
+        return self.finding
 
     def look(self, sight: Sight) -> Finding:
         """Compare the suspension, look at the rest of the path, and return what was found.
@@ -164,8 +156,8 @@ class PathMonitor:
             PlanningError, RoverError: The rest cannot be judged with these settings.
         """
         self._compare_suspension(sight)
-        if self._path is None or self._finding.state != WATCHING:
-            return self._finding
+        if self._path is None or self.finding.state != WATCHING:
+            return self.finding
         refused = (
             self._find_place(self._path, sight)
             or self._miss_joints(sight)
@@ -175,9 +167,10 @@ class PathMonitor:
             refused = self._judge_rest(self._path, sight)
         if refused is not None:
             return self.stop(refused)
-        if self._has_arrived(self._path):
-            self._finding = replace(self._finding, state=ARRIVED)
-        return self._finding
+        place = self.finding.place
+        if place is not None and self._path.is_end(place.index):
+            self.finding = replace(self.finding, state=ARRIVED)
+        return self.finding
 
     def _find_place(self, path: WatchedPath, sight: Sight) -> PathJudgement | None:
         """Find the place of the rover; return a refusal if it is unknown or off the path."""
@@ -187,9 +180,9 @@ class PathMonitor:
                 return None
             return refusal(NO_POSE, f"the rover's pose is not known for {missing:.1f} s")
         self._pose_time = sight.time
-        last = self._finding.place
+        last = self.finding.place
         place = path.find_place(sight.pose, None if last is None else last.index)
-        self._finding = replace(self._finding, place=place)
+        self.finding = replace(self.finding, place=place)
         most = sight.limits.monitor_offset
         if place.offset <= most:
             return None
@@ -211,7 +204,7 @@ class PathMonitor:
     def _compare_suspension(self, sight: Sight) -> None:
         """Compare measured and predicted suspension where the rover stands."""
         self._drift.take(sight.snapshot.compare_standing(), sight.time)
-        self._finding = replace(self._finding, mismatch=dict(self._drift.latest))
+        self.finding = replace(self.finding, mismatch=dict(self._drift.latest))
 
     def _refuse_drift(self, sight: Sight) -> PathJudgement | None:
         """Return a refusal if the suspension has differed too much for some time."""
@@ -243,9 +236,7 @@ class PathMonitor:
         taken = time.monotonic() - begin
         self._pause_end = sight.time + taken + min(taken * (1.0 / SHARE - 1.0), MAX_PAUSE)
         self._judged_on = judged_on
-        self._finding = replace(
-            self._finding, judgement=judgement, judged=self._finding.judged + 1
-        )
+        self.finding = replace(self.finding, judgement=judgement, judged=self.finding.judged + 1)
         if judgement.traversable:
             return None
         assert judgement.candidate is not None
@@ -257,7 +248,7 @@ class PathMonitor:
 
         What is refused whatever the errors of the map does not wait for them to be allowed for.
         """
-        first = 0 if self._finding.place is None else self._finding.place.index
+        first = 0 if self.finding.place is None else self.finding.place.index
         near = int(np.searchsorted(path.distances, path.distances[first] + NEAR)) + 1
         if near < len(path.poses):
             ahead = path.poses[first:near]
@@ -268,10 +259,6 @@ class PathMonitor:
                 if not judgement.traversable:
                     return judgement
         return _check(snapshot, path.poses[first:])
-
-    def _has_arrived(self, path: WatchedPath) -> bool:
-        place = self._finding.place
-        return place is not None and path.is_end(place.index)
 
 
 def rehearse(settings: ServiceSettings) -> None:

@@ -57,20 +57,12 @@ class SensorPoses:
         """
         self._mounts = {base_frame: Rigid.none(), **mounts}
         self._map, self._base = map_frame, base_frame
-        self._driven = TransformTree(timeout)
-
-    @property
-    def timeout(self) -> float:
-        """Age from which odometry is stale [s]."""
-        return self._driven.timeout
-
-    @timeout.setter
-    def timeout(self, timeout: float) -> None:
-        self._driven.timeout = timeout
+        self.driven = TransformTree(timeout)
+        """Where odometry says that the robot's frame is in the map frame."""
 
     def take(self, robot: Rigid, stamp: int) -> None:
         """Keep where odometry says that the robot's frame is in the map frame at a time [ns]."""
-        self._driven.take(self._map, self._base, stamp, robot)
+        self.driven.take(self._map, self._base, stamp, robot)
 
     def find(self, frame: str, stamp: int | None, now: int, tree: TransformTree) -> Rigid:
         """Return where a sensor's frame is in the map frame.
@@ -104,12 +96,12 @@ class SensorPoses:
     def _find_robot(self, stamp: int | None, now: int, tree: TransformTree) -> Rigid:
         if tree.connects(self._map, self._base):
             return tree.find(self._map, self._base, stamp, now)
-        if not self._driven.has_parent(self._base):
+        if not self.driven.has_parent(self._base):
             raise TransformError(
                 f"neither /tf nor odometry says where {self._base!r} is in {self._map!r}"
             )
         try:
-            return self._driven.find(self._map, self._base, stamp, now)
+            return self.driven.find(self._map, self._base, stamp, now)
         except TransformError as error:
             raise TransformError(f"by odometry: {error}") from None
 

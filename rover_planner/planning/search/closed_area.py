@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_planner.planning.search.edges import Edges
 from rover_planner.planning.search.graph import spread
 from rover_planner.planning.search.lattice_search import LatticeSearch
 from rover_planner.planning.search.nodes import HEADINGS
@@ -52,28 +51,18 @@ def find_closed_area(search: LatticeSearch) -> ClosedArea:
     Edges that were not judged count as open, so that the areas are bounds from above.
     """
     edges = search.edges
-    for ends in search.ends:
-        for code in ends.codes:
-            edges.state_of(code)
-    graph, areas = search.shortest.graph(0.0), []
+    graph, nodes, areas = search.shortest.graph(0.0), edges.nodes, []
     for around_goal, ends in enumerate(search.ends):
-        inside = np.zeros(edges.nodes.count, bool)
+        inside = np.zeros(nodes.count, bool)
         crossing = np.zeros(len(edges.codes) + 1, np.int64)
         spread(graph, ends.open_nodes, bool(around_goal), inside, crossing)
-        for code in ends.codes:
-            crossing[edges.codes.index(code)] += 1
-        areas.append(_describe_area(edges, inside, crossing, bool(around_goal)))
+        counts: Counter[str] = Counter()
+        for code, count in zip([*edges.codes, "off_map"], crossing.tolist(), strict=True):
+            counts[code] += count
+        counts.update(ends.codes)
+        total = max(sum(counts.values()), 1)
+        causes = {code: count / total for code, count in counts.most_common() if count}
+        places = np.asarray(inside.reshape(*nodes.shape, HEADINGS).any(axis=2))
+        area = float(places.sum()) * nodes.cell**2
+        areas.append(ClosedArea(bool(around_goal), places, area, causes))
     return min(areas, key=lambda one: one.area)
-
-
-def _describe_area(
-    edges: Edges, inside: np.ndarray, crossing: np.ndarray, around_goal: bool
-) -> ClosedArea:
-    nodes = edges.nodes
-    places = np.asarray(inside.reshape(*nodes.shape, HEADINGS).any(axis=2))
-    counts: Counter[str] = Counter()
-    for code, count in zip([*edges.codes, "off_map"], crossing.tolist(), strict=True):
-        counts[code] += count
-    total = max(sum(counts.values()), 1)
-    causes = {code: count / total for code, count in counts.most_common() if count}
-    return ClosedArea(around_goal, places, float(places.sum()) * nodes.cell**2, causes)

@@ -12,7 +12,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
 from rover_planner.planning.angles import wrap
 from rover_planner.planning.candidates import turn_and_drive
-from rover_planner.planning.dubins import dubins_lengths, dubins_paths
+from rover_planner.planning.dubins import dubins_lengths, shortest_dubins_path
 from rover_planner.planning.path_query import Pose
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.nodes import HEADINGS, Nodes, nearest_heading
@@ -112,8 +112,7 @@ class _Connector:
         """Return the waypoints (n, 3) of the shortest Dubins path between the end and a node."""
         first, last = self._order(there, gear)
         radius = tightest_radius(self.rover)
-        poses = np.column_stack(dubins_paths(first, last, radius, self.waypoint_spacing, 1)[0])
-        poses[0], poses[-1, :2] = first, last[:2]
+        poses = shortest_dubins_path(first, last, radius, self.waypoint_spacing)
         return poses - (0.0, 0.0, np.pi if gear == Gear.BACKWARD else 0.0)
 
     def turns(self) -> list[Connection]:

@@ -23,15 +23,12 @@ UNJUDGED, PASSES, FAILS = 0, 1, 2
 class PrimitiveTable(NamedTuple):
     """The primitives of all headings as arrays, as kernels read them; P is the largest number."""
 
-    step: NDArray[np.int64]
-    """(HEADINGS, P, 2) step in x and y [cells]."""
-    end_heading: NDArray[np.int64]
-    """(HEADINGS, P) heading at the end; -1 where a heading has fewer primitives."""
     least_cost: NDArray[np.float64]
     """(HEADINGS, P) cost on level ground [m]."""
-    back: NDArray[np.int64]
-    """(HEADINGS, Q, 2) first heading and number of the primitives that end with a heading; -1
-    where there are fewer."""
+    links: NDArray[np.int64]
+    """(2, HEADINGS, L, 4) primitives that begin, and those that end with a heading: the heading at
+    the other end, the number among those of its first heading, and the step in x and y to the
+    other end [cells]. -1 ends a list."""
 
 
 @dataclass(eq=False)
@@ -62,19 +59,18 @@ class Edges:
     @cached_property
     def table(self) -> PrimitiveTable:
         """The primitives as arrays."""
-        shape = HEADINGS, self.width
-        step = np.zeros((*shape, 2), np.int64)
-        end, cost = np.full(shape, -1), np.full(shape, np.inf)
-        leading: list[list[tuple[int, int]]] = [[] for _ in range(HEADINGS)]
+        least_cost = np.full((HEADINGS, self.width), np.inf)
+        lists: list[list[tuple[int, ...]]] = [[] for _ in range(2 * HEADINGS)]
         for heading, own in enumerate(self.primitives):
             for k, primitive in enumerate(own):
-                step[heading, k], end[heading, k] = primitive.step, primitive.end_heading
-                cost[heading, k] = primitive.least_cost
-                leading[primitive.end_heading].append((heading, k))
-        back = np.full((HEADINGS, max(map(len, leading)), 2), -1)
-        for heading, pairs in enumerate(leading):
-            back[heading, : len(pairs)] = pairs
-        return PrimitiveTable(step, end, cost, back)
+                (x, y), end = primitive.step, primitive.end_heading
+                least_cost[heading, k] = primitive.least_cost
+                lists[heading].append((end, k, x, y))
+                lists[HEADINGS + end].append((heading, k, -x, -y))
+        links = np.full((2 * HEADINGS, max(map(len, lists)), 4), -1)
+        for row, found in zip(links, lists, strict=True):
+            row[: len(found)] = found
+        return PrimitiveTable(least_cost, links.reshape(2, HEADINGS, -1, 4))
 
     @cached_property
     def samples(self) -> NDArray[np.float64]:
@@ -86,14 +82,10 @@ class Edges:
         """Number of edges, those counted that leave the window."""
         return self.nodes.count * self.width
 
-    def primitive(self, edge: int) -> Primitive:
-        """Return the primitive of an edge."""
-        node, k = divmod(int(edge), self.width)
-        return self.primitives[node % HEADINGS][k]
-
     def piece(self, edge: int) -> Piece:
         """Return an edge as a piece of path, with its cost if it was judged."""
-        node, primitive = int(edge) // self.width, self.primitive(edge)
+        node, k = divmod(int(edge), self.width)
+        primitive = self.primitives[node % HEADINGS][k]
         x, y, _ = self.nodes.poses(np.array([node]))[0]
         cost = float(self.cost.flat[edge])
         return Piece(primitive.poses + np.array([x, y, 0.0]), primitive.gear, cost)
@@ -102,9 +94,8 @@ class Edges:
         """Return the nodes (n,) where edges (n,) end; they must be in the window."""
         node, k = np.divmod(edges, self.width)
         place, heading = np.divmod(node, HEADINGS)
-        step = self.table.step[heading, k]
-        place = place + step[:, 1] * self.nodes.shape[1] + step[:, 0]
-        return place * HEADINGS + self.table.end_heading[heading, k]
+        end_heading, _, x, y = self.table.links[0, heading, k].T
+        return (place + y * self.nodes.shape[1] + x) * HEADINGS + end_heading
 
     def write(self, edge: int, code: str, cost: float) -> None:
         """Keep what was found of an edge: the code of its failure, "" for none, and its cost."""

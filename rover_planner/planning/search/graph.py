@@ -74,6 +74,8 @@ class ToGoal(NamedTuple):
     """Distance of the start's connections from there [m]."""
     cell: float
     """Distance of neighbouring nodes [m]."""
+    limit: float
+    """All costs are known for which the sum with the bound from the start is at most this [m]."""
 
 
 class SearchTree(NamedTuple):
@@ -128,167 +130,97 @@ def _neighbour(graph, node, i, backwards):
     """
     none = np.int64(-1)
     heading, place = node % HEADINGS, node // HEADINGS
-    if backwards:
-        other_heading, k = graph.table.back[heading, i, 0], graph.table.back[heading, i, 1]
-        if other_heading < 0:
-            return none, none, none
-        step, sign = graph.table.step[other_heading, k], -1
-    else:
-        other_heading, k = graph.table.end_heading[heading, i], np.int64(i)
-        if other_heading < 0:
-            return none, none, none
-        step, sign = graph.table.step[heading, k], 1
-    row = place // graph.columns + sign * step[1]
-    column = place % graph.columns + sign * step[0]
+    link = graph.table.links[1 if backwards else 0, heading, i]
+    if link[0] < 0:
+        return none, none, none
+    row, column = place // graph.columns + link[3], place % graph.columns + link[2]
     other = none
     if 0 <= row < graph.rows and 0 <= column < graph.columns:
-        other = np.int64((row * graph.columns + column) * HEADINGS + other_heading)
-    return other, other if backwards else np.int64(node), k
+        other = np.int64((row * graph.columns + column) * HEADINGS + link[0])
+    return other, other if backwards else np.int64(node), link[1]
 
 
 @exact_kernel
-def _from_start(to_goal, columns, node):
-    """Return a bound from below on the cost from the start to a node [m]."""
+def _bound(graph, node, backwards, to_goal):
+    """Return a bound from below on the cost from a node to the goal, or back to the start [m]."""
     place = node // HEADINGS
-    rows = place // columns - to_goal.focus[0]
-    along = place % columns - to_goal.focus[1]
-    return max(to_goal.cell * np.hypot(rows, along) - to_goal.radius, 0.0)
-
-
-@exact_kernel
-def _bound_to_goal(to_goal, limit, columns, node):
-    """Return a bound from below on the cost from a node to the goal [m].
-
-    All costs are known for which the sum with the bound from the start is at most `limit`.
-    """
-    from_start = _from_start(to_goal, columns, node)
-    if to_goal.cost[node] + from_start <= limit:
+    rows = place // graph.columns - to_goal.focus[0]
+    along = place % graph.columns - to_goal.focus[1]
+    from_start = max(to_goal.cell * np.hypot(rows, along) - to_goal.radius, 0.0)
+    if backwards:
+        return from_start
+    if to_goal.cost[node] + from_start <= to_goal.limit:
         return to_goal.cost[node]
-    return max(limit - from_start, 0.0)
+    return max(to_goal.limit - from_start, 0.0)
 
 
 @allocating_kernel
-def measure_to_goal(graph, goals, starts, slack, to_goal):
-    """Measure the costs from the nodes to the goal (A* from the goal towards the start).
+def find_shortest(graph, seeds, exits, backwards, to_goal, tree, slack, most):
+    """Find the shortest path from seeds to exits (A*).
 
     Args:
         graph: Graph.
-        goals: Seeds with the costs from the nodes to the goal.
-        starts: Seeds with the costs from the start to the nodes.
-        slack: Up to which multiple of the cost from the start to the goal it goes on.
-        to_goal: ToGoal; `cost` is written.
-
-    Returns:
-        The `limit` of `_bound_to_goal`, infinite if all nodes are known that lead to the goal; and
-        the number of nodes expanded.
-    """
-    distance = to_goal.cost
-    distance[:] = np.inf
-    heap = [(0.0, 0.0, np.int64(-1))]
-    heap.clear()
-    for i in range(goals.nodes.size):
-        node, cost = goals.nodes[i], goals.costs[i]
-        if graph.standing[node] < FAILS and cost < distance[node]:
-            distance[node] = cost
-            heapq.heappush(heap, (cost + _from_start(to_goal, graph.columns, node), cost, node))
-    entry = np.full(distance.size, np.inf)
-    for i in range(starts.nodes.size):
-        entry[starts.nodes[i]] = min(entry[starts.nodes[i]], starts.costs[i])
-    limit, expanded = np.inf, 0
-    while len(heap) > 0:
-        estimate, here, node = heapq.heappop(heap)
-        if here > distance[node]:
-            continue
-        if estimate > limit:
-            return limit, expanded
-        expanded += 1
-        if entry[node] < np.inf:
-            limit = min(limit, slack * (here + entry[node]))
-        _enter_before(graph, node, to_goal, heap)
-    return np.inf, expanded
-
-
-@allocating_kernel
-def _enter_before(graph, node, to_goal, heap):
-    """Enter the nodes from which an edge leads to a node."""
-    distance = to_goal.cost
-    for i in range(graph.table.back.shape[1]):
-        before, _, k = _neighbour(graph, node, i, True)
-        if k < 0:
-            break
-        if before < 0 or _is_too_dear(graph, before, k, distance[node], distance[before]):
-            continue
-        cost = distance[node] + edge_cost(graph, before, k, node)
-        if cost < distance[before]:
-            distance[before] = cost
-            bound = _from_start(to_goal, graph.columns, before)
-            heapq.heappush(heap, (cost + bound, cost, before))
-
-
-@allocating_kernel
-def find_shortest(graph, starts, goals, to_goal, tree, most):
-    """Find the shortest path from the start to the goal (A*).
-
-    Args:
-        graph: Graph.
-        starts: Seeds with the costs from the start to the nodes.
-        goals: Seeds with the costs from the nodes to the goal.
-        to_goal: ToGoal, and the limit up to which it is measured.
-        tree: SearchTree, written.
+        seeds: Seeds with the costs from the start to the nodes; backwards, from them to the goal.
+        exits: The same of the other end.
+        backwards: Whether the search is from the goal to the start.
+        to_goal: ToGoal.
+        tree: SearchTree, written; backwards only its `cost`.
+        slack: Up to which multiple of the cost of the shortest path it goes on.
         most: Number of nodes that it may expand.
 
     Returns:
-        Index of the goal's seed that the path ends with, -1 if there is no path, GIVEN_UP if it is
-        not known; its cost [m]; and the number of nodes expanded.
+        Index of the exit that the path ends with, -1 if there is no path, GIVEN_UP if it is not
+        known; its cost [m]; the cost [m] up to which paths are known, infinite for all; and the
+        number of nodes expanded.
     """
-    measured, limit = to_goal
     tree.cost[:] = np.inf
     leave = np.full(tree.cost.size, np.int64(-1))
-    for i in range(goals.nodes.size):
-        other = leave[goals.nodes[i]]
-        if other < 0 or goals.costs[i] < goals.costs[other]:
-            leave[goals.nodes[i]] = i
+    for i in range(exits.nodes.size):
+        other = leave[exits.nodes[i]]
+        if other < 0 or exits.costs[i] < exits.costs[other]:
+            leave[exits.nodes[i]] = i
     heap = [(0.0, 0.0, np.int64(-1))]
     heap.clear()
-    for i in range(starts.nodes.size):
-        node, cost = starts.nodes[i], starts.costs[i]
-        bound = _bound_to_goal(measured, limit, graph.columns, node)
-        standing = graph.standing[node] < FAILS
-        if standing and cost < tree.cost[node] and bound < np.inf:
-            tree.cost[node], tree.parent[node] = cost, -1 - i
-            heapq.heappush(heap, (cost + bound, -cost, node))
+    for i in range(seeds.nodes.size):
+        node, cost = seeds.nodes[i], seeds.costs[i]
+        if graph.standing[node] < FAILS and cost < tree.cost[node]:
+            _enter(graph, node, cost, -1 - i, backwards, to_goal, tree, heap)
     best, found, expanded = np.inf, np.int64(-1), 0
+    width = graph.state.shape[1]
     while len(heap) > 0:
         estimate, negative, node = heapq.heappop(heap)
-        if estimate >= best:
-            break
+        if estimate >= slack * best:
+            return found, best, slack * best, expanded
         if -negative > tree.cost[node]:
             continue
         if expanded == most:
-            return np.int64(GIVEN_UP), np.inf, expanded
+            return np.int64(GIVEN_UP), np.inf, 0.0, expanded
         expanded += 1
-        if leave[node] >= 0 and -negative + goals.costs[leave[node]] < best:
-            best, found = -negative + goals.costs[leave[node]], leave[node]
-        _enter_after(graph, node, to_goal, tree, heap)
-    return found, best, expanded
+        if leave[node] >= 0 and -negative + exits.costs[leave[node]] < best:
+            best, found = -negative + exits.costs[leave[node]], leave[node]
+        for i in range(graph.table.links.shape[2]):
+            other, first, k = _neighbour(graph, node, i, backwards)
+            if k < 0:
+                break
+            if other < 0 or _is_too_dear(graph, first, k, tree.cost[node], tree.cost[other]):
+                continue
+            end = np.int64(node) if backwards else other
+            cost = tree.cost[node] + edge_cost(graph, first, k, end)
+            if cost < tree.cost[other]:
+                edge = first * width + k
+                _enter(graph, other, cost, edge, backwards, to_goal, tree, heap)
+    return found, best, np.inf, expanded
 
 
 @allocating_kernel
-def _enter_after(graph, node, to_goal, tree, heap):
-    """Enter the nodes to which the edges of a node lead."""
-    measured, limit = to_goal
-    width = graph.table.end_heading.shape[1]
-    for k in range(width):
-        end, _, number = _neighbour(graph, node, k, False)
-        if number < 0:
-            break
-        if end < 0 or _is_too_dear(graph, node, k, tree.cost[node], tree.cost[end]):
-            continue
-        bound = _bound_to_goal(measured, limit, graph.columns, end)
-        cost = tree.cost[node] + edge_cost(graph, node, k, end)
-        if cost < tree.cost[end] and bound < np.inf:
-            tree.cost[end], tree.parent[end] = cost, node * width + k
-            heapq.heappush(heap, (cost + bound, -cost, end))
+def _enter(graph, node, cost, parent, backwards, to_goal, tree, heap):
+    """Enter a node at a cost [m], if there may be a path from there."""
+    bound = _bound(graph, node, backwards, to_goal)
+    if bound < np.inf:
+        tree.cost[node] = cost
+        if not backwards:
+            tree.parent[node] = parent
+        heapq.heappush(heap, (cost + bound, -cost, node))
 
 
 @allocating_kernel
@@ -309,7 +241,7 @@ def spread(graph, seeds, backwards, inside, crossing):
         if graph.standing[seeds[i]] < FAILS and not inside[seeds[i]]:
             inside[seeds[i]] = True
             stack.append(seeds[i])
-    most = graph.table.back.shape[1] if backwards else graph.table.end_heading.shape[1]
+    most = graph.table.links.shape[2]
     visited = [np.int64(-1)]
     visited.clear()
     while len(stack) > 0:
@@ -369,8 +301,8 @@ class ShortestPaths:
         """Search from about the nodes of the first seeds; later ones must be among them."""
         self._edges, self._doubt, self._difficulty = edges, doubt, difficulty
         nodes, count = edges.nodes, edges.nodes.count
-        self._to_goal = ToGoal(np.empty(count), *nodes.surround(starts.nodes), nodes.cell)
-        self._limit, self._measured, self._most = np.inf, 0, 0
+        self._to_goal = ToGoal(np.empty(count), *nodes.surround(starts.nodes), nodes.cell, np.inf)
+        self._measured = self._most = 0
         self._tree = SearchTree(np.empty(count), np.empty(count, np.int64))
         self._caution, self._misled = -1.0, 0
         self.expanded = 0
@@ -422,12 +354,14 @@ class ShortestPaths:
         rows, columns = np.ogrid[: nodes.shape[0], : nodes.shape[1]]
         away = np.maximum(cell * np.hypot(rows - row, columns - column) - radius, 0.0)
         self._to_goal.cost.reshape(-1, HEADINGS)[:] = away.reshape(-1, 1)
-        self._limit, self._measured, self._most = np.inf, GUESSED, GUESSED
+        self._to_goal = self._to_goal._replace(limit=np.inf)
+        self._measured = self._most = GUESSED
 
     def _search(self, graph: Graph, starts: Seeds, goals: Seeds) -> tuple[int, float]:
         """Return the goal's seed, -1 or GIVEN_UP, and the cost [m] of the shortest path."""
-        to_goal, most = (self._to_goal, self._limit), self._most - self._misled
-        goal, cost, expanded = find_shortest(graph, starts, goals, to_goal, self._tree, most)
+        goal, cost, _, expanded = find_shortest(
+            graph, starts, goals, False, self._to_goal, self._tree, 1.0, self._most - self._misled
+        )
         self.expanded, self.last_expanded = self.expanded + expanded, expanded
         self._misled += max(0, expanded - FEW)
         return int(goal), float(cost)
@@ -435,7 +369,11 @@ class ShortestPaths:
     def _measure(self, graph: Graph, starts: Seeds, goals: Seeds) -> None:
         """Measure the costs to the goal again."""
         self._misled, self._most = 0, np.iinfo(np.int64).max
-        self._limit, self._measured = measure_to_goal(graph, goals, starts, SLACK, self._to_goal)
+        known = SearchTree(self._to_goal.cost, self._tree.parent)
+        _, _, limit, self._measured = find_shortest(
+            graph, goals, starts, True, self._to_goal, known, SLACK, self._most
+        )
+        self._to_goal = self._to_goal._replace(limit=limit)
 
     def _follow_back(self, node: int) -> tuple[int, NDArray[np.int64]]:
         """Return the start's connection and the edges (k,) that lead to a node."""

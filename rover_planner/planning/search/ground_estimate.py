@@ -38,8 +38,6 @@ class GroundEstimate(NamedTuple):
 class _Question(NamedTuple):
     """A map, and where the wheels of a rover at a node are, as the kernel reads it."""
 
-    elevation: np.ndarray
-    """(ny, nx) heights [m]."""
     whole: np.ndarray
     """(ny - 1, nx - 1) whether all corners of a cell are known."""
     away: np.ndarray
@@ -62,12 +60,11 @@ def estimate_ground(rover: Rover, terrain: Terrain, nodes: Nodes) -> GroundEstim
         nodes: The nodes.
     """
     wheels = wheel_places(rover)
-    elevation = np.asarray(terrain.elevation)
-    known = ~np.isnan(elevation)
+    known = ~np.isnan(terrain.elevation)
+    away = np.zeros(known.shape) if known.all() else ndimage.distance_transform_edt(~known)
     question = _Question(
-        elevation,
         known[:-1, :-1] & known[:-1, 1:] & known[1:, :-1] & known[1:, 1:],
-        _distance_to_known(elevation, terrain.resolution),
+        terrain.resolution * away,
         terrain.resolution,
         wheels - terrain.origin,
         largest_wheel_shift(rover),
@@ -121,15 +118,6 @@ def largest_wheel_shift(rover: Rover) -> float:
     return farthest
 
 
-def _distance_to_known(elevation: NDArray[np.float64], resolution: float) -> NDArray[np.float64]:
-    """Return (ny, nx) distances to the next known cell [m]."""
-    unknown = np.isnan(elevation)
-    if not unknown.any():
-        return np.zeros(elevation.shape)
-    away: NDArray[np.float64] = resolution * ndimage.distance_transform_edt(unknown)
-    return away
-
-
 @exact_kernel
 def estimate_nodes(question, at, chosen, found):
     """Write the estimates of the nodes at some places.
@@ -146,7 +134,7 @@ def estimate_nodes(question, at, chosen, found):
             for wheel in range(6):
                 u = (at[place, 0] + question.offsets[heading, wheel, 0]) / question.resolution
                 v = (at[place, 1] + question.offsets[heading, wheel, 1]) / question.resolution
-                if not _is_known(question, u, v):
+                if not _is_known(question.whole, u, v):
                     found.doubt[node] = FULL_DOUBT
                     if _distance(question, u, v) > question.shift:
                         found.groundless[node] = True
@@ -163,23 +151,8 @@ def _distance(question, u, v):
 
 
 @exact_kernel
-def _is_known(question, u, v):
-    """Return whether a place [cells] is on the map, and known: all corners around it are.
-
-    Within rounding of a line between cells, the corners on one side of it suffice.
-    """
-    elevation = question.elevation
-    ny, nx = elevation.shape
-    if not (-_ROUNDING <= u <= nx - 1 + _ROUNDING and -_ROUNDING <= v <= ny - 1 + _ROUNDING):
-        return False
-    i, j = min(int(u), nx - 2), min(int(v), ny - 2)
-    if question.whole[j, i]:
-        return True
-    a, b = u - i, v - j
-    known = True
-    for row in range(2):
-        for column in range(2):
-            weight = (a if column else 1.0 - a) * (b if row else 1.0 - b)
-            if weight > 1e-4 and np.isnan(elevation[j + row, i + column]):
-                known = False
-    return known
+def _is_known(whole, u, v):
+    """Return whether a place [cells] is on the map, and all corners around it are known."""
+    ny, nx = whole.shape
+    on_map = -_ROUNDING <= u <= nx + _ROUNDING and -_ROUNDING <= v <= ny + _ROUNDING
+    return on_map and whole[min(int(v), ny - 1), min(int(u), nx - 1)]

@@ -120,7 +120,7 @@ class PathJudge:
         if not answer.traversable:
             return answer
         held = choose(tuple(self._hold_path(candidate) for candidate in answer.candidates))
-        return held if held.traversable else replace(held, nearest=answer.best)
+        return held if held.traversable else replace(held, nearest=answer.nearest)
 
     def _hold_path(self, candidate: Candidate) -> Candidate:
         """Return a path, refused where its ground was never seen or is marked."""
@@ -223,7 +223,7 @@ class PathJudge:
 
     def stand(self, poses: NDArray[np.float64]) -> tuple[str, ...]:
         """Return the codes (n,) of what fails at single poses (n, 3), wheels ahead; "" if none."""
-        if self._is_map_exact:
+        if self.terrain.elevation_std is None or not self.options.map_sigmas:
             self.poses += len(poses)
             model = pack_model(self.rover, self.terrain, self.options.model)
             codes = find_codes(model.limits, model.evaluate(poses))
@@ -232,10 +232,6 @@ class PathJudge:
         for row in self._find_unobserved(poses[:, None, :], codes):
             codes[row] = UNOBSERVED_CODE
         return tuple(codes)
-
-    @property
-    def _is_map_exact(self) -> bool:
-        return self.terrain.elevation_std is None or not self.options.map_sigmas
 
     def refuse(self, pose: Pose) -> tuple[str, str]:
         """Return code and reason why the rover cannot stand at a pose, empty if it can."""

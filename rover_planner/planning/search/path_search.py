@@ -15,7 +15,7 @@ from rover_physics.numerics.plain_values import to_plain
 from rover_physics.rover.steering_joints import tightest_radius
 from rover_planner.errors import PlanningError
 from rover_planner.planning.candidates import check_pose, generate_candidates, path_length
-from rover_planner.planning.dubins import dubins_paths
+from rover_planner.planning.dubins import shortest_dubins_path
 from rover_planner.planning.path_query import Candidate
 from rover_planner.planning.search.closed_area import ClosedArea, find_closed_area
 from rover_planner.planning.search.connections import (
@@ -318,7 +318,7 @@ class _PathFinder:
         rover, spacing = query.rover, query.options.waypoint_spacing
         edges = self._memory.recall(query, nodes)
         climb = steepest_climb(rover, query.options.model.friction or rover.friction)
-        terrain = cut_out(query, nodes)
+        terrain = cut_out(query, nodes) if self._is_limited else query.terrain
         ground = estimate_ground(rover, terrain, nodes)
         edges.standing[ground.groundless] = edges.state_of("unknown_ground")
         self._groundless = ground.groundless
@@ -439,8 +439,7 @@ def _find_shortcut(judge: PathJudge, old: list[Piece], radius: float) -> Piece |
     spacing = judge.options.waypoint_spacing
     cost = sum(one.cost for one in old) * (1.0 - GAIN)
     for scale in RADII:
-        poses = np.column_stack(dubins_paths(start, end, scale * radius, spacing, 1)[0])
-        poses[0], poses[-1, :2] = start, end[:2]
+        poses = shortest_dubins_path(start, end, scale * radius, spacing)
         if path_length(poses) >= cost:
             continue
         curve = Piece(poses, Gear.FORWARD)

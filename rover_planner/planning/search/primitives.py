@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
 from rover_planner.planning.angles import wrap
+from rover_planner.planning.dubins import count_steps
 from rover_planner.planning.search.nodes import HEADINGS, STEPS, YAWS, opposite
 
 CURVES = {1: 2, 2: 1}
@@ -124,7 +125,7 @@ def _straight(heading: int, cell: float, spacing: float) -> Primitive:
     """Return the straight line to the next node ahead."""
     step = np.array(STEPS[heading])
     length = float(np.hypot(*step)) * cell
-    shares = np.linspace(0.0, 1.0, 1 + _pieces(length, spacing))
+    shares = np.linspace(0.0, 1.0, 1 + count_steps(length, spacing))
     poses = np.column_stack([shares[:, None] * step * cell, np.full(len(shares), YAWS[heading])])
     return Primitive(STEPS[heading], heading, Gear.FORWARD, length, poses)
 
@@ -169,7 +170,7 @@ def _drive_curve(
     """
     arc_leg, side = legs.min(), np.sign(angle)
     radius = arc_leg / np.tan(0.5 * abs(angle))
-    driven = np.linspace(0.0, length, 1 + _pieces(length, spacing))
+    driven = np.linspace(0.0, length, 1 + count_steps(length, spacing))
     on_arc = np.clip(driven - (legs[0] - arc_leg), 0.0, radius * abs(angle))
     before = np.minimum(driven, legs[0] - arc_leg)
     behind = np.maximum(driven - before - on_arc, 0.0)
@@ -196,15 +197,10 @@ def _turns(heading: int, swing: float, spacing: float) -> list[Primitive]:
         end = (heading + side) % HEADINGS
         angle = float(wrap(YAWS[end] - YAWS[heading]))
         length = swing * abs(angle)
-        yaws = YAWS[heading] + np.linspace(0.0, angle, 1 + _pieces(length, spacing))
+        yaws = YAWS[heading] + np.linspace(0.0, angle, 1 + count_steps(length, spacing))
         poses = np.column_stack([np.zeros((len(yaws), 2)), yaws])
         found.append(Primitive((0, 0), end, Gear.ON_THE_SPOT, length, poses))
     return found
-
-
-def _pieces(length: float, spacing: float) -> int:
-    """Return into how many steps of at most `spacing` [m] a length [m] is divided."""
-    return max(1, int(np.ceil(length / spacing - 1e-9)))
 
 
 def _unit(yaw: float) -> np.ndarray:

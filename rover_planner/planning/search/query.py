@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from rover_physics.chance.ground import cut_around
+from rover_physics.errors import TerrainError
 from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.terrain.grid import Terrain
@@ -84,21 +86,14 @@ def choose_window(query: SearchQuery, cell: float) -> tuple[Nodes, bool]:
 
 
 def cut_out(query: SearchQuery, nodes: Nodes) -> Terrain:
-    """Return the heights of the map that a rover at the nodes may touch, without other layers.
+    """Return the part of the map that a rover at the nodes may touch.
 
-    The map itself comes back where that is all of it, or no height in the part is known.
+    The map itself comes back where no height in the part is known.
     """
-    terrain = query.terrain
-    margin = swing_radius(query.rover) + 2.0 * query.rover.wheel.radius
-    low = nodes.cell * np.array(nodes.first, float) - margin
-    high = low + nodes.cell * (np.array(nodes.shape[::-1]) - 1) + 2.0 * margin
-    size = np.array(terrain.elevation.shape[::-1])
-    first = np.clip(np.floor((low - terrain.origin) / terrain.resolution), 0, size - 2).astype(int)
-    last = np.clip(np.ceil((high - terrain.origin) / terrain.resolution), first + 1, size - 1)
-    columns, rows = (slice(a, int(b) + 1) for a, b in zip(first, last, strict=True))
-    part = terrain.elevation[rows, columns]
-    if part.shape == terrain.elevation.shape or np.isnan(part).all():
+    wheel, terrain = query.rover.wheel, query.terrain
+    margin = swing_radius(query.rover) + 2.0 * wheel.radius + terrain.resolution
+    ends = nodes.cell * np.array([nodes.first, np.add(nodes.first, nodes.shape[::-1]) - 1])
+    try:
+        return cut_around(terrain, ends, margin)
+    except TerrainError:
         return terrain
-    x, y = np.asarray(terrain.origin) + terrain.resolution * first
-    # Kernels are compiled for arrays without gaps.
-    return Terrain(np.ascontiguousarray(part), terrain.resolution, (float(x), float(y)))

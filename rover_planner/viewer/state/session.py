@@ -20,7 +20,7 @@ from rover_planner.planning.assumptions import Assumptions
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.query import LatticeSettings
-from rover_planner.studies.rover_values import with_value
+from rover_planner.studies.rover_values import vary
 from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.judging import JudgeRequest, judge_request, show_recorded
 from rover_planner.viewer.state.scenario import Pose, Scenario, Shown
@@ -136,7 +136,7 @@ class ViewSession:
         Raises:
             RoverError: The changed rover is invalid.
         """
-        self._change(rover=with_value(self.wanted.rover, keys, value))
+        self._change(rover=vary(self.wanted.rover, dict.fromkeys(keys, value)))
 
     def change_arm(self, joint: str, angle: float) -> None:
         """Turn a joint of the arm to an angle [rad]."""

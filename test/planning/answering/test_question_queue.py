@@ -3,8 +3,6 @@
 
 import threading
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -44,19 +42,6 @@ class Work:
         return time.monotonic() - self._began if self.begun.is_set() else 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class Task(Question):
-    """A question whose judgement is what a function returns."""
-
-    work: Callable[[Budget], object]
-
-    def judge(self, budget):
-        return self.work(budget)
-
-    def refuse(self, code, _reason):
-        return code
-
-
 class Desk:
     """A queue whose judgements are collected as (name, judgement)."""
 
@@ -67,7 +52,11 @@ class Desk:
         )
 
     def ask(self, name, work, seconds: float = 20.0, clock=time.monotonic) -> None:
-        self.tell(self.queue.ask(Asked(Task(name, "", work), Budget(seconds, clock))))
+        self.tell(
+            self.queue.ask(
+                Asked(Question(name, "", work, lambda code, _: code), Budget(seconds, clock))
+            )
+        )
 
     def tell(self, judged) -> int:
         self.told += [(asked.question.service, judgement) for asked, judgement in judged]

@@ -53,15 +53,15 @@ def cost_of(graph, node, k, end):
 def explicit_costs(known, graph):
     """Return the matrix of the costs of all edges that are not refused."""
     rows, columns, costs = [], [], []
-    shape, table = EDGES.nodes.shape, EDGES.table
+    shape = EDGES.nodes.shape
     for node in range(EDGES.nodes.count):
         place, heading = divmod(node, 16)
         row, column = divmod(place, shape[1])
-        for k, end_heading in enumerate(table.end_heading[heading]):
-            x, y = column + table.step[heading, k, 0], row + table.step[heading, k, 1]
-            if end_heading < 0 or not (0 <= x < shape[1] and 0 <= y < shape[0]):
+        for k, primitive in enumerate(PRIMITIVES[heading]):
+            x, y = column + primitive.step[0], row + primitive.step[1]
+            if not (0 <= x < shape[1] and 0 <= y < shape[0]):
                 continue
-            end = (y * shape[1] + x) * 16 + end_heading
+            end = (y * shape[1] + x) * 16 + primitive.end_heading
             if known.state[node, k] < FAILS and known.standing[end] < FAILS:
                 rows.append(node), columns.append(end)
                 costs.append(cost_of(graph, node, k, end))
