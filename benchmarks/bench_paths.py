@@ -5,9 +5,6 @@ Ground is mild or rocky; paths are straight with 2 cm between waypoints, on one 
 are judged in ways on and back too are part of the rocky ones.
 """
 
-import resource
-import subprocess
-import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -16,7 +13,7 @@ import numba
 import numpy as np
 
 from benchmarks.grounds import real_maps, straight
-from benchmarks.measure import Figure, median_time, median_times
+from benchmarks.measure import Figure, median_time, median_times, peak_memory, run_command
 from rover_physics import (
     Rover,
     SweepOptions,
@@ -155,8 +152,7 @@ def measure_memory(mars: Terrain, folder: Path) -> Figure:
     there = straight(10.0, y=-3.0)
     course = np.concatenate([there, there[::-1]])
     np.savez(folder / "poses.npz", poses=np.resize(course, (MANY, 3)))
-    files = [str(folder / name) for name in ("ground.npz", "poses.npz", "out.npz")]
-    command = [sys.executable, "-m", "rover_planner", "predict", "lsr1", *files]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-    peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
-    return Figure("paths", f"predict {MANY:,} poses: peak memory", peak, "MiB", 1024.0, repeats=1)
+    files = (folder / name for name in ("ground.npz", "poses.npz", "out.npz"))
+    run_command("predict", "lsr1", *files)
+    name = f"predict {MANY:,} poses: peak memory"
+    return Figure("paths", name, peak_memory(), "MiB", 1024.0, repeats=1)

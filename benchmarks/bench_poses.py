@@ -9,7 +9,7 @@ import numba
 import numpy as np
 
 from benchmarks.grounds import all_grounds, random_poses
-from benchmarks.measure import Figure, median_time, median_times
+from benchmarks.measure import Figure, median_time, median_times, peak_memory
 from rover_physics import Rover, SweepOptions, Terrain, load_rover, score_poses, sweep_map
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
@@ -95,7 +95,7 @@ def measure_map(rover: Rover) -> list[Figure]:
     ground = make_mars_terrain(2, MAP_CELLS * 0.05, 0.05)
     elevation = ground.elevation[:MAP_CELLS, :MAP_CELLS]
     ground = Terrain(elevation, ground.resolution, ground.origin)
-    rates, before = [], _peak_memory()
+    rates, before = [], peak_memory(resource.RUSAGE_SELF)
     began = time.perf_counter()
     for first, scores in sweep_map(rover, ground):
         taken = time.perf_counter() - began
@@ -105,14 +105,10 @@ def measure_map(rover: Rover) -> list[Figure]:
             break
         began = time.perf_counter()
     rate, cells = statistics.median(rates), ground.elevation.size
+    memory = peak_memory(resource.RUSAGE_SELF) - before
     name = f"map of {MAP_CELLS:,} x {MAP_CELLS:,} cells"
     return [
         Figure("map", f"{name}: poses per second, all threads", rate, "1/s", repeats=len(rates)),
         Figure("map", f"{name}: 8 headings take", 8 * cells / rate, "s", repeats=len(rates)),
-        Figure("map", f"{name}: memory for it", _peak_memory() - before, "MB", repeats=1),
+        Figure("map", f"{name}: memory for it", memory, "MB", repeats=1),
     ]
-
-
-def _peak_memory() -> float:
-    """Return the peak memory of this process so far [MB]."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

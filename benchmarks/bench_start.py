@@ -5,11 +5,7 @@ The time includes DDS discovery. The cold start compiles into a separate folder,
 cached kernels remain in place. The start of the command line is timed, too.
 """
 
-import os
-import resource
 import statistics
-import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -18,7 +14,7 @@ import numpy as np
 
 from benchmarks.bench_service import GOAL, START
 from benchmarks.grounds import straight
-from benchmarks.measure import Figure
+from benchmarks.measure import Figure, run_command
 from benchmarks.processes import SERVER, memory_of, open_nodes
 from rover_physics import save_terrain
 from rover_planner.worlds.mars_terrain import make_mars_terrain
@@ -67,17 +63,11 @@ def measure_cold_start() -> Figure:
 
 def measure_command() -> Figure:
     """Measure the CPU time of `rover_planner predict` for a short path, imports included."""
-    times = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         save_terrain(folder / "ground.npz", make_mars_terrain(1, 24.0, 0.05))
         np.savez(folder / "poses.npz", poses=straight(0.02 * WAYPOINTS, y=-6.0)[:WAYPOINTS])
-        files = [str(folder / name) for name in ("ground.npz", "poses.npz", "out.npz")]
-        command = [sys.executable, "-m", "rover_planner", "predict", "lsr1", *files]
-        for _ in range(1 + STARTS):
-            before = resource.getrusage(resource.RUSAGE_CHILDREN)
-            subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=os.environ)
-            after = resource.getrusage(resource.RUSAGE_CHILDREN)
-            times.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+        files = [folder / name for name in ("ground.npz", "poses.npz", "out.npz")]
+        times = [run_command("predict", "lsr1", *files).cpu for _ in range(1 + STARTS)]
     name = f"predict of {WAYPOINTS} waypoints, CPU time"
     return Figure("start", name, statistics.median(times[1:]), "s", 0.7, repeats=STARTS)

@@ -5,18 +5,13 @@ A large and a small map are surveyed, and the difference counts: start and compi
 """
 
 import json
-import resource
-import subprocess
-import sys
 import tempfile
-import time
-from dataclasses import dataclass
 from pathlib import Path
 
 import numba
 import numpy as np
 
-from benchmarks.measure import Figure, median_time
+from benchmarks.measure import Figure, Run, median_time, peak_memory, run_command
 from rover_physics import Terrain, load_rover, save_terrain, score_poses
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
@@ -31,28 +26,6 @@ POSES = 20_000
 """Poses that are scored without a survey, for comparison."""
 
 
-@dataclass(frozen=True)
-class Run:
-    """Times and report of a command."""
-
-    seconds: float
-    """Time by the clock [s]."""
-    cpu: float
-    """CPU time of all its processes [s]."""
-    report: dict
-    """The printed report."""
-
-
-def run(*words: object) -> Run:
-    """Run `rover_planner` with words."""
-    began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
-    command = [sys.executable, "-m", "rover_planner", *map(str, words)]
-    printed = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return Run(time.perf_counter() - began, cpu, json.loads(printed))
-
-
 def measure() -> list[Figure]:
     """Survey both maps with one worker and with two, then search what can be reached."""
     with tempfile.TemporaryDirectory() as name:
@@ -64,10 +37,10 @@ def measure() -> list[Figure]:
             for workers in WORKERS:
                 files = folder / f"{cells}.npz", folder / f"{cells}_{workers}.zarr"
                 options = "--headings", HEADINGS, "--workers", workers
-                runs[cells, workers] = run("survey", "lsr1", *files, *options)
+                runs[cells, workers] = run_command("survey", "lsr1", *files, *options)
         middle = np.reshape(grounds[1].bounds, (2, 2)).mean(axis=1)
         start = ",".join(f"{value:.2f}" for value in middle)
-        reached = run("reachable", folder / f"{CELLS[1]}_1.zarr", f"--from={start}")
+        reached = run_command("reachable", folder / f"{CELLS[1]}_1.zarr", f"--from={start}")
     return make_figures(runs, reached, time_of_pose(grounds[1]))
 
 
@@ -94,7 +67,6 @@ def make_figures(runs: dict[tuple[int, int], Run], reached: Run, pose: float) ->
     clock = {n: runs[large, n].seconds - runs[small, n].seconds for n in WORKERS}
     cpu = {n: runs[large, n].cpu - runs[small, n].cpu for n in WORKERS}
     poses = HEADINGS * (large**2 - small**2)
-    memory = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
     rows = (
         ("poses a second and core", poses / cpu[few], "1/s", None, False, ""),
         ("a pose, CPU time of all processes", cpu[few] / poses / pose, "x", 1.1, False,
@@ -105,8 +77,8 @@ def make_figures(runs: dict[tuple[int, int], Run], reached: Run, pose: float) ->
          f"{few} worker"),
         ("start and end, CPU time", runs[small, few].cpu - cpu[few] * HEADINGS * small**2 / poses,
          "s", None, False, ""),
-        ("largest memory of a process", memory, "MB", 1024.0, False, ""),
-        ("reachable: cells", reached.report["cells"], "", None, False, ""),
+        ("largest memory of a process", peak_memory(), "MB", 1024.0, False, ""),
+        ("reachable: cells", json.loads(reached.printed)["cells"], "", None, False, ""),
         ("reachable: CPU time", reached.cpu, "s", None, False, ""),
     )  # fmt: skip
     return [Figure("survey", *row, repeats=1) for row in rows]

@@ -17,6 +17,7 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from benchmarks.bench_service import GOAL, START
 from benchmarks.measure import Figure
 from benchmarks.processes import CONTROLLER, DOMAIN, SERVER, Client, open_nodes
 from rover_physics import load_rover
@@ -27,6 +28,7 @@ from rover_planner.ros.qos import topic_qos
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.rough_grounds import rocky
 from support.traction_states import drive_states
+from support.waiting import wait_until
 
 RATE = 100.0
 """Rate of the controller [Hz]."""
@@ -40,8 +42,6 @@ PRIORITY = 50
 """Real-time priority (SCHED_FIFO) of the controller, as in ros2_control, if it is granted."""
 REPORTED = ("updates", "missed_cycles", "fallbacks", "update_time_median_ms", "update_time_p99_ms")
 """Values of the diagnostics that are read."""
-START, GOAL = (-5.0, -6.0, 0.0), (5.0, -6.0, 0.0)
-"""Poses of the query that keeps the server busy: x, y [m], yaw [rad]."""
 
 
 class DiagnosticsReader:
@@ -56,13 +56,11 @@ class DiagnosticsReader:
             if status.name.startswith(CONTROLLER):
                 self.values = {item.key: item.value for item in status.values}
 
-    def wait_for_updates(self, count: int, timeout: float = 120.0) -> dict[str, float]:
-        """Return the numeric values once `count` updates were made; wait `timeout` [s] at most."""
-        end = time.monotonic() + timeout
-        while float(self.values.get("updates", 0)) < count:
-            if time.monotonic() > end:
-                raise TimeoutError(f"the controller made {self.values.get('updates', 0)} updates")
-            time.sleep(0.1)
+    def wait_for_updates(self, count: int) -> dict[str, float]:
+        """Return the numeric values once `count` updates were made."""
+        wait_until(
+            lambda: float(self.values.get("updates", 0)) >= count, f"{count} updates", 120.0
+        )
         return {key: float(self.values[key]) for key in REPORTED}
 
 

@@ -7,24 +7,53 @@ benchmarks.chance_drives has made (docs/validation.md).
 """
 
 import itertools
-from collections.abc import Sequence
-from dataclasses import dataclass
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
+from scipy.stats import binomtest
 
 from benchmarks.measure import print_table
-from support.chance_paths import (
-    CHANCES,
-    HELD_OUT,
-    TOLD,
-    DrivenPath,
-    find_chance,
-    read_driven_paths,
-)
+from rover_physics import Rover, SweepOptions, Terrain, judge_path, load_rover
+from rover_physics.rover.uncertainty import Uncertainty
+from support.reference_cases import DATA
+from support.reference_drives import drive_ground, unlimited
 
+CHANCES = DATA / "chances.jsonl"
+"""Drives at 0.1 m/s."""
+HELD_OUT = 2
+"""Stream of the paths that calibrate nothing."""
+TOLD = "friction drawn within 10 % and torque limit within 5 % of what is told"
+
+FAST = 0.1
+"""Speed of most drives [m/s]: the largest of the wheels, to keep the run time short."""
+START, LENGTH = -0.8, 1.7
+"""x of the start, where y and yaw are 0, and length [m]."""
+SPACING = 0.01
+"""Distance between waypoints [m]."""
+SIZES = {
+    "step": (0.05, 0.22),
+    "bump_one_side": (0.05, 0.25),
+    "ditch": (0.1, 0.6),
+    "slope": (10.0, 38.0),
+    "cross_slope": (10.0, 38.0),
+    "rocks": (0.05, 0.15),
+    "relief": (0.05, 0.14),
+}
+"""Smallest and largest size of each kind of ground."""
+FRICTIONS, TORQUES = (0.4, 1.0), (0.4, 2.0)
+"""Smallest and largest of what is told: friction coefficient and, in the logarithm, torque limit
+[N m]."""
+CURVED = 0.4
+"""Share of the paths that are arcs."""
+TIGHTEST = 1.2
+"""Largest curvature of an arc [1/m]."""
+FRICTION_STD, TORQUE_STD = 0.10, 0.05
+"""Relative standard deviations of friction and torque limit about what is told."""
 MODEL_STDS = (0.03, 0.06, 0.08, 0.1, 0.15, 0.2)
 """Model errors among which the calibration chooses."""
 EDGES = (0.0, 0.05, 0.2, 0.5, 0.8, 0.95, 1.0)
@@ -33,6 +62,109 @@ ACCEPTED = 0.05
 """Chance below which a path counts as accepted."""
 SURE = 0.95
 """Share of draws from which a path counts as one that passes."""
+
+
+@dataclass(frozen=True)
+class ChancePath:
+    """A path over a ground of the reference drives, or over rocks or relief."""
+
+    kind: str
+    """Kind of the ground."""
+    size: float
+    """Height, width or RMS height [m], or angle [deg]."""
+    seed: int
+    """Seed of rocks and relief."""
+    curvature: float
+    """Curvature [1/m], left positive; 0 is straight ahead."""
+    friction: float
+    """Friction coefficient that the planner is told."""
+    max_torque: float
+    """Torque limit that the planner is told [N m]."""
+    speed: float = FAST
+    """Nominal speed of the drives [m/s]."""
+
+    @property
+    def ground(self) -> Terrain:
+        """The ground."""
+        return drive_ground(self.kind, self.size, self.seed)
+
+    @property
+    def poses(self) -> np.ndarray:
+        """Waypoints (n, 3) x, y [m] and yaw [rad]."""
+        along = np.linspace(0.0, LENGTH, round(LENGTH / SPACING) + 1)
+        turn = self.curvature * along
+        ahead = along * np.sinc(turn / np.pi)
+        aside = 0.5 * turn * along * np.sinc(turn / (2.0 * np.pi)) ** 2
+        return np.column_stack([START + ahead, aside, turn])
+
+    def rover(self, max_torque: float) -> Rover:
+        """Return the rover lsr1 with a torque limit [N m], and MuJoCo's limits only."""
+        rover = replace(unlimited(load_rover("lsr1")), nominal_speed=self.speed)
+        return replace(rover, wheel=replace(rover.wheel, max_torque=max_torque))
+
+
+def draw_path(seed: int, number: int) -> ChancePath:
+    """Return path `number` of a stream."""
+    rng = np.random.default_rng([seed, number])
+    kind = list(SIZES)[number % len(SIZES)]
+    curved = rng.uniform() < CURVED
+    return ChancePath(
+        kind=kind,
+        size=round(float(rng.uniform(*SIZES[kind])), 4),
+        seed=int(rng.integers(1, 1_000_000)),
+        curvature=round(float(rng.uniform(-TIGHTEST, TIGHTEST)), 3) if curved else 0.0,
+        friction=round(float(rng.uniform(*FRICTIONS)), 3),
+        max_torque=round(float(np.exp(rng.uniform(*np.log(TORQUES)))), 3),
+    )
+
+
+def draw_truths(seed: int, number: int, path: ChancePath, draws: int) -> np.ndarray:
+    """Return frictions and torque limits [N m] (draws, 2) of the drives of path `number`."""
+    rng = np.random.default_rng([seed, number, 1])
+    z = rng.standard_normal((draws, 2)).clip(-3.0, 3.0)
+    return np.array([path.friction, path.max_torque]) * (1.0 + z * [FRICTION_STD, TORQUE_STD])
+
+
+@dataclass(frozen=True)
+class DrivenPath:
+    """A path and what became of its drives."""
+
+    path: ChancePath
+    """The path."""
+    stream: int
+    """Seed of `draw_path`."""
+    passed: str
+    """1 for each drive that arrived, 0 for the others, in the order of `draw_truths`."""
+
+
+def read_driven_paths(file: Path = CHANCES) -> list[DrivenPath]:
+    """Return the paths of a file of benchmarks.chance_drives."""
+    rows = map(json.loads, file.read_text().splitlines())
+    names = [field.name for field in fields(ChancePath)]
+    return [
+        DrivenPath(
+            ChancePath(**{name: row[name] for name in names if name in row}),
+            row["stream"],
+            row["passed"],
+        )
+        for row in rows
+    ]
+
+
+def find_chance(path: ChancePath, model_std: float | None = None) -> tuple[float, bool]:
+    """Return the chance that a path fails, and whether the plain verdict refuses it.
+
+    Uncertain are friction and torque limit as they were drawn, and the model; its error is the
+    default one or `model_std`.
+    """
+    told = Uncertainty(friction=FRICTION_STD, max_torque=TORQUE_STD)
+    drawn = {"friction", "max_torque", "model"}
+    others = {one.name: 0.0 for one in fields(told) if one.name not in drawn}
+    known = replace(told, model=told.model if model_std is None else model_std, **others)
+    rover = replace(path.rover(path.max_torque), uncertainty=known)
+    options = SweepOptions(policy="servo", friction=path.friction)
+    verdict = judge_path(rover, path.ground, path.poses, options, accepted_chance=1.0)[1]
+    return verdict.failure_chance, not verdict.traversable
 
 
 @dataclass(frozen=True)
@@ -71,34 +203,30 @@ def compare(paths: Sequence[DrivenPath], model_std: float | None = None) -> Comp
     )
 
 
-def wilson(count: float, of: float) -> tuple[float, float]:
+def wilson(count: float, of: int) -> tuple[float, float]:
     """Return the 95 % interval (Wilson) of a share."""
-    if not of:
-        return 0.0, 1.0
-    z, share = 1.96, count / of
-    middle = (share + z * z / (2.0 * of)) / (1.0 + z * z / of)
-    half = z / (1.0 + z * z / of) * np.sqrt(share * (1.0 - share) / of + z * z / (4.0 * of * of))
-    return max(middle - half, 0.0), min(middle + half, 1.0)
+    return binomtest(round(count), of).proportion_ci(method="wilson") if of else (0.0, 1.0)
 
 
-def reliability(found: Compared) -> list[tuple[str, ...]]:
-    """Return the rows of the reliability table."""
-    rows = []
+def split_by_chance(found: Compared) -> Iterator[tuple[str, Compared]]:
+    """Yield the ranges of EDGES that have paths, and these."""
     for low, high in itertools.pairwise(EDGES):
-        within = (found.chance >= low) & ((found.chance < high) | (high == 1.0))
-        part = found.select(within)
-        if within.any():
-            drives = part.drives.sum()
-            failed = (part.failed * part.drives).sum()
-            low_share, high_share = wilson(failed, drives)
-            told = np.average(part.chance, weights=part.drives)
-            rows.append(
-                (
-                    f"{low:g} to {high:g}", f"{within.sum()}", f"{drives}", f"{told:.3f}",
-                    f"{failed / drives:.3f}", f"{low_share:.3f} to {high_share:.3f}",
-                )
-            )  # fmt: skip
-    return rows
+        part = found.select((found.chance >= low) & ((found.chance < high) | (high == 1.0)))
+        if len(part.chance):
+            yield f"{low:g} to {high:g}", part
+
+
+def reliability(found: Compared) -> Iterator[tuple[str, ...]]:
+    """Yield the rows of the reliability table."""
+    for name, part in split_by_chance(found):
+        drives = part.drives.sum()
+        failed = (part.failed * part.drives).sum()
+        low, high = wilson(failed, drives)
+        told = np.average(part.chance, weights=part.drives)
+        yield (
+            name, f"{len(part.chance)}", f"{drives}", f"{told:.3f}",
+            f"{failed / drives:.3f}", f"{low:.3f} to {high:.3f}",
+        )  # fmt: skip
 
 
 def summary(name: str, found: Compared) -> tuple[str, ...]:
@@ -144,14 +272,11 @@ def draw_picture(file: Path, found: Compared) -> None:
     shift = 0.012 * np.random.default_rng(0).standard_normal((2, len(found.chance)))
     axes.plot(found.chance + shift[0], found.failed + shift[1], "o", ms=4, alpha=0.35,
               label=f"a path, {found.drives.max()} drives")  # fmt: skip
-    for low, high in itertools.pairwise(EDGES):
-        part = found.select((found.chance >= low) & ((found.chance < high) | (high == 1.0)))
-        if len(part.chance):
-            drives, share = part.drives.sum(), np.average(part.failed, weights=part.drives)
-            ends = wilson(share * drives, drives)
-            at = np.average(part.chance, weights=part.drives)
-            axes.plot([at, at], ends, "C3", lw=2)
-            axes.plot(at, share, "C3s", label="range, 95 %" if low == 0.0 else None)
+    for number, (_, part) in enumerate(split_by_chance(found)):
+        drives, share = part.drives.sum(), np.average(part.failed, weights=part.drives)
+        at = np.average(part.chance, weights=part.drives)
+        axes.plot([at, at], wilson(share * drives, drives), "C3", lw=2)
+        axes.plot(at, share, "C3s", label="" if number else "range, 95 %")
     axes.set_xlabel("predicted chance of failure")
     axes.set_ylabel("share of drives that failed")
     axes.legend(frameon=False)

@@ -6,18 +6,17 @@ It needs the extra `bench`. The file gets a line of JSON for each path; lines th
 """
 
 import json
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
 
+from benchmarks.chance import FAST, ChancePath, draw_path, draw_truths
 from benchmarks.drives import LOOK_AHEAD, MAX_TILT
-from rover_physics.rover.steered_drive import SteeredDrive
 from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.simulator.path_follower import PathFollower
-from support.chance_paths import FAST, ChancePath, draw_path, draw_truths
 from support.reference_drives import KEPT
 
 PERIOD = 0.04
@@ -26,37 +25,23 @@ STUCK_WAY, ASKED_WAY = 0.03, 0.8
 """A rover that goes less than the first way [m] while it is asked to go the second is stuck."""
 
 
-@dataclass(frozen=True)
-class Truth:
-    """What a path has that the planner is not told."""
-
-    friction: float
-    """Friction coefficient."""
-    max_torque: float
-    """Torque limit [N m]."""
-
-
-def passes(path: ChancePath, truth: Truth) -> bool:
+def passes(path: ChancePath, friction: float, max_torque: float) -> bool:
     """Drive a path with speed servos with droop and a follower; return whether it arrives.
 
-    The follower aims at LOOK_AHEAD beyond the last pose.
+    The follower aims at LOOK_AHEAD beyond the last pose. Friction coefficient and torque limit
+    [N m] are the true ones, which a planner is not told.
     """
-    rover, poses = path.rover(truth.max_torque), path.poses
+    rover, poses = path.rover(max_torque), path.poses
     x, y, yaw = poses[-1]
     beyond = [x + LOOK_AHEAD * np.cos(yaw), y + LOOK_AHEAD * np.sin(yaw), yaw]
-    plant = MujocoRover(rover, path.ground, tuple(poses[0]), truth.friction)
+    plant = MujocoRover(rover, path.ground, tuple(poses[0]), friction)
     follower = PathFollower(np.vstack([poses, beyond]), LOOK_AHEAD)
     length = float(np.hypot(*np.diff(poses[:, :2], axis=0).T).sum())
-    steered, way = SteeredDrive(rover), [0.0]
-    within, is_lost = round(ASKED_WAY / path.speed / PERIOD), False
+    within, is_lost, way = round(ASKED_WAY / path.speed / PERIOD), False, [0.0]
     while follower.driven < length and not is_lost:
         here = plant.pose[[0, 1, 3]]
-        aims = steered.aim(*follower.steer(here, rover.nominal_speed))
-        plant.steer(aims.angles)
-        share = steered.share(plant.steering_angles, aims.angles)
-        plant.servo_with_droop(
-            share * aims.speeds / rover.wheel.radius, rover.wheel.servo_droop, PERIOD
-        )
+        speeds = plant.steer(follower.steer(here, rover.nominal_speed))
+        plant.servo_with_droop(speeds / rover.wheel.radius, rover.wheel.servo_droop, PERIOD)
         way.append(follower.driven)
         stands = len(way) > within and way[-1] - way[-1 - within] < STUCK_WAY
         is_lost = plant.tilt > MAX_TILT or stands
@@ -80,8 +65,8 @@ def main(
         if (seed, number) in known:
             continue
         path = replace(draw_path(seed, number), speed=speed)
-        truths = [Truth(*truth) for truth in draw_truths(seed, number, path, draws)]
-        passed = "".join("01"[passes(path, truth)] for truth in truths)
+        truths = draw_truths(seed, number, path, draws).tolist()
+        passed = "".join("01"[passes(path, *truth)] for truth in truths)
         row = asdict(path) | {"stream": seed, "number": number, "passed": passed}
         with file.open("a") as target:
             target.write(json.dumps(row) + "\n")

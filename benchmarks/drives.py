@@ -13,7 +13,6 @@ from rich.progress import track
 from benchmarks.measure import console
 from rover_physics import Rover, Terrain, load_rover
 from rover_physics.names import EQUAL, OPTIMAL
-from rover_physics.rover.steered_drive import SteeredDrive, WheelAims
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.simulator.mujoco_rover import TIMESTEP, MujocoRover
 from rover_planner.simulator.path_follower import PathFollower
@@ -123,24 +122,16 @@ class DriveSteering:
         """Prepare for a rover at the start of its path, with a number of attempts at a place."""
         path = np.array([[START, 0.0, 0.0], [END + LOOK_AHEAD, 0.0, 0.0]])
         self.follower = SecondTry(PathFollower(path, LOOK_AHEAD), tries)
-        self._drive, self._plant = SteeredDrive(plant.rover), plant
+        self._plant = plant
 
-    def steer(self) -> tuple[float, float]:
-        """Steer; return the speed [m/s] and the yaw rate [rad/s] that are commanded."""
-        return self._aim()[0]
+    def steer(self) -> tuple[tuple[float, float], np.ndarray]:
+        """Steer; return speed [m/s] and yaw rate [rad/s] that are commanded, and what wheels do.
 
-    def steer_and_roll(self) -> np.ndarray:
-        """Steer; return the rates (6,) of the wheels [rad/s] in the commanded motion."""
-        aims = self._aim()[1]
-        share = self._drive.share(self._plant.steering_angles, aims.angles)
-        return share * aims.speeds / self._plant.rover.wheel.radius
-
-    def _aim(self) -> tuple[tuple[float, float], WheelAims]:
+        Those are the rates (6,) of the wheels [rad/s] in the commanded motion.
+        """
         plant = self._plant
         command = self.follower.steer(plant.pose[[0, 1, 3]], SPEED, plant.time)
-        aims = self._drive.aim(*command)
-        plant.steer(aims.angles)
-        return command, aims
+        return command, plant.steer(command) / plant.rover.wheel.radius
 
 
 def make_controller(
@@ -148,10 +139,10 @@ def make_controller(
 ) -> Callable[[], np.ndarray]:
     """Return a function that advances the plant by PERIOD and returns its torques (6,) [N m]."""
     if name == SERVO:
-        return lambda: plant.servo(steering.steer_and_roll(), PERIOD)
+        return lambda: plant.servo(steering.steer()[1], PERIOD)
     if name == DROOP:
         droop = plant.rover.wheel.servo_droop
-        return lambda: plant.servo_with_droop(steering.steer_and_roll(), droop, PERIOD)
+        return lambda: plant.servo_with_droop(steering.steer()[1], droop, PERIOD)
     values: dict[str, Any] = {"policy": EQUAL if name == EQUAL_TORQUES else OPTIMAL}
     if obstacle.max_torque is not None:
         values["max_torque"] = obstacle.max_torque
@@ -164,7 +155,7 @@ def make_controller(
         now = plant.time
         service.take_joints(plant.joint_positions, plant.joint_velocities, now)
         service.take_attitude(*plant.attitude, plant.body_rates, now)
-        service.take_command(*steering.steer(), now)
+        service.take_command(*steering.steer()[0], now)
         service.take_odometry(plant.pose, 0.0, now)
         torques = service.update(now).torques
         plant.step(torques, PERIOD)

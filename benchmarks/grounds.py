@@ -31,9 +31,9 @@ def real_maps() -> dict[str, Terrain]:
     return {path.stem: load_terrain(path) for path in sorted(folder.glob("*.npz"))}
 
 
-def made_reef(seed: int = 1, half: float = 2.5, resolution: float = 0.01) -> Terrain:
+def made_reef() -> Terrain:
     """Return ground as rough as a coral reef: steep heads and holes on relief, in small cells."""
-    rng = np.random.default_rng(seed)
+    rng, half, resolution = np.random.default_rng(1), 2.5, 0.01
     n = round(2.0 * half / resolution) + 1
     wave = np.hypot(np.fft.fftfreq(n)[:, None], np.fft.rfftfreq(n)[None, :])
     wave = np.maximum(wave, 1.0 / 120.0)

@@ -18,15 +18,15 @@ from scipy.stats import chi2
 from benchmarks.drives import PERIOD, SPEED, run_in_processes
 from benchmarks.grounds import all_grounds
 from benchmarks.learned_soil import make_ground
-from benchmarks.learning import add_noise, row_of, told_rover
+from benchmarks.learning import add_noise, told_rover
 from benchmarks.measure import print_table
 from rover_physics import Rover, Terrain, judge_poses
 from rover_physics.prediction.sweep_options import SweepOptions
-from rover_physics.rover.steered_drive import SteeredDrive
 from rover_planner.errors import PlanningError
 from rover_planner.learning.drive_log import RATES, TIME, YAW, X, Y
 from rover_planner.learning.ground_learner import GroundEstimate, GroundLearner
-from rover_planner.simulator.mujoco_rover import MujocoRover
+from rover_planner.simulator.mujoco_plant import MujocoPlant
+from rover_planner.simulator.plant import Plant
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from support.learning_drives import row_of_plant
 from support.reference_drives import drive_ground
@@ -143,32 +143,22 @@ def drive(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return rows of a drive without noise, slip speeds (n, 6) and commanded speeds (n,)."""
     rover, ground = told_rover(), grounds()[outing.ground]
-    rows, slips, commands = [], [], []
+    rows, slips, commands, place = [], [], [], tuple(start.tolist())
     if outing.simulator == MUJOCO:
-        plant = MujocoRover(rover, ground, tuple(start.tolist()), timestep=0.004)
-        steering = SteeredDrive(rover)
-        for speed, turn, duration in parts:
-            aims = steering.aim(speed, turn)
-            if speed or turn:
-                plant.steer(aims.angles)
-            for _ in range(round(duration / PERIOD)):
-                share = steering.share(plant.steering_angles, aims.angles)
-                rolling = share * aims.speeds if speed or turn else np.zeros(6)
-                plant.servo(rolling / rover.wheel.radius, PERIOD)
-                rows.append(row_of(plant))
-                slips.append(plant.measure_contacts().slip_speeds)
-                commands.append(speed)
+        plant: Plant = MujocoPlant(rover, ground, place)
+        period = PERIOD
     else:
         soil = SOFT if outing.simulator == SOIL else None
-        model = QuasiStaticPlant(rover, ground, tuple(start.tolist()), soil=soil)
-        for speed, turn, duration in parts:
-            for _ in range(round(duration / STEP)):
-                model.drive(speed, turn, STEP)
-                rows.append(row_of_plant(model, (len(rows) + 1) * STEP))
-                slips.append(np.zeros(6))
-                commands.append(speed)
-                if model.state().stopped:
-                    return np.array(rows), np.array(slips), np.array(commands)
+        plant, period = QuasiStaticPlant(rover, ground, place, soil=soil), STEP
+    for speed, turn, duration in parts:
+        for _ in range(round(duration / period)):
+            plant.drive(speed, turn, period)
+            rows.append(row_of_plant(plant, (len(rows) + 1) * period))
+            is_exact = isinstance(plant, MujocoPlant)
+            slips.append(plant.simulated.measure_contacts().slip_speeds if is_exact else [0.0] * 6)
+            commands.append(speed)
+            if plant.state().stopped:
+                return np.array(rows), np.array(slips), np.array(commands)
     return np.array(rows), np.array(slips), np.array(commands)
 
 

@@ -6,7 +6,10 @@ Functions that are compared run in turns, so that other load on the machine affe
 
 import json
 import math
+import resource
 import statistics
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
@@ -54,17 +57,36 @@ class Figure:
         return self.value >= self.target if self.at_least else self.value <= self.target
 
 
-def median_time(
-    function: Callable[[], object],
-    repeats: int = REPEATS,
-    clock: Callable[[], float] = time.process_time,
-) -> float:
-    """Return the median time [s] of a call; the first call warms up and is not counted.
+@dataclass(frozen=True)
+class Run:
+    """Times and output of a command."""
 
-    The default clock is the CPU time of the process, which other programs on the machine affect
-    least. It adds up all threads; use `time.perf_counter` to time several threads.
-    """
-    return median_times([function], repeats, clock)[0]
+    seconds: float
+    """Time by the clock [s]."""
+    cpu: float
+    """CPU time of all its processes [s]."""
+    printed: str
+    """What it printed."""
+
+
+def run_command(*words: object) -> Run:
+    """Run `rover_planner` with words."""
+    began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
+    command = [sys.executable, "-m", "rover_planner", *map(str, words)]
+    printed = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return Run(time.perf_counter() - began, cpu, printed)
+
+
+def peak_memory(whose: int = resource.RUSAGE_CHILDREN) -> float:
+    """Return the peak memory so far [MiB] of a child process, or of this one by RUSAGE_SELF."""
+    return resource.getrusage(whose).ru_maxrss / 1024
+
+
+def median_time(function: Callable[[], object], repeats: int = REPEATS) -> float:
+    """Return the median CPU time [s] of a call; see `median_times`."""
+    return median_times([function], repeats)[0]
 
 
 def median_times(
@@ -72,7 +94,11 @@ def median_times(
     repeats: int = REPEATS,
     clock: Callable[[], float] = time.process_time,
 ) -> list[float]:
-    """Return the median time [s] of each function, called in turns; see `median_time`."""
+    """Return the median time [s] of each function, called in turns; first calls only warm up.
+
+    The default clock is the CPU time of the process, which other programs on the machine affect
+    least. It adds up all threads; use `time.perf_counter` to time several threads.
+    """
     for function in functions:
         function()
     times: list[list[float]] = [[] for _ in functions]

@@ -35,6 +35,7 @@ from std_msgs.msg import Float64MultiArray, String
 
 from benchmarks.processes import (
     ROOT,
+    START_TIME,
     Client,
     LostAnswerError,
     NodeProcesses,
@@ -52,8 +53,6 @@ from support.project.launch_files import simulation_commands
 from support.ros_fixtures import RosRun
 from support.waiting import wait_until
 
-START_TIME = 300.0
-"""Longest wait for the start of all programs [s]."""
 FLIGHT = 0.1
 """Time for which a controller that comes to rest may still send torques [s]."""
 QUEUE = 1000

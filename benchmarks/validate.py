@@ -6,6 +6,10 @@ Run from the repository: python -m benchmarks.validate [--energy]
 With --energy, which needs the extra `bench`, drives are made anew and their energy is compared.
 """
 
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
@@ -13,22 +17,163 @@ import typer
 from scipy.optimize import linprog
 
 from benchmarks.measure import console, print_table
-from rover_physics import SweepOptions, judge_path, load_rover
+from rover_physics import (
+    PathPrediction,
+    Rover,
+    SweepOptions,
+    Terrain,
+    Verdict,
+    judge_path,
+    judge_poses,
+    load_rover,
+)
 from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES, balance_forces
 from rover_physics.prediction.evaluation import new_work, stand
 from rover_physics.prediction.packed_model import pack_model
-from support.reference_cases import reference_predictions, steered_predictions
-from support.reference_drives import (
-    PASSED,
-    curve_ground,
-    curve_options,
-    curve_path,
-    curve_rover,
-    judge_drives,
-    predict_trace,
-    read_curves,
-    unlimited,
-)
+from rover_physics.traversability.verdict import hold_against_limits
+from support.reference_cases import DATA, reference_predictions, steered_predictions
+from support.reference_drives import KEPT, drive_ground, drive_path, unlimited
+
+PASSED = "passed"
+GROUNDS = {"ramp": "slope", "tilt": "cross_slope", "rocks": "caps"}
+"""Grounds of drives that curves have, by the name they have there."""
+LENGTH, TURN = 2.4, np.pi
+"""Length of an arc [m] and angle of a turn on the spot [rad]."""
+
+
+@dataclass(frozen=True)
+class ReferenceDrive:
+    """One drive of the rover lsr1 over an obstacle, from x = -1.2 to 1.2 along +x."""
+
+    kind: str
+    """step, ditch, bump_one_side, slope or cross_slope."""
+    size: float
+    """Height or width [m], or angle of a slope [deg]."""
+    friction: float
+    """Friction coefficient."""
+    max_torque: float
+    """Torque limit of the speed servos [N m]."""
+    outcome: str
+    """passed, stuck or tipped; tipped includes sliding off."""
+    end: float
+    """x at the end of the drive [m]."""
+
+    @property
+    def label(self) -> str:
+        """Kind and size, such as step 0.163."""
+        return (
+            f"{self.kind} {self.size:.3f}" if self.size < 1.0 else f"{self.kind} {self.size:.1f}"
+        )
+
+
+def judge_drives(policy: str) -> Iterator[tuple[ReferenceDrive, Verdict]]:
+    """Yield every drive with the verdict on its path."""
+    rover = unlimited(load_rover("lsr1"))
+    for row in json.loads((DATA / "drives.json").read_text())["rows"]:
+        drive = ReferenceDrive(
+            row["kind"], row["size"], row["mu"], row["tau_max"], row["outcome"], row["x"]
+        )
+        options = SweepOptions(friction=drive.friction, max_torque=drive.max_torque, policy=policy)
+        ground = drive_ground(drive.kind, drive.size)
+        prediction = judge_path(rover, ground, drive_path(), options)[0]
+        yield drive, hold_against_limits(rover, prediction)
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One drive of the rover lsr1 along an arc or a turn on the spot."""
+
+    kind: str
+    """flat, tilt, ramp, step or rocks."""
+    size: float
+    """Angle [deg], height [m] or seed."""
+    mode: str
+    """steered, spot, skid or skid_spot."""
+    curvature: float
+    """[1/m], infinite on the spot."""
+    friction: float
+    """Friction coefficient."""
+    max_torque: float
+    """Torque limit of the speed servos [N m]."""
+    start: np.ndarray
+    """(3,) x, y [m], yaw [rad]."""
+    kept: bool
+    """True if it went all the way and ended within KEPT of its nominal end."""
+    poses: np.ndarray
+    """(k, 3) poses of the trace."""
+    forces: np.ndarray
+    """(k, 6) size of the force on each wheel, mean since the pose before [N]."""
+    torques: np.ndarray
+    """(k, 6) mean torque of each wheel since the pose before [N m]."""
+
+    @property
+    def label(self) -> str:
+        """Ground and mode."""
+        return f"{self.kind} {self.size:g} {self.mode} {self.curvature:g}"
+
+    @property
+    def steered(self) -> bool:
+        """True if the end wheels steer."""
+        return self.mode in ("steered", "spot")
+
+    @property
+    def ground(self) -> Terrain:
+        """The ground."""
+        return drive_ground(GROUNDS.get(self.kind, self.kind), self.size)
+
+    @property
+    def rover(self) -> Rover:
+        """The rover, without limits that MuJoCo lacks."""
+        rover = unlimited(load_rover("lsr1"))
+        return rover if self.steered else replace(rover, steering=None)
+
+    @property
+    def options(self) -> SweepOptions:
+        """The options under policy "servo"."""
+        return SweepOptions(policy="servo", friction=self.friction, max_torque=self.max_torque)
+
+    @property
+    def path(self) -> np.ndarray:
+        """Waypoints (241, 3) of the nominal curve."""
+        x, y, yaw = self.start
+        share = np.linspace(0.0, 1.0, 241)
+        if np.isinf(self.curvature):
+            return np.column_stack([x + 0.0 * share, y + 0.0 * share, yaw + TURN * share])
+        turn = self.curvature * LENGTH * share
+        ahead, aside = np.sin(turn) / self.curvature, (1.0 - np.cos(turn)) / self.curvature
+        c, s = np.cos(yaw), np.sin(yaw)
+        return np.column_stack([x + c * ahead - s * aside, y + s * ahead + c * aside, yaw + turn])
+
+    def predict_trace(self) -> PathPrediction:
+        """Return the prediction at the poses of the trace."""
+        curvatures = np.full(len(self.poses), self.curvature)
+        return judge_poses(self.rover, self.ground, self.poses, curvatures, self.options)[0]
+
+
+@lru_cache
+def read_curves() -> tuple[Curve, ...]:
+    """Return all curves."""
+    return tuple(_read(row) for row in json.loads((DATA / "curves.json").read_text())["rows"])
+
+
+def _read(row: dict) -> Curve:
+    trace = row["trace"]
+    away = np.subtract(row["end"], row["nominal_end"])[:2]
+    return Curve(
+        kind=row["kind"],
+        size=row["size"],
+        mode=row["mode"],
+        curvature=float(row["kappa"]),
+        friction=row["mu"],
+        max_torque=row["tau_max"],
+        start=np.array(row["start"]),
+        kept=row["outcome"] == PASSED and bool(np.hypot(*away) <= KEPT),
+        poses=np.array([line["pose"] for line in trace]).reshape(-1, 3),
+        forces=np.linalg.norm(
+            np.array([line["force"] for line in trace]).reshape(-1, 6, 3), axis=2
+        ),
+        torques=np.array([line["torque"] for line in trace]).reshape(-1, 6),
+    )
 
 
 def settled_errors(cases) -> dict[str, np.ndarray]:
@@ -67,7 +212,7 @@ def print_settled(name: str, cases) -> None:
 def print_drives(policy: str) -> None:
     """Print the drives whose outcome differs from the verdict under `policy`."""
     rows, agree, wrongly_passed = [], 0, 0
-    for drive, _, verdict in judge_drives(policy):
+    for drive, verdict in judge_drives(policy):
         if verdict.traversable == (drive.outcome == PASSED):
             agree += 1
             continue
@@ -87,8 +232,7 @@ def print_curves() -> None:
     """Print the curves whose outcome differs from the verdict under "servo"."""
     rows, agree, wrongly_passed = [], 0, 0
     for curve in read_curves():
-        ground, path = curve_ground(curve.kind, curve.size), curve_path(curve)
-        verdict = judge_path(curve_rover(curve), ground, path, curve_options(curve))[1]
+        verdict = judge_path(curve.rover, curve.ground, curve.path, curve.options)[1]
         if verdict.traversable == curve.kept:
             agree += 1
             continue
@@ -115,7 +259,7 @@ def print_traces() -> None:
         forces, torques, scatter = [], [], []
         for curve in read_curves():
             if curve.mode == mode and len(curve.poses):
-                found = predict_trace(curve)
+                found = curve.predict_trace()
                 drives = (found.speed_share > 0.0) & (np.arange(len(curve.poses)) > 0)
                 parts = (found.wheel_loads, found.tangential, found.lateral)
                 errors = np.sqrt(sum(part**2 for part in parts)) - curve.forces

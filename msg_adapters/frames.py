@@ -1,31 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks the frame of messages, and reads orientations and transforms between frames."""
+"""Checks the frame of messages and transforms between frames, and reads orientations."""
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from msg_adapters.errors import MessageError
-from msg_adapters.stamps import stamp_to_ns
 from rover_physics.numerics.quaternions import length_of, rpy_from_xyzw
-
-
-@dataclass(frozen=True, eq=False)
-class FrameTransform:
-    """Pose of a child frame in its parent frame at a time."""
-
-    parent: str
-    """Name of the parent frame."""
-    child: str
-    """Name of the child frame."""
-    stamp: int
-    """Time [ns]; 0 if the sender set none."""
-    translation: NDArray[np.float64]
-    """(3,) x, y, z [m]."""
-    xyzw: NDArray[np.float64]
-    """(4,) quaternion of length 1."""
 
 
 def check_frame(frame_id: str, map_frame: str, what: str) -> None:
@@ -64,8 +45,8 @@ def check_norm(xyzw: tuple[float, float, float, float], what: str) -> float:
     return norm
 
 
-def read_transform(message: Any) -> FrameTransform:
-    """Return the transform of a geometry_msgs/TransformStamped, also one of a bag.
+def check_transform(message: Any) -> None:
+    """Check a geometry_msgs/TransformStamped, also one of a bag.
 
     Raises:
         MessageError: It is not finite, no unit quaternion, or a frame has no name.
@@ -80,5 +61,3 @@ def read_transform(message: Any) -> FrameTransform:
             f"rotation {numbers[3:].tolist()}; it must be finite, a quaternion of length 1, and "
             "both frames must have names"
         )
-    stamp = stamp_to_ns(message.header.stamp) or 0
-    return FrameTransform(parent, child, stamp, numbers[:3], numbers[3:])

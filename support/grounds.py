@@ -39,20 +39,10 @@ def wall_with_gap(x, y, height=0.5):
     return waves(x, y) + height * ((np.abs(x) < 0.2) & (y < 1.0))
 
 
-def long_wall(x, y):
-    """Return waves with a wall of 1 m along y at x = 0, open beyond y = 2."""
-    return waves(x, y) + np.where((np.abs(x) < 0.1) & (y < 2.0), 1.0, 0.0)
-
-
 def pen(x, y):
     """Return waves with a wall of 1 m around a square of 3 m."""
     edge = np.maximum(np.abs(x), np.abs(y))
     return waves(x, y) + np.where(np.abs(edge - 1.5) < 0.1, 1.0, 0.0)
-
-
-def whole_wall(x, y):
-    """Return waves with a wall of 0.5 m along y at x = 0."""
-    return waves(x, y) + 0.5 * (np.abs(x) < 0.2)
 
 
 def rock_left(x, y):

@@ -1,11 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hostile files for tests: things that are no regular files, archives and arrays of odd bytes."""
+"""Hostile files for tests: things that are no regular files."""
 
-import io
 import os
 import socket
-import struct
-import zipfile
 from pathlib import Path
 
 
@@ -24,18 +21,3 @@ def make_oddities(folder: Path) -> list[str]:
         "/proc/self/mem", "/proc/kmsg", "x" * 300, "x/" * 3000, "", ".", "..", "\n\x1b[2J", "é",
         "\udcff", "a\0b", str(folder / "folder" / ".." / "nowhere"),
     ]  # fmt: skip
-
-
-def archive_of(content: bytes, name="a.npy", method=zipfile.ZIP_DEFLATED) -> bytes:
-    """Return an archive of one member."""
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", method) as archive:
-        archive.writestr(name, content)
-    return buffer.getvalue()
-
-
-def npy(header: str, data: bytes = b"", version=1, length=None) -> bytes:
-    """Return an .npy file with a header of one's own."""
-    text = header.encode("latin1")
-    size = struct.pack("<H" if version == 1 else "<I", len(text) if length is None else length)
-    return b"\x93NUMPY" + bytes([version, 0]) + size + text + data

@@ -22,6 +22,7 @@ from rover_planner.learning.drive_log import (
     X,
     Y,
 )
+from rover_planner.simulator.plant import Plant
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from support.rough_grounds import plane
 
@@ -69,8 +70,8 @@ def drive_over_soil(rover: Rover, ground: Terrain, soil: str, seconds: float) ->
     return np.array(rows).reshape(-1, WIDTH)
 
 
-def row_of_plant(plant: QuasiStaticPlant, time: float) -> Floats:
-    """Return what is measured of a quasi-static rover at a time [s]."""
+def row_of_plant(plant: Plant, time: float) -> Floats:
+    """Return what is measured of a simulated rover at a time [s]."""
     state, row = plant.state(), np.full(WIDTH, np.nan)
     R = matrix_from_xyzw(state.orientation)
     row[[TIME, X, Y, YAW]] = time, *plant.pose()

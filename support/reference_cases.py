@@ -2,7 +2,7 @@
 """The settled cases of test/data, computed with MuJoCo: see test/data/README.md."""
 
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -51,12 +51,6 @@ def reference_grounds() -> tuple[ReferenceGround, ...]:
     return tuple(ground for file in FILES for ground in _read_grounds(file))
 
 
-@lru_cache(maxsize=1)
-def steered_grounds() -> tuple[ReferenceGround, ...]:
-    """Return all grounds with turned wheels, with their cases."""
-    return tuple(_read_grounds(STEERED))
-
-
 def _read_grounds(file: str) -> Iterator[ReferenceGround]:
     with np.load(DATA / file) as entries:
         meta = json.loads(str(entries["meta"]))
@@ -100,18 +94,8 @@ def steered_predictions() -> tuple[tuple[ReferenceGround, PathPrediction], ...]:
     rover = load_rover("lsr1")
     return tuple(
         (case, judge_poses(rover, case.terrain, case.poses, case.curvature)[0])
-        for case in steered_grounds()
+        for case in _read_grounds(STEERED)
     )
-
-
-def angle_errors(predictions: Iterable[tuple[ReferenceGround, PathPrediction]]) -> np.ndarray:
-    """Return the absolute errors (n, 6) of roll, pitch, rocker and bogie angles [rad]."""
-    errors = []
-    for case, prediction in predictions:
-        attitude = np.column_stack([prediction.roll, prediction.pitch])
-        joints = np.hstack([prediction.rocker_angle, prediction.bogie_angle])
-        errors.append(np.abs(np.hstack([attitude - case.attitude, joints - case.joints])))
-    return np.concatenate(errors)
 
 
 def reference_ground(label: str) -> ReferenceGround:

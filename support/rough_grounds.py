@@ -77,20 +77,16 @@ def bowl(depth: float, floor: float, slope: float, half: float = 6.0) -> Terrain
     return Terrain(np.clip((away - floor) * np.tan(slope), 0.0, depth), 0.05, (-half, -half))
 
 
+def with_std(terrain: Terrain, std: float) -> Terrain:
+    """Return the terrain with the same standard deviation [m] everywhere."""
+    return replace(terrain, elevation_std=np.full(terrain.elevation.shape, std))
+
+
 def random_poses(seed: int, count: int, half: float) -> np.ndarray:
     """Return random poses (count, 3) within `half` [m] of the origin, with random headings."""
     rng = np.random.default_rng(seed)
     places = rng.uniform(-half, half, (count, 2))
     return np.column_stack([places, rng.uniform(-np.pi, np.pi, count)])
-
-
-def quarter_turn(terrain: Terrain, poses: np.ndarray) -> tuple[Terrain, np.ndarray]:
-    """Return ground and poses, both rotated by 90 degrees about the map's z: x -> y, y -> -x."""
-    xmin, xmax, ymin, ymax = terrain.bounds
-    turned = replace(
-        terrain, elevation=np.ascontiguousarray(terrain.elevation.T[:, ::-1]), origin=(-ymax, xmin)
-    )
-    return turned, np.column_stack([-poses[:, 1], poses[:, 0], poses[:, 2] + 0.5 * np.pi])
 
 
 def mirrored(terrain: Terrain, poses: np.ndarray) -> tuple[Terrain, np.ndarray]:

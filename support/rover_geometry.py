@@ -56,27 +56,21 @@ def place_rover(rover: Rover, prediction: PathPrediction, i: int) -> Placed:
         angle = prediction.rocker_angle[i, side]
         rocker_turn = Rotation.from_rotvec([0.0, angle, 0.0])
         bogie_turn = Rotation.from_rotvec([0.0, angle + prediction.bogie_angle[i, side], 0.0])
-        rocker_pivot = mirror * suspension.rocker_pivot
-        bogie_arm = mirror * suspension.bogie_pivot - rocker_pivot
-        bogie_pivot = rocker_pivot + rocker_turn.apply(bogie_arm)
+        rocker_pivot, level = mirror * suspension.rocker_pivot, mirror * suspension.bogie_pivot
+        bogie_pivot = rocker_pivot + rocker_turn.apply(level - rocker_pivot)
+        links = (rocker_turn, rocker_pivot, rocker_pivot), (bogie_turn, level, bogie_pivot)
 
-        def on_rocker(point, pivot=rocker_pivot, turn=rocker_turn, mirror=mirror):
-            return pivot + turn.apply(mirror * point - pivot)
-
-        def on_the_bogie(point, arm=bogie_arm, pivot=bogie_pivot, turn=bogie_turn, mirror=mirror,
-                         foot=rocker_pivot):  # fmt: skip
-            return pivot + turn.apply(mirror * point - foot - arm)
+        def place(point, carried, links=links, mirror=mirror):
+            turn, before, now = links[carried]
+            return R @ (now + turn.apply(mirror * np.array(point) - before)) + origin
 
         for name in ("rear", "middle", "front"):
             carried = name != suspension.rocker_wheel
-            local = (on_the_bogie if carried else on_rocker)(np.array(suspension.wheels[name]))
-            wheels.append(R @ local + origin)
+            wheels.append(place(suspension.wheels[name], carried))
             on_bogie.append(carried)
             parts.append((rover.wheel.mass, wheels[-1], side, carried))
-        rocker_com = R @ on_rocker(np.array(masses.rocker.com)) + origin
-        bogie_com = R @ on_the_bogie(np.array(masses.bogie.com)) + origin
-        parts.append((masses.rocker.mass, rocker_com, side, False))
-        parts.append((masses.bogie.mass, bogie_com, side, True))
+        for part, carried in ((masses.rocker, False), (masses.bogie, True)):
+            parts.append((part.mass, place(part.com, carried), side, carried))
         rocker_pivots.append(R @ rocker_pivot + origin)
         bogie_pivots.append(R @ bogie_pivot + origin)
     return Placed(

@@ -18,9 +18,9 @@ RESOLUTION = 0.1
 """Cell size of the maps [m]."""
 
 
-def make_rough_map(rows=150, columns=170, seed=3, **layers) -> Terrain:
+def make_rough_map(rows=150, columns=170, **layers) -> Terrain:
     """Return waves with rocks, a wall and a hole of unknown ground, far from the origin."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(3)
     y, x = np.mgrid[0:rows, 0:columns] * RESOLUTION
     heights = 0.05 * np.sin(1.3 * x) + 0.04 * np.sin(1.7 * y + 0.4) + 0.1 * np.sin(0.3 * x * y)
     for at_x, at_y in rng.uniform(0.0, columns * RESOLUTION, (40, 2)):

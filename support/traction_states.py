@@ -6,7 +6,6 @@ import numpy as np
 from rover_physics import PathPrediction, Rover, Terrain, judge_path
 from rover_physics.traction.balance import MeasuredState
 from rover_physics.traction.contact_ekf import Motion
-from support.rough_grounds import fractal, random_poses, rocky
 from support.rover_geometry import wheel_axes
 
 
@@ -24,24 +23,11 @@ def state_of(rover: Rover, prediction: PathPrediction, i: int) -> MeasuredState:
     )
 
 
-def rough_states(rover: Rover, count: int):
-    """Yield (prediction, waypoint) of `count` random settled poses on rough ground."""
-    left = count
-    for seed in range(100):
-        ground = (rocky if seed % 2 else fractal)(seed)
-        prediction = judge_path(rover, ground, random_poses(seed, 260, 1.8))[0]
-        for i in np.flatnonzero(prediction.settled):
-            if not left:
-                return
-            left -= 1
-            yield prediction, int(i)
-
-
-def drive_states(rover: Rover, ground: Terrain, speed: float = 0.03, start: float = -1.2):
-    """Return prediction, motions and time step [s] of a slow drive along +x."""
-    x = np.linspace(start, -start, 1201)
+def drive_states(rover: Rover, ground: Terrain):
+    """Return prediction, motions and time step [s] of a drive along +x at 3 cm/s."""
+    x = np.linspace(-1.2, 1.2, 1201)
     prediction = judge_path(rover, ground, np.column_stack([x, 0.0 * x, 0.0 * x]))[0]
-    duration = (x[1] - x[0]) / speed
+    duration = (x[1] - x[0]) / 0.03
 
     def rate(values):
         return np.gradient(values, duration, axis=0)

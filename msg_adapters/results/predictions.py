@@ -11,7 +11,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from msg_adapters.commands import doubles, labelled_array
 from msg_adapters.errors import MessageError
 from msg_adapters.joints import OWN_NAMES, JointNames
-from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS, WHEELS
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import steered_wheels, steering_joints
@@ -48,14 +48,20 @@ def array_values(message: Float64MultiArray) -> NDArray[np.float64]:
     return values.reshape(sizes)
 
 
-def tip_over_array(prediction: PathPrediction) -> Float64MultiArray:
+def wheel_array(prediction: PathPrediction | None, field: str) -> Float64MultiArray:
+    """Convert values of wheels at n waypoints into an array (n, 6); None has no waypoints."""
+    none = np.empty((0, len(WHEELS)))
+    return waypoint_array(none if prediction is None else getattr(prediction, field))
+
+
+def tip_over_array(prediction: PathPrediction | None) -> Float64MultiArray:
     """Convert the tip-over margins of n waypoints into an array (n, 2), see MEASURES."""
-    margins = [getattr(prediction, measure) for measure in MEASURES]
+    margins = [[] if prediction is None else getattr(prediction, name) for name in MEASURES]
     return waypoint_array(np.column_stack(margins), "measure")
 
 
 def joint_trajectory(
-    prediction: PathPrediction,
+    prediction: PathPrediction | None,
     rover: Rover,
     frame_id: str,
     stamp,
@@ -71,7 +77,7 @@ def joint_trajectory(
     predicted time from start.
 
     Args:
-        prediction: Prediction of n waypoints.
+        prediction: Prediction of n waypoints; None makes a trajectory without points.
         rover: The rover.
         frame_id: Map frame.
         stamp: builtin_interfaces/Time.
@@ -79,10 +85,14 @@ def joint_trajectory(
             needed. One message must be sent before the next one is made from it.
         names: Names, signs and offsets of the joints in messages.
     """
+    joints = [*JOINTS, *steering_joints(rover)]
+    trajectory = JointTrajectory(joint_names=list(names.robot_names(joints)))
+    trajectory.header.frame_id, trajectory.header.stamp = frame_id, stamp
+    if prediction is None:
+        return trajectory
     count = len(prediction.settled)
     if not prediction.settled.all():
         count = int(np.argmin(prediction.settled))
-    trajectory = empty_trajectory(rover, frame_id, stamp, names)
     suspension = suspension_angles(prediction)[:count]
     steering = prediction.steering_angle[:count, steered_wheels(rover)]
     times = prediction.time[:count]
@@ -93,7 +103,6 @@ def joint_trajectory(
     )
     efforts = np.zeros_like(positions)
     efforts[:, len(SUSPENSION_JOINTS) : len(JOINTS)] = prediction.torque[:count]
-    joints = [*JOINTS, *steering_joints(rover)]
     signs = names.signs(joints)
     positions, velocities = signs * (positions - names.offsets(joints)), signs * velocities
     efforts = signs * efforts
@@ -105,17 +114,6 @@ def joint_trajectory(
         point.positions, point.velocities, point.effort = row
         start = point.time_from_start
         start.sec, start.nanosec = divmod(round(time * 1e9), 1_000_000_000)
-    return trajectory
-
-
-def empty_trajectory(
-    rover: Rover, frame_id: str, stamp, names: JointNames = OWN_NAMES
-) -> JointTrajectory:
-    """Return a trajectory of the JOINTS and the rover's steering joints without points."""
-    joints = names.robot_names([*JOINTS, *steering_joints(rover)])
-    trajectory = JointTrajectory(joint_names=list(joints))
-    trajectory.header.frame_id = frame_id
-    trajectory.header.stamp = stamp
     return trajectory
 
 

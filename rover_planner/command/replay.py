@@ -14,7 +14,7 @@ from rover_planner.shell.poses import Pose, pose_option
 
 if TYPE_CHECKING:
     from rover_planner.parameters.traverse_server import TraverseServerParameters
-    from rover_planner.ros.bags.bag_writer import BagWriter
+    from rover_planner.ros.bags.bag_files import BagWriter
     from rover_planner.ros.bags.replay import Replay, ReplayAnswer
 
 NODE_KEYS = ("/**", "traverse_server", "/traverse_server")
@@ -48,8 +48,7 @@ def replay(
     """
     need("rclpy", "replay")
     need("rosbags", "replay")
-    from rover_planner.ros.bags import bag_reader
-    from rover_planner.ros.bags.bag_writer import write_bag
+    from rover_planner.ros.bags import bag_files
     from rover_planner.ros.bags.replay import Questions, Replay
     from rover_planner.shell.progress import show_bar
 
@@ -61,21 +60,21 @@ def replay(
     questions = Questions(goal, start, stretch)
     work = Replay(_read_parameters(parameters, given), questions)
     topics = {
-        bag_reader.MAP: map_topic,
-        bag_reader.JOINTS: joints_topic,
-        bag_reader.ODOMETRY: odometry_topic,
-        bag_reader.IMU: imu_topic,
-        bag_reader.PATH: path_topic,
+        bag_files.MAP: map_topic,
+        bag_files.JOINTS: joints_topic,
+        bag_files.ODOMETRY: odometry_topic,
+        bag_files.IMU: imu_topic,
+        bag_files.PATH: path_topic,
     }
-    with bag_reader.open_bag(bag, topics) as source:
-        if bag_reader.MAP not in source.topics:
+    with bag_files.open_bag(bag, topics) as source:
+        if bag_files.MAP not in source.topics:
             raise PlanningError(f"{bag}: has no map: PointCloud2 or GridMap")
         try:
             out.mkdir(parents=True)
         except OSError as error:
             raise PlanningError(f"{out} cannot be made: {error.strerror or error}") from None
         with (
-            write_bag(out / "predictions") as predictions,
+            bag_files.write_bag(out / "predictions") as predictions,
             show_bar("replay", source.count) as step,
         ):
             results = _Results(out, work, predictions)
@@ -94,7 +93,7 @@ def replay(
             err=True,
         )
     if not results.count and goal is None:
-        asking = bag_reader.PATH, bag_reader.ODOMETRY
+        asking = bag_files.PATH, bag_files.ODOMETRY
         lacking = [kind for kind in asking if kind not in source.topics]
         what = " and no ".join(lacking) or "drive of two poses"
         typer.echo(f"nothing was asked: the bag has no {what}; give --goal", err=True)

@@ -17,7 +17,7 @@ from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.budget import BUSY, CANCELLED, Budget, QuestionStoppedError
 from rover_planner.planning.answering.judgement import PathJudgement
-from rover_planner.ros.deferred_service import Reply, serve_later
+from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import latched_qos
 

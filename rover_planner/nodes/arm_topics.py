@@ -18,7 +18,7 @@ from rover_planner.planning.answering.questions import (
     ReachQuery,
     ReachRefusal,
 )
-from rover_planner.ros.deferred_service import Reply, serve_later
+from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.subscriptions import subscribe_to_requests
 

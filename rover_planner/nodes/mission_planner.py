@@ -11,9 +11,9 @@ the verdict, wheel loads and slip ratios that the server publishes with its answ
 import contextlib
 import json
 import sys
-import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, KeyValue
 from nav_msgs.msg import Odometry, Path
 from nav_msgs.srv import GetPlan
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_client import AsyncParameterClient
@@ -39,8 +39,7 @@ from msg_adapters.results.predictions import array_values
 from rover_physics.errors import RoverError
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.nodes.mission.drive import Drive, DriveFailedError, DriveSettings
-from rover_planner.nodes.mission.options import MissionOptions
-from rover_planner.nodes.programs import read_arguments
+from rover_planner.nodes.programs import MissionOptions, read_arguments
 from rover_planner.planning.answering.budget import STOPPING
 from rover_planner.ros.process import init_ros
 from rover_planner.ros.qos import (
@@ -84,7 +83,7 @@ class NoAnswerError(Exception):
 class MissionPlanner(Node):
     """Queries the server and collects the results that it publishes with each answer.
 
-    Callbacks run in an executor's thread. Call the blocking methods below from another thread.
+    The methods below take messages while they wait; nothing else is to spin the node.
     """
 
     def __init__(self, map_frame: str = "map", timeout: float = 60.0, **node_arguments: Any):
@@ -92,7 +91,8 @@ class MissionPlanner(Node):
         super().__init__(NODE_NAME, **node_arguments)
         self._frame = map_frame
         self._timeout = timeout
-        self._changed = threading.Condition()
+        self._executor = SingleThreadedExecutor(context=self.context)
+        self._executor.add_node(self)
         self._verdict: dict[str, Any] = {}
         self._verdict_about: tuple[Any, Any] | None = None
         self._arrays: dict[str, np.ndarray] = {}
@@ -119,9 +119,8 @@ class MissionPlanner(Node):
         )
         self._verdicts = verdicts.topic_name  # as remapped, which count_publishers does not do
         for name in ("wheel_loads", "slip_ratios"):
-            self.create_subscription(
-                Float64MultiArray, f"{SERVER}/{name}", self._taker(name), result_qos()
-            )
+            take = partial(self._take_array, name)
+            self.create_subscription(Float64MultiArray, f"{SERVER}/{name}", take, result_qos())
 
     def wait_for_server(self) -> None:
         """Wait until the server's service and its verdict topic are connected.
@@ -172,15 +171,12 @@ class MissionPlanner(Node):
             time.sleep(0.2)
 
     def _ask_once(self, start: Sequence[float], goal: Sequence[float]) -> dict[str, Any]:
-        with self._changed:
-            self._arrays.clear()
+        self._arrays.clear()
         request = GetPlan.Request()
         request.start = stamped_pose(start, self._frame)
         request.goal = stamped_pose(goal, self._frame)
-        future = self._client.call_async(request)
-        future.add_done_callback(self._notify)
-        self._wait(future.done, f"the answer of {self._client.service_name}", REPEAT)
-        plan = future.result().plan
+        answered = self._client.call_async(request)
+        plan = self._finish(answered, f"the answer of {self._client.service_name}", REPEAT).plan
         # The hash tells this question from those of other clients, the stamp from earlier ones.
         about = plan.header.stamp, plan_request_hash(request.start, request.goal, 0.0)
         self._wait(
@@ -245,13 +241,11 @@ class MissionPlanner(Node):
         about, deadline = path_hash(path), time.monotonic() + self._timeout
         while time.monotonic() < deadline:
             self._check_publisher.publish(path)
-            future = self._checker.call_async(Trigger.Request())
-            future.add_done_callback(self._notify)
-            with contextlib.suppress(NoAnswerError):
-                self._wait(future.done, "the answer", REPEAT)
-            if not future.done():
+            try:
+                checked = self._checker.call_async(Trigger.Request())
+                answer = json.loads(self._finish(checked, "the answer", REPEAT).message)
+            except NoAnswerError:
                 continue
-            answer = json.loads(future.result().message)
             if answer["path_hash"] == about:  # else it was an earlier one, or another client's
                 return ("", "") if answer["traversable"] else (answer["code"], answer["reason"])
         raise NoAnswerError(
@@ -264,10 +258,9 @@ class MissionPlanner(Node):
         Raises:
             NoAnswerError: The server does not answer in time.
         """
-        future = self._adviser.call_async(Trigger.Request())
-        future.add_done_callback(self._notify)
-        self._wait(future.done, f"the answer of {self._adviser.service_name}")
-        advice: dict[str, Any] = json.loads(future.result().message)
+        advised = self._adviser.call_async(Trigger.Request())
+        response = self._finish(advised, f"the answer of {self._adviser.service_name}")
+        advice: dict[str, Any] = json.loads(response.message)
         return advice
 
     def set_policy(self, policy: str) -> None:
@@ -276,9 +269,8 @@ class MissionPlanner(Node):
         Raises:
             NoAnswerError: The server does not answer in time.
         """
-        future = self._parameters.set_parameters([Parameter("policy", value=policy)])
-        future.add_done_callback(self._notify)
-        self._wait(future.done, f"parameter policy of {SERVER}")
+        changed = self._parameters.set_parameters([Parameter("policy", value=policy)])
+        self._finish(changed, f"parameter policy of {SERVER}")
 
     def wait_for_pose(self, is_wanted: Callable[[np.ndarray], bool], seconds: float) -> np.ndarray:
         """Return the first measured pose (3,) that is wanted, or the last one after some seconds.
@@ -300,14 +292,10 @@ class MissionPlanner(Node):
         except MessageError as error:
             self.get_logger().warning(f"odometry not used: {error}", once=True)
             return
-        with self._changed:
-            self._pose = pose[[0, 1, 3]]
-            self._changed.notify_all()
+        self._pose = pose[[0, 1, 3]]
 
     def _take_driven(self, message: String) -> None:
-        with self._changed:
-            self._driven = message.data
-            self._changed.notify_all()
+        self._driven = message.data
 
     def _largest(self, name: str, answer: dict[str, Any]) -> float | None:
         """Return the largest value of an array published with the verdict, None if it is empty."""
@@ -320,27 +308,21 @@ class MissionPlanner(Node):
 
     def _take_verdict(self, message: DiagnosticArray) -> None:
         verdict = {entry.key: _value(entry) for entry in message.status[0].values}
-        with self._changed:
-            self._verdict = verdict
-            self._verdict_about = message.header.stamp, verdict.get("question_hash")
-            self._changed.notify_all()
+        self._verdict = verdict
+        self._verdict_about = message.header.stamp, verdict.get("question_hash")
 
-    def _taker(self, name: str) -> Callable[[Float64MultiArray], None]:
-        def take(message: Float64MultiArray) -> None:
-            with self._changed:
-                self._arrays[name] = array_values(message)
-                self._changed.notify_all()
+    def _take_array(self, name: str, message: Float64MultiArray) -> None:
+        self._arrays[name] = array_values(message)
 
-        return take
-
-    def _notify(self, _future: Any) -> None:
-        with self._changed:
-            self._changed.notify_all()
+    def _finish(self, future: Any, what: str, timeout: float | None = None) -> Any:
+        """Return the response of a call; raises as `_wait`."""
+        self._wait(future.done, what, timeout)
+        return future.result()
 
     def _wait(
         self, condition: Callable[[], bool], what: str, timeout: float | None = None
     ) -> None:
-        """Wait until a condition holds.
+        """Take what has come, and what comes until a condition holds.
 
         Raises:
             NoAnswerError: It does not hold in time.
@@ -348,13 +330,26 @@ class MissionPlanner(Node):
         """
         longest = min(timeout or self._timeout, self._timeout)
         deadline = time.monotonic() + longest
-        with self._changed:
-            while not condition():
-                if not self.context.ok():
-                    raise ExternalShutdownException
-                if time.monotonic() > deadline:
-                    raise NoAnswerError(f"waited {longest:.0f} s in vain for {what}")
-                self._changed.wait(0.1)
+        while self._take_next(0.0):
+            pass
+        while not condition():
+            if time.monotonic() > deadline:
+                raise NoAnswerError(f"waited {longest:.0f} s in vain for {what}")
+            self._take_next(0.1)
+
+    def _take_next(self, seconds: float) -> bool:
+        """Take what comes next within some seconds; return whether anything came."""
+        try:
+            call, _, _ = self._executor.wait_for_ready_callbacks(timeout_sec=seconds)
+        except TimeoutException:
+            return False
+        except Exception:
+            if self.context.ok():
+                raise
+            raise ExternalShutdownException from None  # while it began to wait
+        call()
+        call.result()  # raises the error of a callback
+        return True
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -372,11 +367,6 @@ def _run(argv: Sequence[str] | None) -> int:
         return end_with(NODE_NAME, EXIT_BAD_INPUT, str(error))
     init_ros(argv)
     node = MissionPlanner(options.map_frame, options.timeout)
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    ended = threading.Event()
-    thread = threading.Thread(target=spin_until, args=(ended, executor), daemon=True)
-    thread.start()
     try:
         return _carry_out(node, terrain, options)
     except NoAnswerError as error:
@@ -386,23 +376,20 @@ def _run(argv: Sequence[str] | None) -> int:
     except (KeyboardInterrupt, ExternalShutdownException):
         return EXIT_INTERRUPTED
     finally:
-        ended.set()
-        executor.wake()
-        thread.join(2.0)
         rclpy.try_shutdown()
         node.destroy_node()
 
 
 def _carry_out(node: MissionPlanner, terrain: Terrain | None, options: MissionOptions) -> int:
     """Publish the map and query each goal; return the exit code."""
-    report = _print_json if options.json else _print_text
+    report = _print_json if options.as_json else _print_text
     report({"event": "waiting for the server"})
     node.wait_for_server()
     if terrain is not None:
         report({"event": "publishing the map"})
         node.publish_map(terrain)
     codes = set()
-    for number, goal in enumerate(options.goals, start=1):
+    for number, goal in enumerate(options.goal, start=1):
 
         def tell(text: str, goal: int = number) -> None:
             report({"event": text, "goal": goal})
@@ -459,19 +446,6 @@ def _exit_code(answer: dict[str, Any]) -> int:
     if answer["traversable"]:
         return EXIT_OK
     return EXIT_NOT_TRAVERSABLE if _was_judged(answer) else EXIT_FAILED
-
-
-def spin_until(ended: threading.Event, executor: SingleThreadedExecutor) -> None:
-    """Spin until the mission has ended, or a signal has shut ROS down."""
-    while not ended.is_set():
-        try:
-            executor.spin_once(timeout_sec=0.2)
-        except ExternalShutdownException:
-            return
-        except Exception:
-            if executor.context.ok():
-                raise
-            return  # ROS was shut down while the executor began to wait
 
 
 def _print_json(event: dict[str, Any]) -> None:

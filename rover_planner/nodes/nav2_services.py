@@ -29,7 +29,7 @@ from rover_planner.planning.answering.questions import (
 from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.path_geometry import next_given_poses
 from rover_planner.planning.verdict_report import IdentityReport
-from rover_planner.ros.deferred_service import Reply, serve_later
+from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.optional_types import find_type
 from rover_planner.ros.server_inputs import describe_path
 
@@ -38,27 +38,60 @@ ReadPath = Callable[[Path], GivenPath]
 ReadQuestion = Callable[[str, PoseStamped, PoseStamped], Question]
 
 
-class PathValidity:
-    """Answers requests of IsPathValid."""
+ERRORS = {
+    "": "NONE",
+    "off_map": "GOAL_OUTSIDE_MAP",
+    **dict.fromkeys(("too_long", "out_of_time", "busy"), "TIMEOUT"),
+    **dict.fromkeys(("bad_request", "no_map", "stale_map", "internal_error"), "UNKNOWN"),
+    **dict.fromkeys((CANCELLED, STOPPING), "UNKNOWN"),
+}
+"""Names of the errors of ComputePathToPose by the code of a verdict; others are NO_VALID_PATH.
+Their numbers differ between releases of Nav2."""
 
-    def __init__(self, desk: QuestionDesk, read: ReadPath, publish: Publish):
-        """Keep what is needed for answers.
+
+class Nav2Services:
+    """Answers requests of IsPathValid and goals of ComputePathToPose."""
+
+    def __init__(
+        self,
+        node: Node,
+        desk: QuestionDesk,
+        read_path: ReadPath,
+        read_question: ReadQuestion,
+        publish: Publish,
+    ):
+        """Create service and action, where their types are installed.
 
         Args:
+            node: The node.
             desk: Answers the questions.
-            read: Returns a path of the robot as one of the body; refuses one that is too long.
-            publish: Publishes the results of a judgement.
+            read_path: Returns a path of the robot as one of the body; refuses one that is too
+                long.
+            read_question: Returns the question of a service, by start and goal of the robot.
+            publish: Publishes the results of a judgement and returns the plan first.
         """
-        self._desk, self._read, self._publish = desk, read, publish
+        self._desk, self._publish = desk, publish
+        self._read_path, self._read_question = read_path, read_question
+        self._answers: dict[int, tuple[bool, Any]] = {}
+        is_valid = find_type("nav2_msgs.srv:IsPathValid")
+        if is_valid is not None:
+            serve_later(node, is_valid, "~/is_path_valid", self.check)
+        action: Any = find_type("nav2_msgs.action:ComputePathToPose")
+        self.make_result: Callable[[], Any] | None = None
+        """Makes an empty result of the action."""
+        if action is not None:
+            from rclpy.action import ActionServer
 
-    @staticmethod
-    def serve(node: Node, desk: QuestionDesk, read: ReadPath, publish: Publish) -> None:
-        """Create the service, where its type is installed."""
-        kind = find_type("nav2_msgs.srv:IsPathValid")
-        if kind is not None:
-            serve_later(node, kind, "~/is_path_valid", PathValidity(desk, read, publish).take)
+            self.make_result = action.Result
+            ActionServer(
+                node,
+                action,
+                "~/compute_path_to_pose",
+                self.finish,
+                handle_accepted_callback=self.compute,
+            )
 
-    def take(self, request: Any, response: Any, reply: Reply) -> None:
+    def check(self, request: Any, response: Any, reply: Reply) -> None:
         """Take a request; the reply has `is_valid` and `invalid_pose_indices`.
 
         The indices are those of the given poses at or after waypoints that are not passable. A
@@ -67,7 +100,7 @@ class PathValidity:
         path: Path = request.path
         about, stamp = describe_path(path)
         try:
-            given = self._read(path)
+            given = self._read_path(path)
             question = ask_about_path("is_path_valid", about, given)
         except RoverError as error:
             question = ask_in_vain("is_path_valid", about, str(error))
@@ -87,58 +120,14 @@ class PathValidity:
 
         self._desk.ask(question, send)
 
-
-ERRORS = {
-    "": "NONE",
-    "off_map": "GOAL_OUTSIDE_MAP",
-    **dict.fromkeys(("too_long", "out_of_time", "busy"), "TIMEOUT"),
-    **dict.fromkeys(("bad_request", "no_map", "stale_map", "internal_error"), "UNKNOWN"),
-    **dict.fromkeys((CANCELLED, STOPPING), "UNKNOWN"),
-}
-"""Names of the errors of ComputePathToPose by the code of a verdict; others are NO_VALID_PATH.
-Their numbers differ between releases of Nav2."""
-
-
-class PathComputation:
-    """Answers goals of ComputePathToPose."""
-
-    def __init__(self, desk: QuestionDesk, read: ReadQuestion, publish: Publish, result: type):
-        """Keep what is needed for answers.
-
-        Args:
-            desk: Answers the questions.
-            read: Returns the question of a service, by start and goal of the robot.
-            publish: Publishes the results of a judgement and returns the plan first.
-            result: Type of the action's result.
-        """
-        self._desk, self._read, self._publish = desk, read, publish
-        self._result = result
-        self._answers: dict[int, tuple[bool, Any]] = {}
-
-    @staticmethod
-    def serve(node: Node, desk: QuestionDesk, read: ReadQuestion, publish: Publish) -> None:
-        """Create the action, where its type is installed."""
-        kind: Any = find_type("nav2_msgs.action:ComputePathToPose")
-        if kind is None:
-            return
-        from rclpy.action import ActionServer
-
-        answers = PathComputation(desk, read, publish, kind.Result)
-        ActionServer(
-            node,
-            kind,
-            "~/compute_path_to_pose",
-            answers.finish,
-            handle_accepted_callback=answers.take,
-        )
-
-    def take(self, handle: Any) -> None:
+    def compute(self, handle: Any) -> None:
         """Take an accepted goal; it is executed, which ends it, once its answer is found."""
-        goal, begin = handle.request, time.monotonic()
+        goal, begin, make_result = handle.request, time.monotonic(), self.make_result
+        assert make_result is not None
         start = goal.start if goal.use_start else PoseStamped()
 
         def send(answer: Answer) -> None:
-            judged, result = answer.judgement, self._result()
+            judged, result = answer.judgement, make_result()
             result.path, _ = self._publish(judged, answer.identity)
             seconds = time.monotonic() - begin
             result.planning_time = Duration(seconds=seconds).to_msg()
@@ -148,7 +137,7 @@ class PathComputation:
             self._answers[id(handle)] = judged.traversable, result
             handle.execute()
 
-        self._desk.ask(self._read("compute_path_to_pose", start, goal.goal), send)
+        self._desk.ask(self._read_question("compute_path_to_pose", start, goal.goal), send)
 
     def finish(self, handle: Any) -> Any:
         """End a goal whose answer is found; return its result."""

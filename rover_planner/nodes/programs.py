@@ -2,6 +2,7 @@
 """The node programs: their help texts and command-line arguments; needs no ROS."""
 
 import itertools
+import math
 import re
 import sys
 import textwrap
@@ -12,13 +13,13 @@ from typing import Annotated, Any
 import typer
 
 from rover_planner.errors import PlanningError
-from rover_planner.nodes.mission.options import read_mission
+from rover_planner.nodes.mission.drive import DriveSettings
 from rover_planner.parameters.ground_learner import GroundLearnerParameters
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.table import ParameterSpec, specs_of
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.shell.poses import PoseCommand
+from rover_planner.shell.poses import Pose, PoseCommand, pose_option
 from rover_planner.shell.run_app import run_app
 
 HELP_WORDS = ("-h", "--help")
@@ -58,6 +59,63 @@ def read_engine(
 ) -> dict[str, Any]:
     """Return the parameters that the options of rover_simulator set."""
     return {"engine": engine} if engine else {}
+
+
+@dataclass(frozen=True)
+class MissionOptions:
+    """The options of a mission planner; typer reads them, and their helps document them.
+
+    Raises:
+        PlanningError: The timeout or a tolerance is not above 0.
+    """
+
+    start: Annotated[Pose, pose_option("Where the rover stands, in m and rad.")]
+    goal: Annotated[list[Pose], pose_option("Goal; may be given repeatedly.")]
+    map_name: Annotated[
+        str | None,
+        typer.Option(
+            "--map", metavar="TERRAIN", help="Map to publish first: preset (spirit) or .npz file."
+        ),
+    ] = None
+    drive: Annotated[
+        bool,
+        typer.Option("--drive", help="Send each plan to the rover and wait until it is there."),
+    ] = False
+    advise: Annotated[
+        bool,
+        typer.Option(
+            "--advise", help="Where a path is refused, take the first remedy that needs nobody."
+        ),
+    ] = False
+    map_frame: Annotated[str, typer.Option(metavar="FRAME", help="Frame of map and poses.")] = (
+        "map"
+    )
+    timeout: Annotated[
+        float,
+        typer.Option(
+            metavar="S",
+            help="Longest wait for an answer in s; a question without one is repeated each 10 s.",
+        ),
+    ] = 60.0
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print a JSON object a line; goals count from 1.")
+    ] = False
+    position_tolerance: Annotated[
+        float, typer.Option(metavar="M", help="Distance from the goal that is there, in m.")
+    ] = DriveSettings.position_tolerance
+    heading_tolerance: Annotated[
+        float, typer.Option(metavar="RAD", help="Difference from its heading that is there.")
+    ] = DriveSettings.heading_tolerance
+
+    def __post_init__(self) -> None:
+        for name, what in (
+            ("timeout", "a time above 0 in s"),
+            ("position_tolerance", "a distance above 0 in m"),
+            ("heading_tolerance", "an angle above 0 in rad"),
+        ):
+            value = getattr(self, name)
+            if not 0.0 < value < math.inf:
+                raise PlanningError(f"{name} is {value}; it must be {what}")
 
 
 PROGRAMS = {
@@ -104,7 +162,7 @@ PROGRAMS = {
         "subscribes traverse_server/verdict, traverse_server/wheel_loads, "
         "traverse_server/slip_ratios, odometry, path_driven; publishes "
         "elevation_cloud, path, traverse_server/path",
-        read=read_mission,
+        read=MissionOptions,
         exit_codes="Exit code 0: every goal is traversable, and with --drive was reached. 1: a "
         "question was refused before any path was judged, or the rover did not get there. 2: bad "
         "input, or a missing library. 3: a goal is not traversable. 4: no server, or no answer in "

@@ -16,7 +16,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 
 from msg_adapters.results.diagnostics import SEARCH, diagnostics, make_status
-from rover_planner.nodes.maps.map_topics import MapTopics
+from rover_planner.nodes.map_topics import MapTopics
 from rover_planner.planning.answering.budget import STOPPING, Budget, QuestionStoppedError
 from rover_planner.planning.answering.question_queue import Answered, Asked, QuestionQueue
 from rover_planner.planning.answering.questions import Answer, Question, Register
@@ -25,11 +25,10 @@ from rover_planner.planning.answering.server_health import ServerHealth
 from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.verdict_report import IdentityReport
+from rover_planner.ros.deferred import PacedSender
 from rover_planner.ros.guard import refuse_error
-from rover_planner.ros.node import RoverNode
-from rover_planner.ros.paced_sender import PacedSender
+from rover_planner.ros.node import RoverNode, create_steady_timer
 from rover_planner.ros.qos import topic_qos
-from rover_planner.ros.steady import create_steady_timer
 
 LEAVE_TIME = 0.1
 """Time in which the last answers leave before the node is destroyed [s]."""

@@ -18,20 +18,14 @@ from msg_adapters.paths import PoseStock, decimate, empty_path, settled_path
 from msg_adapters.results.diagnostics import verdict_to_diagnostics
 from msg_adapters.results.grids import area_to_grid, empty_grid
 from msg_adapters.results.markers import cleared_markers, path_markers
-from msg_adapters.results.predictions import (
-    MEASURES,
-    empty_trajectory,
-    joint_trajectory,
-    tip_over_array,
-    waypoint_array,
-)
+from msg_adapters.results.predictions import joint_trajectory, tip_over_array, wheel_array
 from msg_adapters.stamps import ns_to_stamp
-from rover_physics.names import WHEELS
+from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.judgement import PathJudgement
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
-from rover_planner.ros.deferred_work import DeferredWork
+from rover_planner.ros.deferred import DeferredWork
 from rover_planner.ros.lazy_publisher import LazyPublisher
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.server_inputs import ServerInputs, describe_path
@@ -158,6 +152,12 @@ class ResultMessages:
         """Frame of the map."""
         return self.values.map_frame
 
+    @property
+    def prediction(self) -> PathPrediction | None:
+        """The prediction of the chosen candidate; None if no path was judged."""
+        candidate = self.judgement.candidate
+        return None if candidate is None else candidate.prediction
+
     @cached_property
     def report(self) -> VerdictReport:
         """The report, with what it is about."""
@@ -168,12 +168,14 @@ class ResultMessages:
         makers: dict[str, Callable[[], object]] = {
             "plan": self.plan,
             "predicted_joints": self._joints,
-            "tip_over_margin": self._margins,
+            "tip_over_margin": lambda: tip_over_array(self.prediction),
             "verdict": self._verdict,
             "closed_area": self._closed_area,
             "markers": self._markers,
         }
-        return makers[topic]() if topic in makers else self._wheels(WHEEL_TOPICS[topic])
+        if topic in makers:
+            return makers[topic]()
+        return wheel_array(self.prediction, WHEEL_TOPICS[topic])
 
     def plan(self) -> Path:
         """Return the path to drive, without poses if none is traversable."""
@@ -204,11 +206,8 @@ class ResultMessages:
         return area_to_grid(around.closed.places, cell, first, self.frame, self.stamp)
 
     def _joints(self) -> JointTrajectory:
-        candidate = self.judgement.candidate
-        if candidate is None:
-            return empty_trajectory(self.rover, self.frame, self.stamp, self.inputs.joint_names)
         return joint_trajectory(
-            candidate.prediction, self.rover, self.frame, self.stamp, self.points,
+            self.prediction, self.rover, self.frame, self.stamp, self.points,
             self.inputs.joint_names,
         )  # fmt: skip
 
@@ -219,19 +218,6 @@ class ResultMessages:
         classes = [waypoint.traversability_class for waypoint in self.judgement.classes]
         reasons, rows = candidate.verdict.reasons, self._rows_to_show()
         return path_markers(candidate.prediction, reasons, rows, self.frame, self.stamp, classes)
-
-    def _margins(self) -> Float64MultiArray:
-        candidate = self.judgement.candidate
-        if candidate is None:
-            return waypoint_array(np.empty((0, len(MEASURES))), "measure")
-        return tip_over_array(candidate.prediction)
-
-    def _wheels(self, field: str) -> Float64MultiArray:
-        """Return a field of the prediction with a value for each waypoint and wheel."""
-        candidate = self.judgement.candidate
-        if candidate is None:
-            return waypoint_array(np.empty((0, len(WHEELS))))
-        return waypoint_array(getattr(candidate.prediction, field))
 
     def _rows_to_show(self) -> NDArray[np.intp]:
         """Return indices of waypoints about `plan_spacing` apart and where the class changes."""

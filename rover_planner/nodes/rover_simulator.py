@@ -36,10 +36,9 @@ from rover_planner.nodes.running import run_node
 from rover_planner.nodes.warm_up import SIMULATION
 from rover_planner.parameters.rover_simulator import QUASI_STATIC, RoverSimulatorParameters
 from rover_planner.parameters.shared import STOP
-from rover_planner.ros.node import RoverNode
+from rover_planner.ros.node import RoverNode, create_steady_timer
 from rover_planner.ros.optional_types import find_type
 from rover_planner.ros.qos import latched_qos, map_qos, sensor_qos, topic_qos
-from rover_planner.ros.steady import create_steady_timer
 from rover_planner.shell.kernels import load_kernels
 from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.simulation import Simulation, load_simulation_settings

@@ -4,6 +4,7 @@
 import importlib
 import signal
 import sys
+from functools import partial
 
 from rover_planner.errors import PlanningError
 from rover_planner.nodes.programs import HELP_WORDS, print_help
@@ -30,26 +31,8 @@ def _start(name: str) -> int:
     return module.main()
 
 
-def start_traverse_server() -> int:
-    """Run the program traverse_server."""
-    return _start("traverse_server")
-
-
-def start_traction_controller() -> int:
-    """Run the program traction_controller."""
-    return _start("traction_controller")
-
-
-def start_rover_simulator() -> int:
-    """Run the program rover_simulator."""
-    return _start("rover_simulator")
-
-
-def start_ground_learner() -> int:
-    """Run the program ground_learner."""
-    return _start("ground_learner")
-
-
-def start_mission_planner() -> int:
-    """Run the program mission_planner."""
-    return _start("mission_planner")
+start_traverse_server = partial(_start, "traverse_server")
+start_traction_controller = partial(_start, "traction_controller")
+start_rover_simulator = partial(_start, "rover_simulator")
+start_ground_learner = partial(_start, "ground_learner")
+start_mission_planner = partial(_start, "mission_planner")

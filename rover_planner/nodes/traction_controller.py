@@ -15,16 +15,14 @@ from msg_adapters.commands import joint_order
 from msg_adapters.results.diagnostics import traction_diagnostics
 from rover_physics.names import WHEEL_COUNT, WHEEL_JOINTS
 from rover_planner.nodes.running import run_node
-from rover_planner.nodes.traction.inputs import TractionInputs
-from rover_planner.nodes.traction.maps import TractionMaps
+from rover_planner.nodes.traction.inputs import TractionInputs, TractionMaps
 from rover_planner.nodes.traction.topics import TractionTopics
 from rover_planner.nodes.warm_up import TRACTION, update_traction
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.ros.frames import NodeFrames
 from rover_planner.ros.logs import TransitionLog
-from rover_planner.ros.node import RoverNode
+from rover_planner.ros.node import RoverNode, create_steady_timer
 from rover_planner.ros.qos import latched_qos, sensor_qos, topic_qos
-from rover_planner.ros.steady import create_steady_timer
 from rover_planner.shell.kernels import load_kernels
 from rover_planner.traction.clocks import ClockWatch
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
@@ -171,9 +169,7 @@ class TractionController(RoverNode[TractionControllerParameters]):
             now = time.monotonic()
         command = repeated or self._find_command(now)
         sent = self._watchdog.send(
-            lambda: self._write(command),
-            now,
-            self._find_deadline(now, command),
+            lambda: self._write(command), now, self._find_deadline(now, command)
         )
         if not sent:
             command = self._supervisor.fail(LOOP_FAULT)

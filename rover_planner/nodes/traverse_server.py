@@ -20,13 +20,7 @@ from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash, plan_request_hash
 from msg_adapters.paths import count_poses, stamped_pose_to_array
 from msg_adapters.raw_messages import SensorReader
-from msg_adapters.results.diagnostics import (
-    HEALTH,
-    MONITOR,
-    diagnostics,
-    make_status,
-    to_json,
-)
+from msg_adapters.results.diagnostics import HEALTH, MONITOR, diagnostics, make_status, to_json
 from msg_adapters.stamps import NANOSECONDS
 from rover_physics.errors import RoverError
 from rover_physics.numerics.kernel_cache import kernel_cache_note
@@ -34,9 +28,8 @@ from rover_physics.warm_up import EXACT, UNCERTAIN
 from rover_planner.maps.known_map import describe_terrain, stamp_text
 from rover_planner.nodes.advice_topics import AdviceTopics
 from rover_planner.nodes.arm_topics import ArmTopics
-from rover_planner.nodes.maps.map_cloud import MapCloud
-from rover_planner.nodes.maps.map_topics import MapTopics
-from rover_planner.nodes.nav2_services import PathComputation, PathValidity
+from rover_planner.nodes.map_topics import MapCloud, MapTopics
+from rover_planner.nodes.nav2_services import Nav2Services
 from rover_planner.nodes.navigation.hazard_topics import HazardTopics
 from rover_planner.nodes.navigation.path_watch import MAX_POSE_AGE, PERIOD, PathWatch
 from rover_planner.nodes.question_desk import QuestionDesk
@@ -64,13 +57,12 @@ from rover_planner.planning.marked_places import NONE_MARKED, parse_place
 from rover_planner.planning.navigation.sensor_mounts import sensor_poses
 from rover_planner.planning.path_query import Pose
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
-from rover_planner.ros.deferred_service import Reply, serve_later
+from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.frames import NodeFrames, is_empty
 from rover_planner.ros.map_intake import read_message
-from rover_planner.ros.node import RoverNode
+from rover_planner.ros.node import RoverNode, create_steady_timer
 from rover_planner.ros.qos import newest_qos, polled_qos, replace_reliability, topic_qos
 from rover_planner.ros.server_inputs import ServerInputs, describe_path
-from rover_planner.ros.steady import create_steady_timer
 from rover_planner.ros.subscriptions import subscribe_to_requests
 from rover_planner.shell.kernels import load_kernels
 
@@ -110,8 +102,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self._create_subscriptions()
         serve_later(self, GetPlan, "~/can_traverse", self._can_traverse)
         serve_later(self, Trigger, "~/check_path", self._check_path)
-        PathValidity.serve(self, self.desk, self.read_path, self.publish)
-        PathComputation.serve(self, self.desk, self.read_question, self.publish)
+        Nav2Services(self, self.desk, self.read_path, self.read_question, self.publish)
         self._advice = AdviceTopics(self, self.desk)
         self.create_service(Trigger, "~/cancel", self._cancel)
         self.create_service(Trigger, "~/clear_places", self._clear_marks)

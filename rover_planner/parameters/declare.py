@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
-from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -30,12 +29,8 @@ def declare_parameters(node: Node, table: type[Table]) -> Table:
     """
     found = []
     for spec in specs_of(table):
-        _refuse_empty_list(node, table, spec)
-        try:
-            node.declare_parameter(spec.name, spec.ros_default, _descriptor(spec))
-        except (InvalidParameterTypeException, InvalidParameterValueException) as error:
-            _explain_override(node, table, spec)
-            raise ParameterError(f"parameter {spec.name}: {error}") from error
+        _check_override(node, table, spec)
+        node.declare_parameter(spec.name, spec.ros_default, _descriptor(spec))
         found.append(node.get_parameter(spec.name))
     _warn_of_unknown_parameters(node, [spec.name for spec in specs_of(table)])
     return replace(table(), **values_in(table, found))
@@ -51,23 +46,21 @@ def _warn_of_unknown_parameters(node: Node, names: list[str]) -> None:
             node.get_logger().warning(f"parameter {name} does not exist and is ignored; {hint}")
 
 
-def _refuse_empty_list(node: Node, table: type[ParameterTable], spec: ParameterSpec) -> None:
-    """Raise ParameterError if an override is [], which ROS takes for one without a value."""
+def _check_override(node: Node, table: type[ParameterTable], spec: ParameterSpec) -> None:
+    """Raise ParameterError, in the words of the table, if an override breaks its rules.
+
+    ROS takes [] for an override without a value.
+    """
     given = node._parameter_overrides.get(spec.name)
-    if given is None or given.type_ != Parameter.Type.NOT_SET:
+    if given is None:
         return
-    replace(table(), **{spec.name: ()})
-    raise ParameterError(
-        f"parameter {spec.name} is [], which has no type in ROS; leave it out, its default is "
-        f"{spec.ros_default}"
-    )
-
-
-def _explain_override(node: Node, table: type[ParameterTable], spec: ParameterSpec) -> None:
-    """Raise ParameterError in the words of the table if an override breaks its rules."""
-    given = node._parameter_overrides.get(spec.name)
-    if given is not None:
-        replace(table(), **values_in(table, [given]))
+    is_empty = given.type_ == Parameter.Type.NOT_SET
+    replace(table(), **({spec.name: ()} if is_empty else values_in(table, [given])))
+    if is_empty:
+        raise ParameterError(
+            f"parameter {spec.name} is [], which has no type in ROS; leave it out, its default is "
+            f"{spec.ros_default}"
+        )
 
 
 def values_in(table: type[ParameterTable], parameters: Iterable[Parameter]) -> dict[str, Any]:

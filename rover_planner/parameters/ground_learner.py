@@ -19,17 +19,13 @@ class GroundLearnerParameters(ParameterTable):
         read_only=True,
     )
     soil: str = parameter(
-        "",
-        "Soil that is assumed at first, on ground that yields, and learned.",
-        read_only=True,
+        "", "Soil that is assumed at first, on ground that yields, and learned.", read_only=True
     )
     stop_when_stuck: bool = parameter(
-        False,
-        "Whether a rover that is stuck gets an emergency stop.",
+        False, "Whether a rover that is stuck gets an emergency stop."
     )
     mark_when_stuck: bool = parameter(
-        False,
-        "Whether the place ahead of a rover that is stuck is marked as impassable.",
+        False, "Whether the place ahead of a rover that is stuck is marked as impassable."
     )
     map_frame: str = parameter(
         "map", "Frame of map and odometry; others are refused.", read_only=True

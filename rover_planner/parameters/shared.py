@@ -19,7 +19,7 @@ RELIABILITIES = (RELIABLE, BEST_EFFORT)
 
 
 MAX_TORQUE: float = parameter(
-    0.0, "Largest torque of a wheel; 0 uses that of the rover file.", unit="N m", bounds=(0.0, 1e6)
+    0.0, "Largest torque of a wheel; 0 uses that of the rover file.", "N m", (0.0, 1e6)
 )
 STEERING_SIGN: str = parameter(
     LEFT,
@@ -44,14 +44,11 @@ STEERING_LIMIT: float = parameter(
     0.0,
     "Angle that the steering joints reach, beyond which a rover file is refused; 0 takes that of "
     "the rover file.",
-    unit="rad",
-    bounds=(0.0, 3.2),
+    "rad",
+    (0.0, 3.2),
 )
 PAYLOAD: float = parameter(
-    OWN_PAYLOAD,
-    "Mass at the arm's tip; -1 uses that of the rover file.",
-    unit="kg",
-    bounds=(OWN_PAYLOAD, 1e6),
+    OWN_PAYLOAD, "Mass at the arm's tip; -1 uses that of the rover file.", "kg", (OWN_PAYLOAD, 1e6)
 )
 
 
@@ -72,10 +69,7 @@ def payload_or_none(payload: float) -> float | None:
 
 
 MAP_RESOLUTION: float = parameter(
-    0.0,
-    "Cell size for clouds; 0 needs points on a regular grid.",
-    unit="m",
-    bounds=(0.0, 10.0),
+    0.0, "Cell size for clouds; 0 needs points on a regular grid.", "m", (0.0, 10.0)
 )
 CELL_HEIGHT: str = parameter(
     CELL_HEIGHTS[0],
@@ -84,7 +78,7 @@ CELL_HEIGHT: str = parameter(
 )
 
 
-MAX_MAP_CELLS: int = parameter(MAX_CELLS, "Largest terrain file.", unit="cells", bounds=(4, 10**9))
+MAX_MAP_CELLS: int = parameter(MAX_CELLS, "Largest terrain file.", "cells", (4, 10**9))
 REALTIME_PRIORITY: int = parameter(
     0,
     "Real-time priority (SCHED_FIFO), in traverse_server of its heartbeat alone, beside which all "
@@ -100,8 +94,8 @@ STOP_TIMEOUT: float = parameter(
     0.0,
     "Time without traverse_server/stop after which the rover stops; 0 only stops while it is "
     "true.",
-    unit="s",
-    bounds=(0.0, 10.0),
+    "s",
+    (0.0, 10.0),
 )
 IMU_FRAME: str = parameter(
     "", "Frame of the IMU; empty is that of the body. Others are refused.", read_only=True
@@ -109,15 +103,12 @@ IMU_FRAME: str = parameter(
 IMU_MOUNTING: tuple[float, ...] = parameter(
     (0.0, 0.0, 0.0),
     "Roll, pitch and yaw of the IMU's axes in the body frame.",
-    unit="rad",
-    bounds=(-6.3, 6.3),
+    "rad",
+    (-6.3, 6.3),
     read_only=True,
 )
 MAP_DURABILITY: str = parameter(
-    EITHER,
-    "Durability of the maps' publishers.",
-    choices=MAP_DURABILITIES,
-    read_only=True,
+    EITHER, "Durability of the maps' publishers.", choices=MAP_DURABILITIES, read_only=True
 )
 INPUT_RELIABILITY: str = parameter(
     RELIABLE,

@@ -2,7 +2,7 @@
 """Base of the tables of node parameters: dataclasses whose fields have meaning, unit, bounds."""
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, ClassVar, TypeVar, get_type_hints
 
 from rover_planner.errors import PlanningError
@@ -21,29 +21,6 @@ _ROS_TYPES: dict[Any, str] = {
 
 class ParameterError(PlanningError):
     """A parameter value that is not allowed; the text says which values are allowed."""
-
-
-def parameter(
-    default: Value,
-    meaning: str,
-    *,
-    unit: str = "",
-    bounds: tuple[float, float] | None = None,
-    choices: tuple[str, ...] = (),
-    read_only: bool = False,
-) -> Value:
-    """Make a field of a `ParameterTable`; `ParameterSpec` explains the arguments."""
-    made: Any = field(
-        default=default,
-        metadata={
-            "meaning": meaning,
-            "unit": unit,
-            "bounds": bounds,
-            "choices": choices,
-            "read_only": read_only,
-        },
-    )
-    return made  # a dataclass field at run time; type checkers see the type of its value
 
 
 @dataclass(frozen=True)
@@ -126,6 +103,21 @@ class ParameterSpec:
             )
 
 
+def parameter(
+    default: Value,
+    meaning: str,
+    unit: str = "",
+    bounds: tuple[float, float] | None = None,
+    *,
+    choices: tuple[str, ...] = (),
+    read_only: bool = False,
+) -> Value:
+    """Make a field of a `ParameterTable`; `ParameterSpec` explains the arguments."""
+    spec = ParameterSpec("", "", default, meaning, unit, bounds, choices, read_only)
+    made: Any = field(default=default, metadata={"spec": spec})
+    return made  # a dataclass field at run time; type checkers see the type of its value
+
+
 @dataclass(frozen=True)
 class ParameterTable:
     """Base class of a node's parameters; the constructor checks all values.
@@ -144,13 +136,13 @@ class ParameterTable:
 
 def specs_of(table: type[ParameterTable]) -> tuple[ParameterSpec, ...]:
     """Return the rows of a table in the order of its fields."""
-    types = get_type_hints(table)
+    types, specs = get_type_hints(table), {row.name: row.metadata["spec"] for row in fields(table)}
     return tuple(
-        ParameterSpec(
-            row.name,
-            _ROS_TYPES[types[row.name]],
-            row.default,
-            **{**row.metadata, "read_only": table.all_read_only or row.metadata["read_only"]},
+        replace(
+            spec,
+            name=name,
+            type_name=_ROS_TYPES[types[name]],
+            read_only=table.all_read_only or spec.read_only,
         )
-        for row in fields(table)
+        for name, spec in specs.items()
     )

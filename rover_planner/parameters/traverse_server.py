@@ -64,10 +64,10 @@ class TraverseServerParameters(ParameterTable):
     )
     candidate_count: int = parameter(9, "Largest number of candidate paths.", bounds=(1, 99))
     candidate_spacing: float = parameter(
-        0.3, "Distance between candidates half-way.", unit="m", bounds=(0.01, 10.0)
+        0.3, "Distance between candidates half-way.", "m", (0.01, 10.0)
     )
     waypoint_spacing: float = parameter(
-        0.02, "Largest distance between judged waypoints.", unit="m", bounds=(0.001, 1.0)
+        0.02, "Largest distance between judged waypoints.", "m", (0.001, 1.0)
     )
     planner: str = parameter(
         AUTO,
@@ -75,12 +75,12 @@ class TraverseServerParameters(ParameterTable):
         "(auto).",
         choices=(FAN, LATTICE, AUTO),
     )
-    search_budget: float = parameter(2.0, "Time for a search.", unit="s", bounds=(0.05, 600.0))
+    search_budget: float = parameter(2.0, "Time for a search.", "s", (0.05, 600.0))
     lattice_cell: float = parameter(
         0.0,
         "Distance between nodes of the search; 0 is a quarter of the wheelbase.",
-        unit="m",
-        bounds=(0.0, 10.0),
+        "m",
+        (0.0, 10.0),
     )
     search_frontier: bool = parameter(
         False, "Whether a goal beyond the known ground is answered with a path to near it."
@@ -88,31 +88,29 @@ class TraverseServerParameters(ParameterTable):
     chance_weight: float = parameter(
         0.0,
         "How much longer a searched path may be to fail never instead of always.",
-        unit="m",
-        bounds=(0.0, 1e6),
+        "m",
+        (0.0, 1e6),
     )
     plan_spacing: float = parameter(
         0.1,
         "Distance between poses of a plan, beside those where the class changes; 0 is every "
         "waypoint.",
-        unit="m",
-        bounds=(0.0, 100.0),
+        "m",
+        (0.0, 100.0),
     )
     steering_limit: float = shared.STEERING_LIMIT
     steering_sign: str = shared.STEERING_SIGN
     joint_map: tuple[str, ...] = shared.JOINT_MAP
     map_frame: str = parameter(
-        "map",
-        "Frame of the map; requests in another frame need /tf.",
-        read_only=True,
+        "map", "Frame of the map; requests in another frame need /tf.", read_only=True
     )
     base_frame: str = parameter("base_link", "Frame of the robot on /tf.", read_only=True)
     base_offset: tuple[float, ...] = shared.BASE_OFFSET
     transform_timeout: float = parameter(
         0.5,
         "Age from which a transform of /tf is refused, and odometry for a sensor's clouds.",
-        unit="s",
-        bounds=(0.01, 60.0),
+        "s",
+        (0.01, 60.0),
     )
     sensor_mounts: tuple[str, ...] = parameter(
         NO_MOUNTS,
@@ -132,9 +130,7 @@ class TraverseServerParameters(ParameterTable):
         read_only=True,
     )
     friction_layer: str = parameter(
-        "friction",
-        "GridMap's layer of Coulomb friction.",
-        read_only=True,
+        "friction", "GridMap's layer of Coulomb friction.", read_only=True
     )
     map_updates: str = parameter(
         AUTO,
@@ -149,40 +145,32 @@ class TraverseServerParameters(ParameterTable):
     map_ageing: float = parameter(
         0.0,
         "Growth of a height's standard deviation with its age, for map_merge surest.",
-        unit="m/s",
-        bounds=(0.0, 10.0),
+        "m/s",
+        (0.0, 10.0),
     )
     loaded_std: float = parameter(
         0.0,
         "Standard deviation of heights of a loaded map that has none; 0 is exact.",
-        unit="m",
-        bounds=(0.0, 1e3),
+        "m",
+        (0.0, 1e3),
     )
     map_window: float = parameter(
         0.0,
         "Side of a window around the rover in which maps merge; 0 covers all.",
-        unit="m",
-        bounds=(0.0, 1e5),
+        "m",
+        (0.0, 1e5),
     )
     fill_under_rover: bool = parameter(
         True, "Whether unknown ground under the rover is filled from its six contacts."
     )
     footprint_margin: float = parameter(
-        0.0,
-        "Width around the wheels that is also filled at the start.",
-        unit="m",
-        bounds=(0.0, 10.0),
+        0.0, "Width around the wheels that is also filled at the start.", "m", (0.0, 10.0)
     )
     footprint_std: float = parameter(
-        0.02,
-        "Standard deviation of filled heights on a map with deviations.",
-        unit="m",
-        bounds=(0.0, 10.0),
+        0.02, "Standard deviation of filled heights on a map with deviations.", "m", (0.0, 10.0)
     )
     imu_attitude: bool = parameter(
-        False,
-        "Whether roll and pitch come from imu instead of odometry.",
-        read_only=True,
+        False, "Whether roll and pitch come from imu instead of odometry.", read_only=True
     )
     imu_frame: str = shared.IMU_FRAME
     imu_mounting: tuple[float, ...] = shared.IMU_MOUNTING
@@ -196,9 +184,7 @@ class TraverseServerParameters(ParameterTable):
         "Unknown cells: refuse paths over them, or interpolate small gaps.",
         choices=(REFUSE, INTERPOLATE),
     )
-    max_gap: float = parameter(
-        0.2, "Widest gap that is interpolated.", unit="m", bounds=(0.0, 100.0)
-    )
+    max_gap: float = parameter(0.2, "Widest gap that is interpolated.", "m", (0.0, 100.0))
     map_sigmas: float = parameter(
         SIGMAS,
         "Standard deviations of the map to allow for; 0 takes it as exact.",
@@ -210,32 +196,20 @@ class TraverseServerParameters(ParameterTable):
         bounds=(0.0, 1.0),
     )
     terrain_file: str = parameter(
-        "",
-        "Map to start with: a preset or terrain file; empty waits for a map.",
-        read_only=True,
+        "", "Map to start with: a preset or terrain file; empty waits for a map.", read_only=True
     )
     max_map_age: float = parameter(
-        0.0,
-        "Age from which a map is refused as stale_map; 0 allows any.",
-        unit="s",
-        bounds=(0.0, 1e9),
+        0.0, "Age from which a map is refused as stale_map; 0 allows any.", "s", (0.0, 1e9)
     )
     time_budget: float = parameter(
-        5.0,
-        "Longest time from question to answer.",
-        unit="s",
-        bounds=(0.05, 600.0),
+        5.0, "Longest time from question to answer.", "s", (0.05, 600.0)
     )
     advice_time: float = parameter(
-        5.0,
-        "Longest time from ~/advise to its answer; questions come first.",
-        unit="s",
-        bounds=(0.05, 600.0),
+        5.0, "Longest time from ~/advise to its answer; questions come first.", "s", (0.05, 600.0)
     )
     max_waiting: int = parameter(50, "Questions that may wait; more are busy.", bounds=(0, 1000))
     map_folder: str = parameter(
-        "~/maps",
-        "Folder below which ~/load_map reads; ~ is the user's home, / allows every file.",
+        "~/maps", "Folder below which ~/load_map reads; ~ is the user's home, / allows every file."
     )
     max_path_poses: int = parameter(
         1500,
@@ -243,14 +217,14 @@ class TraverseServerParameters(ParameterTable):
         bounds=(2, 100_000),
     )
     max_map_bytes: int = parameter(
-        1_000_000_000, "Largest file that ~/load_map reads.", unit="bytes", bounds=(1000, 10**12)
+        1_000_000_000, "Largest file that ~/load_map reads.", "bytes", (1000, 10**12)
     )
     max_map_cells: int = shared.MAX_MAP_CELLS
     suspension_tolerance: float = parameter(
         0.1,
         "Difference of measured and predicted suspension angles above which there is a warning.",
-        unit="rad",
-        bounds=(0.0, 3.2),
+        "rad",
+        (0.0, 3.2),
     )
 
     monitor: bool = parameter(
@@ -258,24 +232,21 @@ class TraverseServerParameters(ParameterTable):
         "Whether the accepted path is watched; ~/stop is then true unless the rover may drive it.",
     )
     monitor_offset: float = parameter(
-        0.5,
-        "Distance from its path above which the rover is to stop.",
-        unit="m",
-        bounds=(0.01, 100.0),
+        0.5, "Distance from its path above which the rover is to stop.", "m", (0.01, 100.0)
     )
     monitor_timeout: float = parameter(
         1.0,
         "Time without the rover's pose, or joint states that were there, after which it is to "
         "stop.",
-        unit="s",
-        bounds=(0.1, 60.0),
+        "s",
+        (0.1, 60.0),
     )
     monitor_mismatch: float = parameter(
         0.3,
         "Difference of suspension angles above which the rover is to stop after a second; 0 "
         "never.",
-        unit="rad",
-        bounds=(0.0, 3.2),
+        "rad",
+        (0.0, 3.2),
     )
 
     realtime_priority: int = shared.REALTIME_PRIORITY

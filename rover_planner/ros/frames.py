@@ -16,7 +16,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Header
 
 from msg_adapters.errors import MessageError
-from msg_adapters.frames import check_frame, read_transform
+from msg_adapters.frames import check_frame, check_transform
 from msg_adapters.paths import pose_to_array
 from msg_adapters.stamps import stamp_to_ns
 from rover_planner.parameters.traction_controller import TractionControllerParameters
@@ -27,7 +27,6 @@ from rover_planner.planning.navigation.transforms import (
     TransformError,
     TransformTree,
     move_path,
-    read_pose,
     write_pose,
 )
 from rover_planner.ros.optional_types import find_type
@@ -80,13 +79,21 @@ class Frames:
         Raises:
             MessageError: It is none.
         """
-        at = read_transform(transform)
-        self._tree.take(at.parent, at.child, at.stamp, Rigid.of(at), is_static=is_static)
+        check_transform(transform)
+        header, moved = transform.header, transform.transform
+        self._tree.take(
+            header.frame_id,
+            transform.child_frame_id,
+            stamp_to_ns(header.stamp) or 0,
+            Rigid.of(moved.translation, moved.rotation),
+            is_static=is_static,
+        )
 
     def take_odometry(self, odometry: Any) -> None:
         """Keep the pose of the body that odometry in the map frame tells, for the sensors."""
         assert self._sensors is not None
-        stamp, robot = stamp_to_ns(odometry.header.stamp), read_pose(odometry.pose.pose)
+        stamp, pose = stamp_to_ns(odometry.header.stamp), odometry.pose.pose
+        robot = Rigid.of(pose.position, pose.orientation)
         if self._offset is not None:
             robot = robot.then(self._offset.inverse())
         self._sensors.take(robot, self.now() if stamp is None else stamp)
@@ -184,7 +191,7 @@ class Frames:
         if is_here and self._offset is None:
             return None
         pose_to_array(pose, what)  # refuses what is no pose
-        rigid = read_pose(pose)
+        rigid = Rigid.of(pose.position, pose.orientation)
         if not is_here:
             stamp = stamp_to_ns(header.stamp)
             rigid = self._tree.find(self._map, frame, stamp, self.now()).then(rigid)

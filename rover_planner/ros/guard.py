@@ -15,9 +15,9 @@ from rclpy.exceptions import InvalidHandle
 from rclpy.executors import SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 
+from msg_adapters.stamps import NANOSECONDS
 from rover_physics.errors import RoverError
 
-NANOSECONDS = 1e9
 EVENT_PERIOD = 1.0
 """Time between two looks at events of publishers and subscriptions, such as profiles that do not
 match [s]: they are half of the entities of a wait set, and with those of a subscription that

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any, Generic, TypeVar
 
 from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.timer import Timer
@@ -93,3 +94,14 @@ class RoverNode(Node, Generic[Table]):
 
         self.add_on_set_parameters_callback(check)
         self.add_post_set_parameters_callback(pass_on)
+
+
+def create_steady_timer(
+    node: Node, period: float, do: Callable[[], object], *, starts: bool = True
+) -> Timer:
+    """Return a timer that calls a function each period [s], from now on or once it is reset.
+
+    Neither a step of the system clock nor a stopped /clock delays it.
+    """
+    steady = Clock(clock_type=ClockType.STEADY_TIME)
+    return node.create_timer(period, do, clock=steady, autostart=starts)

@@ -15,9 +15,8 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
+from msg_adapters.stamps import NANOSECONDS
 from rover_planner.ros.guard import Guard
-
-NANOSECONDS = 1e9
 
 
 @dataclass(frozen=True)

@@ -92,8 +92,3 @@ def map_subscriptions(
         VOLATILE: [(volatile, HEAR_BEST_EFFORT)],
     }[durability]
     return [(replace_reliability(profile, reliability), mends) for profile, mends in chosen]
-
-
-def map_subscriptions_qos(durability: str) -> list[QoSProfile]:
-    """Return the profiles of `map_subscriptions` alone, reliable."""
-    return [profile for profile, _ in map_subscriptions(durability)]

@@ -10,14 +10,13 @@ from rclpy.node import Node
 from rclpy.qos import QoSPolicyKind, QoSProfile
 from rclpy.subscription import Subscription
 
-from rover_planner.ros.node import RoverNode
+from rover_planner.ros.node import RoverNode, create_steady_timer
 from rover_planner.ros.qos import (
     HEAR_BEST_EFFORT,
     map_subscriptions,
     replace_reliability,
     topic_qos,
 )
-from rover_planner.ros.steady import create_steady_timer
 
 PERIOD = 5.0
 """Time between two looks at the types of publishers [s]; one takes a millisecond per topic."""

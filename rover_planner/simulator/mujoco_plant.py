@@ -6,7 +6,6 @@ import numpy as np
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import matrix_from_xyzw
 from rover_physics.rover.model import Rover
-from rover_physics.rover.steered_drive import SteeredDrive
 from rover_physics.terrain.grid import Terrain
 from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.simulator.plant import PlantState
@@ -30,65 +29,53 @@ class MujocoPlant:
         Raises:
             PlanningError: The terrain has unknown cells, or the pose is outside the terrain.
         """
-        self._plant = MujocoRover(rover, terrain, pose, friction)
-        self._rover, self._drive = rover, SteeredDrive(rover)
-        self._refusal = ""
+        self.simulated = MujocoRover(rover, terrain, pose, friction)
+        """The rover in MuJoCo."""
+        self._rover = rover
         sides = np.array([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])
         self._arms = sides * abs(rover.suspension.wheels["middle"][1])
         self._torques = np.zeros(6)
-        self._last = self._plant.pose[:3]
+        self._last = self.simulated.pose[:3]
         self._velocity = np.zeros(3)
 
     def pose(self) -> Floats:
         """Return x, y [m] and yaw [rad] (3,) of the body origin."""
-        return self._plant.pose[[0, 1, 3]]
+        return self.simulated.pose[[0, 1, 3]]
 
     def drive(self, speed: float, yaw_rate: float, duration: float) -> None:
         """Drive at a speed [m/s] and yaw rate [rad/s] for a duration [s], with speed servos."""
         if self._rover.steering is None:
             speeds = speed + yaw_rate * self._arms
         else:
-            speeds = self._steer((speed, yaw_rate))
-        self._torques = self._plant.servo(speeds / self._rover.wheel.radius, duration)
+            speeds = self.simulated.steer((speed, yaw_rate))
+        self._torques = self.simulated.servo(speeds / self._rover.wheel.radius, duration)
         self._measure(duration)
-
-    def _steer(self, command: tuple[float, float]) -> Floats:
-        """Steer towards a command; return the speeds (6,) [m/s] of the wheels meanwhile.
-
-        A rover that is to stand, or cannot follow the command, keeps its steering angles.
-        """
-        aims = self._drive.aim(*command)
-        self._refusal = aims.refusal
-        if self._refusal or not any(command):
-            return np.zeros(6)
-        self._plant.steer(aims.angles)
-        return self._drive.share(self._plant.steering_angles, aims.angles) * aims.speeds
 
     def pull(self, torques: Floats, command: tuple[float, float], duration: float) -> None:
         """Apply torques (6,) [N m] for a duration [s]; speed and yaw rate set the steering.
 
         With fixed wheels the torques also steer.
         """
-        self._steer(command)
+        self.simulated.steer(command)
         self._torques = np.asarray(torques, dtype=float)
-        self._plant.step(self._torques, duration)
+        self.simulated.step(self._torques, duration)
         self._measure(duration)
 
     def brake(self, duration: float) -> None:
         """Lock the wheels for a duration [s]."""
         self._torques = np.zeros(6)
-        self._plant.brake(duration)
+        self.simulated.brake(duration)
         self._measure(duration)
 
     def _measure(self, duration: float) -> None:
-        now = self._plant.pose[:3]
+        now = self.simulated.pose[:3]
         moved = (now - self._last) / duration
-        R = matrix_from_xyzw(self._plant.orientation)
+        R = matrix_from_xyzw(self.simulated.orientation)
         self._velocity, self._last = R.T @ moved, now
 
     def state(self) -> PlantState:
         """Return the current measurements."""
-        plant = self._plant
+        plant = self.simulated
         return PlantState(
             position=plant.pose[:3],
             orientation=plant.orientation,
@@ -97,5 +84,5 @@ class MujocoPlant:
             joint_positions=plant.joint_positions,
             joint_velocities=plant.joint_velocities,
             wheel_torques=self._torques,
-            stopped="the rover has tipped over" if plant.tilt > MAX_TILT else self._refusal,
+            stopped="the rover has tipped over" if plant.tilt > MAX_TILT else plant.refusal,
         )

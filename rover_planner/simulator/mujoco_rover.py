@@ -15,6 +15,7 @@ from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_wxyz
 from rover_physics.rover.model import Rover
+from rover_physics.rover.steered_drive import SteeredDrive
 from rover_physics.rover.steering_joints import steered_wheels, steering_joints
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
@@ -101,7 +102,9 @@ class MujocoRover:
             # Of two bodies in contact the larger friction holds: let it be the wheel's.
             self._model.geom_friction[self._model.geom("ground").id, 0] = 0.0
         self._inertia = float(self._model.dof_M0[self._velocities[_WHEELS][-1]])
-        self._aims = np.zeros(len(self._steered))
+        self._drive, self._aims = SteeredDrive(rover), np.zeros(len(self._steered))
+        self.refusal = ""
+        """Why the rover cannot follow the last command; empty if it can."""
         self._integral = np.zeros(6)
         self._bodies = np.array([self._model.body(name).id for name in WHEELS])
         self._drop(pose)
@@ -144,9 +147,21 @@ class MujocoRover:
         self._model.dof_frictionloss[wheels] = 0.0
         self._integral[:] = 0.0
 
-    def steer(self, angles: Floats) -> None:
-        """Turn the steered wheels to angles (6,) [rad] from now on, at their largest rate."""
-        self._aims = np.asarray(angles)[self._steered]
+    def steer(self, command: tuple[float, float]) -> Floats:
+        """Steer towards a speed [m/s] and yaw rate [rad/s]; return the wheels' speeds meanwhile.
+
+        The steered wheels turn at their largest rate. A rover that is to stand, or cannot follow
+        the command, keeps its steering angles.
+
+        Returns:
+            Speeds (6,) [m/s].
+        """
+        aims = self._drive.aim(*command)
+        self.refusal = aims.refusal
+        if self.refusal or not any(command):
+            return np.zeros(6)
+        self._aims = aims.angles[self._steered]
+        return self._drive.share(self.steering_angles, aims.angles) * aims.speeds
 
     def _advance(self, inputs: Floats) -> None:
         """Advance by a step of the simulation.

@@ -132,15 +132,6 @@ def slow_scenario() -> Scenario:
     return Scenario(LSR1, LSR1, make_terrain(waves), START, GOAL, options, {})
 
 
-def walled_session(
-    height, goal=(-1.1, 0.0, 0.0), rover=LSR1, *, ends_at_first: bool = True
-) -> ViewSession:
-    """Return a session on 5 m x 5 m with a wall at x = 0; a search for the best may take long."""
-    search = LatticeSettings(budget=60.0, ends_at_first=ends_at_first)
-    ground = make_terrain(height, half=2.5)
-    return ViewSession(rover, ground, (-1.6, 0.0, 0.0), goal, SURE, search=search)
-
-
 @contextmanager
 def held(background: Any, at: str = "") -> Iterator[None]:
     """Hold work in the background where it reports that it begins with something.

@@ -126,8 +126,8 @@ def test_a_prediction_takes_what_was_learned(folder, capfd):
 
 def test_a_bag_tells_the_same_as_a_csv_file(folder, capfd):
     pytest.importorskip("rosbags", reason="install the extra bags")
-    from rover_planner.ros.bags.bag_writer import write_bag
-    from support.messages.drives import row_messages
+    from rover_planner.ros.bags.bag_files import write_bag
+    from support.messages import row_messages
 
     with write_bag(folder / "bag") as bag:
         for row in climb(ROVER, SLOPE, 8.0):

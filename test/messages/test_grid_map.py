@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from msg_adapters.errors import MessageError
 from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
-from support.messages.grid_maps import grid_map_of, move_buffer, store_by_rows
+from support.messages import grid_map_of, move_buffer, store_by_rows
 
 RNG = np.random.default_rng(3)
 HEIGHTS = RNG.normal(0.0, 0.3, (7, 5)).astype(np.float32)

@@ -13,14 +13,13 @@ from sensor_msgs.msg import Imu
 
 from msg_adapters.commands import twist_to_speeds
 from msg_adapters.errors import MessageError
-from msg_adapters.frames import read_transform
+from msg_adapters.frames import check_transform
 from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.tools import target_to_point, wrench_to_force_and_moment
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_planner.planning.navigation.transforms import Rigid
-from support.messages.tool_messages import make_target, make_wrench
-from support.messages.transforms import transform_message
+from support.messages import make_target, make_wrench, transform_message
 
 NAN, INF = math.nan, math.inf
 
@@ -104,7 +103,7 @@ MAST = "in frame 'mast'.*imu_frame and imu_mounting"
         *[(read_odometry, odometry(variance=v), "variances within") for v in (1e200, NAN)],
         (read_odometry, odometry("mast"), "is of frame 'mast'; it must be of 'base_li"),
         *[
-            (read_transform, message, "must be finite, a quaternion of length 1, and both frames")
+            (check_transform, message, "must be finite, a quaternion of length 1, and both frames")
             for message in (transform(x=NAN), transform(length=2.0), transform(child=""))
         ],
         (read_target, make_target(frame="odom"), "tool target is in frame 'odom'"),

@@ -10,12 +10,10 @@ from rclpy.node import Node
 from std_msgs.msg import Int32
 from std_srvs.srv import Trigger
 
-import rover_planner.ros.deferred_work
-from rover_planner.ros import paced_sender
-from rover_planner.ros.deferred_work import MAX_WAITING, DeferredWork
+from rover_planner.ros import deferred
+from rover_planner.ros.deferred import AT_ONCE, MAX_WAITING, PAUSE, DeferredWork, PacedSender
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.lazy_publisher import LazyPublisher
-from rover_planner.ros.paced_sender import AT_ONCE, PAUSE, PacedSender
 from rover_planner.ros.qos import result_qos
 from support.ros_fixtures import call
 from support.waiting import wait_until
@@ -65,7 +63,7 @@ def test_a_request_goes_before_what_is_left_of_the_work(busy, serve):
 
 
 def test_requests_without_a_pause_leave_no_more_than_so_many_waiting(busy, serve, monkeypatch):
-    monkeypatch.setattr(rover_planner.ros.deferred_work, "QUIET", 1e3)  # no pause is long enough
+    monkeypatch.setattr(deferred, "QUIET", 1e3)  # no pause is long enough
     deferred_work, done, asked = DeferredWork(busy, Guard(busy.get_logger())), [], 3 * MAX_WAITING
     numbers = iter(range(asked))
 
@@ -160,7 +158,7 @@ class Clock:
 
 def test_a_few_responses_leave_at_once_and_many_in_groups(ros, busy, monkeypatch):
     clock = Clock()
-    monkeypatch.setattr(paced_sender, "time", SimpleNamespace(monotonic=clock.monotonic))
+    monkeypatch.setattr(deferred, "time", SimpleNamespace(monotonic=clock.monotonic))
     sender, sent = PacedSender(busy, Guard(busy.get_logger())), []
     for number in range(50):
         sender.send(lambda number=number: sent.append((number, clock.now)))

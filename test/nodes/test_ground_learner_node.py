@@ -30,7 +30,7 @@ from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.planning.marked_places import parse_place
 from rover_planner.ros.qos import latched_qos, map_qos, sensor_qos, topic_qos
 from support.learning_drives import climb, ramp
-from support.messages.drives import row_messages
+from support.messages import row_messages
 from support.ros_fixtures import RosRun
 from support.waiting import wait_until
 

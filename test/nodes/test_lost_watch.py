@@ -69,7 +69,7 @@ def start_simulation(tmp_path):
 
 def start_drive(ros) -> MissionPlanner:
     """Ask for a path of 3 m, and let the rover drive it."""
-    planner = ros.spin(MissionPlanner(context=ros.context))
+    planner = MissionPlanner(context=ros.context)
     planner.wait_for_server()
     planner.wait_for_pose(lambda pose: True, 30.0)
     answer = planner.ask((0.0, 0.0, 0.0), (3.0, 0.0, 0.0))

@@ -27,7 +27,7 @@ from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.cli import main
 from rover_planner.nodes.result_topics import RESULT_KINDS
 from rover_planner.planning.navigation.transforms import Rigid
-from rover_planner.ros.bags.bag_reader import GRID_MAP, GRID_MAP_FIELDS, GRID_MAP_INFO_FIELDS
+from rover_planner.ros.bags.bag_files import GRID_MAP, GRID_MAP_FIELDS, GRID_MAP_INFO_FIELDS
 from support.rovers import LSR1
 
 BEGIN = 1_700_000_000_000_000_000

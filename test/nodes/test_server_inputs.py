@@ -19,8 +19,7 @@ from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.frames import Frames
 from rover_planner.ros.server_inputs import LOOK_PERIOD, ServerInputs
 from support.grounds import make_terrain, waves
-from support.messages.grid_maps import grid_map_of, move_buffer
-from support.messages.transforms import transform_message
+from support.messages import grid_map_of, move_buffer, transform_message
 
 PRIOR = make_terrain(waves)
 

@@ -14,7 +14,7 @@ import pytest
 
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
-from support.project.checkout import TOP, console_scripts, copy_checkout, copy_kernels
+from support.project.checkout import TOP, console_scripts, copy_checkout
 from support.project.doc_blocks import read_blocks
 from support.project.processes import ProcessToken
 from support.ros_fixtures import domain_id
@@ -25,6 +25,15 @@ TOOLS = ("setuptools<80", "colcon-common-extensions")
 WAIT_FOR_SERVER = "until ros2 node list | grep -q traverse_server; do sleep 1; done"
 """The kernels compile first."""
 HOW = {"copied": (), "linked": ("--symlink-install",)}
+
+
+def copy_kernels(packages: Path) -> None:
+    """Copy the compiled kernels beside copies of the packages with the same sources."""
+    for kind in ("nbi", "nbc", "sha256"):  # the last tells the sources that they belong to
+        for kernel in TOP.glob(f"rover_*/**/__pycache__/*.{kind}"):
+            copy = packages / kernel.relative_to(TOP)
+            copy.parent.mkdir(exist_ok=True)
+            shutil.copy(kernel, copy)
 
 
 @pytest.fixture(scope="module")

@@ -28,7 +28,7 @@ SPEED, CURVATURE = 0.03, 0.5
 def test_servos_with_droop_drive_a_rover_along_the_curve_of_its_wheels():
     plant, drive = MujocoRover(LSR1, plane(0.0, 0.0)), SteeredDrive(LSR1)
     aims = drive.aim(SPEED, CURVATURE * SPEED)
-    plant.steer(aims.angles)
+    plant.steer((SPEED, CURVATURE * SPEED))
     plant.servo(np.zeros(6), 2.0)
     for _ in range(3):
         plant.servo_with_droop(aims.speeds / LSR1.wheel.radius, 0.3, 2.0)

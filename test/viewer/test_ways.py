@@ -8,12 +8,13 @@ import pytest
 
 from rover_physics.traversability.judge import judge_path
 from rover_planner.planning.search.path_search import FOUND, NO_WAY
+from rover_planner.planning.search.query import LatticeSettings
 from rover_planner.viewer.documents.verdict import describe_verdict
 from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.judging import BETTER, SEARCH, JudgeRequest, judge_request
 from rover_planner.viewer.state.session import ViewSession
-from support.grounds import wall_with_gap, whole_wall
-from support.viewer.sessions import LSR1, Judge, held, walled_session
+from support.grounds import make_terrain, wall_with_gap, waves
+from support.viewer.sessions import LSR1, SURE, Judge, held
 from support.waiting import wait_until
 
 GOAL = (1.6, 0.0, 0.0)
@@ -21,6 +22,18 @@ GOAL = (1.6, 0.0, 0.0)
 BEYOND = np.array(GOAL[:2])
 """Its place [m]."""
 FRICTION = [("friction",)]
+
+
+def walled_session(height, goal=(-1.1, 0.0, 0.0), *, ends_at_first=True):
+    """Return a session on 5 m x 5 m with a wall at x = 0; a search for the best may take long."""
+    search = LatticeSettings(budget=60.0, ends_at_first=ends_at_first)
+    ground = make_terrain(height, half=2.5)
+    return ViewSession(LSR1, ground, (-1.6, 0.0, 0.0), goal, SURE, search=search)
+
+
+def whole_wall(x, y):
+    """Return waves with a wall of 0.5 m along y at x = 0."""
+    return waves(x, y) + 0.5 * (np.abs(x) < 0.2)
 
 
 def list_steps(session: ViewSession) -> list[str | int]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The subscriptions of the traction controller: checks messages and passes them to its service."""
+"""The subscriptions of the traction controller: checks messages, prepares maps for its service."""
 
 import math
 import time
@@ -12,23 +12,28 @@ from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Bool
 
 from msg_adapters.commands import twist_to_speeds
+from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.joints import read_joint_map
 from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.raw_messages import SensorReader
+from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
+from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import steering_joints
+from rover_physics.traction.map_contacts import MapContactFinder
 from rover_planner.parameters.shared import STOP
 from rover_planner.parameters.traction_controller import TractionControllerParameters
+from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.frames import NodeFrames
-from rover_planner.ros.logs import TransitionLog
+from rover_planner.ros.logs import RepeatLog, TransitionLog
 from rover_planner.ros.map_intake import CLOUD, MapIntake
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import newest_qos, sensor_qos, topic_qos
 from rover_planner.ros.subscriptions import PublisherCheck, subscribe_to_map
-from rover_planner.traction.clocks import NANOSECONDS, StampCheck, StampError
+from rover_planner.traction.clocks import StampCheck, StampError
 from rover_planner.traction.traction_service import (
     CMD_VEL,
     IMU,
@@ -140,16 +145,18 @@ class TractionInputs:
         if name == ODOMETRY:  # the others are faults, which the node logs
             self._log.update(name, f"odometry not used: {error}", "odometry is used again", now)
 
-    def _find_time(self, name: str, stamp: int, now: float, *, merged: bool = False) -> float:
+    def _find_time(
+        self, name: str, stamp: int | None, now: float, *, merged: bool = False
+    ) -> float:
         waited = round(NANOSECONDS * (time.monotonic() - now))
         clock = self._node.get_clock().now().nanoseconds - waited
-        return self.stamps.find_time(name, stamp, clock, now, merged=merged)
+        return self.stamps.find_time(name, stamp or 0, clock, now, merged=merged)
 
     def _take_joints(self, message: bytes, now: float) -> None:
         state = self._reader.read(message, JointState)
         if not self._heard.intersection(state.name):  # an arm's message, for example
             return
-        stamp = _stamp_of(state)
+        stamp = stamp_to_ns(state.header.stamp) or 0
         measured = self._find_time(JOINT_STATES, stamp, now, merged=True)
         positions = self.joint_names.positions(state, ANGLES)
         rates = self.joint_names.velocities(state, JOINTS)
@@ -157,14 +164,14 @@ class TractionInputs:
 
     def _take_imu(self, message: bytes, now: float) -> None:
         imu = self._reader.read(message, Imu)
-        measured = self._find_time(IMU, _stamp_of(imu), now)
+        measured = self._find_time(IMU, stamp_to_ns(imu.header.stamp), now)
         attitude = imu_to_attitude(imu, self._mounting)
         self._service.take_attitude(attitude.roll, attitude.pitch, attitude.rates, measured)
 
     def _take_command(self, message: bytes, now: float) -> None:
         twist = self._reader.read(message, self._twist)
         if self._twist is TwistStamped:
-            now = self._find_time(CMD_VEL, _stamp_of(twist), now)
+            now = self._find_time(CMD_VEL, stamp_to_ns(twist.header.stamp), now)
         self._service.take_command(*twist_to_speeds(twist), now)
 
     def _take_stop(self, message: Bool, now: float) -> None:
@@ -172,7 +179,7 @@ class TractionInputs:
 
     def _take_odometry(self, message: bytes, now: float) -> None:
         odometry = self._reader.read(message, Odometry)
-        measured = self._find_time(ODOMETRY, _stamp_of(odometry), now)
+        measured = self._find_time(ODOMETRY, stamp_to_ns(odometry.header.stamp), now)
         if odometry.header.frame_id != self._map_frame:
             self._frames.listen()  # only then: /tf of a whole robot costs the loop time
         here = self._frames.localise_odometry(odometry)
@@ -181,7 +188,48 @@ class TractionInputs:
         self._log.update(ODOMETRY, "", "odometry is used again", now)
 
 
-def _stamp_of(message: Any) -> int:
-    """Return the header stamp [ns]."""
-    stamp = message.header.stamp
-    return int(stamp.sec * NANOSECONDS + stamp.nanosec)
+class TractionMaps(MapIntake[MapContactFinder]):
+    """Prepares clouds for the controller in a thread of their own."""
+
+    def __init__(
+        self,
+        node: RoverNode[TractionControllerParameters],
+        rover: Callable[[], Rover],
+        frames: NodeFrames,
+    ):
+        """Start the thread.
+
+        Args:
+            node: The node.
+            rover: Returns the rover for which maps are prepared.
+            frames: Knows where the frames of clouds are on the map.
+        """
+        self._node, self._rover, self._listen = node, rover, frames.listen
+        self._values = node.values
+        self._refusals = RepeatLog()
+        super().__init__(self._make, self._log_refusal, frames)
+
+    def apply(self) -> None:
+        """Prepare the last map again if a parameter of it has changed."""
+        before, self._values = self._values, self._node.values
+        names = ("map_resolution", "cell_height")
+        if any(getattr(before, name) != getattr(self._values, name) for name in names):
+            self.repeat()
+
+    def look_for_frame(self) -> None:
+        """Listen to /tf if a map needs it, and take it when its frame is known; call it often."""
+        if self.waits_for_frame:
+            self._listen()  # only then: /tf of a whole robot costs the loop time
+            self.retry()
+
+    def _make(self, cloud: PointCloud2, source: Rigid | None) -> MapContactFinder:
+        """Prepare a map from a cloud; called in the thread."""
+        values, move = self._values, None if source is None else source.matrix
+        terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height, move)
+        return MapContactFinder(self._rover(), terrain)
+
+    def _log_refusal(self, error: str) -> None:
+        line = f"{CLOUD} refused, the last map stays: {error}"
+        line = self._refusals.line(line, time.monotonic())
+        if line:
+            self._node.get_logger().error(line)

@@ -59,10 +59,7 @@ class TractionTopics:
         estimate, answer = update.estimate, update.answer
         if estimate is None or answer is None:
             return
-        for publisher, values in (
-            (self._loads, answer.loads),
-            (self._used, answer.utilisation),
-        ):
+        for publisher, values in ((self._loads, answer.loads), (self._used, answer.utilisation)):
             set_values(self._of_wheels, values)
             publisher.publish(self._of_wheels)
         self._contacts[0] = estimate.angles

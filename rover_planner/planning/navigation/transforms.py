@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
-from msg_adapters.frames import FrameTransform
 from msg_adapters.stamps import NANOSECONDS
 from rover_planner.errors import PlanningError
 
@@ -37,9 +36,10 @@ class Rigid:
         return Rigid(np.array([x, y, z]), Rotation.from_euler("xyz", [roll, pitch, yaw]))
 
     @staticmethod
-    def of(transform: FrameTransform) -> "Rigid":
-        """Return the position and orientation of a message's transform."""
-        return Rigid(transform.translation, Rotation.from_quat(transform.xyzw))
+    def of(place: Any, turn: Any) -> "Rigid":
+        """Return the transform of a message's position and quaternion."""
+        rotation = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w])
+        return Rigid(np.array([place.x, place.y, place.z]), rotation)
 
     @staticmethod
     def none() -> "Rigid":
@@ -70,14 +70,6 @@ class Rigid:
         return np.array([*self.translation[:2], np.arctan2(ahead[1], ahead[0])])
 
 
-def read_pose(pose: Any) -> Rigid:
-    """Return the transform of a pose from the frame that it is in."""
-    place, turn = pose.position, pose.orientation
-    return Rigid(
-        np.array([place.x, place.y, place.z]), Rotation.from_quat([turn.x, turn.y, turn.z, turn.w])
-    )
-
-
 def write_pose(rigid: Rigid, pose: Any) -> None:
     """Set the numbers of a pose; its parts stay, as they may be known elsewhere."""
     place, turn = pose.position, pose.orientation
@@ -94,7 +86,8 @@ def move_path(path: Any, inner: Rigid | None) -> Any:
     """
     if inner is not None:
         for stamped in path.poses:
-            write_pose(read_pose(stamped.pose).then(inner), stamped.pose)
+            pose = stamped.pose
+            write_pose(Rigid.of(pose.position, pose.orientation).then(inner), pose)
     return path
 
 

@@ -11,7 +11,7 @@ from rover_physics.files.validation import show_file
 from rover_physics.numerics.arrays import Floats
 from rover_planner.errors import PlanningError
 from rover_planner.learning.drive_log import WIDTH, check_rows
-from rover_planner.ros.bags.bag_reader import IMU, JOINTS, ODOMETRY, Recorded, open_bag
+from rover_planner.ros.bags.bag_files import IMU, JOINTS, ODOMETRY, Recorded, open_bag
 from rover_planner.ros.row_collector import RowCollector
 
 

@@ -18,15 +18,7 @@ from rover_planner.planning.answering.questions import Register
 from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.navigation.sensor_mounts import sensor_poses
 from rover_planner.planning.verdict_report import IdentityReport
-from rover_planner.ros.bags.bag_reader import (
-    IMU,
-    JOINTS,
-    MAP,
-    ODOMETRY,
-    PATH,
-    TF_STATIC,
-    Recorded,
-)
+from rover_planner.ros.bags.bag_files import IMU, JOINTS, MAP, ODOMETRY, PATH, TF_STATIC, Recorded
 from rover_planner.ros.bags.recorded_drive import Measured, RecordedDrive
 from rover_planner.ros.frames import Frames
 from rover_planner.ros.server_inputs import ServerInputs

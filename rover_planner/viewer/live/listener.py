@@ -33,7 +33,7 @@ from rover_physics.numerics.quaternions import rpy_from_xyzw
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.ros.qos import (
     latched_qos,
-    map_subscriptions_qos,
+    map_subscriptions,
     result_qos,
     sensor_qos,
     service_qos,
@@ -96,7 +96,7 @@ class LiveListener(Node):
         sensors, results, numbers = sensor_qos(), result_qos(), Float64MultiArray
         self._listen(JointState, "joint_states", self._on_joint_states, sensors, is_stream=True)
         self._listen(Odometry, ODOMETRY, self._on_odometry, sensors, is_stream=True)
-        for qos in map_subscriptions_qos("either"):
+        for qos, _ in map_subscriptions("either"):
             self._listen(PointCloud2, "elevation_cloud", self._on_cloud, qos)
         self._listen(Path, f"{SERVER}/plan", self._on_plan, results)
         self._listen(DiagnosticArray, f"{SERVER}/verdict", self._on_verdict, results)

@@ -1,21 +1,173 @@
 # SPDX-License-Identifier: Apache-2.0
 """A rover that is driven by a controller, for the tests of this folder."""
 
-import pytest
-from rclpy.parameter import Parameter
+import time
+from collections.abc import Callable
+from typing import Any
 
-from rover_planner.nodes.traction_controller import TractionController
-from support.driven_rover import RATE, DrivenRover
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import Twist, TwistStamped
+from rcl_interfaces.msg import Log
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Bool, Float64MultiArray, String
+
+from msg_adapters.stamps import ns_to_stamp
+from rover_physics.names import WHEEL_JOINTS
+from rover_planner.nodes.traction_controller import NODE_NAME, TractionController
+from rover_planner.nodes.warm_up import JOINTS
+from rover_planner.ros.node import create_steady_timer
+from rover_planner.ros.qos import sensor_qos
 from support.ros_fixtures import PATIENT
 from support.waiting import wait_until
 
+RATE = 50.0
+"""Messages per second of each sensor."""
+QUEUE = 1000
+"""Messages that wait for a listener that is late; none is lost."""
+LATENESS = ("waiting for ", " stale: none for ", "updates came too late", "the clock was stepped")
+"""Texts of faults that come at the start, and on a machine that stalls."""
+
+
+class DrivenRover(Node):
+    """A rover whose wheels turn at a constant rate, whatever the torques are."""
+
+    def __init__(self, context: Context):
+        """Send at RATE [Hz] from now on; stamps are zero until `stamp` is replaced."""
+        super().__init__("rover", context=context)
+        self.joints = JointState(name=list(JOINTS))
+        self.joints.position = [0.0] * len(JOINTS)
+        self.joints.velocity = [0.2 if name in WHEEL_JOINTS else 0.0 for name in JOINTS]
+        self.imu = Imu()
+        self.twist: TwistStamped | Twist = TwistStamped()
+        self.stamp: Callable[[], int] = lambda: 0
+        """Returns a header stamp [ns]."""
+        self.commands: list[tuple[int, float, float]] = []
+        """Time at which each was sent [ns], largest magnitude and sum of its torques [N m]."""
+        self.state = ""
+        """The last state of the controller."""
+        self.status: Any = DiagnosticStatus()
+        """Its last status on diagnostics."""
+        self.brakes: list[bool] = []
+        self.log: list[str] = []
+        self._sent_at = 0
+        self._senders = {
+            "joint_states": self.create_publisher(JointState, "joint_states", sensor_qos()),
+            "imu": self.create_publisher(Imu, "imu", sensor_qos()),
+        }
+        self._listen()
+        create_steady_timer(self, 1.0 / RATE, self._send)
+
+    def send_twists(self, kind: type = TwistStamped) -> None:
+        """Send cmd_vel of a type from now on."""
+        self.twist = kind()
+        self._senders["cmd_vel"] = self.create_publisher(kind, "cmd_vel", sensor_qos())
+
+    def _listen(self) -> None:
+        """Subscribe to what the controller publishes."""
+        latched = QoSProfile(depth=QUEUE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        queue = QoSProfile(depth=QUEUE)
+        for kind, name, hear, qos in (
+            (Float64MultiArray, f"{NODE_NAME}/commands", self._hear_command, queue),
+            (String, f"{NODE_NAME}/state", self._hear_state, latched),
+            (Bool, f"{NODE_NAME}/brake", lambda m: self.brakes.append(m.data), latched),
+            (DiagnosticArray, "diagnostics", self._hear_diagnostics, queue),
+            (Log, "/rosout", self._hear_log, latched),
+        ):
+            self.create_subscription(kind, name, hear, qos)
+
+    def _send(self) -> None:
+        self._sent_at = time.time_ns()
+        now = ns_to_stamp(self.stamp())
+        self.joints.header.stamp = self.imu.header.stamp = now
+        twist = self.twist
+        if isinstance(twist, TwistStamped):
+            twist.header.stamp, twist = now, twist.twist
+        twist.linear.x = 0.03
+        messages = {"joint_states": self.joints, "imu": self.imu, "cmd_vel": self.twist}
+        for name, sender in self._senders.items():
+            sender.publish(messages[name])
+
+    def _hear_command(self, message: Float64MultiArray, info: dict[str, int]) -> None:
+        torques = list(message.data)
+        sent = info["source_timestamp"]
+        self.commands.append((sent, max(map(abs, torques)), sum(torques)))
+
+    def _hear_state(self, message: String) -> None:
+        self.state = message.data
+
+    def _hear_diagnostics(self, message: DiagnosticArray) -> None:
+        for status in message.status:
+            if status.name.startswith(NODE_NAME):
+                self.status = status
+
+    def _hear_log(self, message: Log) -> None:
+        if NODE_NAME in message.name:
+            self.log.append(message.msg)
+
+    @property
+    def torque(self) -> float:
+        """The largest torque of the last command [N m]; 0 if there is none."""
+        return self.commands[-1][1] if self.commands else 0.0
+
+    @property
+    def push(self) -> float:
+        """The sum of the torques of the last command [N m]; 0 if there is none."""
+        return self.commands[-1][2] if self.commands else 0.0
+
+    @property
+    def faults(self) -> list[str]:
+        """Lines of the log about faults, without those of the start and of a late machine."""
+        lines = [line for line in self.log if "fault" in line]
+        return [line for line in lines if not any(text in line for text in LATENESS)]
+
+    def pushes_on(self, heard: int, count: int) -> bool:
+        """Return whether so many commands in a row push, of those after the first `heard`.
+
+        On a machine that stalls inputs are stale; the rover then rests, and a new row begins.
+        """
+        row = 0
+        for *_, push in self.commands[heard:]:
+            row = row + 1 if push > 0.0 else 0
+            if row >= count:
+                return True
+        return False
+
+    def commands_after(self, stamp: int) -> list[tuple[int, float]]:
+        """Return time [ns] and sum of torques of the commands that were sent after a time [ns]."""
+        return [(at, push) for at, _, push in self.commands if at > stamp]
+
+    def wait_for_send(self) -> int:
+        """Return when the first message was sent of those that are sent from now on [ns]."""
+        now = time.time_ns()
+        return wait_until(lambda: self._sent_at if self._sent_at > now else 0, "a message")
+
+    def count_lines(self, text: str) -> int:
+        """Return how many lines of the controller's log have a text."""
+        return sum(text in line for line in self.log)
+
 
 @pytest.fixture
-def rover(ros):
+def start_rover(ros):
+    """Return a function that starts a rover, which sends cmd_vel of a type, None: none at all."""
+
+    def start(run=ros, kind=TwistStamped):
+        rover = DrivenRover(run.context)
+        if kind is not None:
+            rover.send_twists(kind)
+        return run.spin(rover)
+
+    return start
+
+
+@pytest.fixture
+def rover(start_rover):
     """Return a rover that sends everything that a controller needs."""
-    rover = DrivenRover(ros.context)
-    rover.send_twists()
-    return ros.spin(rover)
+    return start_rover()
 
 
 @pytest.fixture

@@ -11,8 +11,8 @@ from rclpy.parameter import Parameter
 from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.elevation import terrain_to_point_cloud
+from rover_planner.nodes.warm_up import JOINTS
 from rover_planner.ros.qos import map_qos, sensor_qos
-from support.driven_rover import JOINTS
 from support.ros_fixtures import run_in_executor
 from support.rough_grounds import plane
 from support.waiting import repeat_until, wait_until

@@ -6,7 +6,7 @@ import time
 import pytest
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from support.driven_rover import NANOSECONDS
+from msg_adapters.stamps import NANOSECONDS
 from support.waiting import wait_until
 
 BOUND = 1.5

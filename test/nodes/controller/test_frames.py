@@ -12,7 +12,7 @@ from sensor_msgs.msg import PointCloud2
 from msg_adapters.elevation import terrain_to_point_cloud
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.qos import map_qos, sensor_qos
-from support.messages.transforms import send_transforms
+from support.messages import send_transforms
 from support.rough_grounds import RESOLUTION, plane
 from support.waiting import TIMEOUT, wait_until
 

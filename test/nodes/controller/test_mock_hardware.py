@@ -11,8 +11,9 @@ from rover_physics import load_rover
 from rover_physics.names import STEERING_JOINTS, WHEEL_JOINTS
 from rover_physics.rover.steered_drive import SteeredDrive
 from rover_physics.rover.steering_joints import steering_joints
+from rover_planner.nodes.traction_controller import NODE_NAME
+from rover_planner.nodes.warm_up import JOINTS
 from rover_planner.ros.qos import topic_qos
-from support.driven_rover import CONTROLLER, JOINTS
 from support.waiting import wait_until
 
 SIGNS = {name: -1.0 if "left" in name else 1.0 for name in JOINTS}
@@ -25,7 +26,7 @@ def test_rates_and_steering_angles_are_those_of_the_commanded_motion(rover, star
     lsr1, heard = load_rover("lsr1"), {}
     for group in ("commands", "velocity_commands", "steering_commands"):
         rover.create_subscription(
-            Float64MultiArray, f"{CONTROLLER}/{group}",
+            Float64MultiArray, f"{NODE_NAME}/{group}",
             lambda message, group=group: heard.__setitem__(group, np.array(message.data)),
             topic_qos(),
         )  # fmt: skip

@@ -9,7 +9,6 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import PointCloud2
 
 from rover_planner.ros import subscriptions
-from support.driven_rover import DrivenRover
 from support.ros_fixtures import RosRun
 from support.waiting import wait_until
 
@@ -22,14 +21,8 @@ def other_context():
     run.close()
 
 
-def start_rover(run, kind):
-    rover = DrivenRover(run.context)
-    rover.send_twists(kind)
-    return run.spin(rover)
-
-
 def test_cmd_vel_without_a_stamp_is_driven_where_the_parameter_says_so(
-    other_context, start_controller
+    other_context, start_rover, start_controller
 ):
     rover = start_rover(other_context, Twist)
     start_controller(cmd_vel_stamped=False)
@@ -37,7 +30,7 @@ def test_cmd_vel_without_a_stamp_is_driven_where_the_parameter_says_so(
 
 
 def test_cmd_vel_of_another_type_is_named_with_the_parameter(
-    other_context, start_controller, capfd, monkeypatch
+    other_context, start_rover, start_controller, capfd, monkeypatch
 ):
     monkeypatch.setattr(subscriptions, "PERIOD", 0.5)
     start_controller()

@@ -16,7 +16,6 @@ from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
 from rover_planner.nodes.traction_controller import TractionController
-from support.driven_rover import RATE, DrivenRover
 from support.ros_fixtures import PATIENT, call, domain_id, run_in_executor
 from support.waiting import wait_until
 
@@ -29,19 +28,19 @@ def enable(rover):
 
 
 def test_a_node_starts_disabled_and_drives_once_it_is_enabled(
-    ros, rover, start_controller, enable
+    rover, start_rover, start_controller, enable
 ):
-    start_controller(enabled_at_start=False, rest_policy="coast")
+    node = start_controller(enabled_at_start=False, rest_policy="coast")
     wait_until(lambda: rover.state == "disabled", "the state")
     wait_until(lambda: len(rover.commands) > 20, "commands")
     assert not any(torque for _, torque, _ in rover.commands)
     # At rest inputs are read at a third of the rate; commands come at the whole one.
     spacing = np.median(np.diff([sent for sent, _, _ in rover.commands])) / 1e9
-    assert spacing == pytest.approx(1.0 / RATE, rel=0.3)
+    assert spacing == pytest.approx(1.0 / node.values.rate, rel=0.3)
     answer = enable(True)
     assert (answer.success, answer.message) == (True, "enabled")
     wait_until(lambda: rover.state == "driving" and rover.push > 0.0, "driving")
-    late = ros.spin(DrivenRover(ros.context))
+    late = start_rover(kind=None)
     wait_until(lambda: late.state == "driving" and late.brakes[-1:] == [False], "latched state")
     assert enable(False).message == "disabled"
     wait_until(lambda: rover.state == "disabled" and rover.torque == 0.0, "rest")

@@ -58,7 +58,7 @@ def test_a_rover_drives_around_boulders_that_it_sees_on_the_way(ros, tmp_path, e
     simulator = ros.spin(
         RoverSimulator(context=ros.context, parameter_overrides=values(simulated))
     )
-    planner = ros.spin(MissionPlanner(context=ros.context))
+    planner = MissionPlanner(context=ros.context)
     planner.wait_for_server()
     wait_until(lambda: server.service.terrain is not None, "the map")
     known = np.isfinite(server.service.terrain.elevation).sum()
@@ -70,7 +70,7 @@ def test_a_rover_drives_around_boulders_that_it_sees_on_the_way(ros, tmp_path, e
     place = simulator.simulation.plant.pose()
     assert np.hypot(*(place - goal)[:2]) < 0.25
     assert np.isfinite(server.service.terrain.elevation).sum() > known
-    for node in (simulator, server, controller, planner):
+    for node in (simulator, server, controller):
         assert ros.is_alive(node)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import rclpy
 from nav_msgs.msg import Odometry, Path
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -20,9 +20,8 @@ from msg_adapters.paths import poses_path
 from rover_planner.advice import seek
 from rover_planner.advice.levers import LEVERS
 from rover_planner.nodes.mission.drive import DriveFailedError
-from rover_planner.nodes.mission.options import MissionOptions
-from rover_planner.nodes.mission_planner import MissionPlanner, NoAnswerError, main, spin_until
-from rover_planner.nodes.programs import read_arguments
+from rover_planner.nodes.mission_planner import MissionPlanner, NoAnswerError, main
+from rover_planner.nodes.programs import MissionOptions, read_arguments
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.planning.answering.budget import STOPPING
 from rover_planner.shell.poses import Pose
@@ -35,28 +34,26 @@ START, NEAR, BEYOND = "--start=-2,0,0", "--goal=-0.5,0,0", "--goal=2,0,0"
 
 
 @pytest.fixture
-def spun():
-    """Return a node in a context of its own and its executor."""
+def planner():
+    """Return a planner in a context of its own."""
     context = Context()
     rclpy.init(context=context, domain_id=domain_id())
-    node, executor = Node("spun", context=context), SingleThreadedExecutor(context=context)
-    executor.add_node(node)
-    yield node, executor
-    node.destroy_node()
+    planner = MissionPlanner(context=context)
+    yield planner
+    planner.destroy_node()
     rclpy.try_shutdown(context=context)
 
 
-def test_ros_that_is_shut_down_while_the_node_spins_is_the_end_of_spinning(spun):
-    node, executor = spun
-    rclpy.shutdown(context=node.context)
-    spin_until(threading.Event(), executor)  # as where a signal comes between two looks
+def test_ros_that_is_shut_down_while_the_node_waits_is_the_end_of_waiting(planner):
+    rclpy.shutdown(context=planner.context)  # as where a signal comes between two looks
+    with pytest.raises(ExternalShutdownException):
+        planner.wait_for_server()
 
 
-def test_errors_while_the_node_spins_are_told(spun):
-    node, executor = spun
-    node.create_timer(0.01, lambda: 1 / 0)
+def test_errors_while_the_node_waits_are_told(planner):
+    planner.create_timer(0.01, lambda: 1 / 0)
     with pytest.raises(ZeroDivisionError):
-        spin_until(threading.Event(), executor)
+        planner.wait_for_server()
 
 
 @pytest.mark.parametrize(
@@ -81,8 +78,8 @@ def test_negative_numbers_need_no_equals_sign_and_words_of_ros_are_put_aside():
     options = read_arguments("mission_planner", [*words, *ros_words, "--", BEYOND, "--json"])
     assert isinstance(options, MissionOptions)
     assert options.start == Pose(-3.0, 0.0, 0.0)
-    assert options.goals == (Pose(-0.5, -0.1, 0.0), Pose(2.0, 0.0, 0.0))
-    assert options.json and not options.drive
+    assert options.goal == [Pose(-0.5, -0.1, 0.0), Pose(2.0, 0.0, 0.0)]
+    assert options.as_json and not options.drive
 
 
 @pytest.fixture
@@ -171,9 +168,9 @@ def test_a_server_with_another_name_is_found_by_remapping(ros, run_planner):
 
 
 def test_a_question_that_a_server_does_not_answer_because_it_ends_is_asked_again(
-    ros, mapped, endless
+    mapped, endless, planner
 ):
-    planner, answers = ros.spin(MissionPlanner(context=ros.context)), []
+    answers = []
     planner.wait_for_server()
     with endless():
         ask = threading.Thread(
@@ -195,9 +192,7 @@ def test_a_second_planner_waits_for_the_end_of_the_first_and_a_path_from_elsewhe
     odometry = rover.create_publisher(Odometry, "odometry", 10)
     rover.create_subscription(Path, "path", lambda path: None, 10)
     first, second = (
-        ros.spin(
-            MissionPlanner(timeout=2.0, context=ros.context, cli_args=["--ros-args", "-r", r])
-        )
+        MissionPlanner(timeout=2.0, context=ros.context, cli_args=["--ros-args", "-r", r])
         for r in ("__node:=first", "__node:=second")
     )
     first.send_path(np.zeros((1, 3)))

@@ -11,7 +11,7 @@ from std_srvs.srv import Trigger
 from rover_physics import judge_reach
 from rover_planner.ros.qos import topic_qos
 from support.grounds import make_terrain
-from support.messages.tool_messages import make_target, make_wrench
+from support.messages import make_target, make_wrench
 from support.planner_client import SERVER
 from support.ros_fixtures import call
 from support.waiting import wait_until

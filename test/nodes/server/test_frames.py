@@ -10,7 +10,7 @@ from geometry_msgs.msg import PoseStamped
 from msg_adapters.paths import path_to_poses, stamped_pose
 from rover_planner.planning.navigation.transforms import Rigid
 from support.grounds import make_terrain, rocky
-from support.messages.transforms import send_transforms
+from support.messages import send_transforms
 from support.planner_client import GOAL, START, verdict_of
 from support.waiting import wait_until
 

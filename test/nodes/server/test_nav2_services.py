@@ -7,18 +7,36 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped
 
 from msg_adapters.paths import path_to_poses, poses_path, stamped_pose
-from rover_planner.nodes.nav2_services import PathComputation, PathValidity
+from rover_planner.nodes.nav2_services import Nav2Services
 from support.grounds import make_terrain, wall_at, waves
-from support.project.nav2_jazzy import COMPUTE_PATH_TO_POSE
 from support.waiting import wait_until
+
+COMPUTE_PATH_TO_POSE = {
+    "NONE": 0,
+    "UNKNOWN": 200,
+    "INVALID_PLANNER": 201,
+    "TF_ERROR": 202,
+    "START_OUTSIDE_MAP": 203,
+    "GOAL_OUTSIDE_MAP": 204,
+    "START_OCCUPIED": 205,
+    "GOAL_OCCUPIED": 206,
+    "TIMEOUT": 207,
+    "NO_VALID_PATH": 208,
+}
+"""Constants of the result of the action in Nav2 1.3.13, as its sources have them; 1.3.0 has the
+same. Nav2 is not on PyPI."""
+
+
+def make_services(server, publish):
+    """Return the services of a server; nav2_msgs is not on PyPI."""
+    return Nav2Services(server, server.desk, server.read_path, server.read_question, publish)
 
 
 def ask(server, poses, publish=None):
-    """Put a request to the handler of the service, as rclpy would; nav2_msgs is not on PyPI."""
-    replies = []
-    validity = PathValidity(server.desk, server.read_path, publish or server.publish)
+    """Put a request to the handler of the service, as rclpy would."""
+    replies, services = [], make_services(server, publish or server.publish)
     request, response = SimpleNamespace(path=poses_path(poses, "map")), SimpleNamespace()
-    validity.take(request, response, replies.append)
+    services.check(request, response, replies.append)
     wait_until(lambda: replies, "the reply")
     return replies[0]
 
@@ -47,16 +65,16 @@ def test_a_path_of_too_many_poses_is_not_valid(server):
 class GoalHandle:
     """Stands for rclpy's ServerGoalHandle: it executes a goal by calling the server's callback."""
 
-    def __init__(self, computation, start, goal):
+    def __init__(self, services, start, goal):
         self.request = SimpleNamespace(
             goal=stamped_pose(goal, "map"), start=PoseStamped(), use_start=start is not None
         )
         if start is not None:
             self.request.start = stamped_pose(start, "map")
-        self.ends, self.result, self._computation = [], None, computation
+        self.ends, self.result, self._services = [], None, services
 
     def execute(self):
-        self.result = self._computation.finish(self)
+        self.result = self._services.finish(self)
 
     def succeed(self):
         self.ends.append("succeeded")
@@ -67,13 +85,10 @@ class GoalHandle:
 
 def compute(server, start, goal):
     """Hand a goal to the handlers of the action, as rclpy would."""
-
-    def make_result():
-        return SimpleNamespace(**COMPUTE_PATH_TO_POSE)
-
-    computation = PathComputation(server.desk, server.read_question, server.publish, make_result)
-    handle = GoalHandle(computation, start, goal)
-    computation.take(handle)
+    services = make_services(server, server.publish)
+    services.make_result = lambda: SimpleNamespace(**COMPUTE_PATH_TO_POSE)
+    handle = GoalHandle(services, start, goal)
+    services.compute(handle)
     wait_until(lambda: handle.ends, "the end of the goal")
     return handle
 

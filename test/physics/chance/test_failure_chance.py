@@ -9,6 +9,7 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 
+from benchmarks.chance import HELD_OUT, find_chance, read_driven_paths
 from rover_physics import SweepOptions, Terrain, judge_path, judge_poses, load_rover
 from rover_physics.chance.failure_chance import SAMPLES
 from rover_physics.chance.samples import DEVIATES
@@ -16,7 +17,6 @@ from rover_physics.errors import ModelError, RoverFileError
 from rover_physics.limits.table import CHANCE
 from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 from rover_physics.rover.uncertainty import Uncertainty
-from support.chance_paths import HELD_OUT, find_chance, read_driven_paths
 from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import plane
 

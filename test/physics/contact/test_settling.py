@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from rover_physics import PoseStatus, Terrain, judge_path, judge_poses, load_rover
 from rover_physics.results.record import QUANTITIES
 from rover_physics.rover.urdf.read_rover import rover_from_urdf
-from support.reference_cases import angle_errors, reference_predictions, steered_predictions
+from support.reference_cases import reference_predictions, steered_predictions
 from support.rough_grounds import fractal, plane, random_poses, rocky, scaled_for, smooth
 from support.rover_geometry import ANGLE, GAP, attitude_of, place_rover, wheel_axes, wheel_gaps
 from support.rovers import LSR1
@@ -24,6 +24,16 @@ both_sets = pytest.mark.parametrize(
     [(reference_predictions, 81), (steered_predictions, 21)],
     ids=["straight", "turned"],
 )
+
+
+def angle_errors(predictions):
+    """Return the absolute errors (n, 6) of roll, pitch, rocker and bogie angles [rad]."""
+    errors = []
+    for case, prediction in predictions:
+        attitude = np.column_stack([prediction.roll, prediction.pitch])
+        joints = np.hstack([prediction.rocker_angle, prediction.bogie_angle])
+        errors.append(np.abs(np.hstack([attitude - case.attitude, joints - case.joints])))
+    return np.concatenate(errors)
 
 
 def waypoints_of(predictions):

@@ -3,6 +3,7 @@
 
 import io
 import os
+import struct
 import time
 import tracemalloc
 import zipfile
@@ -20,10 +21,25 @@ from rover_physics.files.user_file import read_regular_file, write_file
 from rover_planner.command.prediction_files import read_poses, read_prediction
 from rover_planner.errors import PlanningError
 from rover_planner.studies.study_file import load_study
-from support.hostile_files import archive_of, make_oddities, npy
+from support.hostile_files import make_oddities
 
 MOST = 1_000_000
 DTYPES = ["f2", "f4", "f8", ">f4", ">f8", "i1", "i2", "i4", ">i8", "u1", "u8", "?", "<U3", ">U5"]
+
+
+def archive_of(content: bytes, name="a.npy", method=zipfile.ZIP_DEFLATED) -> bytes:
+    """Return an archive of one member."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", method) as archive:
+        archive.writestr(name, content)
+    return buffer.getvalue()
+
+
+def npy(header: str, data: bytes = b"", version=1, length=None) -> bytes:
+    """Return an .npy file with a header of one's own."""
+    text = header.encode("latin1")
+    size = struct.pack("<H" if version == 1 else "<I", len(text) if length is None else length)
+    return b"\x93NUMPY" + bytes([version, 0]) + size + text + data
 
 
 def read(archive: bytes, dtype=None, most=MOST):

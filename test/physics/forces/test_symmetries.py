@@ -12,7 +12,6 @@ from rover_physics import SweepOptions, Terrain, judge_poses
 from support.rough_grounds import (
     mirrored,
     plane,
-    quarter_turn,
     random_poses,
     rocky,
     scaled_for,
@@ -28,6 +27,15 @@ ARM = {"arm_yaw": 0.0, "arm_shoulder": 0.0, "arm_elbow": 0.0}
 EQUAL, SERVO = SweepOptions(), SweepOptions(policy="servo")
 seeds = st.integers(0, 10_000)
 few = settings(max_examples=12)
+
+
+def quarter_turn(terrain: Terrain, poses: np.ndarray) -> tuple[Terrain, np.ndarray]:
+    """Return ground and poses, both rotated by 90 degrees about the map's z: x -> y, y -> -x."""
+    xmin, xmax, ymin, ymax = terrain.bounds
+    turned = replace(
+        terrain, elevation=np.ascontiguousarray(terrain.elevation.T[:, ::-1]), origin=(-ymax, xmin)
+    )
+    return turned, np.column_stack([-poses[:, 1], poses[:, 0], poses[:, 2] + 0.5 * np.pi])
 
 
 def assert_mirrored(rover, ground, poses, curvature, options, loads=1e-3, torques=2e-3) -> int:

@@ -26,9 +26,8 @@ from rover_physics.results.record import QUANTITIES
 from rover_physics.traversability.verdict import hold_against_limits
 from support.grounds import gap, make_terrain, waves
 from support.grounds import rocky as low_rock
-from support.rough_grounds import plane, random_poses, rocky
+from support.rough_grounds import plane, random_poses, rocky, with_std
 from support.rovers import LSR1
-from support.uncertain_grounds import with_std
 
 LEVEL = plane(0.0, 0.0)
 POSE = [[0.0, 0.0, 0.0]]

@@ -9,27 +9,16 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from benchmarks.validate import PASSED, judge_drives, read_curves
 from rover_physics import judge_path, load_rover, load_terrain
 from rover_physics.traversability.verdict import hold_against_limits
-from support.reference_drives import (
-    PASSED,
-    curve_ground,
-    curve_options,
-    curve_path,
-    curve_rover,
-    judge_drives,
-    predict_trace,
-    read_curves,
-)
 
 
 @lru_cache(maxsize=3)
 def passes(policy: str) -> np.ndarray:
     """Return for every drive (n, 2) whether it is passable and whether it passed."""
     judged = judge_drives(policy)
-    return np.array(
-        [(verdict.traversable, drive.outcome == PASSED) for drive, _, verdict in judged]
-    )
+    return np.array([(verdict.traversable, drive.outcome == PASSED) for drive, verdict in judged])
 
 
 @pytest.mark.parametrize(
@@ -54,9 +43,8 @@ def test_nine_of_ten_drives_end_as_judged_and_whatever_passed_is_passable_with_t
 def test_nine_of_ten_curves_are_kept_as_judged_and_none_is_passed_that_the_rover_left():
     found = []
     for curve in read_curves():
-        rover, ground = curve_rover(curve), curve_ground(curve.kind, curve.size)
-        prediction = judge_path(rover, ground, curve_path(curve), curve_options(curve))[0]
-        verdict = hold_against_limits(rover, prediction)
+        prediction = judge_path(curve.rover, curve.ground, curve.path, curve.options)[0]
+        verdict = hold_against_limits(curve.rover, prediction)
         found.append((verdict.traversable, curve.kept))
         if curve.mode == "skid":
             assert verdict.code == "friction" and "turns off its path" in verdict.reason
@@ -70,7 +58,7 @@ def test_wheel_forces_and_torques_along_curves_are_those_of_mujoco(modes):
     errors, ratios = [], []
     for curve in read_curves():
         if curve.mode in modes and len(curve.poses):
-            found = predict_trace(curve)
+            found = curve.predict_trace()
             drives = found.speed_share > 0.0
             forces = np.linalg.norm([found.wheel_loads, found.tangential, found.lateral], axis=0)
             errors.append(np.abs(forces - curve.forces)[drives].ravel())

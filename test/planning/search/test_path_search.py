@@ -30,13 +30,18 @@ from rover_planner.planning.search.query import (
     choose_window,
     cut_out,
 )
-from support.grounds import long_wall, make_terrain, pen, waves
+from support.grounds import make_terrain, pen, waves
 from support.rough_grounds import rocky
 from support.rovers import LSR1
 
 OPTIONS = PathQueryOptions(waypoint_spacing=0.04)
 LONG = LatticeSettings(budget=60.0)
 START, GOAL = (-2.5, 0.0, 0.0), (2.5, 0.0, 0.0)
+
+
+def long_wall(x, y):
+    """Return waves with a wall of 1 m along y at x = 0, open beyond y = 2."""
+    return waves(x, y) + np.where((np.abs(x) < 0.1) & (y < 2.0), 1.0, 0.0)
 
 
 def ask(terrain, start=START, goal=GOAL, rover=LSR1, **options):

@@ -1,16 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads the messages that a traverse server needs from a rosbag2, in SQLite or MCAP."""
+"""Reads what a traverse server needs from a rosbag2, in SQLite or MCAP; writes one in MCAP.
+
+Foxglove and ros2 bag read what is written.
+"""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from nav_msgs.msg import Odometry
 from nav_msgs.msg import Path as PathMessage
-from rclpy.serialization import deserialize_message
-from rosbags.rosbag2 import Reader, ReaderError
+from rclpy.serialization import deserialize_message, serialize_message
+from rosbags.rosbag2 import Reader, ReaderError, StoragePlugin, Writer, WriterError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from sensor_msgs.msg import Imu, JointState, PointCloud2
 
@@ -63,6 +66,8 @@ uint16 outer_start_index
 uint16 inner_start_index
 """
 """Fields of a GridMap, which is read without its package."""
+VERSION: Literal[9] = 9
+"""Version of the bag's metadata: that of Jazzy."""
 
 
 @dataclass(frozen=True)
@@ -175,3 +180,45 @@ def _choose(reader: Reader, kind: str, wanted: str) -> str:
             f"choose one by --{kind}-topic"
         )
     return candidates[0] if candidates else ""
+
+
+class BagWriter:
+    """An open bag."""
+
+    def __init__(self, writer: Writer):
+        self._writer = writer
+        self._types = get_typestore(Stores.ROS2_JAZZY)
+        self._connections: dict[str, Any] = {}
+
+    def write(self, topic: str, message: Any, stamp: int) -> None:
+        """Write a message.
+
+        Args:
+            topic: Its topic.
+            message: A ROS message; each topic has one type.
+            stamp: Time of its recording [ns].
+        """
+        if topic not in self._connections:
+            package = type(message).__module__.partition(".")[0]
+            name = f"{package}/msg/{type(message).__name__}"
+            self._connections[topic] = self._writer.add_connection(
+                topic, name, typestore=self._types
+            )
+        self._writer.write(self._connections[topic], stamp, serialize_message(message))
+
+
+@contextmanager
+def write_bag(folder: Path) -> Iterator[BagWriter]:
+    """Create a bag.
+
+    Args:
+        folder: Folder of the bag; must not exist.
+
+    Raises:
+        PlanningError: It exists already or cannot be written.
+    """
+    try:
+        with Writer(folder, version=VERSION, storage_plugin=StoragePlugin.MCAP) as writer:
+            yield BagWriter(writer)
+    except (WriterError, OSError) as error:
+        raise PlanningError(f"{show_file(folder)}: cannot be written: {error}") from None

@@ -1,23 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The maps of a traverse server: topics, files, and what the rover itself knows."""
+"""The maps of a traverse server: topics, files, what the rover itself knows; and its ~/map."""
 
+import contextlib
 import time
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from typing import Any
 
+import numpy as np
 from nav_msgs.srv import LoadMap
+from rclpy.exceptions import InvalidHandle
 from sensor_msgs.msg import PointCloud2
 
+from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.results.grids import terrain_to_occupancy_grid
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.files.validation import show_file
-from rover_planner.maps.known_map import describe_terrain
+from rover_planner.maps.known_map import KnownMap, describe_terrain
 from rover_planner.maps.map_file import MapFileError, MapLimits, open_map
 from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.transforms import Rigid
-from rover_planner.ros.deferred_service import Reply, serve_later
+from rover_planner.ros.deferred import Reply, serve_later
+from rover_planner.ros.lazy_publisher import LazyPublisher
 from rover_planner.ros.logs import RepeatLog
 from rover_planner.ros.map_intake import CLOUD, GRID_MAP, MapIntake
 from rover_planner.ros.node import RoverNode
@@ -194,3 +201,47 @@ class MapTopics:
         if line:
             self._node.get_logger().error(line)
         self._report(error)
+
+
+class MapCloud:
+    """Publishes the map of a service while someone subscribes; clouds are made in a thread."""
+
+    def __init__(self, node: RoverNode[TraverseServerParameters], service: TraverseService):
+        """Create the publisher."""
+        self._node, self._service = node, service
+        self._publisher = LazyPublisher(node, PointCloud2, "~/map")
+        self._shown: KnownMap | None = None
+        self._pool = ThreadPoolExecutor(1, "map_cloud")
+        self._work: Future[None] | None = None
+
+    def update(self) -> None:
+        """Publish the map if it is new and someone subscribes; call it about once a second."""
+        known = self._service.known_map
+        is_new = known is not None and known.fingerprint != getattr(
+            self._shown, "fingerprint", None
+        )
+        is_free = self._work is None or self._work.done()
+        if known is None or not is_new or not is_free:
+            return
+        if not self._publisher.has_listeners:
+            self._publisher.withdraw()
+        else:
+            self._shown = known
+            self._work = self._pool.submit(self._publish, known)
+
+    def close(self) -> None:
+        """End the thread."""
+        self._pool.shutdown(cancel_futures=True)
+
+    def _publish(self, known: KnownMap) -> None:
+        more: dict[str, np.ndarray] = {}
+        if known.cells is not None:
+            age = self._node.seconds - known.cells.time
+            more = {
+                "source": known.cells.source,
+                "age": np.where(np.isfinite(known.received.elevation), age, np.nan),
+            }
+        frame, stamp = known.frame or self._node.values.map_frame, self._node.get_clock().now()
+        cloud = terrain_to_point_cloud(known.received, frame, stamp.to_msg(), more=more)
+        with contextlib.suppress(InvalidHandle):  # the node has ended meanwhile
+            self._publisher.send(cloud)

@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the pictures of docs/viewer.md: `python -m support.viewer.pictures docs`."""
+"""Writes the pictures of docs/viewer.md: `python -m benchmarks.viewer_pictures docs`."""
 
-import argparse
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 from benchmarks.grounds import real_maps
 from rover_physics.names import WHEELS
@@ -51,10 +52,10 @@ chooses) of each picture. The first shows the page as it opens, the others a ref
 
 
 def write_pictures(folder: Path, names: list[str]) -> Iterator[str]:
-    """Write the pictures and yield their names with what they show; no names: all of them."""
+    """Write the pictures and yield their names with what they show."""
     with sync_api.sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=PROGRAM, args=ARGUMENTS)
-        for name in names or CASES:
+        for name in names:
             yield f"{name}: {_write(browser, folder / name)}"
         browser.close()
 
@@ -111,10 +112,14 @@ def _show_drive(page: Page) -> str:
     return page.session.shown.verdict.reason or "traversable"
 
 
-if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, help="folder of the pictures")
-    parser.add_argument("names", nargs="*", help="pictures to write (default: all)")
-    arguments = parser.parse_args()
-    for line in write_pictures(arguments.folder, arguments.names):
+def main(
+    folder: Annotated[Path, typer.Argument(help="Folder of the pictures.")],
+    names: Annotated[list[str] | None, typer.Argument(help="Pictures (default: all).")] = None,
+) -> None:
+    """Write pictures and print what they show."""
+    for line in write_pictures(folder, names or list(CASES)):
         print(line, flush=True)
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Messages for tests: of a drive, of the arm's tool, of /tf, and GridMaps.
+
+A GridMap is an object with the fields of grid_map_msgs/GridMap; tf2_msgs is not on PyPI either.
+"""
+
+import copy
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PoseStamped, TransformStamped, WrenchStamped
+from nav_msgs.msg import Odometry
+from rclpy.duration import Duration
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+
+from msg_adapters.stamps import ns_to_stamp
+from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
+from rover_physics.numerics.arrays import Floats
+from rover_physics.numerics.quaternions import xyzw_from_rpy
+from rover_planner.learning import drive_log as log
+from rover_planner.planning.navigation.transforms import Rigid
+
+Edge = tuple[str, str, Rigid]
+"""Parent frame, child frame, and where the child is in the parent."""
+
+
+def row_messages(row: Floats, begin: float) -> tuple[JointState, Odometry]:
+    """Return joint states and odometry of a row of a drive that began at a time [s]."""
+    joints = JointState(name=[*SUSPENSION_JOINTS, *WHEEL_JOINTS])
+    joints.position = [*row[log.SUSPENSION].tolist(), *([0.0] * len(WHEEL_JOINTS))]
+    joints.velocity = [0.0] * len(SUSPENSION_JOINTS) + row[log.RATES].tolist()
+    joints.effort = [0.0] * len(SUSPENSION_JOINTS) + row[log.TORQUES].tolist()
+    odometry = Odometry()
+    odometry.header.frame_id = "map"
+    odometry.header.stamp = ns_to_stamp(int((begin + row[log.TIME]) * 1e9))
+    place, turn = odometry.pose.pose.position, odometry.pose.pose.orientation
+    place.x, place.y = float(row[log.X]), float(row[log.Y])
+    turn.x, turn.y, turn.z, turn.w = xyzw_from_rpy(*row[[log.ROLL, log.PITCH, log.YAW]]).tolist()
+    return joints, odometry
+
+
+def make_target(x=1.0, y=2.0, z=0.3, frame="map") -> PoseStamped:
+    """Return a target position for the tip of the arm [m]."""
+    target = PoseStamped()
+    target.header.frame_id = frame
+    target.pose.position.x, target.pose.position.y, target.pose.position.z = x, y, z
+    return target
+
+
+def make_wrench(force=(1.0, 2.0, 3.0), moment=(4.0, 5.0, 6.0), frame="map") -> WrenchStamped:
+    """Return force [N] and moment [N m] on the tip of the arm."""
+    wrench = WrenchStamped()
+    wrench.header.frame_id = frame
+    for vector, values in ((wrench.wrench.force, force), (wrench.wrench.torque, moment)):
+        vector.x, vector.y, vector.z = values
+    return wrench
+
+
+def transform_message(parent: str, child: str, rigid: Rigid, stamp: Time) -> TransformStamped:
+    """Return the message that tells where a child frame is in its parent frame."""
+    message = TransformStamped(child_frame_id=child)
+    message.header.frame_id, message.header.stamp = parent, stamp
+    place, turn = message.transform.translation, message.transform.rotation
+    place.x, place.y, place.z = rigid.translation.tolist()
+    turn.x, turn.y, turn.z, turn.w = rigid.rotation.as_quat().tolist()
+    return message
+
+
+def send_transforms(
+    node: Node, take: Callable[[Any], object], *edges: Edge, age: float = 0.0
+) -> None:
+    """Give the callback of a node transforms of an age [s] as a TFMessage."""
+    stamp = (node.get_clock().now() - Duration(seconds=age)).to_msg()
+    take(SimpleNamespace(transforms=[transform_message(*edge, stamp) for edge in edges]))
+
+
+def grid_map_of(
+    layers: dict[str, np.ndarray],
+    resolution: float = 0.05,
+    centre: tuple[float, float] = (0.0, 0.0),
+    basic: tuple[str, ...] = ("elevation",),
+) -> Any:
+    """Return a column-major GridMap, as grid_map stores it, of layers (ny, nx), x, y ascending."""
+    ny, nx = next(iter(layers.values())).shape
+    header = SimpleNamespace(stamp=SimpleNamespace(sec=0, nanosec=0), frame_id="map")
+    position = SimpleNamespace(x=centre[0], y=centre[1], z=0.0)
+    orientation = SimpleNamespace(x=0.0, y=0.0, z=0.0, w=1.0)
+    info = SimpleNamespace(
+        resolution=resolution,
+        length_x=nx * resolution,
+        length_y=ny * resolution,
+        pose=SimpleNamespace(position=position, orientation=orientation),
+    )
+    data = []
+    for values in layers.values():
+        stored = np.asarray(values, np.float32)[::-1, ::-1].T  # rows along -x, columns along -y
+        data.append(_array(stored.ravel(order="F"), ("column_index", ny), ("row_index", nx)))
+    return SimpleNamespace(
+        header=header,
+        info=info,
+        layers=list(layers),
+        basic_layers=[name for name in basic if name in layers],
+        data=data,
+        outer_start_index=0,
+        inner_start_index=0,
+    )
+
+
+def move_buffer(message: Any, row: int, column: int) -> Any:
+    """Return a column-major map whose circular buffer starts at another row and column."""
+    moved = copy.deepcopy(message)
+    for array in moved.data:
+        columns, rows = (dim.size for dim in array.layout.dim)
+        cells = np.reshape(array.data, (rows, columns), order="F")
+        array.data = np.roll(cells, (row, column), (0, 1)).ravel(order="F")
+    moved.outer_start_index, moved.inner_start_index = row, column
+    return moved
+
+
+def store_by_rows(message: Any) -> Any:
+    """Return a column-major map in row-major storage."""
+    stored = copy.deepcopy(message)
+    for array in stored.data:
+        columns, rows = (dim.size for dim in array.layout.dim)
+        cells = np.reshape(array.data, (rows, columns), order="F")
+        array.layout = _array(cells.ravel(), ("row_index", rows), ("column_index", columns)).layout
+        array.data = cells.ravel()
+    return stored
+
+
+def _array(values: np.ndarray, *dims: tuple[str, int]) -> Any:
+    sizes = [size for _, size in dims]
+    dim = [
+        SimpleNamespace(label=label, size=size, stride=int(np.prod(sizes[k:])))
+        for k, (label, size) in enumerate(dims)
+    ]
+    return SimpleNamespace(layout=SimpleNamespace(dim=dim, data_offset=0), data=values)
