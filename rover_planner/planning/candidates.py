@@ -175,7 +175,8 @@ def _sample(start, curve: np.ndarray, speed: np.ndarray, waypoint_spacing: float
     bump = 0.5 * (1 - np.cos(2 * np.pi * t))
     places = curve @ np.array([t * t * (3 - 2 * t), t * rest * rest, -t * t * rest, bump])
     slopes = curve @ _weigh_slopes(t)
-    return np.column_stack([start[:2] + places.T, np.arctan2(slopes[1], slopes[0])])
+    x, y = start[:2, None] + places
+    return np.column_stack([x, y, np.arctan2(slopes[1], slopes[0])])
 
 
 def _interpolate(at: np.ndarray, x: np.ndarray, y: np.ndarray, slopes: np.ndarray) -> np.ndarray:

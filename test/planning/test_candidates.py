@@ -32,6 +32,7 @@ def test_every_candidate_begins_at_the_start_and_ends_at_the_goal(start, goal):
     paths = generate_candidates(start, goal)
     assert 1 <= len(paths) <= 9
     for path in paths:
+        assert path.flags.c_contiguous  # kernels are compiled for such arrays alone
         assert path[-1, :2] == pytest.approx(goal[:2], abs=0)
         assert angle_between(path[-1, 2], goal[2]) < 1e-9
         if len(path) > 1:
