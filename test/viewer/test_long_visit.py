@@ -134,6 +134,7 @@ def test_a_long_visit_keeps_path_comparison_and_memory(ground, browser, tmp_path
             click_through(visitor)
             memory.append(memory_of(process))
         change(visitor, friction="0.7")
+        wait_until(lambda: "friction 0.7" in visitor.text("#subject"), "the verdict on the change")
         wait_for_rest(visitor)
     assert max(memory) < MOST_MEMORY, memory
     third = len(memory) // 3
