@@ -5,7 +5,6 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -19,7 +18,6 @@ from std_srvs.srv import Trigger
 from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash, plan_request_hash
 from msg_adapters.paths import count_poses, stamped_pose_to_array
-from msg_adapters.raw_messages import SensorReader
 from msg_adapters.results.diagnostics import HEALTH, MONITOR, diagnostics, make_status, to_json
 from msg_adapters.stamps import NANOSECONDS
 from rover_physics.errors import RoverError
@@ -131,11 +129,11 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         super().destroy_node()
 
     def _create_subscriptions(self) -> None:
-        hear, reader = partial(self.heard.subscribe, raw=True), SensorReader()
-        hear(JointState, "joint_states", partial(self._take_joints, reader), polled_qos())
-        hear(Odometry, "odometry", partial(self._take_odometry, reader), newest_qos())
+        hear, inputs = self.heard.subscribe, self._inputs
+        hear(JointState, "joint_states", lambda one, _: inputs.take_joints(one), polled_qos())
+        hear(Odometry, "odometry", self._take_odometry, newest_qos())
         if self.values.imu_attitude:
-            hear(Imu, "imu", partial(self._take_imu, reader), newest_qos())
+            hear(Imu, "imu", lambda one, _: inputs.take_imu(one), newest_qos())
         reliability = self.values.input_reliability
         subscribe_to_requests(self, Path, "~/path", self._take_path, reliability, raw=True)
         qos = replace_reliability(topic_qos(), reliability)
@@ -182,28 +180,9 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         if not error:
             self.watch.look()
 
-    def _take_joints(self, reader: SensorReader, message: bytes, _arrival: float) -> None:
-        try:
-            self._inputs.take_joints(reader.read(message, JointState))
-        except MessageError as error:
-            self.get_logger().warning(
-                f"{error}; the angles known before stay", throttle_duration_sec=5.0
-            )
-
-    def _take_odometry(self, reader: SensorReader, message: bytes, _arrival: float) -> None:
-        try:
-            self._inputs.take_odometry(reader.read(message, Odometry))
-            self._maps.look_under_rover()
-        except RoverError as error:
-            self.get_logger().warning(
-                f"odometry not used, the suspension is not compared: {error}", once=True
-            )
-
-    def _take_imu(self, reader: SensorReader, message: bytes, _arrival: float) -> None:
-        try:
-            self._inputs.take_imu(reader.read(message, Imu))
-        except MessageError as error:
-            self.get_logger().warning(f"imu not used: {error}", throttle_duration_sec=10.0)
+    def _take_odometry(self, odometry: Any, _arrival: float) -> None:
+        self._inputs.take_odometry(odometry)
+        self._maps.look_under_rover()
 
     def _take_ground(self, message: String) -> None:
         """Take what was learned of the ground: JSON as the command learn writes it."""

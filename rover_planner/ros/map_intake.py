@@ -14,8 +14,8 @@ from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 
-from msg_adapters.elevation import find_cloud_data, is_same_cloud
-from msg_adapters.errors import MessageError
+from msg_adapters.elevation import is_same_cloud
+from msg_adapters.raw_messages import DamagedMessageError, SensorReader
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_planner.planning.navigation.transforms import Rigid, TransformError
@@ -200,23 +200,9 @@ def read_message(message: bytes, kind: type) -> Any:
     Raises:
         MessageError: The bytes are no such message.
     """
+    if kind is PointCloud2:
+        return SensorReader().read(message, kind)
     try:
-        return _read_cloud(message) if kind is PointCloud2 else deserialize_message(message, kind)
-    except MessageError:
-        raise
+        return deserialize_message(message, kind)
     except Exception as error:  # RMWError, of a module that differs between distributions
-        raise MessageError(
-            f"{len(message)} bytes were received that are no {kind.__name__}; the publisher or "
-            f"the connection is damaged: {error}"
-        ) from None
-
-
-def _read_cloud(message: bytes) -> PointCloud2:
-    """Return a cloud whose data are a view of the message: to copy a large map takes long."""
-    data = find_cloud_data(message)
-    no_bytes = bytes(4)
-    cloud = deserialize_message(
-        message[: data.start - len(no_bytes)] + no_bytes + message[data.stop :], PointCloud2
-    )
-    cloud._data = memoryview(message)[data]  # its setter takes arrays alone
-    return cloud
+        raise DamagedMessageError(message, kind, error) from None

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 from nav_msgs.msg import Path
-from sensor_msgs.msg import JointState, PointCloud2
+from sensor_msgs.msg import JointState
 
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
@@ -137,7 +137,7 @@ class ServerInputs:
 
     def _read_map(self, message: Any, source: Rigid | None) -> Terrain:
         values, move = self.values, None if source is None else source.matrix
-        if isinstance(message, PointCloud2):
+        if not hasattr(message, "layers"):  # it is a cloud
             resolution, height = values.map_resolution, values.cell_height
             return terrain_from_point_cloud(message, resolution, height, move)
         layers = GridMapLayers(

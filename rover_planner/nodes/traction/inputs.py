@@ -16,7 +16,6 @@ from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.joints import read_joint_map
 from msg_adapters.odometry import odometry_to_pose
-from msg_adapters.raw_messages import SensorReader
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
@@ -72,12 +71,12 @@ class TractionInputs:
         self._mounting = ImuMounting(
             parameters.imu_frame or parameters.base_frame, parameters.imu_mounting
         )
-        self._reader, self._odometry_read = SensorReader(), -math.inf
+        self._odometry_read = -math.inf
         self._twist = TwistStamped if parameters.cmd_vel_stamped else Twist
         self._log = TransitionLog(node.get_logger())
         self.stamps = StampCheck(parameters.stamp_tolerance)
         """Judges the header stamps."""
-        self._subscribe(parameters)
+        self._subscribe()
         subscribe_to_map(node, PointCloud2, CLOUD, maps.offer)
         self.publishers = self._check_publishers(parameters)
         """Looks for publishers that are not heard."""
@@ -88,18 +87,14 @@ class TractionInputs:
         names = self.joint_names
         return names.signs(joints) * (angles - names.offsets(joints))
 
-    def _subscribe(self, parameters: TractionControllerParameters) -> None:
+    def _subscribe(self) -> None:
         hear = self._node.heard.subscribe
         merged, newest = sensor_qos(), newest_qos()  # joints may come from several publishers
-        for kind, name, take, qos in (
-            (JointState, JOINT_STATES, self._take_joints, merged),
-            (Imu, IMU, self._take_imu, newest),
-            (self._twist, CMD_VEL, self._take_command, newest),
-        ):
-            hear(kind, name, self._guard(name, take), qos, raw=True)
-        take_odometry = self._guard(ODOMETRY, self._take_odometry)
-        hear(Odometry, ODOMETRY, take_odometry, newest, self._needs_odometry, raw=True)
-        hear(Bool, STOP, self._guard(STOP, self._take_stop), topic_qos())
+        hear(JointState, JOINT_STATES, self._take_joints, merged, refuse=self._refuse)
+        hear(Imu, IMU, self._take_imu, newest, refuse=self._refuse)
+        hear(self._twist, CMD_VEL, self._take_command, newest, refuse=self._refuse)
+        hear(Odometry, ODOMETRY, self._take_odometry, newest, self._needs_odometry, self._refuse)
+        hear(Bool, STOP, self._take_stop, topic_qos(), refuse=self._refuse)
 
     def _needs_odometry(self) -> bool:
         """Return whether odometry is to be read: it takes longest, and at rest nothing uses it."""
@@ -123,27 +118,17 @@ class TractionInputs:
         }
         return PublisherCheck(self._node, types, advice)
 
-    def _guard(
-        self, name: str, take: Callable[[Any, float], None]
-    ) -> Callable[[Any, float], None]:
-        """Return what passes a message and the time of its arrival on, or refuses it."""
-
-        def receive(message: Any, now: float) -> None:
-            try:
-                take(message, now)
-            except StampError as error:
-                self._service.monitor.ignore(name, str(error))
-            except RoverError as error:
-                self._refuse(name, str(error), now)
-            except Exception as error:
-                self._refuse(name, f"internal error: {self._node.guard.report(name, error)}", now)
-
-        return receive
-
-    def _refuse(self, name: str, error: str, now: float) -> None:
-        self._service.monitor.refuse(name, error, now)
+    def _refuse(self, name: str, error: Exception, now: float) -> None:
+        """Keep why a message is not used; a stamp of no use is no fault by itself."""
+        if isinstance(error, StampError):
+            self._service.monitor.ignore(name, str(error))
+            return
+        reason = str(error)
+        if not isinstance(error, RoverError):
+            reason = f"internal error: {self._node.guard.report(name, error)}"
+        self._service.monitor.refuse(name, reason, now)
         if name == ODOMETRY:  # the others are faults, which the node logs
-            self._log.update(name, f"odometry not used: {error}", "odometry is used again", now)
+            self._log.update(name, f"odometry not used: {reason}", "odometry is used again", now)
 
     def _find_time(
         self, name: str, stamp: int | None, now: float, *, merged: bool = False
@@ -152,8 +137,7 @@ class TractionInputs:
         clock = self._node.get_clock().now().nanoseconds - waited
         return self.stamps.find_time(name, stamp or 0, clock, now, merged=merged)
 
-    def _take_joints(self, message: bytes, now: float) -> None:
-        state = self._reader.read(message, JointState)
+    def _take_joints(self, state: Any, now: float) -> None:
         if not self._heard.intersection(state.name):  # an arm's message, for example
             return
         stamp = stamp_to_ns(state.header.stamp) or 0
@@ -162,14 +146,12 @@ class TractionInputs:
         rates = self.joint_names.velocities(state, JOINTS)
         self._service.take_joints(positions, rates, measured, stamp)
 
-    def _take_imu(self, message: bytes, now: float) -> None:
-        imu = self._reader.read(message, Imu)
+    def _take_imu(self, imu: Any, now: float) -> None:
         measured = self._find_time(IMU, stamp_to_ns(imu.header.stamp), now)
         attitude = imu_to_attitude(imu, self._mounting)
         self._service.take_attitude(attitude.roll, attitude.pitch, attitude.rates, measured)
 
-    def _take_command(self, message: bytes, now: float) -> None:
-        twist = self._reader.read(message, self._twist)
+    def _take_command(self, twist: Any, now: float) -> None:
         if self._twist is TwistStamped:
             now = self._find_time(CMD_VEL, stamp_to_ns(twist.header.stamp), now)
         self._service.take_command(*twist_to_speeds(twist), now)
@@ -177,8 +159,7 @@ class TractionInputs:
     def _take_stop(self, message: Bool, now: float) -> None:
         self._service.take_stop(message.data, now)
 
-    def _take_odometry(self, message: bytes, now: float) -> None:
-        odometry = self._reader.read(message, Odometry)
+    def _take_odometry(self, odometry: Any, now: float) -> None:
         measured = self._find_time(ODOMETRY, stamp_to_ns(odometry.header.stamp), now)
         if odometry.header.frame_id != self._map_frame:
             self._frames.listen()  # only then: /tf of a whole robot costs the loop time
