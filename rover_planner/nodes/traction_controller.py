@@ -135,7 +135,7 @@ class TractionController(RoverNode[TractionControllerParameters]):
         self._clock_watch.timeout = values.clock_timeout
         self._inputs.stamps.tolerance = values.stamp_tolerance
         self.frames.apply_timeout(values.transform_timeout)
-        self._maps.apply()
+        self._maps.apply(values)
 
     def _enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         before = self._supervisor.permission.enabled

@@ -149,7 +149,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
 
     def _apply_settings(self, settings: ServiceSettings) -> None:
         self._inputs.values, self.service.settings = self.values, settings
-        self._maps.apply()
+        self._maps.apply(self.values)
         self.watch.apply()
         self.frames.apply_timeout(self.values.transform_timeout)
         self._hazards.apply()

@@ -27,7 +27,7 @@ from rover_planner.parameters.shared import STOP
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.frames import NodeFrames
-from rover_planner.ros.logs import RepeatLog, TransitionLog
+from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.map_intake import CLOUD, MapIntake
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import newest_qos, sensor_qos, topic_qos
@@ -56,7 +56,7 @@ class TractionInputs:
         self,
         node: RoverNode[TractionControllerParameters],
         service: TractionService,
-        maps: MapIntake[Any],
+        maps: MapIntake,
         frames: NodeFrames,
     ):
         """Subscribe to all inputs of a node; `frames` brings odometry to the frame of the map."""
@@ -169,7 +169,7 @@ class TractionInputs:
         self._log.update(ODOMETRY, "", "odometry is used again", now)
 
 
-class TractionMaps(MapIntake[MapContactFinder]):
+class TractionMaps(MapIntake):
     """Prepares clouds for the controller in a thread of their own."""
 
     def __init__(
@@ -185,16 +185,13 @@ class TractionMaps(MapIntake[MapContactFinder]):
             rover: Returns the rover for which maps are prepared.
             frames: Knows where the frames of clouds are on the map.
         """
-        self._node, self._rover, self._listen = node, rover, frames.listen
-        self._values = node.values
-        self._refusals = RepeatLog()
-        super().__init__(self._make, self._log_refusal, frames)
+        self._rover, self._listen = rover, frames.listen
+        self._ready: MapContactFinder | None = None
+        super().__init__(node.get_logger(), node.values, frames)
 
-    def apply(self) -> None:
+    def apply(self, values: TractionControllerParameters) -> None:
         """Prepare the last map again if a parameter of it has changed."""
-        before, self._values = self._values, self._node.values
-        names = ("map_resolution", "cell_height")
-        if any(getattr(before, name) != getattr(self._values, name) for name in names):
+        if self.take_parameters(values):
             self.repeat()
 
     def look_for_frame(self) -> None:
@@ -203,14 +200,13 @@ class TractionMaps(MapIntake[MapContactFinder]):
             self._listen()  # only then: /tf of a whole robot costs the loop time
             self.retry()
 
-    def _make(self, cloud: PointCloud2, source: Rigid | None) -> MapContactFinder:
-        """Prepare a map from a cloud; called in the thread."""
-        values, move = self._values, None if source is None else source.matrix
-        terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height, move)
-        return MapContactFinder(self._rover(), terrain)
+    def take(self) -> MapContactFinder | None:
+        """Return the map that was prepared since the last call, None if there is none."""
+        ready, self._ready = self._ready, None
+        return ready
 
-    def _log_refusal(self, error: str) -> None:
-        line = f"{CLOUD} refused, the last map stays: {error}"
-        line = self._refusals.line(line, time.monotonic())
-        if line:
-            self._node.get_logger().error(line)
+    def prepare(self, cloud: Any, source: Rigid | None) -> None:
+        """Prepare a map from a cloud; called in the thread."""
+        values, move = self.values, None if source is None else source.matrix
+        terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height, move)
+        self._ready = MapContactFinder(self._rover(), terrain)
