@@ -18,7 +18,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 from msg_adapters.results.diagnostics import SEARCH, diagnostics, make_status
 from rover_planner.nodes.map_topics import MapTopics
 from rover_planner.planning.answering.budget import STOPPING, Budget, QuestionStoppedError
-from rover_planner.planning.answering.question_queue import Answered, Asked, QuestionQueue
+from rover_planner.planning.answering.question_queue import Asked, QuestionQueue
 from rover_planner.planning.answering.questions import Answer, Question, Register
 from rover_planner.planning.answering.search_watch import NewerMapError, SearchWatch
 from rover_planner.planning.answering.server_health import ServerHealth
@@ -50,10 +50,6 @@ class Inquiry(Asked):
     """Takes the answer."""
     snapshot: Snapshot
     """Map, settings, path and measurements; its map is that of the time of judging."""
-    number: int
-    """Number of the question."""
-    ros_time: int
-    """ROS time of its arrival [ns]."""
     arrival: float
     """Time of its arrival [s], steady clock."""
     ticket: int
@@ -71,7 +67,7 @@ class QuestionDesk:
         self.health = ServerHealth()
         """Counts of answers and faults."""
         self._queue = QuestionQueue(
-            0, self._judge, lambda: node.handover.call(self._send_finished)
+            self._judge, self._answer, lambda: node.handover.call(self._queue.finish)
         )
         self._progress = node.create_publisher(DiagnosticArray, "~/search_progress", topic_qos())
         self._patrol = create_steady_timer(node, PATROL, self._refuse_overdue, starts=False)
@@ -84,22 +80,22 @@ class QuestionDesk:
     def ask(self, question: Question, reply: Reply) -> None:
         """Take a question; its answer follows within its budget and GRACE."""
         self._node.heard.poll()
-        now = self._node.get_clock().now().nanoseconds
         values = self._service.settings.parameters
-        self._queue.max_waiting = values.max_waiting
         inquiry = Inquiry(
             question,
             Budget(values.time_budget),
             reply=reply,
-            snapshot=replace(self._service.snapshot(now), watch=self._watch()),
-            number=self._register.next_number(),
-            ros_time=now,
+            snapshot=replace(self._service.snapshot(self._ros_time), watch=self._watch()),
             arrival=time.monotonic(),
             ticket=self._maps.ticket(),
         )
-        self._send(self._queue.ask(inquiry))
+        self._queue.ask(inquiry, values.max_waiting)
         if self._queue.open_count:
             self._patrol.reset()
+
+    @property
+    def _ros_time(self) -> int:
+        return int(self._node.get_clock().now().nanoseconds)
 
     def _judge(self, inquiry: Inquiry) -> Any:
         """Return the judgement of a question on the newest map; called in the queue's thread."""
@@ -107,7 +103,7 @@ class QuestionDesk:
         try:
             self._maps.wait(inquiry.ticket, inquiry.budget.check)
             while True:
-                inquiry.snapshot = self._service.add_map(inquiry.snapshot, inquiry.ros_time)
+                inquiry.snapshot = self._service.add_map(inquiry.snapshot, self._ros_time)
                 with contextlib.suppress(NewerMapError):
                     return question.judge(inquiry.snapshot)
         except QuestionStoppedError:
@@ -115,18 +111,14 @@ class QuestionDesk:
         except Exception as error:
             return refuse_error(self._node.guard, question.service, error, question.refuse)
 
-    def _send(self, answered: list[Answered]) -> None:
-        """Send the answers to questions."""
-        for inquiry, judgement in answered:
-            assert isinstance(inquiry, Inquiry)
-            question, done = inquiry.question, time.monotonic()
-            label = f"{inquiry.number}, {question.service}"
-            self.health.take_answer(judgement.code, done, label, done - inquiry.arrival)
-            identity = self._register.identify(
-                inquiry.number, question.service, question.hash, inquiry.snapshot
-            )
-            answer = Answer(judgement, inquiry.snapshot, identity)
-            self._sender.send(partial(inquiry.reply, answer))
+    def _answer(self, inquiry: Inquiry, judgement: Any) -> None:
+        """Hand the answer to a question to its service."""
+        question, done = inquiry.question, time.monotonic()
+        identity = self._register.identify(question.service, question.hash, inquiry.snapshot)
+        label = f"{identity.request}, {question.service}"
+        self.health.take_answer(judgement.code, done, label, done - inquiry.arrival)
+        answer = Answer(judgement, inquiry.snapshot, identity)
+        self._sender.send(partial(inquiry.reply, answer))
         if not self._queue.open_count:
             self._patrol.cancel()
 
@@ -150,16 +142,12 @@ class QuestionDesk:
 
     def identify(self, service: str, path_hash: str, snapshot: Snapshot) -> IdentityReport:
         """Return a new number with what a judgement that nobody asked for is about."""
-        identity = self._register.identify(
-            self._register.next_number(), service, path_hash, snapshot
-        )
+        identity = self._register.identify(service, path_hash, snapshot)
         return replace(identity, path_hash=path_hash)
 
     def cancel(self, code: str, reason: str) -> int:
         """Answer all open questions with a refusal; return their number."""
-        stopped = self._queue.stop_all(code, reason)
-        self._send(stopped)
-        return len(stopped)
+        return self._queue.stop_all(code, reason)
 
     def close(self) -> None:
         """Refuse all open questions and end the thread; the refusals have time to leave."""
@@ -169,9 +157,6 @@ class QuestionDesk:
         if count:
             time.sleep(LEAVE_TIME)
 
-    def _send_finished(self) -> None:
-        self._send(self._queue.finished())
-
     def _refuse_overdue(self) -> None:
-        self._send(self._queue.overdue(GRACE))
-        self._send_finished()
+        self._queue.refuse_overdue(GRACE)
+        self._queue.finish()
