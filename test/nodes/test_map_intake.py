@@ -4,18 +4,15 @@
 from types import SimpleNamespace
 from typing import Any
 
-import pytest
 from builtin_interfaces.msg import Time
-from rclpy.serialization import deserialize_message, serialize_message
-from sensor_msgs.msg import PointCloud2
+from rclpy.serialization import serialize_message
 
-from msg_adapters.elevation import is_same_cloud, terrain_from_point_cloud, terrain_to_point_cloud
-from msg_adapters.errors import MessageError
+from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cloud
 from rover_physics.errors import ModelError
 from rover_physics.traction.map_contacts import MapContactFinder
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.ros.frames import Frames
-from rover_planner.ros.map_intake import MapIntake, read_message
+from rover_planner.ros.map_intake import MapIntake
 from support.rough_grounds import plane
 from support.rovers import LSR1
 from support.waiting import wait_until
@@ -81,13 +78,3 @@ def test_a_map_that_cannot_be_used_is_refused_and_the_next_is_taken():
     intake.offer(cloud_of(3.0))
     intake.wait_for(1)
     intake.close()
-
-
-def test_the_data_of_a_cloud_are_read_where_they_are():
-    message = cloud_of(1.0)
-    whole, read = deserialize_message(message, PointCloud2), read_message(message, PointCloud2)
-    assert read.data.obj is message and read.data == whole.data
-    assert is_same_cloud(read, whole) and is_same_cloud(whole, whole)
-    for damaged in (message[:-9], message[:60], b""):
-        with pytest.raises(MessageError, match="no PointCloud2"):
-            read_message(damaged, PointCloud2)
