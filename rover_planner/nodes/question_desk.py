@@ -7,6 +7,7 @@ service, which makes messages of it.
 """
 
 import contextlib
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -17,7 +18,7 @@ from diagnostic_msgs.msg import DiagnosticArray
 
 from msg_adapters.results.diagnostics import SEARCH, diagnostics, make_status
 from rover_planner.nodes.map_topics import MapTopics
-from rover_planner.planning.answering.budget import STOPPING, Budget, QuestionStoppedError
+from rover_planner.planning.answering.budget import STOPPING, Budget
 from rover_planner.planning.answering.question_queue import Asked, QuestionQueue
 from rover_planner.planning.answering.questions import Answer, Question, Register
 from rover_planner.planning.answering.search_watch import NewerMapError, SearchWatch
@@ -26,7 +27,6 @@ from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.deferred import PacedSender
-from rover_planner.ros.guard import refuse_error
 from rover_planner.ros.node import RoverNode, create_steady_timer
 from rover_planner.ros.qos import topic_qos
 
@@ -34,6 +34,8 @@ LEAVE_TIME = 0.1
 """Time in which the last answers leave before the node is destroyed [s]."""
 PATROL = 0.05
 """Period of the check for questions that have run out of time [s]."""
+WAIT = 0.01
+"""Time between two looks of a thread that gives way to questions [s]."""
 GRACE = 0.1
 """Time after its deadline in which a question in work may still end by itself [s]."""
 
@@ -67,7 +69,7 @@ class QuestionDesk:
         self.health = ServerHealth()
         """Counts of answers and faults."""
         self._queue = QuestionQueue(
-            self._judge, self._answer, lambda: node.handover.call(self._queue.finish)
+            self._judge, self._answer, node.handover.call, node.guard.report
         )
         self._progress = node.create_publisher(DiagnosticArray, "~/search_progress", topic_qos())
         self._patrol = create_steady_timer(node, PATROL, self._refuse_overdue, starts=False)
@@ -99,17 +101,11 @@ class QuestionDesk:
 
     def _judge(self, inquiry: Inquiry) -> Any:
         """Return the judgement of a question on the newest map; called in the queue's thread."""
-        question = inquiry.question
-        try:
-            self._maps.wait(inquiry.ticket, inquiry.budget.check)
-            while True:
-                inquiry.snapshot = self._service.add_map(inquiry.snapshot, self._ros_time)
-                with contextlib.suppress(NewerMapError):
-                    return question.judge(inquiry.snapshot)
-        except QuestionStoppedError:
-            raise
-        except Exception as error:
-            return refuse_error(self._node.guard, question.service, error, question.refuse)
+        self._maps.wait(inquiry.ticket, inquiry.budget.check)
+        while True:
+            inquiry.snapshot = self._service.add_map(inquiry.snapshot, self._ros_time)
+            with contextlib.suppress(NewerMapError):
+                return inquiry.question.judge(inquiry.snapshot)
 
     def _answer(self, inquiry: Inquiry, judgement: Any) -> None:
         """Hand the answer to a question to its service."""
@@ -144,6 +140,20 @@ class QuestionDesk:
         """Return a new number with what a judgement that nobody asked for is about."""
         identity = self._register.identify(service, path_hash, snapshot)
         return replace(identity, path_hash=path_hash)
+
+    def give_way(self, check: Callable[[], object], longest: float = math.inf) -> float:
+        """Wait while there are questions; return the time that took [s]; for other threads.
+
+        Args:
+            check: Called again and again; may raise.
+            longest: Longest wait [s].
+        """
+        began = time.monotonic()
+        check()
+        while self.open_count and time.monotonic() - began < longest:
+            time.sleep(WAIT)
+            check()
+        return time.monotonic() - began
 
     def cancel(self, code: str, reason: str) -> int:
         """Answer all open questions with a refusal; return their number."""

@@ -110,7 +110,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self.watch = PathWatch(self, self.service, self._find_watched, self._publish_stop)
         """Watches the accepted path."""
         self.urgent_threads = (self.watch.heartbeat_thread,)
-        self._hazards = HazardTopics(self, self.service, lambda: self.desk.open_count > 0)
+        self._hazards = HazardTopics(self, self.service, self.desk)
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
         self._diagnostics_due = 0.0
         self._beats = create_steady_timer(self, PERIOD, self._beat)
@@ -335,8 +335,8 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self.publish(judgement, self.desk.identify("monitor", watched, snapshot))
 
     def _cancel(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        count = self.desk.cancel(CANCELLED, "the question was cancelled by ~/cancel")
-        count += self._advice.cancel()
+        why = CANCELLED, "the question was cancelled by ~/cancel"
+        count = self.desk.cancel(*why) + self._advice.cancel(*why)
         response.success = count > 0
         response.message = f"{count} open questions cancelled"
         return response

@@ -3,7 +3,6 @@
 
 import threading
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -17,6 +16,7 @@ from rover_physics.errors import RoverError
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.pose_classes import UNKNOWN, RoverOnMap
+from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.budget import STOPPING, QuestionStoppedError
 from rover_planner.planning.answering.service_settings import ServiceSettings
@@ -45,16 +45,16 @@ class HazardTopics:
         self,
         node: RoverNode[TraverseServerParameters],
         service: TraverseService,
-        is_busy: Callable[[], bool],
+        desk: QuestionDesk,
     ):
         """Create topics, service and thread.
 
         Args:
             node: The node.
             service: Knows map, settings and pose.
-            is_busy: Returns whether questions are open, which come first; called in the thread.
+            desk: Its questions come first.
         """
-        self._node, self._service, self._is_busy = node, service, is_busy
+        self._node, self._service, self._desk = node, service, desk
         self._log = TransitionLog(node.get_logger())
         self._shown: _Shown | None = None
         self._done: tuple[Terrain, ServiceSettings] | None = None
@@ -170,12 +170,7 @@ class HazardTopics:
 
     def _let_questions_go_first(self) -> None:
         """Wait while there are questions, for MAX_PAUSE in each SLICE; called between poses."""
-        self._check_end()
-        began = time.monotonic()
-        while self._is_busy() and time.monotonic() - began < self._patience:
-            time.sleep(0.01)
-            self._check_end()
-        self._patience -= time.monotonic() - began
+        self._patience -= self._desk.give_way(self._check_end, self._patience)
 
     def _show(self, hazards: HazardMap, map_hash: str, withdrawals: int) -> None:
         view = hazards.view()

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from queue import SimpleQueue
 from typing import Any
 
+from rover_physics.errors import RoverError
 from rover_physics.numerics.interruption import interruptible
 from rover_planner.planning.answering.budget import BUSY, TOO_LONG, Budget, QuestionStoppedError
 from rover_planner.planning.answering.questions import Question
@@ -41,17 +42,19 @@ class QuestionQueue:
         self,
         judge: Callable[[Any], Any],
         answer: Callable[[Any, Any], object],
-        wake: Callable[[], object],
+        call: Callable[[Callable[[], None]], object],
+        report: Callable[[str, Exception], str],
     ):
         """Start the thread.
 
         Args:
-            judge: Returns the judgement of an `Asked`; called in the thread. It may raise
-                QuestionStoppedError only.
+            judge: Returns the judgement of an `Asked`; called in the thread. It may raise: a
+                RoverError refuses the request, any other error is one of this program.
             answer: Takes an `Asked` and its judgement.
-            wake: Called in the thread when `finish` has something to do.
+            call: Has the owner's thread call `finish`; called in the thread.
+            report: Takes the place of an error of this program and the error; returns its text.
         """
-        self._judge, self._answer, self._wake = judge, answer, wake
+        self._judge, self._answer, self._call, self._report = judge, answer, call, report
         self._waiting: SimpleQueue[Asked | None] = SimpleQueue()
         self._judged: SimpleQueue[tuple[Asked, Any]] = SimpleQueue()
         self._open: list[Asked] = []
@@ -113,7 +116,7 @@ class QuestionQueue:
         while (asked := self._waiting.get()) is not None:
             if not asked.is_closed:
                 self._judged.put((asked, self._find(asked)))
-                self._wake()
+                self._call(self.finish)
 
     def _find(self, asked: Asked) -> Any:
         """Return the judgement of a question, or its refusal."""
@@ -125,6 +128,11 @@ class QuestionQueue:
                 return self._judge(asked)
         except QuestionStoppedError as error:
             return asked.question.refuse(error.code, str(error))
+        except RoverError as error:
+            return asked.question.refuse("bad_request", str(error))
+        except Exception as error:
+            text = self._report(asked.question.service, error)
+            return asked.question.refuse("internal_error", f"internal error: {text}")
 
 
 def _refuse_stopped(asked: Asked) -> Any:

@@ -3,11 +3,13 @@
 
 import threading
 import time
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 from rover_physics import judge_path, load_rover
+from rover_physics.errors import PoseError
 from rover_physics.numerics.interruption import check_interruption
 from rover_planner.planning.answering.budget import (
     BUSY,
@@ -51,7 +53,8 @@ class Desk:
         self.queue = QuestionQueue(
             lambda asked: asked.question.judge(asked.budget),
             lambda asked, judgement: self.told.append((asked.question.service, judgement)),
-            lambda: None,
+            lambda _finish: None,
+            lambda place, error: f"{place}: {error!r}",
         )
 
     def ask(self, name, work, seconds: float = 20.0, clock=time.monotonic) -> None:
@@ -130,6 +133,16 @@ def test_work_that_checks_nothing_is_refused_after_its_grace_and_its_answer_is_d
     go_on.set()
     desk.ask("next", lambda _: 5)
     assert desk.wait(3)[2:] == [("next", 5)] and desk.queue.open_count == 0
+
+
+def test_errors_of_the_input_are_bad_requests_and_others_internal_errors(desk):
+    for name, error in (("one", PoseError("no pose")), ("two", KeyError("k"))):
+        work = Mock(side_effect=error)
+        asked = Asked(Question(name, "", work, lambda *both: both), Budget(20.0))
+        desk.queue.ask(asked, 100)
+    first, second = (told for _, told in desk.wait(2))
+    assert first == ("bad_request", "no pose")
+    assert second == ("internal_error", "internal error: two: KeyError('k')")
 
 
 def test_all_open_questions_can_be_cancelled(desk):
