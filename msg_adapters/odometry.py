@@ -43,7 +43,7 @@ def odometry_to_pose(
     if base_frame and child not in ("", base_frame):
         raise MessageError(f"odometry is of frame {child!r}; it must be of {base_frame!r}")
     place = odometry.pose.pose.position
-    _, _, yaw = read_orientation(odometry.pose.pose.orientation, "odometry")
+    _, _, yaw = read_orientation(odometry.pose.pose.orientation, "odometry orientation")
     pose = np.array([place.x, place.y, place.z, yaw])
     variances = [float(odometry.pose.covariance[index]) for index in (0, 7)]
     possible = all(abs(one) <= MAX_COORDINATE for one in (place.x, place.y, place.z))
@@ -90,4 +90,4 @@ def planar_odometry(
 
 def odometry_to_tilt(odometry: Odometry) -> tuple[float, float]:
     """Return roll and pitch [rad] of the body in a message that `odometry_to_pose` accepted."""
-    return read_orientation(odometry.pose.pose.orientation, "odometry")[:2]
+    return read_orientation(odometry.pose.pose.orientation, "odometry orientation")[:2]
