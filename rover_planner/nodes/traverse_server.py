@@ -17,7 +17,7 @@ from std_srvs.srv import Trigger
 
 from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash, plan_request_hash
-from msg_adapters.paths import count_poses, stamped_pose_to_array
+from msg_adapters.paths import count_poses
 from msg_adapters.results.diagnostics import HEALTH, MONITOR, diagnostics, make_status, to_json
 from msg_adapters.stamps import NANOSECONDS
 from rover_physics.errors import RoverError
@@ -274,14 +274,9 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
 
     def _read_ends(self, begin: PoseStamped, end: PoseStamped) -> tuple[Pose, Pose]:
         """Return start and goal (3,) of the body in the map frame; an empty start is here."""
-        frame, frames = self.values.map_frame, self.frames
-        if is_empty(begin):
-            start = self._find_here()
-        else:
-            located = frames.localise(begin, "start")
-            start = stamped_pose_to_array(located, frame, "start")
-        located = frames.localise(end, "goal")
-        return start, stamped_pose_to_array(located, frame, "goal")
+        read = self.frames.read_pose
+        start = self._find_here() if is_empty(begin) else read(begin, "start")
+        return start, read(end, "goal")
 
     def _find_watched(self) -> Pose | None:
         """Return the pose (3,) of the body by /tf, else by odometry of just now."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from msg_adapters.imu import imu_to_attitude
 from msg_adapters.joints import OWN_NAMES, JointNames
-from msg_adapters.odometry import odometry_to_pose, odometry_to_tilt
+from msg_adapters.odometry import odometry_to_pose
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_planner.learning.drive_log import (
@@ -102,7 +102,7 @@ class RowCollector:
             MessageError: It has no pose that is possible, or is in another frame.
         """
         pose, _ = odometry_to_pose(message, frame or message.header.frame_id)
-        self._row[[TIME, X, Y, YAW]] = time, *pose[[0, 1, 3]]
+        self._row[[TIME, X, Y, YAW]] = time, *pose[[0, 1, 5]]
         if not self._has_imu:
-            self._row[[ROLL, PITCH]] = odometry_to_tilt(message)
+            self._row[[ROLL, PITCH]] = pose[3:5]
         return self._row.copy()

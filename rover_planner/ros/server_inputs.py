@@ -13,8 +13,6 @@ from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
 from msg_adapters.identity import path_hash
 from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.joints import read_joint_map
-from msg_adapters.odometry import odometry_to_pose, odometry_to_tilt
-from msg_adapters.paths import path_to_poses
 from msg_adapters.sensing import BASE_FRAME
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.terrain.grid import Terrain, load_terrain
@@ -91,11 +89,9 @@ class ServerInputs:
         Raises:
             RoverError: A value is wrong, or the frame is not known.
         """
-        here = self.frames.localise_odometry(odometry)
-        pose, _ = odometry_to_pose(here, self.values.map_frame)
-        body = float(pose[2]), *odometry_to_tilt(here)
-        self.frames.take_odometry(here)
-        self.service.take_pose(pose[[0, 1, 3]], body)
+        pose, _ = self.frames.take_odometry(odometry)
+        z, roll, pitch = pose[2:5].tolist()
+        self.service.take_pose(pose[[0, 1, 5]], (z, roll, pitch))
 
     def take_imu(self, imu: Any) -> None:
         """Take roll and pitch, if the parameter imu_attitude is set; see `take_odometry`.
@@ -113,8 +109,7 @@ class ServerInputs:
         Raises:
             RoverError: A value is wrong, or a frame is not known.
         """
-        poses = path_to_poses(self.frames.localise_path(path), self.values.map_frame)
-        return GivenPath(poses, "", *describe_path(path))
+        return GivenPath(self.frames.read_path(path), "", *describe_path(path))
 
     def take_map(self, message: Any, source: Rigid | None, topic: str) -> bool:
         """Take a PointCloud2 or GridMap; return whether its content is new.

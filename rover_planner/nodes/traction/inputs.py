@@ -15,7 +15,6 @@ from msg_adapters.commands import twist_to_speeds
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.joints import read_joint_map
-from msg_adapters.odometry import odometry_to_pose
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
@@ -163,9 +162,8 @@ class TractionInputs:
         measured = self._find_time(ODOMETRY, stamp_to_ns(odometry.header.stamp), now)
         if odometry.header.frame_id != self._map_frame:
             self._frames.listen()  # only then: /tf of a whole robot costs the loop time
-        here = self._frames.localise_odometry(odometry)
-        pose, deviation = odometry_to_pose(here, self._map_frame, self._base_frame)
-        self._service.take_odometry(pose, deviation, measured)
+        pose, deviation = self._frames.take_odometry(odometry, self._base_frame)
+        self._service.take_odometry(pose[[0, 1, 2, 5]], deviation, measured)
         self._log.update(ODOMETRY, "", "odometry is used again", now)
 
 
