@@ -133,7 +133,6 @@ class TractionController(RoverNode[TractionControllerParameters]):
         values = self.values
         self._supervisor.configure(settings)
         self._clock_watch.timeout = values.clock_timeout
-        self._inputs.stamps.tolerance = values.stamp_tolerance
         self.frames.apply_timeout(values.transform_timeout)
         self._maps.apply(values)
 
@@ -227,7 +226,6 @@ class TractionController(RoverNode[TractionControllerParameters]):
         seen, stamp = time.monotonic(), clock.now().nanoseconds
         fault = self._clock_watch.check(seen, stamp, clock.ros_time_is_active)
         if self._clock_watch.stepped:
-            self._inputs.stamps.forget()
             self.service.forget_times()
         return self._supervisor.update(now, fault)
 

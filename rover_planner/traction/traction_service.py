@@ -144,6 +144,7 @@ class TractionService:
             name: getattr(parameters, f"{name}_timeout")
             for name in (JOINT_STATES, IMU, CMD_VEL, ODOMETRY)
         } | {STOP: parameters.stop_timeout or math.inf}
+        self.monitor.tolerance = parameters.stamp_tolerance
         self._writer = BalanceWriter(rover, settings.payload)
         self._limits = MeasurementLimits(rover)
         self._optimal = parameters.policy == OPTIMAL

@@ -31,7 +31,7 @@ from rover_planner.ros.map_intake import CLOUD, MapIntake
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import newest_qos, sensor_qos, topic_qos
 from rover_planner.ros.subscriptions import PublisherCheck, subscribe_to_map
-from rover_planner.traction.clocks import StampCheck, StampError
+from rover_planner.traction.input_monitor import StampError
 from rover_planner.traction.traction_service import (
     CMD_VEL,
     IMU,
@@ -73,8 +73,6 @@ class TractionInputs:
         self._odometry_read = -math.inf
         self._twist = TwistStamped if parameters.cmd_vel_stamped else Twist
         self._log = TransitionLog(node.get_logger())
-        self.stamps = StampCheck(parameters.stamp_tolerance)
-        """Judges the header stamps."""
         self._subscribe()
         subscribe_to_map(node, PointCloud2, CLOUD, maps.offer)
         self.publishers = self._check_publishers(parameters)
@@ -134,7 +132,8 @@ class TractionInputs:
     ) -> float:
         waited = round(NANOSECONDS * (time.monotonic() - now))
         clock = self._node.get_clock().now().nanoseconds - waited
-        return self.stamps.find_time(name, stamp or 0, clock, now, merged=merged)
+        monitor = self._service.monitor
+        return monitor.find_time(name, stamp or 0, clock, now, merged=merged)
 
     def _take_joints(self, state: Any, now: float) -> None:
         if not self._heard.intersection(state.name):  # an arm's message, for example
