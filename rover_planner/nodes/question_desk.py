@@ -2,7 +2,7 @@
 """Takes the questions of a node's services and has them judged, within their budget.
 
 The course of a question: a service makes a `Question` of its request; the desk notes when it came
-and what is known then; the queue judges it in its thread; the desk hands the `Answer` to the
+and what is known then; the queue judges it in its thread; the desk hands the judgement to the
 service, which makes messages of it.
 """
 
@@ -20,7 +20,7 @@ from msg_adapters.results.diagnostics import SEARCH, diagnostics, make_status
 from rover_planner.nodes.map_topics import MapTopics
 from rover_planner.planning.answering.budget import STOPPING, Budget
 from rover_planner.planning.answering.question_queue import Asked, QuestionQueue
-from rover_planner.planning.answering.questions import Answer, Question, Register
+from rover_planner.planning.answering.questions import Question, Register
 from rover_planner.planning.answering.search_watch import NewerMapError, SearchWatch
 from rover_planner.planning.answering.server_health import ServerHealth
 from rover_planner.planning.answering.snapshot import Snapshot
@@ -40,8 +40,9 @@ GRACE = 0.1
 """Time after its deadline in which a question in work may still end by itself [s]."""
 
 
-Reply = Callable[[Answer], None]
-"""Makes messages of an answer and sends them; called once, in the executor's thread."""
+Reply = Callable[[Any, IdentityReport], None]
+"""Makes messages of a judgement, a `PathJudgement` or `ReachAnswer`, and of what it is about, and
+sends them; called once, in the executor's thread."""
 
 
 @dataclass(eq=False, kw_only=True)
@@ -113,8 +114,7 @@ class QuestionDesk:
         identity = self._register.identify(question.service, question.hash, inquiry.snapshot)
         label = f"{identity.request}, {question.service}"
         self.health.take_answer(judgement.code, done, label, done - inquiry.arrival)
-        answer = Answer(judgement, inquiry.snapshot, identity)
-        self._sender.send(partial(inquiry.reply, answer))
+        self._sender.send(partial(inquiry.reply, judgement, identity))
         if not self._queue.open_count:
             self._patrol.cancel()
 

@@ -38,7 +38,6 @@ from rover_planner.parameters.traverse_server import FAN, TraverseServerParamete
 from rover_planner.planning.answering.budget import CANCELLED
 from rover_planner.planning.answering.judgement import PathJudgement
 from rover_planner.planning.answering.questions import (
-    Answer,
     Question,
     ask_about_path,
     ask_for_path,
@@ -249,8 +248,8 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
             "can_traverse", request.start, request.goal, request.tolerance
         )
 
-        def send(answer: Answer) -> None:
-            response.plan, _ = self.publish(answer.judgement, answer.identity)
+        def send(judged: PathJudgement, identity: IdentityReport) -> None:
+            response.plan, _ = self.publish(judged, identity)
             reply(response)
 
         self.desk.ask(question, send)
@@ -281,17 +280,14 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
     def _find_watched(self) -> Pose | None:
         """Return the pose (3,) of the body by /tf, else by odometry of just now."""
         try:
-            here = self.frames.find_here()
+            return self._inputs.find_here(MAX_POSE_AGE)
         except RoverError:  # it is stale
             return None
-        return self.service.fresh_pose(MAX_POSE_AGE) if here is None else here
 
     def _find_here(self) -> Pose:
         """Return the pose (3,) of the body by /tf, else by odometry."""
         self.heard.poll()
-        here = self.frames.find_here()
-        if here is None:
-            here = self.service.fresh_pose()
+        here = self._inputs.find_here()
         if here is None:
             raise MessageError(
                 "start is empty, which means where the rover is, but neither /tf nor odometry of "
@@ -304,10 +300,10 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
     ) -> None:
         path = self.service.given_path
 
-        def send(answer: Answer) -> None:
-            about = replace(answer.identity, path_hash=path.hash, path_stamp=path.stamp)
-            _, report = self.publish(answer.judgement, about)
-            response.success = answer.judgement.traversable
+        def send(judged: PathJudgement, identity: IdentityReport) -> None:
+            about = replace(identity, path_hash=path.hash, path_stamp=path.stamp)
+            _, report = self.publish(judged, about)
+            response.success = judged.traversable
             response.message = to_json(report().to_dict())
             reply(response)
 

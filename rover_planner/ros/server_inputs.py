@@ -15,12 +15,14 @@ from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.joints import read_joint_map
 from msg_adapters.sensing import BASE_FRAME
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
+from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.maps.ground_beneath import Standing
 from rover_planner.maps.known_map import stamp_text
 from rover_planner.maps.living_map import MapSnapshot
 from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.answering.measurements import MAX_AGE
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.answering.traverse_service import TraverseService
@@ -92,6 +94,15 @@ class ServerInputs:
         pose, _ = self.frames.take_odometry(odometry)
         z, roll, pitch = pose[2:5].tolist()
         self.service.take_pose(pose[[0, 1, 5]], (z, roll, pitch))
+
+    def find_here(self, max_age: float = MAX_AGE) -> Floats | None:
+        """Return the pose (3,) of the body by /tf, else by odometry that is not older [s].
+
+        Raises:
+            TransformError: The transform of /tf is stale.
+        """
+        here = self.frames.find_here()
+        return self.service.fresh_pose(max_age) if here is None else here
 
     def take_imu(self, imu: Any) -> None:
         """Take roll and pitch, if the parameter imu_attitude is set; see `take_odometry`.

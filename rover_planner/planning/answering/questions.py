@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The questions of the services as plain values, their answers, and what each is about."""
+"""The questions of the services as plain values, and what the answer to each is about."""
 
 import secrets
 from collections.abc import Callable
@@ -113,18 +113,6 @@ def ask_about_path(service: str, about: str, path: GivenPath) -> Question:
 def ask_in_vain(service: str, about: str, reason: str) -> Question:
     """Return what a request that cannot be read asks; its answer is the reason."""
     return Question(service, about, lambda _known: refusal("bad_request", reason))
-
-
-@dataclass(frozen=True, eq=False)
-class Answer:
-    """The answer to a question."""
-
-    judgement: Any
-    """A `PathJudgement` or `ReachAnswer`."""
-    snapshot: Snapshot
-    """Map, settings, path and measurements that it was judged by."""
-    identity: IdentityReport
-    """Its question, path and map."""
 
 
 @dataclass
