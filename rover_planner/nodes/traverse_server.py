@@ -136,7 +136,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         reliability = self.values.input_reliability
         subscribe_to_requests(self, Path, "~/path", self._take_path, reliability, raw=True)
         qos = replace_reliability(topic_qos(), reliability)
-        self.create_subscription(String, "~/ground_estimate", self._take_ground, qos)
+        hear(String, "~/ground_estimate", self._take_ground, qos)
         self.create_subscription(String, "~/mark_place", self._take_mark, qos)
 
     def _log_ready(self) -> None:
@@ -183,15 +183,10 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self._inputs.take_odometry(odometry)
         self._maps.look_under_rover()
 
-    def _take_ground(self, message: String) -> None:
+    def _take_ground(self, message: String, _arrival: float) -> None:
         """Take what was learned of the ground: JSON as the command learn writes it."""
-        now = self.get_clock().now().nanoseconds
-        try:
-            ground = parse_learned(message.data, "~/ground_estimate", stamp_text(now))
-        except RoverError as error:
-            self.get_logger().warning(f"not used: {error}", throttle_duration_sec=5.0)
-            return
-        self.service.take_ground(ground)
+        now = stamp_text(self.get_clock().now().nanoseconds)
+        self.service.take_ground(parse_learned(message.data, "~/ground_estimate", now))
 
     def _take_mark(self, message: String) -> None:
         """Take a place that is impassable from now on: JSON with x, y, radius, reason, date."""
