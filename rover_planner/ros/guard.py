@@ -62,7 +62,8 @@ class Guard:
         try:
             function()
         except Exception as error:
-            self.report(getattr(function, "__name__", "a callback"), error)
+            whole = getattr(function, "func", function)  # of a partial
+            self.report(getattr(whole, "__name__", "a callback"), error)
 
 
 class Handover:
