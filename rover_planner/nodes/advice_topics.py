@@ -2,7 +2,6 @@
 """The service ~/advise of the traverse server, and ~/advice, which grows as levers are tried."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -26,14 +25,6 @@ from rover_planner.ros.qos import latched_qos
 NOTHING_REFUSED = "no path was refused yet; ask ~/can_traverse or ~/check_path first"
 
 
-@dataclass(eq=False, kw_only=True)
-class Sought(Asked):
-    """Advice that was asked for."""
-
-    answer: Callable[[Any], None]
-    """Takes the advice or its refusal."""
-
-
 class AdviceTopics:
     """Seeks advice on the path that was refused last, in a thread that gives way to questions."""
 
@@ -43,7 +34,6 @@ class AdviceTopics:
         self._growing = node.create_publisher(String, "~/advice", latched_qos())
         self._queue = QuestionQueue(
             lambda sought: sought.question.judge(sought.budget.check),
-            lambda sought, found: sought.answer(found),
             node.handover.call,
             node.guard.report,
         )
@@ -77,7 +67,7 @@ class AdviceTopics:
 
         question = Question("advise", "", partial(self._seek, self._refused), _refuse)
         budget = Budget(self._node.values.advice_time)
-        self._queue.ask(Sought(question, budget, answer=answer), max_waiting=0)
+        self._queue.ask(Asked(question, budget, answer), max_waiting=0)
 
     def _seek(
         self, refused: PathJudgement | None, check: Callable[[], object]

@@ -49,8 +49,6 @@ sends them; called once, in the executor's thread."""
 class Inquiry(Asked):
     """A question that came to a node."""
 
-    reply: Reply
-    """Takes the answer."""
     snapshot: Snapshot
     """Map, settings, path and measurements; its map is that of the time of judging."""
     arrival: float
@@ -69,9 +67,7 @@ class QuestionDesk:
         self._register = Register()
         self.health = ServerHealth()
         """Counts of answers and faults."""
-        self._queue = QuestionQueue(
-            self._judge, self._answer, node.handover.call, node.guard.report
-        )
+        self._queue = QuestionQueue(self._judge, node.handover.call, node.guard.report)
         self._progress = node.create_publisher(DiagnosticArray, "~/search_progress", topic_qos())
         self._patrol = create_steady_timer(node, PATROL, self._refuse_overdue, starts=False)
 
@@ -87,7 +83,7 @@ class QuestionDesk:
         inquiry = Inquiry(
             question,
             Budget(values.time_budget),
-            reply=reply,
+            lambda judgement: self._answer(inquiry, judgement, reply),
             snapshot=replace(self._service.snapshot(self._ros_time), watch=self._watch()),
             arrival=time.monotonic(),
             ticket=self._maps.ticket(),
@@ -108,13 +104,13 @@ class QuestionDesk:
             with contextlib.suppress(NewerMapError):
                 return inquiry.question.judge(inquiry.snapshot)
 
-    def _answer(self, inquiry: Inquiry, judgement: Any) -> None:
+    def _answer(self, inquiry: Inquiry, judgement: Any, reply: Reply) -> None:
         """Hand the answer to a question to its service."""
         question, done = inquiry.question, time.monotonic()
         identity = self._register.identify(question.service, question.hash, inquiry.snapshot)
         label = f"{identity.request}, {question.service}"
         self.health.take_answer(judgement.code, done, label, done - inquiry.arrival)
-        self._sender.send(partial(inquiry.reply, judgement, identity))
+        self._sender.send(partial(reply, judgement, identity))
         if not self._queue.open_count:
             self._patrol.cancel()
 

@@ -26,6 +26,8 @@ class Asked:
     """The question."""
     budget: Budget
     """Its time."""
+    answer: Callable[[Any], object]
+    """Takes its judgement; called once, in the thread that asks."""
     has_begun: bool = False
     """True if the thread has begun to judge it."""
     is_closed: bool = False
@@ -41,7 +43,6 @@ class QuestionQueue:
     def __init__(
         self,
         judge: Callable[[Any], Any],
-        answer: Callable[[Any, Any], object],
         call: Callable[[Callable[[], None]], object],
         report: Callable[[str, Exception], str],
     ):
@@ -50,11 +51,10 @@ class QuestionQueue:
         Args:
             judge: Returns the judgement of an `Asked`; called in the thread. It may raise: a
                 RoverError refuses the request, any other error is one of this program.
-            answer: Takes an `Asked` and its judgement.
             call: Has the owner's thread call `finish`; called in the thread.
             report: Takes the place of an error of this program and the error; returns its text.
         """
-        self._judge, self._answer, self._call, self._report = judge, answer, call, report
+        self._judge, self._call, self._report = judge, call, report
         self._waiting: SimpleQueue[Asked | None] = SimpleQueue()
         self._judged: SimpleQueue[tuple[Asked, Any]] = SimpleQueue()
         self._open: list[Asked] = []
@@ -110,7 +110,7 @@ class QuestionQueue:
         if not asked.is_closed:
             asked.is_closed = True
             self._open.remove(asked)
-            self._answer(asked, judgement)
+            asked.answer(judgement)
 
     def _run(self) -> None:
         while (asked := self._waiting.get()) is not None:

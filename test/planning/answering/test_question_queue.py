@@ -52,14 +52,19 @@ class Desk:
         self.max_waiting = max_waiting
         self.queue = QuestionQueue(
             lambda asked: asked.question.judge(asked.budget),
-            lambda asked, judgement: self.told.append((asked.question.service, judgement)),
             lambda _finish: None,
             lambda place, error: f"{place}: {error!r}",
         )
 
     def ask(self, name, work, seconds: float = 20.0, clock=time.monotonic) -> None:
-        asked = Asked(Question(name, "", work, lambda code, _: code), Budget(seconds, clock))
-        self.queue.ask(asked, self.max_waiting)
+        question = Question(name, "", work, lambda code, _: code)
+        self.put(question, Budget(seconds, clock))
+
+    def put(self, question, budget) -> None:
+        def answer(judgement) -> None:
+            self.told.append((question.service, judgement))
+
+        self.queue.ask(Asked(question, budget, answer), self.max_waiting)
 
     def work(self, name, answer, seconds: float) -> Work:
         """Ask a question whose time begins with the work on it."""
@@ -138,8 +143,7 @@ def test_work_that_checks_nothing_is_refused_after_its_grace_and_its_answer_is_d
 def test_errors_of_the_input_are_bad_requests_and_others_internal_errors(desk):
     for name, error in (("one", PoseError("no pose")), ("two", KeyError("k"))):
         work = Mock(side_effect=error)
-        asked = Asked(Question(name, "", work, lambda *both: both), Budget(20.0))
-        desk.queue.ask(asked, 100)
+        desk.put(Question(name, "", work, lambda *both: both), Budget(20.0))
     first, second = (told for _, told in desk.wait(2))
     assert first == ("bad_request", "no pose")
     assert second == ("internal_error", "internal error: two: KeyError('k')")
