@@ -109,7 +109,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self.watch = PathWatch(self, self.service, self._find_watched, self._publish_stop)
         """Watches the accepted path."""
         self.urgent_threads = (self.watch.heartbeat_thread,)
-        self._hazards = HazardTopics(self, self.service, self.desk)
+        self._hazards = HazardTopics(self, self.service, self.desk.give_way)
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
         self._diagnostics_due = 0.0
         self._beats = create_steady_timer(self, PERIOD, self._beat)

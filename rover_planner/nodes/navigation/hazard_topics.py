@@ -3,6 +3,7 @@
 
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -16,7 +17,6 @@ from rover_physics.errors import RoverError
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.pose_classes import UNKNOWN, RoverOnMap
-from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.budget import STOPPING, QuestionStoppedError
 from rover_planner.planning.answering.service_settings import ServiceSettings
@@ -45,16 +45,16 @@ class HazardTopics:
         self,
         node: RoverNode[TraverseServerParameters],
         service: TraverseService,
-        desk: QuestionDesk,
+        give_way: Callable[[Callable[[], object], float], float],
     ):
         """Create topics, service and thread.
 
         Args:
             node: The node.
             service: Knows map, settings and pose.
-            desk: Its questions come first.
+            give_way: As `QuestionDesk.give_way`: questions come first.
         """
-        self._node, self._service, self._desk = node, service, desk
+        self._node, self._service, self._give_way = node, service, give_way
         self._log = TransitionLog(node.get_logger())
         self._shown: _Shown | None = None
         self._done: tuple[Terrain, ServiceSettings] | None = None
@@ -170,7 +170,7 @@ class HazardTopics:
 
     def _let_questions_go_first(self) -> None:
         """Wait while there are questions, for MAX_PAUSE in each SLICE; called between poses."""
-        self._patience -= self._desk.give_way(self._check_end, self._patience)
+        self._patience -= self._give_way(self._check_end, self._patience)
 
     def _show(self, hazards: HazardMap, map_hash: str, withdrawals: int) -> None:
         view = hazards.view()
