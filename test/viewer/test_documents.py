@@ -51,8 +51,9 @@ def test_the_values_of_a_lane_are_those_of_the_prediction_at_its_waypoints():
         limits.lane("friction").values[at], prediction.friction_utilisation.max(axis=1)
     )
     np.testing.assert_allclose(limits.lane("belly").values[at], 100.0 * prediction.belly_clearance)
-    wheels = limits.lane("torque").wheel[at]
-    np.testing.assert_array_equal(wheels, prediction.torque_saturation.argmax(axis=1))
+    links = np.array(limits.lane("torque").links)[at]
+    most_torque = prediction.torque_saturation.argmax(axis=1)
+    np.testing.assert_array_equal(links, np.array(WHEELS)[most_torque])
     uses = limits.lane("torque").wheels
     np.testing.assert_allclose(uses.max(axis=1), limits.lane("torque").used)
 
@@ -98,7 +99,7 @@ def test_board_lanes_curves_and_verdict_show_one_number_for_the_wheel_that_fails
     assert board["fails"] and board["bars"][0][2] == write_use(use)
     used = describe_uses(path, end)[codes.index("friction")]
     assert used["now"] == used["worst"] == write_use(use) and used["broken"]
-    assert used["wheel"] == failure.link.replace("_", " ") and used["wheel"] in failure.headline
+    assert used["link"] == failure.link.replace("_", " ") and used["link"] in failure.headline
     lane = describe_limits(path, None)["lanes"][codes.index("friction")]
     assert max(lane["wheels"]["y"][wheel]) == pytest.approx(use, abs=1e-3)
     assert max(lane["now"]["y"][0]) == pytest.approx(use, abs=1e-3)

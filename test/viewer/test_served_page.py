@@ -209,7 +209,7 @@ def test_the_ghost_of_a_failure_stays_for_the_next_one_and_hides_without(page):
         session.change_rover([("friction",)], friction)
         failure = session.shown.path.failure
         mark.show(LSR1, failure)
-        ghosts.append(canvas.nodes["/failure/links"])
+        ghosts.append(canvas.nodes["/failure/body"])
         np.testing.assert_allclose(
             ghosts[-1].position, canvas.to_scene(failure.state.position), rtol=1e-6
         )
@@ -249,7 +249,7 @@ def test_a_rover_of_another_shape_keeps_the_nodes_that_it_has_too(page):
     suspension = replace(LSR1.suspension, rocker_wheel="front")
     rover.take(replace(LSR1, suspension=suspension, manipulator=None), {})
     stays = {name for name in canvas.nodes if canvas.nodes[name] is before.get(name)}
-    assert "/test/rover/links/body" in stays and "/test/rover/links/arm" not in canvas.nodes
+    assert "/test/rover/body" in stays and "/test/rover/body/arm" not in canvas.nodes
     assert set(before) != set(canvas.nodes) and not any(
         canvas.nodes[name]._impl.removed for name in canvas.nodes
     )
@@ -372,7 +372,7 @@ def test_on_a_far_map_the_rover_is_where_it_is_on_a_near_one_and_a_click_lands_w
         page = Page(ViewSession(LSR1, ground, *ends, SURE), port=0)
         try:
             wait_for_rest(page)
-            places[x] = np.array(page.scene.canvas.nodes["/rover/links"].position)
+            places[x] = np.array(page.scene.canvas.nodes["/rover/body"].position)
             aim = np.array([x + 1.5, y + 0.5])
             place = page.scene.canvas.to_scene([*aim, float(ground.elevation_at(*aim))])
             away = np.array([-1.0, 0.0, 2.0])

@@ -97,13 +97,12 @@ def _describe_use(lane: Lane, limits: PathLimits, worst: int, here: int) -> dict
     limit = lane.limit.keep(kept) if np.isfinite(kept) else lane.limit
     used = float(lane.used[worst]) if worst >= 0 else np.nan
     value = float(lane.values[worst]) if worst >= 0 else np.nan
-    wheel = int(lane.wheel[worst]) if worst >= 0 and used > 0.0 else -1
     return {
         "now": write_use(float(lane.used[here])),
         "worst": write_use(used),
         "broken": bool(used > 1.0),
         "value": "" if np.isnan(value) else f"{limit.write(value)}, {limit.good}",
-        "wheel": WHEELS[wheel].replace("_", " ") if wheel >= 0 else "",
+        "link": lane.links[worst].replace("_", " ") if worst >= 0 and used > 0.0 else "",
     }
 
 

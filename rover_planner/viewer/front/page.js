@@ -324,7 +324,7 @@ function drawUses() {
     row.toggleAttribute("data-broken", use.broken);
     row.toggleAttribute("data-chosen", row.dataset.code === chosen.lane);
     row.children[2].textContent = use.now;
-    row.children[3].textContent = [`worst ${use.worst}`, use.value, use.wheel].filter(Boolean).join(", ");
+    row.children[3].textContent = [`worst ${use.worst}`, use.value, use.link].filter(Boolean).join(", ");
   });
 }
 

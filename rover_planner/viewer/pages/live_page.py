@@ -21,7 +21,6 @@ from rover_planner.viewer.live.live_state import (
 )
 from rover_planner.viewer.pages.base import Answer, PageBase
 from rover_planner.viewer.pages.sharing import read_link
-from rover_planner.viewer.scene.ground_mesh import PaintRequest
 from rover_planner.viewer.scene.scene import START
 from rover_planner.viewer.state.drive import RoverState
 from rover_planner.viewer.state.layers import LayerRequest
@@ -76,10 +75,10 @@ class LivePage(PageBase):
             "open": lambda words: _refuse_link(words["query"]),
         }
 
-    def describe_ground(self) -> PaintRequest | None:
+    def describe_ground(self) -> LayerRequest | None:
         """Return the ground as it is known."""
-        layer = LayerRequest(self._rover, self.ground, self.colouring)
-        return PaintRequest(layer, self.scene.canvas.origin) if self._ground_name else None
+        known = bool(self._ground_name)
+        return LayerRequest(self._rover, self.ground, self.colouring) if known else None
 
     @property
     def points(self) -> Floats:

@@ -49,7 +49,6 @@ from rover_planner.viewer.pages.sharing import (
     write_file,
     write_link,
 )
-from rover_planner.viewer.scene.ground_mesh import PaintRequest
 from rover_planner.viewer.scene.overlays import GHOST
 from rover_planner.viewer.scene.scene import FIT
 from rover_planner.viewer.state.drive import SPEEDS, Playback
@@ -113,12 +112,11 @@ class Page(PageBase):
         session.judge_again()  # with the search that was not made
         self.thread.start()
 
-    def describe_ground(self) -> PaintRequest:
+    def describe_ground(self) -> LayerRequest:
         """Return the ground with what is shown on it."""
         path, now = self.session.shown.path.poses, self.session.shown.scenario
         options = now.asked_options.model
-        layer = LayerRequest(now.rover, now.terrain, self.colouring, options, path)
-        return PaintRequest(layer, self.scene.canvas.origin, self.survey)
+        return LayerRequest(now.rover, now.terrain, self.colouring, options, path)
 
     @property
     def points(self) -> Floats:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The limits as people read them, their use along a path, and where the path first fails."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from rover_physics.chance.failure_chance import FailureChance
 from rover_physics.limits.table import CHANCE, RATIO, Sense, Unit
-from rover_physics.names import SIDES, WHEEL_POSITIONS, WHEELS
+from rover_physics.names import WHEEL_POSITIONS, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.record import find_column, numbers_of
@@ -31,16 +32,11 @@ BODY = "body"
 BODY_CODES = ("tilt", "tip_over", "belly")
 """Codes of limits of the body."""
 TITLES = {
-    "steering": "steering",
     "off_map": "off the map",
-    "unknown_ground": "unknown ground",
     "not_settled": "does not settle",
-    "no_equilibrium": "no equilibrium",
-    "not_computable": "not computable",
-    "trapped": "trapped",
     CHANCE: "chance of failure above what is accepted",
 }
-"""Short names of the codes of a verdict that have no number."""
+"""Short names of codes without a number; others are their own."""
 ON_THE_WAY = "on the way here: "
 """Beginning of the reason of a failure between waypoints."""
 
@@ -129,8 +125,8 @@ class Lane:
     used: Floats
     """Use of the limit: 1 at the limit, above 1 where it is broken, NaN where it does
     not count or is not known."""
-    wheel: NDArray[np.int64]
-    """Index of the wheel concerned, -1 for none."""
+    links: Sequence[str]
+    """The wheel or joint concerned, such as rear_left or rocker_left; empty for none."""
     wheels: Floats | None = None
     """(m, 6) use by each wheel; None if the limit is not one value for each wheel."""
 
@@ -204,7 +200,7 @@ def find_path_limits(rover: Rover, prediction: PathPrediction, verdict: Verdict)
 
 def _plain_lane(code: str, title: str, used: Floats) -> Lane:
     """Return the lane of a use (m,) that has neither a value nor a wheel."""
-    return Lane(ShownLimit(code, title), np.full(len(used), np.nan), used, np.full(len(used), -1))
+    return Lane(ShownLimit(code, title), np.full(len(used), np.nan), used, [""] * len(used))
 
 
 def _show_limit(uses: Uses, of_limit: NDArray[np.int64]) -> ShownLimit:
@@ -228,9 +224,18 @@ def _make_lane(rows: AskedPoses, uses: Uses, of_limit: NDArray[np.int64]) -> Lan
         column = find_column(uses.limits.rows[of_limit[0]].reads)[0]
         element = np.maximum(uses.element[every, decides], 0)
         values = limit.unit.factor * numbers_of(prediction.results)[every, column + element]
-    wheel = [find_wheel(prediction, uses, row, int(k)) for row, k in enumerate(decides)]
+    links = [_name_link(prediction, uses, row, int(k)) for row, k in enumerate(decides)]
     by_wheel = _find_wheel_uses(prediction, uses, int(of_limit[0])) if len(of_limit) == 1 else None
-    return Lane(limit, values, used, np.array(wheel, np.int64), by_wheel)
+    return Lane(limit, values, used, links, by_wheel)
+
+
+def _name_link(prediction: PathPrediction, uses: Uses, row: int, k: int) -> str:
+    """Return the wheel or joint that decides limit k at a row; empty for none."""
+    limit, element = uses.limits.rows[k], int(uses.element[row, k])
+    if limit.elements and element >= 0:
+        return f"{limit.reads.removesuffix('_angle')}_{limit.elements[element]}"
+    wheel = find_wheel(prediction, uses, row, k)
+    return WHEELS[wheel] if wheel >= 0 else ""
 
 
 def _find_wheel_uses(prediction: PathPrediction, uses: Uses, k: int) -> Floats | None:
@@ -305,8 +310,8 @@ class Failure:
         """The value beside the limit, such as "friction 1.32 of 1.00, middle left wheel"."""
         if not np.isnan(self.value):
             words = self.limit.compare(self.value)
-        elif self.code in TITLES:
-            words = TITLES[self.code]
+        elif self.code and self.limit.code == GROUND:
+            words = TITLES.get(self.code, self.code.replace("_", " "))
         else:
             return self.reason.removeprefix(ON_THE_WAY)
         return f"{words}, {self.where}" if self.where else words
@@ -330,13 +335,13 @@ def find_failure(rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathL
     here, value = rows.prediction.select([at]), float(lane.values[at])
     limit = lane.limit.keep(float(here.results["kept_share"][0]))
     explains = limit.is_broken_by(value)
+    link = lane.links[at] if explains or verdict.code == "suspension" else ""
     return Failure(
         code=verdict.code,
         reason=verdict.reason,
         limit=limit,
         value=value if explains else np.nan,
-        link=_find_link(rover, terrain, verdict.code, rows, at)
-        or (WHEELS[lane.wheel[at]] if explains and lane.wheel[at] >= 0 else ""),
+        link=link or _find_link(rover, terrain, verdict.code, rows, at),
         distance=float(rows.distance[at]),
         time=float(rows.time[at]),
         is_between=bool(rows.is_between[at]),
@@ -358,22 +363,16 @@ def level_state(rover: Rover, terrain: Terrain, rows: AskedPoses, at: int) -> Ro
 
 
 def _find_link(rover: Rover, terrain: Terrain, code: str, rows: AskedPoses, at: int) -> str:
-    """Return the link that fails at a row; empty if the wheel that decides the limit does."""
-    part = rows.prediction
+    """Return the link that fails at a row where no lane names one; empty for none."""
     if code in BODY_CODES:
         return BODY
-    if code == "suspension":
-        joints = np.hstack([part.rocker_angle[at], part.bogie_angle[at]])
-        limits = rover.suspension.rocker_limits, rover.suspension.bogie_limits
-        low, high = np.repeat(limits, 2, axis=0).T
-        joint = int(np.argmin(np.minimum(joints - low, high - joints)))
-        return f"{('rocker', 'bogie')[joint // 2]}_{SIDES[joint % 2]}"
     if code in ("off_map", "unknown_ground"):
         return _find_lost_wheel(rover, terrain, level_state(rover, terrain, rows, at))
     if code == "steering" and rover.steering is not None:
         turns = np.tile([name in rover.steering.wheels for name in WHEEL_POSITIONS], 2)
         allowed = np.where(turns, rover.steering.limit, 0.0)
-        return WHEELS[int(np.argmax(np.abs(part.steering_angle[at]) - allowed))]
+        angles = rows.prediction.steering_angle[at]
+        return WHEELS[int(np.argmax(np.abs(angles) - allowed))]
     return ""
 
 
