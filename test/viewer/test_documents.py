@@ -18,10 +18,10 @@ from rover_planner.viewer.documents.drive import (
     describe_limits,
     describe_uses,
 )
-from rover_planner.viewer.documents.numbers import plain
 from rover_planner.viewer.documents.rover import compare_drives, describe_sliders, read_values
 from rover_planner.viewer.documents.verdict import describe_paths, describe_verdict
-from rover_planner.viewer.state.path_limits import ShownLimit, write_use
+from rover_planner.viewer.state.numbers import plain, write_use
+from rover_planner.viewer.state.path_limits import ShownLimit
 from rover_planner.viewer.state.scenario import Judged
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import gap, make_terrain, wall_at, waves

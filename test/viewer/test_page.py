@@ -24,7 +24,7 @@ pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.pages.sharing import KEY
-from rover_planner.viewer.state.path_limits import write_use
+from rover_planner.viewer.state.numbers import write_use
 
 pytestmark = [needs_browser, pytest.mark.slow]
 

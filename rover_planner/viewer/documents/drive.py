@@ -12,10 +12,10 @@ from rover_physics.chance.failure_chance import FailureChance
 from rover_physics.limits.table import CHANCE
 from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
-from rover_planner.viewer.documents.numbers import plain, write
 from rover_planner.viewer.state.colours import colour_use, to_css
 from rover_planner.viewer.state.drive import RoverState
-from rover_planner.viewer.state.path_limits import MAX_USE, Lane, PathLimits, write_use
+from rover_planner.viewer.state.numbers import MAX_USE, plain, write, write_use
+from rover_planner.viewer.state.path_limits import Lane, PathLimits
 from rover_planner.viewer.state.scenario import Judged
 
 MAX_POINTS = 240
@@ -101,7 +101,7 @@ def _describe_use(lane: Lane, limits: PathLimits, worst: int, here: int) -> dict
         "now": write_use(float(lane.used[here])),
         "worst": write_use(used),
         "broken": bool(used > 1.0),
-        "value": "" if np.isnan(value) else f"{limit.write(value)}, {limit.good}",
+        "value": "" if np.isnan(value) else f"{write(value, limit.unit.digits)}, {limit.good}",
         "link": lane.links[worst].replace("_", " ") if worst >= 0 and used > 0.0 else "",
     }
 

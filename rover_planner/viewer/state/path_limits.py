@@ -20,11 +20,10 @@ from rover_physics.traversability.classification import find_wheel
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.planning.asked_poses import AskedPoses, merge_poses
 from rover_planner.viewer.state.drive import RoverState, place_state
+from rover_planner.viewer.state.numbers import write
 
 GROUND = "ground"
 """Code of what is no limit of a number: unknown ground, no equilibrium, entrapment, steering."""
-MAX_USE = 99.0
-"""Largest use that is written as a number."""
 MORE_DIGITS = 2
 """Most digits beyond those of the unit that tell a value from its limit; else words do."""
 BODY = "body"
@@ -73,12 +72,6 @@ class ShownLimit:
             return False
         return value < self.bound if self.is_lowest else value > self.bound
 
-    def write(self, value: float, more: int = 0) -> str:
-        """Return a value as text, without the unit and with more digits; ? for NaN."""
-        if np.isfinite(value):
-            return f"{value:.{self.unit.digits + more}f}"
-        return "?" if np.isnan(value) else "infinite"
-
     def compare(self, value: float) -> str:
         """Return a value beside the limit, such as "friction 1.32 of 1.00", with enough digits.
 
@@ -87,13 +80,13 @@ class ShownLimit:
         if self.bound is None:
             return self.title
         unit, bound = f" {self.unit.name}".rstrip(), self.bound
-        for more in range(MORE_DIGITS + 1):
-            shown, limit = self.write(value, more), self.write(bound, more)
+        for digits in range(self.unit.digits, self.unit.digits + MORE_DIGITS + 1):
+            shown, limit = write(value, digits), write(bound, digits)
             if shown != limit:
                 least = "at least " if self.is_lowest else ""
                 return f"{self.title} {shown} of {least}{limit}{unit}"
         side = "at" if value == bound else "just above" if value > bound else "just below"
-        return f"{self.title} {side} {self.write(bound)}{unit}"
+        return f"{self.title} {side} {write(bound, self.unit.digits)}{unit}"
 
     @property
     def good(self) -> str:
@@ -101,17 +94,7 @@ class ShownLimit:
         if self.bound is None:
             return ""
         word = "min" if self.is_lowest else "max"
-        return f"{word} {self.write(self.bound)} {self.unit.name}".strip()
-
-
-def write_use(use: float) -> str:
-    """Return the use of a limit as text, such as "76 %"."""
-    if np.isnan(use):
-        return "not asked"
-    if use > MAX_USE:
-        return "fails" if np.isinf(use) else f"over {100.0 * MAX_USE:.0f} %"
-    text = f"{100.0 * use:.0f} %"
-    return "just above 100 %" if use > 1.0 and text == "100 %" else text
+        return f"{word} {write(self.bound, self.unit.digits, self.unit.name)}"
 
 
 @dataclass(frozen=True, eq=False)
