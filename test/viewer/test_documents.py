@@ -23,7 +23,6 @@ from rover_planner.viewer.documents.verdict import describe_paths, describe_verd
 from rover_planner.viewer.state.numbers import plain, write_use
 from rover_planner.viewer.state.path_limits import ShownLimit
 from rover_planner.viewer.state.scenario import Judged
-from rover_planner.viewer.state.session import ViewSession
 from support.grounds import gap, make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, SURE, ramp, session_on
 
@@ -36,8 +35,7 @@ def stepped(x, y):
 def judged_on(height, start=-1.0, **options) -> Judged:
     """Return a straight path to x = 1 m over a ground, judged."""
     options = SURE.change(count=1, **options)
-    ends = (start, 0.0, 0.0), (start + 2.0, 0.0, 0.0)
-    return ViewSession(LSR1, make_terrain(height), *ends, options).shown.path
+    return session_on(height, (start, 0.0, 0.0), (start + 2.0, 0.0, 0.0), options).shown.path
 
 
 # Limits along a path.
@@ -107,10 +105,8 @@ def test_board_lanes_curves_and_verdict_show_one_number_for_the_wheel_that_fails
 
 
 def list_paths_of(path: Judged) -> dict:
-    session = ViewSession(
-        LSR1, path.scenario.terrain, path.scenario.start, path.scenario.goal,
-        path.scenario.options,
-    )  # fmt: skip
+    asked = path.scenario
+    session = session_on(asked.terrain, asked.start, asked.goal, asked.options)
     return describe_paths(session.shown)["rows"][0]
 
 
@@ -152,7 +148,7 @@ def test_the_lanes_of_the_reference_stand_below_those_of_now():
 
 
 def test_the_chance_of_failure_is_a_lane_of_its_own_with_its_main_cause():
-    session = ViewSession(LSR1, make_terrain(ramp), (-2.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    session = session_on(ramp, options=None)
     session.change_rover([("friction",)], 0.55)
     shown = session.shown
     asked = shown.scenario
@@ -176,7 +172,7 @@ def test_the_chance_of_failure_is_a_lane_of_its_own_with_its_main_cause():
 
 
 def test_the_chance_of_a_path_that_is_refused_is_that_up_to_its_failure():
-    session = ViewSession(LSR1, make_terrain(wall_at(0.5)), (-2.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    session = session_on(wall_at(0.5), options=None)
     session.judge_again()
     shown = session.shown
     assert len(shown.chance.at) == shown.verdict.first_failure + 1 < len(shown.path.poses)
@@ -291,8 +287,8 @@ def test_the_numbers_of_the_only_path_are_those_up_to_its_failure():
     def slope_beyond(x, y):
         return gap(x, y) + 0.5 * np.maximum(x - 1.0, 0.0)
 
-    ground, ends = make_terrain(slope_beyond), ((-1.5, 0.0, 0.0), (2.5, 0.0, 0.0))
-    session = ViewSession(LSR1, ground, *ends, PathQueryOptions(count=1))
+    ground, options = make_terrain(slope_beyond), PathQueryOptions(count=1)
+    session = session_on(ground, (-1.5, 0.0, 0.0), (2.5, 0.0, 0.0), options)
     poses = session.shown.path.poses
     prediction, verdict = judge_path(LSR1, ground, poses)
     assert verdict.max_tilt > 0.4

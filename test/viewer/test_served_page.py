@@ -15,13 +15,11 @@ from websockets.sync.client import connect
 from rover_physics.names import WHEELS
 from rover_planner.studies.rover_values import write_rover
 from rover_planner.viewer.pages.sharing import read_link, write_link
-from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, waves
 from support.viewer.sessions import (
     FAR,
     LSR1,
     PATIENCE,
-    SURE,
     ask,
     held,
     is_at_rest,
@@ -368,8 +366,7 @@ def test_on_a_far_map_the_rover_is_where_it_is_on_a_near_one_and_a_click_lands_w
     places = {}
     for x, y in ((0.0, 0.0), FAR):
         ground = shift(make_terrain(waves), (x, y))
-        ends = (x - 2.0, y, 0.0), (x + 1.0, y, 0.0)
-        page = Page(ViewSession(LSR1, ground, *ends, SURE), port=0)
+        page = Page(session_on(ground, (x - 2.0, y, 0.0), (x + 1.0, y, 0.0)), port=0)
         try:
             wait_for_rest(page)
             places[x] = np.array(page.scene.canvas.nodes["/rover/body"].position)

@@ -152,8 +152,7 @@ class PageBase(ABC):
         self._camera = gui.add_button_group("View", (*VIEWS, FOLLOW))
         self._camera.on_click(self._request_view)
         for key, (label, words) in HOTKEYS.items():
-            ask = partial(self.hear, words)
-            gui.add_command(label, hotkey=key).on_trigger(lambda _event, ask=ask: ask(None))
+            gui.add_command(label, hotkey=key).on_trigger(partial(self._press, words))
         self.server.on_client_connect(lambda client: self._look([client], START))
         self.server.scene.on_click()(partial(self._request_click, shift=False))
         self.server.scene.on_click(modifier="shift")(partial(self._request_click, shift=True))
@@ -288,6 +287,9 @@ class PageBase(ABC):
     def _show_forces(self, words: Words) -> None:
         self.forces = bool(words["shown"])
         self.scene.show_forces(self.forces)
+
+    def _press(self, words: Words, _event: Any) -> None:
+        self.hear(words, None)
 
     def _request_view(self, event: Any) -> None:
         client, name = event.client, event.target.value

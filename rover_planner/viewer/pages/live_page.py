@@ -108,15 +108,11 @@ class LivePage(PageBase):
         tell("chosen", self.list_chosen())
         tell("learned", describe_learned(data.learned))
         trail = None if data.learned is None else data.learned.places
-        draw, old = self.draw_made, bool(answer["old"])
-        draw("the trail is not drawn", self._draw_trail, trail, self.ground)
-        draw("the plan is not drawn", self._draw_plan, plan, old, self.ground)
-
-    def _draw_trail(self, trail: Floats | None, _ground: Terrain) -> None:
-        self.scene.paths.show_trail(trail)
-
-    def _draw_plan(self, plan: Floats | None, is_old: bool, _ground: Terrain) -> None:
-        self.scene.paths.show_plan(plan, is_old)
+        draw, old, paths = self.draw_made, bool(answer["old"]), self.scene.paths
+        draw("the trail is not drawn", lambda *_: paths.show_trail(trail), trail, self.ground)
+        draw(
+            "the plan is not drawn", lambda *_: paths.show_plan(plan, old), plan, old, self.ground
+        )
 
     def advance(self, seconds: float) -> None:
         """Show the latest data."""

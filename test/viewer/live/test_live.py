@@ -80,6 +80,15 @@ def odometry(x=1.0, y=2.0, z=0.3, speed=0.05) -> Odometry:
     return message
 
 
+def publish_until(publisher, message, condition, what: str) -> None:
+    """Publish a message again and again, until it has had its effect."""
+    repeat_until(lambda: publisher.publish(message), condition, what)
+
+
+def has_place(listener) -> bool:
+    return listener.latest().position is not None
+
+
 def test_the_state_has_the_measured_joints(listener, talker):
     angles = {"rocker_right": 0.1, "rocker_left": -0.1, "bogie_right": 0.2, "bogie_left": -0.05}
     state = JointState(name=[*angles, *WHEEL_JOINTS])
@@ -106,16 +115,8 @@ def test_the_energy_is_torque_times_rate_times_time(listener, talker):
         message.header.stamp.sec = second
         return message
 
-    repeat_until(
-        lambda: talker.joints.publish(state(10)),
-        lambda: listener.latest().efforts,
-        "the first state",
-    )
-    repeat_until(
-        lambda: talker.joints.publish(state(12)),
-        lambda: listener.latest().time == 2.0,
-        "two seconds",
-    )
+    publish_until(talker.joints, state(10), lambda: listener.latest().efforts, "the first state")
+    publish_until(talker.joints, state(12), lambda: listener.latest().time == 2.0, "two seconds")
     assert listener.latest().energy == pytest.approx(6 * 0.5 * 1.0 * 2.0)
 
 
@@ -129,11 +130,7 @@ def test_estimates_of_the_controller_take_precedence_over_predictions(listener, 
         received.append(listener.latest())
         return "controller" in received[-1].forces_from
 
-    repeat_until(
-        lambda: talker.estimated.publish(labelled_array(loads, "wheel")),
-        is_estimated,
-        "the controller",
-    )
+    publish_until(talker.estimated, labelled_array(loads, "wheel"), is_estimated, "the controller")
     np.testing.assert_allclose(received[-1].forces["wheel_loads"], loads)
 
 
@@ -159,11 +156,7 @@ def test_invalid_messages_are_skipped_and_values_without_a_topic_are_nan(ros, li
     talker.joints.publish(broken)
     talker.odometry.publish(odometry(x=float("inf")))
     talker.estimated.publish(Float64MultiArray(data=[1.0]))
-    repeat_until(
-        lambda: talker.odometry.publish(odometry()),
-        lambda: listener.latest().position is not None,
-        "good odometry",
-    )
+    publish_until(talker.odometry, odometry(), lambda: has_place(listener), "good odometry")
     assert ros.is_alive(listener)
     assert "rocker_right" not in listener.latest().joints
     state = read_state(LSR1, listener.latest())
@@ -175,22 +168,19 @@ def test_invalid_messages_are_skipped_and_values_without_a_topic_are_nan(ros, li
 
 def test_what_was_learned_of_the_ground_is_told_with_the_places_where_it_was(listener, talker):
     estimates = talker.create_publisher(String, "/traverse_server/ground_estimate", latched_qos())
-    learned = lambda: listener.latest().learned  # noqa: E731
+
+    def learned():
+        return listener.latest().learned
 
     def is_at(x: float) -> bool:
-        position = listener.latest().position
-        return position is not None and position[0] == x
+        return has_place(listener) and listener.latest().position[0] == x
 
     friction = {"mean": 0.8, "std": 0.1, "low": 0.35, "high": None}
     for x, high, words in (
         (0.0, None, "friction at least 0.35: no wheel has slipped yet"),
         (0.5, 0.9, "friction 0.80, give or take 0.10: wheels have slipped"),
     ):
-        repeat_until(
-            lambda x=x: talker.odometry.publish(odometry(x, 0.0)),
-            lambda x=x: is_at(x),
-            "the place",
-        )
+        publish_until(talker.odometry, odometry(x, 0.0), lambda x=x: is_at(x), "the place")
         estimates.publish(String(data=json.dumps({"friction": {**friction, "high": high}})))
         wait_until(lambda words=words: words in describe_learned(learned()), words)
     np.testing.assert_allclose(learned().places, [[0.0, 0.0, 0.35], [0.5, 0.0, 0.8]])
@@ -209,11 +199,7 @@ def test_a_trail_keeps_places_a_step_apart_and_the_newest_of_many():
 
 def test_a_plan_needs_odometry_and_a_server(listener, talker):
     assert "odometry" in listener.request_plan(np.zeros(2))
-    repeat_until(
-        lambda: talker.odometry.publish(odometry()),
-        lambda: listener.latest().position is not None,
-        "odometry",
-    )
+    publish_until(talker.odometry, odometry(), lambda: has_place(listener), "odometry")
     assert "can_traverse" in listener.request_plan(np.zeros(2))
 
 
