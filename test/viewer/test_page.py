@@ -74,14 +74,8 @@ def test_the_page_opens_with_verdict_board_and_limits_on_the_screen_of_a_laptop(
     assert len(loads) == 6 and sum(loads) == pytest.approx(LSR1.weight, rel=0.1)
     for word in ("lsr1", NAME, "firm, friction 0.8", "planning"):
         assert word in visitor.text("#subject")
-    for selector in (
-        "#verdict",
-        "#board .wheels",
-        "#board .numbers",
-        "#limits",
-        "#drive",
-        "#scene",
-    ):
+    parts = "#verdict", "#board .wheels", "#board .numbers", "#limits", "#drive", "#scene"
+    for selector in parts:
         assert visitor.is_on_screen(selector), selector
     assert visitor.tab.title() == f"lsr1 on {NAME}"
 

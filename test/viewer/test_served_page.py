@@ -69,6 +69,13 @@ def change_friction(page: Page, friction: float) -> None:
     page.hear({"ask": "value", "label": FRICTION, "value": friction}, None)
 
 
+def set_friction(page: Page, friction: float) -> None:
+    """Change the friction, and wait until that is judged and shown."""
+    change_friction(page, friction)
+    wait_until(lambda: page.session.wanted.rover.friction == friction, "the value")
+    wait_for_rest(page)
+
+
 def fail(*_arguments) -> None:
     raise ValueError("a line of <no> points")
 
@@ -108,9 +115,7 @@ def test_another_site_gets_no_channel(page):
 
 def test_a_changed_number_is_told_with_what_it_changes_and_can_be_undone_and_reset(page):
     for friction in (0.75, 0.7):
-        change_friction(page, friction)
-        wait_until(lambda f=friction: page.session.wanted.rover.friction == f, "the value")
-        wait_for_rest(page)
+        set_friction(page, friction)
     assert told(page, "subject")["rover"] == "lsr1 (changed)"
     assert told(page, "changes")["rover"] == [["friction [-]", "0.8", "0.7"]]
     assert told(page, "limits")["compared"]
@@ -156,12 +161,8 @@ def test_while_a_change_is_judged_the_verdict_and_the_paths_are_grey_and_it_can_
         page.hear({"ask": "cancel"}, None)
         wait_until(lambda: session.is_stopped, "the end of the work")
     wait_until(lambda: told(page, "verdict")["stopped"], "the button to judge again")
-    wait_until(
-        lambda: (
-            {row["waits"] for row in told(page, "paths")["rows"]} == {"old, was not judged again"}
-        ),
-        "rows that say so",
-    )
+    waits = lambda: {row["waits"] for row in told(page, "paths")["rows"]}  # noqa: E731
+    wait_until(lambda: waits() == {"old, was not judged again"}, "rows that say so")
     page.hear({"ask": "judge"}, None)
     wait_for_rest(page)
     wait_until(lambda: not told(page, "verdict")["old"], "the new verdict")
@@ -425,9 +426,7 @@ def test_path_and_time_of_a_link_come_with_its_paths_and_not_with_a_later_goal(p
 
 
 def test_a_program_that_was_started_again_takes_up_the_link_that_the_last_one_told(page):
-    change_friction(page, 0.7)
-    wait_until(lambda: page.session.wanted.rover.friction == 0.7, "the value")
-    wait_for_rest(page)
+    set_friction(page, 0.7)
     wait_until(lambda: read_link(told(page, "current")).rover["friction"] == 0.7, "the link")
     again = Page(session_on(ramp), port=0)
     try:

@@ -479,9 +479,8 @@ function openTab(name) {
 }
 
 // Space and arrows belong to the drive, unless a control was reached by the keyboard.
-const KEYS = { " ": { ask: "toggle" }, ArrowLeft: { ask: "step", by: -1 }, ArrowRight: { ask: "step", by: 1 }, Home: { ask: "seek", time: 0 } };
 document.addEventListener("keydown", (event) => {
-  const target = event.target, question = KEYS[event.key];
+  const target = event.target, question = state.scene?.keys[event.code?.toLowerCase()];
   const typed = target.matches("input, select, summary") || target.matches("button:focus-visible");
   if (!question || typed || event.ctrlKey || event.altKey) return;
   event.preventDefault();

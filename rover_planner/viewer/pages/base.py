@@ -55,7 +55,7 @@ HOTKEYS: dict[Any, tuple[str, Words]] = {
     "arrowright": ("Step", {"ask": "step", "by": 1}),
     "home": ("To the start", {"ask": "seek", "time": 0.0}),
 }
-"""What keys ask while the scene has the focus; page.js does the same elsewhere."""
+"""What keys ask, by the name of the key in small letters."""
 CONTINUOUS = ("value", "seek", "place")
 """Words that come dozens of times a second while a slider is dragged."""
 MAX_PORT = 65535
@@ -139,7 +139,8 @@ class PageBase(ABC):
         self.scene.rover.take(rover, {})
         self._add_camera()
         self.painter = self.begin_work(partial(paint, survey=survey), self._draw_ground, "ground")
-        self.channel.tell("scene", {"port": self.server.get_port()})
+        keys = {key: words for key, (_, words) in HOTKEYS.items()}
+        self.channel.tell("scene", {"port": self.server.get_port(), "keys": keys})
         self._last = time.monotonic()
         self.thread = threading.Thread(target=self._run, name="page", daemon=True)
         """Changes the page."""

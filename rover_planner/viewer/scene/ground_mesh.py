@@ -64,7 +64,8 @@ def draw_picture(grid: GroundGrid, ground: ColouredGround) -> NDArray[np.uint8]:
     """
     x, y = grid.pixels
     light = hill_shade(grid.heights, grid.step) / LEVEL_SHADE
-    factor = grid.refine(np.clip(np.nan_to_num(light, nan=1.0), *SHADES))
+    light = np.clip(np.nan_to_num(light, nan=1.0), *SHADES)
+    factor = grid.refine(light.astype(np.float32))  # a whole picture of them: half the memory
     if ground.beyond is not None:
         period = max(MIN_PERIOD, round(HATCH_PERIOD / (x[1] - x[0])))
         row, column = (np.arange(len(at), dtype=np.int16) for at in (y, x))
