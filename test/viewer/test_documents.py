@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics.names import EQUAL, OPTIMAL, SERVO, WHEELS
+from rover_physics.names import EQUAL, OPTIMAL, SERVO, SIDES, WHEELS
 from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from rover_planner.planning.path_query import PathQueryOptions
@@ -265,6 +265,17 @@ def test_where_the_rover_does_not_settle_a_level_one_stands_and_the_wheel_beyond
     prediction = judged_on(lambda x, y: 0.0 * x).candidate.prediction
     right = prediction.wheel_centres[0] - prediction.position[0]
     np.testing.assert_allclose(np.abs(wheels), np.abs(right), atol=0.01)
+
+
+def test_the_joint_that_ends_a_path_is_named_by_its_failure_and_by_the_uses():
+    rover = replace(LSR1, suspension=replace(LSR1.suspension, bogie_limits=(-0.01, 0.01)))
+    path = session_on(waves, options=SURE.change(count=1), rover=rover).shown.path
+    failure = path.failure
+    turned = np.abs(failure.state.here.bogie_angle[0])
+    assert failure.code == "suspension" and turned.max() > 0.01
+    assert failure.link == f"bogie_{SIDES[int(turned.argmax())]}"
+    joints = [lane.limit.code for lane in path.limits.lanes].index("suspension")
+    assert describe_uses(path, np.inf)[joints]["link"] == failure.link.replace("_", " ")
 
 
 @pytest.mark.parametrize("start", [-1.0, 0.4])
