@@ -141,12 +141,11 @@ class DrawnRover:
             turns[f"rocker_{side}"] = wxyz_about_y(float(state.rocker_angle[k]))
             turns[f"bogie_{side}"] = wxyz_about_y(float(state.bogie_angle[k]))
         used = dict(zip(WHEELS, map(colours.colour_use, state.friction_use), strict=True))
-        for link, (node, own) in self.meshes.items():
-            fails = link == failing
-            values = {"color": colours.REFUSED if fails else used.get(link, own)}
-            values |= {"wxyz": turns[link]} if link in turns else {}
+        for link, turn in turns.items():
+            (node, own), fails = self.meshes[link], link == failing
+            colour = colours.REFUSED if fails else used.get(link, own)
             opacity = 1.0 if fails else self._opacity
-            self._canvas.change(node, opacity=opacity, **values)
+            self._canvas.change(node, color=colour, opacity=opacity, wxyz=turn)
         self._canvas.change(self.meshes[BODY][0], position=self._canvas.to_scene(state.position))
 
     def _draw_forces(self, state: RoverState, rover: Rover) -> None:
