@@ -49,7 +49,7 @@ def test_the_values_of_a_lane_are_those_of_the_prediction_at_its_waypoints():
         limits.lane("friction").values[at], prediction.friction_utilisation.max(axis=1)
     )
     np.testing.assert_allclose(limits.lane("belly").values[at], 100.0 * prediction.belly_clearance)
-    links = np.array(limits.lane("torque").links)[at]
+    links = [limits.find_link(limits.lane("torque"), row) for row in np.flatnonzero(at)]
     most_torque = prediction.torque_saturation.argmax(axis=1)
     np.testing.assert_array_equal(links, np.array(WHEELS)[most_torque])
     uses = limits.lane("torque").wheels

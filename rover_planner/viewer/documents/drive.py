@@ -102,7 +102,7 @@ def _describe_use(lane: Lane, limits: PathLimits, worst: int, here: int) -> dict
         "worst": write_use(used),
         "broken": bool(used > 1.0),
         "value": "" if np.isnan(value) else f"{write(value, limit.unit.digits)}, {limit.good}",
-        "link": lane.links[worst].replace("_", " ") if worst >= 0 and used > 0.0 else "",
+        "link": limits.find_link(lane, worst).replace("_", " ") if used > 0.0 else "",
     }
 
 

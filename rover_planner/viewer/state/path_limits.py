@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The limits as people read them, their use along a path, and where the path first fails."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -108,8 +107,8 @@ class Lane:
     used: Floats
     """Use of the limit: 1 at the limit, above 1 where it is broken, NaN where it does
     not count or is not known."""
-    links: Sequence[str]
-    """The wheel or joint concerned, such as rear_left or rocker_left; empty for none."""
+    decides: NDArray[np.int64] | None = None
+    """(m,) which of the rover's limits it is that is used most; None for what is no limit."""
     wheels: Floats | None = None
     """(m, 6) use by each wheel; None if the limit is not one value for each wheel."""
 
@@ -127,6 +126,8 @@ class PathLimits:
     """The poses."""
     lanes: tuple[Lane, ...]
     """The limits, in the order in which they become reasons."""
+    uses: Uses
+    """The uses of all limits of the rover at the poses."""
 
     @property
     def end(self) -> float:
@@ -145,6 +146,17 @@ class PathLimits:
         """Return the lane of a code of a verdict; that of the ground for other codes."""
         found = {lane.limit.code: lane for lane in self.lanes}
         return found.get(code, found[GROUND])
+
+    def find_link(self, lane: Lane, row: int) -> str:
+        """Return the wheel or joint that decides a lane at a row, such as rocker_left, or ""."""
+        if lane.decides is None:
+            return ""
+        k = int(lane.decides[row])
+        limit, element = self.uses.limits.rows[k], int(self.uses.element[row, k])
+        if limit.elements and element >= 0:
+            return f"{limit.reads.removesuffix('_angle')}_{limit.elements[element]}"
+        wheel = find_wheel(self.rows.prediction, self.uses, row, k)
+        return WHEELS[wheel] if wheel >= 0 else ""
 
     def add_chance(self, chance: FailureChance | None) -> "PathLimits":
         """Return the limits with a lane for the chance that the path fails there, if known."""
@@ -176,14 +188,14 @@ def find_path_limits(rover: Rover, prediction: PathPrediction, verdict: Verdict)
         of_code.pop("sinkage", None)
     unjudged = np.where(rows.prediction.settled, 0.0, np.inf)
     lanes = [_make_lane(rows, uses, np.array(one)) for one in of_code.values()]
-    found = PathLimits(rows, (_plain_lane(GROUND, "ground", unjudged), *lanes))
+    found = PathLimits(rows, (_plain_lane(GROUND, "ground", unjudged), *lanes), uses)
     _add_refusals(found, verdict)
     return found
 
 
 def _plain_lane(code: str, title: str, used: Floats) -> Lane:
     """Return the lane of a use (m,) that has neither a value nor a wheel."""
-    return Lane(ShownLimit(code, title), np.full(len(used), np.nan), used, [""] * len(used))
+    return Lane(ShownLimit(code, title), np.full(len(used), np.nan), used)
 
 
 def _show_limit(uses: Uses, of_limit: NDArray[np.int64]) -> ShownLimit:
@@ -207,18 +219,8 @@ def _make_lane(rows: AskedPoses, uses: Uses, of_limit: NDArray[np.int64]) -> Lan
         column = find_column(uses.limits.rows[of_limit[0]].reads)[0]
         element = np.maximum(uses.element[every, decides], 0)
         values = limit.unit.factor * numbers_of(prediction.results)[every, column + element]
-    links = [_name_link(prediction, uses, row, int(k)) for row, k in enumerate(decides)]
     by_wheel = _find_wheel_uses(prediction, uses, int(of_limit[0])) if len(of_limit) == 1 else None
-    return Lane(limit, values, used, links, by_wheel)
-
-
-def _name_link(prediction: PathPrediction, uses: Uses, row: int, k: int) -> str:
-    """Return the wheel or joint that decides limit k at a row; empty for none."""
-    limit, element = uses.limits.rows[k], int(uses.element[row, k])
-    if limit.elements and element >= 0:
-        return f"{limit.reads.removesuffix('_angle')}_{limit.elements[element]}"
-    wheel = find_wheel(prediction, uses, row, k)
-    return WHEELS[wheel] if wheel >= 0 else ""
+    return Lane(limit, values, used, decides, by_wheel)
 
 
 def _find_wheel_uses(prediction: PathPrediction, uses: Uses, k: int) -> Floats | None:
@@ -318,7 +320,7 @@ def find_failure(rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathL
     here, value = rows.prediction.select([at]), float(lane.values[at])
     limit = lane.limit.keep(float(here.results["kept_share"][0]))
     explains = limit.is_broken_by(value)
-    link = lane.links[at] if explains or verdict.code == "suspension" else ""
+    link = limits.find_link(lane, at) if explains or verdict.code == "suspension" else ""
     return Failure(
         code=verdict.code,
         reason=verdict.reason,
