@@ -104,6 +104,12 @@ class Case:
         return (0 if rows.start == 0 else 1) <= row <= place - rows.start
 
 
+def case_of(rover: Rover, terrain: Terrain, poses: Floats, options: PathQueryOptions) -> Case:
+    """Return the case of a path that was judged with some options."""
+    chance = min(options.accepted_chance, ACCEPTED_CHANCE)
+    return Case(rover, terrain, poses, options.model, options.map_sigmas, chance)
+
+
 @dataclass(frozen=True, eq=False)
 class JudgedCase:
     """A case with its prediction and verdict; where it is refused, where and by what it fails."""

@@ -18,6 +18,7 @@ from rover_physics.files.user_file import write_file
 from rover_physics.files.validation import errors_of, show_file
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
+from rover_planner.maps.hill_shade import LEVEL_SHADE, hill_shade
 
 SUFFIXES = (".png", ".svg", ".pdf")
 """Suffixes of pictures."""
@@ -43,7 +44,7 @@ INK, UNKNOWN = "#222222", "#CCD6E6"
 """Colours of lines and texts, and of unknown ground."""
 BRIGHTEST = 1.1
 """Brightness that would be white."""
-LEVEL = 2 / 3 / BRIGHTEST
+LEVEL = LEVEL_SHADE / BRIGHTEST
 """Grey of level ground in a picture, 0 to 1."""
 
 Extent = tuple[float, float, float, float]
@@ -86,21 +87,6 @@ def drawing(
         figure.savefig(picture, dpi=130, format=path.suffix[1:].lower())
     with errors_of(path, PlanningError):
         write_file(path, picture.getvalue())
-
-
-def hill_shade(elevation: NDArray[np.float64], resolution: float) -> NDArray[np.float64]:
-    """Return the brightness (ny, nx) of the cells, 0 to 1, with light from the north-west.
-
-    Cells with unknown height stay NaN.
-    """
-    dy, dx = np.gradient(elevation, resolution)
-    azimuth, altitude = np.deg2rad(135.0), np.deg2rad(40.0)
-    sun = np.array(
-        [np.cos(altitude) * np.cos(azimuth), np.cos(altitude) * np.sin(azimuth), np.sin(altitude)]
-    )
-    cosine = (-dx * sun[0] - dy * sun[1] + sun[2]) / np.sqrt(1 + dx**2 + dy**2)
-    # level ground has a brightness of two thirds, so that both sides of a rock are visible
-    return np.clip(2 / 3 + 0.9 * (cosine - sun[2]), 0.0, 1.0)
 
 
 def find_extent(origin: tuple[float, float], shape: tuple[int, ...], resolution: float) -> Extent:

@@ -26,8 +26,8 @@ from rover_planner.figures.pictures import (
     WHEEL_COLOURS,
     drawing,
     find_extent,
-    hill_shade,
 )
+from rover_planner.maps.hill_shade import LEVEL_SHADE, hill_shade
 from rover_planner.planning.path_geometry import distance_along
 from rover_planner.planning.path_query import Candidate, PathAnswer
 
@@ -152,9 +152,9 @@ def _shade_layer(terrain: Terrain) -> NDArray[np.float64]:
     Unknown cells are opaque.
     """
     shade = hill_shade(terrain.elevation, terrain.resolution)
-    shade = np.where(np.isfinite(shade), shade, 2 / 3)
-    light = np.where(shade > 2 / 3, 1.0, 0.0)
-    depth = np.abs(shade - 2 / 3)
+    shade = np.where(np.isfinite(shade), shade, LEVEL_SHADE)
+    light = np.where(shade > LEVEL_SHADE, 1.0, 0.0)
+    depth = np.abs(shade - LEVEL_SHADE)
     layer = np.repeat(light[:, :, None], 4, axis=2)
     layer[:, :, 3] = np.clip(np.where(light > 0, 1.8, 1.35) * depth, 0, 0.9)
     layer[np.isnan(terrain.elevation)] = (*to_rgb(UNKNOWN), 1.0)

@@ -9,9 +9,8 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from msg_adapters.results.diagnostics import to_json
-from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.advice.advise import Advice, grow_within
-from rover_planner.advice.case import Case
+from rover_planner.advice.case import Case, case_of
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.budget import STOPPING, Budget
@@ -96,8 +95,4 @@ def _case_of(judgement: PathJudgement) -> Case:
     """Return the case of a refused path, on the map and with the settings of its judgement."""
     judge, candidate = judgement.judge, judgement.candidate
     assert judge is not None and candidate is not None
-    options = judge.options
-    chance = min(options.accepted_chance, ACCEPTED_CHANCE)
-    return Case(
-        judge.rover, judge.terrain, candidate.poses, options.model, options.map_sigmas, chance
-    )
+    return case_of(judge.rover, judge.terrain, candidate.poses, judge.options)

@@ -4,6 +4,7 @@
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -109,6 +110,10 @@ class Visitor:
     def texts(self, selector: str) -> list[str]:
         """Return the texts of all elements of a kind."""
         return [str(text) for text in self.tab.locator(selector).all_inner_texts()]
+
+    def read_letters(self) -> Any:
+        """Return the text, size [px] and contrast of all letters that are shown."""
+        return self.tab.evaluate(Path(__file__).with_name("read_letters.js").read_text())
 
     def is_on_screen(self, selector: str) -> bool:
         """Return whether all of an element is within the window."""

@@ -8,13 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.query import LatticeSettings
 from rover_planner.viewer.state.background_work import BackgroundWork, Inbox, Progress
-from rover_planner.viewer.state.scenario import Scenario
-from rover_planner.viewer.state.session import ViewSession
+from rover_planner.viewer.state.judging import JudgeRequest
+from rover_planner.viewer.state.scenario import Pose, Scenario, Shown
+from rover_planner.viewer.state.session import REFUSALS, ViewSession
 from support.grounds import make_terrain, waves
 from support.waiting import wait_until
 
@@ -40,9 +42,31 @@ def ramp(x, y):
     return waves(x, y) + 0.25 * x
 
 
-def session_on(height, start=(-2.0, 0.0, 0.0), goal=(1.0, 0.0, 0.0)) -> ViewSession:
-    """Return a session of the LSR-1 on a ground with heights height(x, y) [m]."""
-    return ViewSession(LSR1, make_terrain(height), start, goal, SURE)
+def session_on(
+    ground: Any,
+    start: Pose = (-2.0, 0.0, 0.0),
+    goal: Pose = (1.0, 0.0, 0.0),
+    options: PathQueryOptions | None = SURE,
+    rover: Rover = LSR1,
+    search: LatticeSettings | None = None,
+) -> ViewSession:
+    """Return a session on a terrain, or on a ground with heights ground(x, y) [m].
+
+    It judges at once, until a page or a `Judge` takes that over.
+    """
+    terrain = ground if isinstance(ground, Terrain) else make_terrain(ground)
+    session = ViewSession(rover, terrain, start, goal, options, search)
+
+    def judge(request: JudgeRequest) -> None:
+        try:
+            for found in session.find_steps(request):
+                if isinstance(found, Shown):
+                    session.take(request, found)
+        except REFUSALS as error:
+            session.take(request, error)
+
+    session.judge = judge
+    return session
 
 
 def blocked(x, y):
@@ -54,8 +78,7 @@ def blocked(x, y):
 def blocked_session() -> ViewSession:
     """Return a session of which some paths are refused and some pass; it searches briefly."""
     search = LatticeSettings(budget=0.5)
-    ends = (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
-    return ViewSession(LSR1, make_terrain(blocked), *ends, SURE, search=search)
+    return session_on(blocked, goal=(2.0, 0.0, 0.0), search=search)
 
 
 def shift(terrain: Terrain, by: tuple[float, float]) -> Terrain:

@@ -7,7 +7,6 @@ import pytest
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
-from rover_physics.rover.rover_file import load_rover
 from rover_planner.advice.advise import grow_advice
 from rover_planner.advice.case import Case
 from rover_planner.planning.path_query import PathQueryOptions
@@ -19,12 +18,10 @@ from rover_planner.viewer.documents.advice import (
     seek_advice,
 )
 from rover_planner.viewer.pages.page import Page
-from rover_planner.viewer.state.session import ViewSession
-from support.grounds import make_terrain, rock_left
-from support.viewer.sessions import wait_for_rest
+from support.grounds import rock_left
+from support.viewer.sessions import LSR1, session_on, wait_for_rest
 from support.waiting import wait_until
 
-LSR1 = load_rover("lsr1")
 ENDS = (-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)
 OPTIONS = PathQueryOptions(count=1, waypoint_spacing=0.05)
 
@@ -39,7 +36,7 @@ def slope(x, y):
 )
 def test_a_path_passes_with_the_values_that_a_remedy_has(ground, changes, levers):
     rover = replace(LSR1, **changes)
-    session = ViewSession(rover, make_terrain(ground), *ENDS, OPTIONS)
+    session = session_on(ground, *ENDS, OPTIONS, rover)
     path, wanted = session.shown.path, session.wanted
     assert not path.verdict.traversable
     model = wanted.asked_options.model
@@ -57,7 +54,7 @@ def test_a_path_passes_with_the_values_that_a_remedy_has(ground, changes, levers
 
 @pytest.fixture
 def page():
-    served = Page(ViewSession(LSR1, make_terrain(rock_left), *ENDS, OPTIONS), port=0)
+    served = Page(session_on(rock_left, *ENDS, OPTIONS), port=0)
     wait_for_rest(served)
     yield served
     served.close()
@@ -81,8 +78,7 @@ def test_advice_is_sought_when_it_is_asked_for_shown_as_a_ghost_and_taken(page):
 
 
 def test_a_search_tells_what_was_found_by_a_promised_time_and_that_it_goes_on():
-    session = ViewSession(LSR1, make_terrain(rock_left), *ENDS, OPTIONS)
-    path, since = session.shown.path, 1000.0
+    path, since = session_on(rock_left, *ENDS, OPTIONS).shown.path, 1000.0
     growing = seek_advice(path)
     none, some = next(growing), next(one for one in growing if one.remedies)
     first, last = (Advised(path, since, one) for one in (none, replace(some, complete=True)))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics.names import EQUAL, OPTIMAL, SERVO, WHEELS
+from rover_physics.names import EQUAL, OPTIMAL, SERVO, SIDES, WHEELS
 from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from rover_planner.planning.path_query import PathQueryOptions
@@ -18,12 +18,11 @@ from rover_planner.viewer.documents.drive import (
     describe_limits,
     describe_uses,
 )
-from rover_planner.viewer.documents.numbers import plain
 from rover_planner.viewer.documents.rover import compare_drives, describe_sliders, read_values
 from rover_planner.viewer.documents.verdict import describe_paths, describe_verdict
-from rover_planner.viewer.state.path_limits import ShownLimit, write_use
+from rover_planner.viewer.state.numbers import plain, write_use
+from rover_planner.viewer.state.path_limits import ShownLimit
 from rover_planner.viewer.state.scenario import Judged
-from rover_planner.viewer.state.session import ViewSession
 from support.grounds import gap, make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, SURE, ramp, session_on
 
@@ -36,8 +35,7 @@ def stepped(x, y):
 def judged_on(height, start=-1.0, **options) -> Judged:
     """Return a straight path to x = 1 m over a ground, judged."""
     options = SURE.change(count=1, **options)
-    ends = (start, 0.0, 0.0), (start + 2.0, 0.0, 0.0)
-    return ViewSession(LSR1, make_terrain(height), *ends, options).shown.path
+    return session_on(height, (start, 0.0, 0.0), (start + 2.0, 0.0, 0.0), options).shown.path
 
 
 # Limits along a path.
@@ -51,8 +49,9 @@ def test_the_values_of_a_lane_are_those_of_the_prediction_at_its_waypoints():
         limits.lane("friction").values[at], prediction.friction_utilisation.max(axis=1)
     )
     np.testing.assert_allclose(limits.lane("belly").values[at], 100.0 * prediction.belly_clearance)
-    wheels = limits.lane("torque").wheel[at]
-    np.testing.assert_array_equal(wheels, prediction.torque_saturation.argmax(axis=1))
+    links = [limits.find_link(limits.lane("torque"), row) for row in np.flatnonzero(at)]
+    most_torque = prediction.torque_saturation.argmax(axis=1)
+    np.testing.assert_array_equal(links, np.array(WHEELS)[most_torque])
     uses = limits.lane("torque").wheels
     np.testing.assert_allclose(uses.max(axis=1), limits.lane("torque").used)
 
@@ -98,7 +97,7 @@ def test_board_lanes_curves_and_verdict_show_one_number_for_the_wheel_that_fails
     assert board["fails"] and board["bars"][0][2] == write_use(use)
     used = describe_uses(path, end)[codes.index("friction")]
     assert used["now"] == used["worst"] == write_use(use) and used["broken"]
-    assert used["wheel"] == failure.link.replace("_", " ") and used["wheel"] in failure.headline
+    assert used["link"] == failure.link.replace("_", " ") and used["link"] in failure.headline
     lane = describe_limits(path, None)["lanes"][codes.index("friction")]
     assert max(lane["wheels"]["y"][wheel]) == pytest.approx(use, abs=1e-3)
     assert max(lane["now"]["y"][0]) == pytest.approx(use, abs=1e-3)
@@ -106,10 +105,8 @@ def test_board_lanes_curves_and_verdict_show_one_number_for_the_wheel_that_fails
 
 
 def list_paths_of(path: Judged) -> dict:
-    session = ViewSession(
-        LSR1, path.scenario.terrain, path.scenario.start, path.scenario.goal,
-        path.scenario.options,
-    )  # fmt: skip
+    asked = path.scenario
+    session = session_on(asked.terrain, asked.start, asked.goal, asked.options)
     return describe_paths(session.shown)["rows"][0]
 
 
@@ -151,7 +148,7 @@ def test_the_lanes_of_the_reference_stand_below_those_of_now():
 
 
 def test_the_chance_of_failure_is_a_lane_of_its_own_with_its_main_cause():
-    session = ViewSession(LSR1, make_terrain(ramp), (-2.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    session = session_on(ramp, options=None)
     session.change_rover([("friction",)], 0.55)
     shown = session.shown
     asked = shown.scenario
@@ -175,7 +172,7 @@ def test_the_chance_of_failure_is_a_lane_of_its_own_with_its_main_cause():
 
 
 def test_the_chance_of_a_path_that_is_refused_is_that_up_to_its_failure():
-    session = ViewSession(LSR1, make_terrain(wall_at(0.5)), (-2.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    session = session_on(wall_at(0.5), options=None)
     session.judge_again()
     shown = session.shown
     assert len(shown.chance.at) == shown.verdict.first_failure + 1 < len(shown.path.poses)
@@ -270,6 +267,17 @@ def test_where_the_rover_does_not_settle_a_level_one_stands_and_the_wheel_beyond
     np.testing.assert_allclose(np.abs(wheels), np.abs(right), atol=0.01)
 
 
+def test_the_joint_that_ends_a_path_is_named_by_its_failure_and_by_the_uses():
+    rover = replace(LSR1, suspension=replace(LSR1.suspension, bogie_limits=(-0.01, 0.01)))
+    path = session_on(waves, options=SURE.change(count=1), rover=rover).shown.path
+    failure = path.failure
+    turned = np.abs(failure.state.here.bogie_angle[0])
+    assert failure.code == "suspension" and turned.max() > 0.01
+    assert failure.link == f"bogie_{SIDES[int(turned.argmax())]}"
+    joints = [lane.limit.code for lane in path.limits.lanes].index("suspension")
+    assert describe_uses(path, np.inf)[joints]["link"] == failure.link.replace("_", " ")
+
+
 @pytest.mark.parametrize("start", [-1.0, 0.4])
 def test_a_refusal_on_unknown_ground_is_at_the_time_to_which_the_drive_is_played(start):
     session = session_on(gap, start=(start, 0.0, 0.0), goal=(1.9, 0.0, 0.0))
@@ -290,8 +298,8 @@ def test_the_numbers_of_the_only_path_are_those_up_to_its_failure():
     def slope_beyond(x, y):
         return gap(x, y) + 0.5 * np.maximum(x - 1.0, 0.0)
 
-    ground, ends = make_terrain(slope_beyond), ((-1.5, 0.0, 0.0), (2.5, 0.0, 0.0))
-    session = ViewSession(LSR1, ground, *ends, PathQueryOptions(count=1))
+    ground, options = make_terrain(slope_beyond), PathQueryOptions(count=1)
+    session = session_on(ground, (-1.5, 0.0, 0.0), (2.5, 0.0, 0.0), options)
     poses = session.shown.path.poses
     prediction, verdict = judge_path(LSR1, ground, poses)
     assert verdict.max_tilt > 0.4

@@ -24,7 +24,7 @@ pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.pages.sharing import KEY
-from rover_planner.viewer.state.path_limits import write_use
+from rover_planner.viewer.state.numbers import write_use
 
 pytestmark = [needs_browser, pytest.mark.slow]
 
@@ -74,14 +74,8 @@ def test_the_page_opens_with_verdict_board_and_limits_on_the_screen_of_a_laptop(
     assert len(loads) == 6 and sum(loads) == pytest.approx(LSR1.weight, rel=0.1)
     for word in ("lsr1", NAME, "firm, friction 0.8", "planning"):
         assert word in visitor.text("#subject")
-    for selector in (
-        "#verdict",
-        "#board .wheels",
-        "#board .numbers",
-        "#limits",
-        "#drive",
-        "#scene",
-    ):
+    parts = "#verdict", "#board .wheels", "#board .numbers", "#limits", "#drive", "#scene"
+    for selector in parts:
         assert visitor.is_on_screen(selector), selector
     assert visitor.tab.title() == f"lsr1 on {NAME}"
 
@@ -299,7 +293,7 @@ def test_a_saved_file_shows_the_same_without_a_network(visitor, page, browser, t
 
 
 def test_letters_are_large_enough_and_have_contrast_and_a_phone_shows_all_of_its_width(visitor):
-    found = visitor.tab.evaluate(READ_LETTERS)
+    found = visitor.read_letters()
     assert min(one["size"] for one in found) >= 12.0
     poor = [one for one in found if one["contrast"] < 4.5]
     assert not poor, poor[:5]
@@ -307,29 +301,6 @@ def test_letters_are_large_enough_and_have_contrast_and_a_phone_shows_all_of_its
     for selector in ("#stage", "#verdict", "#limits"):
         assert visitor.tab.locator(selector).bounding_box()["width"] > 350, selector
     visitor.tab.set_viewport_size(LAPTOP)
-
-
-READ_LETTERS = """() => {
-  const light = (text) => {
-    const parts = text.match(/[\\d.]+/g).map(Number);
-    if (parts.length === 4 && parts[3] === 0) return null;
-    const [r, g, b] = parts.map((one) => one / 255).map((one) =>
-      one <= 0.04045 ? one / 12.92 : ((one + 0.055) / 1.055) ** 2.4);
-    return 0.2126 * r + 0.7152 * g + 0.0722 * b;
-  };
-  const behind = (one) =>
-    one ? light(getComputedStyle(one).backgroundColor) ?? behind(one.parentElement) : 1;
-  const is = (node) => node.nodeType === 3 && node.data.trim();
-  const has = (one) => [...one.childNodes].some(is);
-  return [...document.querySelectorAll("body *")]
-    .filter((one) => one.checkVisibility() && has(one))
-    .map((one) => {
-      const style = getComputedStyle(one), pair = [light(style.color), behind(one)].sort();
-      return { text: one.textContent.slice(0, 30), size: parseFloat(style.fontSize),
-        contrast: (pair[1] + 0.05) / (pair[0] + 0.05) };
-    });
-}"""
-"""Returns size [px] and contrast of all letters that are shown."""
 
 
 def test_a_visitor_of_a_page_that_ends_is_told(visitor, page):

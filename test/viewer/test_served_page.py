@@ -15,13 +15,11 @@ from websockets.sync.client import connect
 from rover_physics.names import WHEELS
 from rover_planner.studies.rover_values import write_rover
 from rover_planner.viewer.pages.sharing import read_link, write_link
-from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, waves
 from support.viewer.sessions import (
     FAR,
     LSR1,
     PATIENCE,
-    SURE,
     ask,
     held,
     is_at_rest,
@@ -71,6 +69,13 @@ def change_friction(page: Page, friction: float) -> None:
     page.hear({"ask": "value", "label": FRICTION, "value": friction}, None)
 
 
+def set_friction(page: Page, friction: float) -> None:
+    """Change the friction, and wait until that is judged and shown."""
+    change_friction(page, friction)
+    wait_until(lambda: page.session.wanted.rover.friction == friction, "the value")
+    wait_for_rest(page)
+
+
 def fail(*_arguments) -> None:
     raise ValueError("a line of <no> points")
 
@@ -110,9 +115,7 @@ def test_another_site_gets_no_channel(page):
 
 def test_a_changed_number_is_told_with_what_it_changes_and_can_be_undone_and_reset(page):
     for friction in (0.75, 0.7):
-        change_friction(page, friction)
-        wait_until(lambda f=friction: page.session.wanted.rover.friction == f, "the value")
-        wait_for_rest(page)
+        set_friction(page, friction)
     assert told(page, "subject")["rover"] == "lsr1 (changed)"
     assert told(page, "changes")["rover"] == [["friction [-]", "0.8", "0.7"]]
     assert told(page, "limits")["compared"]
@@ -158,12 +161,8 @@ def test_while_a_change_is_judged_the_verdict_and_the_paths_are_grey_and_it_can_
         page.hear({"ask": "cancel"}, None)
         wait_until(lambda: session.is_stopped, "the end of the work")
     wait_until(lambda: told(page, "verdict")["stopped"], "the button to judge again")
-    wait_until(
-        lambda: (
-            {row["waits"] for row in told(page, "paths")["rows"]} == {"old, was not judged again"}
-        ),
-        "rows that say so",
-    )
+    waits = lambda: {row["waits"] for row in told(page, "paths")["rows"]}  # noqa: E731
+    wait_until(lambda: waits() == {"old, was not judged again"}, "rows that say so")
     page.hear({"ask": "judge"}, None)
     wait_for_rest(page)
     wait_until(lambda: not told(page, "verdict")["old"], "the new verdict")
@@ -209,7 +208,7 @@ def test_the_ghost_of_a_failure_stays_for_the_next_one_and_hides_without(page):
         session.change_rover([("friction",)], friction)
         failure = session.shown.path.failure
         mark.show(LSR1, failure)
-        ghosts.append(canvas.nodes["/failure/links"])
+        ghosts.append(canvas.nodes["/failure/body"])
         np.testing.assert_allclose(
             ghosts[-1].position, canvas.to_scene(failure.state.position), rtol=1e-6
         )
@@ -249,7 +248,7 @@ def test_a_rover_of_another_shape_keeps_the_nodes_that_it_has_too(page):
     suspension = replace(LSR1.suspension, rocker_wheel="front")
     rover.take(replace(LSR1, suspension=suspension, manipulator=None), {})
     stays = {name for name in canvas.nodes if canvas.nodes[name] is before.get(name)}
-    assert "/test/rover/links/body" in stays and "/test/rover/links/arm" not in canvas.nodes
+    assert "/test/rover/body" in stays and "/test/rover/body/arm" not in canvas.nodes
     assert set(before) != set(canvas.nodes) and not any(
         canvas.nodes[name]._impl.removed for name in canvas.nodes
     )
@@ -368,11 +367,10 @@ def test_on_a_far_map_the_rover_is_where_it_is_on_a_near_one_and_a_click_lands_w
     places = {}
     for x, y in ((0.0, 0.0), FAR):
         ground = shift(make_terrain(waves), (x, y))
-        ends = (x - 2.0, y, 0.0), (x + 1.0, y, 0.0)
-        page = Page(ViewSession(LSR1, ground, *ends, SURE), port=0)
+        page = Page(session_on(ground, (x - 2.0, y, 0.0), (x + 1.0, y, 0.0)), port=0)
         try:
             wait_for_rest(page)
-            places[x] = np.array(page.scene.canvas.nodes["/rover/links"].position)
+            places[x] = np.array(page.scene.canvas.nodes["/rover/body"].position)
             aim = np.array([x + 1.5, y + 0.5])
             place = page.scene.canvas.to_scene([*aim, float(ground.elevation_at(*aim))])
             away = np.array([-1.0, 0.0, 2.0])
@@ -428,9 +426,7 @@ def test_path_and_time_of_a_link_come_with_its_paths_and_not_with_a_later_goal(p
 
 
 def test_a_program_that_was_started_again_takes_up_the_link_that_the_last_one_told(page):
-    change_friction(page, 0.7)
-    wait_until(lambda: page.session.wanted.rover.friction == 0.7, "the value")
-    wait_for_rest(page)
+    set_friction(page, 0.7)
     wait_until(lambda: read_link(told(page, "current")).rover["friction"] == 0.7, "the link")
     again = Page(session_on(ramp), port=0)
     try:

@@ -24,7 +24,7 @@ from rover_planner.viewer.documents.rover import describe_changes
 from rover_planner.viewer.documents.verdict import describe_paths, describe_verdict
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, wall_at, waves
-from support.viewer.sessions import LSR1, SURE, Judge, blocked_session, ramp, session_on, straight
+from support.viewer.sessions import LSR1, Judge, blocked_session, ramp, session_on, straight
 
 # What a person looks at, and what it is compared with.
 
@@ -159,7 +159,7 @@ def test_a_path_is_judged_under_all_policies_and_one_that_cannot_judge_says_so()
     assert not any(one["old"] for one in judged)
     ground = make_terrain(ramp)
     ground = replace(ground, elevation_std=np.full(ground.elevation.shape, 1e-3))
-    session = ViewSession(LSR1, ground, (-2.0, 0.0, 0.0), (1.0, 0.0, 0.0), SURE)
+    session = session_on(ground)
     session.judge_again()
     _, servo, _ = describe_verdict(session.shown)["policies"]
     assert servo["word"] == "not judged" and "no bounds" in servo["reason"] and not servo["old"]
@@ -169,7 +169,7 @@ def recorded(folder, poses):
     terrain = make_terrain(wall_at(0.5))
     prediction, verdict = judge_path(LSR1, terrain, poses)
     write_prediction(folder / "out.npz", prediction, verdict)
-    session = ViewSession(LSR1, terrain, (-2.0, 0.0, 0.0), (-1.5, 0.0, 0.0), SURE)
+    session = session_on(terrain, goal=(-1.5, 0.0, 0.0))
     session.replay(*read_prediction(folder / "out.npz"))
     return session, prediction, verdict
 
@@ -218,7 +218,7 @@ def test_a_replay_keeps_the_soil_the_policy_and_the_arm_it_was_predicted_with(tm
     write_prediction(file, prediction, verdict, assumptions=assumed)
     assert read_recorded_assumptions(file) == assumed
 
-    session = ViewSession(LSR1, ground, (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    session = session_on(ground, (-1.0, 0.0, 0.0), options=None)
     session.replay(*read_prediction(file), read_recorded_assumptions(file))
     assert (session.wanted.rover.friction, session.wanted.rover.manipulator.payload) == (0.7, 0.5)
     assert session.wanted.arm_angles == angles

@@ -14,7 +14,7 @@ from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.judging import BETTER, SEARCH, JudgeRequest, judge_request
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, wall_with_gap, waves
-from support.viewer.sessions import LSR1, SURE, Judge, held
+from support.viewer.sessions import LSR1, Judge, held, session_on
 from support.waiting import wait_until
 
 GOAL = (1.6, 0.0, 0.0)
@@ -28,7 +28,7 @@ def walled_session(height, goal=(-1.1, 0.0, 0.0), *, ends_at_first=True):
     """Return a session on 5 m x 5 m with a wall at x = 0; a search for the best may take long."""
     search = LatticeSettings(budget=60.0, ends_at_first=ends_at_first)
     ground = make_terrain(height, half=2.5)
-    return ViewSession(LSR1, ground, (-1.6, 0.0, 0.0), goal, SURE, search=search)
+    return session_on(ground, (-1.6, 0.0, 0.0), goal, search=search)
 
 
 def whole_wall(x, y):

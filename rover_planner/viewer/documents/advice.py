@@ -5,10 +5,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from rover_planner.advice.advise import Advice, grow_advice
-from rover_planner.advice.case import Case
+from rover_planner.advice.case import case_of
 from rover_planner.advice.remedy import Remedy
+from rover_planner.planning.assumptions import assume
 from rover_planner.viewer.state.scenario import Judged, Scenario
 
 PROMISED = 20.0
@@ -42,18 +42,12 @@ def apply_remedy(scenario: Scenario, remedy: Remedy) -> Scenario:
 
     Friction, torque, payload and limits are numbers of the rover there, which sliders show.
     """
-    case, told = remedy.judged.case, remedy.options()
-    rover = replace(case.rover, friction=told.get("friction", case.rover.friction))
-    most = told.get("max_torque", rover.wheel.max_torque)
-    rover = replace(rover, wheel=replace(rover.wheel, max_torque=most))
-    if rover.manipulator is not None:
-        carried = told.get("payload", rover.manipulator.payload)
-        rover = replace(rover, manipulator=replace(rover.manipulator, payload=carried))
+    case = remedy.judged.case
     has_path = case.poses is not remedy.refusal.case.poses
     return replace(
         scenario,
-        rover=rover,
-        arm_angles=told.get("joint_angles", scenario.arm_angles),
+        rover=assume(case.rover, case.options).change(case.rover),
+        arm_angles=case.options.arm_angles or {},
         options=scenario.options.change(
             policy=case.options.policy, backward=case.options.backward
         ),
@@ -64,11 +58,7 @@ def apply_remedy(scenario: Scenario, remedy: Remedy) -> Scenario:
 def seek_advice(path: Judged) -> Iterator[Advice]:
     """Yield advice on a path that grows."""
     asked = path.scenario
-    options = asked.asked_options
-    chance = min(options.accepted_chance, ACCEPTED_CHANCE)
-    return grow_advice(
-        Case(asked.rover, asked.terrain, path.poses, options.model, options.map_sigmas, chance)
-    )
+    return grow_advice(case_of(asked.rover, asked.terrain, path.poses, asked.asked_options))
 
 
 def describe_advice(advised: Advised | None, is_seeking: bool, now: float) -> dict[str, Any]:

@@ -12,10 +12,10 @@ from rover_physics.chance.failure_chance import FailureChance
 from rover_physics.limits.table import CHANCE
 from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
-from rover_planner.viewer.documents.numbers import plain, write
 from rover_planner.viewer.state.colours import colour_use, to_css
 from rover_planner.viewer.state.drive import RoverState
-from rover_planner.viewer.state.path_limits import MAX_USE, Lane, PathLimits, write_use
+from rover_planner.viewer.state.numbers import MAX_USE, plain, write, write_use
+from rover_planner.viewer.state.path_limits import Lane, PathLimits
 from rover_planner.viewer.state.scenario import Judged
 
 MAX_POINTS = 240
@@ -97,13 +97,12 @@ def _describe_use(lane: Lane, limits: PathLimits, worst: int, here: int) -> dict
     limit = lane.limit.keep(kept) if np.isfinite(kept) else lane.limit
     used = float(lane.used[worst]) if worst >= 0 else np.nan
     value = float(lane.values[worst]) if worst >= 0 else np.nan
-    wheel = int(lane.wheel[worst]) if worst >= 0 and used > 0.0 else -1
     return {
         "now": write_use(float(lane.used[here])),
         "worst": write_use(used),
         "broken": bool(used > 1.0),
-        "value": "" if np.isnan(value) else f"{limit.write(value)}, {limit.good}",
-        "wheel": WHEELS[wheel].replace("_", " ") if wheel >= 0 else "",
+        "value": "" if np.isnan(value) else f"{write(value, limit.unit.digits)}, {limit.good}",
+        "link": limits.find_link(lane, worst).replace("_", " ") if used > 0.0 else "",
     }
 
 

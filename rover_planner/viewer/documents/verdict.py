@@ -8,8 +8,7 @@ import numpy as np
 
 from rover_physics.names import EQUAL, OPTIMAL, SERVO
 from rover_planner.viewer.documents.drive import write_chance
-from rover_planner.viewer.documents.numbers import write
-from rover_planner.viewer.state.path_limits import write_use
+from rover_planner.viewer.state.numbers import write, write_use
 from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
 
 POLICY_TITLES = {EQUAL: "equal torques", SERVO: "speed servos", OPTIMAL: "traction control"}

@@ -6,6 +6,7 @@ const state = {};
 const chosen = { tab: "Drive", lane: "", link: "", program: "", moved: null };
 const at = (id) => document.getElementById(id);
 const SVG = "http://www.w3.org/2000/svg";
+const SHAPES = ["svg", "path"]; // elements of a drawing
 const COLOURS = { rear: "#0072b2", middle: "#d55e00", front: "#00795a" };
 const PRESS = 5000; // [ms] for which a press lasts at most
 const ROOMY = 900; // [px] of height from which the board begins with all its numbers
@@ -17,7 +18,7 @@ const percent = (use) => (use < 99 ? `${Math.round(100 * use)} %` : "fails");
 
 // An element with its attributes and children; what begins with "on" listens.
 function make(tag, attributes = {}, ...children) {
-  const element = document.createElement(tag);
+  const element = document.createElementNS(SHAPES.includes(tag) ? SVG : document.body.namespaceURI, tag);
   for (const [name, value] of Object.entries(attributes)) {
     if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
     else if (value !== null && value !== undefined && value !== false) element.setAttribute(name, value === true ? "" : value);
@@ -26,14 +27,12 @@ function make(tag, attributes = {}, ...children) {
   return element;
 }
 
-function draw(tag, attributes) {
-  const element = document.createElementNS(SVG, tag);
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
-  return element;
-}
-
 const button = (words, question, attributes = {}) =>
   make("button", { onclick: () => ask(question), ...attributes }, words);
+const cells = (tag, values) => values.map((value) => make(tag, {}, value));
+const table = (heads, rows, attributes = {}) =>
+  make("table", attributes, heads.length ? make("tr", {}, cells("th", heads)) : "", rows);
+const key = (look, words) => make("span", { class: "key" }, make("i", look), words);
 
 // ---- The channel.
 
@@ -117,7 +116,7 @@ function drawErrors() {
   const lines = (state.errors || []).map(([what, why]) => `${what}: ${why}`);
   if (state.lost) lines.unshift("No connection to the program: what is shown is old. The page goes on by itself when the program runs again.");
   if (state.restarted) lines.push(state.restarted);
-  at("errors").replaceChildren(...lines.map((line) => make("div", {}, line)));
+  at("errors").replaceChildren(...cells("div", lines));
 }
 
 // Under another name of this machine the scene has a process of its own: its pictures delay no number.
@@ -149,7 +148,7 @@ function drawVerdict(one) {
       one.stopped ? button("Judge again", { ask: "judge" }) : ""),
     make("div", { class: "policies" }, ...policies),
     ...(one.details && one.details.length ? [make("details", { open: open || document.body.className === "sent" },
-      make("summary", {}, "the whole reason"), ...one.details.map((line) => make("div", {}, line)))] : []),
+      make("summary", {}, "the whole reason"), cells("div", one.details))] : []),
   );
   if (state.advice) drawAdvice(state.advice);
 }
@@ -179,9 +178,7 @@ function drawPaths({ rows, shown }) {
     make("td", {}, make("b", { class: "mark" }, row.word), row.waits ? ` (${row.waits})` : ""),
     make("td", {}, row.length), make("td", {}, row.energy), make("td", {}, row.use, make("br"), row.limit)),
   make("tr", {}, make("td"), make("td", { colspan: 4, class: "quiet" }, row.reason))));
-  at("paths").replaceChildren(make("table", { role: "grid" },
-    make("tr", {}, ...["", "verdict", "length [m]", "energy [J]", "most used"].map((head) => make("th", {}, head))),
-    ...bodies));
+  at("paths").replaceChildren(table(["", "verdict", "length [m]", "energy [J]", "most used"], bodies, { role: "grid" }));
   if (focus !== undefined) at("paths").querySelector(`[data-row="${focus}"]`)?.focus();
 }
 
@@ -228,10 +225,8 @@ function drawValues(values) {
 }
 
 function drawChanges({ kept, rover, drive }) {
-  const rows = (lines) => lines.map(([name, was, now]) =>
-    make("tr", {}, make("td", {}, name), make("td", {}, was), make("td", {}, make("b", {}, now))));
-  const table = rover.length || drive.length
-    ? make("table", {}, make("tr", {}, ...["", kept ? "reference" : "loaded", "now"].map((head) => make("th", {}, head))), ...rows(rover), ...rows(drive))
+  const rows = [...rover, ...drive].map(([name, was, now]) => make("tr", {}, cells("td", [name, was, make("b", {}, now)])));
+  const differs = rows.length ? table(["", kept ? "reference" : "loaded", "now"], rows)
     : make("div", { class: "quiet" }, `nothing differs from the rover as ${kept ? "kept" : "loaded"}`);
   const offers = state.offers || { presets: [] };
   at("changes").replaceChildren(
@@ -241,7 +236,7 @@ function drawChanges({ kept, rover, drive }) {
       select("preset", offers.presets.map((name) => [name, name]), state.chosen?.preset, (name) => ({ ask: "preset", name })),
       make("label", {}, "Load a file ", make("input", { type: "file", accept: ".yaml,.yml", style: "width:9em", onchange: upload })),
       button("Save as rover file", { ask: "save rover" })),
-    table);
+    differs);
 }
 
 async function upload(event) {
@@ -300,7 +295,7 @@ function drawLimits({ end, lanes, code, compared }) {
     make("div", {}), make("div", { class: "worst" })));
   at("limits").replaceChildren(
     make("h2", {}, "Use of the limits ", make("small", {}, end ? `over ${end.toFixed(2)} m${compared ? "; below: the reference" : ""}` : "at the first pose")),
-    ...rows, make("div", {}, ...CLASSES.map(([, kind, words]) => make("span", { class: "key" }, make("i", { class: kind }), words))));
+    ...rows, make("div", {}, CLASSES.map(([, kind, words]) => key({ class: kind }, words))));
   drawUses();
   drawCurves();
 }
@@ -324,7 +319,7 @@ function drawUses() {
     row.toggleAttribute("data-broken", use.broken);
     row.toggleAttribute("data-chosen", row.dataset.code === chosen.lane);
     row.children[2].textContent = use.now;
-    row.children[3].textContent = [`worst ${use.worst}`, use.value, use.wheel].filter(Boolean).join(", ");
+    row.children[3].textContent = [`worst ${use.worst}`, use.value, use.link].filter(Boolean).join(", ");
   });
 }
 
@@ -334,7 +329,7 @@ function drawCurves() {
   at("curves").replaceChildren(
     make("h2", {}, lane.code === "chance" ? "chance of failure" : `${lane.title}, use of the limit`), plot(lane.wheels || lane.now, percent, 1.0, lane.before),
     make("h2", {}, "wheel loads"), plot(state.limits.loads, (value) => `${value.toFixed(0)} N`, null, null),
-    make("div", {}, ...Object.entries(COLOURS).map(([name, colour]) => make("span", { class: "key" }, make("i", { style: `background:${colour}` }), name)),
+    make("div", {}, Object.entries(COLOURS).map(([name, colour]) => key({ style: `background:${colour}` }, name)),
       make("small", {}, "right: line, left: dashes")));
   moveCursor();
 }
@@ -343,7 +338,7 @@ function plot(curve, write, limit, old) {
   const known = [...curve.y.flat(), ...(old ? old.y.flat() : [])].filter((value) => value !== null);
   const top = Math.min(Math.max(limit ? 1.2 : 0, ...known, 1e-9), limit ? 3 : Infinity);
   const down = (value) => 100 * (1 - Math.min(value, top) / (1.04 * top)); // a line at the top is seen
-  const box = draw("svg", { viewBox: "0 0 1000 100", preserveAspectRatio: "none" });
+  const box = make("svg", { viewBox: "0 0 1000 100", preserveAspectRatio: "none" });
   const end = state.limits.end || 1;
   const line = (x, y, attributes) => {
     let path = "", pen = "M";
@@ -353,7 +348,7 @@ function plot(curve, write, limit, old) {
       pen = "L";
     });
     if (x.length === 1) path += "h1000";
-    box.append(draw("path", { d: path || "M0 0", fill: "none", "vector-effect": "non-scaling-stroke", "stroke-width": 1.6, ...attributes }));
+    box.append(make("path", { d: path || "M0 0", fill: "none", "vector-effect": "non-scaling-stroke", "stroke-width": 1.6, ...attributes }));
   };
   if (old) line(old.x, old.y[0], { stroke: "#888", "stroke-width": 4, opacity: 0.6 });
   curve.y.forEach((y, k) => {
@@ -396,9 +391,8 @@ function drawBoard(board) {
     make("div", { class: "numbers" }, ...Object.entries(board.numbers).map(([name, value]) => make("div", {}, make("span", {}, name), make("b", {}, value)))),
     make("details", { open: document.body.className === "sent" || (at("board").querySelector("details")?.open ?? innerHeight > ROOMY) },
       make("summary", {}, "all numbers of the wheels"),
-      make("table", { id: "wheels" },
-        make("tr", {}, make("th"), ...board.wheels.map((wheel) => make("th", {}, wheel.name))),
-        ...board.table.map(([title, cells]) => make("tr", {}, make("th", {}, title), ...cells.map((cell) => make("td", {}, cell)))))));
+      table(["", ...board.wheels.map((wheel) => wheel.name)],
+        board.table.map(([title, values]) => make("tr", {}, make("th", {}, title), cells("td", values))), { id: "wheels" })));
 }
 
 function drawDrive(drive) {
@@ -434,19 +428,19 @@ function drawLegend({ title, gradient, ends, keys, notes }) {
   at("legend").replaceChildren(make("b", {}, title),
     ...(gradient.length ? [make("div", { class: "bar", style: `background:linear-gradient(90deg,${gradient})` }),
       make("div", { class: "ends" }, ...ends.map((end) => make("span", {}, end)))] : []),
-    ...keys.map(([colour, words]) => make("div", { class: "key" }, make("i", colour === "hatched" ? { class: "hatched" } : { style: `background:${colour}` }), words)),
-    ...notes.map((note) => make("div", {}, note)));
+    ...keys.map(([colour, words]) => make("div", {}, key(colour === "hatched" ? { class: "hatched" } : { style: `background:${colour}` }, words))),
+    ...cells("div", notes));
 }
 
 function drawLearned(lines) {
   at("learned").replaceChildren(...(lines.length ? [make("h2", {}, "learned of the ground")] : []),
-    ...lines.map((line) => make("div", {}, line)));
+    ...cells("div", lines));
 }
 
 function drawTopics(topics) {
-  at("topics").replaceChildren(make("h2", {}, "age of the last message"), make("table", {},
-    ...topics.map(({ topic, age, stale }) => make("tr", { "data-old": stale },
-      make("td", {}, topic), make("td", {}, `${stale ? "stale, " : ""}${age}`)))));
+  const rows = topics.map(({ topic, age, stale }) =>
+    make("tr", { "data-old": stale }, cells("td", [topic, `${stale ? "stale, " : ""}${age}`])));
+  at("topics").replaceChildren(make("h2", {}, "age of the last message"), table([], rows));
 }
 
 // ---- Share.
@@ -485,9 +479,8 @@ function openTab(name) {
 }
 
 // Space and arrows belong to the drive, unless a control was reached by the keyboard.
-const KEYS = { " ": { ask: "toggle" }, ArrowLeft: { ask: "step", by: -1 }, ArrowRight: { ask: "step", by: 1 }, Home: { ask: "seek", time: 0 } };
 document.addEventListener("keydown", (event) => {
-  const target = event.target, question = KEYS[event.key];
+  const target = event.target, question = state.scene?.keys[event.code?.toLowerCase()];
   const typed = target.matches("input, select, summary") || target.matches("button:focus-visible");
   if (!question || typed || event.ctrlKey || event.altKey) return;
   event.preventDefault();

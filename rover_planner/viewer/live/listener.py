@@ -40,12 +40,12 @@ from rover_planner.ros.qos import (
     topic_qos,
 )
 from rover_planner.viewer.live.live_state import (
+    CLICK,
     ODOMETRY,
     SIGN_OF_LIFE,
-    Click,
     LearnedTrail,
     LiveData,
-    LiveVerdict,
+    Question,
     TopicAge,
 )
 
@@ -86,7 +86,7 @@ class LiveListener(Node):
         self._estimated: Mapping[str, np.ndarray] = {}
         self._ages: dict[str, TopicAge] = {}
         self._first_time: float | None = None
-        self._click: Click | None = None
+        self._click: Question | None = None
         self._planner = self.create_client(
             GetPlan, f"{SERVER}/can_traverse", qos_profile=service_qos()
         )
@@ -162,8 +162,8 @@ class LiveListener(Node):
         request = GetPlan.Request(
             start=stamped_pose(start, self._frame), goal=stamped_pose((*goal, yaw), self._frame)
         )
-        click = Click(plan_request_hash(request.start, request.goal, 0.0), time.monotonic())
-        self._click = click
+        hashed = plan_request_hash(request.start, request.goal, 0.0)
+        self._click = click = Question(CLICK, hashed, time.monotonic())
         take = partial(self._on_answer, click)
         self._planner.call_async(request).add_done_callback(partial(self._hear, "plan", take))
         return ""
@@ -172,7 +172,7 @@ class LiveListener(Node):
         """Follow the server's newest verdict again."""
         self._click = None
 
-    def _on_answer(self, click: Click, future: Any) -> None:
+    def _on_answer(self, click: Question, future: Any) -> None:
         """Take the plan of a click."""
         plan = future.result().plan
         if plan.poses:
@@ -245,13 +245,12 @@ class LiveListener(Node):
         self._ages[SIGN_OF_LIFE] = TopicAge(SIGN_OF_LIFE, now, True)
         about = {one.key: one.value for one in status.values}
         passes = status.level != DiagnosticStatus.ERROR
-        question = f"question {about.get('request', '?')}, {about.get('service', '?')}"
+        name = f"question {about.get('request', '?')}, {about.get('service', '?')}"
         reason, hashed = "" if passes else status.message, about.get("question_hash", "")
-        verdict = LiveVerdict(passes, reason, question, hashed, now)
-        self._data = replace(self._data, verdict=verdict)
+        self._data = replace(self._data, newest=Question(name, hashed, now, passes, reason))
         click = self._click
-        if click is not None and click.verdict is None and click.question_hash == hashed:
-            click.verdict = verdict
+        if click is not None and click.traversable is None and click.hash == hashed:
+            click.since, click.reason, click.traversable = now, reason, passes
 
     def _on_prediction(self, field: str, message: Float64MultiArray) -> None:
         self._predicted = {**self._predicted, field: array_values(message).copy()}

@@ -22,6 +22,8 @@ TRAIL_STEP, MAX_TRAIL = 0.1, 1000
 """Distance of two places of a trail [m], and their largest number."""
 ODOMETRY, SIGN_OF_LIFE = "odometry", "traverse_server"
 """Topics without which a rover, or its server, is not live."""
+CLICK = "your click"
+"""Name of a visitor's question."""
 PATIENCE = 2.0
 """Time after which a click without an answer says so [s]."""
 
@@ -54,34 +56,26 @@ class TopicAge:
         return f"{self.age:.1f} s" if self.age < 10.0 else f"{self.age:.0f} s"
 
 
-@dataclass(frozen=True, eq=False)
-class LiveVerdict:
-    """A verdict of the server."""
-
-    traversable: bool
-    """True if there is a path that the rover can drive."""
-    reason: str
-    """Reason of a refusal, empty where there is one."""
-    question: str
-    """Its question, such as "question 12, can_traverse"."""
-    question_hash: str
-    """`msg_adapters.identity.plan_request_hash` of the question."""
-    heard: float
-    """Time on the monotonic clock [s]."""
-
-
 @dataclass(eq=False)
-class Click:
-    """A visitor's question to the server, and its answer as far as it has come."""
+class Question:
+    """A question to the server, and its answer as far as it has come."""
 
-    question_hash: str
-    """As in `LiveVerdict`."""
-    asked: float
-    """Time on the monotonic clock [s]."""
-    verdict: LiveVerdict | None = None
-    """Its verdict; None until it comes."""
+    name: str
+    """Whose it is, such as "question 12, can_traverse" or CLICK."""
+    hash: str
+    """`msg_adapters.identity.plan_request_hash` of it."""
+    since: float
+    """When it was asked, or its verdict was heard, on the monotonic clock [s]."""
+    traversable: bool | None = None
+    """True if there is a path that the rover can drive; None until the verdict comes."""
+    reason: str = ""
+    """Reason of a refusal."""
     plan: Floats | None = None
-    """(n, 3) poses of its plan; None without one."""
+    """(n, 3) poses of the plan; None without one."""
+
+    def describe(self, now: float) -> str:
+        """Return whose it is and how old its answer is, in words."""
+        return f"{self.name}, {write_age(now - self.since)}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,10 +125,10 @@ class LiveData:
     terrain: Terrain | None = None
     """The map."""
     plan: Floats | None = None
-    """(n, 3) poses of the plan, x, y [m], yaw [rad]."""
-    verdict: LiveVerdict | None = None
-    """The newest verdict of the server, whoever asked."""
-    click: Click | None = None
+    """(n, 3) poses of the newest plan of the server, x, y [m], yaw [rad]."""
+    newest: Question | None = None
+    """What the server has answered last, whoever asked."""
+    click: Question | None = None
     """The last question of a visitor; None without one."""
     learned: LearnedTrail | None = None
     """What was learned of the ground."""
@@ -205,30 +199,30 @@ def choose_answer(
         The answer as `describe_verdict` returns one, old if nobody stands for it any more; (n, 3)
         poses of its plan, None without one.
     """
-    newest, click, server = data.verdict, data.click, data.server
-    verdict, offers = (newest if click is None else click.verdict), []
-    if verdict is not None:
-        whose = "your click" if click is not None else verdict.question
-        answer = describe_answer(verdict.traversable, f"{whose}, {write_age(now - verdict.heard)}")
-        headline = verdict.reason
-    elif click is not None:
-        waited = now - click.asked
-        late = waited > PATIENCE
-        answer = describe_answer(None, f"your click, {write_age(waited)}")
-        headline = f"no answer from the server for {waited:.0f} s" if late else "asking the server"
-    else:
-        answer = describe_answer(None, "")
+    newest, click, server, offers = data.newest, data.click, data.server, []
+    shown = newest if click is None else click
+    passes = None if shown is None else shown.traversable
+    if shown is None:
         headline = "click the ground to ask for a plan"
-    if click is not None and newest is not None and newest is not click.verdict:
-        age = write_age(now - newest.heard) + (", old" if server.is_stale else "")
-        words = f"{newest.question}: {WORDS[newest.traversable]}, {age}"
+    elif passes is not None:
+        headline = shown.reason
+    elif now - shown.since > PATIENCE:
+        headline = f"no answer from the server for {now - shown.since:.0f} s"
+    else:
+        headline = "asking the server"
+    if click is not None and newest is not None and newest.since != click.since:
+        age = write_age(now - newest.since) + (", old" if server.is_stale else "")
+        words = f"{newest.name}: {WORDS[newest.traversable]}, {age}"
         offers = [{"words": words, "ask": {"ask": "newest"}}]
-    old = ""
-    if verdict is not None and server.is_stale:
-        old = f"the server is silent for {server.describe()}"
-    shown = data.plan if click is None else click.plan
-    document = {**answer, "headline": headline, "old": old, "refusal": refusal, "offers": offers}
-    return document, shown
+    is_old = passes is not None and server.is_stale
+    document = {
+        **describe_answer(passes, "" if shown is None else shown.describe(now)),
+        "headline": headline,
+        "old": f"the server is silent for {server.describe()}" if is_old else "",
+        "refusal": refusal,
+        "offers": offers,
+    }
+    return document, data.plan if click is None else click.plan
 
 
 def write_age(seconds: float) -> str:

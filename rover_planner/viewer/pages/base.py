@@ -19,7 +19,7 @@ from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.viewer.front.channel import Channel, Mailbox, Part
-from rover_planner.viewer.scene.ground_mesh import PaintRequest, intersect_ground, paint
+from rover_planner.viewer.scene.ground_mesh import intersect_ground, paint
 from rover_planner.viewer.scene.scene import START, VIEWS, Scene
 from rover_planner.viewer.state.background_work import (
     BackgroundWork,
@@ -31,6 +31,7 @@ from rover_planner.viewer.state.background_work import (
 from rover_planner.viewer.state.layers import (
     PREDICTED,
     Colouring,
+    LayerRequest,
     Legend,
     list_layers,
 )
@@ -54,7 +55,7 @@ HOTKEYS: dict[Any, tuple[str, Words]] = {
     "arrowright": ("Step", {"ask": "step", "by": 1}),
     "home": ("To the start", {"ask": "seek", "time": 0.0}),
 }
-"""What keys ask while the scene has the focus; page.js does the same elsewhere."""
+"""What keys ask, by the name of the key in small letters."""
 CONTINUOUS = ("value", "seek", "place")
 """Words that come dozens of times a second while a slider is dragged."""
 MAX_PORT = 65535
@@ -137,8 +138,9 @@ class PageBase(ABC):
         self.scene.canvas.move_to(terrain)
         self.scene.rover.take(rover, {})
         self._add_camera()
-        self.painter = self.begin_work(paint, self._draw_ground, "ground")
-        self.channel.tell("scene", {"port": self.server.get_port()})
+        self.painter = self.begin_work(partial(paint, survey=survey), self._draw_ground, "ground")
+        keys = {key: words for key, (_, words) in HOTKEYS.items()}
+        self.channel.tell("scene", {"port": self.server.get_port(), "keys": keys})
         self._last = time.monotonic()
         self.thread = threading.Thread(target=self._run, name="page", daemon=True)
         """Changes the page."""
@@ -221,7 +223,7 @@ class PageBase(ABC):
         """Return what the page does by the word `ask`; refusals are raised as errors."""
 
     @abstractmethod
-    def describe_ground(self) -> PaintRequest | None:
+    def describe_ground(self) -> LayerRequest | None:
         """Return what is painted as the ground; None while it is not known."""
 
     @property
@@ -266,7 +268,7 @@ class PageBase(ABC):
             self.painter.ask(request)
 
     def _draw_ground(
-        self, _request: PaintRequest, painted: tuple[bytes, Legend] | BaseException
+        self, _request: LayerRequest, painted: tuple[bytes, Legend] | BaseException
     ) -> None:
         def draw() -> None:
             if isinstance(painted, BaseException):

@@ -21,7 +21,6 @@ from rover_planner.viewer.live.live_state import (
 )
 from rover_planner.viewer.pages.base import Answer, PageBase
 from rover_planner.viewer.pages.sharing import read_link
-from rover_planner.viewer.scene.ground_mesh import PaintRequest
 from rover_planner.viewer.scene.scene import START
 from rover_planner.viewer.state.drive import RoverState
 from rover_planner.viewer.state.layers import LayerRequest
@@ -76,10 +75,10 @@ class LivePage(PageBase):
             "open": lambda words: _refuse_link(words["query"]),
         }
 
-    def describe_ground(self) -> PaintRequest | None:
+    def describe_ground(self) -> LayerRequest | None:
         """Return the ground as it is known."""
-        layer = LayerRequest(self._rover, self.ground, self.colouring)
-        return PaintRequest(layer, self.scene.canvas.origin) if self._ground_name else None
+        known = bool(self._ground_name)
+        return LayerRequest(self._rover, self.ground, self.colouring) if known else None
 
     @property
     def points(self) -> Floats:
@@ -109,15 +108,11 @@ class LivePage(PageBase):
         tell("chosen", self.list_chosen())
         tell("learned", describe_learned(data.learned))
         trail = None if data.learned is None else data.learned.places
-        draw, old = self.draw_made, bool(answer["old"])
-        draw("the trail is not drawn", self._draw_trail, trail, self.ground)
-        draw("the plan is not drawn", self._draw_plan, plan, old, self.ground)
-
-    def _draw_trail(self, trail: Floats | None, _ground: Terrain) -> None:
-        self.scene.paths.show_trail(trail)
-
-    def _draw_plan(self, plan: Floats | None, is_old: bool, _ground: Terrain) -> None:
-        self.scene.paths.show_plan(plan, is_old)
+        draw, old, paths = self.draw_made, bool(answer["old"]), self.scene.paths
+        draw("the trail is not drawn", lambda *_: paths.show_trail(trail), trail, self.ground)
+        draw(
+            "the plan is not drawn", lambda *_: paths.show_plan(plan, old), plan, old, self.ground
+        )
 
     def advance(self, seconds: float) -> None:
         """Show the latest data."""

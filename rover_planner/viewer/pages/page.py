@@ -40,16 +40,8 @@ from rover_planner.viewer.documents.verdict import (
     describe_subject,
     describe_verdict,
 )
+from rover_planner.viewer.pages import sharing
 from rover_planner.viewer.pages.base import PERIOD, Answer, PageBase
-from rover_planner.viewer.pages.sharing import (
-    MAX_LENGTH,
-    PageLink,
-    read_link,
-    read_scenario,
-    write_file,
-    write_link,
-)
-from rover_planner.viewer.scene.ground_mesh import PaintRequest
 from rover_planner.viewer.scene.overlays import GHOST
 from rover_planner.viewer.scene.scene import FIT
 from rover_planner.viewer.state.drive import SPEEDS, Playback
@@ -91,7 +83,7 @@ class Page(PageBase):
         self.session, self.playback = session, Playback()
         self._ground_name = ground_name
         self._click_sets = "goal"
-        self._opening: tuple[PageLink, Scenario] | None = None
+        self._opening: tuple[sharing.PageLink, Scenario] | None = None
         """The link whose path and time are not shown yet, and what it asks for."""
         self._told_at = 0.0
         super().__init__(session.wanted.rover, session.wanted.terrain, (host, port), survey)
@@ -113,12 +105,11 @@ class Page(PageBase):
         session.judge_again()  # with the search that was not made
         self.thread.start()
 
-    def describe_ground(self) -> PaintRequest:
+    def describe_ground(self) -> LayerRequest:
         """Return the ground with what is shown on it."""
         path, now = self.session.shown.path.poses, self.session.shown.scenario
         options = now.asked_options.model
-        layer = LayerRequest(now.rover, now.terrain, self.colouring, options, path)
-        return PaintRequest(layer, self.scene.canvas.origin, self.survey)
+        return LayerRequest(now.rover, now.terrain, self.colouring, options, path)
 
     @property
     def points(self) -> Floats:
@@ -147,7 +138,7 @@ class Page(PageBase):
             "judge": lambda _words: session.judge_again(),
             "preset": lambda words: session.take_rover(load_rover(words["name"])),
             "upload": lambda words: session.take_rover(read_rover(words["text"], words["name"])),
-            "open": lambda words: self._open(read_link(words["query"])),
+            "open": lambda words: self._open(sharing.read_link(words["query"])),
             "click": lambda words: setattr(self, "_click_sets", words["sets"]),
             "toggle": lambda _words: playback.toggle(),
             "step": lambda words: playback.step(words["by"]),
@@ -237,10 +228,10 @@ class Page(PageBase):
         """The fingerprint of the map, computed when it is first asked for."""
         return fingerprint(self.ground)
 
-    def _link(self) -> PageLink:
+    def _link(self) -> sharing.PageLink:
         """Return the link to what is shown."""
         shown, now = self.session.shown, self.session.shown.scenario
-        return PageLink(
+        return sharing.PageLink(
             loaded=rover_to_dict(now.loaded),
             rover=rover_to_dict(now.rover),
             ground=self._map_print,
@@ -256,11 +247,11 @@ class Page(PageBase):
 
     def _tell_link(self) -> dict[str, Any]:
         """Return the link to what is shown, for the visitor who asks for it."""
-        query, rover = write_link(self._link()), self.session.shown.scenario.rover.name
+        query, rover = sharing.write_link(self._link()), self.session.shown.scenario.rover.name
         if not query:
             raise PlanningError(
                 f"the link with the file of {rover} would be longer than an address may be, "
-                f"{MAX_LENGTH} characters; save the rover file and the HTML file instead"
+                f"{sharing.MAX_LENGTH} characters; save the rover file and the HTML file instead"
             )
         return {"link": query}
 
@@ -276,16 +267,16 @@ class Page(PageBase):
         self.advance(0.0)
         self.tell()
         rover = path.scenario.rover
-        text = write_file(self.server, self.channel.parts, self._link(), rover, base)
+        text = sharing.write_file(self.server, self.channel.parts, self._link(), rover, base)
         return _file(f"{rover.name}.html", text)
 
-    def _open(self, link: PageLink | None) -> None:
+    def _open(self, link: sharing.PageLink | None) -> None:
         """Judge what a link holds, and show it."""
         if link is None:
             return
         if link.layer not in self.layers:
             raise PlanningError(f"the link names the layer {link.layer!r}, which there is not")
-        asked = read_scenario(link, self.session.wanted, self._map_print)
+        asked = sharing.read_scenario(link, self.session.wanted, self._map_print)
         self.colouring = Colouring(link.layer, link.heading, link.along)
         self.session.take_scenario(asked)
         self._opening = link, asked
@@ -382,7 +373,7 @@ class Page(PageBase):
         made("paths", describe_paths, shown, is_old, is_judging)
         is_seeking = self._advice.progress is not None
         tell("advice", describe_advice(self._advised, is_seeking, time.monotonic()))
-        made("current", lambda *_: write_link(self._link()), shown, self.colouring)
+        made("current", lambda *_: sharing.write_link(self._link()), shown, self.colouring)
         made("sliders", describe_sliders, wanted.loaded)
         made("values", describe_values, wanted)
         made("changes", describe_changes, path, reference, session.kept is not None)

@@ -20,6 +20,15 @@ of a UTM map than 0.25 m.
 """
 
 
+def find_origin(terrain: Terrain) -> Floats:
+    """Return the origin (3,) of a scene [m] near the middle of a ground, at its median height."""
+    x_low, x_high, y_low, y_high = terrain.bounds
+    known = terrain.elevation[np.isfinite(terrain.elevation)]
+    height = float(np.median(known)) if known.size else 0.0
+    middle = np.array([0.5 * (x_low + x_high), 0.5 * (y_low + y_high), height])
+    return np.asarray(STEP * np.round(middle / STEP))
+
+
 @dataclass(frozen=True, eq=False)
 class Strand:
     """A line of one colour."""
@@ -50,7 +59,6 @@ class Canvas:
         """Radius of the wheels of the rover that was drawn last [m]."""
         self.nodes: dict[str, Any] = {}
         """What is shown, by name."""
-        self._values: dict[str, dict[str, Any]] = {}
 
     def to_scene(self, points: ArrayLike) -> Floats:
         """Return points (..., 3) of the map frame in the scene [m]."""
@@ -61,16 +69,11 @@ class Canvas:
         return np.asarray(points, dtype=float) + self.origin
 
     def move_to(self, terrain: Terrain) -> bool:
-        """Take another ground, and an origin near its median height; return whether that moved.
+        """Take another ground, and the origin near it; return whether that moved.
 
         What was drawn before must then be drawn again.
         """
-        x_low, x_high, y_low, y_high = terrain.bounds
-        known = terrain.elevation[np.isfinite(terrain.elevation)]
-        height = float(np.median(known)) if known.size else 0.0
-        middle = np.array([0.5 * (x_low + x_high), 0.5 * (y_low + y_high), height])
-        before, self.origin = self.origin, STEP * np.round(middle / STEP)
-        self.terrain = terrain
+        before, self.origin, self.terrain = self.origin, find_origin(terrain), terrain
         return not np.array_equal(self.origin, before)
 
     def lay(self, points: ArrayLike, height: float, unknown: float = np.nan) -> Floats:
@@ -110,18 +113,22 @@ class Canvas:
         self.show(self.scene.add_frame, name, show_axes=False, **values)
 
     def show(self, add: Callable[..., Any], name: str, **values: Any) -> None:
-        """Add a node with some values, or send those of the node of this name that differ."""
-        before = self._values.setdefault(name, values)
-        if name not in self.nodes:
+        """Add a node with some values, or give them to the node of this name.
+
+        viser sends those that differ.
+        """
+        if name in self.nodes:
+            self.change(name, **values)
+        else:
             self.nodes[name] = add(name, **values)
+
+    def change(self, name: str, **values: Any) -> None:
+        """Give values to a node."""
         for key, value in values.items():
-            if key not in before or not np.array_equal(value, before[key]):
-                setattr(self.nodes[name], key, value)
-        self._values[name] = before | values
+            setattr(self.nodes[name], key, value)
 
     def remove(self, group: str, but: Collection[str] = ()) -> None:
         """Remove a node, and those below its name but some of these."""
         for name in reversed([*self.nodes]):  # what is below a node goes with it
             if f"{name}/".startswith(f"{group}/") and name not in but:
                 self.nodes.pop(name).remove()
-                del self._values[name]

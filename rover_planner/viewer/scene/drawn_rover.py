@@ -14,19 +14,9 @@ from rover_physics.numerics.quaternions import wxyz_about_y, wxyz_from_rpy
 from rover_physics.rover.manipulator import link_points
 from rover_physics.rover.model import Manipulator, Rover
 from rover_planner.viewer.scene.canvas import Canvas, Strand
-from rover_planner.viewer.state.colours import (
-    BODY,
-    CASING,
-    DARK,
-    LOAD,
-    METAL,
-    REFUSED,
-    TRACTION,
-    Colour,
-    colour_use,
-)
+from rover_planner.viewer.state import colours
 from rover_planner.viewer.state.drive import RoverState
-from rover_planner.viewer.state.path_limits import Failure
+from rover_planner.viewer.state.path_limits import BODY, Failure
 
 WEIGHT_LENGTH = 4.0
 """Length of the arrow of a sixth of the rover's weight [wheel radii]."""
@@ -42,12 +32,15 @@ LABEL_HEIGHT = 4.5
 
 
 class DrawnRover:
-    """Body, rockers, bogies, wheels, arm and forces of a rover, which stay for the next one."""
+    """Body, rockers, bogies, wheels, arm and forces of a rover, which stay for the next one.
+
+    The node of a link is its mesh, below that of the link it hangs on.
+    """
 
     def __init__(self, canvas: Canvas, name: str, opacity: float | None = None):
         """Draw nothing yet; nodes will be below a node `name`, opaque without an opacity."""
         self._canvas, self._name, self._opacity = canvas, name, opacity
-        self._links, self._forces = f"{name}/links", f"{name}/forces"
+        self._forces = f"{name}/forces"
         self.rover: Rover | None = None
         """The rover; None before the first."""
         self.state: RoverState | None = None
@@ -55,8 +48,7 @@ class DrawnRover:
         self._looks: tuple[Any, ...] = ()
         """What the shape of the rover and the length of its arrows depend on."""
         self._arm: dict[str, float] = {}
-        self._joints: dict[str, str] = {}
-        self.meshes: dict[str, tuple[str, Colour]] = {}
+        self.meshes: dict[str, tuple[str, colours.Colour]] = {}
         """Node and colour of each link by its name; that of a wheel is its tyre."""
 
     def take(self, rover: Rover, arm_angles: Mapping[str, float]) -> None:
@@ -72,59 +64,58 @@ class DrawnRover:
             self._looks, self.rover = (), None  # an error must not leave half a rover
             self._draw(rover)
         if arm is not None and (is_new or arm_angles != self._arm):
-            self._put("arm", "arm", make_arm(arm, arm_angles, wheel.radius), DARK)
+            mesh = make_arm(arm, arm_angles, wheel.radius)
+            self._put("arm", BODY, np.zeros(3), mesh, colours.DARK)
         self._looks, self._arm, self.rover = looks, dict(arm_angles), rover
         if is_new:
             self.show(self.state)
 
     def _draw(self, rover: Rover) -> None:
-        """Put all links and joints of a rover, and take away those that it lacks."""
-        self._joints, self.meshes = {}, {}
+        """Put all links of a rover, and take away those that it lacks."""
+        self.meshes = {}
         self._canvas.show_frame(self._name, visible=self.state is not None)
-        for name in (self._links, self._forces):
-            self._canvas.show_frame(name)
-        self._put("body", "body", make_body(rover), BODY)
-        wheel = make_wheel(rover)
+        self._canvas.show_frame(self._forces)
+        self._put(BODY, "", np.zeros(3), make_body(rover), colours.BODY)
+        tyre, grousers = make_wheel(rover)
         for side in SIDES:
-            self._put_side(rover, side, wheel)
-        nodes = [*self._joints.values(), *(node for node, _ in self.meshes.values())]
-        self._canvas.remove(self._links, [self._links, *nodes])
+            self._put_side(rover, side, tyre, grousers)
+        self._canvas.remove(f"{self._name}/{BODY}", [node for node, _ in self.meshes.values()])
 
-    def _put(self, link: str, path: str, mesh: trimesh.Trimesh, colour: Colour) -> None:
-        """Put the mesh of a link."""
-        name, opacity = f"{self._links}/{path}", self._opacity
+    def _put(
+        self, link: str, above: str, place: Floats, mesh: trimesh.Trimesh, colour: colours.Colour
+    ) -> None:
+        """Put the mesh of a link at a place (3,) [m] of the link above; the first has none."""
+        parent = self.meshes[above][0] if above else self._name
+        name, opacity = f"{parent}/{link}", self._opacity
         self.meshes[link] = name, colour
         self._canvas.show(
             self._canvas.scene.add_mesh_simple, name, vertices=mesh.vertices, faces=mesh.faces,
-            color=colour, flat_shading=True, opacity=opacity, cast_shadow=opacity is None,
+            position=place, color=colour, flat_shading=True, opacity=opacity,
+            cast_shadow=opacity is None,
         )  # fmt: skip
 
-    def _put_joint(self, link: str, path: str, position: Floats) -> None:
-        self._joints[link] = f"{self._links}/{path}"
-        self._canvas.show_frame(self._joints[link], position=position)
-
     def _put_side(
-        self, rover: Rover, side: str, wheel: tuple[trimesh.Trimesh, trimesh.Trimesh]
+        self, rover: Rover, side: str, tyre: trimesh.Trimesh, grousers: trimesh.Trimesh
     ) -> None:
-        """Put rocker, bogie and wheels of a side; `wheel` is as `make_wheel` returns it."""
-        suspension = rover.suspension
-        rocker = on_side(suspension.rocker_pivot, side)
-        bogie = on_side(suspension.bogie_pivot, side)
+        """Put rocker, bogie and wheels of a side."""
+        suspension, beam = rover.suspension, 0.16 * rover.wheel.radius
+        pivots = {
+            f"rocker_{side}": on_side(suspension.rocker_pivot, side),
+            f"bogie_{side}": on_side(suspension.bogie_pivot, side),
+        }
+        rocker, bogie = pivots
         wheels = {name: on_side(suspension.wheels[name], side) for name in WHEEL_POSITIONS}
-        rocker_path, bogie_path = f"rocker_{side}", f"rocker_{side}/bogie"
-        self._put_joint(f"rocker_{side}", rocker_path, rocker)
-        self._put_joint(f"bogie_{side}", bogie_path, bogie - rocker)
-        radius = 0.16 * rover.wheel.radius
-        ends = [bogie - rocker, wheels[suspension.rocker_wheel] - rocker]
-        self._put(f"rocker_{side}", f"{rocker_path}/beams", make_beams(ends, radius), METAL)
-        ends = [wheels[name] - bogie for name in suspension.bogie_wheels]
-        self._put(f"bogie_{side}", f"{bogie_path}/beams", make_beams(ends, radius), METAL)
+        ends = [pivots[bogie], wheels[suspension.rocker_wheel]]
+        beams = make_beams([end - pivots[rocker] for end in ends], beam)
+        self._put(rocker, BODY, pivots[rocker], beams, colours.METAL)
+        ends = [wheels[name] for name in suspension.bogie_wheels]
+        beams = make_beams([end - pivots[bogie] for end in ends], beam)
+        self._put(bogie, rocker, pivots[bogie] - pivots[rocker], beams, colours.METAL)
         for position, centre in wheels.items():
-            on_bogie, name = position in suspension.bogie_wheels, f"{position}_{side}"
-            path = f"{bogie_path if on_bogie else rocker_path}/{position}"
-            self._put_joint(name, path, centre - (bogie if on_bogie else rocker))
-            self._put(name, f"{path}/tyre", wheel[0], METAL)
-            self._put(f"{name} grousers", f"{path}/grousers", wheel[1], DARK)
+            name, on_bogie = f"{position}_{side}", position in suspension.bogie_wheels
+            on = bogie if on_bogie else rocker
+            self._put(name, on, centre - pivots[on], tyre, colours.METAL)
+            self._put(f"{name}_grousers", name, np.zeros(3), grousers, colours.DARK)
 
     def show(self, state: RoverState | None, failing: str = "") -> None:
         """Show rover and forces in a state.
@@ -139,30 +130,23 @@ class DrawnRover:
             return
         self._canvas.show_frame(self._name, visible=state is not None)
         if state is not None:
-            self._turn(state)
-            self._colour(state, failing)
+            self._show_links(state, failing)
             self._draw_forces(state, self.rover)
 
-    def _turn(self, state: RoverState) -> None:
-        """Bring the joints to a state."""
-        turns = {wheel: wxyz_from_rpy(0.0, float(state.spin[k]), float(state.steering_angle[k]))
-                 for k, wheel in enumerate(WHEELS)}  # fmt: skip
+    def _show_links(self, state: RoverState, failing: str) -> None:
+        """Bring the links to a state; wheels have the colours of their use of friction."""
+        rolled = wxyz_from_rpy(np.zeros(6), state.spin, state.steering_angle)
+        turns = {BODY: wxyz_from_rpy(*state.attitude), **dict(zip(WHEELS, rolled, strict=True))}
         for k, side in enumerate(SIDES):
             turns[f"rocker_{side}"] = wxyz_about_y(float(state.rocker_angle[k]))
             turns[f"bogie_{side}"] = wxyz_about_y(float(state.bogie_angle[k]))
+        used = dict(zip(WHEELS, map(colours.colour_use, state.friction_use), strict=True))
         for link, turn in turns.items():
-            self._canvas.show_frame(self._joints[link], wxyz=turn)
-        place, turn = self._canvas.to_scene(state.position), wxyz_from_rpy(*state.attitude)
-        self._canvas.show_frame(self._links, position=place, wxyz=turn)
-
-    def _colour(self, state: RoverState, failing: str) -> None:
-        """Give wheels the colours of their use of friction, and a failing link that of that."""
-        used = dict(zip(WHEELS, map(colour_use, state.friction_use), strict=True))
-        for link, (node, own) in self.meshes.items():
-            fails = link == failing
-            colour, opacity = used.get(link, own), 1.0 if fails else self._opacity
-            add = self._canvas.scene.add_mesh_simple
-            self._canvas.show(add, node, color=REFUSED if fails else colour, opacity=opacity)
+            (node, own), fails = self.meshes[link], link == failing
+            colour = colours.REFUSED if fails else used.get(link, own)
+            opacity = 1.0 if fails else self._opacity
+            self._canvas.change(node, color=colour, opacity=opacity, wxyz=turn)
+        self._canvas.change(self.meshes[BODY][0], position=self._canvas.to_scene(state.position))
 
     def _draw_forces(self, state: RoverState, rover: Rover) -> None:
         """Draw the normal forces and those along the ground, of no length if not known."""
@@ -176,13 +160,13 @@ class DrawnRover:
             for values in (state.wheel_loads, state.tangential, state.lateral)
         )
         arrows = {
-            "normal": (points + N * normal, LOAD),
-            "along": (points + (T * along + S * axis), TRACTION),
+            "normal": (points + N * normal, colours.LOAD),
+            "along": (points + (T * along + S * axis), colours.TRACTION),
         }
         for name, (tips, colour) in arrows.items():
             self._canvas.show(
                 self._canvas.scene.add_arrows, f"{self._forces}/{name}",
-                points=np.stack([points, tips], axis=1), colors=colour,
+                points=np.stack([points, tips], axis=1), colors=np.array(colour, np.uint8),
                 shaft_radius=0.07 * radius, head_radius=0.16 * radius, head_length=0.35 * radius,
             )  # fmt: skip
 
@@ -232,7 +216,7 @@ class FailureMark:
         if failure.link in WHEELS:
             place = state.wheel_centres[WHEELS.index(failure.link)]
         top = state.position + np.array([0.0, 0.0, LABEL_HEIGHT * radius])
-        leader = Strand(np.array([top, place]), CASING)
+        leader = Strand(np.array([top, place]), colours.CASING)
         self._canvas.show_lines(f"{REASON}/leader", [leader], 2.0)
         self._canvas.show_label(f"{REASON}/words", f"{words}\n{failure.place}", top)
 

@@ -3,7 +3,6 @@
 
 import gc
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,8 @@ from numpy.typing import NDArray
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
+from rover_planner.maps.hill_shade import LEVEL_SHADE, hill_shade
+from rover_planner.viewer.scene.canvas import find_origin
 from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.layers import (
     ColouredGround,
@@ -24,10 +25,8 @@ from rover_planner.viewer.state.layers import (
 )
 from rover_planner.viewer.state.survey_layers import ShownSurvey
 
-LIGHT = (-0.6, 0.5, 1.0)
-"""Direction to the light of the hillshade."""
-RELIEF = 1.3
-"""Contrast of the hillshade; 1 is that of a matt surface."""
+SHADES = (0.3, 1.25)
+"""Least and largest brightness of the ground; 1 where it is level."""
 HATCH_PERIOD, MIN_PERIOD = 0.16, 5
 """Period of the stripes where a limit is broken [m], and the least one [pixels]."""
 HATCH_SHADE = 0.5
@@ -39,25 +38,14 @@ UNLIT = "KHR_materials_unlit"
 the screen takes most of the time of a picture."""
 
 
-@dataclass(frozen=True, eq=False)
-class PaintRequest:
-    """A picture of the ground."""
-
-    layer: LayerRequest
-    """What it shows."""
-    origin: Floats
-    """(3,) origin of the scene [m], map frame."""
-    survey: ShownSurvey | None = None
-    """The survey; None if there is none."""
-
-
-def paint(request: PaintRequest) -> Iterator[Progress | tuple[bytes, Legend]]:
+def paint(
+    asked: LayerRequest, survey: ShownSurvey | None = None
+) -> Iterator[Progress | tuple[bytes, Legend]]:
     """Yield what is begun, and the painted ground as a file for the scene, with its legend.
 
     A layer that is predicted for the rover takes seconds.
     """
     yield Progress("ground")
-    asked, survey = request.layer, request.survey
     name, grid = asked.how.layer, make_grid(asked.terrain)
     if survey is not None and name in survey.names:
         ground = survey.colour(name, asked.rover, asked.options, grid)
@@ -65,7 +53,7 @@ def paint(request: PaintRequest) -> Iterator[Progress | tuple[bytes, Legend]]:
         ground = colour_limit(asked, grid)
     else:
         ground = colour_ground(name, asked.terrain, grid)
-    yield write_ground(grid, ground, request.origin), ground.legend
+    yield write_ground(grid, ground, find_origin(asked.terrain)), ground.legend
 
 
 def draw_picture(grid: GroundGrid, ground: ColouredGround) -> NDArray[np.uint8]:
@@ -75,7 +63,9 @@ def draw_picture(grid: GroundGrid, ground: ColouredGround) -> NDArray[np.uint8]:
     has thin lines every metre.
     """
     x, y = grid.pixels
-    factor = grid.refine(_light(*grid.slopes))
+    light = hill_shade(grid.heights, grid.step) / LEVEL_SHADE
+    light = np.clip(np.nan_to_num(light, nan=1.0), *SHADES)
+    factor = grid.refine(light.astype(np.float32))  # a whole picture of them: half the memory
     if ground.beyond is not None:
         period = max(MIN_PERIOD, round(HATCH_PERIOD / (x[1] - x[0])))
         row, column = (np.arange(len(at), dtype=np.int16) for at in (y, x))
@@ -87,13 +77,6 @@ def draw_picture(grid: GroundGrid, ground: ColouredGround) -> NDArray[np.uint8]:
     for k in range(3):  # one by one: all at once take three times the memory
         picture[..., k] = np.minimum(ground.colours[..., k] * factor, 255.0)
     return picture
-
-
-def _light(along_x: Floats, along_y: Floats) -> Floats:
-    """Return the brightness of ground with these rises, lit from LIGHT: 1 where it is level."""
-    right, up = (np.nan_to_num(one).astype(np.float32) for one in (along_x, along_y))
-    lit = (LIGHT[2] - LIGHT[0] * right - LIGHT[1] * up) / LIGHT[2] / np.sqrt(right**2 + up**2 + 1)
-    return np.asarray(np.clip(1.0 + RELIEF * (np.maximum(lit, 0.0) - 1.0), 0.3, 1.25))
 
 
 def build_ground_mesh(

@@ -24,7 +24,7 @@ CASING = (16, 16, 16)
 
 
 def map_colours(values: NDArray[np.float64], low: float, high: float) -> NDArray[np.uint8]:
-    """Return colours (..., 3) of values on the map cividis, grey where a value is not finite.
+    """Return colours (..., 3) of values on the map cividis, grey where a value is NaN.
 
     Args:
         values: (...) values.
@@ -34,11 +34,8 @@ def map_colours(values: NDArray[np.float64], low: float, high: float) -> NDArray
     from matplotlib import colormaps
 
     span = high - low if high > low else 1.0
-    table = colormaps["cividis"](np.arange(256), bytes=True)[:, :3]
-    share = np.clip((np.nan_to_num(values) - low) / span, 0.0, 1.0)
-    colours = np.asarray(table[(255.0 * share).astype(np.uint8)])
-    colours[~np.isfinite(values)] = UNKNOWN
-    return colours
+    scale = colormaps["cividis"].with_extremes(bad=to_css(UNKNOWN))
+    return np.asarray(scale((values - low) / span, bytes=True)[..., :3])
 
 
 def colour_use(use: float) -> Colour:

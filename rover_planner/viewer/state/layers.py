@@ -65,11 +65,10 @@ class GroundGrid:
         )
         return x, y
 
-    @cached_property
-    def slopes(self) -> tuple[Floats, Floats]:
-        """Rises (ny, nx) of the cells along x and along y."""
-        heights = self.heights
-        return np.gradient(heights, self.x, axis=1), np.gradient(heights, self.y, axis=0)
+    @property
+    def step(self) -> float:
+        """Distance of the cells [m]."""
+        return float(self.x[1] - self.x[0])
 
     def refine(self, values: NDArray[Any]) -> NDArray[Any]:
         """Return values (ny, nx, ...) of the cells as those of the pixels (my, mx, ...)."""
@@ -182,7 +181,7 @@ def colour_ground(layer: str, terrain: Terrain, grid: GroundGrid) -> ColouredGro
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
     ends: tuple[str, ...] = f"{low:.2f} m", f"{high:.2f} m"
     if layer == SLOPE:
-        values = np.degrees(np.arctan(np.hypot(*grid.slopes)))
+        values = np.degrees(np.arctan(np.hypot(*np.gradient(heights, grid.step))))
         low, high, ends = 0.0, STEEP, ("0 deg", f"{STEEP:.0f} deg")
     elif layer == FRICTION and terrain.friction is not None:
         at, low, high = (grid.x, grid.y), 0.0, 1.0

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rover_physics.chance.failure_chance import FailureChance
 from rover_physics.limits.table import CHANCE, RATIO, Sense, Unit
-from rover_physics.names import SIDES, WHEEL_POSITIONS, WHEELS
+from rover_physics.names import WHEEL_POSITIONS, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.record import find_column, numbers_of
@@ -19,11 +19,10 @@ from rover_physics.traversability.classification import find_wheel
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.planning.asked_poses import AskedPoses, merge_poses
 from rover_planner.viewer.state.drive import RoverState, place_state
+from rover_planner.viewer.state.numbers import write
 
 GROUND = "ground"
 """Code of what is no limit of a number: unknown ground, no equilibrium, entrapment, steering."""
-MAX_USE = 99.0
-"""Largest use that is written as a number."""
 MORE_DIGITS = 2
 """Most digits beyond those of the unit that tell a value from its limit; else words do."""
 BODY = "body"
@@ -31,16 +30,11 @@ BODY = "body"
 BODY_CODES = ("tilt", "tip_over", "belly")
 """Codes of limits of the body."""
 TITLES = {
-    "steering": "steering",
     "off_map": "off the map",
-    "unknown_ground": "unknown ground",
     "not_settled": "does not settle",
-    "no_equilibrium": "no equilibrium",
-    "not_computable": "not computable",
-    "trapped": "trapped",
     CHANCE: "chance of failure above what is accepted",
 }
-"""Short names of the codes of a verdict that have no number."""
+"""Short names of codes without a number; others are their own."""
 ON_THE_WAY = "on the way here: "
 """Beginning of the reason of a failure between waypoints."""
 
@@ -77,12 +71,6 @@ class ShownLimit:
             return False
         return value < self.bound if self.is_lowest else value > self.bound
 
-    def write(self, value: float, more: int = 0) -> str:
-        """Return a value as text, without the unit and with more digits; ? for NaN."""
-        if np.isfinite(value):
-            return f"{value:.{self.unit.digits + more}f}"
-        return "?" if np.isnan(value) else "infinite"
-
     def compare(self, value: float) -> str:
         """Return a value beside the limit, such as "friction 1.32 of 1.00", with enough digits.
 
@@ -91,13 +79,13 @@ class ShownLimit:
         if self.bound is None:
             return self.title
         unit, bound = f" {self.unit.name}".rstrip(), self.bound
-        for more in range(MORE_DIGITS + 1):
-            shown, limit = self.write(value, more), self.write(bound, more)
+        for digits in range(self.unit.digits, self.unit.digits + MORE_DIGITS + 1):
+            shown, limit = write(value, digits), write(bound, digits)
             if shown != limit:
                 least = "at least " if self.is_lowest else ""
                 return f"{self.title} {shown} of {least}{limit}{unit}"
         side = "at" if value == bound else "just above" if value > bound else "just below"
-        return f"{self.title} {side} {self.write(bound)}{unit}"
+        return f"{self.title} {side} {write(bound, self.unit.digits)}{unit}"
 
     @property
     def good(self) -> str:
@@ -105,17 +93,7 @@ class ShownLimit:
         if self.bound is None:
             return ""
         word = "min" if self.is_lowest else "max"
-        return f"{word} {self.write(self.bound)} {self.unit.name}".strip()
-
-
-def write_use(use: float) -> str:
-    """Return the use of a limit as text, such as "76 %"."""
-    if np.isnan(use):
-        return "not asked"
-    if use > MAX_USE:
-        return "fails" if np.isinf(use) else f"over {100.0 * MAX_USE:.0f} %"
-    text = f"{100.0 * use:.0f} %"
-    return "just above 100 %" if use > 1.0 and text == "100 %" else text
+        return f"{word} {write(self.bound, self.unit.digits, self.unit.name)}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,8 +107,8 @@ class Lane:
     used: Floats
     """Use of the limit: 1 at the limit, above 1 where it is broken, NaN where it does
     not count or is not known."""
-    wheel: NDArray[np.int64]
-    """Index of the wheel concerned, -1 for none."""
+    decides: NDArray[np.int64] | None = None
+    """(m,) which of the rover's limits it is that is used most; None for what is no limit."""
     wheels: Floats | None = None
     """(m, 6) use by each wheel; None if the limit is not one value for each wheel."""
 
@@ -148,6 +126,8 @@ class PathLimits:
     """The poses."""
     lanes: tuple[Lane, ...]
     """The limits, in the order in which they become reasons."""
+    uses: Uses
+    """The uses of all limits of the rover at the poses."""
 
     @property
     def end(self) -> float:
@@ -166,6 +146,17 @@ class PathLimits:
         """Return the lane of a code of a verdict; that of the ground for other codes."""
         found = {lane.limit.code: lane for lane in self.lanes}
         return found.get(code, found[GROUND])
+
+    def find_link(self, lane: Lane, row: int) -> str:
+        """Return the wheel or joint that decides a lane at a row, such as rocker_left, or ""."""
+        if lane.decides is None:
+            return ""
+        k = int(lane.decides[row])
+        limit, element = self.uses.limits.rows[k], int(self.uses.element[row, k])
+        if limit.elements and element >= 0:
+            return f"{limit.reads.removesuffix('_angle')}_{limit.elements[element]}"
+        wheel = find_wheel(self.rows.prediction, self.uses, row, k)
+        return WHEELS[wheel] if wheel >= 0 else ""
 
     def add_chance(self, chance: FailureChance | None) -> "PathLimits":
         """Return the limits with a lane for the chance that the path fails there, if known."""
@@ -197,14 +188,14 @@ def find_path_limits(rover: Rover, prediction: PathPrediction, verdict: Verdict)
         of_code.pop("sinkage", None)
     unjudged = np.where(rows.prediction.settled, 0.0, np.inf)
     lanes = [_make_lane(rows, uses, np.array(one)) for one in of_code.values()]
-    found = PathLimits(rows, (_plain_lane(GROUND, "ground", unjudged), *lanes))
+    found = PathLimits(rows, (_plain_lane(GROUND, "ground", unjudged), *lanes), uses)
     _add_refusals(found, verdict)
     return found
 
 
 def _plain_lane(code: str, title: str, used: Floats) -> Lane:
     """Return the lane of a use (m,) that has neither a value nor a wheel."""
-    return Lane(ShownLimit(code, title), np.full(len(used), np.nan), used, np.full(len(used), -1))
+    return Lane(ShownLimit(code, title), np.full(len(used), np.nan), used)
 
 
 def _show_limit(uses: Uses, of_limit: NDArray[np.int64]) -> ShownLimit:
@@ -228,9 +219,8 @@ def _make_lane(rows: AskedPoses, uses: Uses, of_limit: NDArray[np.int64]) -> Lan
         column = find_column(uses.limits.rows[of_limit[0]].reads)[0]
         element = np.maximum(uses.element[every, decides], 0)
         values = limit.unit.factor * numbers_of(prediction.results)[every, column + element]
-    wheel = [find_wheel(prediction, uses, row, int(k)) for row, k in enumerate(decides)]
     by_wheel = _find_wheel_uses(prediction, uses, int(of_limit[0])) if len(of_limit) == 1 else None
-    return Lane(limit, values, used, np.array(wheel, np.int64), by_wheel)
+    return Lane(limit, values, used, decides, by_wheel)
 
 
 def _find_wheel_uses(prediction: PathPrediction, uses: Uses, k: int) -> Floats | None:
@@ -305,8 +295,8 @@ class Failure:
         """The value beside the limit, such as "friction 1.32 of 1.00, middle left wheel"."""
         if not np.isnan(self.value):
             words = self.limit.compare(self.value)
-        elif self.code in TITLES:
-            words = TITLES[self.code]
+        elif self.code and self.limit.code == GROUND:
+            words = TITLES.get(self.code, self.code.replace("_", " "))
         else:
             return self.reason.removeprefix(ON_THE_WAY)
         return f"{words}, {self.where}" if self.where else words
@@ -330,13 +320,13 @@ def find_failure(rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathL
     here, value = rows.prediction.select([at]), float(lane.values[at])
     limit = lane.limit.keep(float(here.results["kept_share"][0]))
     explains = limit.is_broken_by(value)
+    link = limits.find_link(lane, at) if explains or verdict.code == "suspension" else ""
     return Failure(
         code=verdict.code,
         reason=verdict.reason,
         limit=limit,
         value=value if explains else np.nan,
-        link=_find_link(rover, terrain, verdict.code, rows, at)
-        or (WHEELS[lane.wheel[at]] if explains and lane.wheel[at] >= 0 else ""),
+        link=link or _find_link(rover, terrain, verdict.code, rows, at),
         distance=float(rows.distance[at]),
         time=float(rows.time[at]),
         is_between=bool(rows.is_between[at]),
@@ -358,22 +348,16 @@ def level_state(rover: Rover, terrain: Terrain, rows: AskedPoses, at: int) -> Ro
 
 
 def _find_link(rover: Rover, terrain: Terrain, code: str, rows: AskedPoses, at: int) -> str:
-    """Return the link that fails at a row; empty if the wheel that decides the limit does."""
-    part = rows.prediction
+    """Return the link that fails at a row where no lane names one; empty for none."""
     if code in BODY_CODES:
         return BODY
-    if code == "suspension":
-        joints = np.hstack([part.rocker_angle[at], part.bogie_angle[at]])
-        limits = rover.suspension.rocker_limits, rover.suspension.bogie_limits
-        low, high = np.repeat(limits, 2, axis=0).T
-        joint = int(np.argmin(np.minimum(joints - low, high - joints)))
-        return f"{('rocker', 'bogie')[joint // 2]}_{SIDES[joint % 2]}"
     if code in ("off_map", "unknown_ground"):
         return _find_lost_wheel(rover, terrain, level_state(rover, terrain, rows, at))
     if code == "steering" and rover.steering is not None:
         turns = np.tile([name in rover.steering.wheels for name in WHEEL_POSITIONS], 2)
         allowed = np.where(turns, rover.steering.limit, 0.0)
-        return WHEELS[int(np.argmax(np.abs(part.steering_angle[at]) - allowed))]
+        angles = rows.prediction.steering_angle[at]
+        return WHEELS[int(np.argmax(np.abs(angles) - allowed))]
     return ""
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The state behind the page: what visitors want judged, and what was judged last."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import islice
@@ -21,7 +21,6 @@ from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.query import LatticeSettings
 from rover_planner.studies.rover_values import vary
-from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.judging import JudgeRequest, judge_request, show_recorded
 from rover_planner.viewer.state.scenario import Pose, Scenario, Shown
 
@@ -34,10 +33,14 @@ MAX_STEPS = 50
 class ViewSession:
     """The scenario that is wanted and what is shown: frozen values that are replaced as a whole.
 
-    It judges at once, or has its owner judge in another thread. All changes belong to one thread,
-    the owner's. A refused change alters nothing but `refusal`. The path that is looked at stays
-    until `show_path`, another goal or another rover.
+    Its owner judges, perhaps in another thread. All changes belong to one thread, the owner's. A
+    refused change alters nothing but `refusal`. The path that is looked at stays until
+    `show_path`, another goal or another rover.
     """
+
+    judge: Callable[[JudgeRequest], object]
+    """Judges a request by `find_steps`, and has `take` called with all that is found; the owner
+    sets it."""
 
     def __init__(
         self,
@@ -73,15 +76,13 @@ class ViewSession:
         self.is_stopped = False
         """True if the judgement of `wanted` was cancelled or failed."""
         self._undo: list[Scenario] = []
-        self.judge: Callable[[JudgeRequest], object] = self._judge_now
-        """Judges a request: at once, or by `find_steps` in a thread of the owner, who then calls
-        `take` with all that is found."""
         self.find_steps = partial(judge_request, memory=EdgeMemory())
         """Finds what is shown, as `judge_request` does."""
         self._asked = JudgeRequest(self.wanted)
         """The newest request."""
-        first = self.find_steps(self._asked)
-        *_, self.shown = islice(_results(first), 2)  # and not what it searches
+        steps = self.find_steps(self._asked)
+        found = (step for step in steps if isinstance(step, Shown))
+        *_, self.shown = islice(found, 2)  # and not what it searches
         """The last finding."""
         self._index = self.shown.index
         """Index of the path that visitors want to look at."""
@@ -195,13 +196,6 @@ class ViewSession:
         self._asked = JudgeRequest(wanted, before, at, self.kept)
         self.judge(self._asked)
 
-    def _judge_now(self, request: JudgeRequest) -> None:
-        try:
-            for shown in _results(self.find_steps(request)):
-                self.take(request, shown)
-        except REFUSALS as error:
-            self.take(request, error)
-
     def take(self, request: JudgeRequest, found: Shown | BaseException) -> None:
         """Take what was judged, unless visitors look at another path meanwhile.
 
@@ -247,11 +241,6 @@ class ViewSession:
         start, goal = tuple(poses[0].tolist()), tuple(poses[-1].tolist())
         self.wanted = self.kept = replace(wanted, start=start, goal=goal, recorded=poses)
         self.shown, self._index = show_recorded(self.wanted, prediction, reasons), 0
-
-
-def _results(steps: Iterator[Progress | Shown]) -> Iterator[Shown]:
-    """Yield what was judged, without what is begun."""
-    return (step for step in steps if isinstance(step, Shown))
 
 
 def _facing(start: Pose | Floats, goal: Pose | Floats) -> Pose:

@@ -17,6 +17,7 @@ from rover_physics import (
 from rover_physics.errors import RoverFileError
 from rover_physics.limits import table
 from rover_physics.limits.table import NEWTONS, Limit
+from rover_physics.names import WHEELS
 from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 from rover_physics.traversability.pose_classes import (
     IMPASSABLE,
@@ -100,8 +101,10 @@ def test_hazard_map_and_survey_obey_it(strict):
 
 def test_the_page_has_a_lane_for_it(strict):
     prediction, verdict = judge_path(strict, GROUND, PATH)
-    lane = find_path_limits(strict, prediction, verdict).lane("wheel_load")
+    limits = find_path_limits(strict, prediction, verdict)
+    lane = limits.lane("wheel_load")
     assert lane.limit.title == "heaviest"
     assert lane.limit.bound == strict.limits.further["wheel_load"]
     assert (lane.used > 1.0).tolist() == [False] * verdict.first_failure + [True]
-    assert lane.wheel[-1] == prediction.wheel_loads[verdict.first_failure].argmax()
+    heaviest = WHEELS[prediction.wheel_loads[verdict.first_failure].argmax()]
+    assert limits.find_link(lane, -1) == heaviest

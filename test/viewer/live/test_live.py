@@ -22,14 +22,14 @@ from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.ros.qos import latched_qos, result_qos, sensor_qos, topic_qos
 from rover_planner.viewer.live.listener import LiveListener, listen
 from rover_planner.viewer.live.live_state import (
+    CLICK,
     MAX_AGE,
     MAX_TRAIL,
     PATIENCE,
     TRAIL_STEP,
-    Click,
     LearnedTrail,
     LiveData,
-    LiveVerdict,
+    Question,
     TopicAge,
     choose_answer,
     describe_learned,
@@ -80,6 +80,15 @@ def odometry(x=1.0, y=2.0, z=0.3, speed=0.05) -> Odometry:
     return message
 
 
+def publish_until(publisher, message, condition, what: str) -> None:
+    """Publish a message again and again, until it has had its effect."""
+    repeat_until(lambda: publisher.publish(message), condition, what)
+
+
+def has_place(listener) -> bool:
+    return listener.latest().position is not None
+
+
 def test_the_state_has_the_measured_joints(listener, talker):
     angles = {"rocker_right": 0.1, "rocker_left": -0.1, "bogie_right": 0.2, "bogie_left": -0.05}
     state = JointState(name=[*angles, *WHEEL_JOINTS])
@@ -106,16 +115,8 @@ def test_the_energy_is_torque_times_rate_times_time(listener, talker):
         message.header.stamp.sec = second
         return message
 
-    repeat_until(
-        lambda: talker.joints.publish(state(10)),
-        lambda: listener.latest().efforts,
-        "the first state",
-    )
-    repeat_until(
-        lambda: talker.joints.publish(state(12)),
-        lambda: listener.latest().time == 2.0,
-        "two seconds",
-    )
+    publish_until(talker.joints, state(10), lambda: listener.latest().efforts, "the first state")
+    publish_until(talker.joints, state(12), lambda: listener.latest().time == 2.0, "two seconds")
     assert listener.latest().energy == pytest.approx(6 * 0.5 * 1.0 * 2.0)
 
 
@@ -129,11 +130,7 @@ def test_estimates_of_the_controller_take_precedence_over_predictions(listener, 
         received.append(listener.latest())
         return "controller" in received[-1].forces_from
 
-    repeat_until(
-        lambda: talker.estimated.publish(labelled_array(loads, "wheel")),
-        is_estimated,
-        "the controller",
-    )
+    publish_until(talker.estimated, labelled_array(loads, "wheel"), is_estimated, "the controller")
     np.testing.assert_allclose(received[-1].forces["wheel_loads"], loads)
 
 
@@ -154,16 +151,12 @@ def test_predictions_of_a_silent_server_are_no_longer_shown(listener, talker):
 
 def test_invalid_messages_are_skipped_and_values_without_a_topic_are_nan(ros, listener, talker):
     assert read_state(LSR1, listener.latest()) is None
-    assert listener.latest().terrain is None and listener.latest().verdict is None
+    assert listener.latest().terrain is None and listener.latest().newest is None
     broken = JointState(name=["rocker_right"], position=[float("nan")])
     talker.joints.publish(broken)
     talker.odometry.publish(odometry(x=float("inf")))
     talker.estimated.publish(Float64MultiArray(data=[1.0]))
-    repeat_until(
-        lambda: talker.odometry.publish(odometry()),
-        lambda: listener.latest().position is not None,
-        "good odometry",
-    )
+    publish_until(talker.odometry, odometry(), lambda: has_place(listener), "good odometry")
     assert ros.is_alive(listener)
     assert "rocker_right" not in listener.latest().joints
     state = read_state(LSR1, listener.latest())
@@ -175,22 +168,19 @@ def test_invalid_messages_are_skipped_and_values_without_a_topic_are_nan(ros, li
 
 def test_what_was_learned_of_the_ground_is_told_with_the_places_where_it_was(listener, talker):
     estimates = talker.create_publisher(String, "/traverse_server/ground_estimate", latched_qos())
-    learned = lambda: listener.latest().learned  # noqa: E731
+
+    def learned():
+        return listener.latest().learned
 
     def is_at(x: float) -> bool:
-        position = listener.latest().position
-        return position is not None and position[0] == x
+        return has_place(listener) and listener.latest().position[0] == x
 
     friction = {"mean": 0.8, "std": 0.1, "low": 0.35, "high": None}
     for x, high, words in (
         (0.0, None, "friction at least 0.35: no wheel has slipped yet"),
         (0.5, 0.9, "friction 0.80, give or take 0.10: wheels have slipped"),
     ):
-        repeat_until(
-            lambda x=x: talker.odometry.publish(odometry(x, 0.0)),
-            lambda x=x: is_at(x),
-            "the place",
-        )
+        publish_until(talker.odometry, odometry(x, 0.0), lambda x=x: is_at(x), "the place")
         estimates.publish(String(data=json.dumps({"friction": {**friction, "high": high}})))
         wait_until(lambda words=words: words in describe_learned(learned()), words)
     np.testing.assert_allclose(learned().places, [[0.0, 0.0, 0.35], [0.5, 0.0, 0.8]])
@@ -209,11 +199,7 @@ def test_a_trail_keeps_places_a_step_apart_and_the_newest_of_many():
 
 def test_a_plan_needs_odometry_and_a_server(listener, talker):
     assert "odometry" in listener.request_plan(np.zeros(2))
-    repeat_until(
-        lambda: talker.odometry.publish(odometry()),
-        lambda: listener.latest().position is not None,
-        "odometry",
-    )
+    publish_until(talker.odometry, odometry(), lambda: has_place(listener), "odometry")
     assert "can_traverse" in listener.request_plan(np.zeros(2))
 
 
@@ -247,19 +233,18 @@ NOW = 1000.0
 ALIVE = TopicAge("traverse_server", time.monotonic() + 1e6, True)
 
 
-def verdict_on(question_hash: str, passes: bool, age: float) -> LiveVerdict:
-    reason = "" if passes else "a wheel slips"
-    return LiveVerdict(passes, reason, f"question {question_hash}", question_hash, NOW - age)
+def question(name: str, passes: bool | None, age: float, plan=None) -> Question:
+    reason = "a wheel slips" if passes is False else ""
+    return Question(name, "0", NOW - age, passes, reason, plan)
 
 
-def data_of(verdict, plan, click=None, server=ALIVE) -> LiveData:
-    return LiveData(verdict=verdict, plan=plan, click=click, ages={server.topic: server})
+def data_of(newest, plan, click=None, server=ALIVE) -> LiveData:
+    return LiveData(newest=newest, plan=plan, click=click, ages={server.topic: server})
 
 
 def test_an_answer_to_a_click_belongs_to_the_click_and_the_newest_is_one_click_away():
-    refusal, mission = verdict_on("1", False, 5.0), verdict_on("2", True, 3.0)
+    click, mission = question(CLICK, False, 5.0), question("question 2", True, 3.0)
     clicked, planned = np.zeros((2, 3)), np.ones((3, 3))
-    click = Click("1", NOW - 6.0, refusal)
     told, plan = choose_answer(data_of(mission, planned, click), NOW)
     assert told["passes"] is False and told["headline"] == "a wheel slips"
     assert told["about"] == "your click, 5 s ago" and plan is None
@@ -269,8 +254,8 @@ def test_an_answer_to_a_click_belongs_to_the_click_and_the_newest_is_one_click_a
     told, plan = choose_answer(data_of(mission, planned), NOW)
     assert told["passes"] and told["about"] == "question 2, 3 s ago"
     assert plan is planned and not told["old"]
-    again = Click("2", NOW - 4.0, mission, clicked)
-    assert choose_answer(data_of(mission, planned, again), NOW)[1] is clicked
+    told, plan = choose_answer(data_of(mission, planned, question(CLICK, True, 3.0, clicked)), NOW)
+    assert plan is clicked and told["offers"] == []  # the newest is its own
 
 
 def test_a_click_without_an_answer_says_so_in_2_s_and_shows_no_older_verdict():
@@ -278,17 +263,17 @@ def test_a_click_without_an_answer_says_so_in_2_s_and_shows_no_older_verdict():
         (0.5, "asking the server"),
         (PATIENCE + 1.0, "no answer from the server"),
     ):
-        click = Click("1", NOW - waited)
-        told = choose_answer(data_of(verdict_on("2", True, 9.0), None, click), NOW)[0]
+        click, newest = question(CLICK, None, waited), question("question 2", True, 9.0)
+        told = choose_answer(data_of(newest, None, click), NOW)[0]
         assert told["passes"] is None and told["headline"].startswith(words)
 
 
 def test_a_verdict_of_a_server_that_fell_silent_is_old_in_words_and_in_the_scene():
     silent = TopicAge("traverse_server", time.monotonic() - 20.0, True)
-    data = data_of(verdict_on("1", True, 25.0), np.zeros((2, 3)), None, silent)
+    data = data_of(question("question 1", True, 25.0), np.zeros((2, 3)), None, silent)
     told, _ = choose_answer(data, NOW)
     assert told["old"] == "the server is silent for 20 s"
     assert told["about"] == "question 1, 25 s ago"
-    click = Click("1", NOW - 26.0, verdict_on("1", True, 25.0))
-    told, _ = choose_answer(data_of(verdict_on("2", True, 24.0), None, click, silent), NOW)
+    click, newest = question(CLICK, True, 25.0), question("question 2", True, 24.0)
+    told, _ = choose_answer(data_of(newest, None, click, silent), NOW)
     assert told["offers"][0]["words"] == "question 2: traversable, 24 s ago, old"
