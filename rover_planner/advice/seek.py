@@ -119,8 +119,6 @@ class _Seeker:
         shares = [one.shares(steps) for one in asked.ranges]
         # The nearest come first.
         for chosen in sorted(product(*shares), key=lambda some: sum(map(abs, some))):
-            if self._fails_where_known(asked, chosen):
-                continue
             judged = self._judge(asked, chosen)
             if judged is not None:
                 step = steps[0] if len(asked.levers) == 1 else 1.0
@@ -140,64 +138,37 @@ class _Seeker:
         for k, one in enumerate(asked.ranges):
             if isinstance(one, Choice):
                 continue
-            passes, hopes = shares[k], asked.keeps_rows
+            passes = shares[k]
             fails = float(np.sign(passes)) * max(0.0, abs(passes) - step)
             while abs(passes - fails) > TOLERANCE:
-                low, shares[k] = fails, 0.5 * (passes + fails)
-                if hopes:
-                    low, shares[k] = self._narrow(asked, shares, k, (fails, passes))
-                    if shares[k] == passes:
-                        break
+                shares[k] = 0.5 * (passes + fails)
                 found = self._judge(asked, shares)
                 if found is None:
-                    fails, hopes = shares[k], asked.keeps_rows and not hopes
+                    fails = shares[k]
                 else:
-                    fails, passes, judged = low, shares[k], found
+                    passes, judged = shares[k], found
             shares[k] = passes
         return shares, judged
-
-    def _narrow(
-        self, asked: Combination, shares: Sequence[float], k: int, ends: tuple[float, float]
-    ) -> tuple[float, float]:
-        """Return the ends of share k, narrowed down by the failures that are remembered alone.
-
-        The first end fails. The second may, if it is not the one that was given.
-        """
-        fails, passes = ends
-        while abs(passes - fails) > TOLERANCE:
-            middle = 0.5 * (passes + fails)
-            if self._fails_where_known(asked, [*shares[:k], middle, *shares[k + 1 :]]):
-                fails = middle
-            else:
-                passes = middle
-        return fails, passes
 
     def _judge(self, asked: Combination, shares: Sequence[float]) -> JudgedCase | None:
         """Return the case with levers set if it passes, else None."""
         case = asked.set_levers(shares)
         try:
-            judged = None if case is None else case.judge()
+            if case is None or (asked.keeps_rows and self._fails_where_known(case)):
+                return None
+            judged = case.judge()
         except RoverError:
             return None  # the rover cannot do that
-        if judged is None or judged.passes:
-            return judged
-        if asked.keeps_rows:
+        if not judged.passes and asked.keeps_rows:
             self._note(judged)
-        return None
+        return judged if judged.passes else None
 
-    def _fails_where_known(self, asked: Combination, shares: Sequence[float]) -> bool:
-        """Return whether the case with levers set fails where others have failed."""
-        case = asked.set_levers(shares)
-        if case is None or not asked.keeps_rows:
-            return case is None
+    def _fails_where_known(self, case: Case) -> bool:
+        """Return whether a case fails where others have failed."""
         for known in self._failed:
             by_sum = known.by_sum and case.options.policy == SERVO
             rows = self._refusal.rows_around(known.place, by_sum)
-            try:
-                fails = case.fails_at(known.place, rows, known.by_chance)
-            except RoverError:
-                fails = True  # the rover cannot do that
-            if fails:
+            if case.fails_at(known.place, rows, known.by_chance):
                 self._remember(known)
                 return True
         return False

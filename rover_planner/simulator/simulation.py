@@ -10,6 +10,7 @@ from rover_physics.names import EQUAL
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover
+from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.rover_simulator import MUJOCO, RoverSimulatorParameters
@@ -124,9 +125,7 @@ class Simulation:
         A rover that a controller's torques drive tries again where it stands still.
         """
         rover = self.settings.rover
-        wheels = rover.suspension.wheels
-        outermost = max(float(np.hypot(x, y)) for x, y, _ in wheels.values())
-        follower = PathFollower(poses, 0.5 * (wheels["front"][0] - wheels["rear"][0]), outermost)
+        follower = PathFollower(poses, 0.5 * rover.wheelbase, swing_radius(rover))
         tries = MAX_TRIES if self.settings.parameters.follow_commands else 1
         steering = rover.steering
         # From one limit to the other, while the rover stands.

@@ -141,8 +141,7 @@ def _load_once(file: str) -> Terrain:
 
 
 def _length(rover: Rover) -> float:
-    wheels = rover.suspension.wheels
-    return wheels["front"][0] - wheels["rear"][0] + 2.0 * rover.wheel.radius
+    return rover.wheelbase + 2.0 * rover.wheel.radius
 
 
 def step_ground(rover: Rover, height: float) -> Terrain:

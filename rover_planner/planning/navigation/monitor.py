@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rover_physics.chance.samples import cut_around
 from rover_physics.errors import TerrainError
 from rover_physics.names import SUSPENSION_JOINTS
+from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.terrain.grid import Terrain
 from rover_planner.maps.known_map import KnownMap
 from rover_planner.parameters.traverse_server import TraverseServerParameters
@@ -290,9 +291,8 @@ def _take_as_exact(snapshot: Snapshot) -> Snapshot:
 
 def _cut_map(snapshot: Snapshot, poses: NDArray[np.float64]) -> Snapshot:
     """Return a snapshot with the map around poses (n, 3) alone: a large one takes long to pack."""
-    known, wheels = snapshot.known_map, snapshot.settings.rover.suspension.wheels
+    known, reach = snapshot.known_map, swing_radius(snapshot.settings.rover)
     assert known is not None
-    reach = max(math.hypot(x, y) for x, y, _ in wheels.values())
     try:
         cut = cut_around(known.terrain, poses[:, :2], AROUND * reach)
     except TerrainError:  # nothing is known there

@@ -55,8 +55,8 @@ class Connection:
     surcharge: float = 0.0
     """Cost that comes to that of driving [m]."""
 
-    def piece(self, cost: float = np.nan) -> Piece:
-        """Return it as a piece of path with its cost [m], if it is judged."""
+    def piece(self, cost: float) -> Piece:
+        """Return it as a piece of path with its cost [m]."""
         return Piece(self._poses, self.gear, cost)
 
     @cached_property

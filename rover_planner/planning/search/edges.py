@@ -90,6 +90,10 @@ class Edges:
         cost = float(self.cost.flat[edge])
         return Piece(primitive.poses + np.array([x, y, 0.0]), primitive.gear, cost)
 
+    def is_open(self, edge: int) -> bool:
+        """Return whether an edge is not judged."""
+        return bool(self.state.flat[edge] == UNJUDGED)
+
     def ends(self, edges: NDArray[np.int64]) -> NDArray[np.int64]:
         """Return the nodes (n,) where edges (n,) end; they must be in the window."""
         node, k = np.divmod(edges, self.width)

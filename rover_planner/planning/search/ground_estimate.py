@@ -15,6 +15,7 @@ from scipy import ndimage
 
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.rover.model import Rover
+from rover_physics.rover.steering_joints import swing_radius
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.search.cell_counts import CellCounts
 from rover_planner.planning.search.nodes import HEADINGS, YAWS, Nodes
@@ -71,7 +72,7 @@ def estimate_ground(rover: Rover, terrain: Terrain, nodes: Nodes) -> GroundEstim
     )
     found = GroundEstimate(np.zeros(nodes.count, bool), np.zeros(nodes.count, np.float32))
     at = nodes.poses(np.arange(0, nodes.count, HEADINGS))[:, :2]
-    reach = float(np.hypot(*wheels[0].T).max())
+    reach = swing_radius(rover)
     low, high = np.reshape(terrain.bounds, (2, 2)).T
     doubtful = ((at - reach < low) | (at + reach > high)).any(axis=1)
     doubtful |= CellCounts(terrain, ~known).are_near(at, reach)

@@ -83,6 +83,19 @@ class _Ends:
         self.codes: list[str] = []
         """Codes of the connections that were refused."""
 
+    def piece(self, k: int) -> Piece:
+        """Return connection k as a piece of path with its cost."""
+        return self.connections[k].piece(float(self.costs[k]))
+
+    def is_open(self, k: int) -> bool:
+        """Return whether connection k is not judged."""
+        return not self.judged[k]
+
+    def write(self, k: int, code: str, cost: float) -> None:
+        """Keep what was found of connection k: the code of its failure, "" for none, its cost."""
+        self.judged[k], self.costs[k] = True, cost + self.connections[k].surcharge
+        self.codes += [code] if code else []
+
     @property
     def open_nodes(self) -> NDArray[np.int64]:
         """The nodes (k,) of the connections that may pass."""
@@ -94,9 +107,8 @@ class _Ends:
         return Seeds(self.nodes, self.costs)
 
 
-Open = tuple[Piece, _Ends | None, int]
-"""A piece that is not judged; the ends that it belongs to and its index there, or None and its
-edge."""
+Part = tuple[Edges | _Ends, int]
+"""A part of a route: an edge, or a connection of the start or of the goal."""
 
 
 @dataclass
@@ -187,19 +199,25 @@ class LatticeSearch:
 
         More and more pieces are judged at a time.
         """
-        pieces = sorted(self._open_pieces(route), key=self._hardness, reverse=True)
-        size = FIRST_PIECES
-        while pieces:
-            if not all(self._judge(pieces[:size])):
+        parts = [(kept, index) for kept, index in self._parts(route) if kept.is_open(index)]
+        parts, size = sorted(parts, key=self._hardness, reverse=True), FIRST_PIECES
+        while parts:
+            if not self._judge(parts[:size]):
                 self._judge_ends()
                 return False
-            pieces, size = pieces[size:], 2 * size
+            parts, size = parts[size:], 2 * size
         return True
 
-    def _hardness(self, piece: Open) -> float:
-        """Return how likely a piece is refused; the connections of the ends come first."""
-        _, ends, index = piece
-        if ends is not None:
+    def _parts(self, route: Route) -> list[Part]:
+        """Return the parts of a route in the order of the drive."""
+        starts, goals = self.ends
+        inner: list[Part] = [(self.edges, edge) for edge in route.edges.tolist()]
+        return [(starts, route.start), *inner, (goals, route.goal)]
+
+    def _hardness(self, part: Part) -> float:
+        """Return how likely a part is refused; the connections of the ends come first."""
+        kept, index = part
+        if kept is not self.edges:
             return np.inf
         node, k = divmod(index, self.edges.width)
         return float(difficulty_of(self.difficulty, self.edges.nodes.shape[1], node, k))
@@ -212,40 +230,21 @@ class LatticeSearch:
             rows = np.flatnonzero(~ends.judged)
             self._stand(np.unique(self._unjudged(ends.nodes[rows])))
             stands = self.edges.standing[ends.nodes[rows]] == PASSES
-            self._judge(self._open_ends(ends, *rows[stands].tolist()))
+            self._judge([(ends, k) for k in rows[stands].tolist()])
             ends.judged[:] = True
 
-    def _open_pieces(self, route: Route) -> list[Open]:
-        """Return the pieces of a route that are not judged, in the order of the drive."""
-        starts, goals = self.ends
-        open_edges = route.edges[self.edges.state.flat[route.edges] == UNJUDGED]
-        inner: list[Open] = [(self.edges.piece(edge), None, edge) for edge in open_edges.tolist()]
-        return [
-            *self._open_ends(starts, route.start),
-            *inner,
-            *self._open_ends(goals, route.goal),
-        ]
-
-    def _open_ends(self, ends: _Ends, *indices: int) -> list[Open]:
-        """Return the connections of some indices that are not judged."""
-        return [(ends.connections[k].piece(), ends, k) for k in indices if not ends.judged[k]]
-
-    def _judge(self, pieces: Sequence[Open]) -> list[bool]:
-        """Judge pieces, keep what is found, and return whether they pass."""
-        if not pieces:
-            return []
-        found = self.judge.judge_pieces([piece for piece, _, _ in pieces])
-        for (_, ends, index), judged in zip(pieces, found, strict=True):
-            if ends is None:
+    def _judge(self, parts: Sequence[Part]) -> bool:
+        """Judge parts, keep what is found, and return whether all pass."""
+        if not parts:
+            return True
+        found = self.judge.judge_pieces([kept.piece(index) for kept, index in parts])
+        for (kept, index), judged in zip(parts, found, strict=True):
+            kept.write(index, judged.code, judged.cost)
+            if kept is self.edges:
                 self.progress.judged += 1
-                self.edges.write(index, judged.code, judged.cost)
                 if judged.code:
                     self._doubt_around(index)
-            else:
-                cost = judged.cost + ends.connections[index].surcharge
-                ends.judged[index], ends.costs[index] = True, cost
-                ends.codes += [judged.code] if judged.code else []
-        return [not judged.code for judged in found]
+        return not any(judged.code for judged in found)
 
     def _doubt_around(self, edge: int) -> None:
         """Doubt the edges that lead where a refused edge does."""
@@ -254,7 +253,7 @@ class LatticeSearch:
 
     def _take(self, route: Route) -> bool:
         """Judge a route as a whole and keep it if it is the best; return whether it passes."""
-        pieces = self._pieces(route)
+        pieces = [kept.piece(index) for kept, index in self._parts(route)]
         if sum(one.cost for one in pieces) >= self.progress.cost:
             return True
         poses, owners = join_pieces(pieces)
@@ -265,27 +264,14 @@ class LatticeSearch:
             return False
         return True
 
-    def _pieces(self, route: Route) -> list[Piece]:
-        """Return the pieces of a route that is judged."""
-        starts, goals = self.ends
-        first, last = starts.connections[route.start], goals.connections[route.goal]
-        return [
-            first.piece(float(starts.costs[route.start])),
-            *(self.edges.piece(edge) for edge in route.edges),
-            last.piece(float(goals.costs[route.goal])),
-        ]
-
-    def _refuse(self, route: Route, piece: int, code: str) -> None:
-        """Close a piece of a route for this search: it passes, but the whole path does not."""
-        start_ends, goal_ends = self.ends
-        if piece == 0:
-            start_ends.costs[route.start] = np.inf
-        elif piece == len(route.edges) + 1:
-            goal_ends.costs[route.goal] = np.inf
+    def _refuse(self, route: Route, number: int, code: str) -> None:
+        """Close a part of a route for this search: it passes, but the whole path does not."""
+        kept, index = self._parts(route)[number]
+        if isinstance(kept, Edges):
+            self._refused.append((index, PASSES, float(kept.cost.flat[index])))
+            kept.write(index, code, np.inf)
         else:
-            edge = int(route.edges[piece - 1])
-            self._refused.append((edge, PASSES, float(self.edges.cost.flat[edge])))
-            self.edges.write(edge, code, np.inf)
+            kept.costs[index] = np.inf
 
     def _forget_refusals(self) -> None:
         """Let the edges pass again that were closed for this search only."""
