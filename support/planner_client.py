@@ -17,6 +17,7 @@ from std_srvs.srv import Trigger
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import poses_path, stamped_pose
 from rover_physics.warm_up import warm_up
+from rover_planner.nodes import traverse_server
 from rover_planner.nodes.result_topics import RESULT_KINDS
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.ros.qos import map_qos, result_qos, topic_qos
@@ -43,6 +44,7 @@ def spin_server(ros: RosRun, **overrides) -> TraverseServer:
     parameters = [Parameter(name, value=value) for name, value in values.items()]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(kernels, "LOADING_DELAY", 1e6)
+        patch.setattr(traverse_server, "EXACT", ())
         server = TraverseServer(context=ros.context, parameter_overrides=parameters)
     return ros.spin(server)
 
