@@ -97,7 +97,7 @@ class Ear(Node):
             self.create_subscription(kind, topic, hear, qos)
 
     def _hear_odometry(self, odometry: Odometry) -> None:
-        self.pose = odometry_to_pose(odometry, "map")[0][[0, 1, 3]]
+        self.pose = odometry_to_pose(odometry, "map")[0][[0, 1, 5]]
 
     def _hear_state(self, state: String, about: dict[str, int]) -> None:
         self.rest.take(sent_at(about), state=state.data)

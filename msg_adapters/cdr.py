@@ -46,6 +46,12 @@ class Fields:
         begin, self.at = self.at, self.at + length
         return self._message[begin : self.at - 1].decode(errors="replace")
 
+    def view(self) -> memoryview:
+        """Return a view of a sequence of bytes."""
+        length = self.count()
+        begin, self.at = self.at, self.at + length
+        return memoryview(self._message)[begin : self.at]
+
     def doubles(self) -> tuple[float, ...]:
         """Return a sequence of doubles."""
         count = self.count()

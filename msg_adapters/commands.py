@@ -47,11 +47,6 @@ def joint_order(joints: Sequence[str], names: JointNames = OWN_NAMES) -> NDArray
     return np.array([WHEEL_JOINTS.index(joint) for joint in found])
 
 
-def effort_commands(torques: NDArray[np.float64], order: NDArray[np.int64]) -> Float64MultiArray:
-    """Convert torques (6,) [N m] in wheel order into efforts; `order` comes from `joint_order`."""
-    return Float64MultiArray(data=doubles(torques[order]))
-
-
 def labelled_array(values: NDArray[np.float64], *labels: str) -> Float64MultiArray:
     """Convert values into an array whose dimensions have labels."""
     message = Float64MultiArray(data=doubles(values))
@@ -60,11 +55,6 @@ def labelled_array(values: NDArray[np.float64], *labels: str) -> Float64MultiArr
         for k, (label, size) in enumerate(zip(labels, values.shape, strict=True))
     ]
     return message
-
-
-def set_values(message: Float64MultiArray, values: NDArray[np.float64]) -> None:
-    """Replace the values of a message by others of the same shape, faster than a new message."""
-    message.data = doubles(values)
 
 
 def doubles(values: NDArray[np.float64]) -> array.array:

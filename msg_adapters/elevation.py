@@ -8,7 +8,6 @@ read back unchanged.
 """
 
 import array
-import struct
 from collections.abc import Mapping
 from typing import Any
 
@@ -16,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 from sensor_msgs.msg import PointCloud2, PointField
 
-from msg_adapters.cdr import Fields
 from msg_adapters.errors import MessageError
 from msg_adapters.gridding import (
     CELL_HEIGHTS,
@@ -43,8 +41,6 @@ LAYERS = {"friction": "friction", "elevation_std": "elevation_std", CLASS: "grou
 COMBINED = {"friction": "min", "elevation_std": "max", CLASS: "most frequent"}
 """How the values of several points of a cell are combined."""
 
-MAX_FIELDS = 1000
-"""Largest number of fields of a cloud."""
 MAX_POINT_STEP = 1_000_000
 """Largest size of a point [bytes]."""
 
@@ -59,27 +55,6 @@ _KINDS = {
 }
 _NUMBERS = _FLOATS | {getattr(PointField, name): kind for name, kind in _KINDS.items()}
 _DATATYPE_NAMES = {getattr(PointField, n): n for n in (*_KINDS, "FLOAT32", "FLOAT64")}
-
-
-def find_cloud_data(message: bytes) -> slice:
-    """Return where the bytes of a serialised PointCloud2 are its data, without reading these.
-
-    Raises:
-        MessageError: They are no PointCloud2.
-    """
-    fields = Fields(message)
-    try:
-        fields.numbers("iI"), fields.text(), fields.numbers("II")  # stamp, frame, height and width
-        for _ in range(min(fields.count(), MAX_FIELDS)):
-            fields.text(), fields.numbers("I"), fields.numbers("B"), fields.numbers("I")
-        fields.numbers("B"), fields.numbers("II")  # is_bigendian, point_step and row_step
-        size = fields.count()
-        data = slice(fields.at, fields.at + size)
-    except struct.error:
-        data = slice(0, len(message) + 1)
-    if data.stop > len(message):
-        raise MessageError(f"{len(message)} bytes were received that are no PointCloud2")
-    return data
 
 
 def is_same_cloud(cloud: PointCloud2, other: PointCloud2) -> bool:

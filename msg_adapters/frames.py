@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checks the frame of messages and transforms between frames, and reads orientations."""
 
+import math
 from typing import Any
 
 import numpy as np
 
 from msg_adapters.errors import MessageError
 from rover_physics.numerics.quaternions import length_of, rpy_from_xyzw
+
+NORM_TOLERANCE = 0.01
+"""Largest deviation of a quaternion's norm from 1."""
 
 
 def check_frame(frame_id: str, map_frame: str, what: str) -> None:
@@ -34,15 +38,22 @@ def check_norm(xyzw: tuple[float, float, float, float], what: str) -> float:
     """Return the norm of a quaternion, which is about 1.
 
     Raises:
-        MessageError: It is not; `what` names the message.
+        MessageError: It is not; `what` names it.
     """
     norm = length_of(xyzw)
-    if not 0.99 < norm < 1.01:
+    if not abs(norm - 1.0) <= NORM_TOLERANCE:
+        wrong = f"has length {norm:.3g}" if math.isfinite(norm) else "is not finite"
         raise MessageError(
-            f"{what} has orientation {list(xyzw)} of norm {norm:g}; it must be a quaternion of "
-            "norm 1"
+            f"{describe_quaternion(xyzw, what)} {wrong}; it must be a quaternion of length 1, for "
+            "no rotation w = 1"
         )
     return norm
+
+
+def describe_quaternion(xyzw: tuple[float, float, float, float], what: str) -> str:
+    """Return the name and the elements of a quaternion."""
+    x, y, z, w = xyzw
+    return f"{what} (x {x:g}, y {y:g}, z {z:g}, w {w:g})"
 
 
 def check_transform(message: Any) -> None:
@@ -55,7 +66,9 @@ def check_transform(message: Any) -> None:
     place, turn = message.transform.translation, message.transform.rotation
     numbers = np.array([place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w])
     length = float(np.linalg.norm(numbers[3:]))
-    if not (np.isfinite(numbers).all() and 0.99 < length < 1.01 and parent and child):
+    if not (
+        np.isfinite(numbers).all() and abs(length - 1.0) <= NORM_TOLERANCE and parent and child
+    ):
         raise MessageError(
             f"transform from {child!r} to {parent!r} has translation {numbers[:3].tolist()} and "
             f"rotation {numbers[3:].tolist()}; it must be finite, a quaternion of length 1, and "

@@ -90,7 +90,7 @@ def imu_to_attitude(imu: Imu, mounting: ImuMounting | None = None) -> Attitude:
         )
     q = imu.orientation
     xyzw = (q.x, q.y, q.z, q.w)
-    norm = check_norm(xyzw, "imu")
+    norm = check_norm(xyzw, "imu orientation")
     body = xyzw if mounting is None else mounting.turn_orientation(xyzw)
     roll, pitch, _ = rpy_from_xyzw(body, squared_norm=norm**2)
     if imu.angular_velocity_covariance[0] == NOT_MEASURED:

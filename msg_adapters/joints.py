@@ -108,8 +108,7 @@ class JointNames:
                 f"joint_states has {len(values)} {_PLURALS[field]} for {len(state.name)} names; "
                 "there must be one for each, or none at all"
             )
-        places = self._places(tuple(state.name), tuple(wanted))
-        found = [(link, float(values[place])) for place, link in places]
+        found = [(link, float(values[place])) for place, link in self.places(state.name, wanted)]
         for link, value in found:
             if not math.isfinite(value):
                 raise MessageError(
@@ -117,6 +116,16 @@ class JointNames:
                     f"{right}"
                 )
         return found
+
+    def places(
+        self, names: Collection[str], wanted: Collection[str]
+    ) -> tuple[tuple[int, JointLink], ...]:
+        """Return where wanted joints of the model are among the names of a message.
+
+        Raises:
+            MessageError: One of them occurs twice.
+        """
+        return self._places(tuple(names), tuple(wanted))
 
     def _find_places(
         self, names: tuple[str, ...], wanted: tuple[str, ...]

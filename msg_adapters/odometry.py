@@ -26,7 +26,9 @@ YAW_RATE_VARIANCE = 1e-4
 def odometry_to_pose(
     odometry: Odometry, map_frame: str, base_frame: str = ""
 ) -> tuple[NDArray[np.float64], float]:
-    """Return x, y, z [m], yaw [rad] (4,) of the body, and the standard deviation of x, y [m].
+    """Return the pose of the body, and the standard deviation of x, y [m].
+
+    The pose is x, y, z [m], roll, pitch, yaw [rad] (6,).
 
     Args:
         odometry: The message.
@@ -43,8 +45,8 @@ def odometry_to_pose(
     if base_frame and child not in ("", base_frame):
         raise MessageError(f"odometry is of frame {child!r}; it must be of {base_frame!r}")
     place = odometry.pose.pose.position
-    _, _, yaw = read_orientation(odometry.pose.pose.orientation, "odometry")
-    pose = np.array([place.x, place.y, place.z, yaw])
+    angles = read_orientation(odometry.pose.pose.orientation, "odometry orientation")
+    pose = np.array([place.x, place.y, place.z, *angles])
     variances = [float(odometry.pose.covariance[index]) for index in (0, 7)]
     possible = all(abs(one) <= MAX_COORDINATE for one in (place.x, place.y, place.z))
     if not possible or not all(variance <= MAX_DEVIATION**2 for variance in variances):
@@ -86,8 +88,3 @@ def planar_odometry(
         frame_id,
         stamp,
     )
-
-
-def odometry_to_tilt(odometry: Odometry) -> tuple[float, float]:
-    """Return roll and pitch [rad] of the body in a message that `odometry_to_pose` accepted."""
-    return read_orientation(odometry.pose.pose.orientation, "odometry")[:2]

@@ -13,18 +13,14 @@ from std_msgs.msg import Header
 
 from msg_adapters.cdr import Fields
 from msg_adapters.errors import MessageError
-from msg_adapters.frames import check_frame
+from msg_adapters.frames import check_frame, check_norm, describe_quaternion
 from rover_physics.numerics.plausible import MAX_COORDINATE
 from rover_physics.numerics.quaternions import (
     forward_from_xyzw,
-    length_of,
     xyzw_from_rpy,
     xyzw_from_yaw,
 )
 from rover_physics.results.path_prediction import PathPrediction
-
-_LENGTH_TOLERANCE = 0.005
-"""Largest deviation of a quaternion's length from 1, as in tf2."""
 
 MAX_POSES = 100_000
 """Largest number of poses of a path; a longer path is refused before it is read. It is the
@@ -56,24 +52,13 @@ def yaw_from_quaternion(quaternion: Quaternion, what: str = "orientation") -> fl
     Raises:
         MessageError: NaN, not of unit length, or the forward axis is vertical.
     """
-    x, y, z, w = quaternion.x, quaternion.y, quaternion.z, quaternion.w
-    length = length_of((x, y, z, w))
-    if not abs(length - 1.0) <= _LENGTH_TOLERANCE:
-        wrong = f"has length {length:.3g}" if math.isfinite(length) else "is not finite"
-        text = _describe(quaternion, what)
-        raise MessageError(
-            f"{text} {wrong}; it must be a quaternion of length 1, for no rotation w = 1"
-        )
-    forward_x, forward_y = forward_from_xyzw((x, y, z, w))
+    xyzw = quaternion.x, quaternion.y, quaternion.z, quaternion.w
+    check_norm(xyzw, what)
+    forward_x, forward_y = forward_from_xyzw(xyzw)
     if math.hypot(forward_x, forward_y) < _MIN_LEVEL:
-        text = _describe(quaternion, what)
+        text = describe_quaternion(xyzw, what)
         raise MessageError(f"{text} points forward straight up or down; it has no heading")
     return math.atan2(forward_y, forward_x)
-
-
-def _describe(quaternion: Quaternion, what: str) -> str:
-    x, y, z, w = quaternion.x, quaternion.y, quaternion.z, quaternion.w
-    return f"{what} (x {x:g}, y {y:g}, z {z:g}, w {w:g})"
 
 
 def pose_to_array(pose: Pose, what: str = "pose") -> NDArray[np.float64]:

@@ -2,7 +2,8 @@
 """Reads sensor messages from their bytes, without a Python object for each of their fields.
 
 rclpy makes some twenty objects of an odometry, which takes several times as long as all that is
-done with it. Here a message has only the fields that adapters read, under the same names.
+done with it, and copies the data of a cloud. Here a message has only the fields that adapters
+read, under the same names, and the data of a cloud are a view of its bytes.
 """
 
 import struct
@@ -11,10 +12,23 @@ from typing import Any, NamedTuple
 
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import Imu, JointState
+from sensor_msgs.msg import Imu, JointState, PointCloud2
 
 from msg_adapters.cdr import Fields
 from msg_adapters.errors import MessageError
+
+MAX_FIELDS = 1000
+"""Largest number of fields of a cloud."""
+
+
+class DamagedMessageError(MessageError):
+    """Bytes that are no message of their type."""
+
+    def __init__(self, message: bytes, kind: type, error: Exception):
+        super().__init__(
+            f"{len(message)} bytes were received that are no {kind.__name__}; the publisher or "
+            f"the connection is damaged: {error}"
+        )
 
 
 class _Vector(NamedTuple):
@@ -39,13 +53,17 @@ class SensorReader:
     def __init__(self) -> None:
         self._readers = {
             Imu: _read_imu, JointState: self._read_joints, Odometry: _read_odometry,
-            Twist: _read_twist, TwistStamped: _read_twist_stamped,
+            Twist: _read_twist, TwistStamped: _read_twist_stamped, PointCloud2: _read_cloud,
         }  # fmt: skip
         self._head, self._frame = b"", ""
         self._names: tuple[str, ...] = ()
 
+    def reads(self, kind: type) -> bool:
+        """Return whether it reads messages of a type."""
+        return kind in self._readers
+
     def read(self, message: bytes, kind: type) -> Any:
-        """Return what adapters read of an Imu, JointState, Odometry, Twist or TwistStamped.
+        """Return what adapters read of a message of a type that it `reads`.
 
         Raises:
             MessageError: The bytes are no such message.
@@ -53,10 +71,7 @@ class SensorReader:
         try:
             return self._readers[kind](Fields(message))
         except struct.error as error:
-            raise MessageError(
-                f"{len(message)} bytes were received that are no {kind.__name__}; the publisher "
-                f"or the connection is damaged: {error}"
-            ) from None
+            raise DamagedMessageError(message, kind, error) from None
 
     def _read_joints(self, fields: Fields) -> SimpleNamespace:
         stamp = _read_stamp(fields)
@@ -106,3 +121,19 @@ def _read_twist(fields: Fields) -> SimpleNamespace:
 
 def _read_twist_stamped(fields: Fields) -> SimpleNamespace:
     return SimpleNamespace(header=_read_header(fields), twist=_read_twist(fields))
+
+
+def _read_cloud(fields: Fields) -> SimpleNamespace:
+    header, (height, width) = _read_header(fields), fields.numbers("II")
+    columns = [_read_point_field(fields) for _ in range(min(fields.count(), MAX_FIELDS))]
+    (is_bigendian,), (point_step, row_step) = fields.numbers("B"), fields.numbers("II")
+    data, (is_dense,) = fields.view(), fields.numbers("B")
+    return SimpleNamespace(
+        header=header, height=height, width=width, fields=columns, is_bigendian=bool(is_bigendian),
+        point_step=point_step, row_step=row_step, data=data, is_dense=bool(is_dense),
+    )  # fmt: skip
+
+
+def _read_point_field(fields: Fields) -> SimpleNamespace:
+    name, (offset,), (datatype,) = fields.text(), fields.numbers("I"), fields.numbers("B")
+    return SimpleNamespace(name=name, offset=offset, datatype=datatype, count=fields.count())

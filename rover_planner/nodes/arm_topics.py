@@ -13,11 +13,11 @@ from rover_physics.traversability.reach import ReachAnswer
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.questions import (
-    Answer,
     Question,
     ReachQuery,
     ReachRefusal,
 )
+from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.subscriptions import subscribe_to_requests
@@ -58,11 +58,11 @@ class ArmTopics:
     def _check_reach(
         self, _request: Trigger.Request, response: Trigger.Response, reply: Reply
     ) -> None:
-        def send(answer: Answer) -> None:
-            response.success = answer.judgement.possible
-            response.message = to_json(answer.judgement.to_dict())
+        def send(answer: ReachAnswer, _identity: IdentityReport) -> None:
+            response.success = answer.possible
+            response.message = to_json(answer.to_dict())
             reply(response)
-            self._log(answer.judgement)
+            self._log(answer)
 
         self._desk.ask(Question("check_reach", "", self.query.ask, ReachRefusal), send)
 

@@ -3,9 +3,8 @@
 
 import json
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
-from functools import partial
 from typing import Any
 
 from geometry_msgs.msg import TwistStamped
@@ -18,7 +17,6 @@ from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.frames import check_frame
 from msg_adapters.joints import read_joint_map
 from msg_adapters.odometry import planar_odometry
-from msg_adapters.raw_messages import SensorReader
 from msg_adapters.stamps import NANOSECONDS, ns_to_stamp, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
@@ -74,48 +72,35 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
         self._estimates = self.create_publisher(String, ESTIMATE, latched_qos())
         self._stops = self.create_publisher(Bool, EMERGENCY_STOP, latched_qos())
         self._marks = self.create_publisher(String, MARK_PLACE, latched_qos())
-        self._reader, self._wheels = SensorReader(), WheelOdometry(self._rover)
+        self._wheels = WheelOdometry(self._rover)
         self._motion: WheelMotion | None = None  # what the wheels' odometry went on by last
         self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", sensor_qos())
-        for kind, name, take, qos in (
-            (TwistStamped, "cmd_vel", self._take_command, newest_qos()),
-            (JointState, "joint_states", self._rows.take_joints, polled_qos()),
-            (Imu, "imu", self._take_imu, polled_qos()),
-            (Odometry, "odometry", self._take_odometry, polled_qos()),
-        ):
-            read = self._refusing(name, partial(self._read_and_take, kind, take))
-            self.heard.subscribe(kind, name, read, qos, raw=True)
+        hear, rows = self.heard.subscribe, self._rows
+        hear(TwistStamped, "cmd_vel", self._take_command, newest_qos())
+        hear(JointState, "joint_states", lambda one, _: rows.take_joints(one), polled_qos())
+        hear(Imu, "imu", self._take_imu, polled_qos())
+        hear(Odometry, "odometry", self._take_odometry, polled_qos())
         self.loop = self.create_timer(POLLING, self._read_sensors)
-        subscribe_to_map(self, PointCloud2, CLOUD, self._refusing(CLOUD, self._take_map))
+        subscribe_to_map(self, PointCloud2, CLOUD, self._take_map)
         self.follow_changes(lambda _: None, lambda _: None)
         self.get_logger().info(f"ready for rover {self._rover.name}")
 
-    def _refusing(self, name: str, take: Callable[[Any], None]) -> Callable[..., None]:
-        """Return a callback that refuses what cannot be used."""
-
-        def receive(message: Any, _arrived: float = 0.0) -> None:
-            try:
-                take(message)
-            except RoverError as error:
-                self.get_logger().warning(f"{name} not used: {error}", throttle_duration_sec=5.0)
-
-        return receive
-
     def _take_map(self, data: bytes) -> None:
-        values, cloud = self.values, read_message(data, PointCloud2)
-        check_frame(cloud.header.frame_id, values.map_frame, CLOUD)
-        terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height)
-        if self.learner is None:
-            soil = values.soil or None
-            self.learner = GroundLearner(self._rover, terrain, self._told, soil)
-        else:
-            self.learner.change_map(terrain)
+        values = self.values
+        try:
+            cloud = read_message(data, PointCloud2)
+            check_frame(cloud.header.frame_id, values.map_frame, CLOUD)
+            terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height)
+            if self.learner is None:
+                soil = values.soil or None
+                self.learner = GroundLearner(self._rover, terrain, self._told, soil)
+            else:
+                self.learner.change_map(terrain)
+        except RoverError as error:
+            self.get_logger().warning(f"{CLOUD} not used: {error}", throttle_duration_sec=5.0)
 
-    def _take_command(self, twist: TwistStamped) -> None:
+    def _take_command(self, twist: Any, _arrival: float) -> None:
         self._commanded, self._command_time = twist_to_speeds(twist)[0], self.seconds
-
-    def _read_and_take(self, kind: type, take: Callable[[Any], None], message: bytes) -> None:
-        take(self._reader.read(message, kind))
 
     def _read_sensors(self) -> None:
         """Take what the sensors sent, and tell where the wheels say that the rover is."""
@@ -137,7 +122,7 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
         )
         self._wheel_odometry.publish(message)
 
-    def _take_imu(self, imu: Imu) -> None:
+    def _take_imu(self, imu: Any, _arrival: float) -> None:
         """Take attitude and yaw rate, and go on by what the wheels turned."""
         self._rows.take_imu(imu)
         motion = self._rows.motion(self._time_of(imu) / NANOSECONDS)
@@ -149,7 +134,7 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
         """Return the stamp of a message, or the present time if it has none [ns]."""
         return stamp_to_ns(message.header.stamp) or self.get_clock().now().nanoseconds
 
-    def _take_odometry(self, odometry: Odometry) -> None:
+    def _take_odometry(self, odometry: Any, _arrival: float) -> None:
         now = self._time_of(odometry) / NANOSECONDS
         row = self._rows.take_odometry(odometry, now, self.values.map_frame)
         self.heard_until = now

@@ -25,7 +25,6 @@ from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.lazy_publisher import LazyPublisher
-from rover_planner.ros.logs import RepeatLog
 from rover_planner.ros.map_intake import CLOUD, GRID_MAP, MapIntake
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.optional_types import find_type
@@ -41,7 +40,7 @@ MERGE_WAIT = 0.005
 machine may take 15 ms more to wake the thread until it is 20 ms."""
 
 
-class MapTopics:
+class MapTopics(MapIntake):
     """Keeps the map of a TraverseService up to date; maps are prepared in a thread."""
 
     def __init__(
@@ -59,15 +58,11 @@ class MapTopics:
                 with an empty text.
         """
         self._node, self._inputs, self._report = node, inputs, report
-        self._service, self._values = inputs.service, node.values
+        self._service = inputs.service
         self._is_from_topic = False
         self._logged_at, self._logged_kind = -float("inf"), ("", False)
-        self._map_count, self._refusals = 0, RepeatLog()
-        self._intake: MapIntake[None] = MapIntake(
-            self._take_message, self._refuse, inputs.frames, self._renew
-        )
-        self.retry = self._intake.retry
-        """Takes the last message if its transform has come meanwhile; to be called each second."""
+        self._map_count = 0
+        super().__init__(node.get_logger(), node.values, inputs.frames)
         self._subscribe(CLOUD, PointCloud2)
         serve_later(node, LoadMap, "~/load_map", self._load_map)
         grid_map = find_type("grid_map_msgs.msg:GridMap")
@@ -77,37 +72,32 @@ class MapTopics:
     def _subscribe(self, topic: str, kind: type) -> None:
         def offer(message: bytes) -> None:
             self._node.heard.poll()
-            self._intake.offer(message, kind)
+            self.offer(message, kind)
 
         subscribe_to_map(self._node, kind, topic, offer)
 
-    def ticket(self) -> int:
-        """Return a number for `wait`: all maps that have come until now."""
-        return self._intake.ticket()
-
-    def wait(self, ticket: int, check: Callable[[], object]) -> None:
+    def wait(
+        self, ticket: int, check: Callable[[], object], longest: float = float("inf")
+    ) -> None:
         """Wait until the maps before a ticket are taken; `check` may raise meanwhile.
 
         Where maps merge, the wait is no longer than MERGE_WAIT, as there is a good map.
         """
         merges = self._inputs.keeper.merges and self._service.known_map is not None
-        self._intake.wait(ticket, check, MERGE_WAIT if merges else float("inf"))
+        super().wait(ticket, check, MERGE_WAIT if merges else longest)
 
-    def apply(self) -> None:
+    def apply(self, values: TraverseServerParameters) -> None:
         """Make the present map anew if a parameter of messages has changed.
 
         Those of merging and filling count from the next map on.
         """
-        before, self._values = self._values, self._node.values
-        values, rover = self._values, self._service.settings.rover
-        self._intake.do(lambda: self._inputs.keeper.apply(rover, values))
-        names = ("map_resolution", "cell_height")
-        is_new = any(getattr(before, name) != getattr(self._values, name) for name in names)
-        if self._is_from_topic and is_new:
-            self._intake.repeat()
+        rover = self._service.settings.rover
+        self.do(lambda: self._inputs.keeper.apply(rover, values))
+        if self.take_parameters(values) and self._is_from_topic:
+            self.repeat()
         else:
-            self._intake.do(self._intake.expect_other)
-            self._intake.do(self._service.refresh_map)
+            self.do(self.expect_other)
+            self.do(self._service.refresh_map)
 
     def _load_map(
         self, request: LoadMap.Request, response: LoadMap.Response, reply: Reply
@@ -122,12 +112,12 @@ class MapTopics:
                 response.result = LoadMap.Response.RESULT_INVALID_MAP_DATA
             self._node.handover.call(partial(reply, response))
 
-        self._intake.do(load)
+        self.do(load)
 
     def _load(self, url: str, response: LoadMap.Response) -> None:
         """Take the map of a file and fill the response."""
         try:
-            values = self._values
+            values = self.values
             limits = MapLimits(values.map_folder, values.max_map_bytes, values.max_map_cells)
             terrain = open_map(url, limits)
             standing, now = self._service.standing(), self._node.seconds
@@ -141,34 +131,30 @@ class MapTopics:
                 else LoadMap.Response.RESULT_INVALID_MAP_DATA
             )
             return
-        self._intake.forget()
+        self.forget()
         self._is_from_topic = False
         source = show_file(url)
         self._note(source, self._inputs.keep(snapshot, source))
         stamp = self._node.get_clock().now().to_msg()
-        response.map = terrain_to_occupancy_grid(terrain, self._values.map_frame, stamp)
+        response.map = terrain_to_occupancy_grid(terrain, self.values.map_frame, stamp)
         response.result = LoadMap.Response.RESULT_SUCCESS
 
     def look_under_rover(self) -> None:
         """Have unknown ground under the rover filled, if that is due."""
         if self._inputs.may_fill_under_rover():
-            self._intake.do(self._fill_under_rover)
+            self.do(self._fill_under_rover)
 
-    def close(self) -> None:
-        """End the thread."""
-        self._intake.close()
-
-    def _renew(self, cloud: PointCloud2) -> None:
+    def renew(self, cloud: Any) -> None:
         """Take a cloud that says what the map in use says; where maps merge, cells are newer."""
         if self._inputs.keeper.merges:
-            self._take_message(cloud, None)
+            self.prepare(cloud, None)
         else:
             self._service.renew_map(stamp_to_ns(cloud.header.stamp))
             self._report("")
 
-    def _take_message(self, message: Any, source: Rigid | None) -> None:
-        topic = self._intake.topic
-        self._note(topic, self._inputs.take_map(message, source, topic))
+    def prepare(self, message: Any, source: Rigid | None) -> None:
+        """Take a PointCloud2 or GridMap into the map."""
+        self._note(self.topic, self._inputs.take_map(message, source, self.topic))
         self._is_from_topic = True
 
     def _fill_under_rover(self) -> None:
@@ -192,14 +178,14 @@ class MapTopics:
                 self._logged_at, self._logged_kind = now, kind
                 self._node.get_logger().info(f"map from {source}: {describe_terrain(taken)}")
 
-    def _refuse(self, error: str) -> None:
+    def describe_kept(self) -> str:
+        """Return what stays where a map is refused."""
         there = self._service.known_map is not None
-        kept = "the last good map stays" if there else "there is no map yet"
-        line = self._refusals.line(
-            f"{self._intake.topic} refused, {kept}: {error}", time.monotonic()
-        )
-        if line:
-            self._node.get_logger().error(line)
+        return "the last good map stays" if there else "there is no map yet"
+
+    def refuse(self, error: str) -> None:
+        """Log and report why a map is refused."""
+        super().refuse(error)
         self._report(error)
 
 

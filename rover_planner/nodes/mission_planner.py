@@ -292,7 +292,7 @@ class MissionPlanner(Node):
         except MessageError as error:
             self.get_logger().warning(f"odometry not used: {error}", once=True)
             return
-        self._pose = pose[[0, 1, 3]]
+        self._pose = pose[[0, 1, 5]]
 
     def _take_driven(self, message: String) -> None:
         self._driven = message.data

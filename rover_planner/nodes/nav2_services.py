@@ -21,7 +21,6 @@ from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.planning.answering.budget import CANCELLED, STOPPING
 from rover_planner.planning.answering.judgement import PathJudgement
 from rover_planner.planning.answering.questions import (
-    Answer,
     Question,
     ask_about_path,
     ask_in_vain,
@@ -105,17 +104,16 @@ class Nav2Services:
         except RoverError as error:
             question = ask_in_vain("is_path_valid", about, str(error))
 
-        def send(answer: Answer) -> None:
-            judged = answer.judgement
+        def send(judged: PathJudgement, identity: IdentityReport) -> None:
             response.is_valid = judged.traversable
             response.invalid_pose_indices = list(range(len(path.poses)))
             if judged.candidate is not None:
-                spacing = answer.snapshot.settings.query.waypoint_spacing
-                assert given.poses is not None
+                assert judged.judge is not None and given.poses is not None
+                spacing = judged.judge.options.waypoint_spacing
                 response.invalid_pose_indices = find_invalid_poses(
                     judged.candidate.verdict.codes, next_given_poses(given.poses, spacing)
                 )
-            self._publish(judged, replace(answer.identity, path_hash=about, path_stamp=stamp))
+            self._publish(judged, replace(identity, path_hash=about, path_stamp=stamp))
             reply(response)
 
         self._desk.ask(question, send)
@@ -126,9 +124,9 @@ class Nav2Services:
         assert make_result is not None
         start = goal.start if goal.use_start else PoseStamped()
 
-        def send(answer: Answer) -> None:
-            judged, result = answer.judgement, make_result()
-            result.path, _ = self._publish(judged, answer.identity)
+        def send(judged: PathJudgement, identity: IdentityReport) -> None:
+            result = make_result()
+            result.path, _ = self._publish(judged, identity)
             seconds = time.monotonic() - begin
             result.planning_time = Duration(seconds=seconds).to_msg()
             result.error_code = getattr(result, _name_error(judged))

@@ -2,11 +2,12 @@
 """Takes the questions of a node's services and has them judged, within their budget.
 
 The course of a question: a service makes a `Question` of its request; the desk notes when it came
-and what is known then; the queue judges it in its thread; the desk hands the `Answer` to the
+and what is known then; the queue judges it in its thread; the desk hands the judgement to the
 service, which makes messages of it.
 """
 
 import contextlib
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -17,16 +18,15 @@ from diagnostic_msgs.msg import DiagnosticArray
 
 from msg_adapters.results.diagnostics import SEARCH, diagnostics, make_status
 from rover_planner.nodes.map_topics import MapTopics
-from rover_planner.planning.answering.budget import STOPPING, Budget, QuestionStoppedError
-from rover_planner.planning.answering.question_queue import Answered, Asked, QuestionQueue
-from rover_planner.planning.answering.questions import Answer, Question, Register
+from rover_planner.planning.answering.budget import STOPPING, Budget
+from rover_planner.planning.answering.question_queue import Asked, QuestionQueue
+from rover_planner.planning.answering.questions import Question, Register
 from rover_planner.planning.answering.search_watch import NewerMapError, SearchWatch
 from rover_planner.planning.answering.server_health import ServerHealth
 from rover_planner.planning.answering.snapshot import Snapshot
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.deferred import PacedSender
-from rover_planner.ros.guard import refuse_error
 from rover_planner.ros.node import RoverNode, create_steady_timer
 from rover_planner.ros.qos import topic_qos
 
@@ -34,26 +34,23 @@ LEAVE_TIME = 0.1
 """Time in which the last answers leave before the node is destroyed [s]."""
 PATROL = 0.05
 """Period of the check for questions that have run out of time [s]."""
+WAIT = 0.01
+"""Time between two looks of a thread that gives way to questions [s]."""
 GRACE = 0.1
 """Time after its deadline in which a question in work may still end by itself [s]."""
 
 
-Reply = Callable[[Answer], None]
-"""Makes messages of an answer and sends them; called once, in the executor's thread."""
+Reply = Callable[[Any, IdentityReport], None]
+"""Makes messages of a judgement, a `PathJudgement` or `ReachAnswer`, and of what it is about, and
+sends them; called once, in the executor's thread."""
 
 
 @dataclass(eq=False, kw_only=True)
 class Inquiry(Asked):
     """A question that came to a node."""
 
-    reply: Reply
-    """Takes the answer."""
     snapshot: Snapshot
     """Map, settings, path and measurements; its map is that of the time of judging."""
-    number: int
-    """Number of the question."""
-    ros_time: int
-    """ROS time of its arrival [ns]."""
     arrival: float
     """Time of its arrival [s], steady clock."""
     ticket: int
@@ -66,13 +63,11 @@ class QuestionDesk:
     def __init__(self, node: RoverNode[Any], service: TraverseService, maps: MapTopics):
         """Begin without questions."""
         self._node, self._service, self._maps = node, service, maps
-        self._sender = PacedSender(node, node.guard)
+        self._sender = PacedSender(node.guard)
         self._register = Register()
         self.health = ServerHealth()
         """Counts of answers and faults."""
-        self._queue = QuestionQueue(
-            0, self._judge, lambda: node.handover.call(self._send_finished)
-        )
+        self._queue = QuestionQueue(self._judge, node.handover.call, node.guard.report)
         self._progress = node.create_publisher(DiagnosticArray, "~/search_progress", topic_qos())
         self._patrol = create_steady_timer(node, PATROL, self._refuse_overdue, starts=False)
 
@@ -84,49 +79,38 @@ class QuestionDesk:
     def ask(self, question: Question, reply: Reply) -> None:
         """Take a question; its answer follows within its budget and GRACE."""
         self._node.heard.poll()
-        now = self._node.get_clock().now().nanoseconds
         values = self._service.settings.parameters
-        self._queue.max_waiting = values.max_waiting
         inquiry = Inquiry(
             question,
             Budget(values.time_budget),
-            reply=reply,
-            snapshot=replace(self._service.snapshot(now), watch=self._watch()),
-            number=self._register.next_number(),
-            ros_time=now,
+            lambda judgement: self._answer(inquiry, judgement, reply),
+            snapshot=replace(self._service.snapshot(self._ros_time), watch=self._watch()),
             arrival=time.monotonic(),
             ticket=self._maps.ticket(),
         )
-        self._send(self._queue.ask(inquiry))
+        self._queue.ask(inquiry, values.max_waiting)
         if self._queue.open_count:
             self._patrol.reset()
 
+    @property
+    def _ros_time(self) -> int:
+        return int(self._node.get_clock().now().nanoseconds)
+
     def _judge(self, inquiry: Inquiry) -> Any:
         """Return the judgement of a question on the newest map; called in the queue's thread."""
-        question = inquiry.question
-        try:
-            self._maps.wait(inquiry.ticket, inquiry.budget.check)
-            while True:
-                inquiry.snapshot = self._service.add_map(inquiry.snapshot, inquiry.ros_time)
-                with contextlib.suppress(NewerMapError):
-                    return question.judge(inquiry.snapshot)
-        except QuestionStoppedError:
-            raise
-        except Exception as error:
-            return refuse_error(self._node.guard, question.service, error, question.refuse)
+        self._maps.wait(inquiry.ticket, inquiry.budget.check)
+        while True:
+            inquiry.snapshot = self._service.add_map(inquiry.snapshot, self._ros_time)
+            with contextlib.suppress(NewerMapError):
+                return inquiry.question.judge(inquiry.snapshot)
 
-    def _send(self, answered: list[Answered]) -> None:
-        """Send the answers to questions."""
-        for inquiry, judgement in answered:
-            assert isinstance(inquiry, Inquiry)
-            question, done = inquiry.question, time.monotonic()
-            label = f"{inquiry.number}, {question.service}"
-            self.health.take_answer(judgement.code, done, label, done - inquiry.arrival)
-            identity = self._register.identify(
-                inquiry.number, question.service, question.hash, inquiry.snapshot
-            )
-            answer = Answer(judgement, inquiry.snapshot, identity)
-            self._sender.send(partial(inquiry.reply, answer))
+    def _answer(self, inquiry: Inquiry, judgement: Any, reply: Reply) -> None:
+        """Hand the answer to a question to its service."""
+        question, done = inquiry.question, time.monotonic()
+        identity = self._register.identify(question.service, question.hash, inquiry.snapshot)
+        label = f"{identity.request}, {question.service}"
+        self.health.take_answer(judgement.code, done, label, done - inquiry.arrival)
+        self._sender.send(partial(reply, judgement, identity))
         if not self._queue.open_count:
             self._patrol.cancel()
 
@@ -150,28 +134,34 @@ class QuestionDesk:
 
     def identify(self, service: str, path_hash: str, snapshot: Snapshot) -> IdentityReport:
         """Return a new number with what a judgement that nobody asked for is about."""
-        identity = self._register.identify(
-            self._register.next_number(), service, path_hash, snapshot
-        )
+        identity = self._register.identify(service, path_hash, snapshot)
         return replace(identity, path_hash=path_hash)
+
+    def give_way(self, check: Callable[[], object], longest: float = math.inf) -> float:
+        """Wait while there are questions; return the time that took [s]; for other threads.
+
+        Args:
+            check: Called again and again; may raise.
+            longest: Longest wait [s].
+        """
+        began = time.monotonic()
+        check()
+        while self.open_count and time.monotonic() - began < longest:
+            time.sleep(WAIT)
+            check()
+        return time.monotonic() - began
 
     def cancel(self, code: str, reason: str) -> int:
         """Answer all open questions with a refusal; return their number."""
-        stopped = self._queue.stop_all(code, reason)
-        self._send(stopped)
-        return len(stopped)
+        return self._queue.stop_all(code, reason)
 
     def close(self) -> None:
         """Refuse all open questions and end the thread; the refusals have time to leave."""
         count = self.cancel(STOPPING, "the server is shutting down")
         self._queue.close()
-        self._sender.send_all()
         if count:
             time.sleep(LEAVE_TIME)
 
-    def _send_finished(self) -> None:
-        self._send(self._queue.finished())
-
     def _refuse_overdue(self) -> None:
-        self._send(self._queue.overdue(GRACE))
-        self._send_finished()
+        self._queue.refuse_overdue(GRACE)
+        self._queue.finish()

@@ -125,28 +125,19 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
             hear(Bool, BRAKE, self._take_brake, latched_qos())
 
     def _take_path(self, path: Path, _arrival: float) -> None:
-        try:
-            self.simulation.take_path(path_to_poses(path, self._frame))
-            self._path_hash = path_hash(path)
-        except MessageError as error:
-            self.get_logger().error(f"path refused: {error}")
+        self.simulation.take_path(path_to_poses(path, self._frame))
+        self._path_hash = path_hash(path)
 
-    def _take_speeds(self, twist: TwistStamped, arrival: float) -> None:
-        if _stamp_of(twist) in self._own_stamps:
-            return
-        try:
+    def _take_speeds(self, twist: Any, arrival: float) -> None:
+        if _stamp_of(twist) not in self._own_stamps:
             self.simulation.take_speeds(*twist_to_speeds(twist), arrival)
-        except MessageError as error:
-            self.get_logger().error(f"cmd_vel refused: {error}", throttle_duration_sec=5.0)
 
     def _take_torques(self, message: Float64MultiArray, arrival: float) -> None:
         efforts = np.array(message.data)
         if efforts.shape != (6,) or not np.isfinite(efforts).all():
-            self.get_logger().error(
-                f"commands refused: {efforts.tolist()}; they must be 6 finite torques in N m",
-                throttle_duration_sec=5.0,
+            raise MessageError(
+                f"they are {efforts.tolist()}; they must be 6 finite torques in N m"
             )
-            return
         torques = np.empty(6)
         torques[self._order] = efforts
         self.simulation.take_torques(torques, arrival)
@@ -259,7 +250,7 @@ def _twist(speeds: tuple[float, float], stamp: Any) -> TwistStamped:
     return message
 
 
-def _stamp_of(twist: TwistStamped) -> tuple[int, int]:
+def _stamp_of(twist: Any) -> tuple[int, int]:
     return twist.header.stamp.sec, twist.header.stamp.nanosec
 
 

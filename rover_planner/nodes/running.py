@@ -78,11 +78,9 @@ def run_node(
 
 def _take_priority(node: RoverNode[Any]) -> None:
     """Set the real-time priority of a node's parameter; log a warning if it is not granted."""
-    if node.has_parameter("realtime_priority"):
-        priority = node.get_parameter("realtime_priority").value
-        refusal = take_priority(priority, node.urgent_threads)
-        if refusal:
-            node.get_logger().warning(refusal)
+    refusal = take_priority(getattr(node.values, "realtime_priority", 0), node.urgent_threads)
+    if refusal:
+        node.get_logger().warning(refusal)
 
 
 class StopSignals:

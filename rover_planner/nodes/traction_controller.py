@@ -27,15 +27,15 @@ from rover_planner.shell.kernels import load_kernels
 from rover_planner.traction.clocks import ClockWatch
 from rover_planner.traction.settings import TractionSettings, load_traction_settings
 from rover_planner.traction.statistics import TractionStatistics
-from rover_planner.traction.supervisor import (
+from rover_planner.traction.supervisor import TractionSupervisor
+from rover_planner.traction.traction_service import (
     DISABLED,
     DRIVING,
     FAULT,
     STALLED,
     TractionCommand,
-    TractionSupervisor,
+    TractionService,
 )
-from rover_planner.traction.traction_service import TractionService
 from rover_planner.traction.watchdog import Watchdog
 
 NODE_NAME = "traction_controller"
@@ -105,7 +105,7 @@ class TractionController(RoverNode[TractionControllerParameters]):
         """Send zero torques and the brake, wait until they have arrived, and stop updating."""
         self._timer.cancel()
         self._watchdog.close()
-        self._topics.writer.write(np.zeros(WHEEL_COUNT), True, DISABLED)
+        self._topics.write(np.zeros(WHEEL_COUNT), True, DISABLED)
         self._topics.commands.wait_for_all_acked(ARRIVAL_TIME)
 
     def destroy_node(self) -> None:
@@ -133,9 +133,8 @@ class TractionController(RoverNode[TractionControllerParameters]):
         values = self.values
         self._supervisor.configure(settings)
         self._clock_watch.timeout = values.clock_timeout
-        self._inputs.stamps.tolerance = values.stamp_tolerance
         self.frames.apply_timeout(values.transform_timeout)
-        self._maps.apply()
+        self._maps.apply(values)
 
     def _enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         before = self._supervisor.permission.enabled
@@ -174,21 +173,21 @@ class TractionController(RoverNode[TractionControllerParameters]):
         if not sent:
             command = self._supervisor.fail(LOOP_FAULT)
             self._write(command)  # torques of a sending that hung are not the last ones
-        self._topics.publish_forces(command.update)
-        self.statistics.take(command.update, start, time.perf_counter())
+        self._topics.publish_forces(command)
+        self.statistics.take(command, start, time.perf_counter())
         self._log_changes(command, now)
 
     def _write(self, command: TractionCommand) -> None:
         """Publish torques, and rates and steering angles for drives that hold those."""
-        writer, service = self._topics.writer, self.service
+        topics, service = self._topics, self.service
         if command.state != DRIVING:
-            writer.write(command.torques, command.brake, command.state)
+            topics.write(command.torques, command.brake, command.state)
             return
-        writer.write(command.torques, command.brake, command.state, service.wanted_rates)
-        if self._topics.steering.get_subscription_count():
+        topics.write(command.torques, command.brake, command.state, service.wanted_rates)
+        if topics.steering.get_subscription_count():
             angles = service.course.steering_aims(service.wanted)
             if angles is not None:
-                self._topics.publish_steering(self._inputs.to_robot_steering(angles))
+                topics.publish_steering(self._inputs.to_robot_steering(angles))
 
     def _find_repeated(self, now: float) -> TractionCommand | None:
         """Return the last command if this update is to send it again, else None."""
@@ -227,7 +226,6 @@ class TractionController(RoverNode[TractionControllerParameters]):
         seen, stamp = time.monotonic(), clock.now().nanoseconds
         fault = self._clock_watch.check(seen, stamp, clock.ros_time_is_active)
         if self._clock_watch.stepped:
-            self._inputs.stamps.forget()
             self.service.forget_times()
         return self._supervisor.update(now, fault)
 
@@ -239,21 +237,21 @@ class TractionController(RoverNode[TractionControllerParameters]):
 
     def _send_watchdog_command(self) -> None:
         """Send zero torques and the brake; called in the thread of the watchdog."""
-        self._topics.watchdog_writer.write(np.zeros(WHEEL_COUNT), True, FAULT)
+        self._topics.write(np.zeros(WHEEL_COUNT), True, FAULT)
 
     def _log_changes(self, command: TractionCommand, now: float) -> None:
         """Log the begin and the end of faults and stalls; show a new state in the diagnostics."""
         last, self._command = self._command, command
-        update, policy = command.update, self.values.rest_policy
-        fault = f"fault, rest by {policy}: {update.fault}" if update.fault else ""
+        policy = self.values.rest_policy
+        fault = f"fault, rest by {policy}: {command.fault}" if command.fault else ""
         self._log.update(FAULT, fault, "all inputs are right", now)
         stalled = "stalled: no progress, stopped pushing" if command.state == STALLED else ""
         self._log.update(STALLED, stalled, "no longer stalled", now)
-        if last is None or (last.state, last.update.fault) != (command.state, update.fault):
+        if last is None or (last.state, last.fault) != (command.state, command.fault):
             self._publish_diagnostics()
-        if update.warning and update.warning != self._warning:
-            self.get_logger().warning(update.warning)
-            self._warning = update.warning
+        if command.warning and command.warning != self._warning:
+            self.get_logger().warning(command.warning)
+            self._warning = command.warning
 
     def _publish_diagnostics(self) -> None:
         self._maps.look_for_frame()
@@ -268,7 +266,7 @@ class TractionController(RoverNode[TractionControllerParameters]):
         name, stamp = self.service.settings.rover.name, self.get_clock().now().to_msg()
         self._topics.diagnostics.publish(
             traction_diagnostics(
-                values, command.state, command.update.fault,
+                values, command.state, command.fault,
                 self._inputs.publishers.problems, name, stamp,
             )
         )  # fmt: skip

@@ -5,7 +5,6 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
@@ -18,8 +17,7 @@ from std_srvs.srv import Trigger
 
 from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash, plan_request_hash
-from msg_adapters.paths import count_poses, stamped_pose_to_array
-from msg_adapters.raw_messages import SensorReader
+from msg_adapters.paths import count_poses
 from msg_adapters.results.diagnostics import HEALTH, MONITOR, diagnostics, make_status, to_json
 from msg_adapters.stamps import NANOSECONDS
 from rover_physics.errors import RoverError
@@ -40,7 +38,6 @@ from rover_planner.parameters.traverse_server import FAN, TraverseServerParamete
 from rover_planner.planning.answering.budget import CANCELLED
 from rover_planner.planning.answering.judgement import PathJudgement
 from rover_planner.planning.answering.questions import (
-    Answer,
     Question,
     ask_about_path,
     ask_for_path,
@@ -112,7 +109,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self.watch = PathWatch(self, self.service, self._find_watched, self._publish_stop)
         """Watches the accepted path."""
         self.urgent_threads = (self.watch.heartbeat_thread,)
-        self._hazards = HazardTopics(self, self.service, lambda: self.desk.open_count > 0)
+        self._hazards = HazardTopics(self, self.service, self.desk.give_way)
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
         self._diagnostics_due = 0.0
         self._beats = create_steady_timer(self, PERIOD, self._beat)
@@ -131,15 +128,15 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         super().destroy_node()
 
     def _create_subscriptions(self) -> None:
-        hear, reader = partial(self.heard.subscribe, raw=True), SensorReader()
-        hear(JointState, "joint_states", partial(self._take_joints, reader), polled_qos())
-        hear(Odometry, "odometry", partial(self._take_odometry, reader), newest_qos())
+        hear, inputs = self.heard.subscribe, self._inputs
+        hear(JointState, "joint_states", lambda one, _: inputs.take_joints(one), polled_qos())
+        hear(Odometry, "odometry", self._take_odometry, newest_qos())
         if self.values.imu_attitude:
-            hear(Imu, "imu", partial(self._take_imu, reader), newest_qos())
+            hear(Imu, "imu", lambda one, _: inputs.take_imu(one), newest_qos())
         reliability = self.values.input_reliability
         subscribe_to_requests(self, Path, "~/path", self._take_path, reliability, raw=True)
         qos = replace_reliability(topic_qos(), reliability)
-        self.create_subscription(String, "~/ground_estimate", self._take_ground, qos)
+        hear(String, "~/ground_estimate", self._take_ground, qos)
         self.create_subscription(String, "~/mark_place", self._take_mark, qos)
 
     def _log_ready(self) -> None:
@@ -151,7 +148,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
 
     def _apply_settings(self, settings: ServiceSettings) -> None:
         self._inputs.values, self.service.settings = self.values, settings
-        self._maps.apply()
+        self._maps.apply(self.values)
         self.watch.apply()
         self.frames.apply_timeout(self.values.transform_timeout)
         self._hazards.apply()
@@ -182,38 +179,14 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         if not error:
             self.watch.look()
 
-    def _take_joints(self, reader: SensorReader, message: bytes, _arrival: float) -> None:
-        try:
-            self._inputs.take_joints(reader.read(message, JointState))
-        except MessageError as error:
-            self.get_logger().warning(
-                f"{error}; the angles known before stay", throttle_duration_sec=5.0
-            )
+    def _take_odometry(self, odometry: Any, _arrival: float) -> None:
+        self._inputs.take_odometry(odometry)
+        self._maps.look_under_rover()
 
-    def _take_odometry(self, reader: SensorReader, message: bytes, _arrival: float) -> None:
-        try:
-            self._inputs.take_odometry(reader.read(message, Odometry))
-            self._maps.look_under_rover()
-        except RoverError as error:
-            self.get_logger().warning(
-                f"odometry not used, the suspension is not compared: {error}", once=True
-            )
-
-    def _take_imu(self, reader: SensorReader, message: bytes, _arrival: float) -> None:
-        try:
-            self._inputs.take_imu(reader.read(message, Imu))
-        except MessageError as error:
-            self.get_logger().warning(f"imu not used: {error}", throttle_duration_sec=10.0)
-
-    def _take_ground(self, message: String) -> None:
+    def _take_ground(self, message: String, _arrival: float) -> None:
         """Take what was learned of the ground: JSON as the command learn writes it."""
-        now = self.get_clock().now().nanoseconds
-        try:
-            ground = parse_learned(message.data, "~/ground_estimate", stamp_text(now))
-        except RoverError as error:
-            self.get_logger().warning(f"not used: {error}", throttle_duration_sec=5.0)
-            return
-        self.service.take_ground(ground)
+        now = stamp_text(self.get_clock().now().nanoseconds)
+        self.service.take_ground(parse_learned(message.data, "~/ground_estimate", now))
 
     def _take_mark(self, message: String) -> None:
         """Take a place that is impassable from now on: JSON with x, y, radius, reason, date."""
@@ -270,8 +243,8 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
             "can_traverse", request.start, request.goal, request.tolerance
         )
 
-        def send(answer: Answer) -> None:
-            response.plan, _ = self.publish(answer.judgement, answer.identity)
+        def send(judged: PathJudgement, identity: IdentityReport) -> None:
+            response.plan, _ = self.publish(judged, identity)
             reply(response)
 
         self.desk.ask(question, send)
@@ -295,29 +268,21 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
 
     def _read_ends(self, begin: PoseStamped, end: PoseStamped) -> tuple[Pose, Pose]:
         """Return start and goal (3,) of the body in the map frame; an empty start is here."""
-        frame, frames = self.values.map_frame, self.frames
-        if is_empty(begin):
-            start = self._find_here()
-        else:
-            located = frames.localise(begin, "start")
-            start = stamped_pose_to_array(located, frame, "start")
-        located = frames.localise(end, "goal")
-        return start, stamped_pose_to_array(located, frame, "goal")
+        read = self.frames.read_pose
+        start = self._find_here() if is_empty(begin) else read(begin, "start")
+        return start, read(end, "goal")
 
     def _find_watched(self) -> Pose | None:
         """Return the pose (3,) of the body by /tf, else by odometry of just now."""
         try:
-            here = self.frames.find_here()
+            return self._inputs.find_here(MAX_POSE_AGE)
         except RoverError:  # it is stale
             return None
-        return self.service.fresh_pose(MAX_POSE_AGE) if here is None else here
 
     def _find_here(self) -> Pose:
         """Return the pose (3,) of the body by /tf, else by odometry."""
         self.heard.poll()
-        here = self.frames.find_here()
-        if here is None:
-            here = self.service.fresh_pose()
+        here = self._inputs.find_here()
         if here is None:
             raise MessageError(
                 "start is empty, which means where the rover is, but neither /tf nor odometry of "
@@ -330,10 +295,10 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
     ) -> None:
         path = self.service.given_path
 
-        def send(answer: Answer) -> None:
-            about = replace(answer.identity, path_hash=path.hash, path_stamp=path.stamp)
-            _, report = self.publish(answer.judgement, about)
-            response.success = answer.judgement.traversable
+        def send(judged: PathJudgement, identity: IdentityReport) -> None:
+            about = replace(identity, path_hash=path.hash, path_stamp=path.stamp)
+            _, report = self.publish(judged, about)
+            response.success = judged.traversable
             response.message = to_json(report().to_dict())
             reply(response)
 
@@ -356,8 +321,8 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self.publish(judgement, self.desk.identify("monitor", watched, snapshot))
 
     def _cancel(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        count = self.desk.cancel(CANCELLED, "the question was cancelled by ~/cancel")
-        count += self._advice.cancel()
+        why = CANCELLED, "the question was cancelled by ~/cancel"
+        count = self.desk.cancel(*why) + self._advice.cancel(*why)
         response.success = count > 0
         response.message = f"{count} open questions cancelled"
         return response

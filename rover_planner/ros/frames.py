@@ -1,24 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """Brings poses of messages to the map frame and to the body, and knows where sensors were."""
 
-import copy
 from collections.abc import Callable
 from functools import partial
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import Pose, PoseStamped, TransformStamped
+from geometry_msgs.msg import PoseStamped, TransformStamped
 from nav_msgs.msg import Path
-from numpy.typing import NDArray
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from std_msgs.msg import Header
 
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame, check_transform
-from msg_adapters.paths import pose_to_array
+from msg_adapters.odometry import odometry_to_pose
+from msg_adapters.paths import path_to_poses, pose_to_array, stamped_pose_to_array
 from msg_adapters.stamps import stamp_to_ns
+from rover_physics.numerics.arrays import Floats
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.navigation.sensor_mounts import SensorPoses
@@ -27,7 +25,6 @@ from rover_planner.planning.navigation.transforms import (
     TransformError,
     TransformTree,
     move_path,
-    write_pose,
 )
 from rover_planner.ros.optional_types import find_type
 
@@ -89,15 +86,6 @@ class Frames:
             is_static=is_static,
         )
 
-    def take_odometry(self, odometry: Any) -> None:
-        """Keep the pose of the body that odometry in the map frame tells, for the sensors."""
-        assert self._sensors is not None
-        stamp, pose = stamp_to_ns(odometry.header.stamp), odometry.pose.pose
-        robot = Rigid.of(pose.position, pose.orientation)
-        if self._offset is not None:
-            robot = robot.then(self._offset.inverse())
-        self._sensors.take(robot, self.now() if stamp is None else stamp)
-
     def find(self, frame: str, stamp: int | None) -> Rigid:
         """Return where a frame is in the map frame at a time [ns]; None is the newest.
 
@@ -123,7 +111,7 @@ class Frames:
             return None
         return self.find(frame, stamp)
 
-    def find_here(self) -> NDArray[np.float64] | None:
+    def find_here(self) -> Floats | None:
         """Return (3,) x, y [m], yaw [rad] of the body on the map by /tf; None without /tf.
 
         Raises:
@@ -142,62 +130,70 @@ class Frames:
         found = self._to_body(Rigid.from_rpy(x, y, 0.0, 0.0, 0.0, yaw)).xyyaw.tolist()
         return found[0], found[1], found[2]
 
-    def localise(self, stamped: PoseStamped, what: str) -> PoseStamped:
-        """Return a pose of the robot as one of the body in the map frame.
-
-        A pose in a frame that no transform has is returned as it is, for others to refuse.
+    def read_pose(self, stamped: PoseStamped, what: str) -> Floats:
+        """Return x, y [m], yaw [rad] (3,) of the body in the map frame by a pose of the robot.
 
         Raises:
-            MessageError: The pose is not finite, or no unit quaternion.
+            MessageError: Another frame, which no transform has, or no pose; `what` names it.
             TransformError: As `TransformTree.find`.
         """
         moved = self._move(stamped.header, stamped.pose, what)
-        if moved is None:
-            return stamped
-        frame, pose = moved
-        return PoseStamped(header=Header(stamp=stamped.header.stamp, frame_id=frame), pose=pose)
+        return stamped_pose_to_array(stamped, self._map, what) if moved is None else moved.xyyaw
 
-    def localise_path(self, path: Path) -> Path:
-        """Return a path of the robot as one of the body in the map frame; see `localise`."""
+    def read_path(self, path: Path) -> Floats:
+        """Return the poses (n, 3) of the body by a path of the robot; see `read_pose`."""
         frame = path.header.frame_id
-        if self._offset is None and (frame == self._map or not self._tree.knows(frame)):
-            return path
-        moved = Path(header=copy.deepcopy(path.header))
-        for index, pose in enumerate(path.poses):
-            own = PoseStamped(header=pose.header, pose=pose.pose)
-            if not own.header.frame_id:
-                own.header = path.header
-            moved.poses.append(self.localise(own, f"path pose {index}"))
-        if moved.poses:
-            moved.header.frame_id = moved.poses[0].header.frame_id
-        return moved
+        is_plain = self._offset is None and (frame == self._map or not self._tree.knows(frame))
+        if is_plain or not path.poses:
+            return path_to_poses(path, self._map)
+        poses = []
+        for index, one in enumerate(path.poses):
+            header = one.header if one.header.frame_id else path.header
+            stamped = PoseStamped(header=header, pose=one.pose)
+            poses.append(self.read_pose(stamped, f"path pose {index}"))
+        return np.array(poses)
 
-    def localise_odometry(self, odometry: Any) -> Any:
-        """Return odometry, as `SensorReader` reads it, of the body in the map frame."""
-        moved = self._move(odometry.header, odometry.pose.pose, "odometry")
-        if moved is None:
-            return odometry
-        frame, pose = moved
-        return SimpleNamespace(
-            header=SimpleNamespace(stamp=odometry.header.stamp, frame_id=frame),
-            child_frame_id=odometry.child_frame_id,
-            pose=SimpleNamespace(pose=pose, covariance=odometry.pose.covariance),
-        )
+    def take_odometry(self, odometry: Any, base_frame: str = "") -> tuple[Floats, float]:
+        """Return the pose of the body in the map frame by odometry; the sensors move with it.
 
-    def _move(self, header: Any, pose: Any, what: str) -> tuple[str, Pose] | None:
-        """Return the frame and the pose of the body; None where those of the robot are it."""
+        Args:
+            odometry: The message; may be one of `SensorReader`.
+            base_frame: As for `odometry_to_pose`.
+
+        Returns:
+            x, y, z [m], roll, pitch, yaw [rad] (6,), and the standard deviation of x, y [m].
+
+        Raises:
+            MessageError: As `odometry_to_pose`.
+            TransformError: As `TransformTree.find`.
+        """
+        header = odometry.header
+        moved = self._move(header, odometry.pose.pose, "odometry")
+        frame = self._map if moved is None else header.frame_id
+        pose, deviation = odometry_to_pose(odometry, frame, base_frame)
+        if moved is not None:
+            pose = moved.xyzrpy
+        if self._sensors is not None:
+            stamp, robot = stamp_to_ns(header.stamp), self._to_robot(Rigid.from_rpy(*pose))
+            self._sensors.take(robot, self.now() if stamp is None else stamp)
+        return pose, deviation
+
+    def _move(self, header: Any, pose: Any, what: str) -> Rigid | None:
+        """Return the body in the map frame.
+
+        None: it is what the pose says, or the frame is one that no transform has.
+        """
         frame = header.frame_id
-        is_here = frame == self._map or not self._tree.knows(frame)
-        if is_here and self._offset is None:
+        is_here = frame == self._map
+        is_plain = is_here and self._offset is None
+        if is_plain or not (is_here or self._tree.knows(frame)):
             return None
         pose_to_array(pose, what)  # refuses what is no pose
-        rigid = Rigid.of(pose.position, pose.orientation)
+        robot = Rigid.of(pose.position, pose.orientation)
         if not is_here:
             stamp = stamp_to_ns(header.stamp)
-            rigid = self._tree.find(self._map, frame, stamp, self.now()).then(rigid)
-        body = Pose()
-        write_pose(self._to_body(rigid), body)
-        return frame if is_here else self._map, body
+            robot = self._tree.find(self._map, frame, stamp, self.now()).then(robot)
+        return self._to_body(robot)
 
     def to_base(self, path: Path) -> Path:
         """Change a path of the body into one of the robot, in place, and return it."""
@@ -206,6 +202,9 @@ class Frames:
 
     def _to_body(self, robot: Rigid) -> Rigid:
         return robot if self._offset is None else robot.then(self._offset)
+
+    def _to_robot(self, body: Rigid) -> Rigid:
+        return body if self._offset is None else body.then(self._offset.inverse())
 
 
 class NodeFrames(Frames):

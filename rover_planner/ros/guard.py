@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keeps a node alive: errors are refusals with a reason; an unexpected one is logged once."""
+"""Keeps a node alive: unexpected errors are counted, and those of one kind logged once."""
 
 import contextlib
 import functools
@@ -8,7 +8,7 @@ import time
 import traceback
 from collections import Counter, deque
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 from rclpy.event_handler import EventHandler
 from rclpy.exceptions import InvalidHandle
@@ -16,7 +16,6 @@ from rclpy.executors import SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 
 from msg_adapters.stamps import NANOSECONDS
-from rover_physics.errors import RoverError
 
 EVENT_PERIOD = 1.0
 """Time between two looks at events of publishers and subscriptions, such as profiles that do not
@@ -25,8 +24,6 @@ leaves a message unread no wait lasts."""
 PATIENCE, PATIENT_PERIODS = 0.1, 5
 """Time between two looks at all else where a node has a loop [s], or that number of its periods if
 it is more."""
-
-Refusal = TypeVar("Refusal")
 
 
 class Guard:
@@ -65,7 +62,8 @@ class Guard:
         try:
             function()
         except Exception as error:
-            self.report(getattr(function, "__name__", "a callback"), error)
+            whole = getattr(function, "func", function)  # of a partial
+            self.report(getattr(whole, "__name__", "a callback"), error)
 
 
 class Handover:
@@ -85,16 +83,6 @@ class Handover:
     def _call_all(self) -> None:
         while self._waiting:
             self._guard.call(self._waiting.popleft())
-
-
-def refuse_error(
-    guard: Guard, request: str, error: Exception, refuse: Callable[[str, str], Refusal]
-) -> Refusal:
-    """Return `refuse(code, reason)` for an error; the guard counts and logs internal errors."""
-    if isinstance(error, RoverError):
-        return refuse("bad_request", str(error))
-    text = guard.report(request, error)
-    return refuse("internal_error", f"internal error: {text}")
 
 
 class GuardedExecutor(SingleThreadedExecutor):

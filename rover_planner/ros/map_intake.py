@@ -5,21 +5,24 @@ import contextlib
 import math
 import threading
 import time
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
 from functools import partial
-from typing import Any, Generic, TypeVar
+from typing import Any
 
+from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 
-from msg_adapters.elevation import find_cloud_data, is_same_cloud
-from msg_adapters.errors import MessageError
+from msg_adapters.elevation import is_same_cloud
+from msg_adapters.raw_messages import DamagedMessageError, SensorReader
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_planner.planning.navigation.transforms import Rigid, TransformError
 from rover_planner.ros.frames import Frames
+from rover_planner.ros.logs import RepeatLog
 
 WAIT = 0.02
 """Time between two checks of who waits for a map [s]."""
@@ -29,58 +32,82 @@ END_TIME = 2.0
 CLOUD, GRID_MAP = "elevation_cloud", "elevation_map"
 """Topics of maps: PointCloud2, and GridMap where its package is installed."""
 
-Map = TypeVar("Map")
+CELL_PARAMETERS = ("map_resolution", "cell_height")
+"""Parameters by which clouds are gridded."""
 
 
-class MapIntake(Generic[Map]):
-    """Takes serialised messages, prepares a map of the latest of each type, and returns it."""
+class MapIntake(ABC):
+    """Takes serialised messages, and has a map made of the latest of each type.
 
-    def __init__(
-        self,
-        prepare: Callable[[Any, Rigid | None], Map],
-        refuse: Callable[[str], None],
-        frames: Frames,
-        renew: Callable[[PointCloud2], None] = lambda _cloud: None,
-    ):
+    `prepare`, `renew` and `refuse` are called in the thread.
+    """
+
+    def __init__(self, logger: RcutilsLogger, values: Any, frames: Frames):
         """Start the thread.
 
         Args:
-            prepare: Makes a map of a message and of where its frame is in that of the map, None
-                if it is that; called in the thread; may raise RoverError.
-            refuse: Called in the thread with the reason why a message cannot be used.
+            logger: Logs refusals, those of one kind once in a while.
+            values: A table with the CELL_PARAMETERS.
             frames: Knows where frames are on the map; asked in the thread.
-            renew: Called in the thread, instead of `prepare`, with a cloud in the map frame from
-                which the last one differs in its stamp at most.
         """
-        self._prepare, self._refuse, self._renew = prepare, refuse, renew
-        self._frames = frames
+        self.values = values
+        """The parameters in force."""
         self.topic = CLOUD
         """Topic of the map in work."""
+        self._logger, self._frames, self._refusals = logger, frames, RepeatLog()
         self._unplaced: tuple[str, int | None] | None = None
         self._changed = threading.Condition()
-        self._last: dict[type, bytes] = {}
-        self._used: PointCloud2 | None = None
+        self._last: tuple[bytes, type] | None = None
+        self._used: Any = None
         self._newest: dict[type, int] = {}
         self._jobs: deque[Callable[[], Any]] = deque()
         self._given, self._done = 0, 0
-        self._ready: Map | None = None
         self._ending = False
         self._thread = threading.Thread(target=self._run, name="maps", daemon=True)
         self._thread.start()
 
+    @abstractmethod
+    def prepare(self, message: Any, source: Rigid | None) -> None:
+        """Make a map of a message.
+
+        Args:
+            message: The message.
+            source: Where its frame is in that of the map; None if it is that.
+
+        Raises:
+            RoverError: The message cannot be used.
+        """
+
+    def renew(self, cloud: Any) -> None:  # noqa: B027, the map that is there may stay as it is
+        """Take a cloud in the map frame from which the last one differs in its stamp at most."""
+
+    def describe_kept(self) -> str:
+        """Return what stays where a map is refused."""
+        return "the last map stays"
+
+    def refuse(self, error: str) -> None:
+        """Take the reason why a message cannot be used."""
+        text = f"{self.topic} refused, {self.describe_kept()}: {error}"
+        line = self._refusals.line(text, time.monotonic())
+        if line:
+            self._logger.error(line)
+
+    def take_parameters(self, values: Any) -> bool:
+        """Take new parameters; return whether clouds are gridded otherwise from now on."""
+        before, self.values = self.values, values
+        return any(getattr(before, name) != getattr(values, name) for name in CELL_PARAMETERS)
+
     def offer(self, message: bytes, kind: type = PointCloud2) -> None:
         """Take a serialised message; one of its type that still waits is replaced."""
-        self._last.pop(kind, None)  # the last of all comes last
-        self._last[kind] = message
+        self._last = message, kind
         self._do_latest(message, kind)
 
     def repeat(self) -> None:
         """Prepare the last message again, if there is one, such as with other settings."""
         self.do(self.expect_other)
-        taken = list(self._last.items())  # the thread of the maps may forget them meanwhile
-        if taken:
-            kind, message = taken[-1]
-            self._do_latest(message, kind)
+        last = self._last  # the thread may forget it meanwhile
+        if last is not None:
+            self._do_latest(*last)
 
     @property
     def waits_for_frame(self) -> bool:
@@ -103,8 +130,8 @@ class MapIntake(Generic[Map]):
         self._used = None
 
     def forget(self) -> None:
-        """Forget the last messages, because another map replaces them; call it in the thread."""
-        self._last.clear()
+        """Forget the last message, because another map replaces it; call it in the thread."""
+        self._last = None
         self.expect_other()
 
     def do(self, job: Callable[[], Any]) -> None:
@@ -113,11 +140,6 @@ class MapIntake(Generic[Map]):
             self._given += 1
             self._jobs.append(job)
             self._changed.notify_all()
-
-    def take(self) -> Map | None:
-        """Return the map that was prepared since the last call, None if there is none."""
-        ready, self._ready = self._ready, None
-        return ready
 
     def ticket(self) -> int:
         """Return a number for `wait`: all that was given until now."""
@@ -162,7 +184,7 @@ class MapIntake(Generic[Map]):
                 job()
             except Exception as error:
                 # An internal error must not end the thread: the next map may work.
-                self._refuse(f"internal error: {type(error).__name__}: {error}")
+                self.refuse(f"internal error: {type(error).__name__}: {error}")
             with self._changed:
                 self._done += 1
                 self._changed.notify_all()
@@ -178,12 +200,12 @@ class MapIntake(Generic[Map]):
             source = self._find_source(read.header)
             is_plain = kind is PointCloud2 and source is None
             if is_plain and used is not None and is_same_cloud(read, used):
-                self._renew(read)
+                self.renew(read)
             else:
-                self._ready = self._prepare(read, source)
+                self.prepare(read, source)
             self._used = read if is_plain else None
         except RoverError as error:
-            self._refuse(str(error))
+            self.refuse(str(error))
 
     def _find_source(self, header: Header) -> Rigid | None:
         stamp = stamp_to_ns(header.stamp)
@@ -200,23 +222,9 @@ def read_message(message: bytes, kind: type) -> Any:
     Raises:
         MessageError: The bytes are no such message.
     """
+    if kind is PointCloud2:
+        return SensorReader().read(message, kind)
     try:
-        return _read_cloud(message) if kind is PointCloud2 else deserialize_message(message, kind)
-    except MessageError:
-        raise
+        return deserialize_message(message, kind)
     except Exception as error:  # RMWError, of a module that differs between distributions
-        raise MessageError(
-            f"{len(message)} bytes were received that are no {kind.__name__}; the publisher or "
-            f"the connection is damaged: {error}"
-        ) from None
-
-
-def _read_cloud(message: bytes) -> PointCloud2:
-    """Return a cloud whose data are a view of the message: to copy a large map takes long."""
-    data = find_cloud_data(message)
-    no_bytes = bytes(4)
-    cloud = deserialize_message(
-        message[: data.start - len(no_bytes)] + no_bytes + message[data.stop :], PointCloud2
-    )
-    cloud._data = memoryview(message)[data]  # its setter takes arrays alone
-    return cloud
+        raise DamagedMessageError(message, kind, error) from None

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The node that each node program is: its parameters, what it hears, and what keeps it alive."""
 
-import traceback
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any, Generic, TypeVar
 
 from rcl_interfaces.msg import SetParametersResult
@@ -77,20 +77,14 @@ class RoverNode(Node, Generic[Table]):
             except RoverError as error:
                 return SetParametersResult(successful=False, reason=one_line(str(error)))
             except Exception as error:
-                # An internal error must not end the node.
-                self.get_logger().error(f"set_parameters: {traceback.format_exc()}")
-                reason = f"internal error: {type(error).__name__}: {error}"
+                reason = f"internal error: {self.guard.report('set_parameters', error)}"
                 return SetParametersResult(successful=False, reason=one_line(reason))
             return SetParametersResult(successful=True)
 
         def pass_on(_parameters: list[Parameter]) -> None:
-            if accepted is None:
-                return
-            self.values, made = accepted
-            try:
-                apply(made)
-            except Exception:
-                self.get_logger().error(f"parameters not applied: {traceback.format_exc()}")
+            if accepted is not None:
+                self.values, made = accepted
+                self.guard.call(partial(apply, made))
 
         self.add_on_set_parameters_callback(check)
         self.add_post_set_parameters_callback(pass_on)

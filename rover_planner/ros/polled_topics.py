@@ -15,8 +15,16 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
+from msg_adapters.raw_messages import SensorReader
 from msg_adapters.stamps import NANOSECONDS
+from rover_physics.errors import RoverError
 from rover_planner.ros.guard import Guard
+from rover_planner.ros.logs import RepeatLog
+
+Take = Callable[[Any, float], object]
+"""Takes a message and the time of its arrival [s], monotonic; may raise."""
+Refuse = Callable[[str, Exception, float], object]
+"""Takes the name of a topic, what `Take` has raised of a message, and when that came [s]."""
 
 
 @dataclass(frozen=True)
@@ -24,10 +32,12 @@ class _Topic:
     """A topic that is polled."""
 
     subscription: Subscription
+    kind: type
     name: str
-    take: Callable[[Any, float], None]
+    take: Take
     depth: int
     is_due: Callable[[], bool]
+    refuse: Refuse
 
 
 class PolledTopics:
@@ -38,50 +48,52 @@ class PolledTopics:
         self._node, self._guard, self._group = node, guard, _Apart()
         self._topics: list[_Topic] = []
         self._polled = time.monotonic()
+        self._reader, self._refusals = SensorReader(), RepeatLog()
 
     def subscribe(
         self,
         kind: type,
         name: str,
-        take: Callable[[Any, float], None],
+        take: Take,
         qos: QoSProfile,
         is_due: Callable[[], bool] = lambda: True,
-        *,
-        raw: bool = False,
+        refuse: Refuse | None = None,
     ) -> None:
         """Subscribe to a topic.
 
         Args:
-            kind: Type of the messages.
+            kind: Type of the messages; those of sensors are read by a `SensorReader`.
             name: Name of the topic.
-            take: Called with each message and the time of its arrival [s], monotonic.
+            take: Called with each message.
             qos: The profile; of more messages than its depth the last ones are read.
             is_due: Whether it is to be read at all now.
-            raw: Whether `take` gets the bytes of a message: to make the message takes long.
+            refuse: Called if `take` raises; None has that logged.
         """
-        group = self._group
         topic = self._node.create_subscription(
-            kind, name, take, qos, callback_group=group, raw=raw
+            kind, name, take, qos, callback_group=self._group, raw=self._reader.reads(kind)
         )
-        self._topics.append(_Topic(topic, topic.topic_name, take, qos.depth, is_due))
+        self._topics.append(
+            _Topic(topic, kind, name, take, qos.depth, is_due, refuse or self._refuse)
+        )
 
     def poll(self) -> None:
         """Read all that has come since the last time, in the order of its arrival."""
         before, self._polled = self._polled, time.monotonic()
-        arrived = []
-        for topic in self._topics:
-            if topic.is_due():
-                arrived += self._read(topic)
-        for at, name, take, message in sorted(arrived, key=lambda one: one[0]):
+        arrived = [
+            found for topic in self._topics if topic.is_due() for found in self._take(topic)
+        ]
+        for at, topic, found in sorted(arrived, key=lambda one: one[0]):
             # Since the last poll at most, whatever the system clock was set to meanwhile.
             age, now = (time.time_ns() - at) / NANOSECONDS, time.monotonic()
+            arrival = now - min(max(age, 0.0), now - before)
             try:
-                take(message, now - min(max(age, 0.0), now - before))
+                is_raw = topic.subscription.raw
+                topic.take(self._reader.read(found, topic.kind) if is_raw else found, arrival)
             except Exception as error:
-                self._guard.report(f"reading of {name}", error)
+                topic.refuse(topic.name, error, arrival)
 
-    def _read(self, topic: _Topic) -> list[tuple[int, str, Callable[[Any, float], None], Any]]:
-        """Return what has come with its time [ns], the name of the topic and who takes it."""
+    def _take(self, topic: _Topic) -> list[tuple[int, _Topic, Any]]:
+        """Return what has come, with its time [ns]."""
         one, arrived = topic.subscription, []
         for _ in range(topic.depth):
             try:
@@ -92,8 +104,17 @@ class PolledTopics:
                 continue
             if found is None:
                 break
-            arrived.append((found[1]["received_timestamp"], topic.name, topic.take, found[0]))
+            arrived.append((found[1]["received_timestamp"], topic, found[0]))
         return arrived
+
+    def _refuse(self, name: str, error: Exception, now: float) -> None:
+        """Log why a message is not used, those of one kind once in a while."""
+        if not isinstance(error, RoverError):
+            self._guard.report(f"reading of {name}", error)
+            return
+        line = self._refusals.line(f"{name} not used: {error}", now)
+        if line:
+            self._node.get_logger().warning(line)
 
 
 class _Apart(CallbackGroup):

@@ -2,16 +2,14 @@
 """Merges joint states, attitude and odometry into the rows that the ground is learned from."""
 
 import math
-from dataclasses import dataclass
-from itertools import chain
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from msg_adapters.imu import imu_to_attitude
 from msg_adapters.joints import OWN_NAMES, JointNames
-from msg_adapters.odometry import odometry_to_pose, odometry_to_tilt
+from msg_adapters.odometry import odometry_to_pose
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_planner.learning.drive_log import (
@@ -29,23 +27,12 @@ from rover_planner.learning.drive_log import (
 )
 from rover_planner.learning.wheel_odometry import WheelMotion
 
-_COLUMNS = (
-    dict(zip(SUSPENSION_JOINTS, range(WIDTH)[SUSPENSION], strict=True))
-    | dict(zip(STEERING_JOINTS, range(WIDTH)[STEERING], strict=True)),
-    dict(zip(WHEEL_JOINTS, range(WIDTH)[RATES], strict=True)),
-    dict(zip(WHEEL_JOINTS, range(WIDTH)[TORQUES], strict=True)),
+_POSITIONS = dict(zip(SUSPENSION_JOINTS, range(WIDTH)[SUSPENSION], strict=True)) | dict(
+    zip(STEERING_JOINTS, range(WIDTH)[STEERING], strict=True)
 )
-"""Columns of positions, velocities and efforts by joint."""
-
-
-@dataclass(frozen=True)
-class _Selection:
-    """The measurements among all values of joint states, and what becomes of them."""
-
-    places: NDArray[np.intp]
-    columns: NDArray[np.intp]
-    signs: Floats
-    offsets: Floats
+_VELOCITIES = dict(zip(WHEEL_JOINTS, range(WIDTH)[RATES], strict=True))
+_EFFORTS = dict(zip(WHEEL_JOINTS, range(WIDTH)[TORQUES], strict=True))
+"""Columns of the measurements by joint."""
 
 
 class RowCollector:
@@ -54,33 +41,31 @@ class RowCollector:
     def __init__(self, names: JointNames = OWN_NAMES) -> None:
         """Start without measurements; `names` are those of the joints in messages."""
         self._row, self._names, self._has_imu = np.full(WIDTH, np.nan), names, False
-        self._form: tuple[Any, ...] = ()
-        self._chosen = self._select((), ())
         self._yaw_rate = math.nan
 
     def take_joints(self, message: Any) -> None:
-        """Take joint states by name; a value that is missing or not finite was not measured."""
-        fields = message.position, message.velocity, message.effort
-        form = tuple(message.name), tuple(map(len, fields))
-        if form != self._form:
-            self._form, self._chosen = form, self._select(*form)
-        chosen = self._chosen
-        values = np.fromiter(chain(*fields), float)[chosen.places]
-        measured = chosen.signs * values + chosen.offsets
-        self._row[chosen.columns] = np.where(np.isfinite(measured), measured, np.nan)
+        """Take joint states by name; a value that is missing or not finite was not measured.
 
-    def _select(self, listed: tuple[str, ...], lengths: tuple[int, ...]) -> _Selection:
-        """Return what is measured in messages with such names and lengths of their fields."""
-        links = [self._names.link(self._names.model_name(name)) for name in listed]
-        found, begin = [], 0
-        for columns, length in zip(_COLUMNS, lengths, strict=False):
-            for place, link in enumerate(links if length == len(listed) else ()):
-                if link.model in columns:
-                    offset = link.offset if columns is _COLUMNS[0] else 0.0
-                    found.append((begin + place, columns[link.model], link.sign, offset))
-            begin += length
-        places, own_columns, signs, offsets = np.array(found).reshape(-1, 4).T
-        return _Selection(places.astype(int), own_columns.astype(int), signs, offsets)
+        Raises:
+            MessageError: A joint occurs twice.
+        """
+        self._keep(message.name, message.position, _POSITIONS, are_angles=True)
+        self._keep(message.name, message.velocity, _VELOCITIES)
+        self._keep(message.name, message.effort, _EFFORTS)
+
+    def _keep(
+        self,
+        names: Sequence[str],
+        values: Sequence[float],
+        columns: Mapping[str, int],
+        *,
+        are_angles: bool = False,
+    ) -> None:
+        if len(values) != len(names):
+            return
+        for place, link in self._names.places(names, columns):
+            value = link.sign * values[place] + (link.offset if are_angles else 0.0)
+            self._row[columns[link.model]] = value if math.isfinite(value) else math.nan
 
     def take_imu(self, message: Any) -> None:
         """Take roll and pitch.
@@ -117,7 +102,7 @@ class RowCollector:
             MessageError: It has no pose that is possible, or is in another frame.
         """
         pose, _ = odometry_to_pose(message, frame or message.header.frame_id)
-        self._row[[TIME, X, Y, YAW]] = time, *pose[[0, 1, 3]]
+        self._row[[TIME, X, Y, YAW]] = time, *pose[[0, 1, 5]]
         if not self._has_imu:
-            self._row[[ROLL, PITCH]] = odometry_to_tilt(message)
+            self._row[[ROLL, PITCH]] = pose[3:5]
         return self._row.copy()

@@ -6,23 +6,23 @@ from collections.abc import Callable
 from typing import Any
 
 from nav_msgs.msg import Path
-from sensor_msgs.msg import JointState, PointCloud2
+from sensor_msgs.msg import JointState
 
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
 from msg_adapters.identity import path_hash
 from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.joints import read_joint_map
-from msg_adapters.odometry import odometry_to_pose, odometry_to_tilt
-from msg_adapters.paths import path_to_poses
 from msg_adapters.sensing import BASE_FRAME
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
+from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.maps.ground_beneath import Standing
 from rover_planner.maps.known_map import stamp_text
 from rover_planner.maps.living_map import MapSnapshot
 from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.answering.measurements import MAX_AGE
 from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.answering.traverse_service import TraverseService
@@ -91,11 +91,18 @@ class ServerInputs:
         Raises:
             RoverError: A value is wrong, or the frame is not known.
         """
-        here = self.frames.localise_odometry(odometry)
-        pose, _ = odometry_to_pose(here, self.values.map_frame)
-        body = float(pose[2]), *odometry_to_tilt(here)
-        self.frames.take_odometry(here)
-        self.service.take_pose(pose[[0, 1, 3]], body)
+        pose, _ = self.frames.take_odometry(odometry)
+        z, roll, pitch = pose[2:5].tolist()
+        self.service.take_pose(pose[[0, 1, 5]], (z, roll, pitch))
+
+    def find_here(self, max_age: float = MAX_AGE) -> Floats | None:
+        """Return the pose (3,) of the body by /tf, else by odometry that is not older [s].
+
+        Raises:
+            TransformError: The transform of /tf is stale.
+        """
+        here = self.frames.find_here()
+        return self.service.fresh_pose(max_age) if here is None else here
 
     def take_imu(self, imu: Any) -> None:
         """Take roll and pitch, if the parameter imu_attitude is set; see `take_odometry`.
@@ -113,8 +120,7 @@ class ServerInputs:
         Raises:
             RoverError: A value is wrong, or a frame is not known.
         """
-        poses = path_to_poses(self.frames.localise_path(path), self.values.map_frame)
-        return GivenPath(poses, "", *describe_path(path))
+        return GivenPath(self.frames.read_path(path), "", *describe_path(path))
 
     def take_map(self, message: Any, source: Rigid | None, topic: str) -> bool:
         """Take a PointCloud2 or GridMap; return whether its content is new.
@@ -137,7 +143,7 @@ class ServerInputs:
 
     def _read_map(self, message: Any, source: Rigid | None) -> Terrain:
         values, move = self.values, None if source is None else source.matrix
-        if isinstance(message, PointCloud2):
+        if not hasattr(message, "layers"):  # it is a cloud
             resolution, height = values.map_resolution, values.cell_height
             return terrain_from_point_cloud(message, resolution, height, move)
         layers = GridMapLayers(

@@ -1,20 +1,31 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Monitors inputs: whether each is available, recent and valid."""
+"""Monitors inputs: whether each is available, recent and valid.
+
+Frozen, delayed and future stamps must not pass as recent measurements.
+"""
 
 import math
 from collections import defaultdict
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
+from rover_planner.errors import PlanningError
+from rover_planner.traction.clocks import NANOSECONDS
+
 NEVER = -math.inf
 """Time of an input that has not arrived yet [s]."""
 
 
+class StampError(PlanningError):
+    """A message that is not used because of its stamp; the text says why."""
+
+
 @dataclass
 class InputRecord:
-    """Last valid time [s] of one input, and what is wrong with it."""
+    """Last valid time [s] of one input, its last stamp [ns], and what is wrong with it."""
 
     time: float = NEVER
+    stamp: int = 0
     error: str = ""
     error_time: float = NEVER
     ignored: str = ""
@@ -37,8 +48,42 @@ class InputMonitor:
         """
         self.timeouts = dict(timeouts)
         """Timeouts [s] by name."""
+        self.tolerance = 0.0
+        """Time that a stamp may be ahead of the clock [s]."""
         self._optional = optional
         self._inputs: defaultdict[str, InputRecord] = defaultdict(InputRecord)
+
+    def find_time(
+        self, name: str, stamp: int, clock: int, now: float, *, merged: bool = False
+    ) -> float:
+        """Return the time of a measurement on the monotonic clock [s].
+
+        It is the time of arrival less the age by the header stamp. A message without a stamp (0)
+        has the time of its arrival.
+
+        Args:
+            name: The input.
+            stamp: Its header stamp [ns].
+            clock: The clock of the stamps [ns].
+            now: Time of arrival, monotonic [s].
+            merged: Whether several publishers share the topic; their stamps need not ascend.
+
+        Raises:
+            StampError: The stamp does not advance, or is ahead of the clock.
+        """
+        if stamp == 0:
+            return now
+        age, record = (clock - stamp) / NANOSECONDS, self._inputs[name]
+        if age < -self.tolerance:
+            raise StampError(
+                f"stamps are more than {1e3 * self.tolerance:.0f} ms ahead of this node's clock; "
+                "synchronise the clocks"
+            )
+        if not merged:
+            if stamp <= record.stamp:
+                raise StampError("stamps do not advance")
+            record.stamp = stamp
+        return now - max(age, 0.0)
 
     def take(self, name: str, time: float) -> None:
         """Record a valid input that was measured at a time [s]."""
@@ -62,9 +107,9 @@ class InputMonitor:
         self._inputs[name].detail = detail
 
     def forget(self) -> None:
-        """Forget the times of all inputs: each must arrive anew."""
+        """Forget times and stamps of all inputs: each must arrive anew."""
         for record in self._inputs.values():
-            record.time = NEVER
+            record.time, record.stamp = NEVER, 0
 
     def is_fresh(self, name: str, now: float) -> bool:
         """Return whether an input is available, valid and not stale at time `now` [s]."""

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rover_planner.traction.traction_service import TractionUpdate
+from rover_planner.traction.traction_service import TractionCommand
 
 MAX_TIMES = 6000
 """Number of updates whose times are kept: one minute at 100 Hz."""
@@ -26,15 +26,15 @@ class TractionStatistics:
         """Updates with equal torques because OSQP failed."""
         self.updates = 0
         """Updates in all."""
-        self.last: TractionUpdate | None = None
-        """The last update."""
+        self.last: TractionCommand | None = None
+        """The last one."""
 
     @property
     def times(self) -> np.ndarray:
         """Durations of the last updates, including publishing [s]."""
         return np.array(self._times)
 
-    def take(self, update: TractionUpdate, start: float, end: float) -> None:
+    def take(self, update: TractionCommand, start: float, end: float) -> None:
         """Count an update that lasted from start to end [s]."""
         if self._last_start is not None:
             self.missed += max(round((start - self._last_start) / self._period) - 1, 0)
@@ -57,7 +57,7 @@ class TractionStatistics:
         return values if self.last is None else values | _describe_update(self.last)
 
 
-def _describe_update(update: TractionUpdate) -> dict[str, Any]:
+def _describe_update(update: TractionCommand) -> dict[str, Any]:
     """Return the results of an update by name; empty if there is a fault."""
     answer, estimate = update.answer, update.estimate
     if answer is None or estimate is None:

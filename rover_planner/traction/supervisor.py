@@ -11,7 +11,7 @@ The policies of rest:
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,12 +20,18 @@ from rover_physics.numerics.arrays import Floats
 from rover_planner.parameters.traction_controller import BRAKE, HOLD
 from rover_planner.traction.loops import StallWatch, WheelServos
 from rover_planner.traction.settings import TractionSettings
-from rover_planner.traction.traction_service import MAX_STEP, TractionService, TractionUpdate
+from rover_planner.traction.traction_service import (
+    DISABLED,
+    DRIVING,
+    EMERGENCY_STOP,
+    FAULT,
+    MAX_STEP,
+    STALLED,
+    STANDSTILL,
+    TractionCommand,
+    TractionService,
+)
 
-DISABLED, EMERGENCY_STOP, FAULT = "disabled", "emergency_stop", "fault"
-STALLED, STANDSTILL, DRIVING = "stalled", "standstill", "driving"
-STATES = (DISABLED, EMERGENCY_STOP, FAULT, STALLED, STANDSTILL, DRIVING)
-"""States of the rover; it drives in the last one only."""
 STANDSTILL_DELAY = 0.5
 """Time for which the loops bring the rover to a stop before the rest policy takes over [s]."""
 RECOVERY_TIME = 0.2
@@ -34,22 +40,6 @@ HOLD_RATE_GAIN = 10.0
 """Angular deceleration per wheel rate of the hold servos [1/s]."""
 HOLD_ANGLE_GAIN = 25.0
 """Angular deceleration per angle turned of the hold servos [1/s^2]."""
-
-
-@dataclass(frozen=True, eq=False)
-class TractionCommand:
-    """The command of the node after one update."""
-
-    torques: Floats
-    """(6,) torques, wheel order [N m]."""
-    brake: bool
-    """True if the brake is to be applied."""
-    state: str
-    """One of STATES."""
-    update: TractionUpdate
-    """The update of the torque allocation; its fault is the reason not to drive, if any."""
-    expiry: float
-    """Time at which the first input that the torques need becomes stale [s]."""
 
 
 class DrivePermission:
@@ -130,18 +120,17 @@ class TractionSupervisor:
             self.service.start_from(self._rest_torques)
             self._rest_torques = None
         self._held = False
-        update = self.service.update(now)
-        if update.fault:
-            self._latch(update.fault, now)
-            return self._rest(FAULT, update.fault, now, duration)
-        return TractionCommand(update.torques, False, DRIVING, update, self.service.monitor.expiry)
+        command = self.service.drive(now)
+        if command.fault:
+            self._latch(command.fault, now)
+            return self._rest(FAULT, command.fault, now, duration)
+        return command
 
     def fail(self, fault: str) -> TractionCommand:
         """Return zero torques and the brake, after an internal error."""
         self._held, self._rest_torques = False, None
         self.trip(fault)
-        update = self.service.rest(fault)
-        return TractionCommand(update.torques, True, FAULT, update, float("inf"))
+        return replace(self.service.rest(fault), brake=True)
 
     def _latch(self, fault: str, now: float) -> str:
         """Return the fault that counts: at once, and until RECOVERY_TIME after its cause."""
@@ -183,8 +172,8 @@ class TractionSupervisor:
     def _rest(self, state: str, fault: str, now: float, duration: float) -> TractionCommand:
         """Return the command of a rover at rest, by the policy of the settings."""
         parameters = self.service.settings.parameters
-        update = self.service.rest(fault)
-        torques, expiry = np.zeros(WHEEL_COUNT), float("inf")
+        self.service.rest(fault)
+        torques, expiry = np.zeros(WHEEL_COUNT), math.inf
         timeout, policy = parameters.joint_states_timeout, parameters.rest_policy
         joints_unknown = now - self.service.joints.wheel_time > timeout
         brake = policy == BRAKE or (policy == HOLD and joints_unknown)
@@ -193,7 +182,7 @@ class TractionSupervisor:
         else:
             self._held = False
         self._rest_torques = torques
-        return TractionCommand(torques, brake, state, update, expiry)
+        return TractionCommand(torques, fault, state=state, brake=brake, expiry=expiry)
 
     def _hold_wheels(self, duration: float) -> Floats:
         """Return the torques (6,) [N m] that stop and hold the wheels."""

@@ -50,22 +50,34 @@ MAX_STEP = 0.1
 """Upper bound of the time step of loops and filter [s]."""
 
 
+DISABLED, EMERGENCY_STOP, FAULT = "disabled", "emergency_stop", "fault"
+STALLED, STANDSTILL, DRIVING = "stalled", "standstill", "driving"
+STATES = (DISABLED, EMERGENCY_STOP, FAULT, STALLED, STANDSTILL, DRIVING)
+"""States of the rover; it drives in the last one only."""
+
+
 @dataclass(frozen=True, eq=False)
-class TractionUpdate:
-    """The result of one update."""
+class TractionCommand:
+    """What the wheels are to do after one update, and how that was found."""
 
     torques: Floats
-    """(6,) torques to command, wheel order [N m]; zero if there is a fault."""
-    fault: str
-    """Reason for zero torques; empty if there is no fault."""
-    warning: str
+    """(6,) torques, wheel order [N m]."""
+    fault: str = ""
+    """Reason not to drive; empty if there is none."""
+    warning: str = ""
     """Problem that does not stop the rover; empty if there is none."""
-    answer: TractionAnswer | None
-    """The torque allocation, before heading and slip control; None if there is a fault."""
-    estimate: ContactEstimate | None
-    """The contact angles; None if there is a fault."""
-    duration: float
-    """Computation time of the update [s]; 0 if there is a fault."""
+    answer: TractionAnswer | None = None
+    """The torque allocation, before heading and slip control; None if the rover rests."""
+    estimate: ContactEstimate | None = None
+    """The contact angles; None if the rover rests."""
+    duration: float = 0.0
+    """Computation time of the allocation [s]; 0 if the rover rests."""
+    state: str = DRIVING
+    """One of STATES."""
+    brake: bool = False
+    """True if the brake is to be applied."""
+    expiry: float = math.inf
+    """Time at which the first input that the torques need becomes stale [s]."""
 
 
 class TractionService:
@@ -132,6 +144,7 @@ class TractionService:
             name: getattr(parameters, f"{name}_timeout")
             for name in (JOINT_STATES, IMU, CMD_VEL, ODOMETRY)
         } | {STOP: parameters.stop_timeout or math.inf}
+        self.monitor.tolerance = parameters.stamp_tolerance
         self._writer = BalanceWriter(rover, settings.payload)
         self._limits = MeasurementLimits(rover)
         self._optimal = parameters.policy == OPTIMAL
@@ -261,12 +274,14 @@ class TractionService:
         """Start to drive from torques (6,) [N m] that act now: the next ones are near them."""
         self._torques = torques.copy()
 
-    def update(self, now: float) -> TractionUpdate:
-        """Return the torques for time `now` [s], on the same clock as the inputs."""
-        start = time.perf_counter()
+    def update(self, now: float) -> TractionCommand:
+        """Return the command for time `now` [s], on the same clock as the inputs."""
         fault = self.find_fault(now)
-        if fault:
-            return self.rest(fault)
+        return self.rest(fault) if fault else self.drive(now)
+
+    def drive(self, now: float) -> TractionCommand:
+        """Return the command for time `now` [s], at which the inputs have no fault."""
+        start = time.perf_counter()
         duration = 0.0 if self._last_time is None else min(now - self._last_time, MAX_STEP)
         self._last_time = now
         level = self._measure_state(level_estimate())
@@ -285,12 +300,15 @@ class TractionService:
         torques = self._command_torques(answer, rows, duration)
         if not np.isfinite(torques).all():
             return self.rest(f"torques {torques.tolist()} N m came out; they must be finite")
-        return TractionUpdate(torques, "", warning, answer, estimate, time.perf_counter() - start)
+        took = time.perf_counter() - start
+        return TractionCommand(
+            torques, "", warning, answer, estimate, took, expiry=self.monitor.expiry
+        )
 
-    def rest(self, fault: str) -> TractionUpdate:
+    def rest(self, fault: str) -> TractionCommand:
         """Return zero torques at once, and reset the loops."""
         self._reset()
-        return TractionUpdate(np.zeros(WHEEL_COUNT), fault, "", None, None, 0.0)
+        return TractionCommand(np.zeros(WHEEL_COUNT), fault, state=FAULT)
 
     def _reset(self) -> None:
         """Discard the last answer and set all integrals to zero."""

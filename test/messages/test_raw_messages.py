@@ -8,7 +8,7 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.serialization import serialize_message
-from sensor_msgs.msg import Imu, JointState
+from sensor_msgs.msg import Imu, JointState, PointCloud2, PointField
 
 from msg_adapters.errors import MessageError
 from msg_adapters.raw_messages import SensorReader
@@ -51,12 +51,27 @@ def twist() -> TwistStamped:
     return message
 
 
+def cloud() -> PointCloud2:
+    """Return a cloud of two points with two fields."""
+    message = PointCloud2(height=1, width=2, point_step=12, row_step=24, is_dense=True)
+    message.fields = [
+        PointField(name=name, offset=offset, datatype=datatype, count=1)
+        for name, offset, datatype in (("x", 0, PointField.FLOAT64), ("räd", 8, PointField.INT32))
+    ]
+    message.data = bytes(range(24))
+    return message
+
+
 def fields_of(message, like) -> object:
     """Return the fields of a message that `like` has, as plain values."""
     if hasattr(like, "_fields"):
         return [getattr(message, name) for name in like._fields]
     if hasattr(like, "__dict__"):
         return {name: fields_of(getattr(message, name), one) for name, one in vars(like).items()}
+    if isinstance(like, list):
+        return [fields_of(one, other) for one, other in zip(message, like, strict=True)]
+    if isinstance(like, memoryview):
+        return bytes(message)
     if isinstance(like, tuple):
         return [one if isinstance(one, str) else float(one) for one in message]
     return message
@@ -70,6 +85,7 @@ def fields_of(message, like) -> object:
         odometry(""),
         odometry("base"),
         twist(),
+        cloud(),
         joints([]),
         joints(["a"], [1.0]),
         joints(["a", "bcdefg"], [], [2.0, math.inf], [3.0, 4.0]),
@@ -93,6 +109,14 @@ def test_damaged_bytes_are_refused():
     for damaged in (b"", whole[:20], whole[:40]):
         with pytest.raises(MessageError, match="no JointState"):
             SensorReader().read(damaged, JointState)
+
+
+def test_the_data_of_a_cloud_are_read_where_they_are():
+    message = serialize_message(cloud())
+    assert SensorReader().read(message, PointCloud2).data.obj is message
+    for damaged in (message[:-9], message[:60], b""):
+        with pytest.raises(MessageError, match="no PointCloud2"):
+            SensorReader().read(damaged, PointCloud2)
 
 
 def test_the_joints_of_several_publishers_keep_their_names():

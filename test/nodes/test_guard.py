@@ -14,8 +14,7 @@ from rclpy.timer import Timer
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from rover_physics.errors import PoseError
-from rover_planner.ros.guard import Guard, GuardedExecutor, Handover, refuse_error
+from rover_planner.ros.guard import Guard, GuardedExecutor, Handover
 from rover_planner.ros.logs import REPEAT_PERIOD, RepeatLog, TransitionLog
 from support.ros_fixtures import call
 from support.waiting import wait_until
@@ -133,16 +132,6 @@ def test_an_error_is_logged_once_with_its_trace_and_counted():
     assert "Traceback" in lines[0] and "ZeroDivisionError" in lines[0]
     assert guard.recent(20.0) and not Guard(lines).recent(20.0)
     assert len(guard.report("x", ValueError("y" * 10_000))) <= 300
-
-
-def test_errors_of_the_input_are_bad_requests_and_others_internal_errors():
-    lines = Lines()
-    guard = Guard(lines)
-    told = refuse_error(guard, "check", PoseError("no pose"), lambda *both: both)
-    assert told == ("bad_request", "no pose") and not lines
-    code, reason = refuse_error(guard, "check", KeyError("k"), lambda *both: both)
-    assert code == "internal_error" and reason.startswith("internal error: KeyError")
-    assert guard.total == 1
 
 
 def test_functions_of_other_threads_run_in_order_and_an_error_ends_nothing(ros):

@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Maps taken as bytes: each is prepared once, the latest is returned, bad ones are refused."""
+"""Maps taken as bytes: each is prepared once, the latest counts, bad ones are refused."""
 
-import pytest
+from types import SimpleNamespace
+from typing import Any
+
 from builtin_interfaces.msg import Time
-from rclpy.serialization import deserialize_message, serialize_message
-from sensor_msgs.msg import PointCloud2
+from rclpy.serialization import serialize_message
 
 from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cloud
-from msg_adapters.errors import MessageError
 from rover_physics.errors import ModelError
 from rover_physics.traction.map_contacts import MapContactFinder
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.ros.frames import Frames
-from rover_planner.ros.map_intake import MapIntake, read_message
+from rover_planner.ros.map_intake import MapIntake
 from support.rough_grounds import plane
 from support.rovers import LSR1
 from support.waiting import wait_until
@@ -25,56 +25,56 @@ def cloud_of(half, second=0):
     return serialize_message(terrain_to_point_cloud(terrain, "map", Time(sec=second)))
 
 
-def test_a_map_is_prepared_once_and_returned_once():
-    made, renewed = [], []
+class Intake(MapIntake):
+    """Keeps what is made of maps."""
 
-    def prepare(cloud, _source):
-        made.append(MapContactFinder(LSR1, terrain_from_point_cloud(cloud)))
-        return made[-1]
+    def __init__(self, smallest=0):
+        self.smallest, self.errors = smallest, []
+        self.made: list[MapContactFinder] = []
+        self.renewed: list[Any] = []
+        logger = SimpleNamespace(error=self.errors.append)
+        super().__init__(logger, TraverseServerParameters(), FRAMES)
 
-    intake = MapIntake(prepare, made.append, FRAMES, renewed.append)
+    def prepare(self, message, source):
+        if message.width < self.smallest:
+            raise ModelError("too small")
+        self.made.append(MapContactFinder(LSR1, terrain_from_point_cloud(message)))
+
+    def renew(self, cloud):
+        self.renewed.append(cloud)
+
+    def wait_for(self, count):
+        wait_until(lambda: len(self.made) == count, f"map {count}")
+
+
+def test_a_map_is_prepared_once_and_again_where_it_or_a_parameter_changes():
+    intake = Intake()
     intake.offer(cloud_of(1.0))
-    prepared = wait_until(intake.take, "a map")
-    assert prepared.rover is LSR1 and intake.take() is None
+    intake.wait_for(1)
     intake.offer(cloud_of(1.0, second=5))
-    wait_until(lambda: renewed, "the same map, later")
-    assert renewed[0].header.stamp.sec == 5
+    wait_until(lambda: intake.renewed, "the same map, later")
+    assert intake.renewed[0].header.stamp.sec == 5
     intake.offer(cloud_of(2.0))
-    other = wait_until(intake.take, "the next map")
-    assert other.terrain.elevation.shape > prepared.terrain.elevation.shape
-    assert len(made) == 2
+    intake.wait_for(2)
+    first, second = (one.terrain.elevation.shape for one in intake.made)
+    assert second > first
+    assert not intake.take_parameters(TraverseServerParameters(friction=0.5))
+    assert intake.take_parameters(TraverseServerParameters(map_resolution=0.2))
     intake.repeat()
-    wait_until(intake.take, "the same map with other settings")
+    intake.wait_for(3)
     intake.close()
-    assert len(made) == 3 and len(renewed) == 1
+    assert len(intake.made) == 3 and len(intake.renewed) == 1
 
 
 def test_a_map_that_cannot_be_used_is_refused_and_the_next_is_taken():
-    told = []
-
-    def prepare(cloud, _source):
-        if cloud.width < 60:
-            raise ModelError("too small")
-        return MapContactFinder(LSR1, terrain_from_point_cloud(cloud))
-
-    intake = MapIntake(prepare, told.append, FRAMES)
+    intake = Intake(smallest=60)
     intake.offer(cloud_of(0.5))
-    wait_until(lambda: told, "the refusal")
-    assert told == ["too small"] and intake.take() is None
+    wait_until(lambda: intake.errors, "the refusal")
+    assert intake.errors == ["elevation_cloud refused, the last map stays: too small"]
+    assert not intake.made
     intake.offer(b"\x00\x01\x00\x00" + b"\xff" * 40)
-    wait_until(lambda: len(told) == 2, "the refusal of damaged bytes")
-    assert "are no PointCloud2" in told[1] and "internal error" not in told[1]
+    wait_until(lambda: len(intake.errors) == 2, "the refusal of damaged bytes")
+    assert "are no PointCloud2" in intake.errors[1] and "internal error" not in intake.errors[1]
     intake.offer(cloud_of(3.0))
-    assert wait_until(intake.take, "a map") is not None
+    intake.wait_for(1)
     intake.close()
-
-
-def test_the_data_of_a_cloud_are_read_where_they_are():
-    message = cloud_of(1.0)
-    whole, read = deserialize_message(message, PointCloud2), read_message(message, PointCloud2)
-    assert read.data.obj is message and read.data == whole.data
-    read._data = whole.data
-    assert read == whole
-    for damaged in (message[:-9], message[:60], b""):
-        with pytest.raises(MessageError, match="no PointCloud2"):
-            read_message(damaged, PointCloud2)

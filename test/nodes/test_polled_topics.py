@@ -3,10 +3,13 @@
 
 import itertools
 import time
+from types import SimpleNamespace
 
 from rclpy.node import Node
+from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
+from msg_adapters.errors import MessageError
 from rover_planner.ros.guard import Guard
 from rover_planner.ros.polled_topics import PolledTopics
 from rover_planner.ros.qos import topic_qos
@@ -52,3 +55,36 @@ def test_messages_wait_until_polled_come_in_the_order_of_arrival_and_errors_end_
     due.append(True)
     topics.poll()
     assert heard[-1][0] == "later"
+
+
+def test_what_cannot_be_used_is_logged_once_or_refused_by_who_asks(ros, monkeypatch):
+    node, lines, refused = Node("hearer", context=ros.context), [], []
+    monkeypatch.setattr(node, "get_logger", lambda: SimpleNamespace(warning=lines.append))
+    guard = Guard(SimpleNamespace(error=lines.append))
+
+    def take(message, _arrival):
+        if not message.position:
+            raise MessageError("no positions")
+
+    topics = PolledTopics(node, guard)
+    topics.subscribe(JointState, "joints", take, topic_qos())
+    topics.subscribe(
+        JointState, "others", take, topic_qos(), refuse=lambda name, error, _: refused.append(name)
+    )
+    speaker = ros.spin(Node("speaker", context=ros.context))
+    joints, others = (
+        speaker.create_publisher(JointState, name, topic_qos()) for name in ("joints", "others")
+    )
+    wait_until(
+        lambda: joints.get_subscription_count() and others.get_subscription_count(), "the topics"
+    )
+    for publisher in (joints, joints, others):
+        publisher.publish(JointState())
+
+    def poll():
+        topics.poll()
+        return refused and lines
+
+    wait_until(poll, "both refusals")
+    assert refused == ["others"] and lines == ["joints not used: no positions"]
+    assert guard.total == 0

@@ -70,15 +70,15 @@ def test_the_watch_of_the_path_holds_the_rover_and_where_it_is_expected_so_does_
     assert rig.run(1.0).state == "driving"  # nobody told it to expect a watch
     service.take_stop(True, rig.now)
     command = rig.run(PERIOD)
-    assert command.state == "fault" and "stop is true" in command.update.fault
+    assert command.state == "fault" and "stop is true" in command.fault
     service.take_stop(False, rig.now)
     assert rig.run(1.0).state == "driving"  # by itself, with the next accepted path
     rig = Rig(stop_timeout=0.4)
-    assert "waiting for traverse_server/stop" in rig.run(1.0).update.fault
+    assert "waiting for traverse_server/stop" in rig.run(1.0).fault
     rig.supervisor.service.take_stop(False, rig.now)
     assert rig.run(0.36).state == "driving" and rig.commands[-1].expiry <= rig.now + 0.06
     command = rig.run(0.08)
-    assert command.state == "fault" and "stop stale: none for 400 ms" in command.update.fault
+    assert command.state == "fault" and "stop stale: none for 400 ms" in command.fault
 
 
 def test_hold_brakes_wheels_that_turn_and_stays_within_the_limit():
@@ -105,7 +105,7 @@ def test_hold_without_wheel_rates_lets_go_and_applies_the_brake():
     assert not rig.run(1.0).brake
     command = rig.run(0.1, "imu", "cmd_vel")
     assert command.state == "fault" and command.brake and not command.torques.any()
-    assert command.update.fault.startswith("joint_states stale")
+    assert command.fault.startswith("joint_states stale")
     assert not rig.run(0.1).brake
 
 
@@ -157,7 +157,7 @@ def test_a_fault_found_elsewhere_is_taken_into_the_next_update():
     rig = Rig()
     rig.run(1.0)
     rig.supervisor.trip("updates came too late")
-    assert rig.run(PERIOD).update.fault == "updates came too late"
+    assert rig.run(PERIOD).fault == "updates came too late"
     assert rig.run(1.0).state == "driving"
     assert rig.run(PERIOD, clock_fault="the clock was stepped back").state == "fault"
 

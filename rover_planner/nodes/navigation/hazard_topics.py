@@ -45,16 +45,16 @@ class HazardTopics:
         self,
         node: RoverNode[TraverseServerParameters],
         service: TraverseService,
-        is_busy: Callable[[], bool],
+        give_way: Callable[[Callable[[], object], float], float],
     ):
         """Create topics, service and thread.
 
         Args:
             node: The node.
             service: Knows map, settings and pose.
-            is_busy: Returns whether questions are open, which come first; called in the thread.
+            give_way: As `QuestionDesk.give_way`: questions come first.
         """
-        self._node, self._service, self._is_busy = node, service, is_busy
+        self._node, self._service, self._give_way = node, service, give_way
         self._log = TransitionLog(node.get_logger())
         self._shown: _Shown | None = None
         self._done: tuple[Terrain, ServiceSettings] | None = None
@@ -170,12 +170,7 @@ class HazardTopics:
 
     def _let_questions_go_first(self) -> None:
         """Wait while there are questions, for MAX_PAUSE in each SLICE; called between poses."""
-        self._check_end()
-        began = time.monotonic()
-        while self._is_busy() and time.monotonic() - began < self._patience:
-            time.sleep(0.01)
-            self._check_end()
-        self._patience -= time.monotonic() - began
+        self._patience -= self._give_way(self._check_end, self._patience)
 
     def _show(self, hazards: HazardMap, map_hash: str, withdrawals: int) -> None:
         view = hazards.view()

@@ -18,7 +18,7 @@ from msg_adapters.results.diagnostics import MONITOR, make_status
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.numerics.kernel_cache import KernelMissingError, loading_only
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.budget import STOPPING, QuestionStoppedError
+from rover_planner.planning.answering.budget import STOPPING, Budget, QuestionStoppedError
 from rover_planner.planning.answering.judgement import PathJudgement, refusal
 from rover_planner.planning.answering.server_health import Health
 from rover_planner.planning.answering.snapshot import Snapshot
@@ -94,7 +94,7 @@ class PathWatch:
         self._changed = threading.Condition()
         self._new_path: WatchedPath | None = None
         self._sight: Sight | None = None
-        self._ending = False
+        self._life = Budget(math.inf)
         self._thread = threading.Thread(target=self._run, name="monitor", daemon=True)
         self._thread.start()
         node.create_service(SetBool, "~/monitor", self._switch)
@@ -164,7 +164,7 @@ class PathWatch:
 
     def _send_stops(self) -> None:
         """Publish ~/stop each PERIOD and when it is new; a watch that hangs says nothing."""
-        while not self._ending and self._node.context.ok():
+        while not self._life.is_over and self._node.context.ok():
             if self._is_alive:
                 self._node.guard.call(lambda: self._stop.publish(Bool(data=self._stops)))
             self._stop_is_new.wait(PERIOD)
@@ -173,7 +173,7 @@ class PathWatch:
     def close(self) -> None:
         """End the threads."""
         with self._changed:
-            self._ending = True
+            self._life.stop(STOPPING, "the server is shutting down")
             self._changed.notify_all()
         self._stop_is_new.set()
         self._heartbeat.join(END_TIME)
@@ -204,7 +204,7 @@ class PathWatch:
     def _rehearse(self) -> None:
         """Look at a path of no meaning, unless that compiles kernels."""
         try:
-            with interruptible(self._check_end), loading_only():
+            with interruptible(self._life.check), loading_only():
                 rehearse(self._service.settings)
         except (KernelMissingError, QuestionStoppedError):
             return
@@ -215,24 +215,20 @@ class PathWatch:
         self._rehearse()
         while True:
             with self._changed:
-                self._changed.wait_for(lambda: self._sight is not None or self._ending)
-                if self._ending:
+                self._changed.wait_for(lambda: self._sight is not None or self._life.is_over)
+                if self._life.is_over:
                     return
                 sight, path = self._sight, self._new_path
                 self._sight = self._new_path = None
             assert sight is not None
             try:
-                with interruptible(self._check_end):
+                with interruptible(self._life.check):
                     finding = self._look(sight, path)
             except QuestionStoppedError:
                 return
             except Exception as error:
                 finding = self._fail(error)
             self._hand_over(finding, sight)
-
-    def _check_end(self) -> None:
-        if self._ending:
-            raise QuestionStoppedError(STOPPING, "the server is shutting down")
 
     def _look(self, sight: Sight, path: WatchedPath | None) -> Finding:
         if path is not None and not len(path.poses):
@@ -261,7 +257,7 @@ class PathWatch:
         if finding.state != STOPPED or judgement is None or judgement is self._reported:
             return
         self._reported = judgement
-        with interruptible(self._check_end):
+        with interruptible(self._life.check):
             complete = judgement.complete()
         self._node.handover.call(
             lambda: self._report_stop(complete, finding.path_hash, sight.snapshot)

@@ -15,8 +15,6 @@ from msg_adapters.commands import twist_to_speeds
 from msg_adapters.elevation import terrain_from_point_cloud
 from msg_adapters.imu import ImuMounting, imu_to_attitude
 from msg_adapters.joints import read_joint_map
-from msg_adapters.odometry import odometry_to_pose
-from msg_adapters.raw_messages import SensorReader
 from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
@@ -28,12 +26,12 @@ from rover_planner.parameters.shared import STOP
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.frames import NodeFrames
-from rover_planner.ros.logs import RepeatLog, TransitionLog
+from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.map_intake import CLOUD, MapIntake
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import newest_qos, sensor_qos, topic_qos
 from rover_planner.ros.subscriptions import PublisherCheck, subscribe_to_map
-from rover_planner.traction.clocks import StampCheck, StampError
+from rover_planner.traction.input_monitor import StampError
 from rover_planner.traction.traction_service import (
     CMD_VEL,
     IMU,
@@ -57,7 +55,7 @@ class TractionInputs:
         self,
         node: RoverNode[TractionControllerParameters],
         service: TractionService,
-        maps: MapIntake[Any],
+        maps: MapIntake,
         frames: NodeFrames,
     ):
         """Subscribe to all inputs of a node; `frames` brings odometry to the frame of the map."""
@@ -72,12 +70,10 @@ class TractionInputs:
         self._mounting = ImuMounting(
             parameters.imu_frame or parameters.base_frame, parameters.imu_mounting
         )
-        self._reader, self._odometry_read = SensorReader(), -math.inf
+        self._odometry_read = -math.inf
         self._twist = TwistStamped if parameters.cmd_vel_stamped else Twist
         self._log = TransitionLog(node.get_logger())
-        self.stamps = StampCheck(parameters.stamp_tolerance)
-        """Judges the header stamps."""
-        self._subscribe(parameters)
+        self._subscribe()
         subscribe_to_map(node, PointCloud2, CLOUD, maps.offer)
         self.publishers = self._check_publishers(parameters)
         """Looks for publishers that are not heard."""
@@ -88,18 +84,14 @@ class TractionInputs:
         names = self.joint_names
         return names.signs(joints) * (angles - names.offsets(joints))
 
-    def _subscribe(self, parameters: TractionControllerParameters) -> None:
+    def _subscribe(self) -> None:
         hear = self._node.heard.subscribe
         merged, newest = sensor_qos(), newest_qos()  # joints may come from several publishers
-        for kind, name, take, qos in (
-            (JointState, JOINT_STATES, self._take_joints, merged),
-            (Imu, IMU, self._take_imu, newest),
-            (self._twist, CMD_VEL, self._take_command, newest),
-        ):
-            hear(kind, name, self._guard(name, take), qos, raw=True)
-        take_odometry = self._guard(ODOMETRY, self._take_odometry)
-        hear(Odometry, ODOMETRY, take_odometry, newest, self._needs_odometry, raw=True)
-        hear(Bool, STOP, self._guard(STOP, self._take_stop), topic_qos())
+        hear(JointState, JOINT_STATES, self._take_joints, merged, refuse=self._refuse)
+        hear(Imu, IMU, self._take_imu, newest, refuse=self._refuse)
+        hear(self._twist, CMD_VEL, self._take_command, newest, refuse=self._refuse)
+        hear(Odometry, ODOMETRY, self._take_odometry, newest, self._needs_odometry, self._refuse)
+        hear(Bool, STOP, self._take_stop, topic_qos(), refuse=self._refuse)
 
     def _needs_odometry(self) -> bool:
         """Return whether odometry is to be read: it takes longest, and at rest nothing uses it."""
@@ -123,37 +115,27 @@ class TractionInputs:
         }
         return PublisherCheck(self._node, types, advice)
 
-    def _guard(
-        self, name: str, take: Callable[[Any, float], None]
-    ) -> Callable[[Any, float], None]:
-        """Return what passes a message and the time of its arrival on, or refuses it."""
-
-        def receive(message: Any, now: float) -> None:
-            try:
-                take(message, now)
-            except StampError as error:
-                self._service.monitor.ignore(name, str(error))
-            except RoverError as error:
-                self._refuse(name, str(error), now)
-            except Exception as error:
-                self._refuse(name, f"internal error: {self._node.guard.report(name, error)}", now)
-
-        return receive
-
-    def _refuse(self, name: str, error: str, now: float) -> None:
-        self._service.monitor.refuse(name, error, now)
+    def _refuse(self, name: str, error: Exception, now: float) -> None:
+        """Keep why a message is not used; a stamp of no use is no fault by itself."""
+        if isinstance(error, StampError):
+            self._service.monitor.ignore(name, str(error))
+            return
+        reason = str(error)
+        if not isinstance(error, RoverError):
+            reason = f"internal error: {self._node.guard.report(name, error)}"
+        self._service.monitor.refuse(name, reason, now)
         if name == ODOMETRY:  # the others are faults, which the node logs
-            self._log.update(name, f"odometry not used: {error}", "odometry is used again", now)
+            self._log.update(name, f"odometry not used: {reason}", "odometry is used again", now)
 
     def _find_time(
         self, name: str, stamp: int | None, now: float, *, merged: bool = False
     ) -> float:
         waited = round(NANOSECONDS * (time.monotonic() - now))
         clock = self._node.get_clock().now().nanoseconds - waited
-        return self.stamps.find_time(name, stamp or 0, clock, now, merged=merged)
+        monitor = self._service.monitor
+        return monitor.find_time(name, stamp or 0, clock, now, merged=merged)
 
-    def _take_joints(self, message: bytes, now: float) -> None:
-        state = self._reader.read(message, JointState)
+    def _take_joints(self, state: Any, now: float) -> None:
         if not self._heard.intersection(state.name):  # an arm's message, for example
             return
         stamp = stamp_to_ns(state.header.stamp) or 0
@@ -162,14 +144,12 @@ class TractionInputs:
         rates = self.joint_names.velocities(state, JOINTS)
         self._service.take_joints(positions, rates, measured, stamp)
 
-    def _take_imu(self, message: bytes, now: float) -> None:
-        imu = self._reader.read(message, Imu)
+    def _take_imu(self, imu: Any, now: float) -> None:
         measured = self._find_time(IMU, stamp_to_ns(imu.header.stamp), now)
         attitude = imu_to_attitude(imu, self._mounting)
         self._service.take_attitude(attitude.roll, attitude.pitch, attitude.rates, measured)
 
-    def _take_command(self, message: bytes, now: float) -> None:
-        twist = self._reader.read(message, self._twist)
+    def _take_command(self, twist: Any, now: float) -> None:
         if self._twist is TwistStamped:
             now = self._find_time(CMD_VEL, stamp_to_ns(twist.header.stamp), now)
         self._service.take_command(*twist_to_speeds(twist), now)
@@ -177,18 +157,16 @@ class TractionInputs:
     def _take_stop(self, message: Bool, now: float) -> None:
         self._service.take_stop(message.data, now)
 
-    def _take_odometry(self, message: bytes, now: float) -> None:
-        odometry = self._reader.read(message, Odometry)
+    def _take_odometry(self, odometry: Any, now: float) -> None:
         measured = self._find_time(ODOMETRY, stamp_to_ns(odometry.header.stamp), now)
         if odometry.header.frame_id != self._map_frame:
             self._frames.listen()  # only then: /tf of a whole robot costs the loop time
-        here = self._frames.localise_odometry(odometry)
-        pose, deviation = odometry_to_pose(here, self._map_frame, self._base_frame)
-        self._service.take_odometry(pose, deviation, measured)
+        pose, deviation = self._frames.take_odometry(odometry, self._base_frame)
+        self._service.take_odometry(pose[[0, 1, 2, 5]], deviation, measured)
         self._log.update(ODOMETRY, "", "odometry is used again", now)
 
 
-class TractionMaps(MapIntake[MapContactFinder]):
+class TractionMaps(MapIntake):
     """Prepares clouds for the controller in a thread of their own."""
 
     def __init__(
@@ -204,16 +182,13 @@ class TractionMaps(MapIntake[MapContactFinder]):
             rover: Returns the rover for which maps are prepared.
             frames: Knows where the frames of clouds are on the map.
         """
-        self._node, self._rover, self._listen = node, rover, frames.listen
-        self._values = node.values
-        self._refusals = RepeatLog()
-        super().__init__(self._make, self._log_refusal, frames)
+        self._rover, self._listen = rover, frames.listen
+        self._ready: MapContactFinder | None = None
+        super().__init__(node.get_logger(), node.values, frames)
 
-    def apply(self) -> None:
+    def apply(self, values: TractionControllerParameters) -> None:
         """Prepare the last map again if a parameter of it has changed."""
-        before, self._values = self._values, self._node.values
-        names = ("map_resolution", "cell_height")
-        if any(getattr(before, name) != getattr(self._values, name) for name in names):
+        if self.take_parameters(values):
             self.repeat()
 
     def look_for_frame(self) -> None:
@@ -222,14 +197,13 @@ class TractionMaps(MapIntake[MapContactFinder]):
             self._listen()  # only then: /tf of a whole robot costs the loop time
             self.retry()
 
-    def _make(self, cloud: PointCloud2, source: Rigid | None) -> MapContactFinder:
-        """Prepare a map from a cloud; called in the thread."""
-        values, move = self._values, None if source is None else source.matrix
-        terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height, move)
-        return MapContactFinder(self._rover(), terrain)
+    def take(self) -> MapContactFinder | None:
+        """Return the map that was prepared since the last call, None if there is none."""
+        ready, self._ready = self._ready, None
+        return ready
 
-    def _log_refusal(self, error: str) -> None:
-        line = f"{CLOUD} refused, the last map stays: {error}"
-        line = self._refusals.line(line, time.monotonic())
-        if line:
-            self._node.get_logger().error(line)
+    def prepare(self, cloud: Any, source: Rigid | None) -> None:
+        """Prepare a map from a cloud; called in the thread."""
+        values, move = self.values, None if source is None else source.matrix
+        terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height, move)
+        self._ready = MapContactFinder(self._rover(), terrain)

@@ -5,20 +5,21 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from numpy.typing import NDArray
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from std_msgs.msg import Bool, Float64MultiArray, String
 
-from msg_adapters.commands import effort_commands, labelled_array, set_values
+from msg_adapters.commands import doubles, labelled_array
 from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
 from rover_planner.ros.qos import latched_qos, topic_qos
-from rover_planner.traction.traction_service import TractionUpdate
+from rover_planner.traction.traction_service import TractionCommand
 
 STANDING_WHEELS = np.zeros(WHEEL_COUNT)
 """Rates of wheels that stand [rad/s]."""
 
 
 class TractionTopics:
-    """Publishers of commands, state, brake and forces; each thread has messages of its own."""
+    """Publishers of commands, state, brake and forces; any thread may write commands."""
 
     def __init__(self, node: Node, order: NDArray[np.int64], signs: Floats):
         """Create the publishers.
@@ -28,69 +29,51 @@ class TractionTopics:
             order: (6,) index of the wheel of each value of ~/commands.
             signs: (6,) sign of the torque of each wheel in messages, in wheel order.
         """
-        qos = topic_qos()
-        self.commands = node.create_publisher(Float64MultiArray, "~/commands", qos)
-        self.velocities = node.create_publisher(Float64MultiArray, "~/velocity_commands", qos)
-        self.steering = node.create_publisher(Float64MultiArray, "~/steering_commands", qos)
+
+        def publish(name: str) -> Publisher:
+            return node.create_publisher(Float64MultiArray, name, topic_qos())
+
+        self._order, self._signs = order, signs[order]
+        self.commands = publish("~/commands")
+        self.velocities = publish("~/velocity_commands")
+        self.steering = publish("~/steering_commands")
         self.brake = node.create_publisher(Bool, "~/brake", latched_qos())
         self.state = node.create_publisher(String, "~/state", latched_qos())
-        self.diagnostics = node.create_publisher(DiagnosticArray, "diagnostics", qos)
-        self._loads = node.create_publisher(Float64MultiArray, "~/wheel_loads", qos)
-        self._used = node.create_publisher(Float64MultiArray, "~/friction_utilisation", qos)
-        self._angles = node.create_publisher(Float64MultiArray, "~/contact_angles", qos)
-        self.last_state: tuple[str, bool] | None = None
-        """State and brake published last."""
-        # Messages are reused, which is safe because publishing copies them.
-        zeros = np.zeros(WHEEL_COUNT)
-        self._contacts = np.zeros((2, WHEEL_COUNT))
-        self._of_wheels = labelled_array(zeros, "wheel")
-        self._of_contacts = labelled_array(self._contacts, "angle, deviation", "wheel")
-        self.writer = CommandWriter(self, order, signs)
-        """For the thread of the updates."""
-        self.watchdog_writer = CommandWriter(self, order, signs)
-        """For the thread of the watchdog."""
-
-    def publish_steering(self, angles: Floats) -> None:
-        """Publish angles [rad] of the steered wheels as messages have them, in wheel order."""
-        self.steering.publish(Float64MultiArray(data=angles.tolist()))
-
-    def publish_forces(self, update: TractionUpdate) -> None:
-        """Publish loads, utilisation and contact angles of an update that has them."""
-        estimate, answer = update.estimate, update.answer
-        if estimate is None or answer is None:
-            return
-        for publisher, values in ((self._loads, answer.loads), (self._used, answer.utilisation)):
-            set_values(self._of_wheels, values)
-            publisher.publish(self._of_wheels)
-        self._contacts[0] = estimate.angles
-        np.sqrt(estimate.covariance.diagonal(), out=self._contacts[1])
-        set_values(self._of_contacts, self._contacts)
-        self._angles.publish(self._of_contacts)
-
-
-class CommandWriter:
-    """Publishes commands with messages of its own, so that threads share none."""
-
-    def __init__(self, topics: TractionTopics, order: NDArray[np.int64], signs: Floats):
-        """Write to the publishers of `topics`; the rest is as there."""
-        self._topics, self._order, self._signs = topics, order, signs[order]
-        self._efforts = effort_commands(np.zeros(WHEEL_COUNT), order)
-        self._rates = effort_commands(np.zeros(WHEEL_COUNT), order)
-        self._brake, self._state = Bool(), String()
+        self.diagnostics = node.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
+        self._loads = publish("~/wheel_loads")
+        self._used = publish("~/friction_utilisation")
+        self._angles = publish("~/contact_angles")
+        self._last_state: tuple[str, bool] | None = None
 
     def write(
         self, torques: Floats, brake: bool, state: str, rates: Floats = STANDING_WHEELS
     ) -> None:
         """Publish torques (6,) [N m] and rates (6,) [rad/s]; brake and state if changed."""
-        topics = self._topics
-        if topics.velocities.get_subscription_count():
-            set_values(self._rates, self._signs * rates[self._order])
-            topics.velocities.publish(self._rates)
-        set_values(self._efforts, self._signs * torques[self._order])
-        topics.commands.publish(self._efforts)
-        if topics.last_state == (state, brake):
+        if self.velocities.get_subscription_count():
+            self.velocities.publish(self._to_message(rates))
+        self.commands.publish(self._to_message(torques))
+        if self._last_state != (state, brake):
+            self._last_state = state, brake
+            self.brake.publish(Bool(data=brake))
+            self.state.publish(String(data=state))
+
+    def _to_message(self, values: Floats) -> Float64MultiArray:
+        """Return values of the wheels (6,) in the order and with the signs of messages."""
+        return Float64MultiArray(data=doubles(self._signs * values[self._order]))
+
+    def publish_steering(self, angles: Floats) -> None:
+        """Publish angles [rad] of the steered wheels as messages have them, in wheel order."""
+        self.steering.publish(Float64MultiArray(data=doubles(angles)))
+
+    def publish_forces(self, command: TractionCommand) -> None:
+        """Publish loads, utilisation and contact angles of a rover that drives, to who listens."""
+        estimate, answer = command.estimate, command.answer
+        if estimate is None or answer is None:
             return
-        topics.last_state = state, brake
-        self._brake.data, self._state.data = brake, state
-        topics.brake.publish(self._brake)
-        topics.state.publish(self._state)
+        for publisher, values in ((self._loads, answer.loads), (self._used, answer.utilisation)):
+            if publisher.get_subscription_count():
+                publisher.publish(labelled_array(values, "wheel"))
+        if self._angles.get_subscription_count():
+            deviations = np.sqrt(estimate.covariance.diagonal())
+            contacts = np.array([estimate.angles, deviations])
+            self._angles.publish(labelled_array(contacts, "angle, deviation", "wheel"))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from queue import SimpleQueue
 from typing import Any
 
+from rover_physics.errors import RoverError
 from rover_physics.numerics.interruption import interruptible
 from rover_planner.planning.answering.budget import BUSY, TOO_LONG, Budget, QuestionStoppedError
 from rover_planner.planning.answering.questions import Question
@@ -25,36 +26,37 @@ class Asked:
     """The question."""
     budget: Budget
     """Its time."""
+    answer: Callable[[Any], object]
+    """Takes its judgement; called once, in the thread that asks."""
     has_begun: bool = False
     """True if the thread has begun to judge it."""
     is_closed: bool = False
     """True if it has its judgement."""
 
 
-Answered = tuple[Asked, Any]
-"""A question and its judgement."""
-
-
 class QuestionQueue:
     """Judges questions in their order; refuses those that it has no place or no time for.
 
-    Its methods belong to one thread, the owner's. They return the questions that are to be
-    answered, with their judgements; each question has one.
+    Its methods belong to one thread, the owner's. Within them each question is answered, once.
     """
 
-    def __init__(self, max_waiting: int, judge: Callable[[Any], Any], wake: Callable[[], object]):
+    def __init__(
+        self,
+        judge: Callable[[Any], Any],
+        call: Callable[[Callable[[], None]], object],
+        report: Callable[[str, Exception], str],
+    ):
         """Start the thread.
 
         Args:
-            max_waiting: Largest number of questions that wait while one is in work.
-            judge: Returns the judgement of an `Asked`; called in the thread. It may raise
-                QuestionStoppedError only.
-            wake: Called in the thread when there are `finished` questions.
+            judge: Returns the judgement of an `Asked`; called in the thread. It may raise: a
+                RoverError refuses the request, any other error is one of this program.
+            call: Has the owner's thread call `finish`; called in the thread.
+            report: Takes the place of an error of this program and the error; returns its text.
         """
-        self.max_waiting = max_waiting
-        self._judge, self._wake = judge, wake
+        self._judge, self._call, self._report = judge, call, report
         self._waiting: SimpleQueue[Asked | None] = SimpleQueue()
-        self._judged: SimpleQueue[Answered] = SimpleQueue()
+        self._judged: SimpleQueue[tuple[Asked, Any]] = SimpleQueue()
         self._open: list[Asked] = []
         self._thread = threading.Thread(target=self._run, name="questions", daemon=True)
         self._thread.start()
@@ -64,56 +66,57 @@ class QuestionQueue:
         """Number of questions without an answer."""
         return len(self._open)
 
-    def ask(self, asked: Asked) -> list[Answered]:
-        """Queue a question, or refuse it as BUSY."""
-        if len(self._open) > self.max_waiting:
-            reason = f"{len(self._open)} questions are open already; ask again later"
-            return [(asked, asked.question.refuse(BUSY, reason))]
+    def ask(self, asked: Asked, max_waiting: int) -> None:
+        """Queue a question, or refuse it as BUSY if more than that number wait."""
+        count = len(self._open)
         self._open.append(asked)
-        self._waiting.put(asked)
-        return []
+        if count > max_waiting:
+            self._refuse(asked, BUSY, f"{count} questions are open already; ask again later")
+        else:
+            self._waiting.put(asked)
 
-    def finished(self) -> list[Answered]:
-        """Take what the thread has judged."""
-        return self._take_open([self._judged.get() for _ in range(self._judged.qsize())])
+    def finish(self) -> None:
+        """Answer what the thread has judged."""
+        for _ in range(self._judged.qsize()):
+            self._close(*self._judged.get())
 
-    def overdue(self, grace: float) -> list[Answered]:
+    def refuse_overdue(self, grace: float) -> None:
         """Refuse waiting questions just before their deadline, one in work `grace` [s] after."""
-        refused = []
-        for asked in self._open:
+        for asked in list(self._open):
             budget = asked.budget
             if asked.has_begun and budget.remaining < -grace:
-                refused.append((asked, _refuse_stopped(asked)))
+                self._close(asked, _refuse_stopped(asked))
             elif not asked.has_begun and budget.remaining < HOPELESS * budget.seconds:
-                refused.append((asked, _refuse_waiting(asked)))
-        return self._take_open(refused)
+                self._close(asked, _refuse_waiting(asked))
 
-    def stop_all(self, code: str, reason: str) -> list[Answered]:
-        """Stop all open questions with a code and reason."""
-        for asked in self._open:
+    def stop_all(self, code: str, reason: str) -> int:
+        """Stop all open questions with a code and reason; return their number."""
+        stopped = list(self._open)
+        for asked in stopped:
             asked.budget.stop(code, reason)
-        return self._take_open(
-            [(asked, asked.question.refuse(code, reason)) for asked in self._open]
-        )
+            self._refuse(asked, code, reason)
+        return len(stopped)
 
     def close(self) -> None:
         """End the thread; stop all questions before."""
         self._waiting.put(None)
         self._thread.join(END_TIME)
 
-    def _take_open(self, answered: list[Answered]) -> list[Answered]:
-        """Take questions from the open ones; return those that were open."""
-        closed = [(asked, judgement) for asked, judgement in answered if not asked.is_closed]
-        for asked, _ in closed:
+    def _refuse(self, asked: Asked, code: str, reason: str) -> None:
+        self._close(asked, asked.question.refuse(code, reason))
+
+    def _close(self, asked: Asked, judgement: Any) -> None:
+        """Answer a question that is open."""
+        if not asked.is_closed:
             asked.is_closed = True
             self._open.remove(asked)
-        return closed
+            asked.answer(judgement)
 
     def _run(self) -> None:
         while (asked := self._waiting.get()) is not None:
             if not asked.is_closed:
                 self._judged.put((asked, self._find(asked)))
-                self._wake()
+                self._call(self.finish)
 
     def _find(self, asked: Asked) -> Any:
         """Return the judgement of a question, or its refusal."""
@@ -125,6 +128,11 @@ class QuestionQueue:
                 return self._judge(asked)
         except QuestionStoppedError as error:
             return asked.question.refuse(error.code, str(error))
+        except RoverError as error:
+            return asked.question.refuse("bad_request", str(error))
+        except Exception as error:
+            text = self._report(asked.question.service, error)
+            return asked.question.refuse("internal_error", f"internal error: {text}")
 
 
 def _refuse_stopped(asked: Asked) -> Any:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The questions of the services as plain values, their answers, and what each is about."""
+"""The questions of the services as plain values, and what the answer to each is about."""
 
 import secrets
 from collections.abc import Callable
@@ -115,18 +115,6 @@ def ask_in_vain(service: str, about: str, reason: str) -> Question:
     return Question(service, about, lambda _known: refusal("bad_request", reason))
 
 
-@dataclass(frozen=True, eq=False)
-class Answer:
-    """The answer to a question."""
-
-    judgement: Any
-    """A `PathJudgement` or `ReachAnswer`."""
-    snapshot: Snapshot
-    """Map, settings, path and measurements that it was judged by."""
-    identity: IdentityReport
-    """Its question, path and map."""
-
-
 @dataclass
 class Register:
     """Numbers the questions of a server, and says what each answer is about."""
@@ -136,27 +124,20 @@ class Register:
     count: int = 0
     """Number of the last question."""
 
-    def next_number(self) -> int:
-        """Return the number of a new question, one above the last."""
-        self.count += 1
-        return self.count
-
-    def identify(
-        self, number: int, service: str, question_hash: str, snapshot: Snapshot
-    ) -> IdentityReport:
-        """Return what the answer to a question is about, without its path.
+    def identify(self, service: str, question_hash: str, snapshot: Snapshot) -> IdentityReport:
+        """Return what the answer to the next question is about, without its path.
 
         Args:
-            number: Number of the question.
             service: Name of the service that was called.
             question_hash: Hash of the request.
             snapshot: What was known when it was asked.
         """
+        self.count += 1
         known = snapshot.known_map
         content, stamp = (
             ("", "") if known is None else (known.fingerprint, stamp_text(known.stamp))
         )
-        about = number, service, self.server, question_hash
+        about = self.count, service, self.server, question_hash
         identity = IdentityReport(*about, "", "", content, stamp, snapshot.map_age)
         ground = snapshot.ground
         if ground is None:

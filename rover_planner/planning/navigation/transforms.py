@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation, Slerp
 
 from msg_adapters.stamps import NANOSECONDS
+from rover_physics.numerics.quaternions import rpy_from_xyzw
 from rover_planner.errors import PlanningError
 
 MEMORY = 10_000_000_000
@@ -69,12 +70,11 @@ class Rigid:
         ahead = self.rotation.apply([1.0, 0.0, 0.0])
         return np.array([*self.translation[:2], np.arctan2(ahead[1], ahead[0])])
 
-
-def write_pose(rigid: Rigid, pose: Any) -> None:
-    """Set the numbers of a pose; its parts stay, as they may be known elsewhere."""
-    place, turn = pose.position, pose.orientation
-    place.x, place.y, place.z = rigid.translation.tolist()
-    turn.x, turn.y, turn.z, turn.w = rigid.rotation.as_quat().tolist()
+    @property
+    def xyzrpy(self) -> NDArray[np.float64]:
+        """(6,) x, y, z [m], roll, pitch, yaw [rad], as for `from_rpy`."""
+        x, y, z, w = self.rotation.as_quat().tolist()
+        return np.array([*self.translation, *rpy_from_xyzw((x, y, z, w))])
 
 
 def move_path(path: Any, inner: Rigid | None) -> Any:
@@ -86,8 +86,10 @@ def move_path(path: Any, inner: Rigid | None) -> Any:
     """
     if inner is not None:
         for stamped in path.poses:
-            pose = stamped.pose
-            write_pose(Rigid.of(pose.position, pose.orientation).then(inner), pose)
+            place, turn = stamped.pose.position, stamped.pose.orientation
+            moved = Rigid.of(place, turn).then(inner)
+            place.x, place.y, place.z = moved.translation.tolist()
+            turn.x, turn.y, turn.z, turn.w = moved.rotation.as_quat().tolist()
     return path
 
 

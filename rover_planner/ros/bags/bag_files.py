@@ -10,15 +10,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from nav_msgs.msg import Odometry
-from nav_msgs.msg import Path as PathMessage
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.rosbag2 import Reader, ReaderError, StoragePlugin, Writer, WriterError
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-from sensor_msgs.msg import Imu, JointState, PointCloud2
 
 from rover_physics.files.validation import show_file
 from rover_planner.errors import PlanningError
+from rover_planner.ros.optional_types import find_type
 
 MAP, JOINTS, ODOMETRY, IMU, PATH = "map", "joints", "odometry", "imu", "path"
 TF, TF_STATIC = "tf", "tf_static"
@@ -34,14 +32,6 @@ TYPES: dict[str, tuple[str, ...]] = {
     PATH: ("nav_msgs/msg/Path",),
 }
 """Types of each input, as bags name them."""
-CLASSES = {
-    "sensor_msgs/msg/PointCloud2": PointCloud2,
-    "sensor_msgs/msg/JointState": JointState,
-    "nav_msgs/msg/Odometry": Odometry,
-    "sensor_msgs/msg/Imu": Imu,
-    "nav_msgs/msg/Path": PathMessage,
-}
-"""Classes of the types that every ROS has."""
 USUAL = {
     MAP: ("elevation_cloud", "elevation_map"),
     JOINTS: ("joint_states",),
@@ -128,8 +118,9 @@ class BagReader:
         ]
 
     def _deserialize(self, raw: bytes, name: str) -> Any:
-        if name in CLASSES:
-            return deserialize_message(raw, CLASSES[name])
+        kind = find_type(name.replace("/msg/", ".msg:"))
+        if kind is not None:
+            return deserialize_message(raw, kind)
         return self._store.deserialize_cdr(raw, name)
 
 

@@ -167,11 +167,10 @@ class Replay:
     ) -> ReplayAnswer:
         """Ask a question; an invalid one is refused with its reason."""
         now = self._service.snapshot(stamp) if snapshot is None else snapshot
-        number = self._register.next_number()
         try:
             judgement = ask(now).complete()
         except RoverError as error:
             judgement = refusal("bad_request", str(error))
-        identity = self._register.identify(number, kind, "", now)
+        identity = self._register.identify(kind, "", now)
         identity = replace(identity, path_hash=now.path.hash, path_stamp=now.path.stamp)
         return ReplayAnswer(kind, stamp, judgement, identity, now.terrain)

@@ -3,11 +3,13 @@
 
 import threading
 import time
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
 from rover_physics import judge_path, load_rover
+from rover_physics.errors import PoseError
 from rover_physics.numerics.interruption import check_interruption
 from rover_planner.planning.answering.budget import (
     BUSY,
@@ -47,20 +49,22 @@ class Desk:
 
     def __init__(self, max_waiting: int = 100):
         self.told: list[tuple[str, object]] = []
+        self.max_waiting = max_waiting
         self.queue = QuestionQueue(
-            max_waiting, lambda asked: asked.question.judge(asked.budget), lambda: None
+            lambda asked: asked.question.judge(asked.budget),
+            lambda _finish: None,
+            lambda place, error: f"{place}: {error!r}",
         )
 
     def ask(self, name, work, seconds: float = 20.0, clock=time.monotonic) -> None:
-        self.tell(
-            self.queue.ask(
-                Asked(Question(name, "", work, lambda code, _: code), Budget(seconds, clock))
-            )
-        )
+        question = Question(name, "", work, lambda code, _: code)
+        self.put(question, Budget(seconds, clock))
 
-    def tell(self, judged) -> int:
-        self.told += [(asked.question.service, judgement) for asked, judgement in judged]
-        return len(judged)
+    def put(self, question, budget) -> None:
+        def answer(judgement) -> None:
+            self.told.append((question.service, judgement))
+
+        self.queue.ask(Asked(question, budget, answer), self.max_waiting)
 
     def work(self, name, answer, seconds: float) -> Work:
         """Ask a question whose time begins with the work on it."""
@@ -70,7 +74,7 @@ class Desk:
 
     def wait(self, count: int) -> list[tuple[str, object]]:
         def enough() -> bool:
-            self.tell(self.queue.finished())
+            self.queue.finish()
             return len(self.told) >= count
 
         wait_until(enough, f"{count} answers")
@@ -127,19 +131,28 @@ def test_work_that_checks_nothing_is_refused_after_its_grace_and_its_answer_is_d
     assert deaf.begun.wait(20.0)
     desk.ask("waiting", work_on, seconds=0.05)
     time.sleep(0.1)
-    desk.tell(desk.queue.overdue(10.0))
+    desk.queue.refuse_overdue(10.0)
     assert desk.told == [("waiting", BUSY)]  # it never began, and needs no grace
-    desk.tell(desk.queue.overdue(0.02))
+    desk.queue.refuse_overdue(0.02)
     assert desk.told == [("waiting", BUSY), ("deaf", TOO_LONG)]
     go_on.set()
     desk.ask("next", lambda _: 5)
     assert desk.wait(3)[2:] == [("next", 5)] and desk.queue.open_count == 0
 
 
+def test_errors_of_the_input_are_bad_requests_and_others_internal_errors(desk):
+    for name, error in (("one", PoseError("no pose")), ("two", KeyError("k"))):
+        work = Mock(side_effect=error)
+        desk.put(Question(name, "", work, lambda *both: both), Budget(20.0))
+    first, second = (told for _, told in desk.wait(2))
+    assert first == ("bad_request", "no pose")
+    assert second == ("internal_error", "internal error: two: KeyError('k')")
+
+
 def test_all_open_questions_can_be_cancelled(desk):
     desk.ask("one", work_on)
     desk.ask("two", work_on)
-    assert desk.tell(desk.queue.stop_all(CANCELLED, "told so")) == 2
+    assert desk.queue.stop_all(CANCELLED, "told so") == 2
     assert desk.told == [("one", CANCELLED), ("two", CANCELLED)]
     desk.ask("next", lambda _: 5)
     assert desk.wait(3)[2] == ("next", 5)

@@ -83,7 +83,7 @@ def test_a_learned_friction_changes_new_questions_only_if_it_is_to_be_used(
     service.take_ground(LearnedGround(0.4, 0.04, 0.33, is_bounded, "12.5"))
     assert friction_used(service) == pytest.approx(0.8 / assumed * told, rel=1e-6)
     assert before.settings.rover.friction == 0.8
-    report = asdict(Register().identify(1, "check_path", "", service.snapshot()))
+    report = asdict(Register().identify("check_path", "", service.snapshot()))
     assert report["ground"] == ("learned" if learn == "use" else "told")
     known = {"off": math.nan}.get(learn, 0.4)
     assert report["ground_friction"] == pytest.approx(known, nan_ok=True)
@@ -107,9 +107,7 @@ def test_what_was_learned_on_a_class_of_ground_holds_for_all_of_it():
     service, used = used_on(1)
     assert used == pytest.approx(0.8 / 0.4 * told, rel=1e-6)
     assert service.snapshot().known_map is service.snapshot().known_map  # packed once
-    assert asdict(Register().identify(1, "", "", service.snapshot()))["ground_classes"] == {
-        "1": 0.4
-    }
+    assert asdict(Register().identify("", "", service.snapshot()))["ground_classes"] == {"1": 0.4}
     assert used_on(2)[1] == pytest.approx(told, rel=1e-6)  # nothing slipped there
     assert used_on(3)[1] == pytest.approx(told, rel=1e-6)  # no wheel was there
     assert used_on(np.nan)[1] == pytest.approx(0.8 / 0.5 * told, rel=1e-6)

@@ -38,7 +38,7 @@ def full(service):
 
 
 def test_the_docs_have_the_keys_of_a_full_report_and_no_other(full, service):
-    identity = Register().identify(1, "can_traverse", "ab", service.snapshot())
+    identity = Register().identify("can_traverse", "ab", service.snapshot())
     report = replace(full.report, identity=identity)
     text = DOCS.read_text()
     table = text[text.index("| key | meaning |") :]
