@@ -54,9 +54,9 @@ EXTRAS = {
         "ruff>=0.9,<1",
         "oxlint>=1.0,<2",
         "mypy>=1.14,<3",
-        "pytest-cov>=6.0,<8",
         "uv>=0.5,<1",
     ],
+    "coverage": ["pytest-cov>=6.0,<8"],
 }
 EXTRAS["all"] = [
     one for name in ("ros", "plots", "view", "bags", "survey", "test") for one in EXTRAS[name]

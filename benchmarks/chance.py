@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
+import scipy  # loads `stats` where it is used: that takes a second
 import typer
-from scipy.stats import binomtest
 
 from benchmarks.measure import print_table
 from rover_physics import Rover, SweepOptions, Terrain, judge_path, load_rover
@@ -205,7 +205,9 @@ def compare(paths: Sequence[DrivenPath], model_std: float | None = None) -> Comp
 
 def wilson(count: float, of: int) -> tuple[float, float]:
     """Return the 95 % interval (Wilson) of a share."""
-    return binomtest(round(count), of).proportion_ci(method="wilson") if of else (0.0, 1.0)
+    if not of:
+        return 0.0, 1.0
+    return scipy.stats.binomtest(round(count), of).proportion_ci(method="wilson")
 
 
 def split_by_chance(found: Compared) -> Iterator[tuple[str, Compared]]:

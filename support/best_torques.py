@@ -2,7 +2,7 @@
 """Independent linear programs in the forces on the wheels, with pyramids for friction cones."""
 
 import numpy as np
-from scipy.optimize import linprog
+import scipy  # loads `optimize` where it is used: no worker of the tests waits for it
 
 from support.rover_geometry import balance_matrix, free_balance_matrix
 
@@ -36,7 +36,7 @@ def solve_forces(rover, prediction, i, cost, max_torque, friction_share=1.0, sha
     bounds = [(0.0, None)] * 6 + [(-pull, pull)] * 6 + lateral
     program = np.append(cost, np.zeros(len(lateral))), rows, np.zeros(len(rows)), A, b, bounds
     for method in ("highs", "highs-ipm", "highs-ds"):  # the others where one does not decide
-        answer = linprog(*program, method=method)
+        answer = scipy.optimize.linprog(*program, method=method)
         if answer.status in (0, 2):
             break
     assert answer.status in (0, 2), answer.message

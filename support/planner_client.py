@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A client of the traverse server for tests: publishes, calls, and keeps the results."""
 
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -17,6 +17,7 @@ from std_srvs.srv import Trigger
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import poses_path, stamped_pose
 from rover_physics.warm_up import warm_up
+from rover_planner.nodes import traverse_server
 from rover_planner.nodes.result_topics import RESULT_KINDS
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.ros.qos import map_qos, result_qos, topic_qos
@@ -27,19 +28,23 @@ from support.waiting import wait_until
 SERVER = "/traverse_server"
 START, GOAL = (-2.0, 0.0, 0.0), (2.0, 0.3, 0.0)
 """Default poses of a query: x, y [m] and yaw [rad]."""
+load_kernels = cache(warm_up)
+"""Loads the kernels of questions, once in a process."""
 
 
 def spin_server(ros: RosRun, **overrides) -> TraverseServer:
     """Start a traverse server with parameters.
 
     Questions have more time than by default, so that a busy machine makes no difference; kernels
-    that a test needs later are loaded when it does. Maps are loaded from any folder.
+    that a test needs later are loaded when it does. Maps are loaded from any folder. Waypoints are
+    farther apart, so that a question takes less work.
     """
-    warm_up()
-    values = {"time_budget": 60.0, "map_folder": "/"} | overrides
+    load_kernels()
+    values = {"time_budget": 60.0, "map_folder": "/", "waypoint_spacing": 0.05} | overrides
     parameters = [Parameter(name, value=value) for name, value in values.items()]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(kernels, "LOADING_DELAY", 1e6)
+        patch.setattr(traverse_server, "EXACT", ())
         server = TraverseServer(context=ros.context, parameter_overrides=parameters)
     return ros.spin(server)
 

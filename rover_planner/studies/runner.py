@@ -190,7 +190,8 @@ def _optimise(study: Study, attempt: Callable[[tuple[float, ...]], float]) -> No
     value, best = min(tried, key=lambda pair: pair[0])
     if value >= IMPOSSIBLE:
         return
-    simplex = np.vstack([best, best + NEAR * np.diag(bounds[:, 1] - bounds[:, 0])])
+    steps = np.diag(NEAR * (bounds[:, 1] - bounds[:, 0]))
+    simplex = np.vstack([best, best + steps])
     with contextlib.suppress(_EnoughError):
         minimize(
             cost, best, args=(study.evaluations,), method="Nelder-Mead", bounds=bounds,

@@ -352,7 +352,7 @@ def _map_file(path: Path, dtype: DTypeLike, shape: tuple[int, ...]) -> NDArray[A
     """
     with path.open("wb") as file:
         # Room that is lacking later would end the process.
-        os.posix_fallocate(file.fileno(), 0, int(np.prod(shape)) * np.dtype(dtype).itemsize)
+        os.posix_fallocate(file.fileno(), 0, math.prod(shape) * np.dtype(dtype).itemsize)
     return np.asarray(np.memmap(path, dtype, "r+", shape=shape))
 
 

@@ -75,7 +75,7 @@ def test_a_pose_has_the_class_that_a_path_there_would_have(kind, name):
     if kind == "uncertain":
         terrain = replace(terrain, elevation_std=np.full(shape, 0.004))
     on_map = RoverOnMap(load_rover(name), terrain, options)
-    poses = poses_of(terrain, 250 if kind in ("soil", "uncertain") else 600)
+    poses = poses_of(terrain, 150 if kind in ("soil", "uncertain") else 300)
     found = classify_poses(on_map, poses)
     np.testing.assert_array_equal(found, classes_of_judgements(on_map, poses))
     assert len(set(found.tolist())) >= 3

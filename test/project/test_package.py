@@ -105,7 +105,7 @@ def test_every_requirement_is_bounded_on_both_sides_and_locked():
     assert extras["all"] == [line for name in names for line in extras[name]]
     locked = (TOP / "constraints.txt").read_text(encoding="utf-8")
     names = set(re.findall(r"^([a-z0-9.-]+)==", locked, re.MULTILINE))
-    asked_for = [extras[name] for name in ("all", "bench", "dev")]
+    asked_for = [extras[name] for name in ("all", "bench", "dev", "coverage")]
     for requirement in sum(asked_for, setup_arguments()["install_requires"]):
         match = re.fullmatch(r"([\w.-]+)>=[\d.]+,<[\d.]+", requirement)
         assert match, requirement

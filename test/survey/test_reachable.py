@@ -96,11 +96,11 @@ def compare_with_scipy(open_at, turns_at, numbers, distance):
 
 
 @given(
-    shape=st.tuples(st.integers(1, 13), st.integers(1, 13)),
+    shape=st.tuples(st.integers(1, 10), st.integers(1, 10)),
     headings=st.sampled_from([1, 2, 3, 4, 8, 16, 24]),
     seed=st.integers(0, 10_000),
     share=st.floats(0.4, 1.0),
-    chunk=st.integers(1, 13),
+    chunk=st.integers(1, 10),
 )
 def test_areas_of_any_map_are_those_of_scipy(shape, headings, seed, share, chunk):
     open_at, turns_at = make_flags(shape, headings, seed, share)

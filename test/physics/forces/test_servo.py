@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import scipy
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from scipy.optimize import brentq
 
 from rover_physics import SweepOptions, judge_path, judge_poses
 from rover_physics.forces.servo import CREEP, write_residual
@@ -264,10 +264,10 @@ def expected(grip, velocity, droop, limit) -> np.ndarray:
     def excess(slip):
         return slip - (along - 1.0) - droop / FULL * forces(slip)[T]
 
-    slip = brentq(excess, -10.0, 10.0, xtol=1e-15)
+    slip = scipy.optimize.brentq(excess, -10.0, 10.0, xtol=1e-15)
     if abs(forces(slip)[T]) > limit:
         most = np.copysign(limit, forces(slip)[T])
-        slip = brentq(lambda s: forces(s)[T] - most, -1e4, 1e4, xtol=1e-15)
+        slip = scipy.optimize.brentq(lambda s: forces(s)[T] - most, -1e4, 1e4, xtol=1e-15)
     return forces(slip)
 
 
@@ -314,7 +314,7 @@ def test_forces_are_those_of_servo_and_soil(soil, load, velocity, droop, share):
         thrust = share * (shear[0] - resistance) + resistance
         return rim - 1.0 + droop / FULL * thrust
 
-    rim = brentq(excess, -50.0, 50.0, xtol=1e-14)
+    rim = scipy.optimize.brentq(excess, -50.0, 50.0, xtol=1e-14)
     assume(abs(rim) > 0.05)  # where the rim stands, a creep keeps the slip regular
     shear, resistance = soil_forces(soil, load, velocity, rim)
     assert velocity[0] - servo.slip[0] == pytest.approx(rim, abs=1e-8)

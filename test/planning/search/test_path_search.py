@@ -35,7 +35,7 @@ from support.rough_grounds import rocky
 from support.rovers import LSR1
 
 OPTIONS = PathQueryOptions(waypoint_spacing=0.04)
-LONG = LatticeSettings(budget=60.0)
+LONG = LatticeSettings(budget=60.0, cell=0.25)
 START, GOAL = (-2.5, 0.0, 0.0), (2.5, 0.0, 0.0)
 
 

@@ -86,7 +86,7 @@ def test_torques_that_hold_the_slope_keep_the_speed_and_more_drive_it_up():
         plant.pull(1.3 * needed, AHEAD, STEP)
     assert plant.pose()[0] > -0.99
     before = plant.pose()[0]
-    for _ in range(300):
+    for _ in range(100):
         plant.pull(0.5 * needed, AHEAD, STEP)
     assert plant.pose()[0] < before
 
@@ -330,11 +330,11 @@ def test_a_curve_is_driven_with_its_wheels_turned(engine, side):
 
 def test_a_turn_on_the_spot_stays_there_and_the_drive_goes_on():
     plant = QuasiStaticPlant(LSR1, plane(0.0, 0.0, half=3.0), (0.0, 0.0, 0.0))
-    away, poses, _ = drive_along(plant, turn_and_go(0.8, 0.2))
+    away, poses, _ = drive_along(plant, turn_and_go(0.5, 0.2))
     assert away < 0.03
-    turning = poses[poses[:, 2] < 0.6]
+    turning = poses[poses[:, 2] < 0.4]
     assert np.abs(turning[:, :2]).max() < 0.02
-    assert poses[-1][2] == pytest.approx(0.8, abs=0.03)
+    assert poses[-1][2] == pytest.approx(0.5, abs=0.03)
 
 
 @ENGINES
