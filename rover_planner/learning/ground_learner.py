@@ -49,6 +49,9 @@ SLIP_SHARE = 0.15
 """Slip over rolling above which a wheel slips; rigid wheels creep by less."""
 SLIP_SPEED = 0.08
 """Slip over the nominal speed above which a wheel slips."""
+GRIP_SHARE, GRIP_EXCESS = 0.3, 0.1
+"""Slip over rolling from which a wheel proves no grip, be its slip certain or not; and tractions
+beyond what holds the rover, over the weight, from which loads are too wrong for that."""
 LASTING = 3
 """Number of windows in a row in which a wheel that slips does."""
 CERTAIN = 5.0
@@ -366,6 +369,10 @@ class GroundLearner:
         tells &= self._turns_freely(window)
         distance = abs(float(find_median(window.travel))) * elapsed
         weights = self._weigh(window, tells, elapsed)
+        forward = np.sign(window.rolling.mean())
+        beyond = abs(window.excess - self._resistance * self._sense.weight * forward)
+        grips = grips & (np.abs(window.ratio) < GRIP_SHARE)
+        grips &= beyond < GRIP_EXCESS * self._sense.weight
         shears = np.abs(tractions) / np.maximum(along, 1e-9) * (1.0 + STICKING_LOSS * sticking)
         noises = loads * np.hypot(LEAST_NOISE, FLUCTUATION_NOISE * fluctuation)
         for one, own in grounds:

@@ -100,6 +100,21 @@ def test_a_torque_that_fluctuates_tells_the_friction_of_a_wheel_that_slips_less_
     assert shaky.high - shaky.low > 1.1 * (steady.high - steady.low)
 
 
+def test_wheels_whose_slip_is_hidden_by_noise_prove_no_friction():
+    rows = climb(ROVER, SLOPE, 20.0)[::5]
+    rows[rows[:, X] > 0.0, RATES] *= 3.0
+    # Two wheels spin with more torque, two with less: the sum still holds the rover.
+    rows[rows[:, X] > 0.0, TORQUES] *= [1.8, 0.2, 1.0, 0.3, 1.8, 1.0]
+    rows[:, X] += 0.01 * np.random.default_rng(1).standard_normal(len(rows))
+    assert learn(rows).estimate.friction.low < 0.9 * SLOPE
+
+
+def test_torques_beyond_what_holds_the_rover_prove_no_friction():
+    rows = climb(ROVER, SLOPE, 20.0)[::5]
+    rows[rows[:, X] > 0.3, TORQUES] *= 2.0  # as where wheels push a face that the map lacks
+    assert learn(rows).estimate.friction.low < 1.2 * SLOPE
+
+
 def test_a_gap_and_a_jump_of_the_odometry_are_no_slip():
     rows = climb(ROVER, SLOPE, 20.0)[::5]
     rows = np.delete(rows, slice(60, 80), axis=0)
