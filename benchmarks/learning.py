@@ -450,6 +450,7 @@ def print_summary(learned: list[Learned]) -> None:
     first = [one.early for one in learned if one.early is not None]
     print(
         f"constant, when slip first bounds it: {np.median([abs(e[0]) for e in first]):.0%} off, "
+        f"within 10 % in {np.mean([abs(e[0]) < 0.1 for e in first]):.0%}, "
         f"interval has it in {np.mean([e[1] for e in first]):.0%} of {len(first)}"
     )
     stuck = [one for one in learned if one.stuck_time is not None]

@@ -21,16 +21,7 @@ from rover_physics.numerics.records import record_type
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.learning.contact_sense import ContactSense
-from rover_planner.learning.drive_log import (
-    PITCH,
-    RATES,
-    SUSPENSION,
-    TIME,
-    TORQUES,
-    WIDTH,
-    X,
-    Y,
-)
+from rover_planner.learning.drive_log import PITCH, RATES, SUSPENSION, TIME, TORQUES, WIDTH, X, Y
 from rover_planner.learning.friction_filter import FrictionEstimate, FrictionFilter
 from rover_planner.learning.ground_map import GroundLayers, GroundMap
 from rover_planner.learning.soil_fit import SoilEstimate, SoilFit
@@ -224,11 +215,10 @@ class GroundLearner:
 
     def _clean(self, row: Floats) -> Floats:
         """Return a row without torques that no motor has."""
-        torques = row[TORQUES]
-        if (np.abs(torques) > SPIKE * self._rover.wheel.max_torque).any():
+        spikes = np.abs(row[TORQUES]) > SPIKE * self._rover.wheel.max_torque
+        if spikes.any():
             row = row.copy()
-            most = SPIKE * self._rover.wheel.max_torque
-            row[TORQUES] = np.where(np.abs(torques) > most, np.nan, torques)
+            row[TORQUES][spikes] = np.nan
         return row
 
     def _jumps(self, row: Floats) -> bool:
@@ -369,8 +359,7 @@ class GroundLearner:
         tells &= self._turns_freely(window)
         distance = abs(float(find_median(window.travel))) * elapsed
         weights = self._weigh(window, tells, elapsed)
-        forward = np.sign(window.rolling.mean())
-        beyond = abs(window.excess - self._resistance * self._sense.weight * forward)
+        beyond = abs(window.excess - float((window.tractions - tractions).sum()))
         grips = grips & (np.abs(window.ratio) < GRIP_SHARE)
         grips &= beyond < GRIP_EXCESS * self._sense.weight
         shears = np.abs(tractions) / np.maximum(along, 1e-9) * (1.0 + STICKING_LOSS * sticking)
