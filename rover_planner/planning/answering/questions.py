@@ -117,12 +117,12 @@ def ask_in_vain(service: str, about: str, reason: str) -> Question:
 
 @dataclass
 class Register:
-    """Numbers the questions of a server, and says what each answer is about."""
+    """Numbers the answers of a server, and says what each is about."""
 
     server: str = field(default_factory=lambda: secrets.token_hex(4))
     """Random text of this run of the server."""
     count: int = 0
-    """Number of the last question."""
+    """Number of the last answer."""
 
     def identify(self, service: str, question_hash: str, snapshot: Snapshot) -> IdentityReport:
         """Return what the answer to the next question is about, without its path.
