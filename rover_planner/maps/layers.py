@@ -3,12 +3,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
 
 from msg_adapters.gridding import most_frequent
 from rover_physics.terrain.grid import Terrain
@@ -41,8 +39,6 @@ EMPTY = {
 """Type and empty value of each layer."""
 ALWAYS = ("elevation", "source", "time")
 """Layers that every window has."""
-INTERPOLATED = ("elevation", "elevation_std")
-"""Layers that are interpolated between cells."""
 LASTING = ("friction", "ground_class")
 """Layers whose values stay where a newer map has none, and are never interpolated."""
 
@@ -207,24 +203,37 @@ def sample_layers(terrain: Terrain, column: Floats, row: Floats) -> dict[str, La
     Heights and deviations are interpolated bilinearly, others are those of the nearest cell. They
     are unknown off the map, and where a cell that counts is unknown.
     """
-    places = np.broadcast_arrays(_snap(row), _snap(column))
+    ny, nx = terrain.elevation.shape
+    below, above, up, on_rows = _bracket(row, ny)
+    left, right, along, on_columns = _bracket(column, nx)
     layers: dict[str, Layer] = {}
     for name, layer in layers_of(terrain).items():
-        _, unknown = EMPTY[name]
-        look = partial(map_coordinates, coordinates=places, mode="constant", cval=unknown)
-        if name in INTERPOLATED:
-            gaps = np.isnan(layer)
-            layers[name] = look(np.where(gaps, 0.0, layer), order=1)
-            layers[name][look(gaps.astype(np.float64), order=1) > 0.0] = unknown
+        kind, unknown = EMPTY[name]
+        if name in ("elevation", "elevation_std"):
+            found = np.zeros(np.broadcast_shapes(below.shape, left.shape))
+            for j, of_row in ((below, 1.0 - up), (above, up)):
+                for i, of_column in ((left, 1.0 - along), (right, along)):
+                    share = of_row * of_column
+                    found += np.where(share == 0.0, 0.0, share * layer[j, i])
         else:
-            layers[name] = look(layer, order=0)
+            found = layer[np.where(up < 0.5, below, above), np.where(along < 0.5, left, right)]
+        layers[name] = np.where(on_rows & on_columns, found, unknown).astype(kind)
     return layers
 
 
-def _snap(place: Floats) -> Floats:
-    """Return fractional indices, those at the centre of a cell as whole numbers."""
+def _bracket(
+    place: Floats, count: int
+) -> tuple[NDArray[np.intp], NDArray[np.intp], Floats, NDArray[np.bool_]]:
+    """Return the lower and upper cell around fractional indices, of `count` cells.
+
+    The third is how far they are beyond the lower one, 0 to 1, the last whether they are on the
+    map.
+    """
     whole = np.rint(place)
-    return np.where(np.abs(place - whole) <= SAME_PLACE, whole, place)
+    place = np.where(np.abs(place - whole) <= SAME_PLACE, whole, place)
+    inside = (place >= 0.0) & (place <= count - 1)
+    first = np.clip(np.floor(place), 0, max(count - 2, 0)).astype(np.intp)
+    return first, np.minimum(first + 1, count - 1), place - first, inside
 
 
 def _combine(terrain: Terrain, grid: CellGrid, box: CellBox) -> Patch:

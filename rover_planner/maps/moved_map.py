@@ -20,6 +20,7 @@ from rover_planner.maps.layers import (
     MAX_OFF_CENTRE,
     SAME_PLACE,
     Floats,
+    layers_of,
     sample_layers,
 )
 
@@ -28,6 +29,9 @@ MAX_LEAN = 0.005
 sideways, by 5 mm for each metre of height."""
 NO_LEAN = 1e-9
 """Lean that is a rounding error [rad]."""
+BAND_CELLS = 16_384
+"""Cells that are laid at once, as numpy keeps Python's lock meanwhile, which questions need."""
+
 
 Move = tuple[Floats, Floats]
 """Place of a map's frame in that of the server, rotation R (3, 3) and translation t (3,) [m]: a
@@ -99,12 +103,17 @@ def _lay_turned(
             f"at most {max_cells} are taken"
         )
     own, (ny, nx) = replace(terrain, soil=None, soil_names=()), terrain.elevation.shape
-    columns, rows = np.arange(box.columns), np.arange(box.rows)[:, None]
-    x, y = grid.places(box.column + columns, box.row + rows)
-    dx, dy = (x - middle[0]) / terrain.resolution, (y - middle[1]) / terrain.resolution
-    column = turn[0] * dx + turn[1] * dy + 0.5 * (nx - 1)
-    row = turn[0] * dy - turn[1] * dx + 0.5 * (ny - 1)
-    laid = sample_layers(own, column, row)
+    laid = {name: np.full((box.rows, box.columns), np.nan) for name in layers_of(own)}
+    band = max(BAND_CELLS // max(box.columns, 1), 1)
+    for first in range(0, box.rows, band):
+        rows = slice(first, min(first + band, box.rows))
+        columns, lines = np.arange(box.columns), np.arange(rows.start, rows.stop)[:, None]
+        x, y = grid.places(box.column + columns, box.row + lines)
+        dx, dy = (x - middle[0]) / terrain.resolution, (y - middle[1]) / terrain.resolution
+        column = turn[0] * dx + turn[1] * dy + 0.5 * (nx - 1)
+        row = turn[0] * dy - turn[1] * dx + 0.5 * (ny - 1)
+        for name, layer in sample_layers(own, column, row).items():
+            laid[name][rows] = layer
     if not np.isfinite(laid["elevation"]).any():
         raise PlanningError(
             "the map is turned against its cells, and none of them has four known ones around"
