@@ -34,14 +34,16 @@ def read_orientation(turn: Any, what: str) -> tuple[float, float, float]:
     return rpy_from_xyzw(xyzw, squared_norm=check_norm(xyzw, what) ** 2)
 
 
-def check_norm(xyzw: tuple[float, float, float, float], what: str) -> float:
-    """Return the norm of a quaternion, which is about 1.
+def check_norm(
+    xyzw: tuple[float, float, float, float], what: str, tolerance: float = NORM_TOLERANCE
+) -> float:
+    """Return the norm of a quaternion, which is 1 within a tolerance.
 
     Raises:
         MessageError: It is not; `what` names it.
     """
     norm = length_of(xyzw)
-    if not abs(norm - 1.0) <= NORM_TOLERANCE:
+    if not abs(norm - 1.0) <= tolerance:
         wrong = f"has length {norm:.3g}" if math.isfinite(norm) else "is not finite"
         raise MessageError(
             f"{describe_quaternion(xyzw, what)} {wrong}; it must be a quaternion of length 1, for "

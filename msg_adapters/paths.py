@@ -22,6 +22,9 @@ from rover_physics.numerics.quaternions import (
 )
 from rover_physics.results.path_prediction import PathPrediction
 
+_NORM_TOLERANCE = 0.005
+"""Largest deviation of a quaternion's norm from 1, as in tf2."""
+
 MAX_POSES = 100_000
 """Largest number of poses of a path; a longer path is refused before it is read. It is the
 largest number of waypoints of a path, one pose for each."""
@@ -53,7 +56,7 @@ def yaw_from_quaternion(quaternion: Quaternion, what: str = "orientation") -> fl
         MessageError: NaN, not of unit length, or the forward axis is vertical.
     """
     xyzw = quaternion.x, quaternion.y, quaternion.z, quaternion.w
-    check_norm(xyzw, what)
+    check_norm(xyzw, what, _NORM_TOLERANCE)
     forward_x, forward_y = forward_from_xyzw(xyzw)
     if math.hypot(forward_x, forward_y) < _MIN_LEVEL:
         text = describe_quaternion(xyzw, what)

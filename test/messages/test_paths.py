@@ -49,6 +49,7 @@ def test_the_heading_of_a_tilted_body_is_its_yaw():
     ("quaternion", "text"),
     [
         ((0.0, 0.0, 0.0, 0.0), "has length 0; it must be a quaternion of length 1"),
+        ((0.0, 0.0, 0.0, 1.008), "has length 1.01; it must be"),
         ((0.0, math.nan, 0.0, 1.0), "is not finite"),
         ((0.0, -math.sqrt(0.5), 0.0, math.sqrt(0.5)), "it has no heading"),
         ((1e155, 0.0, 0.0, 0.0), r"has length 1e\+155; it must be"),
