@@ -63,7 +63,7 @@ class QuestionDesk:
     def __init__(self, node: RoverNode[Any], service: TraverseService, maps: MapTopics):
         """Begin without questions."""
         self._node, self._service, self._maps = node, service, maps
-        self._sender = PacedSender(node.guard)
+        self._sender = PacedSender(node, node.guard)
         self._register = Register()
         self.health = ServerHealth()
         """Counts of answers and faults."""
@@ -159,6 +159,7 @@ class QuestionDesk:
         """Refuse all open questions and end the thread; the refusals have time to leave."""
         count = self.cancel(STOPPING, "the server is shutting down")
         self._queue.close()
+        self._sender.send_all()
         if count:
             time.sleep(LEAVE_TIME)
 
