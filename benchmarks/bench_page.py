@@ -21,7 +21,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, save_terrain
 from rover_planner.command.view import SEED, TERRAIN_SIZE, choose_ends
 from rover_planner.viewer.documents.verdict import describe_verdict
-from rover_planner.viewer.state.judging import JudgeRequest, judge_request
+from rover_planner.viewer.state.judging import judge_steps
 from rover_planner.viewer.state.scenario import Shown
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.worlds.mars_terrain import make_mars_terrain
@@ -69,7 +69,7 @@ def measure_verdict(name: str, terrain: Terrain) -> Figure:
 
     def judge() -> None:
         asked = replace(shown.scenario, rover=replace(rover, friction=next(frictions)))
-        steps = judge_request(JudgeRequest(asked, shown, shown.index))
+        steps = judge_steps(asked, shown, shown.index)
         describe_verdict(next(one for one in steps if isinstance(one, Shown)))
 
     taken = 1000.0 * median_time(judge, TRIES)

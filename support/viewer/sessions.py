@@ -14,7 +14,7 @@ from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.query import LatticeSettings
 from rover_planner.viewer.state.background_work import BackgroundWork, Inbox, Progress
-from rover_planner.viewer.state.judging import JudgeRequest
+from rover_planner.viewer.state.judging import Step
 from rover_planner.viewer.state.scenario import Pose, Scenario, Shown
 from rover_planner.viewer.state.session import REFUSALS, ViewSession
 from support.grounds import make_terrain, waves
@@ -57,13 +57,13 @@ def session_on(
     terrain = ground if isinstance(ground, Terrain) else make_terrain(ground)
     session = ViewSession(rover, terrain, start, goal, options, search)
 
-    def judge(request: JudgeRequest) -> None:
+    def judge(steps: Iterator[Step]) -> None:
         try:
-            for found in session.find_steps(request):
+            for found in steps:
                 if isinstance(found, Shown):
-                    session.take(request, found)
+                    session.take(steps, found)
         except REFUSALS as error:
-            session.take(request, error)
+            session.take(steps, error)
 
     session.judge = judge
     return session
@@ -108,13 +108,13 @@ class Judge:
     def __init__(self, session: ViewSession):
         """Let a session judge in the background; nothing is judged yet."""
         self.session, self._found = session, Inbox[Any]()
-        self.work = BackgroundWork(session.find_steps, lambda *found: self._found.put(found))
+        self.work = BackgroundWork[Any](lambda *found: self._found.put(found))
         session.judge = self.work.ask
 
     def take(self) -> None:
         """Let the session take what was found."""
-        for request, found in self._found.take().values():
-            self.session.take(request, found)
+        for steps, found in self._found.take().values():
+            self.session.take(steps, found)
 
     def finish(self) -> None:
         """Wait until all is judged, and let the session take it."""
@@ -156,28 +156,28 @@ def slow_scenario() -> Scenario:
 
 
 @contextmanager
-def held(background: Any, at: str = "") -> Iterator[None]:
-    """Hold work in the background where it reports that it begins with something.
+def held(session: ViewSession, at: str = "") -> Iterator[None]:
+    """Hold the judgement of a session where it reports that it begins with something.
 
-    What is held can be cancelled, and gives way to newer requests, which are held, too. It goes on
+    What is held can be cancelled, and gives way to newer steps, which are held, too. It goes on
     at the end of the context. So a test can look at work that is under way as long as it takes.
 
     Args:
-        background: The `BackgroundWork`, whose work begins within the context.
+        session: The session, which asks for the judgement within the context.
         at: What is held, such as "searching a way"; empty: all.
     """
-    work, go_on = background._work, threading.Event()
+    find_steps, go_on = session.find_steps, threading.Event()
 
-    def work_and_wait(request):
-        for found in work(request):
+    def find_and_wait(*asked: Any) -> Iterator[Step]:
+        for found in find_steps(*asked):
             yield found
             is_held = isinstance(found, Progress) and at in ("", found.what)
             while is_held and not go_on.wait(0.01):
                 yield found  # which ends work that was stopped
 
-    background._work = work_and_wait
+    session.find_steps = find_and_wait
     try:
         yield
     finally:
         go_on.set()
-        background._work = work
+        session.find_steps = find_steps

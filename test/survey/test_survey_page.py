@@ -15,7 +15,7 @@ from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.survey.layers import CLASS_COLOURS, CLASS_NUMBERS
-from rover_planner.viewer.state.colours import UNKNOWN, from_css
+from rover_planner.viewer.state.colours import UNKNOWN
 from rover_planner.viewer.state.survey_layers import CLASS, load_map, open_survey
 from support.rovers import LSR1
 from support.survey_maps import make_request, survey_here
@@ -51,7 +51,9 @@ def colour_at(shown, name, place):
 
 
 def test_classes_have_the_colours_of_the_picture_and_a_legend_of_those_that_are_there(shown):
-    passable, impassable = (from_css(CLASS_COLOURS[k]) for k in (0, CLASS_NUMBERS["impassable"]))
+    passable, impassable = (
+        tuple(bytes.fromhex(CLASS_COLOURS[k][1:])) for k in (0, CLASS_NUMBERS["impassable"])
+    )
     assert colour_at(shown, CLASS, PASSABLE) == passable
     assert colour_at(shown, CLASS, WALL) == impassable
     assert colour_at(shown, CLASS, HOLE) == UNKNOWN

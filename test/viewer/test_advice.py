@@ -74,14 +74,16 @@ def test_advice_is_sought_when_it_is_asked_for_shown_as_a_ghost_and_taken(page):
     page.hear({"ask": "remedy", "words": place}, None)
     wait_until(lambda: page.channel.parts["verdict"]["passes"], "the verdict with the remedy")
     assert "/lines/ghost" not in page.scene.canvas.nodes
-    assert page.errors.messages == {}
+    assert page.errors == {}
 
 
 def test_a_search_tells_what_was_found_by_a_promised_time_and_that_it_goes_on():
     path, since = session_on(rock_left, *ENDS, OPTIONS).shown.path, 1000.0
     growing = seek_advice(path)
     none, some = next(growing), next(one for one in growing if one.remedies)
-    first, last = (Advised(path, since, one) for one in (none, replace(some, complete=True)))
+    first, last = (
+        Advised(path, growing, since, one) for one in (none, replace(some, complete=True))
+    )
     told = describe_advice(first, True, since + 0.5 * PROMISED)
     assert told["words"] == "tried: nothing yet" and not told["can_ask"]
     for advised, found in ((first, "nothing"), (last, str(len(last.remedies)))):

@@ -11,7 +11,7 @@ import pytest
 
 from rover_planner.planning.path_query import answer_path_query
 from rover_planner.viewer.state.background_work import BackgroundWork, Progress
-from rover_planner.viewer.state.judging import PATH, JudgeRequest, judge_request
+from rover_planner.viewer.state.judging import PATH, judge_steps
 from support.viewer.sessions import Judge, ramp, session_on, slow_scenario
 from support.waiting import start_watch, wait_until
 
@@ -21,24 +21,22 @@ SLOW = slow_scenario()
 """What takes seconds."""
 
 
-def judge_without_end(request):
-    """Judge a request; SLOW again and again, without a result."""
-    while request.scenario is SLOW:
-        yield from (one for one in judge_request(request) if isinstance(one, Progress))
-    yield from judge_request(request)
+def judge_without_end():
+    """Judge SLOW again and again, without a result."""
+    while True:
+        yield from (one for one in judge_steps(SLOW) if isinstance(one, Progress))
 
 
 @pytest.fixture
 def found() -> list:
-    """What work has found: requests, and results or errors."""
+    """What work has found: results or errors."""
     return []
 
 
 @pytest.fixture
 def busy_judge(found):
-    """A thread that judges, and does not end with SLOW by itself; it must end."""
-    take = lambda request, one: found.append((request, one))  # noqa: E731
-    work = BackgroundWork(judge_without_end, take, "judge of this test")
+    """Work that must end, although `judge_without_end` does not by itself."""
+    work = BackgroundWork(lambda _, one: found.append(one), "judge of this test")
     yield work
     assert work.close()
     assert "judge of this test" not in {thread.name for thread in threading.enumerate()}
@@ -51,58 +49,56 @@ def wait_for_idle(work) -> None:
 def test_a_newer_request_stops_at_once_what_follows_a_result(found):
     steps = {"old": 0}
 
-    def count_steps(request):
-        yield "first"
-        while request == "old" and steps["old"] < 1000:
+    def count_steps():
+        yield "old"
+        while steps["old"] < 1000:
             steps["old"] += 1
             yield Progress("step", 1, 1)
             time.sleep(0.005)
-        yield "last"
 
-    work = BackgroundWork(count_steps, lambda *one: found.append(one))
-    work.ask("old")
+    work = BackgroundWork(lambda _, one: found.append(one))
+    work.ask(count_steps())
     wait_until(lambda: steps["old"] > 3, "the old work to begin")
-    work.ask("new")
+    work.ask(iter(["new", "last"]))
     asked_at = steps["old"]
     wait_for_idle(work)
     assert steps["old"] <= asked_at + 2
-    assert found == [("old", "first"), ("new", "first"), ("new", "last")]
+    assert found == ["old", "new", "last"]
     assert work.close()
 
 
 def test_a_first_result_waits_for_no_older_work_and_what_follows_it_does(found):
     go_on = threading.Event()
 
-    def work_on(request):
-        yield "verdict"
-        if request == "old":
-            go_on.wait()
-        yield "rest"
+    def work_on(number):
+        yield number
+        go_on.wait()
+        yield f"rest of {number}"
 
-    work, asked = BackgroundWork(work_on, lambda *one: found.append(one)), ["old", "new", "old"]
-    for count, request in enumerate(asked, 1):
-        work.ask(request)
-        wait_until(lambda count=count: len(found) == count, "the verdict")
-    assert found == [(request, "verdict") for request in asked] and work.progress
+    work, asked = BackgroundWork(lambda _, one: found.append(one)), [1, 2, 3]
+    for number in asked:
+        work.ask(work_on(number))
+        wait_until(lambda count=number: len(found) == count, "the verdict")
+    assert found == asked and work.progress
     go_on.set()
     wait_for_idle(work)
-    assert found[3:] == [("old", "rest")]
+    assert found[3:] == ["rest of 3"]
     assert work.close()
 
 
 def test_the_time_of_a_newer_request_does_not_count_from_the_result_of_an_older_one(found):
     go_on = threading.Event()
 
-    def work_on(request):
-        if request == "new":
+    def work_on(is_new):
+        if is_new:
             go_on.wait()
         yield "verdict"
         go_on.wait()
 
-    work = BackgroundWork(work_on, lambda *one: found.append(one))
-    work.ask("old")
+    work = BackgroundWork(lambda _, one: found.append(one))
+    work.ask(work_on(False))
     wait_until(lambda: found and work.progress.seconds > 0.5, "time without a result")
-    work.ask("new")
+    work.ask(work_on(True))
     assert work.progress.seconds < 0.5
     go_on.set()
     wait_for_idle(work)
@@ -112,18 +108,18 @@ def test_the_time_of_a_newer_request_does_not_count_from_the_result_of_an_older_
 @pytest.mark.timed
 def test_cancelled_work_stops_soon_and_is_never_delivered(busy_judge, found):
     quick = session_on(ramp).wanted
-    busy_judge.ask(JudgeRequest(SLOW))
+    busy_judge.ask(judge_without_end())
     wait_until(lambda: busy_judge.progress.step == 2, "the second path")
     assert busy_judge.progress.describe() == f"{PATH} 2 of 3"
     passed = start_watch()
     assert busy_judge.cancel()
     assert busy_judge.progress is None and not busy_judge.cancel()
-    busy_judge.ask(JudgeRequest(quick))
+    busy_judge.ask(judge_steps(quick))
     wait_until(lambda: busy_judge.progress is None or busy_judge.progress.what, "the next work")
     assert passed() < STOP_TIME
     wait_for_idle(busy_judge)
-    assert {request.scenario for request, _ in found} == {quick}
-    busy_judge.ask(JudgeRequest(SLOW))
+    assert {shown.scenario for shown in found} == {quick}
+    busy_judge.ask(judge_without_end())
     wait_until(lambda: busy_judge.progress.what, "the work to begin")
     passed = start_watch()
     assert busy_judge.close()
@@ -132,16 +128,15 @@ def test_cancelled_work_stops_soon_and_is_never_delivered(busy_judge, found):
 
 @pytest.mark.parametrize("error", [MemoryError(), SystemExit(3)])
 def test_an_error_is_delivered_and_what_is_asked_next_is_done(error, found):
-    def fail_or_answer(request):
-        if request:
-            raise error
-        yield "answer"
+    def fail():
+        raise error
+        yield
 
-    work = BackgroundWork(fail_or_answer, lambda *one: found.append(one))
-    for fails in (True, False):
-        work.ask(fails)
+    work = BackgroundWork(lambda _, one: found.append(one))
+    for steps in (fail(), iter(["answer"])):
+        work.ask(steps)
         wait_for_idle(work)
-    assert found == [(True, error), (False, "answer")]
+    assert found == [error, "answer"]
     assert work.close()
 
 
@@ -149,8 +144,8 @@ def test_a_process_ends_although_work_runs_in_it():
     code = (
         "import itertools, time\n"
         "from rover_planner.viewer.state.background_work import BackgroundWork, Progress\n"
-        "work = BackgroundWork(lambda _: itertools.repeat(Progress('on', 1, 1)), print)\n"
-        "work.ask('for ever')\n"
+        "work = BackgroundWork(print)\n"
+        "work.ask(itertools.repeat(Progress('on', 1, 1)))\n"
         "while not work.progress.what: time.sleep(0.01)\n"
         "print('end', flush=True)\n"
     )

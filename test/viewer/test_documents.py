@@ -21,7 +21,7 @@ from rover_planner.viewer.documents.drive import (
 from rover_planner.viewer.documents.rover import compare_drives, describe_sliders, read_values
 from rover_planner.viewer.documents.verdict import describe_paths, describe_verdict
 from rover_planner.viewer.state.numbers import plain, write_use
-from rover_planner.viewer.state.path_limits import ShownLimit
+from rover_planner.viewer.state.path_limits import Lane
 from rover_planner.viewer.state.scenario import Judged
 from support.grounds import gap, make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, SURE, ramp, session_on
@@ -88,11 +88,11 @@ def test_board_lanes_curves_and_verdict_show_one_number_for_the_wheel_that_fails
     failure, end = path.failure, path.trajectory.times[-1]
     assert failure.code == "friction" and failure.link in WHEELS
     use = float(path.limits.lane("friction").used[failure.row])
-    words = ShownLimit("friction", "friction", 1.0).compare(failure.value)
-    assert failure.headline == f"{words}, {failure.where}"
+    words = path.limits.lane("friction").compare(failure.row)
+    assert failure.headline == f"{words}, {failure.link.replace('_', ' ')} wheel"
     told = words.replace("friction", "utilisation").replace(" of ", ", limit ")
     assert failure.link in path.verdict.reason and told in path.verdict.reason
-    wheel, codes = WHEELS.index(failure.link), [lane.limit.code for lane in path.limits.lanes]
+    wheel, codes = WHEELS.index(failure.link), [lane.code for lane in path.limits.lanes]
     board = describe_board(failure.state, failure.link)["wheels"][wheel]
     assert board["fails"] and board["bars"][0][2] == write_use(use)
     used = describe_uses(path, end)[codes.index("friction")]
@@ -184,9 +184,7 @@ def test_a_use_without_bound_is_above_the_limit_in_its_curve():
     path = judged_on(gap)
     lane = path.limits.lane(path.failure.code)
     assert np.isinf(lane.used).any()
-    [told] = (
-        one for one in describe_limits(path, None)["lanes"] if one["code"] == lane.limit.code
-    )
+    [told] = (one for one in describe_limits(path, None)["lanes"] if one["code"] == lane.code)
     assert told["now"]["y"][0][-1] > 1.0
 
 
@@ -207,7 +205,8 @@ def test_a_peak_between_points_of_a_curve_is_kept():
     ],
 )
 def test_as_many_digits_as_tell_a_value_from_its_limit_and_words_where_none_do(value, words):
-    assert ShownLimit("friction", "friction", 1.0).compare(value) == words
+    values, bounds = np.array([value]), np.ones(1)
+    assert Lane("friction", "friction", values, values, bounds).compare(0) == words
 
 
 def test_a_use_that_is_above_the_limit_never_reads_as_one_at_it():
@@ -219,7 +218,8 @@ def test_a_use_that_is_above_the_limit_never_reads_as_one_at_it():
 
 def test_with_speed_servos_friction_is_no_number_that_a_passing_path_may_cross():
     for policy, bound in ((EQUAL, LSR1.limits.friction_utilisation), (SERVO, None)):
-        assert judged_on(ramp, policy=policy).limits.lane("friction").limit.bound == bound
+        bounds = judged_on(ramp, policy=policy).limits.lane("friction").bounds
+        assert bounds is None if bound is None else (bounds == bound).all()
 
 
 # The failure.
@@ -274,7 +274,7 @@ def test_the_joint_that_ends_a_path_is_named_by_its_failure_and_by_the_uses():
     turned = np.abs(failure.state.here.bogie_angle[0])
     assert failure.code == "suspension" and turned.max() > 0.01
     assert failure.link == f"bogie_{SIDES[int(turned.argmax())]}"
-    joints = [lane.limit.code for lane in path.limits.lanes].index("suspension")
+    joints = [lane.code for lane in path.limits.lanes].index("suspension")
     assert describe_uses(path, np.inf)[joints]["link"] == failure.link.replace("_", " ")
 
 

@@ -53,7 +53,7 @@ def visitor(page, browser):
     """A visitor of the page; neither may tell an error at the end."""
     opened = Visitor(browser, page.url)
     yield opened
-    assert opened.page_errors == [] and page.errors.messages == {}
+    assert opened.page_errors == [] and page.errors == {}
 
 
 def find_refused(page: Page) -> int:
@@ -195,7 +195,7 @@ def test_a_button_that_is_pressed_while_what_it_stands_on_is_told_anew_takes_the
 ):
     visitor.press("To the start")
     visitor.tab.wait_for_timeout(4000)  # the longest press is 5 s: this one must not end the next
-    with held(page._judging):
+    with held(page.session):
         page.hear({"ask": "value", "label": FRICTION, "value": 0.75}, None)
         visitor.tab.get_by_role("button", name="Cancel").hover()
         visitor.tab.mouse.down()

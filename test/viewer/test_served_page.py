@@ -151,7 +151,7 @@ def test_a_rover_file_and_a_preset_are_loaded_and_the_arm_follows(page):
 
 def test_while_a_change_is_judged_the_verdict_and_the_paths_are_grey_and_it_can_be_cancelled(page):
     session, shown = page.session, page.session.shown
-    with held(page._judging):
+    with held(page.session):
         change_friction(page, 0.75)
         wait_until(lambda: told(page, "verdict")["judging"], "the notice")
         assert told(page, "verdict")["old"].startswith("judging path")
@@ -316,7 +316,7 @@ def test_a_drawing_that_fails_is_told_and_stops_no_other_and_what_is_drawn_is_no
 
     ask(page, ask_for_four)
     assert done == ["paths", "rover"]
-    assert "ZeroDivisionError" in page.errors.messages.pop("the plots")
+    assert "ZeroDivisionError" in page.errors.pop("the plots")
 
 
 def test_a_failed_request_is_told_until_a_request_succeeds(page):
@@ -398,7 +398,7 @@ def test_a_link_with_unknown_names_is_refused_and_nothing_else_changes(page, cha
     query = write_link(replace(page._link(), **change))
     page.hear({"ask": "open", "query": f"?{query}"}, None)
     wait_until(lambda: page.session.refusal.startswith(reason), "the reason")
-    assert page.session.wanted is wanted and page.errors.messages == {}
+    assert page.session.wanted is wanted and page.errors == {}
 
 
 def test_a_link_that_would_be_longer_than_an_address_may_be_is_refused(page, monkeypatch):

@@ -11,7 +11,7 @@ from rover_planner.planning.search.path_search import FOUND, NO_WAY
 from rover_planner.planning.search.query import LatticeSettings
 from rover_planner.viewer.documents.verdict import describe_verdict
 from rover_planner.viewer.state.background_work import Progress
-from rover_planner.viewer.state.judging import BETTER, SEARCH, JudgeRequest, judge_request
+from rover_planner.viewer.state.judging import BETTER, SEARCH, judge_steps
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, wall_with_gap, waves
 from support.viewer.sessions import LSR1, Judge, held, session_on
@@ -38,7 +38,7 @@ def whole_wall(x, y):
 
 def list_steps(session: ViewSession) -> list[str | int]:
     """Return what is begun, and how many paths each result has, when all is judged."""
-    steps = judge_request(JudgeRequest(session.wanted))
+    steps = judge_steps(session.wanted)
     return [one.what if isinstance(one, Progress) else len(one.paths) for one in steps]
 
 
@@ -112,7 +112,7 @@ def judge() -> Iterator[Judge]:
 
 def test_a_search_can_be_cancelled_and_begun_again_and_a_chosen_path_stays_meanwhile(judge):
     session, work = judge.session, judge.work
-    with held(work, SEARCH):
+    with held(session, SEARCH):
         session.plan_to(BEYOND)
         wait_until(lambda: work.progress.what == SEARCH, "the search", 60.0)
         judge.take()

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Advice on the path that is looked at: sought, told beside the reason of a refusal, and taken."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,6 +8,7 @@ from rover_planner.advice.advise import Advice, grow_advice
 from rover_planner.advice.case import case_of
 from rover_planner.advice.remedy import Remedy
 from rover_planner.planning.assumptions import assume
+from rover_planner.viewer.state.background_work import Steps
 from rover_planner.viewer.state.scenario import Judged, Scenario
 
 PROMISED = 20.0
@@ -21,6 +21,8 @@ class Advised:
 
     path: Judged
     """The path."""
+    steps: Steps[Advice]
+    """What seeks the advice."""
     since: float
     """When a visitor asked for advice, on the monotonic clock [s]."""
     advice: Advice | None = None
@@ -55,7 +57,7 @@ def apply_remedy(scenario: Scenario, remedy: Remedy) -> Scenario:
     )
 
 
-def seek_advice(path: Judged) -> Iterator[Advice]:
+def seek_advice(path: Judged) -> Steps[Advice]:
     """Yield advice on a path that grows."""
     asked = path.scenario
     return grow_advice(case_of(asked.rover, asked.terrain, path.poses, asked.asked_options))

@@ -45,13 +45,13 @@ def describe_limits(
     rows, stands = limits.rows, limits.rows.prediction.settled
     lanes = []
     for lane in limits.lanes:
-        code, old = lane.limit.code, None
+        code, old = lane.code, None
         if before is not None and code != CHANCE:
             old = _pick_points(before.rows.distance, before.lane(code).used[:, None])
         lanes.append(
             {
                 "code": code,
-                "title": lane.limit.title,
+                "title": lane.title,
                 "now": _pick_points(rows.distance, lane.used[:, None]),
                 "wheels": None
                 if lane.wheels is None
@@ -62,7 +62,7 @@ def describe_limits(
     loads = rows.prediction.wheel_loads[stands]
     return {
         "end": round(end, 4),
-        "code": "" if failure is None else limits.lane(failure.code).limit.code,
+        "code": "" if failure is None else limits.lane(failure.code).code,
         "compared": reference is not None,
         "lanes": lanes,
         "loads": _pick_points(rows.distance[stands], loads, 1),
@@ -93,15 +93,12 @@ def write_chance(chance: FailureChance) -> str:
 
 
 def _describe_use(lane: Lane, limits: PathLimits, worst: int, here: int) -> dict[str, Any]:
-    kept = float(limits.rows.prediction.results["kept_share"][max(worst, 0)])
-    limit = lane.limit.keep(kept) if np.isfinite(kept) else lane.limit
     used = float(lane.used[worst]) if worst >= 0 else np.nan
-    value = float(lane.values[worst]) if worst >= 0 else np.nan
     return {
         "now": write_use(float(lane.used[here])),
         "worst": write_use(used),
         "broken": bool(used > 1.0),
-        "value": "" if np.isnan(value) else f"{write(value, limit.unit.digits)}, {limit.good}",
+        "value": lane.write_value(worst) if worst >= 0 else "",
         "link": limits.find_link(lane, worst).replace("_", " ") if used > 0.0 else "",
     }
 

@@ -85,8 +85,8 @@ def compare_drives(before: Judged, now: Judged) -> list[list[str]]:
     rows = [[name, read(before), read(now)] for name, read in reads.items()]
     for lane in now.limits.lanes:
         uses = [
-            write_use(float(np.fmax.reduce(one.limits.lane(lane.limit.code).used)))
+            write_use(float(np.fmax.reduce(one.limits.lane(lane.code).used)))
             for one in (before, now)
         ]
-        rows.append([lane.limit.title, *uses])
+        rows.append([lane.title, *uses])
     return [row for row in rows if row[0] == "verdict" or row[1] != row[2]]

@@ -102,7 +102,7 @@ def _describe_row(path: Judged, number: int, waits: str, best: bool) -> dict[str
     verdict, length = path.verdict, f"{path.candidate.length:.2f}"
     limits = path.limits
     uses = [float(np.nanmax(one.used, initial=0.0)) for one in limits.lanes]
-    most = limits.lanes[int(np.argmax(uses))].limit.title
+    most = limits.lanes[int(np.argmax(uses))].title
     word = "passes" if verdict.traversable else "refused"
     return {
         "number": number,

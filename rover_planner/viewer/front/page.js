@@ -37,11 +37,10 @@ const key = (look, words) => make("span", { class: "key" }, make("i", look), wor
 // ---- The channel.
 
 let socket = null;
-let held = null; // parts that wait while something is pressed: drawn anew, it would lose the click
-let pressed = 0; // timer that ends the press
+let pressed = 0; // timer of a press, in which nothing is drawn: drawn anew, it would lose the click
+let waits = false; // true until the picture of FIRST
 const FIRST = ["subject", "verdict"]; // what a person waits for; a picture of it comes before all else
-const later = new Set(); // names of the parts that are drawn after it
-let waits = false; // true until that picture
+const waiting = new Set(); // names of the parts that are not drawn yet
 
 function ask(question) {
   if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(question));
@@ -60,25 +59,17 @@ function showLost(is) {
 }
 
 function take(parts) {
-  if (held) { Object.assign(held, parts); return; }
   Object.assign(state, parts);
-  if ("program" in parts) greet(parts.program);
-  const first = FIRST.filter((name) => name in parts);
-  first.forEach((name) => DRAW[name](parts[name]));
-  for (const name of Object.keys(parts)) if (!first.includes(name)) later.add(name);
-  if (first.length && !waits) {
+  for (const name of Object.keys(parts)) waiting.add(name);
+  if (FIRST.some((name) => name in parts)) {
+    draw(FIRST);
+    if (!waits) requestAnimationFrame(() => setTimeout(() => { waits = false; draw(); }));
     waits = true;
-    requestAnimationFrame(() => setTimeout(drawLater));
-  } else if (!waits) drawLater();
+  } else if (!waits) draw();
 }
 
-function drawLater() {
-  const names = [...later];
-  waits = false;
-  later.clear();
-  if (held) { held = { ...Object.fromEntries(names.map((name) => [name, state[name]])), ...held }; return; }
-  for (const name of names) if (DRAW[name]) DRAW[name](state[name]);
-  if (names.includes("offers")) openTab(chosen.tab);
+function draw(names = [...waiting]) {
+  for (const name of pressed ? [] : names) if (waiting.delete(name)) DRAW[name]?.(state[name]);
 }
 
 // A program that was started again knows nothing of what was changed: take that up.
@@ -102,8 +93,8 @@ const DRAW = {
   subject: drawSubject, errors: drawErrors, scene: drawScene, verdict: drawVerdict, advice: drawAdvice,
   paths: drawPaths, sliders: drawSliders, values: drawValues, changes: drawChanges,
   limits: drawLimits, uses: drawUses, board: drawBoard, drive: drawDrive,
-  legend: drawLegend, chosen: drawChosen, offers: drawChosen, topics: drawTopics, learned: drawLearned,
-  file: saveFile, link: drawShare, current: (link) => { chosen.link = link; }, written: drawShare,
+  legend: drawLegend, chosen: drawChosen, offers: drawOffers, topics: drawTopics, learned: drawLearned,
+  program: greet, file: saveFile, link: drawShare, current: (link) => { chosen.link = link; }, written: drawShare,
 };
 
 function drawSubject(facts) {
@@ -271,6 +262,11 @@ function drawChosen() {
   at("chosen").replaceChildren(...rows);
   drawShare();
   if (state.changes) drawChanges(state.changes);
+}
+
+function drawOffers() {
+  drawChosen();
+  openTab(chosen.tab);
 }
 
 // ---- Limits: lanes, curves, and their uses at the time that is shown.
@@ -488,15 +484,12 @@ document.addEventListener("keydown", (event) => {
   ask(question);
 });
 function release() {
-  const parts = held;
-  held = null;
-  if (parts) take(parts);
+  clearTimeout(pressed);
+  pressed = 0;
+  draw();
 }
 document.addEventListener("pointerdown", (event) => {
-  if (!event.target.closest("button, [tabindex], tbody")) return;
-  held = held || {};
-  clearTimeout(pressed); // that of an earlier press
-  pressed = setTimeout(release, PRESS);
+  if (event.target.closest("button, [tabindex], tbody")) pressed = setTimeout(release, PRESS);
 });
 for (const end of ["pointerup", "pointercancel"]) document.addEventListener(end, () => setTimeout(release));
 document.addEventListener("click", (event) => {

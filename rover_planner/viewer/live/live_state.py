@@ -136,19 +136,9 @@ class LiveData:
     """The ages of all topics by name."""
 
     @property
-    def odometry(self) -> TopicAge:
-        """The age of the odometry, without which nothing here is live."""
-        return self.ages.get(ODOMETRY, TopicAge(ODOMETRY, None, True))
-
-    @property
-    def server(self) -> TopicAge:
-        """The age of the server's last sign of life."""
-        return self.ages.get(SIGN_OF_LIFE, TopicAge(SIGN_OF_LIFE, None, True))
-
-    @property
     def freshness(self) -> str:
         """Whether rover and server are live, in words."""
-        odometry, server = self.odometry, self.server
+        odometry, server = self.ages[ODOMETRY], self.ages[SIGN_OF_LIFE]
         if odometry.age is None:
             return "waiting for odometry"
         if odometry.is_stale:
@@ -165,7 +155,7 @@ def read_state(rover: Rover, data: LiveData) -> RoverState | None:
     """
     if data.position is None:
         return None
-    is_live = not data.odometry.is_stale
+    is_live = not data.ages[ODOMETRY].is_stale
     efforts, forces = (data.efforts, data.forces) if is_live else ({}, {})
     torques = np.array([efforts.get(name, np.nan) for name in WHEEL_JOINTS])
     return place_state(
@@ -199,7 +189,7 @@ def choose_answer(
         The answer as `describe_verdict` returns one, old if nobody stands for it any more; (n, 3)
         poses of its plan, None without one.
     """
-    newest, click, server, offers = data.newest, data.click, data.server, []
+    newest, click, server, offers = data.newest, data.click, data.ages[SIGN_OF_LIFE], []
     shown = newest if click is None else click
     passes = None if shown is None else shown.traversable
     if shown is None:

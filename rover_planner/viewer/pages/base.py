@@ -6,7 +6,7 @@ import threading
 import time
 import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from typing import Any
@@ -21,20 +21,8 @@ from rover_planner.errors import PlanningError
 from rover_planner.viewer.front.channel import Channel, Mailbox, Part
 from rover_planner.viewer.scene.ground_mesh import intersect_ground, paint
 from rover_planner.viewer.scene.scene import START, VIEWS, Scene
-from rover_planner.viewer.state.background_work import (
-    BackgroundWork,
-    Inbox,
-    Progress,
-    Request,
-    Result,
-)
-from rover_planner.viewer.state.layers import (
-    PREDICTED,
-    Colouring,
-    LayerRequest,
-    Legend,
-    list_layers,
-)
+from rover_planner.viewer.state.background_work import BackgroundWork, Inbox, Result, Steps, Take
+from rover_planner.viewer.state.layers import PREDICTED, Colouring, LayerRequest, list_layers
 from rover_planner.viewer.state.session import REFUSALS
 from rover_planner.viewer.state.survey_layers import ShownSurvey
 
@@ -59,37 +47,6 @@ HOTKEYS: dict[Any, tuple[str, Words]] = {
 CONTINUOUS = ("value", "seek", "place")
 """Words that come dozens of times a second while a slider is dragged."""
 MAX_PORT = 65535
-
-
-class Errors:
-    """Runs parts of the page's work; an error in one of them is told and stops no other."""
-
-    def __init__(self, tell: Callable[[list[list[str]]], None]):
-        """Tell nothing yet; `tell` shows what failed and why."""
-        self._tell = tell
-        self.messages: dict[str, str] = {}
-        """The messages by what failed; each stays until the same part succeeds."""
-
-    def run(self, failure: str, work: Action) -> None:
-        """Run some work.
-
-        Args:
-            failure: What is told of an error, such as "the paths are not drawn".
-            work: The work.
-        """
-        message = ""
-        try:
-            work()
-        except REFUSALS as error:
-            message = str(error)
-        except Exception as error:
-            message = f"{type(error).__name__}: {error}"
-            if self.messages.get(failure) != message:
-                traceback.print_exc()
-        if self.messages.get(failure, "") != message:
-            self.messages.pop(failure, None)
-            self.messages |= {failure: message} if message else {}
-            self._tell([[what, why] for what, why in self.messages.items()])
 
 
 class PageBase(ABC):
@@ -130,7 +87,8 @@ class PageBase(ABC):
             self.channel = Channel(self._host, 0, self.hear)
         scene_port = self.channel.port + 1 if port and self.channel.port < MAX_PORT else 0
         self.server = viser.ViserServer(self._host, scene_port, label="camera", verbose=False)
-        self.errors = Errors(lambda messages: self.channel.tell("errors", messages))
+        self.errors: dict[str, str] = {}
+        """Why parts of its work have failed; each stays until the same part succeeds."""
         self.works: list[BackgroundWork] = []
         """What works in the background."""
         self._made_of: dict[str, tuple[Any, ...]] = {}
@@ -138,7 +96,7 @@ class PageBase(ABC):
         self.scene.canvas.move_to(terrain)
         self.scene.rover.take(rover, {})
         self._add_camera()
-        self.painter = self.begin_work(partial(paint, survey=survey), self._draw_ground, "ground")
+        self.painter = self.begin_work(self._draw_ground, "ground")
         keys = {key: words for key, (_, words) in HOTKEYS.items()}
         self.channel.tell("scene", {"port": self.server.get_port(), "keys": keys})
         self._last = time.monotonic()
@@ -191,30 +149,25 @@ class PageBase(ABC):
         for name, part in parts.items() if mailbox is not None else ():
             mailbox.put(part, name)  # type: ignore[union-attr]
 
-    def begin_work(
-        self,
-        work: Callable[[Request], Iterator[Progress | Result]],
-        take: Callable[[Request, Result | BaseException], object],
-        name: str,
-    ) -> BackgroundWork[Request, Result]:
+    def begin_work(self, take: Take[Result], name: str) -> BackgroundWork[Result]:
         """Return work in threads of a name; what it finds is taken by the page's thread.
 
         The work waits until that is drawn: what it finds next would slow down the drawings.
         """
 
-        def hand_over(request: Request, found: Result | BaseException) -> None:
+        def hand_over(steps: Steps[Result], found: Result | BaseException) -> None:
             drawn = threading.Event()
 
             def take_and_tell() -> None:
                 try:
-                    take(request, found)
+                    take(steps, found)
                 finally:
                     drawn.set()
 
             self.requests.put(take_and_tell)
             drawn.wait(DRAWING_TIME)
 
-        begun = BackgroundWork(work, hand_over, name)
+        begun = BackgroundWork(hand_over, name)
         self.works.append(begun)
         return begun
 
@@ -265,11 +218,9 @@ class PageBase(ABC):
         """Begin to colour the ground."""
         request = self.describe_ground()
         if request is not None:
-            self.painter.ask(request)
+            self.painter.ask(paint(request, self.survey))
 
-    def _draw_ground(
-        self, _request: LayerRequest, painted: tuple[bytes, Legend] | BaseException
-    ) -> None:
+    def _draw_ground(self, _steps: Any, painted: Any) -> None:
         def draw() -> None:
             if isinstance(painted, BaseException):
                 raise painted
@@ -277,7 +228,7 @@ class PageBase(ABC):
             self.scene.draw_ground(file)
             self.channel.tell("legend", asdict(legend))
 
-        self.errors.run("the ground is not drawn", draw)
+        self.run("the ground is not drawn", draw)
 
     def _colour(self, words: Words) -> None:
         if words["layer"] not in self.layers:
@@ -331,16 +282,37 @@ class PageBase(ABC):
         due = self._last + PERIOD
         self.requests.wait(due - time.monotonic())
         for action in self.requests.take().values():
-            self.errors.run("the last request failed", partial(self._fulfil, action))
+            self.run("the last request failed", partial(self._fulfil, action))
         self.tell_all()
         now = time.monotonic()
         passed, self._last = now - self._last, now
         with self.server.atomic():  # one message to wake the server for all that is sent
-            self.errors.run("drawing stopped", partial(self.advance, passed))
+            self.run("drawing stopped", partial(self.advance, passed))
+
+    def run(self, failure: str, work: Action) -> None:
+        """Do a part of the page's work; an error in it is told, and stops no other.
+
+        Args:
+            failure: What is told of an error, such as "the paths are not drawn".
+            work: The part.
+        """
+        message = ""
+        try:
+            work()
+        except REFUSALS as error:
+            message = str(error)
+        except Exception as error:
+            message = f"{type(error).__name__}: {error}"
+            if self.errors.get(failure) != message:
+                traceback.print_exc()
+        if self.errors.get(failure, "") != message:
+            self.errors.pop(failure, None)
+            self.errors |= {failure: message} if message else {}
+            self.channel.tell("errors", [[what, why] for what, why in self.errors.items()])
 
     def tell_all(self) -> None:
         """Tell what is shown, or that it is old."""
-        self.errors.run("what is shown is old", self.tell)
+        self.run("what is shown is old", self.tell)
 
     def has_changed(self, name: str, *made_of: Any) -> bool:
         """Return whether something is made of other objects than when this was asked last."""
@@ -362,7 +334,7 @@ class PageBase(ABC):
         """
         if self.has_changed(failure, *made_of):
             with self.server.atomic():
-                self.errors.run(failure, partial(draw, *made_of))
+                self.run(failure, partial(draw, *made_of))
 
     def _fulfil(self, request: Action) -> None:
         """Act on a request, or say why not."""

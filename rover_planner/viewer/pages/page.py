@@ -2,7 +2,7 @@
 """The page that plans: what visitors ask of the session, and one function that shows its state."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, replace
 from functools import cached_property, partial
 from typing import Any
@@ -16,38 +16,16 @@ from rover_planner.advice.advise import Advice
 from rover_planner.advice.remedy import Remedy
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import read_rover, write_rover
-from rover_planner.viewer.documents.advice import (
-    Advised,
-    apply_remedy,
-    describe_advice,
-    seek_advice,
-)
-from rover_planner.viewer.documents.drive import (
-    describe_board,
-    describe_limits,
-    describe_uses,
-)
-from rover_planner.viewer.documents.rover import (
-    JOINTS,
-    describe_changes,
-    describe_sliders,
-    describe_values,
-    list_sliders,
-)
-from rover_planner.viewer.documents.verdict import (
-    POLICY_TITLES,
-    describe_paths,
-    describe_subject,
-    describe_verdict,
-)
+from rover_planner.viewer.documents import advice, drive, rover, verdict
 from rover_planner.viewer.pages import sharing
 from rover_planner.viewer.pages.base import PERIOD, Answer, PageBase
 from rover_planner.viewer.scene.overlays import GHOST
 from rover_planner.viewer.scene.scene import FIT
+from rover_planner.viewer.state.background_work import Steps
 from rover_planner.viewer.state.drive import SPEEDS, Playback
-from rover_planner.viewer.state.judging import JudgeRequest
+from rover_planner.viewer.state.judging import Step
 from rover_planner.viewer.state.layers import Colouring, LayerRequest
-from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
+from rover_planner.viewer.state.scenario import Scenario, Shown
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.survey_layers import ShownSurvey
 
@@ -87,15 +65,15 @@ class Page(PageBase):
         """The link whose path and time are not shown yet, and what it asks for."""
         self._told_at = 0.0
         super().__init__(session.wanted.rover, session.wanted.terrain, (host, port), survey)
-        self._advice = self.begin_work(seek_advice, self._take_advice, "advice")
-        self._judging = self.begin_work(session.find_steps, self._take_judged, "judge")
+        self._advice = self.begin_work(self._take_advice, "advice")
+        self._judging = self.begin_work(self._take_judged, "judge")
         session.judge = self._judging.ask
-        self._advised: Advised | None = None
+        self._advised: advice.Advised | None = None
         """The path that is looked at and the advice on it; None if it was not asked for."""
         offers = {
             "presets": list(preset_names()),
             "soils": list(load_soils()),
-            "policies": [[name, title] for name, title in POLICY_TITLES.items()],
+            "policies": [[name, title] for name, title in verdict.POLICY_TITLES.items()],
             "speeds": list(SPEEDS),
         }
         self.channel.tell("offers", self.list_layers() | offers)
@@ -167,14 +145,14 @@ class Page(PageBase):
 
     def _change_value(self, label: str, number: float) -> None:
         """Change a number of the rover, or turn a joint, by the label of its slider."""
-        parts = list_sliders(self.session.wanted.loaded).values()
+        parts = rover.list_sliders(self.session.wanted.loaded).values()
         found = [one for values in parts for one in values if one.label == label]
         if not found:
             raise PlanningError(f"the rover has no number {label!r}")
         (one,) = found
         number = min(max(number, one.low), one.high)
         kind, *name = one.keys[0]
-        if kind == JOINTS:
+        if kind == rover.JOINTS:
             self.session.change_arm(str(name[0]), number)
         else:
             self.session.change_rover(one.keys, number)
@@ -195,13 +173,13 @@ class Page(PageBase):
     def _advise(self) -> None:
         """Seek advice on the path that is looked at."""
         path = self.session.shown.path
-        self._advised = Advised(path, time.monotonic())
-        self._advice.ask(path)
+        self._advised = advice.Advised(path, advice.seek_advice(path), time.monotonic())
+        self._advice.ask(self._advised.steps)
 
-    def _take_advice(self, path: Judged, found: Advice | BaseException) -> None:
+    def _take_advice(self, steps: Steps[Advice], found: Advice | BaseException) -> None:
         if isinstance(found, BaseException):
             raise PlanningError(f"no advice: {found}")
-        if self._advised is not None and path is self._advised.path:
+        if self._advised is not None and steps is self._advised.steps:
             self._advised = replace(self._advised, advice=found)
 
     def _find_remedy(self, words: str) -> Remedy:
@@ -219,7 +197,7 @@ class Page(PageBase):
         """Judge the path with the levers of a remedy set."""
         remedy = self._find_remedy(words)
         self._show_ghost(None)
-        self.session.take_change(apply_remedy(self.session.wanted, remedy))
+        self.session.take_change(advice.apply_remedy(self.session.wanted, remedy))
 
     # Files and links.
 
@@ -247,17 +225,17 @@ class Page(PageBase):
 
     def _tell_link(self) -> dict[str, Any]:
         """Return the link to what is shown, for the visitor who asks for it."""
-        query, rover = sharing.write_link(self._link()), self.session.shown.scenario.rover.name
+        query, name = sharing.write_link(self._link()), self.session.shown.scenario.rover.name
         if not query:
             raise PlanningError(
-                f"the link with the file of {rover} would be longer than an address may be, "
+                f"the link with the file of {name} would be longer than an address may be, "
                 f"{sharing.MAX_LENGTH} characters; save the rover file and the HTML file instead"
             )
         return {"link": query}
 
     def _save_rover(self) -> dict[str, Any]:
-        rover = self.session.wanted.rover
-        return _file(f"{rover.name.removesuffix('.yaml')}.yaml", write_rover(rover))
+        model = self.session.wanted.rover
+        return _file(f"{model.name.removesuffix('.yaml')}.yaml", write_rover(model))
 
     def _save_page(self, base: str) -> dict[str, Any]:
         """Return the page as a file; the rover goes to where the path is refused if it is."""
@@ -266,9 +244,9 @@ class Page(PageBase):
             self.playback.go_to(path.failure.time)
         self.advance(0.0)
         self.tell()
-        rover = path.scenario.rover
-        text = sharing.write_file(self.server, self.channel.parts, self._link(), rover, base)
-        return _file(f"{rover.name}.html", text)
+        model = path.scenario.rover
+        text = sharing.write_file(self.server, self.channel.parts, self._link(), model, base)
+        return _file(f"{model.name}.html", text)
 
     def _open(self, link: sharing.PageLink | None) -> None:
         """Judge what a link holds, and show it."""
@@ -301,8 +279,8 @@ class Page(PageBase):
 
     # What was judged.
 
-    def _take_judged(self, request: JudgeRequest, found: Shown | BaseException) -> None:
-        self.errors.run("not judged", partial(self.session.take, request, found))
+    def _take_judged(self, steps: Iterator[Step], found: Shown | BaseException) -> None:
+        self.run("not judged", partial(self.session.take, steps, found))
         self._show()
         self._go_on_opening()
 
@@ -367,17 +345,17 @@ class Page(PageBase):
         every = frozenset(range(len(shown.paths)))
         is_slow = work["judging"] or work["stopped"]
         self.scene.paths.mark_old(every if work["old"] else shown.old if is_slow else frozenset())
-        made("subject", describe_subject, shown.scenario, self._ground_name)
-        tell("verdict", describe_verdict(shown) | work)
+        made("subject", verdict.describe_subject, shown.scenario, self._ground_name)
+        tell("verdict", verdict.describe_verdict(shown) | work)
         is_old, is_judging = bool(work["old"]), self._judging.progress is not None
-        made("paths", describe_paths, shown, is_old, is_judging)
+        made("paths", verdict.describe_paths, shown, is_old, is_judging)
         is_seeking = self._advice.progress is not None
-        tell("advice", describe_advice(self._advised, is_seeking, time.monotonic()))
+        tell("advice", advice.describe_advice(self._advised, is_seeking, time.monotonic()))
         made("current", lambda *_: sharing.write_link(self._link()), shown, self.colouring)
-        made("sliders", describe_sliders, wanted.loaded)
-        made("values", describe_values, wanted)
-        made("changes", describe_changes, path, reference, session.kept is not None)
-        made("limits", describe_limits, path, reference, shown.chance)
+        made("sliders", rover.describe_sliders, wanted.loaded)
+        made("values", rover.describe_values, wanted)
+        made("changes", rover.describe_changes, path, reference, session.kept is not None)
+        made("limits", drive.describe_limits, path, reference, shown.chance)
         model = wanted.options.model
         tell("chosen", {
             **self.list_chosen(), "policy": model.policy, "soil": model.soil or "",
@@ -407,9 +385,9 @@ class Page(PageBase):
             "fails": None if failure is None else round(failure.time, 2),
         })  # fmt: skip
         link = "" if failure is None else failure.link
-        board = describe_board(state, link, has_slip=path.trajectory.has_slip)
+        board = drive.describe_board(state, link, has_slip=path.trajectory.has_slip)
         self.channel.tell("board", board)
-        uses = describe_uses(path, playback.time, self.session.shown.chance)
+        uses = drive.describe_uses(path, playback.time, self.session.shown.chance)
         self.channel.tell("uses", uses)
 
 

@@ -47,31 +47,29 @@ class DrawnRover:
         """The state that is shown; None hides the rover."""
         self._looks: tuple[Any, ...] = ()
         """What the shape of the rover and the length of its arrows depend on."""
-        self._arm: dict[str, float] = {}
         self.meshes: dict[str, tuple[str, colours.Colour]] = {}
         """Node and colour of each link by its name; that of a wheel is its tyre."""
 
     def take(self, rover: Rover, arm_angles: Mapping[str, float]) -> None:
-        """Draw another rover, with its arm at angles [rad] by joint name.
-
-        Of a rover that looks like the last one, only the arm is turned.
-        """
+        """Draw another rover, with its arm at angles [rad] by joint name, if it looks new."""
         wheel, arm = rover.wheel, rover.manipulator
+        shape = wheel.radius, wheel.width, rover.suspension, rover.belly, arm
+        looks = *shape, rover.weight, dict(arm_angles)
+        if looks == self._looks:
+            self.rover = rover
+            return
+        self._looks, self.rover = (), None  # an error must not leave half a rover
         self._canvas.radius = wheel.radius
-        looks = wheel.radius, wheel.width, rover.suspension, rover.belly, arm, rover.weight
-        is_new = looks != self._looks
-        if is_new:
-            self._looks, self.rover = (), None  # an error must not leave half a rover
-            self._draw(rover)
-        if arm is not None and (is_new or arm_angles != self._arm):
+        self._draw(rover)
+        if arm is not None:
             mesh = make_arm(arm, arm_angles, wheel.radius)
             self._put("arm", BODY, np.zeros(3), mesh, colours.DARK)
-        self._looks, self._arm, self.rover = looks, dict(arm_angles), rover
-        if is_new:
-            self.show(self.state)
+        self._canvas.remove(f"{self._name}/{BODY}", [node for node, _ in self.meshes.values()])
+        self._looks, self.rover = looks, rover
+        self.show(self.state)
 
     def _draw(self, rover: Rover) -> None:
-        """Put all links of a rover, and take away those that it lacks."""
+        """Put all links of a rover but its arm."""
         self.meshes = {}
         self._canvas.show_frame(self._name, visible=self.state is not None)
         self._canvas.show_frame(self._forces)
@@ -79,7 +77,6 @@ class DrawnRover:
         tyre, grousers = make_wheel(rover)
         for side in SIDES:
             self._put_side(rover, side, tyre, grousers)
-        self._canvas.remove(f"{self._name}/{BODY}", [node for node, _ in self.meshes.values()])
 
     def _put(
         self, link: str, above: str, place: Floats, mesh: trimesh.Trimesh, colour: colours.Colour
@@ -193,8 +190,7 @@ class FailureMark:
             self._canvas.remove(REASON)
             self.ghost.show(None)
             return
-        wheels = rover.suspension.wheels
-        self._near = NEAR * (wheels["front"][0] - wheels["rear"][0])
+        self._near = NEAR * rover.wheelbase
         self.ghost.take(rover, {})
         self.ghost.show(failure.state, failure.link)
         self._draw_label(failure, rover.wheel.radius)
@@ -249,10 +245,8 @@ def make_body(rover: Rover) -> trimesh.Trimesh:
     belly, pivot, radius = rover.belly, rover.suspension.rocker_pivot, rover.wheel.radius
     low = np.array([belly.x[0], belly.y[0], belly.z])
     high = np.array([belly.x[1], belly.y[1], belly.z + 1.4 * radius])
-    box = trimesh.creation.box(high - low)
-    box.apply_translation(0.5 * (low + high))
     axle = make_bar(on_side(pivot, "right"), on_side(pivot, "left"), 0.12 * radius)
-    return join_meshes([box, axle])
+    return join_meshes([trimesh.creation.box(bounds=[low, high]), axle])
 
 
 def make_wheel(rover: Rover) -> tuple[trimesh.Trimesh, trimesh.Trimesh]:
@@ -260,13 +254,13 @@ def make_wheel(rover: Rover) -> tuple[trimesh.Trimesh, trimesh.Trimesh]:
     radius, width = rover.wheel.radius, rover.wheel.width
     across = [[0.0, -0.5 * width, 0.0], [0.0, 0.5 * width, 0.0]]
     tyre = trimesh.creation.cylinder(radius=0.96 * radius, segment=across, sections=32)
-    grousers = []
-    for k in range(GROUSERS):
-        grouser = trimesh.creation.box([0.06 * radius, 1.01 * width, 0.5 * radius])
-        grouser.apply_translation([0.0, 0.0, 0.75 * radius])
-        turn = trimesh.transformations.rotation_matrix(2 * np.pi * k / GROUSERS, [0, 1, 0])
-        grouser.apply_transform(turn)
-        grousers.append(grouser)
+    half = np.array([0.03 * radius, 0.505 * width, 0.25 * radius])
+    bounds = np.array([-half, half]) + np.array([0.0, 0.0, 0.75 * radius])
+    turns = [
+        trimesh.transformations.rotation_matrix(angle, [0, 1, 0])
+        for angle in np.linspace(0.0, 2.0 * np.pi, GROUSERS, endpoint=False)
+    ]
+    grousers = [trimesh.creation.box(bounds=bounds).apply_transform(turn) for turn in turns]
     return tyre, join_meshes(grousers)
 
 

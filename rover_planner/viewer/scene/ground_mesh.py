@@ -13,16 +13,8 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.terrain.grid import Terrain
 from rover_planner.maps.hill_shade import LEVEL_SHADE, hill_shade
 from rover_planner.viewer.scene.canvas import find_origin
+from rover_planner.viewer.state import layers
 from rover_planner.viewer.state.background_work import Progress
-from rover_planner.viewer.state.layers import (
-    ColouredGround,
-    GroundGrid,
-    LayerRequest,
-    Legend,
-    colour_ground,
-    colour_limit,
-    make_grid,
-)
 from rover_planner.viewer.state.survey_layers import ShownSurvey
 
 SHADES = (0.3, 1.25)
@@ -39,24 +31,24 @@ the screen takes most of the time of a picture."""
 
 
 def paint(
-    asked: LayerRequest, survey: ShownSurvey | None = None
-) -> Iterator[Progress | tuple[bytes, Legend]]:
+    asked: layers.LayerRequest, survey: ShownSurvey | None = None
+) -> Iterator[Progress | tuple[bytes, layers.Legend]]:
     """Yield what is begun, and the painted ground as a file for the scene, with its legend.
 
     A layer that is predicted for the rover takes seconds.
     """
     yield Progress("ground")
-    name, grid = asked.how.layer, make_grid(asked.terrain)
+    name, grid = asked.how.layer, layers.make_grid(asked.terrain)
     if survey is not None and name in survey.names:
         ground = survey.colour(name, asked.rover, asked.options, grid)
     elif asked.how.is_predicted:
-        ground = colour_limit(asked, grid)
+        ground = layers.colour_limit(asked, grid)
     else:
-        ground = colour_ground(name, asked.terrain, grid)
+        ground = layers.colour_ground(name, asked.terrain, grid)
     yield write_ground(grid, ground, find_origin(asked.terrain)), ground.legend
 
 
-def draw_picture(grid: GroundGrid, ground: ColouredGround) -> NDArray[np.uint8]:
+def draw_picture(grid: layers.GroundGrid, ground: layers.ColouredGround) -> NDArray[np.uint8]:
     """Return the picture (my, mx, 3) on a ground.
 
     It is lit, as light in a picture costs the page nothing, hatched where a limit is broken, and
@@ -80,7 +72,7 @@ def draw_picture(grid: GroundGrid, ground: ColouredGround) -> NDArray[np.uint8]:
 
 
 def build_ground_mesh(
-    grid: GroundGrid, picture: NDArray[np.uint8], origin: Floats
+    grid: layers.GroundGrid, picture: NDArray[np.uint8], origin: Floats
 ) -> trimesh.Trimesh:
     """Return the known cells of a ground about an origin (3,) [m] with a picture on them."""
     from PIL import Image
@@ -97,7 +89,7 @@ def build_ground_mesh(
     return trimesh.Trimesh(vertices, faces, visual=visual, process=False)
 
 
-def write_ground(grid: GroundGrid, ground: ColouredGround, origin: Floats) -> bytes:
+def write_ground(grid: layers.GroundGrid, ground: layers.ColouredGround, origin: Floats) -> bytes:
     """Return a coloured ground about an origin (3,) [m] as a binary glTF file, without lights.
 
     It takes a third of a second: most of it to compress the picture.

@@ -10,20 +10,17 @@ from numpy.typing import NDArray
 from rover_physics.numerics.arrays import Floats
 from rover_planner.viewer.scene.canvas import Canvas, Strand
 from rover_planner.viewer.state.colours import (
+    BEYOND,
     PASSABLE,
     REFUSED,
     UNKNOWN,
     Colour,
-    blend,
     map_colours,
 )
 from rover_planner.viewer.state.scenario import Judged
 
 MAX_POINTS = 250
 """Most points of a path that are drawn."""
-FADE = 0.6
-"""Share of white in the colour of a path behind the waypoint that is refused."""
-WHITE = (255, 255, 255)
 GHOST = (143, 74, 115)
 """Colour of a path that a person points at."""
 CLEARANCE = 0.15
@@ -131,7 +128,7 @@ class PathOverlay:
         cross = [self._find_strand(line, REFUSED, 2.0 * CLEARANCE) for line in crossing]
         return [
             *self._find_strand(points[: end + 1], REFUSED),
-            *self._find_strand(points[end:], blend(REFUSED, WHITE, FADE)),
+            *self._find_strand(points[end:], BEYOND),
             *itertools.chain.from_iterable(cross),
         ]
 

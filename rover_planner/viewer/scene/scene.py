@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.names import WHEEL_POSITIONS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
+from rover_physics.rover.steering_joints import swing_radius
 from rover_planner.viewer.scene.canvas import Canvas
 from rover_planner.viewer.scene.drawn_rover import DrawnRover, FailureMark
 from rover_planner.viewer.scene.overlays import PathOverlay
@@ -63,7 +63,11 @@ class Cameras:
             else:
                 fov, aspect = _field_of_view(client)
                 middle = 0.5 * (path.min(axis=0) + path.max(axis=0))
-                radius = float(np.linalg.norm(path - middle, axis=1).max()) + find_radius(rover)
+                radius = (
+                    float(np.linalg.norm(path - middle, axis=1).max())
+                    + swing_radius(rover)
+                    + rover.wheel.radius
+                )
                 flat = 0.45 * beside - 0.65 * ahead
                 towards = np.array([*flat, SLANT] if view == FIT else [0.0, -1e-3, 1.0])
                 towards /= np.linalg.norm(towards)
@@ -102,12 +106,6 @@ class Cameras:
     def _place(self, client: Any, position: Floats, look_at: Floats) -> None:
         client.camera.position = self._canvas.to_scene(position)
         client.camera.look_at = self._canvas.to_scene(look_at)
-
-
-def find_radius(rover: Rover) -> float:
-    """Return the radius of the circle around a rover, seen from above, that holds its wheels."""
-    hubs = np.array([rover.suspension.wheels[name] for name in WHEEL_POSITIONS])
-    return float(np.linalg.norm(hubs[:, :2], axis=1).max()) + rover.wheel.radius
 
 
 def _field_of_view(client: Any) -> tuple[float, float]:

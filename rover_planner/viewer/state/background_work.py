@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Between threads: a worker that does the newest request, and the newest values by name."""
+"""Between threads: a worker that takes the newest steps, and the newest values by name."""
 
 import threading
 import time
@@ -15,7 +15,6 @@ that is dragged still gets results where they take less."""
 END_TIME = 20.0
 """Longest wait for the thread when the work is closed [s]."""
 
-Request = TypeVar("Request")
 Result = TypeVar("Result")
 Value = TypeVar("Value")
 
@@ -39,58 +38,56 @@ class Progress:
         return f"{self.what or 'waiting'}{many}"
 
 
-Work = Callable[[Request], Iterator[Progress | Result]]
-"""Yields what is begun, and the results of a request, each as soon as it is known."""
-
-
-Take = Callable[[Request, Result | BaseException], object]
-"""Takes a result of a request, or the error that ended it."""
+Steps = Iterator[Progress | Result]
+"""Yields what is begun, and all results, each as soon as it is known."""
+Take = Callable[[Steps[Result], Result | BaseException], object]
+"""Takes a result of steps, or the error that ended them."""
 
 
 class _StoppedError(Exception):
     """Leaves work that was cancelled or replaced."""
 
 
-class BackgroundWork(Generic[Request, Result]):
-    """Does one request at a time, the newest; those that a newer one replaces are dropped.
+class BackgroundWork(Generic[Result]):
+    """Takes the newest steps that were asked for; those that newer ones replace are dropped.
 
-    A newer request stops work that has had PATIENCE, or has given its first result. Each request
-    has a thread of its own: the newer one does not wait for the last step of work that has given
-    its result, which on rough ground takes longer than a result. The methods may be called from
+    Newer steps stop those that have had PATIENCE, or have given their first result. All have
+    threads of their own: the newer ones do not wait for the last step of those that have given
+    their result, which on rough ground takes longer than a result. The methods may be called from
     any thread.
     """
 
-    def __init__(
-        self, work: Work[Request, Result], take: Take[Request, Result], name: str = "background"
-    ):
+    def __init__(self, take: Take[Result], name: str = "background"):
         """Do nothing yet.
 
         Args:
-            work: Does a request. Between the slices of the model's sweeps it may be stopped by
-                an error, which it must let pass; it is left at what it yields.
-            take: Called in the thread with all that is found, in the order of the requests. It
-                may wait until that was used.
+            take: Called in the thread with all that is found, in the order in which it was asked
+                for. It may wait until that was used.
             name: Name of the threads.
         """
-        self._work, self._take, self._name = work, take, name
+        self._take, self._name = take, name
         self._lock = threading.RLock()
         # The lock guards all that follows.
-        self._waiting: Request | None = None
-        self._in_work: Request | None = None
+        self._waiting: Steps[Result] | None = None
+        self._in_work: Steps[Result] | None = None
         self._has_result = False
         self._progress = Progress()
         self._since = 0.0
         self._threads: list[threading.Thread] = []
-        """The last one is that of the request in work; those before it end their last steps."""
+        """The last one is that of the steps in work; those before it end their last steps."""
 
-    def ask(self, request: Request) -> None:
-        """Do a request instead of the one that waits, and soon instead of the one in work."""
+    def ask(self, steps: Steps[Result]) -> None:
+        """Take steps instead of those that wait, and soon instead of those in work.
+
+        Between the slices of the model's sweeps they may be stopped by an error, which they must
+        let pass.
+        """
         with self._lock:
             if self._in_work is None or self._has_result:
                 self._progress, self._since = Progress(), time.monotonic()
-                self._begin(request)
+                self._begin(steps)
             else:
-                self._waiting = request
+                self._waiting = steps
 
     def cancel(self) -> bool:
         """Stop all work; what it finds after this is dropped. Return whether there was any."""
@@ -114,57 +111,53 @@ class BackgroundWork(Generic[Request, Result]):
             thread.join(END_TIME)
         return not any(thread.is_alive() for thread in self._threads)
 
-    def _is_wanted(self) -> bool:
-        """Return whether what this thread does was neither cancelled nor replaced."""
-        return self._in_work is not None and self._threads[-1] is threading.current_thread()
-
-    def _begin(self, request: Request) -> None:
-        self._in_work, self._waiting, self._has_result = request, None, False
+    def _begin(self, steps: Steps[Result]) -> None:
+        self._in_work, self._waiting, self._has_result = steps, None, False
         earlier = [one for one in self._threads if one.is_alive()]
-        arguments = request, earlier
+        arguments = steps, earlier
         thread = threading.Thread(target=self._do, args=arguments, name=self._name, daemon=True)
         self._threads = [*earlier, thread]
         thread.start()
 
-    def _do(self, request: Request, earlier: Sequence[threading.Thread]) -> None:
-        """Do a request; what follows its first result waits for the end of earlier threads."""
+    def _do(self, steps: Steps[Result], earlier: Sequence[threading.Thread]) -> None:
+        """Take steps; what follows a first result waits for the end of earlier threads."""
         begun = time.monotonic()
 
         def check() -> None:
             gives_way = self._has_result or time.monotonic() - begun >= PATIENCE
-            if not self._is_wanted() or (self._waiting is not None and gives_way):
-                raise _StoppedError("a newer request or a visitor stopped the work")
+            if self._in_work is not steps or (self._waiting is not None and gives_way):
+                raise _StoppedError("newer work or a visitor stopped the work")
 
         try:
             with interruptible(check):
-                for found in self._work(request):
+                for found in steps:
                     if isinstance(found, Progress):
                         check()
                         with self._lock:
                             self._progress = found
                     else:
-                        self._deliver(request, found)
+                        self._deliver(steps, found)
                         for thread in earlier:
                             thread.join()
                         check()
         except _StoppedError:
             pass
-        except BaseException as error:  # other requests must go on; who takes it tells of it
+        except BaseException as error:  # other work must go on; who takes it tells of it
             if self._waiting is None:
-                self._deliver(request, error)
+                self._deliver(steps, error)
         with self._lock:
-            if self._is_wanted():
+            if self._in_work is steps:
                 self._in_work = None
                 if self._waiting is not None:
                     self._begin(self._waiting)
 
-    def _deliver(self, request: Request, found: Result | BaseException) -> None:
+    def _deliver(self, steps: Steps[Result], found: Result | BaseException) -> None:
         """Hand over what was found, unless it was cancelled or replaced."""
         with self._lock:
-            if not self._is_wanted():
+            if self._in_work is not steps:
                 return
             self._since, self._has_result = time.monotonic(), True
-        self._take(request, found)
+        self._take(steps, found)
 
 
 class Inbox(Generic[Value]):

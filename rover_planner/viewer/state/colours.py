@@ -11,6 +11,8 @@ PASSABLE = (0, 114, 178)
 """Blue: a path that can be driven, as in the pictures of the demo."""
 REFUSED = (213, 94, 0)
 """Vermillion: a path that is refused, and the pose where it is."""
+BEYOND = (238, 191, 153)
+"""Faded vermillion: a path behind the waypoint that is refused."""
 LOAD = (86, 180, 233)
 """Sky blue: normal forces, torque saturation."""
 TRACTION = (230, 159, 0)
@@ -45,14 +47,8 @@ def colour_use(use: float) -> Colour:
     """
     if np.isnan(use):
         return UNKNOWN
-    t = float(np.clip(use, 0.0, 1.0))
-    return blend(PASSABLE, MIDDLE, 2 * t) if t < 0.5 else blend(MIDDLE, REFUSED, 2 * t - 1)
-
-
-def blend(first: Colour, second: Colour, share: float) -> Colour:
-    """Return the blend of two colours with a share of the second, 0 to 1."""
-    start, end = np.array(first), np.array(second)
-    red, green, blue = np.round(start + share * (end - start)).astype(int).tolist()
+    channels = zip(PASSABLE, MIDDLE, REFUSED, strict=True)
+    red, green, blue = (round(np.interp(use, (0.0, 0.5, 1.0), one)) for one in channels)
     return red, green, blue
 
 
@@ -66,9 +62,3 @@ def to_linear(colours: NDArray[np.int_]) -> NDArray[np.uint8]:
 def to_css(colour: Colour) -> str:
     """Return a colour as CSS writes it, such as #0072b2."""
     return "#{:02x}{:02x}{:02x}".format(*colour)
-
-
-def from_css(text: str) -> Colour:
-    """Return a colour from text such as #0072b2."""
-    red, green, blue = bytes.fromhex(text.removeprefix("#"))
-    return red, green, blue

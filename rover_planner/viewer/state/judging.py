@@ -2,7 +2,7 @@
 """Judges a scenario step by step: the path, its reference, others, its chance, a way around."""
 
 from collections.abc import Generator, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from rover_physics.chance.failure_chance import find_failure_chance
 from rover_physics.errors import RoverError
@@ -25,25 +25,17 @@ SEARCH, BETTER = "searching a way", "way found, searching a better one"
 """Names of steps."""
 
 
-@dataclass(frozen=True, eq=False)
-class JudgeRequest:
-    """A scenario to judge, and the path that is looked at."""
-
-    scenario: Scenario
-    """Rover, ground, ends and options."""
-    before: Shown | None = None
-    """What was shown, whose paths are judged again; None: other paths are wanted."""
-    index: int | None = None
-    """Index of the path that is looked at; None: the one that is chosen."""
-    reference: Scenario | None = None
-    """Values to compare with; None: the rover as it was loaded."""
-
-
 Step = Progress | Shown
 """The beginning of a step, or what is known."""
 
 
-def judge_request(request: JudgeRequest, memory: EdgeMemory | None = None) -> Iterator[Step]:
+def judge_steps(
+    asked: Scenario,
+    before: Shown | None = None,
+    index: int | None = None,
+    reference: Scenario | None = None,
+    memory: EdgeMemory | None = None,
+) -> Iterator[Step]:
     """Yield what is shown with the verdict on the path looked at, then with more and more.
 
     Its reference, the other paths, its verdicts under all policies and its chance of failure
@@ -51,19 +43,21 @@ def judge_request(request: JudgeRequest, memory: EdgeMemory | None = None) -> It
     the search's budget, or why there is none. The path that is looked at stays the same.
 
     Args:
-        request: What to judge.
+        asked: Rover, ground, ends and options.
+        before: What was shown, whose paths are judged again; None: other paths are wanted.
+        index: Index of the path that is looked at; None: the one that is chosen.
+        reference: Values to compare with; None: the rover as it was loaded.
         memory: What earlier searches have found; None begins anew.
 
     Raises:
         RoverError, PlanningError: The rover, the poses or the options are invalid.
     """
-    before, asked = request.before, request.scenario
-    if before is None or request.index is None:
+    if before is None or index is None:
         shown = yield from _judge_new(asked)
     else:
-        shown = yield from _judge_again(asked, before, request.index)
+        shown = yield from _judge_again(asked, before, index)
     loaded = replace(asked, rover=asked.loaded, arm_angles={})
-    values = asked.take_values(request.reference or loaded)
+    values = asked.take_values(reference or loaded)
     shown = replace(shown, reference=_recall(shown, before, values))
     yield shown
     if shown.reference is None and not shown.path.is_of(shown.path.poses, values):

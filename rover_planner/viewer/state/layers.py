@@ -7,7 +7,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy import ndimage
 
 from rover_physics.limits.table import LIMITS
@@ -50,30 +50,30 @@ class GroundGrid:
     heights: Floats
     """(ny, nx) of the cells [m], NaN where unknown."""
 
-    @property
-    def factor(self) -> int:
-        """Number of pixels along a side of a cell."""
-        return max(1, min(MOST_IN_CELL, MAX_PIXELS // max(self.heights.shape)))
-
     @cached_property
     def pixels(self) -> tuple[Floats, Floats]:
-        """X (mx,) and y (my,) [m] of the pixels."""
-        x, y = (
-            at[0]
-            + (at[1] - at[0]) * ((np.arange(self.factor * len(at)) + 0.5) / self.factor - 0.5)
-            for at in (self.x, self.y)
-        )
-        return x, y
+        """X (mx,) and y (my,) [m] of the pixels, of which all cells have the same number."""
+        factor = max(1, min(MOST_IN_CELL, MAX_PIXELS // max(self.heights.shape)))
+        return self.spread(factor * len(self.x)), self.spread(factor * len(self.y), 1)
+
+    def spread(self, count: int, axis: int = 0) -> Floats:
+        """Return x, or y for axis 1, of the middles of so many equal parts of all cells [m]."""
+        cells = (self.x, self.y)[axis]
+        return cells[0] + self.step * (len(cells) * (np.arange(count) + 0.5) / count - 0.5)
 
     @property
     def step(self) -> float:
         """Distance of the cells [m]."""
         return float(self.x[1] - self.x[0])
 
-    def refine(self, values: NDArray[Any]) -> NDArray[Any]:
-        """Return values (ny, nx, ...) of the cells as those of the pixels (my, mx, ...)."""
-        factors = [self.factor] * 2 + [1] * (values.ndim - 2)
-        return np.asarray(ndimage.zoom(values, factors, order=1, mode="nearest", grid_mode=True))
+    def refine(self, values: NDArray[Any], order: int = 1) -> NDArray[Any]:
+        """Return values (ky, kx, ...) of equal parts of all cells as those of the pixels.
+
+        They are linear between the parts, or with order 0 those of the nearest one.
+        """
+        size = (*(len(at) for at in self.pixels[::-1]), *values.shape[2:])
+        factors, how = np.divide(size, values.shape), {"mode": "nearest", "grid_mode": True}
+        return np.asarray(ndimage.zoom(values, factors, order=order, **how))
 
 
 def make_grid(terrain: Terrain) -> GroundGrid:
@@ -82,29 +82,6 @@ def make_grid(terrain: Terrain) -> GroundGrid:
     heights = terrain.elevation[::stride, ::stride]
     step, (x, y), (ny, nx) = stride * terrain.resolution, terrain.origin, heights.shape
     return GroundGrid(x + step * np.arange(nx), y + step * np.arange(ny), heights)
-
-
-def sample(
-    values: NDArray[Any], origin: Sequence[float], step: ArrayLike, at: Sequence[Floats]
-) -> tuple[NDArray[Any], NDArray[np.bool_]]:
-    """Return the nearest values of a grid, and which places are on it.
-
-    Args:
-        values: (ny, nx, ...) values.
-        origin: x and y of the first [m].
-        step: Distance of the values [m]; two if x and y differ.
-        at: x (mx,) and y (my,) of the places [m].
-
-    Returns:
-        Values (my, mx, ...), off the grid those at its edge; (my, mx) True on it.
-    """
-    columns, rows = (
-        np.rint((places - first) / distance).astype(int)
-        for places, first, distance in zip(at, origin, np.broadcast_to(step, 2), strict=True)
-    )
-    ny, nx = values.shape[:2]
-    is_on = ((rows >= 0) & (rows < ny))[:, None] & (columns >= 0) & (columns < nx)
-    return values[np.ix_(rows.clip(0, ny - 1), columns.clip(0, nx - 1))], is_on
 
 
 @dataclass(frozen=True)
@@ -184,9 +161,8 @@ def colour_ground(layer: str, terrain: Terrain, grid: GroundGrid) -> ColouredGro
         values = np.degrees(np.arctan(np.hypot(*np.gradient(heights, grid.step))))
         low, high, ends = 0.0, STEEP, ("0 deg", f"{STEEP:.0f} deg")
     elif layer == FRICTION and terrain.friction is not None:
-        at, low, high = (grid.x, grid.y), 0.0, 1.0
-        values, _ = sample(terrain.friction, terrain.origin, terrain.resolution, at)
-        ends = "0.00", "1.00"
+        stride, low, high = round(grid.step / terrain.resolution), 0.0, 1.0
+        values, ends = terrain.friction[::stride, ::stride], ("0.00", "1.00")
     return ColouredGround(grid.refine(map_colours(values, low, high)), _grade(layer, ends))
 
 
@@ -198,17 +174,17 @@ def colour_limit(request: LayerRequest, grid: GroundGrid) -> ColouredGround:
     Raises:
         RoverError: The model refuses an option.
     """
-    asked = [np.linspace(one[0], one[-1], min(len(one), MAX_PREDICTED)) for one in grid.pixels]
+    counts = [min(len(one), MAX_PREDICTED) for one in grid.pixels]
+    asked = [grid.spread(count, axis) for axis, count in enumerate(counts)]
     used, how = predict_use(request, asked), request.how
     colours = map_colours(used, 0.0, 1.0)
     colours[used > 1.0] = REFUSED
-    corner, step = [one[0] for one in asked], [one[1] - one[0] for one in asked]
     words = "along the path" if how.along else f"at heading {how.heading:g} deg"
     hatched = ("hatched", "beyond the limit")
     return ColouredGround(
-        sample(colours, corner, step, grid.pixels)[0],
+        grid.refine(colours, 0),
         _grade(f"{how.layer} {words}", ("0 %", "100 %"), hatched),
-        sample(used > 1.0, corner, step, grid.pixels)[0],
+        grid.refine(used > 1.0, 0),
     )
 
 

@@ -39,46 +39,48 @@ ON_THE_WAY = "on the way here: "
 """Beginning of the reason of a failure between waypoints."""
 
 
-@dataclass(frozen=True)
-class ShownLimit:
-    """One limit of a rover; its numbers are in the unit that people read."""
+@dataclass(frozen=True, eq=False)
+class Lane:
+    """One limit along the path, in the unit that people read; arrays (m,) as in `AskedPoses`."""
 
     code: str
     """Code of a verdict, or GROUND."""
     title: str
     """Short name."""
-    bound: float | None = None
-    """Largest or smallest good value; None if it is not a single number."""
+    values: Floats
+    """The value nearest to the limit; NaN for none."""
+    used: Floats
+    """Use of the limit: 1 at the limit, above 1 where it is broken, NaN where it does
+    not count or is not known."""
+    bounds: Floats | None = None
+    """(m,) largest or smallest good value; None if it is not a single number."""
     unit: Unit = RATIO
-    """Unit of bound and values."""
+    """Unit of values and bounds."""
     is_lowest: bool = False
-    """True if the bound is the smallest good value, not the largest."""
-    keeps_margin: bool = False
-    """True if a control margin reduces the bound."""
+    """True if the bounds are smallest good values, not largest."""
+    decides: NDArray[np.int64] | None = None
+    """(m,) which of the rover's limits it is that is used most; None for what is no limit."""
+    wheels: Floats | None = None
+    """(m, 6) use by each wheel; None if the limit is not one value for each wheel."""
 
-    def keep(self, share: float) -> "ShownLimit":
-        """Return the limit of which a share is kept, if a control margin reduces it."""
-        if self.bound is None or not self.keeps_margin:
-            return self
-        return replace(self, bound=share * self.bound)
-
-    def is_broken_by(self, value: float) -> bool:
-        """Return whether a value is beyond the limit; False if it is no single number.
+    def is_explained_at(self, row: int) -> bool:
+        """Return whether the value at a row is beyond the limit.
 
         The worst case of an uncertain map may break a limit that the value itself keeps.
         """
-        if self.bound is None:
+        if self.bounds is None:
             return False
-        return value < self.bound if self.is_lowest else value > self.bound
+        above = self.values[row] - self.bounds[row]
+        return bool(above < 0.0 if self.is_lowest else above > 0.0)
 
-    def compare(self, value: float) -> str:
-        """Return a value beside the limit, such as "friction 1.32 of 1.00", with enough digits.
+    def compare(self, row: int) -> str:
+        """Return value and limit at a row, such as "friction 1.32 of 1.00", with enough digits.
 
         Where MORE_DIGITS do not tell them apart, words do: "friction just above 1.00".
         """
-        if self.bound is None:
+        if self.bounds is None:
             return self.title
-        unit, bound = f" {self.unit.name}".rstrip(), self.bound
+        unit, value, bound = f" {self.unit.name}".rstrip(), self.values[row], self.bounds[row]
         for digits in range(self.unit.digits, self.unit.digits + MORE_DIGITS + 1):
             shown, limit = write(value, digits), write(bound, digits)
             if shown != limit:
@@ -87,30 +89,13 @@ class ShownLimit:
         side = "at" if value == bound else "just above" if value > bound else "just below"
         return f"{self.title} {side} {write(bound, self.unit.digits)}{unit}"
 
-    @property
-    def good(self) -> str:
-        """Good values with their unit, such as "max 1.00"; empty if it is no single number."""
-        if self.bound is None:
+    def write_value(self, row: int) -> str:
+        """Return value and limit at a row, such as "0.76, max 1.00"; empty if there is none."""
+        if self.bounds is None or np.isnan(self.values[row]):
             return ""
-        word = "min" if self.is_lowest else "max"
-        return f"{word} {write(self.bound, self.unit.digits, self.unit.name)}"
-
-
-@dataclass(frozen=True, eq=False)
-class Lane:
-    """One limit along the path; arrays (m,) as in `AskedPoses`."""
-
-    limit: ShownLimit
-    """The limit."""
-    values: Floats
-    """The value nearest to the limit, in the limit's unit; NaN for none."""
-    used: Floats
-    """Use of the limit: 1 at the limit, above 1 where it is broken, NaN where it does
-    not count or is not known."""
-    decides: NDArray[np.int64] | None = None
-    """(m,) which of the rover's limits it is that is used most; None for what is no limit."""
-    wheels: Floats | None = None
-    """(m, 6) use by each wheel; None if the limit is not one value for each wheel."""
+        word, digits = "min" if self.is_lowest else "max", self.unit.digits
+        good = write(self.bounds[row], digits, self.unit.name)
+        return f"{write(self.values[row], digits)}, {word} {good}"
 
     def worst_until(self, rows: int) -> int:
         """Return the row of the first rows that uses most; -1 if nothing is known there."""
@@ -144,7 +129,7 @@ class PathLimits:
 
     def lane(self, code: str) -> Lane:
         """Return the lane of a code of a verdict; that of the ground for other codes."""
-        found = {lane.limit.code: lane for lane in self.lanes}
+        found = {lane.code: lane for lane in self.lanes}
         return found.get(code, found[GROUND])
 
     def find_link(self, lane: Lane, row: int) -> str:
@@ -195,43 +180,37 @@ def find_path_limits(rover: Rover, prediction: PathPrediction, verdict: Verdict)
 
 def _plain_lane(code: str, title: str, used: Floats) -> Lane:
     """Return the lane of a use (m,) that has neither a value nor a wheel."""
-    return Lane(ShownLimit(code, title), np.full(len(used), np.nan), used)
-
-
-def _show_limit(uses: Uses, of_limit: NDArray[np.int64]) -> ShownLimit:
-    """Return the limit of some rows of the table, which is a number if it is one row's."""
-    row, bound = uses.limits.rows[of_limit[0]], uses.limits.bounds[of_limit[0]]
-    if len(of_limit) > 1 or row.sense == Sense.RANGE:
-        return ShownLimit(row.code, row.title)
-    unit, is_lowest = row.shown or row.unit, row.sense in (Sense.LEAST, Sense.SHARE)
-    number = unit.factor * bound
-    return ShownLimit(row.code, row.title, number, unit, is_lowest, row.keeps_margin)
+    return Lane(code, title, np.full(len(used), np.nan), used)
 
 
 def _make_lane(rows: AskedPoses, uses: Uses, of_limit: NDArray[np.int64]) -> Lane:
-    """Return the lane of some rows of the table, of which that which is used most counts."""
-    prediction, every = rows.prediction, np.arange(len(rows.distance))
-    limit, values = _show_limit(uses, of_limit), np.full(len(every), np.nan)
+    """Return the lane of some rows of the table, of which that which is used most counts.
+
+    It has a number if it is that of one row of the table.
+    """
+    prediction, every, k = rows.prediction, np.arange(len(rows.distance)), int(of_limit[0])
+    limit, bound = uses.limits.rows[k], uses.limits.bounds[k]
     asked = np.where(np.isnan(uses.use[:, of_limit]), -np.inf, uses.use[:, of_limit])
     decides = of_limit[asked.argmax(axis=1)]
     used = np.where(prediction.settled, uses.use[every, decides], np.nan)
-    if limit.bound is not None:
-        column = find_column(uses.limits.rows[of_limit[0]].reads)[0]
-        element = np.maximum(uses.element[every, decides], 0)
-        values = limit.unit.factor * numbers_of(prediction.results)[every, column + element]
-    by_wheel = _find_wheel_uses(prediction, uses, int(of_limit[0])) if len(of_limit) == 1 else None
-    return Lane(limit, values, used, decides, by_wheel)
-
-
-def _find_wheel_uses(prediction: PathPrediction, uses: Uses, k: int) -> Floats | None:
-    """Return the uses (m, 6) of a row of the table by the wheels; None if it is not theirs."""
-    row, (column, count) = uses.limits.rows[k], find_column(uses.limits.rows[k].reads)
-    if count != len(WHEELS) or row.sense != Sense.MOST:
-        return None
-    kept = prediction.results["kept_share"][:, None] if row.keeps_margin else 1.0
+    lane = replace(_plain_lane(limit.code, limit.title, used), decides=decides)
+    if len(of_limit) > 1 or limit.sense == Sense.RANGE:
+        return lane
+    unit, kept = limit.shown or limit.unit, np.ones(len(every))
+    if limit.keeps_margin:
+        kept = np.nan_to_num(prediction.results["kept_share"], nan=1.0)
+    column, count = find_column(limit.reads)
     values = numbers_of(prediction.results)[:, column : column + count]
-    return np.asarray(
-        np.where(np.isnan(uses.use[:, [k]]), np.nan, values / (uses.limits.bounds[k] * kept))
+    wheels = None
+    if count == len(WHEELS) and limit.sense == Sense.MOST:
+        wheels = np.where(np.isnan(uses.use[:, [k]]), np.nan, values / (bound * kept)[:, None])
+    return replace(
+        lane,
+        values=unit.factor * values[every, np.maximum(uses.element[every, k], 0)],
+        bounds=unit.factor * bound * kept,
+        unit=unit,
+        is_lowest=limit.sense in (Sense.LEAST, Sense.SHARE),
+        wheels=wheels,
     )
 
 
@@ -254,12 +233,8 @@ class Failure:
 
     code: str
     """Code of the verdict."""
-    reason: str
-    """Reason of the verdict."""
-    limit: ShownLimit
-    """The broken limit."""
-    value: float
-    """The value that breaks it, in its unit; NaN if there is none."""
+    headline: str
+    """The value beside the limit, such as "friction 1.32 of 1.00, middle left wheel"."""
     link: str
     """The link that fails: a name of WHEELS, BODY, rocker_left, bogie_right and so on; empty if
     it is none."""
@@ -279,27 +254,10 @@ class Failure:
         return time >= self.time - 1e-6
 
     @property
-    def where(self) -> str:
-        """The link in words, such as "middle left wheel"; empty for none."""
-        words = self.link.replace("_", " ")
-        return f"{words} wheel" if self.link in WHEELS else words
-
-    @property
     def place(self) -> str:
         """Where and when it is, in words."""
         between = ", between waypoints" if self.is_between else ""
         return f"after {self.distance:.2f} m, {self.time:.0f} s{between}"
-
-    @property
-    def headline(self) -> str:
-        """The value beside the limit, such as "friction 1.32 of 1.00, middle left wheel"."""
-        if not np.isnan(self.value):
-            words = self.limit.compare(self.value)
-        elif self.code and self.limit.code == GROUND:
-            words = TITLES.get(self.code, self.code.replace("_", " "))
-        else:
-            return self.reason.removeprefix(ON_THE_WAY)
-        return f"{words}, {self.where}" if self.where else words
 
 
 def find_failure(rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathLimits) -> Failure:
@@ -317,16 +275,17 @@ def find_failure(rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathL
     if not broken.size:  # a recorded refusal that this rover does not explain
         broken = np.flatnonzero(is_there & ~rows.is_between)
     at = int(broken[np.argmin(rows.is_between[broken])])
-    here, value = rows.prediction.select([at]), float(lane.values[at])
-    limit = lane.limit.keep(float(here.results["kept_share"][0]))
-    explains = limit.is_broken_by(value)
+    here, explains = rows.prediction.select([at]), lane.is_explained_at(at)
     link = limits.find_link(lane, at) if explains or verdict.code == "suspension" else ""
+    link = link or _find_link(rover, terrain, verdict.code, rows, at)
+    of_ground = TITLES.get(verdict.code, verdict.code.replace("_", " "))
+    words = lane.compare(at) if explains else of_ground if lane.code == GROUND else ""
+    where = link.replace("_", " ") + (" wheel" if link in WHEELS else "")
+    headline = ", ".join(filter(None, (words, where))) if words else verdict.reason
     return Failure(
         code=verdict.code,
-        reason=verdict.reason,
-        limit=limit,
-        value=value if explains else np.nan,
-        link=link or _find_link(rover, terrain, verdict.code, rows, at),
+        headline=headline.removeprefix(ON_THE_WAY),
+        link=link,
         distance=float(rows.distance[at]),
         time=float(rows.time[at]),
         is_between=bool(rows.is_between[at]),

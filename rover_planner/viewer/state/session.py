@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The state behind the page: what visitors want judged, and what was judged last."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import islice
@@ -21,7 +21,7 @@ from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.query import LatticeSettings
 from rover_planner.studies.rover_values import vary
-from rover_planner.viewer.state.judging import JudgeRequest, judge_request, show_recorded
+from rover_planner.viewer.state.judging import Step, judge_steps, show_recorded
 from rover_planner.viewer.state.scenario import Pose, Scenario, Shown
 
 REFUSALS = (RoverError, PlanningError)
@@ -38,9 +38,8 @@ class ViewSession:
     `show_path`, another goal or another rover.
     """
 
-    judge: Callable[[JudgeRequest], object]
-    """Judges a request by `find_steps`, and has `take` called with all that is found; the owner
-    sets it."""
+    judge: Callable[[Iterator[Step]], object]
+    """Takes steps, and has `take` called with all that they find; the owner sets it."""
 
     def __init__(
         self,
@@ -76,12 +75,11 @@ class ViewSession:
         self.is_stopped = False
         """True if the judgement of `wanted` was cancelled or failed."""
         self._undo: list[Scenario] = []
-        self.find_steps = partial(judge_request, memory=EdgeMemory())
-        """Finds what is shown, as `judge_request` does."""
-        self._asked = JudgeRequest(self.wanted)
-        """The newest request."""
-        steps = self.find_steps(self._asked)
-        found = (step for step in steps if isinstance(step, Shown))
+        self.find_steps = partial(judge_steps, memory=EdgeMemory())
+        """Finds what is shown, as `judge_steps` does."""
+        self._asked = self.find_steps(self.wanted)
+        """The newest steps."""
+        found = (step for step in self._asked if isinstance(step, Shown))
         *_, self.shown = islice(found, 2)  # and not what it searches
         """The last finding."""
         self._index = self.shown.index
@@ -193,21 +191,21 @@ class ViewSession:
             self._index = index
         self.wanted, self.refusal, self.is_stopped = wanted, "", False
         before, at = (self.shown, self._index) if same else (None, None)
-        self._asked = JudgeRequest(wanted, before, at, self.kept)
+        self._asked = self.find_steps(wanted, before, at, self.kept)
         self.judge(self._asked)
 
-    def take(self, request: JudgeRequest, found: Shown | BaseException) -> None:
+    def take(self, steps: Iterator[Step], found: Shown | BaseException) -> None:
         """Take what was judged, unless visitors look at another path meanwhile.
 
         Args:
-            request: What was asked.
+            steps: The steps that have found it.
             found: What is shown, or the error that ended the judgement. After a refusal, what was
                 judged last is wanted again.
 
         Raises:
             Exception: The newest judgement failed by an error that is no refusal.
         """
-        is_newest = request is self._asked
+        is_newest = steps is self._asked
         if isinstance(found, Shown):
             same = found.index == self._index and found.scenario.has_paths_of(self.wanted)
             if is_newest or same:

@@ -25,8 +25,8 @@ from rover_planner.survey.layers import (
     read_drawn_classes,
 )
 from rover_planner.survey.store import SurveyStore
-from rover_planner.viewer.state.colours import UNKNOWN, from_css, to_css
-from rover_planner.viewer.state.layers import ColouredGround, GroundGrid, Legend, sample
+from rover_planner.viewer.state.colours import UNKNOWN, to_css
+from rover_planner.viewer.state.layers import ColouredGround, GroundGrid, Legend
 
 MAX_READ = 1200
 """Most cells along a side that are read of a layer; of more, every second, third, ..."""
@@ -55,30 +55,29 @@ class ShownSurvey:
         Each pixel has the colour of the nearest surveyed cell that is read.
         """
         from matplotlib import colormaps
+        from matplotlib.colors import ListedColormap, to_hex
 
         if name == CLASS:
             numbers = read_drawn_classes(self._store, self._every)
-            colours, labels = [from_css(one) for one in CLASS_COLOURS], [*CLASS_LABELS]
+            palette, labels = [*CLASS_COLOURS], [*CLASS_LABELS]
         else:
             numbers = np.asarray(self._store.layer("first_limit")[:: self._every, :: self._every])
             labels = [c.replace("_", " ") or "none: all headings pass" for c in number_limits()]
-            palette = colormaps["tab20"](np.arange(len(labels) - 1) % 20, bytes=True)
-            colours = [from_css(CLASS_COLOURS[0]), *((r, g, b) for r, g, b, _ in palette.tolist())]
-        table = np.full((256, 3), UNKNOWN, np.uint8)
-        table[: len(colours)] = colours
-        found = np.unique(numbers)
-        keys = [(to_css(colours[k]), labels[k]) for k in found if k < len(labels)]
-        if (found >= len(labels)).any():
-            keys.append((to_css(UNKNOWN), UNKNOWN_LABEL))
+            cycle = np.arange(len(labels) - 1) % colormaps["tab20"].N
+            palette = [CLASS_COLOURS[0], *colormaps["tab20"](cycle)]
+        colours = ListedColormap([*palette, to_css(UNKNOWN)])
+        numbers = np.minimum(numbers, len(labels))
+        named = [*enumerate(labels), (len(labels), UNKNOWN_LABEL)]
+        keys = [(to_hex(colours(k)), label) for k, label in named if (numbers == k).any()]
         differences = self.find_differences(rover, options)
         changed = [f"not as on the page: {'; '.join(differences)}"] if differences else []
         legend = Legend(name, tuple(keys), notes=(self._describe(name), *changed))
-        notes = self._store.notes
-        step, origin = notes.cell * self._every, notes.frame.origin
-        placed, is_on = sample(table[numbers], origin, step, grid.pixels)
-        return ColouredGround(
-            np.where(is_on[..., None], placed, np.array(UNKNOWN, np.uint8)), legend
-        )
+        notes, (x, y), (ny, nx) = self._store.notes, grid.pixels, numbers.shape
+        cell, (left, low) = notes.cell * self._every, notes.frame.origin
+        columns = np.rint((x - left) / cell).astype(int).clip(0, nx - 1)
+        rows = np.rint((y - low) / cell).astype(int).clip(0, ny - 1)
+        nearest = numbers[np.ix_(rows, columns)]
+        return ColouredGround(colours(nearest, bytes=True)[..., :3], legend)
 
     def find_differences(self, rover: Rover, options: SweepOptions) -> tuple[str, ...]:
         """Return in what the survey differs from a rover and options that are shown."""

@@ -103,8 +103,8 @@ def test_the_page_has_a_lane_for_it(strict):
     prediction, verdict = judge_path(strict, GROUND, PATH)
     limits = find_path_limits(strict, prediction, verdict)
     lane = limits.lane("wheel_load")
-    assert lane.limit.title == "heaviest"
-    assert lane.limit.bound == strict.limits.further["wheel_load"]
+    assert lane.title == "heaviest"
+    assert lane.bounds[0] == strict.limits.further["wheel_load"]
     assert (lane.used > 1.0).tolist() == [False] * verdict.first_failure + [True]
     heaviest = WHEELS[prediction.wheel_loads[verdict.first_failure].argmax()]
     assert limits.find_link(lane, -1) == heaviest

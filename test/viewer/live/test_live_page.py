@@ -98,4 +98,4 @@ def test_a_live_page_shows_a_rover_and_the_plan_and_forces_of_its_server_until_t
     wait_until(lambda: "not live: odometry is " in told("subject")["mode"], "the silence")
     wait_until(lambda: topic("odometry")["stale"], "the stale topic")
     wait_until(lambda: told("board")["wheels"][0]["load"] == "?", "no forces")
-    assert not topic("/traverse_server/plan")["stale"] and page.errors.messages == {}
+    assert not topic("/traverse_server/plan")["stale"] and page.errors == {}
