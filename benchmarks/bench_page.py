@@ -20,7 +20,7 @@ from benchmarks.processes import memory_of
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, save_terrain
 from rover_planner.command.view import SEED, TERRAIN_SIZE, choose_ends
-from rover_planner.viewer.documents.verdict import describe_verdict
+from rover_planner.viewer.documents.paths import describe_verdict
 from rover_planner.viewer.state.judging import judge_steps
 from rover_planner.viewer.state.scenario import Shown
 from rover_planner.viewer.state.session import ViewSession

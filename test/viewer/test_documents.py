@@ -11,16 +11,18 @@ from rover_physics.names import EQUAL, OPTIMAL, SERVO, SIDES, WHEELS
 from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.viewer.documents.drive import (
+from rover_planner.viewer.documents.paths import (
     MAX_POINTS,
     choose_rows,
     describe_board,
     describe_limits,
+    describe_paths,
     describe_uses,
+    describe_verdict,
+    plain,
+    write_use,
 )
 from rover_planner.viewer.documents.rover import compare_drives, describe_sliders, read_values
-from rover_planner.viewer.documents.verdict import describe_paths, describe_verdict
-from rover_planner.viewer.state.numbers import plain, write_use
 from rover_planner.viewer.state.path_limits import Lane
 from rover_planner.viewer.state.scenario import Judged
 from support.grounds import gap, make_terrain, wall_at, waves

@@ -22,9 +22,9 @@ from support.viewer.sessions import wait_patiently as wait_until
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
+from rover_planner.viewer.documents.paths import write_use
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.pages.sharing import KEY
-from rover_planner.viewer.state.numbers import write_use
 
 pytestmark = [needs_browser, pytest.mark.slow]
 
@@ -216,7 +216,7 @@ def test_a_click_into_the_scene_sets_the_goal_and_one_into_the_sky_is_refused(vi
     box = visitor.tab.locator("#scene").bounding_box()
     middle = box["x"] + 0.5 * box["width"], box["y"] + 0.7 * box["height"]
     client = wait_for_scene(page)
-    ask(page, lambda: page._look([client], "Fit"))
+    ask(page, lambda: page._look(client, "Fit"))
     visitor.tab.wait_for_timeout(500)
     visitor.tab.mouse.click(*middle)
     wait_until(lambda: page.session.wanted.goal != goal, "another goal")

@@ -5,6 +5,7 @@ import io
 import math
 import weakref
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -84,8 +85,13 @@ def test_a_trajectory_ends_where_the_path_is_refused_and_has_no_state_without_po
 TIMES = np.linspace(0.0, 10.0, 11)
 
 
+def drive(times=TIMES) -> SimpleNamespace:
+    """Return a drive with poses at the first waypoints, as it is played."""
+    return SimpleNamespace(times=times, places=TIMES[: len(times)])
+
+
 def test_playing_stops_at_the_end_and_starts_again_from_the_beginning():
-    playback = Playback(TIMES, TIMES, speed=2.0)
+    playback = Playback(drive(), speed=2.0)
     playback.toggle()
     playback.advance(1.0)
     assert (playback.time, playback.is_playing, playback.moved) == (2.0, True, True)
@@ -99,19 +105,19 @@ def test_playing_stops_at_the_end_and_starts_again_from_the_beginning():
 
 
 def test_a_drive_that_ends_early_does_not_forget_where_the_rover_was():
-    playback = Playback(TIMES, TIMES, place=8.0)
-    playback.set_drive(TIMES[:4], TIMES[:4])
+    playback = Playback(drive(), place=8.0)
+    playback.take(drive(TIMES[:4]))
     assert playback.time == playback.duration == 3.0
-    playback.set_drive(2.0 * TIMES, TIMES)
+    playback.take(drive(2.0 * TIMES))
     assert playback.time == 16.0
-    playback.set_drive(TIMES[:4], TIMES[:4])
+    playback.take(drive(TIMES[:4]))
     playback.seek(2.0)
-    playback.set_drive(TIMES, TIMES)
+    playback.take(drive())
     assert playback.time == 2.0
 
 
 def test_steps_go_from_waypoint_to_waypoint():
-    playback, seen = Playback(TIMES[:4], TIMES[:4], place=1.4), []
+    playback, seen = Playback(drive(TIMES[:4]), place=1.4), []
     for by in (1, 1, 1, -1, -1, -1, -1):
         playback.step(by)
         seen.append(playback.time)

@@ -351,7 +351,7 @@ def test_a_camera_sees_all_of_the_path_from_behind_or_above_and_the_rover_from_i
     middle = 0.5 * (path.min(axis=0) + path.max(axis=0))
     away = {}
     for view in ("Fit", "Top", "Side"):
-        page._look([client], view)
+        page.scene.look(view, page.points, [client])
         away[view] = client.camera.position - client.camera.look_at
         if view != "Side":
             np.testing.assert_allclose(client.camera.look_at[:2], middle, atol=1e-6)

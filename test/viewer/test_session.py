@@ -20,8 +20,8 @@ from rover_planner.command.prediction_files import (
 from rover_planner.command.view import SEED, choose_ends, name_ground
 from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import assume
+from rover_planner.viewer.documents.paths import describe_paths, describe_verdict
 from rover_planner.viewer.documents.rover import describe_changes
-from rover_planner.viewer.documents.verdict import describe_paths, describe_verdict
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, Judge, blocked_session, ramp, session_on, straight

@@ -9,7 +9,7 @@ import pytest
 from rover_physics.traversability.judge import judge_path
 from rover_planner.planning.search.path_search import FOUND, NO_WAY
 from rover_planner.planning.search.query import LatticeSettings
-from rover_planner.viewer.documents.verdict import describe_verdict
+from rover_planner.viewer.documents.paths import describe_verdict
 from rover_planner.viewer.state.background_work import Progress
 from rover_planner.viewer.state.judging import BETTER, SEARCH, judge_steps
 from rover_planner.viewer.state.session import ViewSession

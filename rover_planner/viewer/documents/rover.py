@@ -10,8 +10,8 @@ import numpy as np
 from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import rover_to_dict
 from rover_planner.studies.rover_values import RoverValue, get_value, list_values
-from rover_planner.viewer.documents.verdict import POLICY_TITLES
-from rover_planner.viewer.state.numbers import write, write_use
+from rover_planner.viewer.documents.paths import POLICY_TITLES, write_use
+from rover_planner.viewer.state.path_limits import write
 from rover_planner.viewer.state.scenario import Judged, Scenario
 
 JOINTS = "joints"

@@ -13,7 +13,7 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.learned_ground import LearnedGround
-from rover_planner.viewer.documents.verdict import WORDS, describe_answer
+from rover_planner.viewer.documents.paths import WORDS, describe_answer
 from rover_planner.viewer.state.drive import RoverState, place_state
 
 MAX_AGE = 2.0

@@ -6,7 +6,7 @@ import threading
 import time
 import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from typing import Any
@@ -112,7 +112,7 @@ class PageBase(ABC):
         self._camera.on_click(self._request_view)
         for key, (label, words) in HOTKEYS.items():
             gui.add_command(label, hotkey=key).on_trigger(partial(self._press, words))
-        self.server.on_client_connect(lambda client: self._look([client], START))
+        self.server.on_client_connect(lambda client: self._look(client, START))
         self.server.scene.on_click()(partial(self._request_click, shift=False))
         self.server.scene.on_click(modifier="shift")(partial(self._request_click, shift=True))
 
@@ -245,16 +245,15 @@ class PageBase(ABC):
 
     def _request_view(self, event: Any) -> None:
         client, name = event.client, event.target.value
-        act = self._follow if name in (FOLLOW, STAY) else self._look
-        self.requests.put(lambda: act([client], name))
+        self.requests.put(partial(self._look, client, name))
 
-    def _look(self, clients: Collection[Any], view: str) -> None:
-        self.scene.cameras.look(clients, view, self.points)
-
-    def _follow(self, _clients: Collection[Any], name: str) -> None:
-        """Go along with the rover or not, and name the button by what it does next."""
-        self.scene.cameras.follow(name == FOLLOW)
-        self._camera.options = (*VIEWS, STAY if name == FOLLOW else FOLLOW)
+    def _look(self, client: Any, name: str) -> None:
+        """Show a view, or go along with the rover or not, and name the button by what is next."""
+        if name in (FOLLOW, STAY):
+            self.scene.follow(name == FOLLOW)
+            self._camera.options = (*VIEWS, STAY if name == FOLLOW else FOLLOW)
+        else:
+            self.scene.look(name, self.points, [client])
 
     def _request_click(self, event: Any, shift: bool) -> None:
         def click() -> None:
@@ -282,25 +281,30 @@ class PageBase(ABC):
         due = self._last + PERIOD
         self.requests.wait(due - time.monotonic())
         for action in self.requests.take().values():
-            self.run("the last request failed", partial(self._fulfil, action))
+            self.run("the last request failed", action, self.show_refusal)
         self.tell_all()
         now = time.monotonic()
         passed, self._last = now - self._last, now
         with self.server.atomic():  # one message to wake the server for all that is sent
             self.run("drawing stopped", partial(self.advance, passed))
 
-    def run(self, failure: str, work: Action) -> None:
+    def run(
+        self, failure: str, work: Action, refuse: Callable[[str], object] | None = None
+    ) -> None:
         """Do a part of the page's work; an error in it is told, and stops no other.
 
         Args:
             failure: What is told of an error, such as "the paths are not drawn".
             work: The part.
+            refuse: Takes the reason of a refusal, which then is no error.
         """
         message = ""
         try:
             work()
         except REFUSALS as error:
-            message = str(error)
+            message = "" if refuse else str(error)
+            if refuse:
+                refuse(str(error))
         except Exception as error:
             message = f"{type(error).__name__}: {error}"
             if self.errors.get(failure) != message:
@@ -335,13 +339,6 @@ class PageBase(ABC):
         if self.has_changed(failure, *made_of):
             with self.server.atomic():
                 self.run(failure, partial(draw, *made_of))
-
-    def _fulfil(self, request: Action) -> None:
-        """Act on a request, or say why not."""
-        try:
-            request()
-        except REFUSALS as error:
-            self.show_refusal(str(error))
 
 
 def check_address(host: str, port: int) -> None:

@@ -10,7 +10,7 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
-from rover_planner.viewer.documents.drive import describe_board
+from rover_planner.viewer.documents.paths import describe_board
 from rover_planner.viewer.live.listener import LiveListener
 from rover_planner.viewer.live.live_state import (
     LiveData,
@@ -125,14 +125,13 @@ class LivePage(PageBase):
             self._turn_arm(data)
             if self._first is None:
                 self._first = state.position[:2]
-                self._look(self.server.get_clients().values(), START)
+                self.scene.look(START, self.points)
         if now - self._told_at > BOARD_PERIOD:
             self._told_at = now
             self._tell_board(state, data)
 
     def _tell_board(self, state: RoverState | None, data: LiveData) -> None:
-        slips = state is not None and bool(np.nan_to_num(state.slip_ratio).any())
-        self.channel.tell("board", describe_board(state, has_slip=slips))
+        self.channel.tell("board", describe_board(state))
         words = f"{data.freshness}; {data.forces_from or 'forces not known'}"
         self.channel.tell("drive", {"duration": None, "words": words})
         self.channel.tell("topics", list_topics(data.ages.values()))

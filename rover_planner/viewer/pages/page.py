@@ -8,7 +8,6 @@ from functools import cached_property, partial
 from typing import Any
 
 from rover_physics.numerics.arrays import Floats
-from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover, preset_names, rover_to_dict
 from rover_physics.terrain.grid import fingerprint
 from rover_physics.terrain.soil_file import load_soils
@@ -16,7 +15,7 @@ from rover_planner.advice.advise import Advice
 from rover_planner.advice.remedy import Remedy
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import read_rover, write_rover
-from rover_planner.viewer.documents import advice, drive, rover, verdict
+from rover_planner.viewer.documents import advice, paths, rover
 from rover_planner.viewer.pages import sharing
 from rover_planner.viewer.pages.base import PERIOD, Answer, PageBase
 from rover_planner.viewer.scene.overlays import GHOST
@@ -58,7 +57,7 @@ class Page(PageBase):
             survey: A survey of rover and ground, whose layers are offered.
             ground_name: What the page calls the ground.
         """
-        self.session, self.playback = session, Playback()
+        self.session, self.playback = session, Playback(session.shown.path.trajectory)
         self._ground_name = ground_name
         self._click_sets = "goal"
         self._opening: tuple[sharing.PageLink, Scenario] | None = None
@@ -73,7 +72,7 @@ class Page(PageBase):
         offers = {
             "presets": list(preset_names()),
             "soils": list(load_soils()),
-            "policies": [[name, title] for name, title in verdict.POLICY_TITLES.items()],
+            "policies": [[name, title] for name, title in paths.POLICY_TITLES.items()],
             "speeds": list(SPEEDS),
         }
         self.channel.tell("offers", self.list_layers() | offers)
@@ -166,7 +165,7 @@ class Page(PageBase):
         failure = self.session.shown.path.failure
         if failure is not None:
             self.playback.go_to(failure.time)
-            self.scene.cameras.look_at_failure(self.session.shown.scenario.rover, failure)
+            self.scene.look_at_failure(self.session.shown.scenario.rover, failure)
 
     # Advice.
 
@@ -301,22 +300,18 @@ class Page(PageBase):
             self.playback.go_to(0.0)
         is_new = self.has_changed("drive", path)
         if is_new:
-            self.playback.set_drive(path.trajectory.times, path.trajectory.places)
+            self.playback.take(path.trajectory)
         self._tell_drive()
         if is_new:
             self._ended.wait(PERIOD)
         draw("the failure is not shown", scene.failure.show, asked.rover, path.failure)
         draw("the rover is not drawn", scene.rover.take, asked.rover, asked.arm_angles)
-        draw("the cameras are not moved", self._fit, asked.loaded)
+        draw("the cameras are not moved", lambda _: scene.look(FIT, self.points), asked.loaded)
         draw("the paths are not drawn", scene.paths.show, shown.paths, shown.index)
         depends = self.colouring.is_predicted or self.survey is not None
         if self.has_changed("ground", asked) and depends:
             self.paint()
         self.playback.moved = True
-
-    def _fit(self, _loaded: Rover) -> None:
-        """Let all cameras look at all of the path of a rover that was loaded."""
-        self._look(self.server.get_clients().values(), FIT)
 
     # What is told.
 
@@ -345,17 +340,17 @@ class Page(PageBase):
         every = frozenset(range(len(shown.paths)))
         is_slow = work["judging"] or work["stopped"]
         self.scene.paths.mark_old(every if work["old"] else shown.old if is_slow else frozenset())
-        made("subject", verdict.describe_subject, shown.scenario, self._ground_name)
-        tell("verdict", verdict.describe_verdict(shown) | work)
+        made("subject", paths.describe_subject, shown.scenario, self._ground_name)
+        tell("verdict", paths.describe_verdict(shown) | work)
         is_old, is_judging = bool(work["old"]), self._judging.progress is not None
-        made("paths", verdict.describe_paths, shown, is_old, is_judging)
+        made("paths", paths.describe_paths, shown, is_old, is_judging)
         is_seeking = self._advice.progress is not None
         tell("advice", advice.describe_advice(self._advised, is_seeking, time.monotonic()))
         made("current", lambda *_: sharing.write_link(self._link()), shown, self.colouring)
         made("sliders", rover.describe_sliders, wanted.loaded)
         made("values", rover.describe_values, wanted)
         made("changes", rover.describe_changes, path, reference, session.kept is not None)
-        made("limits", drive.describe_limits, path, reference, shown.chance)
+        made("limits", paths.describe_limits, path, reference, shown.chance)
         model = wanted.options.model
         tell("chosen", {
             **self.list_chosen(), "policy": model.policy, "soil": model.soil or "",
@@ -385,9 +380,9 @@ class Page(PageBase):
             "fails": None if failure is None else round(failure.time, 2),
         })  # fmt: skip
         link = "" if failure is None else failure.link
-        board = drive.describe_board(state, link, has_slip=path.trajectory.has_slip)
+        board = paths.describe_board(state, link)
         self.channel.tell("board", board)
-        uses = drive.describe_uses(path, playback.time, self.session.shown.chance)
+        uses = paths.describe_uses(path, playback.time, self.session.shown.chance)
         self.channel.tell("uses", uses)
 
 

@@ -26,101 +26,15 @@ MIN_AWAY = 12.0
 """Smallest distance of a camera from what it looks at [wheel radii]."""
 
 
-class Cameras:
-    """Places the cameras of visitors, and lets them go along with a rover that is drawn."""
-
-    def __init__(self, server: Any, canvas: Canvas, drawn: DrawnRover):
-        """Move no camera yet."""
-        self._server, self._canvas, self._drawn = server, canvas, drawn
-        self._follows = False
-
-    def look(self, clients: Collection[Any], view: str, points: Floats) -> None:
-        """Let cameras look at a path, or at the rover on it.
-
-        Args:
-            clients: The clients of viser of the cameras' visitors.
-            view: FIT all of the path from behind and beside; TOP the same from above, north at
-                the top; SIDE the rover from the right side of its path; START along the path from
-                behind and beside its start.
-            points: (n, 2) x and y of the path [m]; where the ground is not known, its height is 0.
-        """
-        rover, state = self._drawn.rover, self._drawn.state
-        if rover is None:
-            return
-        path = self._canvas.lay(points, 0.0, 0.0)
-        ahead = path[-1, :2] - path[0, :2]
-        length = float(np.linalg.norm(ahead))
-        ahead = ahead / length if length > 0.0 else np.array([1.0, 0.0])
-        beside, least = np.array([ahead[1], -ahead[0]]), MIN_AWAY * rover.wheel.radius
-        for client in clients:
-            if view == SIDE:
-                towards, away = np.array([*beside, 0.25]), 1.5 * least
-                middle = path[0] if state is None else state.position
-            elif view == START:
-                towards = np.array([*(0.9 * beside - 0.8 * ahead), SLANT])
-                away = min(0.25 * max(length, 1.0), 3.0) + 0.5 * least
-                middle = path[0] + [*(0.12 * length * ahead), 0.0]
-            else:
-                fov, aspect = _field_of_view(client)
-                middle = 0.5 * (path.min(axis=0) + path.max(axis=0))
-                radius = (
-                    float(np.linalg.norm(path - middle, axis=1).max())
-                    + swing_radius(rover)
-                    + rover.wheel.radius
-                )
-                flat = 0.45 * beside - 0.65 * ahead
-                towards = np.array([*flat, SLANT] if view == FIT else [0.0, -1e-3, 1.0])
-                towards /= np.linalg.norm(towards)
-                away = MARGIN * max(radius, least) / np.sin(0.5 * fov) / min(aspect, 1.0)
-            from_here = path[0] if view == START else middle
-            self._place(client, from_here + away * towards, middle)
-
-    def follow(self, follows: bool) -> None:
-        """Go along with the rover or not; first look at it from the same side and distance."""
-        self._follows = follows
-        if follows and self._drawn.state is not None:
-            place = self._drawn.state.position
-            for client in self._clients():
-                offset = client.camera.position - client.camera.look_at
-                self._place(client, place + offset, place)
-
-    def look_at_failure(self, rover: Rover, failure: Failure) -> None:
-        """Let all cameras look at a failure, from the side of what fails."""
-        yaw, at = float(failure.state.attitude[2]), failure.state.position
-        size = rover.suspension.wheels["front"][0] - rover.belly.x[0]
-        side = -1.0 if "right" in failure.link else 1.0
-        ahead, left = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
-        offset = size * np.array([*(-0.9 * ahead + side * 2.2 * left), 1.3])
-        for client in self._clients():
-            self._place(client, at + offset, at)
-
-    def go_along(self, by: Floats) -> None:
-        """Move all cameras by (3,) [m] if they go along with the rover."""
-        if self._follows:
-            for client in self._clients():
-                client.camera.position = client.camera.position + by
-
-    def _clients(self) -> list[Any]:
-        return list(self._server.get_clients().values())
-
-    def _place(self, client: Any, position: Floats, look_at: Floats) -> None:
-        client.camera.position = self._canvas.to_scene(position)
-        client.camera.look_at = self._canvas.to_scene(look_at)
-
-
-def _field_of_view(client: Any) -> tuple[float, float]:
-    """Return the vertical field of view [rad] and width over height of a visitor's picture."""
-    camera = client.camera
-    fov, height = float(camera.fov), float(camera.image_height)
-    return (fov if fov > 0.1 else 1.0), (float(camera.image_width) / height if height else 1.0)
-
-
 class Scene:
-    """All nodes of the scene; a new state of the rover sends poses, wheel colours and arrows."""
+    """All nodes of the scene, and the cameras of its visitors, which may go along with the rover.
+
+    A new state of the rover sends poses, wheel colours and arrows.
+    """
 
     def __init__(self, server: Any):
         """Set up the lights of an empty scene."""
-        self._server = server
+        self._server, self._follows = server, False
         server.scene.set_up_direction("+z")
         server.scene.configure_default_lights(cast_shadow=False)
         server.scene.configure_environment_map(environment_intensity=0.25)
@@ -129,8 +43,6 @@ class Scene:
         self.paths = PathOverlay(self.canvas)
         self.rover = DrawnRover(self.canvas, "/rover")
         self.failure = FailureMark(self.canvas)
-        self.cameras = Cameras(server, self.canvas, self.rover)
-        """The visitors' cameras."""
 
     def draw_ground(self, glb: bytes) -> None:
         """Show another ground, as `write_ground` returns it, or the same in other colours."""
@@ -146,5 +58,75 @@ class Scene:
         before = self.rover.state
         with self._server.atomic():
             self.rover.show(state, self.failure.make_room(state))
-            if before is not None and state is not None:
-                self.cameras.go_along(state.position - before.position)
+            if self._follows and before is not None and state is not None:
+                by = state.position - before.position
+                for client in self._clients():
+                    client.camera.position = client.camera.position + by
+
+    def look(self, view: str, points: Floats, clients: Collection[Any] | None = None) -> None:
+        """Let cameras look at a path, or at the rover on it.
+
+        Args:
+            view: FIT all of the path from behind and beside; TOP the same from above, north at
+                the top; SIDE the rover from the right side of its path; START along the path from
+                behind and beside its start.
+            points: (n, 2) x and y of the path [m]; where the ground is not known, its height is 0.
+            clients: The clients of viser of the cameras' visitors (default: all).
+        """
+        rover, state = self.rover.rover, self.rover.state
+        if rover is None:
+            return
+        path = self.canvas.lay(points, 0.0, 0.0)
+        ahead = path[-1, :2] - path[0, :2]
+        length = float(np.linalg.norm(ahead))
+        ahead = ahead / length if length > 0.0 else np.array([1.0, 0.0])
+        beside, least = np.array([ahead[1], -ahead[0]]), MIN_AWAY * rover.wheel.radius
+        for client in self._clients() if clients is None else clients:
+            if view == SIDE:
+                at = path[0] if state is None else state.position
+                self._place(client, at, at + 1.5 * least * np.array([*beside, 0.25]))
+            elif view == START:
+                away = min(0.25 * max(length, 1.0), 3.0) + 0.5 * least
+                towards = np.array([*(0.9 * beside - 0.8 * ahead), SLANT])
+                at = path[0] + [*(0.12 * length * ahead), 0.0]
+                self._place(client, at, path[0] + away * towards)
+            else:
+                at = 0.5 * (path.min(axis=0) + path.max(axis=0))
+                radius = float(np.linalg.norm(path - at, axis=1).max()) + swing_radius(rover)
+                flat = 0.45 * beside - 0.65 * ahead
+                towards = np.array([*flat, SLANT] if view == FIT else [0.0, -1e-3, 1.0])
+                away = _distance_of(client, max(radius + rover.wheel.radius, least))
+                self._place(client, at, at + away * towards / np.linalg.norm(towards))
+
+    def follow(self, follows: bool) -> None:
+        """Go along with the rover or not; first look at it from the same side and distance."""
+        self._follows = follows
+        if follows and self.rover.state is not None:
+            at = self.rover.state.position
+            for client in self._clients():
+                self._place(client, at, at + client.camera.position - client.camera.look_at)
+
+    def look_at_failure(self, rover: Rover, failure: Failure) -> None:
+        """Let all cameras look at a failure, from the side of what fails."""
+        yaw, at = float(failure.state.attitude[2]), failure.state.position
+        size = rover.suspension.wheels["front"][0] - rover.belly.x[0]
+        side = -1.0 if "right" in failure.link else 1.0
+        ahead, left = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])
+        offset = size * np.array([*(-0.9 * ahead + side * 2.2 * left), 1.3])
+        for client in self._clients():
+            self._place(client, at, at + offset)
+
+    def _clients(self) -> Collection[Any]:
+        return list(self._server.get_clients().values())
+
+    def _place(self, client: Any, look_at: Floats, position: Floats) -> None:
+        client.camera.position = self.canvas.to_scene(position)
+        client.camera.look_at = self.canvas.to_scene(look_at)
+
+
+def _distance_of(client: Any, radius: float) -> float:
+    """Return the distance [m] from which a ball of a radius fits into a visitor's picture."""
+    camera = client.camera
+    fov, width, height = camera.fov, camera.image_width, camera.image_height
+    narrow = min(width / height, 1.0) if height else 1.0
+    return float(MARGIN * radius / np.sin(0.5 * (fov if fov > 0.1 else 1.0)) / narrow)

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The drive along a predicted path: the rover at any time of it, and the clock that plays it."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.names import SERVO, WHEELS
+from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.records import new_record
 from rover_physics.results.path_prediction import PathPrediction, prediction_of
@@ -67,14 +67,15 @@ class RoverState:
     @property
     def friction_use(self) -> Floats:
         """(6,) friction utilisation over its limit."""
-        bound = self.rover.limits.friction_utilisation * self.kept_share
-        return np.asarray(self.friction_utilisation / max(bound, LEAST_BOUND))
+        return self._use(self.friction_utilisation, self.rover.limits.friction_utilisation)
 
     @property
     def torque_use(self) -> Floats:
         """(6,) torque saturation over its limit."""
-        bound = self.rover.limits.torque_saturation * self.kept_share
-        return np.asarray(self.torque_saturation / max(bound, LEAST_BOUND))
+        return self._use(self.torque_saturation, self.rover.limits.torque_saturation)
+
+    def _use(self, values: Floats, limit: float) -> Floats:
+        return np.asarray(values / max(limit * self.kept_share, LEAST_BOUND))
 
 
 def place_state(
@@ -137,12 +138,6 @@ class Trajectory:
         self._spin = _roll_wheels(rover, self._driven) if end else np.zeros((0, 6))
 
     @property
-    def has_slip(self) -> bool:
-        """True if slip is predicted: on yielding soil, or with speed servos."""
-        driven = self._driven
-        return driven.policy == SERVO or bool(np.any(driven.sinkage > 0.0))
-
-    @property
     def energy(self) -> float:
         """Energy spent up to its end [J]."""
         return float(self._driven.energy[-1]) if self.length else 0.0
@@ -176,10 +171,8 @@ def _roll_wheels(rover: Rover, driven: PathPrediction) -> Floats:
 class Playback:
     """The time of a drive that is shown, and how it moves on."""
 
-    times: Floats = field(default_factory=lambda: np.zeros(1))
-    """(n,) times of the poses of the drive [s]."""
-    places: Floats = field(default_factory=lambda: np.zeros(1))
-    """(n,) their places along the path, whole numbers at waypoints."""
+    drive: Trajectory
+    """The drive."""
     place: float = 0.0
     """Where the rover is along the path; a drive may end before."""
     speed: float = 10.0
@@ -192,12 +185,12 @@ class Playback:
     @property
     def time(self) -> float:
         """Time that is shown [s]."""
-        return float(np.interp(self.place, self.places, self.times))
+        return float(np.interp(self.place, self.drive.places, self.drive.times))
 
     @property
     def duration(self) -> float:
         """Duration of the drive [s]."""
-        return float(self.times[-1])
+        return float(self.drive.times[-1])
 
     def toggle(self) -> None:
         """Pause if it plays; else play, from the start if the shown time is the end."""
@@ -207,7 +200,7 @@ class Playback:
 
     def seek(self, time: float) -> None:
         """Go to a time [s], limited to the drive."""
-        self.place, self.moved = float(np.interp(time, self.times, self.places)), True
+        self.place, self.moved = float(np.interp(time, self.drive.times, self.drive.places)), True
 
     def go_to(self, time: float) -> None:
         """Pause, and go to a time [s], limited to the drive."""
@@ -217,10 +210,10 @@ class Playback:
     def step(self, by: int = 1) -> None:
         """Pause, and go to the next pose, or to the previous one if `by` is -1."""
         if by > 0:
-            index = int(np.searchsorted(self.times, self.time + 1e-9, side="right"))
+            index = int(np.searchsorted(self.drive.times, self.time + 1e-9, side="right"))
         else:
-            index = int(np.searchsorted(self.times, self.time - 1e-9, side="left")) - 1
-        self.go_to(float(self.times[np.clip(index, 0, len(self.times) - 1)]))
+            index = int(np.searchsorted(self.drive.times, self.time - 1e-9, side="left")) - 1
+        self.go_to(float(self.drive.times[np.clip(index, 0, len(self.drive.times) - 1)]))
 
     def advance(self, seconds: float) -> None:
         """Move on by the visitor's time [s] if it plays."""
@@ -234,11 +227,6 @@ class Playback:
             f"playing, {self.speed:g} times as fast as the rover" if self.is_playing else "paused"
         )
 
-    def set_drive(self, times: Floats, places: Floats) -> None:
-        """Take another drive, and stay at the place, or at the end of a drive that ends before.
-
-        Args:
-            times: (n,) times of its poses [s], ascending, n >= 1.
-            places: (n,) their places along the path, ascending.
-        """
-        self.times, self.places, self.moved = times, places, True
+    def take(self, drive: Trajectory) -> None:
+        """Take another drive, and stay at the place, or at the end of a drive that ends before."""
+        self.drive, self.moved = drive, True

@@ -19,7 +19,6 @@ from rover_physics.traversability.classification import find_wheel
 from rover_physics.traversability.verdict import Verdict
 from rover_planner.planning.asked_poses import AskedPoses, merge_poses
 from rover_planner.viewer.state.drive import RoverState, place_state
-from rover_planner.viewer.state.numbers import write
 
 GROUND = "ground"
 """Code of what is no limit of a number: unknown ground, no equilibrium, entrapment, steering."""
@@ -225,6 +224,13 @@ def _add_refusals(limits: PathLimits, verdict: Verdict) -> None:
         lane, here = limits.lane(code), rows.prediction.waypoint == waypoint
         if code not in ("", CHANCE) and not np.any(lane.used[here] > 1.0):
             lane.used[here & ~rows.is_between] = ABOVE
+
+
+def write(value: float, digits: int, unit: str = "") -> str:
+    """Return a number as text with its unit, ? for NaN."""
+    if np.isnan(value):
+        return "?"
+    return f"{value:.{digits}f} {unit}".rstrip() if abs(value) < 1e5 else "infinite"
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,295 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Judged paths: verdicts, uses of the limits beside those of the reference, and the board."""
+
+import itertools
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rover_physics.chance.failure_chance import FailureChance
+from rover_physics.limits.table import CHANCE
+from rover_physics.names import EQUAL, OPTIMAL, SERVO, WHEELS
+from rover_physics.numerics.arrays import Floats
+from rover_planner.viewer.state.colours import colour_use, to_css
+from rover_planner.viewer.state.drive import RoverState
+from rover_planner.viewer.state.path_limits import Lane, PathLimits, write
+from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
+
+POLICY_TITLES = {EQUAL: "equal torques", SERVO: "speed servos", OPTIMAL: "traction control"}
+"""Names of the torque policies on the page."""
+WORDS = {None: "no verdict", True: "traversable", False: "not traversable"}
+MAX_USE = 99.0
+"""Largest use that is written as a number."""
+MAX_POINTS = 240
+"""Most points of a curve."""
+WHEEL_ROWS = {
+    "normal force N [N]": ("wheel_loads", 1.0, 1),
+    "traction T [N]": ("tangential", 1.0, 1),
+    "lateral force S [N]": ("lateral", 1.0, 1),
+    "use of friction [%]": ("friction_use", 100.0, 0),
+    "use of torque [%]": ("torque_use", 100.0, 0),
+    "slip ratio [%]": ("slip_ratio", 100.0, 0),
+}
+"""Rows of the table of wheels: field of the state, factor and digits."""
+
+
+def describe_subject(scenario: Scenario, ground: str) -> dict[str, str]:
+    """Return what a scenario is about, by name, on a ground with a name."""
+    rover, terrain, options = scenario.rover, scenario.terrain, scenario.options
+    soil = options.model.soil or f"firm, friction {rover.friction:g}"
+    if terrain.soil_names:
+        soil = f"{', '.join(terrain.soil_names)} on the map"
+    return {
+        "rover": rover.name + ("" if rover == scenario.loaded else " (changed)"),
+        "map": ground,
+        "soil": soil,
+        "torques": POLICY_TITLES[options.model.policy],
+        "mode": "planning" if scenario.recorded is None else "replay",
+    }
+
+
+def describe_verdict(shown: Shown) -> dict[str, Any]:
+    """Return the verdict on the path that is looked at."""
+    failure, verdict = shown.path.failure, shown.verdict
+    around = shown.around
+    closed = "" if around is None or around.path is not None else f"no way: {around.reason}"
+    return {
+        **describe_answer(verdict.traversable, f"path {shown.index + 1} of {len(shown.paths)}"),
+        "headline": "" if failure is None else failure.headline,
+        "where": "" if failure is None else failure.place,
+        "chance": ""
+        if shown.chance is None
+        else f"chance of failure {write_chance(shown.chance)}",
+        "details": [*filter(None, (verdict.reason, closed))],
+        "policies": _list_policies(shown),
+        "offers": _list_offers(shown),
+        "fails": failure is not None,
+    }
+
+
+def describe_answer(traversable: bool | None, about: str) -> dict[str, Any]:
+    """Return a bare verdict: what it says and what it is about."""
+    return {"passes": traversable, "word": WORDS[traversable], "about": about}
+
+
+def _list_policies(shown: Shown) -> list[dict[str, Any]]:
+    """Return the verdicts under all policies; none for a replay, whose soil is not known."""
+    rows = []
+    for policy, title in POLICY_TITLES.items() if shown.scenario.recorded is None else ():
+        one = shown.by_policy.get(policy)
+        passes, reason = (None, "") if one is None else (one.traversable, one.reason)
+        word = {None: "not judged", True: "passes", False: "refused"}[passes]
+        old = one is None or one.scenario is not shown.scenario
+        row = {"title": title, "word": word, "passes": passes, "old": old}
+        rows.append({**row, "reason": reason or word})
+    return rows
+
+
+def _list_offers(shown: Shown) -> Sequence[dict[str, Any]]:
+    """Return what a click takes instead of a path that is refused: words, and what it asks."""
+    if shown.offer is None:
+        return []
+    kind = "path" if shown.offer < shown.generated else "way around, path"
+    length = shown.paths[shown.offer].candidate.length
+    words = f"{kind} {shown.offer + 1} passes ({length:.1f} m)"
+    return [{"words": words, "ask": {"ask": "show", "index": shown.offer}}]
+
+
+def describe_paths(
+    shown: Shown, is_outdated: bool = False, is_judging: bool = False
+) -> dict[str, Any]:
+    """Return a row for each path; the numbers of a refused one are up to its first failure.
+
+    Args:
+        shown: What is shown.
+        is_outdated: True if other values are wanted than those of what is shown.
+        is_judging: True if something is judged; else old paths say that they wait.
+    """
+    every = frozenset(range(len(shown.paths)))
+    old = every if is_outdated else shown.old
+    waits = "old, is judged" if is_judging else "old, was not judged again"
+    rows = [
+        _describe_row(path, number=k + 1, waits=waits if k in old else "", best=k == shown.best)
+        for k, path in enumerate(shown.paths)
+    ]
+    return {"rows": rows, "shown": shown.index}
+
+
+def _describe_row(path: Judged, number: int, waits: str, best: bool) -> dict[str, Any]:
+    verdict, length = path.verdict, f"{path.candidate.length:.2f}"
+    limits = path.limits
+    uses = [float(np.nanmax(one.used, initial=0.0)) for one in limits.lanes]
+    most = limits.lanes[int(np.argmax(uses))].title
+    word = "passes" if verdict.traversable else "refused"
+    return {
+        "number": number,
+        "passes": verdict.traversable,
+        "word": f"{word}, best" if best else word,
+        "waits": waits,
+        "length": length if verdict.traversable else f"{limits.end:.2f} of {length}",
+        "energy": write(path.trajectory.energy, 1),
+        "use": write_use(max(uses)),
+        "limit": most,
+        "reason": verdict.reason,
+    }
+
+
+def describe_limits(
+    path: Judged, reference: Judged | None, chance: FailureChance | None = None
+) -> dict[str, Any]:
+    """Return the curves of a path's lanes, those of the reference, of its chance, and the loads.
+
+    A lane has the use now and before, and six curves where wheels have it. Loads are those of the
+    wheels [N] while the rover stands.
+    """
+    failure, before = path.failure, None if reference is None else reference.limits
+    limits = path.limits.add_chance(chance)
+    end = max(limits.end, 0.0 if before is None else before.end)
+    rows, stands = limits.rows, limits.rows.prediction.settled
+    lanes = []
+    for lane in limits.lanes:
+        old = None
+        if before is not None and lane.code != CHANCE:
+            old = _pick_points(before.rows.distance, before.lane(lane.code).used[:, None])
+        now = _pick_points(rows.distance, lane.used[:, None])
+        wheels = None if lane.wheels is None else _pick_points(rows.distance, lane.wheels)
+        told = {"code": lane.code, "title": lane.title, "now": now}
+        lanes.append({**told, "wheels": wheels, "before": old})
+    loads = rows.prediction.wheel_loads[stands]
+    return {
+        "end": round(end, 4),
+        "code": "" if failure is None else limits.lane(failure.code).code,
+        "compared": reference is not None,
+        "lanes": lanes,
+        "loads": _pick_points(rows.distance[stands], loads, 1),
+    }
+
+
+def describe_uses(
+    path: Judged, time: float, chance: FailureChance | None = None
+) -> list[dict[str, Any]]:
+    """Return for each lane its use at a time [s] and the worst so far, with value and wheel."""
+    limits, failure = path.limits.add_chance(chance), path.failure
+    rows = limits.rows_until(time)
+    here = rows - 1
+    if failure is not None and failure.is_reached(time):
+        rows, here = max(rows, failure.row + 1), failure.row
+    uses = [_describe_use(lane, limits, lane.worst_until(rows), here) for lane in limits.lanes]
+    if chance is not None:
+        of = "whole path" if failure is None or failure.code == CHANCE else "up to the failure"
+        uses[-1]["value"] = f"{of} {100.0 * chance.path:.0f} %"
+        uses[-1]["broken"] = failure is not None and failure.code == CHANCE
+    return uses
+
+
+def write_chance(chance: FailureChance) -> str:
+    """Return the chance that a path fails, and its main cause, in words."""
+    cause = f", most often by {chance.limit}" if chance.limit else ""
+    return f"{100.0 * chance.path:.0f} %{cause}"
+
+
+def _describe_use(lane: Lane, limits: PathLimits, worst: int, here: int) -> dict[str, Any]:
+    used = float(lane.used[worst]) if worst >= 0 else np.nan
+    return {
+        "now": write_use(float(lane.used[here])),
+        "worst": write_use(used),
+        "broken": bool(used > 1.0),
+        "value": lane.write_value(worst) if worst >= 0 else "",
+        "link": limits.find_link(lane, worst).replace("_", " ") if used > 0.0 else "",
+    }
+
+
+def _pick_points(distance: Floats, values: Floats, digits: int = 3) -> dict[str, Any]:
+    """Return x (j,) and curves y (k, j) of values (m, k) with all peaks and dips.
+
+    What is infinite is MAX_USE: a use without bound is above the limit, no gap.
+    """
+    rows = choose_rows(values)
+    y = np.where(np.isposinf(values[rows]), MAX_USE, values[rows]).T
+    return {"x": plain(distance[rows], 4), "y": plain(y, digits)}
+
+
+def choose_rows(values: Floats) -> NDArray[np.intp]:
+    """Return at most MAX_POINTS rows of curves (m, k): first, last, and all peaks and dips.
+
+    A peak between two waypoints is what refuses a path; it must not be left out.
+    """
+    m = len(values)
+    if m <= MAX_POINTS:
+        return np.arange(m)
+    edges = np.linspace(0, m, MAX_POINTS // 2).astype(int)
+    high = np.nan_to_num(values, nan=-1e9).max(axis=1)
+    low = np.nan_to_num(values, nan=1e9).min(axis=1)
+    chosen = [
+        first + int(pick)
+        for first, end in itertools.pairwise(edges)
+        for pick in (np.argmax(high[first:end]), np.argmin(low[first:end]))
+    ]
+    return np.unique([0, *chosen, m - 1])
+
+
+def describe_board(state: RoverState | None, failing: str = "") -> dict[str, Any] | None:
+    """Return the wheels in wheel order, and the numbers of a state; None without a state.
+
+    Args:
+        state: The rover; slip is told where wheels slip, on yielding soil or with servos.
+        failing: The link that fails, empty for none.
+    """
+    if state is None:
+        return None
+    wheels, slips = [], np.nan_to_num(state.slip_ratio).any()
+    for k, name in enumerate(WHEELS):
+        friction, torque = float(state.friction_use[k]), float(state.torque_use[k])
+        bars = (("friction", friction), ("torque", torque))
+        slip = abs(float(state.slip_ratio[k]))
+        wheels.append(
+            {
+                "name": name.replace("_", " "),
+                "bars": [[title, plain(use), write_use(use)] for title, use in bars],
+                "colour": to_css(colour_use(friction)),
+                "load": write(float(state.wheel_loads[k]), 1, "N"),
+                "slip": write(100.0 * slip, 0, "% slip") if slips else "",
+                "turn": plain(math.degrees(float(state.steering_angle[k])), 1),
+                "fails": failing == name,
+            }
+        )
+    numbers = {
+        "time": write(state.time, 1, "s"),
+        "distance": write(100.0 * state.distance, 1, "cm"),
+        "speed": write(100.0 * state.speed, 1, "cm/s"),
+        "energy": write(state.energy, 2, "J"),
+        "tilt": write(math.degrees(state.tilt), 1, "deg"),
+        "belly": write(100.0 * state.belly_clearance, 1, "cm"),
+        "margin": write(state.tip_over_ratio, 2),
+        "x, y": f"{state.position[0]:.2f}, {state.position[1]:.2f} m",
+    }
+    table = [
+        [title, [write(scale * float(value), digits) for value in getattr(state, name)]]
+        for title, (name, scale, digits) in WHEEL_ROWS.items()
+    ]
+    return {"wheels": wheels, "numbers": numbers, "table": table}
+
+
+def plain(values: ArrayLike, digits: int = 3) -> Any:
+    """Return numbers of any shape as nested lists with a number of digits.
+
+    None stands for NaN and for what is infinite.
+    """
+    array = np.round(np.asarray(values, float), digits)
+    known = np.isfinite(array)
+    if known.all():
+        return array.tolist()
+    return np.where(known, array.astype(object), np.array(None, object)).tolist()
+
+
+def write_use(use: float) -> str:
+    """Return the use of a limit as text, such as "76 %"."""
+    if np.isnan(use):
+        return "not asked"
+    if use > MAX_USE:
+        return "fails" if np.isinf(use) else f"over {100.0 * MAX_USE:.0f} %"
+    text = f"{100.0 * use:.0f} %"
+    return "just above 100 %" if use > 1.0 and text == "100 %" else text
