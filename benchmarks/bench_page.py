@@ -22,7 +22,7 @@ from rover_physics.terrain.grid import Terrain, save_terrain
 from rover_planner.command.view import SEED, TERRAIN_SIZE, choose_ends
 from rover_planner.viewer.documents.paths import describe_verdict
 from rover_planner.viewer.state.judging import judge_steps
-from rover_planner.viewer.state.scenario import Shown
+from rover_planner.viewer.state.scenario import Scenario, Shown
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.viewer.browser import Visitor, open_browser
@@ -65,7 +65,7 @@ def measure() -> list[Figure]:
 def measure_verdict(name: str, terrain: Terrain) -> Figure:
     """Measure the CPU time from a changed number to the verdict on the path looked at."""
     rover, frictions = load_rover("lsr1"), itertools.count(0.6, 0.01)
-    shown = ViewSession(rover, terrain, *choose_ends(rover, terrain)).shown
+    shown = ViewSession(Scenario(rover, rover, terrain, *choose_ends(rover, terrain))).shown
 
     def judge() -> None:
         asked = replace(shown.scenario, rover=replace(rover, friction=next(frictions)))

@@ -14,7 +14,7 @@ from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.command.view import SEED, TERRAIN_SIZE, choose_ends
 from rover_planner.viewer.pages.page import Page
-from rover_planner.viewer.state.scenario import Pose
+from rover_planner.viewer.state.scenario import Pose, Scenario
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.viewer.browser import ARGUMENTS, PROGRAM, Visitor, sync_api
@@ -64,8 +64,8 @@ def _write(browser: Any, file: Path) -> str:
     """Write one picture; return what it shows."""
     name, make, ends = CASES[file.name]
     rover, ground = load_rover("lsr1"), make()
-    session = ViewSession(rover, ground, *(ends or choose_ends(rover, ground)))
-    page = Page(session, port=0, ground_name=name)
+    session = ViewSession(Scenario(rover, rover, ground, *(ends or choose_ends(rover, ground))))
+    page = Page(session, ground_name=name)
     try:
         wait_until(lambda: is_at_rest(page), "the verdicts")
         visitor = Visitor(browser, page.url, scale=1.0)
@@ -94,7 +94,7 @@ def _show_failure(page: Page, visitor: Visitor) -> str:
     for index, path in enumerate(session.shown.paths):
         if path.verdict.traversable:
             continue
-        page.hear({"ask": "show", "index": index}, None)
+        page.hear({"ask": "show", "index": index})
         wait_until(lambda index=index: session.shown.index == index, "the path")
         wait_until(lambda: is_at_rest(page), "its verdicts")
         failure = session.shown.path.failure
@@ -108,7 +108,7 @@ def _show_failure(page: Page, visitor: Visitor) -> str:
 
 def _show_drive(page: Page) -> str:
     """Show the rover after a third of its drive."""
-    page.hear({"ask": "seek", "time": page.playback.duration / 3.0}, None)
+    page.hear({"ask": "seek", "time": page.playback.duration / 3.0})
     return page.session.shown.verdict.reason or "traversable"
 
 

@@ -72,6 +72,7 @@ def view(
         need("zarr", "a survey")
     from rover_physics.rover.rover_file import load_rover
     from rover_planner.viewer.pages.base import check_address
+    from rover_planner.viewer.state.scenario import Scenario
     from rover_planner.viewer.state.session import ViewSession
     from rover_planner.viewer.state.survey_layers import load_map, open_survey
 
@@ -97,7 +98,8 @@ def view(
             given = name if terrain is not None else ""
             page: PageBase = _follow(closing, model, ground, (host, port), given)
         else:
-            session = ViewSession(model, ground, start or low, goal or high)
+            wanted = Scenario(model, model, ground, start or low, goal or high)
+            session = ViewSession(wanted)
             page = _show(session, (host, port), prediction, surveyed, name)
         closing.callback(page.close)
         # What is there now stays. Looking through all of it for garbage takes 0.1 s each time.
@@ -163,7 +165,7 @@ def _show(
                 f"{session.wanted.rover.name}"
             )
         session.replay(*read_prediction(prediction), assumptions)
-    return Page(session, *address, survey=survey, ground_name=name)
+    return Page(session, address, survey, name)
 
 
 def _follow(
@@ -178,7 +180,7 @@ def _follow(
     from rover_planner.viewer.pages.live_page import LivePage
 
     listener = closing.enter_context(listen())
-    return LivePage(rover, ground, listener, *address, ground_name=ground_name)
+    return LivePage(rover, ground, listener, address, ground_name)
 
 
 def _load_or_make(name: str | None, follow: bool, max_cells: int) -> "Terrain":

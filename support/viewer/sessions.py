@@ -46,16 +46,16 @@ def session_on(
     ground: Any,
     start: Pose = (-2.0, 0.0, 0.0),
     goal: Pose = (1.0, 0.0, 0.0),
-    options: PathQueryOptions | None = SURE,
+    options: PathQueryOptions = SURE,
     rover: Rover = LSR1,
-    search: LatticeSettings | None = None,
+    **more: Any,
 ) -> ViewSession:
     """Return a session on a terrain, or on a ground with heights ground(x, y) [m].
 
     It judges at once, until a page or a `Judge` takes that over.
     """
     terrain = ground if isinstance(ground, Terrain) else make_terrain(ground)
-    session = ViewSession(rover, terrain, start, goal, options, search)
+    session = ViewSession(Scenario(rover, rover, terrain, start, goal, options, **more))
 
     def judge(steps: Iterator[Step]) -> None:
         try:
@@ -152,7 +152,7 @@ def wait_for_rest(page: Any) -> None:
 def slow_scenario() -> Scenario:
     """Return a scenario of three paths with so many waypoints that each takes a while."""
     options = PathQueryOptions(count=3, spacing=0.2, waypoint_spacing=5e-5)
-    return Scenario(LSR1, LSR1, make_terrain(waves), START, GOAL, options, {})
+    return Scenario(LSR1, LSR1, make_terrain(waves), START, GOAL, options)
 
 
 @contextmanager

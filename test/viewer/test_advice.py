@@ -54,7 +54,7 @@ def test_a_path_passes_with_the_values_that_a_remedy_has(ground, changes, levers
 
 @pytest.fixture
 def page():
-    served = Page(session_on(rock_left, *ENDS, OPTIONS), port=0)
+    served = Page(session_on(rock_left, *ENDS, OPTIONS))
     wait_for_rest(served)
     yield served
     served.close()
@@ -62,16 +62,16 @@ def page():
 
 def test_advice_is_sought_when_it_is_asked_for_shown_as_a_ghost_and_taken(page):
     assert page.channel.parts["advice"]["can_ask"]
-    page.hear({"ask": "advise"}, None)
+    page.hear({"ask": "advise"})
 
     def find_path() -> str:
         rows = [row["words"] for row in page.channel.parts["advice"]["rows"] if row["taken"]]
         return next((words for words in rows if words.startswith("Drive ")), "")
 
     place = wait_until(find_path, "another path", 60.0)
-    page.hear({"ask": "ghost", "words": place}, None)
+    page.hear({"ask": "ghost", "words": place})
     wait_until(lambda: "/lines/ghost" in page.scene.canvas.nodes, "the ghost")
-    page.hear({"ask": "remedy", "words": place}, None)
+    page.hear({"ask": "remedy", "words": place})
     wait_until(lambda: page.channel.parts["verdict"]["passes"], "the verdict with the remedy")
     assert "/lines/ghost" not in page.scene.canvas.nodes
     assert page.errors == {}
@@ -95,9 +95,9 @@ def test_a_search_tells_what_was_found_by_a_promised_time_and_that_it_goes_on():
 
 
 def test_a_search_ends_when_nobody_looks_at_its_path_any_more(page):
-    page.hear({"ask": "advise"}, None)
+    page.hear({"ask": "advise"})
     wait_until(lambda: page._advice.progress, "the search")
-    page.hear({"ask": "value", "label": "friction [-]", "value": 0.7}, None)
+    page.hear({"ask": "value", "label": "friction [-]", "value": 0.7})
     wait_until(lambda: page.session.shown.scenario.rover.friction == 0.7, "the verdict")
     wait_until(lambda: page._advice.progress is None, "the end of the search")
     wait_until(lambda: page.channel.parts["advice"]["can_ask"], "the question")

@@ -11,20 +11,10 @@ from rover_physics.names import EQUAL, OPTIMAL, SERVO, SIDES, WHEELS
 from rover_physics.traversability.judge import judge_path
 from rover_physics.traversability.verdict import hold_against_limits
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.viewer.documents.paths import (
-    MAX_POINTS,
-    choose_rows,
-    describe_board,
-    describe_limits,
-    describe_paths,
-    describe_uses,
-    describe_verdict,
-    plain,
-    write_use,
-)
+from rover_planner.viewer.documents import paths
 from rover_planner.viewer.documents.rover import compare_drives, describe_sliders, read_values
 from rover_planner.viewer.state.path_limits import Lane
-from rover_planner.viewer.state.scenario import Judged
+from rover_planner.viewer.state.scenario import CANDIDATES, Judged
 from support.grounds import gap, make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, SURE, ramp, session_on
 
@@ -95,26 +85,28 @@ def test_board_lanes_curves_and_verdict_show_one_number_for_the_wheel_that_fails
     told = words.replace("friction", "utilisation").replace(" of ", ", limit ")
     assert failure.link in path.verdict.reason and told in path.verdict.reason
     wheel, codes = WHEELS.index(failure.link), [lane.code for lane in path.limits.lanes]
-    board = describe_board(failure.state, failure.link)["wheels"][wheel]
-    assert board["fails"] and board["bars"][0][2] == write_use(use)
-    used = describe_uses(path, end)[codes.index("friction")]
-    assert used["now"] == used["worst"] == write_use(use) and used["broken"]
+    board = paths.describe_board(failure.state, failure.link)["wheels"][wheel]
+    assert board["fails"] and board["bars"][0][2] == paths.write_use(use)
+    used = paths.describe_uses(path, end)[codes.index("friction")]
+    assert used["now"] == used["worst"] == paths.write_use(use) and used["broken"]
     assert used["link"] == failure.link.replace("_", " ") and used["link"] in failure.headline
-    lane = describe_limits(path, None)["lanes"][codes.index("friction")]
+    lane = paths.describe_limits(path, None)["lanes"][codes.index("friction")]
     assert max(lane["wheels"]["y"][wheel]) == pytest.approx(use, abs=1e-3)
     assert max(lane["now"]["y"][0]) == pytest.approx(use, abs=1e-3)
-    assert list_paths_of(path)["use"] == write_use(use)
+    assert list_paths_of(path)["use"] == paths.write_use(use)
 
 
 def list_paths_of(path: Judged) -> dict:
     asked = path.scenario
     session = session_on(asked.terrain, asked.start, asked.goal, asked.options)
-    return describe_paths(session.shown)["rows"][0]
+    return paths.describe_paths(session.shown)["rows"][0]
 
 
 def test_the_worst_so_far_grows_and_has_all_limits_in_one_unit():
     path = judged_on(waves)
-    uses = [describe_uses(path, time) for time in np.linspace(0.0, path.trajectory.times[-1], 5)]
+    uses = [
+        paths.describe_uses(path, time) for time in np.linspace(0.0, path.trajectory.times[-1], 5)
+    ]
     worst = [[one["worst"].replace("not asked", "-1") for one in row] for row in uses]
     shares = np.array([[float(words.split()[0]) for words in row] for row in worst])
     assert (np.diff(shares, axis=0) >= 0.0).all()
@@ -127,12 +119,12 @@ def test_a_path_that_fails_at_its_first_pose_has_a_lane_and_a_use_for_each_limit
     session.change_rover([("wheel", "max_torque")], 0.01)
     path = session.shown.path
     assert path.verdict.first_failure == 0
-    told = describe_limits(path, None)
+    told = paths.describe_limits(path, None)
     assert path.failure.distance == told["end"] == 0.0
     assert all(len(lane["now"]["x"]) == 1 for lane in told["lanes"])
     uses = {
         lane["code"]: one
-        for lane, one in zip(told["lanes"], describe_uses(path, 0.0), strict=True)
+        for lane, one in zip(told["lanes"], paths.describe_uses(path, 0.0), strict=True)
     }
     assert uses["torque"]["broken"] and uses["tilt"]["now"].endswith("%")
     assert len(told["loads"]["x"]) == 1
@@ -143,42 +135,42 @@ def test_the_lanes_of_the_reference_stand_below_those_of_now():
     session = session_on(ramp)
     session.change_rover([("friction",)], 0.3)
     shown = session.shown
-    told = describe_limits(shown.path, shown.reference)
+    told = paths.describe_limits(shown.path, shown.reference)
     assert told["compared"] and told["end"] == pytest.approx(shown.reference.limits.end, abs=1e-4)
     [friction] = (lane for lane in told["lanes"] if lane["code"] == "friction")
     assert max(friction["now"]["y"][0]) > 1.0 > max(friction["before"]["y"][0]) > 0.0
 
 
 def test_the_chance_of_failure_is_a_lane_of_its_own_with_its_main_cause():
-    session = session_on(ramp, options=None)
+    session = session_on(ramp, options=CANDIDATES)
     session.change_rover([("friction",)], 0.55)
     shown = session.shown
     asked = shown.scenario
     _, verdict = judge_path(asked.rover, asked.terrain, shown.path.poses, accepted_chance=1.0)
     assert 0.0 < verdict.failure_chance < 1.0
     assert shown.chance.path == verdict.failure_chance
-    told = describe_limits(shown.path, None, shown.chance)["lanes"]
+    told = paths.describe_limits(shown.path, None, shown.chance)["lanes"]
     assert [lane["code"] for lane in told].index("chance") == len(shown.path.limits.lanes)
     curve = told[-1]["now"]["y"][0]
     assert max(curve) == pytest.approx(max(verdict.failure_chance_at), abs=1e-3)
-    use = describe_uses(shown.path, np.inf, shown.chance)[-1]
+    use = paths.describe_uses(shown.path, np.inf, shown.chance)[-1]
     assert use["broken"]
     percent = f"{100.0 * verdict.failure_chance:.0f} %"
     assert use["value"] == f"whole path {percent}"
-    words = describe_verdict(shown)
+    words = paths.describe_verdict(shown)
     assert words["chance"] == f"chance of failure {percent}, most often by friction"
     assert words["headline"] == "chance of failure above what is accepted"
-    assert describe_limits(shown.path, None, shown.chance)["code"] == "chance"
+    assert paths.describe_limits(shown.path, None, shown.chance)["code"] == "chance"
     ground = shown.path.limits.lane("ground")
     assert not ground.used.any()
 
 
 def test_the_chance_of_a_path_that_is_refused_is_that_up_to_its_failure():
-    session = session_on(wall_at(0.5), options=None)
+    session = session_on(wall_at(0.5), options=CANDIDATES)
     session.judge_again()
     shown = session.shown
     assert len(shown.chance.at) == shown.verdict.first_failure + 1 < len(shown.path.poses)
-    told = describe_uses(shown.path, np.inf, shown.chance)[-1]
+    told = paths.describe_uses(shown.path, np.inf, shown.chance)[-1]
     assert told["value"] == f"up to the failure {100.0 * shown.chance.path:.0f} %"
 
 
@@ -186,15 +178,17 @@ def test_a_use_without_bound_is_above_the_limit_in_its_curve():
     path = judged_on(gap)
     lane = path.limits.lane(path.failure.code)
     assert np.isinf(lane.used).any()
-    [told] = (one for one in describe_limits(path, None)["lanes"] if one["code"] == lane.code)
+    [told] = (
+        one for one in paths.describe_limits(path, None)["lanes"] if one["code"] == lane.code
+    )
     assert told["now"]["y"][0][-1] > 1.0
 
 
 def test_a_peak_between_points_of_a_curve_is_kept():
-    values = np.zeros((10 * MAX_POINTS, 2))
+    values = np.zeros((10 * paths.MAX_POINTS, 2))
     values[1237, 1] = 5.0
-    rows = choose_rows(values)
-    assert len(rows) <= MAX_POINTS + 2 and values[rows].max() == 5.0
+    rows = paths.choose_rows(values)
+    assert len(rows) <= paths.MAX_POINTS + 2 and values[rows].max() == 5.0
 
 
 @pytest.mark.parametrize(
@@ -212,10 +206,10 @@ def test_as_many_digits_as_tell_a_value_from_its_limit_and_words_where_none_do(v
 
 
 def test_a_use_that_is_above_the_limit_never_reads_as_one_at_it():
-    assert [write_use(use) for use in (0.996, 1.0, 1.0001, 1.23)] == [
+    assert [paths.write_use(use) for use in (0.996, 1.0, 1.0001, 1.23)] == [
         "100 %", "100 %", "just above 100 %", "123 %",
     ]  # fmt: skip
-    assert (write_use(np.nan), write_use(np.inf)) == ("not asked", "fails")
+    assert (paths.write_use(np.nan), paths.write_use(np.inf)) == ("not asked", "fails")
 
 
 def test_with_speed_servos_friction_is_no_number_that_a_passing_path_may_cross():
@@ -277,7 +271,7 @@ def test_the_joint_that_ends_a_path_is_named_by_its_failure_and_by_the_uses():
     assert failure.code == "suspension" and turned.max() > 0.01
     assert failure.link == f"bogie_{SIDES[int(turned.argmax())]}"
     joints = [lane.code for lane in path.limits.lanes].index("suspension")
-    assert describe_uses(path, np.inf)[joints]["link"] == failure.link.replace("_", " ")
+    assert paths.describe_uses(path, np.inf)[joints]["link"] == failure.link.replace("_", " ")
 
 
 @pytest.mark.parametrize("start", [-1.0, 0.4])
@@ -288,10 +282,10 @@ def test_a_refusal_on_unknown_ground_is_at_the_time_to_which_the_drive_is_played
     assert path.failure.time == path.trajectory.times[-1]
     assert (path.trajectory.length == 0) == (start > 0.0) == (path.failure.time == 0.0)
     told = [
-        describe_verdict(session.shown),
-        describe_limits(path, None),
-        describe_uses(path, 0.0),
-        describe_paths(session.shown)["rows"],
+        paths.describe_verdict(session.shown),
+        paths.describe_limits(path, None),
+        paths.describe_uses(path, 0.0),
+        paths.describe_paths(session.shown)["rows"],
     ]
     json.dumps(told, allow_nan=False)
 
@@ -318,24 +312,24 @@ def test_the_numbers_of_the_only_path_are_those_up_to_its_failure():
 def test_the_board_has_all_loads_and_unknown_values_are_none_or_a_question_mark():
     path = judged_on(waves)
     state = path.trajectory.state_at(20.0)
-    board = describe_board(state)
+    board = paths.describe_board(state)
     assert [one["load"] for one in board["wheels"]] == [
         f"{load:.1f} N" for load in state.wheel_loads
     ]
     assert [len(cells) for _, cells in board["table"]] == [6] * 6
     lost = {"wheel_loads": np.full(6, np.nan), "friction_utilisation": np.full(6, np.nan)}
     unknown = replace(state, here=state.here.change(**lost))
-    board = describe_board(unknown)
+    board = paths.describe_board(unknown)
     assert {one["load"] for one in board["wheels"]} == {"?"}
     assert {one["bars"][0][1] for one in board["wheels"]} == {None}
     json.dumps(board, allow_nan=False)
-    assert plain([1.0, np.nan, np.inf]) == [1.0, None, None]
+    assert paths.plain([1.0, np.nan, np.inf]) == [1.0, None, None]
 
 
 def test_a_row_of_a_path_has_the_numbers_of_its_verdict():
     session = session_on(wall_at(0.5), goal=(1.5, 0.0, 0.0))
     shown = session.shown
-    rows = describe_paths(shown)["rows"]
+    rows = paths.describe_paths(shown)["rows"]
     assert [row["passes"] for row in rows] == [one.verdict.traversable for one in shown.paths]
     assert [row["number"] for row in rows if row["word"].endswith("best")] == (
         [] if shown.best is None else [shown.best + 1]
@@ -355,4 +349,4 @@ def test_each_number_of_the_rover_has_a_slider_and_what_it_changes_of_the_drive_
     used = [
         float(np.nanmax(one.limits.lane("friction").used)) for one in (before, session.shown.path)
     ]
-    assert rows["friction"] == tuple(map(write_use, used))
+    assert rows["friction"] == tuple(map(paths.write_use, used))

@@ -35,7 +35,7 @@ NAME = "blocked.npz"
 @pytest.fixture(scope="module")
 def page():
     """A page at rest; of its paths around a block one passes, and beyond the goal is a wall."""
-    served = Page(blocked_session(), port=0, ground_name=NAME)
+    served = Page(blocked_session(), ground_name=NAME)
     wait_for_rest(served)
     served.home = served.session.wanted
     yield served
@@ -196,7 +196,7 @@ def test_a_button_that_is_pressed_while_what_it_stands_on_is_told_anew_takes_the
     visitor.press("To the start")
     visitor.tab.wait_for_timeout(4000)  # the longest press is 5 s: this one must not end the next
     with held(page.session):
-        page.hear({"ask": "value", "label": FRICTION, "value": 0.75}, None)
+        page.hear({"ask": "value", "label": FRICTION, "value": 0.75})
         visitor.tab.get_by_role("button", name="Cancel").hover()
         visitor.tab.mouse.down()
         for _ in range(2):
@@ -205,7 +205,7 @@ def test_a_button_that_is_pressed_while_what_it_stands_on_is_told_anew_takes_the
         visitor.tab.wait_for_timeout(300)
         visitor.tab.mouse.up()
         wait_until(lambda: page.session.is_stopped, "the end of the work")
-    page.hear({"ask": "reset"}, None)
+    page.hear({"ask": "reset"})
     wait_until(lambda: page.session.shown.scenario.rover == LSR1, "the loaded rover")
     wait_for_rest(page)
 

@@ -12,28 +12,9 @@ import pytest
 
 from rover_physics.results.uses import find_uses, limits_of
 from rover_physics.traversability.judge import judge_path, judge_poses
+from rover_planner.viewer.state import colours, layers
 from rover_planner.viewer.state.background_work import Inbox
-from rover_planner.viewer.state.colours import (
-    PASSABLE,
-    REFUSED,
-    UNKNOWN,
-    colour_use,
-    map_colours,
-)
 from rover_planner.viewer.state.drive import Playback, Trajectory
-from rover_planner.viewer.state.layers import (
-    FRICTION,
-    PREDICTED,
-    SLOPE,
-    ColouredGround,
-    Colouring,
-    LayerRequest,
-    colour_ground,
-    colour_limit,
-    list_layers,
-    make_grid,
-    predict_use,
-)
 from rover_planner.viewer.state.path_limits import find_path_limits
 from support.grounds import gap, make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, straight
@@ -43,12 +24,6 @@ pytest.importorskip("trimesh", reason="no trimesh: pip install '.[view]'")
 import trimesh
 
 from rover_planner.viewer.scene import ground_mesh
-from rover_planner.viewer.scene.ground_mesh import (
-    build_ground_mesh,
-    draw_picture,
-    intersect_ground,
-    write_ground,
-)
 
 # Trajectories.
 
@@ -133,50 +108,37 @@ def test_a_later_value_of_a_name_replaces_the_earlier_one():
     assert not inbox.wait(0.0) and inbox.take() == {}
 
 
-# Colours.
-
-
-def test_the_colour_of_a_wheel_goes_from_blue_to_vermillion_and_is_grey_for_nan():
-    assert colour_use(0.0) == PASSABLE
-    assert colour_use(1.0) == colour_use(7.0) == REFUSED
-    assert colour_use(math.nan) == UNKNOWN
-
-
-def test_colours_get_lighter_with_the_value_and_are_grey_for_nan():
-    colours = map_colours(np.array([0.0, 0.5, 1.0, np.nan]), 0.0, 1.0).astype(int)
-    weights = np.array([0.299, 0.587, 0.114])
-    light = colours[:3] @ weights
-    assert light[0] < light[1] < light[2]
-    assert tuple(colours[3]) == UNKNOWN
+def test_colours_go_with_the_value_from_blue_to_vermillion_or_get_lighter_and_are_grey_for_nan():
+    used = [colours.colour_use(use) for use in (0.0, 1.0, 7.0, math.nan)]
+    assert used == [colours.PASSABLE, colours.REFUSED, colours.REFUSED, colours.UNKNOWN]
+    found = colours.map_colours(np.array([0.0, 0.5, 1.0, np.nan]), 0.0, 1.0).astype(int)
+    light = found[:3] @ np.array([0.299, 0.587, 0.114])
+    assert light[0] < light[1] < light[2] and tuple(found[3]) == colours.UNKNOWN
 
 
 # The ground.
 
 
-def test_a_click_is_where_its_ray_meets_the_ground():
-    terrain = make_terrain(waves)
-    target = np.array([1.0, 0.5, float(terrain.elevation_at(1.0, 0.5))])
+def test_a_ray_meets_the_ground_where_it_is_aimed_and_nothing_in_the_sky_or_where_none_is_known():
+    ground, holed, meet = make_terrain(waves), make_terrain(gap), ground_mesh.intersect_ground
+    target = np.array([1.0, 0.5, float(ground.elevation_at(1.0, 0.5))])
     origin = np.array([-3.0, -3.0, 4.0])
-    place = intersect_ground(terrain, origin, target - origin)
-    assert place is not None
-    np.testing.assert_allclose(place, target[:2], atol=terrain.resolution)
+    place = meet(ground, origin, target - origin)
+    np.testing.assert_allclose(place, target[:2], atol=ground.resolution)
+    assert meet(holed, np.array([0.0, 0.0, 2.0]), np.array([1.0, 0.0, 0.5])) is None
+    assert meet(holed, np.array([0.75, 0.0, 2.0]), np.array([0.0, 0.0, -1.0])) is None
 
 
-def test_a_ray_into_the_sky_or_onto_unknown_ground_meets_nothing():
-    terrain = make_terrain(gap)
-    assert intersect_ground(terrain, np.array([0.0, 0.0, 2.0]), np.array([1.0, 0.0, 0.5])) is None
-    down = np.array([0.0, 0.0, -1.0])
-    assert intersect_ground(terrain, np.array([0.75, 0.0, 2.0]), down) is None
-
-
-def coloured(ground, layer) -> ColouredGround:
+def coloured(ground, layer) -> layers.ColouredGround:
     """Return a ground in the colours of a layer of its own."""
-    return colour_ground(layer, ground, make_grid(ground))
+    return layers.colour_ground(layer, ground, layers.make_grid(ground))
 
 
 def test_unknown_ground_is_left_out_of_the_mesh():
     whole, holed = (
-        build_ground_mesh(make_grid(ground), np.zeros((2, 2, 3), np.uint8), np.zeros(3))
+        ground_mesh.build_ground_mesh(
+            layers.make_grid(ground), np.zeros((2, 2, 3), np.uint8), np.zeros(3)
+        )
         for ground in map(make_terrain, (waves, gap))
     )
     assert len(holed.faces) < len(whole.faces)
@@ -189,20 +151,24 @@ def test_the_friction_of_a_map_is_a_layer_where_it_is_known_and_else_none():
     friction = np.full(plain.elevation.shape, np.nan)
     friction[:, : friction.shape[1] // 2] = 0.2
     learned = replace(plain, friction=friction)
-    assert FRICTION in list_layers(learned) and FRICTION not in list_layers(plain)
-    picture = draw_picture(make_grid(learned), coloured(learned, FRICTION)).astype(float)
+    assert layers.FRICTION in layers.list_layers(
+        learned
+    ) and layers.FRICTION not in layers.list_layers(plain)
+    picture = ground_mesh.draw_picture(
+        layers.make_grid(learned), coloured(learned, layers.FRICTION)
+    ).astype(float)
     known, unknown = picture[:, 10], picture[:, -10]
     assert (known[:, 0] < known[:, 2]).all()  # blue
     assert np.ptp(unknown, axis=1).max() == 0.0  # grey
 
 
 def test_the_ground_has_a_layer_for_the_use_of_each_limit_of_a_pose_and_one_for_all():
-    assert {"use of all limits", "use of tilt", "use of friction"} <= set(PREDICTED)
-    assert "use of drop" not in PREDICTED  # it is of a path
+    assert {"use of all limits", "use of tilt", "use of friction"} <= set(layers.PREDICTED)
+    assert "use of drop" not in layers.PREDICTED  # it is of a path
     ground = make_terrain(lambda x, y: gap(x, y) + 0.3 * x)
     at = np.array([-1.0, 0.75]), np.array([0.0])
     tilt, every = (
-        predict_use(LayerRequest(LSR1, ground, Colouring(layer)), at)[0]
+        layers.predict_use(layers.LayerRequest(LSR1, ground, layers.Colouring(layer)), at)[0]
         for layer in ("use of tilt", "use of all limits")
     )
     pose = [[-1.0, 0.0, 0.0]]
@@ -212,21 +178,21 @@ def test_the_ground_has_a_layer_for_the_use_of_each_limit_of_a_pose_and_one_for_
     assert every[0] == pytest.approx(np.nanmax(uses.use), rel=1e-6)
     assert np.isnan([tilt[1], every[1]]).all()  # unknown ground
     steep = make_terrain(lambda x, y: x)
-    grid, how = make_grid(steep), Colouring("use of tilt")
-    found = colour_limit(LayerRequest(LSR1, steep, how), grid)
-    picture = draw_picture(grid, found)
+    grid, how = layers.make_grid(steep), layers.Colouring("use of tilt")
+    found = layers.colour_limit(layers.LayerRequest(LSR1, steep, how), grid)
+    picture = ground_mesh.draw_picture(grid, found)
     assert np.median(picture[..., 0]) > np.median(picture[..., 2])  # beyond it is vermillion
     assert found.legend.keys[0] == ("hatched", "beyond the limit")
 
 
 def test_a_ground_is_a_file_that_needs_no_light_and_leaves_no_garbage(monkeypatch):
     terrain, pictures = make_terrain(gap), []
-    ground, origin = coloured(terrain, SLOPE), np.array([0.5, -0.25, 0.0])
+    ground, origin = coloured(terrain, layers.SLOPE), np.array([0.5, -0.25, 0.0])
+    drawn = ground_mesh.draw_picture(layers.make_grid(terrain), ground)
     monkeypatch.setattr(ground_mesh, "draw_picture", lambda *_: pictures.pop())
-    drawn = draw_picture(make_grid(terrain), ground)
     pictures.append(drawn.copy())
     held = weakref.ref(pictures[0])
-    file = write_ground(make_grid(terrain), ground, origin)
+    file = ground_mesh.write_ground(layers.make_grid(terrain), ground, origin)
     assert held() is None and b"KHR_materials_unlit" in file
     (read,) = trimesh.load(io.BytesIO(file), file_type="glb").geometry.values()
     np.testing.assert_allclose(read.vertices[0] + origin, [*terrain.origin, gap(*terrain.origin)])

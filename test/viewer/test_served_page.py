@@ -46,7 +46,7 @@ FRICTION = "friction [-]"
 
 @pytest.fixture(scope="module")
 def served():
-    page = Page(session_on(ramp), port=0)
+    page = Page(session_on(ramp))
     yield page
     page.close()
 
@@ -66,7 +66,7 @@ def told(page: Page, name: str):
 
 def change_friction(page: Page, friction: float) -> None:
     """Change the friction as a slider does."""
-    page.hear({"ask": "value", "label": FRICTION, "value": friction}, None)
+    page.hear({"ask": "value", "label": FRICTION, "value": friction})
 
 
 def set_friction(page: Page, friction: float) -> None:
@@ -120,7 +120,7 @@ def test_a_changed_number_is_told_with_what_it_changes_and_can_be_undone_and_res
     assert told(page, "changes")["rover"] == [["friction [-]", "0.8", "0.7"]]
     assert told(page, "limits")["compared"]
     for word, friction in (("undo", 0.75), ("reset", 0.8)):
-        page.hear({"ask": word}, None)
+        page.hear({"ask": word})
         wait_until(lambda f=friction: told(page, "values")[FRICTION] == [f, 0.8], word)
         wait_for_rest(page)
 
@@ -128,7 +128,7 @@ def test_a_changed_number_is_told_with_what_it_changes_and_can_be_undone_and_res
 def test_a_number_or_an_angle_beyond_the_ends_of_its_slider_is_that_at_its_end(page):
     sliders = {one[0]: one for part in told(page, "sliders") for one in part["sliders"]}
     for label in (FRICTION, "arm_yaw [rad]"):
-        page.hear({"ask": "value", "label": label, "value": 9999.0}, None)
+        page.hear({"ask": "value", "label": label, "value": 9999.0})
         most = sliders[label][2]
         wait_until(lambda at=label, most=most: told(page, "values")[at][0] == most, label)
     wait_for_rest(page)
@@ -136,14 +136,14 @@ def test_a_number_or_an_angle_beyond_the_ends_of_its_slider_is_that_at_its_end(p
 
 def test_a_rover_file_and_a_preset_are_loaded_and_the_arm_follows(page):
     text = write_rover(replace(LSR1, name="bare", manipulator=None))
-    page.hear({"ask": "upload", "name": "bare.yaml", "text": text}, None)
+    page.hear({"ask": "upload", "name": "bare.yaml", "text": text})
 
     def meshes() -> dict:
         return page.scene.rover.meshes
 
     wait_until(lambda: told(page, "chosen")["preset"] == "bare", "the loaded rover")
     wait_until(lambda: "arm" not in meshes() and "body" in meshes(), "no arm")
-    page.hear({"ask": "preset", "name": "lsr1"}, None)
+    page.hear({"ask": "preset", "name": "lsr1"})
     wait_until(lambda: "arm" in meshes(), "the arm")
     titles = [part["title"] for part in told(page, "sliders")]
     assert titles[-1] == "Arm"
@@ -158,12 +158,12 @@ def test_while_a_change_is_judged_the_verdict_and_the_paths_are_grey_and_it_can_
         assert session.shown is shown
         every = frozenset(range(len(session.shown.paths)))
         wait_until(lambda: page.scene.paths._old == every, "grey paths")
-        page.hear({"ask": "cancel"}, None)
+        page.hear({"ask": "cancel"})
         wait_until(lambda: session.is_stopped, "the end of the work")
     wait_until(lambda: told(page, "verdict")["stopped"], "the button to judge again")
     waits = lambda: {row["waits"] for row in told(page, "paths")["rows"]}  # noqa: E731
     wait_until(lambda: waits() == {"old, was not judged again"}, "rows that say so")
-    page.hear({"ask": "judge"}, None)
+    page.hear({"ask": "judge"})
     wait_for_rest(page)
     wait_until(lambda: not told(page, "verdict")["old"], "the new verdict")
     assert session.shown.scenario.rover.friction == 0.75 and not page.scene.paths._old
@@ -329,7 +329,7 @@ def test_a_failed_request_is_told_until_a_request_succeeds(page):
 
 def test_a_closed_page_leaves_no_thread_behind():
     before = set(threading.enumerate())
-    page = Page(session_on(ramp), port=0)
+    page = Page(session_on(ramp))
     page.requests.put(page.session.judge_again)
     page.close()
     left = {thread.name for thread in set(threading.enumerate()) - before}
@@ -364,7 +364,7 @@ def test_on_a_far_map_the_rover_is_where_it_is_on_a_near_one_and_a_click_lands_w
     places = {}
     for x, y in ((0.0, 0.0), FAR):
         ground = shift(make_terrain(waves), (x, y))
-        page = Page(session_on(ground, (x - 2.0, y, 0.0), (x + 1.0, y, 0.0)), port=0)
+        page = Page(session_on(ground, (x - 2.0, y, 0.0), (x + 1.0, y, 0.0)))
         try:
             wait_for_rest(page)
             places[x] = np.array(page.scene.canvas.nodes["/rover/body"].position)
@@ -396,14 +396,14 @@ def test_on_a_far_map_the_rover_is_where_it_is_on_a_near_one_and_a_click_lands_w
 def test_a_link_with_unknown_names_is_refused_and_nothing_else_changes(page, change, reason):
     wanted = page.session.wanted
     query = write_link(replace(page._link(), **change))
-    page.hear({"ask": "open", "query": f"?{query}"}, None)
+    page.hear({"ask": "open", "query": f"?{query}"})
     wait_until(lambda: page.session.refusal.startswith(reason), "the reason")
     assert page.session.wanted is wanted and page.errors == {}
 
 
 def test_a_link_that_would_be_longer_than_an_address_may_be_is_refused(page, monkeypatch):
     monkeypatch.setattr(sharing, "MAX_LENGTH", 100)
-    page.hear({"ask": "link"}, None)
+    page.hear({"ask": "link"})
     wait_until(lambda: "link with the file of lsr1" in page.session.refusal, "the reason")
     assert write_link(page._link()) == ""
 
@@ -425,10 +425,10 @@ def test_path_and_time_of_a_link_come_with_its_paths_and_not_with_a_later_goal(p
 def test_a_program_that_was_started_again_takes_up_the_link_that_the_last_one_told(page):
     set_friction(page, 0.7)
     wait_until(lambda: read_link(told(page, "current")).rover["friction"] == 0.7, "the link")
-    again = Page(session_on(ramp), port=0)
+    again = Page(session_on(ramp))
     try:
         assert told(again, "program") != told(page, "program")
-        again.hear({"ask": "open", "query": f"?{told(page, 'current')}"}, None)
+        again.hear({"ask": "open", "query": f"?{told(page, 'current')}"})
         wait_until(lambda: again.session.shown.scenario.rover.friction == 0.7, "the rover")
     finally:
         again.close()

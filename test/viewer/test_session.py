@@ -22,6 +22,7 @@ from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import assume
 from rover_planner.viewer.documents.paths import describe_paths, describe_verdict
 from rover_planner.viewer.documents.rover import describe_changes
+from rover_planner.viewer.state.scenario import CANDIDATES, Scenario
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, Judge, blocked_session, ramp, session_on, straight
@@ -218,7 +219,7 @@ def test_a_replay_keeps_the_soil_the_policy_and_the_arm_it_was_predicted_with(tm
     write_prediction(file, prediction, verdict, assumptions=assumed)
     assert read_recorded_assumptions(file) == assumed
 
-    session = session_on(ground, (-1.0, 0.0, 0.0), options=None)
+    session = session_on(ground, (-1.0, 0.0, 0.0), options=CANDIDATES)
     session.replay(*read_prediction(file), read_recorded_assumptions(file))
     assert (session.wanted.rover.friction, session.wanted.rover.manipulator.payload) == (0.7, 0.5)
     assert session.wanted.arm_angles == angles
@@ -239,7 +240,7 @@ def test_default_ends_are_on_known_ground_where_the_rover_can_stand_at_most_10_m
     start, goal = choose_ends(LSR1, spirit)
     way = np.linspace(start[:2], goal[:2], 100)
     assert np.isfinite(spirit.elevation_at(way[:, 0], way[:, 1])).all()
-    assert ViewSession(LSR1, spirit, start, goal).shown.verdict.traversable
+    assert ViewSession(Scenario(LSR1, LSR1, spirit, start, goal)).shown.verdict.traversable
     start, goal = choose_ends(LSR1, Terrain(np.zeros((1200, 1200)), 0.1, (0.0, 0.0)))
     assert np.hypot(goal[0] - start[0], goal[1] - start[1]) == pytest.approx(10.0)
     steep = choose_ends(LSR1, make_terrain(lambda x, y: 2.0 * x))  # it can stand nowhere

@@ -60,14 +60,18 @@ def describe_verdict(shown: Shown) -> dict[str, Any]:
         **describe_answer(verdict.traversable, f"path {shown.index + 1} of {len(shown.paths)}"),
         "headline": "" if failure is None else failure.headline,
         "where": "" if failure is None else failure.place,
-        "chance": ""
-        if shown.chance is None
-        else f"chance of failure {write_chance(shown.chance)}",
+        "chance": "" if shown.chance is None else _write_chance(shown.chance),
         "details": [*filter(None, (verdict.reason, closed))],
         "policies": _list_policies(shown),
         "offers": _list_offers(shown),
         "fails": failure is not None,
     }
+
+
+def _write_chance(chance: FailureChance) -> str:
+    """Return the chance that a path fails, and its main cause, in words."""
+    cause = f", most often by {chance.limit}" if chance.limit else ""
+    return f"chance of failure {100.0 * chance.path:.0f} %{cause}"
 
 
 def describe_answer(traversable: bool | None, about: str) -> dict[str, Any]:
@@ -183,12 +187,6 @@ def describe_uses(
         uses[-1]["value"] = f"{of} {100.0 * chance.path:.0f} %"
         uses[-1]["broken"] = failure is not None and failure.code == CHANCE
     return uses
-
-
-def write_chance(chance: FailureChance) -> str:
-    """Return the chance that a path fails, and its main cause, in words."""
-    cause = f", most often by {chance.limit}" if chance.limit else ""
-    return f"{100.0 * chance.path:.0f} %{cause}"
 
 
 def _describe_use(lane: Lane, limits: PathLimits, worst: int, here: int) -> dict[str, Any]:

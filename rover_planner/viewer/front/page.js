@@ -28,7 +28,7 @@ function make(tag, attributes = {}, ...children) {
 }
 
 const button = (words, question, attributes = {}) =>
-  make("button", { onclick: () => ask(question), ...attributes }, words);
+  make("button", { "data-ask": JSON.stringify(question), ...attributes }, words);
 const cells = (tag, values) => values.map((value) => make(tag, {}, value));
 const table = (heads, rows, attributes = {}) =>
   make("table", attributes, heads.length ? make("tr", {}, cells("th", heads)) : "", rows);
@@ -260,6 +260,7 @@ function drawChosen() {
     check("Heading along the path", now.along, (along) => colour({ along })));
   rows.push(check("Forces", now.forces, (shown) => ({ ask: "forces", shown })));
   at("chosen").replaceChildren(...rows);
+  if (offers.speeds) at("speed").replaceChildren(select("Speed", offers.speeds.map((one) => [one, `${one} x`]), now.speed, (times) => ({ ask: "speed", times: Number(times) })));
   drawShare();
   if (state.changes) drawChanges(state.changes);
 }
@@ -392,31 +393,15 @@ function drawBoard(board) {
 }
 
 function drawDrive(drive) {
-  const box = at("drive");
-  if (drive.duration === null) { box.replaceChildren(make("span", {}, drive.words)); return; }
-  if (!box.querySelector("input")) {
-    const time = (event) => ask({ ask: "seek", time: Number(event.target.value) });
-    const hold = (is) => () => { chosen.scrubs = is; };
-    box.replaceChildren(
-      make("div", { class: "track" }, make("input", { type: "range", min: 0, step: 0.1, "aria-label": "Time [s]", oninput: time, onpointerdown: hold(true), onpointerup: hold(false) }), make("i", { class: "mark", title: "fails" })),
-      button("To the start", { ask: "seek", time: 0 }),
-      button("Play", { ask: "toggle" }, { id: "play", class: "main" }),
-      button("Step back", { ask: "step", by: -1 }), button("Step", { ask: "step", by: 1 }),
-      make("span", { id: "speed" }), make("span", { id: "plays" }));
-  }
-  const scrubber = box.querySelector("input");
-  scrubber.max = drive.duration;
-  if (!chosen.scrubs) scrubber.value = drive.time;
-  const mark = box.querySelector(".mark");
-  mark.hidden = drive.fails === null;
-  mark.style.left = `${100 * (drive.fails || 0) / (drive.duration || 1)}%`;
+  const isLive = drive.duration === null;
+  at("drive").toggleAttribute("data-live", isLive);
+  at("plays").textContent = isLive ? drive.words : `${drive.time.toFixed(1)} s, ${drive.words}`;
+  if (isLive) return;
+  at("time").max = drive.duration;
+  if (!chosen.scrubs) at("time").value = drive.time;
+  at("fails").hidden = drive.fails === null;
+  at("fails").style.left = `${100 * (drive.fails || 0) / (drive.duration || 1)}%`;
   at("play").textContent = drive.plays ? "Pause" : "Play";
-  at("plays").textContent = `${drive.time.toFixed(1)} s, ${drive.words}`;
-  const speed = String(state.chosen?.speed ?? 10);
-  if (at("speed").dataset.now !== speed && state.offers?.speeds) {
-    at("speed").dataset.now = speed;
-    at("speed").replaceChildren(select("Speed", state.offers.speeds.map((one) => [String(one), `${one} x`]), speed, (times) => ({ ask: "speed", times: Number(times) })));
-  }
   moveCursor();
 }
 
@@ -493,8 +478,12 @@ document.addEventListener("pointerdown", (event) => {
 });
 for (const end of ["pointerup", "pointercancel"]) document.addEventListener(end, () => setTimeout(release));
 document.addEventListener("click", (event) => {
-  if (event.detail > 0) event.target.closest("button")?.blur(); // pressed with the pointer
+  const pushed = event.target.closest("button");
+  if (pushed?.dataset.ask) ask(JSON.parse(pushed.dataset.ask));
+  if (event.detail > 0) pushed?.blur(); // pressed with the pointer
 });
+at("time").addEventListener("input", () => ask({ ask: "seek", time: Number(at("time").value) }));
+for (const [name, is] of [["pointerdown", true], ["pointerup", false]]) at("time").addEventListener(name, () => { chosen.scrubs = is; });
 
 openTab(chosen.tab);
 const told = at("told");

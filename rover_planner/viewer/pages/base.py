@@ -47,6 +47,8 @@ HOTKEYS: dict[Any, tuple[str, Words]] = {
 CONTINUOUS = ("value", "seek", "place")
 """Words that come dozens of times a second while a slider is dragged."""
 MAX_PORT = 65535
+HERE = ("127.0.0.1", 0)
+"""A free port of this machine alone."""
 
 
 class PageBase(ABC):
@@ -60,6 +62,7 @@ class PageBase(ABC):
         rover: Rover,
         terrain: Terrain,
         address: tuple[str, int],
+        ground_name: str,
         survey: ShownSurvey | None = None,
     ):
         """Start the servers; the page of a kind starts the thread when it can tell what it shows.
@@ -69,12 +72,13 @@ class PageBase(ABC):
             terrain: The ground.
             address: Where to serve: a host, and the port of the page; the scene has the next free
                 one. 0 takes free ones.
+            ground_name: What the page calls the ground; empty if it is not that of the rover.
             survey: A survey of rover and ground, whose layers are offered.
         """
         import viser
 
         self._host, port = address
-        self.ground, self.survey = terrain, survey
+        self.ground, self.ground_name, self.survey = terrain, ground_name, survey
         """What is shown."""
         self.requests: Inbox[Action] = Inbox()
         self.colouring, self.forces = Colouring(self.layers[0]), True
@@ -136,18 +140,17 @@ class PageBase(ABC):
         while not self._ended.wait(0.5):
             pass
 
-    def hear(self, words: Words, mailbox: Mailbox | None) -> None:
+    def hear(self, words: Words, mailbox: Mailbox | None = None) -> None:
         """Take what a visitor asks; a later value of a slider replaces an earlier one."""
         answer = self._answers.get(str(words.get("ask")))
         if answer is not None:
             word = words["ask"]
             kind = f"{word} {words.get('label', '')}" if word in CONTINUOUS else ""
-            self.requests.put(partial(self._answer, answer, words, mailbox), kind)
+            self.requests.put(partial(self._answer, answer, words, mailbox or Inbox()), kind)
 
-    def _answer(self, answer: Answer, words: Words, mailbox: Mailbox | None) -> None:
-        parts = answer(words) or {}
-        for name, part in parts.items() if mailbox is not None else ():
-            mailbox.put(part, name)  # type: ignore[union-attr]
+    def _answer(self, answer: Answer, words: Words, mailbox: Mailbox) -> None:
+        for name, part in (answer(words) or {}).items():
+            mailbox.put(part, name)
 
     def begin_work(self, take: Take[Result], name: str) -> BackgroundWork[Result]:
         """Return work in threads of a name; what it finds is taken by the page's thread.
@@ -157,14 +160,8 @@ class PageBase(ABC):
 
         def hand_over(steps: Steps[Result], found: Result | BaseException) -> None:
             drawn = threading.Event()
-
-            def take_and_tell() -> None:
-                try:
-                    take(steps, found)
-                finally:
-                    drawn.set()
-
-            self.requests.put(take_and_tell)
+            self.requests.put(partial(take, steps, found))
+            self.requests.put(drawn.set)
             drawn.wait(DRAWING_TIME)
 
         begun = BackgroundWork(hand_over, name)
@@ -241,7 +238,7 @@ class PageBase(ABC):
         self.scene.show_forces(self.forces)
 
     def _press(self, words: Words, _event: Any) -> None:
-        self.hear(words, None)
+        self.hear(words)
 
     def _request_view(self, event: Any) -> None:
         client, name = event.client, event.target.value
@@ -261,7 +258,7 @@ class PageBase(ABC):
             direction = np.array(event.ray_direction)
             index = self.scene.paths.find_number(origin, direction)
             if index is not None:
-                self.hear({"ask": "show", "index": index}, None)
+                self.hear({"ask": "show", "index": index})
                 return
             point = intersect_ground(self.ground, origin, direction)
             if point is None:

@@ -19,7 +19,7 @@ from rover_planner.viewer.live.live_state import (
     list_topics,
     read_state,
 )
-from rover_planner.viewer.pages.base import Answer, PageBase
+from rover_planner.viewer.pages.base import HERE, Answer, PageBase
 from rover_planner.viewer.pages.sharing import read_link
 from rover_planner.viewer.scene.scene import START
 from rover_planner.viewer.state.drive import RoverState
@@ -43,27 +43,19 @@ class LivePage(PageBase):
         rover: Rover,
         terrain: Terrain,
         listener: LiveListener,
-        host: str = "127.0.0.1",
-        port: int = 8080,
+        address: tuple[str, int] = HERE,
         ground_name: str = "",
     ):
-        """Start to serve.
+        """Start to serve the data of a listener, which the caller spins, as `PageBase` does.
 
-        Args:
-            rover: The rover.
-            terrain: The ground until a map comes.
-            listener: Source of the data; the caller spins it.
-            host: Address to serve on.
-            port: Port to serve on; 0 takes a free one.
-            ground_name: Name of the terrain; empty if it is not that of the rover.
+        The terrain is shown until a map comes.
         """
-        self._listener, self._rover = listener, rover
-        self._ground_name, self._refusal = ground_name, ""
+        self._listener, self._rover, self._refusal = listener, rover, ""
         self._data: LiveData = listener.latest()
         self._first: Floats | None = None
         """Where the rover was first seen (2,) [m]."""
         self._told_at = self._ground_at = 0.0
-        super().__init__(rover, terrain, (host, port))
+        super().__init__(rover, terrain, address, ground_name)
         self.channel.tell("offers", self.list_layers())
         self.paint()
         self.thread.start()
@@ -77,7 +69,7 @@ class LivePage(PageBase):
 
     def describe_ground(self) -> LayerRequest | None:
         """Return the ground as it is known."""
-        known = bool(self._ground_name)
+        known = bool(self.ground_name)
         return LayerRequest(self._rover, self.ground, self.colouring) if known else None
 
     @property
@@ -88,7 +80,7 @@ class LivePage(PageBase):
 
     def click(self, point: Floats, shift: bool) -> None:
         """Ask the server for a plan to a point."""
-        if not self._ground_name:
+        if not self.ground_name:
             raise PlanningError("the ground is not known yet")
         self._refusal = self._listener.request_plan(point)
 
@@ -102,7 +94,7 @@ class LivePage(PageBase):
         answer, plan = choose_answer(data, now, self._refusal)
         tell("verdict", answer)
         soil = ", ".join(self.ground.soil_names)
-        ground = self._ground_name or "not known yet"
+        ground = self.ground_name or "not known yet"
         facts = {"rover": self._rover.name, "map": ground, "soil": soil, "mode": data.freshness}
         tell("subject", facts)
         tell("chosen", self.list_chosen())
@@ -142,7 +134,7 @@ class LivePage(PageBase):
         is_new = terrain is not None and terrain is not self.ground
         if terrain is None or not is_new or now - self._ground_at < GROUND_PERIOD:
             return
-        self.ground, self._ground_name, self._ground_at = terrain, "elevation_cloud", now
+        self.ground, self.ground_name, self._ground_at = terrain, "elevation_cloud", now
         if self.scene.canvas.move_to(terrain):
             self._first = None
         self.channel.tell("offers", self.list_layers())

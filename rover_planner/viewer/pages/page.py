@@ -17,7 +17,7 @@ from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import read_rover, write_rover
 from rover_planner.viewer.documents import advice, paths, rover
 from rover_planner.viewer.pages import sharing
-from rover_planner.viewer.pages.base import PERIOD, Answer, PageBase
+from rover_planner.viewer.pages.base import HERE, PERIOD, Answer, PageBase
 from rover_planner.viewer.scene.overlays import GHOST
 from rover_planner.viewer.scene.scene import FIT
 from rover_planner.viewer.state.background_work import Steps
@@ -43,27 +43,18 @@ class Page(PageBase):
     def __init__(
         self,
         session: ViewSession,
-        host: str = "127.0.0.1",
-        port: int = 8080,
+        address: tuple[str, int] = HERE,
         survey: ShownSurvey | None = None,
         ground_name: str = "ground",
     ):
-        """Start to serve a session.
-
-        Args:
-            session: The session.
-            host: Address to serve on.
-            port: Port to serve on; 0 takes a free one.
-            survey: A survey of rover and ground, whose layers are offered.
-            ground_name: What the page calls the ground.
-        """
+        """Start to serve a session; other arguments as for `PageBase`."""
         self.session, self.playback = session, Playback(session.shown.path.trajectory)
-        self._ground_name = ground_name
         self._click_sets = "goal"
         self._opening: tuple[sharing.PageLink, Scenario] | None = None
         """The link whose path and time are not shown yet, and what it asks for."""
         self._told_at = 0.0
-        super().__init__(session.wanted.rover, session.wanted.terrain, (host, port), survey)
+        asked = session.wanted
+        super().__init__(asked.rover, asked.terrain, address, ground_name, survey)
         self._advice = self.begin_work(self._take_advice, "advice")
         self._judging = self.begin_work(self._take_judged, "judge")
         session.judge = self._judging.ask
@@ -340,7 +331,7 @@ class Page(PageBase):
         every = frozenset(range(len(shown.paths)))
         is_slow = work["judging"] or work["stopped"]
         self.scene.paths.mark_old(every if work["old"] else shown.old if is_slow else frozenset())
-        made("subject", paths.describe_subject, shown.scenario, self._ground_name)
+        made("subject", paths.describe_subject, shown.scenario, self.ground_name)
         tell("verdict", paths.describe_verdict(shown) | work)
         is_old, is_judging = bool(work["old"]), self._judging.progress is not None
         made("paths", paths.describe_paths, shown, is_old, is_judging)

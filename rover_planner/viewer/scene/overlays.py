@@ -5,7 +5,6 @@ import itertools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rover_physics.numerics.arrays import Floats
 from rover_planner.viewer.scene.canvas import Canvas, Strand
@@ -139,8 +138,8 @@ class PathOverlay:
 
         There is none where fewer than two points are on known ground.
         """
-        points = points[_thin(len(points))]
-        line = self._canvas.lay(points, height)
+        rows = np.linspace(0, len(points) - 1, min(len(points), MAX_POINTS)).round().astype(int)
+        line = self._canvas.lay(points[rows], height)
         line = line[np.isfinite(line[:, 2])]
         return [Strand(line, colour)] if len(line) > 1 else []
 
@@ -169,8 +168,3 @@ class PathOverlay:
             poles.append(Strand(np.array([foot, top]), UNKNOWN))
             self._canvas.show_label(f"{FLAGS}/{name}", name, top)
         self._canvas.show_lines("/poles", poles, NARROW)
-
-
-def _thin(count: int) -> NDArray[np.intp]:
-    """Return at most MAX_POINTS rows of `count`, with the first and the last."""
-    return np.unique(np.linspace(0, count - 1, min(count, MAX_POINTS)).round().astype(np.intp))

@@ -24,6 +24,8 @@ from rover_planner.viewer.state.path_limits import (
 )
 
 Pose = tuple[float, float, float]
+CANDIDATES = PathQueryOptions(count=5, spacing=0.5)
+"""Options of the candidates that the page begins with."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +42,9 @@ class Scenario:
     """x, y [m] and yaw [rad], map frame."""
     goal: Pose
     """The same."""
-    options: PathQueryOptions
+    options: PathQueryOptions = CANDIDATES
     """Options of the candidates and of the model."""
-    arm_angles: Mapping[str, float]
+    arm_angles: Mapping[str, float] = field(default_factory=dict)
     """Angles [rad] of the arm's joints by name; joints that are not named are stowed."""
     recorded: Floats | None = None
     """Poses (n, 3) of a recorded path that takes the place of candidates."""

@@ -14,12 +14,9 @@ from rover_physics.files.validation import Key
 from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
-from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import Assumptions
-from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.edge_memory import EdgeMemory
-from rover_planner.planning.search.query import LatticeSettings
 from rover_planner.studies.rover_values import vary
 from rover_planner.viewer.state.judging import Step, judge_steps, show_recorded
 from rover_planner.viewer.state.scenario import Pose, Scenario, Shown
@@ -41,32 +38,13 @@ class ViewSession:
     judge: Callable[[Iterator[Step]], object]
     """Takes steps, and has `take` called with all that they find; the owner sets it."""
 
-    def __init__(
-        self,
-        rover: Rover,
-        terrain: Terrain,
-        start: Pose,
-        goal: Pose,
-        options: PathQueryOptions | None = None,
-        search: LatticeSettings | None = None,
-    ):
+    def __init__(self, wanted: Scenario):
         """Plan from start to goal; no path around obstacles is searched yet.
-
-        Args:
-            rover: The rover.
-            terrain: The ground.
-            start: x, y [m] and yaw [rad], map frame.
-            goal: The same.
-            options: How candidates are made and judged (default: 5 candidates, 0.5 m apart).
-            search: Settings of searches around obstacles (default: for 2 s).
 
         Raises:
             RoverError, PlanningError: The rover, the poses or the options are invalid.
         """
-        options = options or PathQueryOptions(count=5, spacing=0.5)
-        self.wanted = Scenario(
-            rover, rover, terrain, start, goal, options, {}, search=search or LatticeSettings()
-        )
+        self.wanted = wanted
         """The scenario that visitors want judged."""
         self.kept: Scenario | None = None
         """The values that were kept as reference; None: the rover as it was loaded."""

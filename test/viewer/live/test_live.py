@@ -4,6 +4,7 @@
 import json
 import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -46,30 +47,23 @@ def listener(ros) -> LiveListener:
     return ros.spin(LiveListener(context=ros.context))
 
 
-class Talker(Node):
-    """Publishes the topics of a rover, its server and its controller."""
-
-    def __init__(self, ros):
-        super().__init__("talker", context=ros.context)
-        self.joints = self.create_publisher(JointState, "joint_states", sensor_qos())
-        self.odometry = self.create_publisher(Odometry, "odometry", sensor_qos())
-        self.verdict = self.create_publisher(
-            DiagnosticArray, "/traverse_server/verdict", result_qos()
-        )
-        self.predicted = self.create_publisher(
-            Float64MultiArray, "/traverse_server/wheel_loads", result_qos()
-        )
-        self.estimated = self.create_publisher(
-            Float64MultiArray, "/traction_controller/wheel_loads", topic_qos()
-        )
-        ros.spin(self)
-
-
 @pytest.fixture
-def talker(ros, listener) -> Talker:
-    talker = Talker(ros)
-    wait_until(lambda: talker.odometry.get_subscription_count() == 1, "the listener")
-    return talker
+def talker(ros, listener) -> SimpleNamespace:
+    """What publishes the topics of a rover, its server and its controller."""
+    node = Node("talker", context=ros.context)
+    topics = {
+        "joints": (JointState, "joint_states", sensor_qos()),
+        "odometry": (Odometry, "odometry", sensor_qos()),
+        "verdict": (DiagnosticArray, "/traverse_server/verdict", result_qos()),
+        "plans": (Path, "/traverse_server/plan", result_qos()),
+        "predicted": (Float64MultiArray, "/traverse_server/wheel_loads", result_qos()),
+        "estimates": (String, "/traverse_server/ground_estimate", latched_qos()),
+        "estimated": (Float64MultiArray, "/traction_controller/wheel_loads", topic_qos()),
+    }
+    made = {name: node.create_publisher(*topic) for name, topic in topics.items()}
+    ros.spin(node)
+    wait_until(lambda: made["odometry"].get_subscription_count() == 1, "the listener")
+    return SimpleNamespace(**made)
 
 
 def odometry(x=1.0, y=2.0, z=0.3, speed=0.05) -> Odometry:
@@ -135,11 +129,10 @@ def test_estimates_of_the_controller_take_precedence_over_predictions(listener, 
 
 
 def test_predictions_of_a_silent_server_are_no_longer_shown(listener, talker):
-    plans = talker.create_publisher(Path, "/traverse_server/plan", result_qos())
     life = DiagnosticArray(status=[DiagnosticStatus(message="a wheel slips")])
     poses = np.column_stack([np.linspace(0.0, 2.0, 3), np.zeros((3, 2))])
     talker.predicted.publish(waypoint_array(np.full((3, 6), 7.0)))
-    plans.publish(poses_path(poses, "map"))
+    talker.plans.publish(poses_path(poses, "map"))
     repeat_until(
         lambda: (talker.verdict.publish(life), talker.odometry.publish(odometry())),
         lambda: "server" in listener.latest().forces_from,
@@ -167,8 +160,6 @@ def test_invalid_messages_are_skipped_and_values_without_a_topic_are_nan(ros, li
 
 
 def test_what_was_learned_of_the_ground_is_told_with_the_places_where_it_was(listener, talker):
-    estimates = talker.create_publisher(String, "/traverse_server/ground_estimate", latched_qos())
-
     def learned():
         return listener.latest().learned
 
@@ -181,7 +172,7 @@ def test_what_was_learned_of_the_ground_is_told_with_the_places_where_it_was(lis
         (0.5, 0.9, "friction 0.80, give or take 0.10: wheels have slipped"),
     ):
         publish_until(talker.odometry, odometry(x, 0.0), lambda x=x: is_at(x), "the place")
-        estimates.publish(String(data=json.dumps({"friction": {**friction, "high": high}})))
+        talker.estimates.publish(String(data=json.dumps({"friction": {**friction, "high": high}})))
         wait_until(lambda words=words: words in describe_learned(learned()), words)
     np.testing.assert_allclose(learned().places, [[0.0, 0.0, 0.35], [0.5, 0.0, 0.8]])
     assert describe_learned(None) == []

@@ -35,7 +35,7 @@ def page(ros):
     """A page that follows the graph of the test."""
     warm_up()
     with listen(ros.context) as listener:
-        served = LivePage(LSR1, LEVEL, listener, port=0)
+        served = LivePage(LSR1, LEVEL, listener)
         yield served
         served.close()
 
@@ -63,7 +63,7 @@ def test_a_live_page_shows_a_rover_and_the_plan_and_forces_of_its_server_until_t
     server = ros.spin(TraverseServer(context=ros.context))
     wait_until(lambda: "live; forces not known" in words(), "the rover")
     wait_until(lambda: told("subject")["map"] == "elevation_cloud", "the map")
-    ask(page, lambda: page.hear({"ask": "open", "query": f"?{QUERY}"}, None))
+    ask(page, lambda: page.hear({"ask": "open", "query": f"?{QUERY}"}))
     wait_until(lambda: "opens no links" in told("verdict")["refusal"], "the refused link")
 
     def is_answered() -> bool:
@@ -84,7 +84,7 @@ def test_a_live_page_shows_a_rover_and_the_plan_and_forces_of_its_server_until_t
     wait_until(lambda: PLAN not in page.scene.canvas.nodes, "no plan")
     ask(page, lambda: page.click(np.array([1.0, 0.0]), False))
     wait_until(lambda: PLAN in page.scene.canvas.nodes, "the plan again")
-    page.hear({"ask": "newest"}, None)
+    page.hear({"ask": "newest"})
     wait_until(lambda: told("verdict")["about"].startswith("question"), "the newest verdict")
 
     for timer in server.timers:  # the server falls silent, as if it was killed
