@@ -22,8 +22,6 @@ from support.viewer.sessions import (
     PATIENCE,
     ask,
     held,
-    is_at_rest,
-    is_busy,
     ramp,
     session_on,
     shift,
@@ -38,7 +36,7 @@ from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.scene.canvas import Canvas, Strand
 from rover_planner.viewer.scene.drawn_rover import DrawnRover
 from rover_planner.viewer.state.colours import PASSABLE, REFUSED, UNKNOWN
-from rover_planner.viewer.state.judging import POLICY
+from rover_planner.viewer.state.judging import PATH
 
 pytestmark = pytest.mark.filterwarnings("error::pytest.PytestUnhandledThreadExceptionWarning")
 FRICTION = "friction [-]"
@@ -172,32 +170,24 @@ def test_while_a_change_is_judged_the_verdict_and_the_paths_are_grey_and_it_can_
 def test_the_verdict_is_told_before_its_drawings_and_policies_are_judged_after_them(
     page, monkeypatch
 ):
-    begun, go_on, judged, show = threading.Event(), threading.Event(), [], page.scene.paths.show
-    tell, told_at, drawn_at = page.channel.tell, {}, []
+    tell, show, told_at, drawn = page.channel.tell, page.scene.paths.show, {}, []
 
     def tell_and_note(name: str, part) -> None:
-        told_at[name] = told_at.get(name, time.monotonic())
+        told_at.setdefault(name, time.monotonic())
         tell(name, part)
 
-    def draw_slowly(*arguments) -> None:
-        drawn_at.append(time.monotonic())
-        progress = page._judging.progress
-        judged.append(progress.what if progress else "")
-        begun.set()
-        assert go_on.wait(PATIENCE)
+    def draw_and_note(*arguments) -> None:
+        drawn.append((time.monotonic(), page._judging.progress))
         show(*arguments)
 
     monkeypatch.setattr(base, "DRAWING_TIME", PATIENCE)  # or it would give up the wait
-    monkeypatch.setattr(page.scene.paths, "show", draw_slowly)
+    monkeypatch.setattr(page.scene.paths, "show", draw_and_note)
     monkeypatch.setattr(page.channel, "tell", tell_and_note)
-    change_friction(page, 0.4)
-    assert begun.wait(PATIENCE)
-    assert drawn_at[0] - told_at["limits"] >= base.PERIOD  # a picture of the words comes first
-    passes = told(page, "verdict")["passes"]
-    assert is_busy(page)
-    go_on.set()
-    assert passes is False and judged[0] != POLICY
-    wait_until(lambda: is_at_rest(page), "the drawings")
+    set_friction(page, 0.4)
+    at, progress = drawn[0]
+    assert at - told_at["limits"] >= base.PERIOD  # a picture of the words comes first
+    assert progress is not None and progress.what == PATH
+    assert told(page, "verdict")["passes"] is False
     assert not any(one["old"] for one in told(page, "verdict")["policies"])
 
 

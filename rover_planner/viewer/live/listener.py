@@ -23,13 +23,13 @@ from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64MultiArray, String
 
 from msg_adapters.elevation import terrain_from_point_cloud
+from msg_adapters.frames import read_orientation
 from msg_adapters.identity import plan_request_hash
-from msg_adapters.paths import path_to_poses, stamped_pose, yaw_from_quaternion
+from msg_adapters.paths import path_to_poses, stamped_pose
 from msg_adapters.results.diagnostics import HEALTH
 from msg_adapters.results.predictions import array_values
 from rover_physics.errors import RoverError
 from rover_physics.names import WHEEL_JOINTS
-from rover_physics.numerics.quaternions import rpy_from_xyzw
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.ros.qos import (
     latched_qos,
@@ -115,10 +115,10 @@ class LiveListener(Node):
         self, kind: Any, topic: str, take: Take, qos: QoSProfile, *, is_stream: bool = False
     ) -> None:
         """Subscribe to a topic and note the age of its messages."""
-        self._ages[topic] = TopicAge(topic, None, is_stream)
+        age = self._ages[topic] = TopicAge(topic, None, is_stream)
 
         def hear(message: Any) -> None:
-            self._ages[topic] = TopicAge(topic, time.monotonic(), is_stream)
+            age.heard = time.monotonic()
             self._hear(topic, take, message)
 
         self.create_subscription(kind, topic, hear, qos)
@@ -143,8 +143,8 @@ class LiveListener(Node):
         is_estimated = not estimated.keys().isdisjoint(PREDICTED_FIELDS.values())
         source = "forces predicted by the server" if predicted else ""
         source = "forces estimated by the traction controller" if is_estimated else source
-        forces, ages = {**predicted, **estimated}, dict(self._ages)
-        return replace(data, forces=forces, forces_from=source, ages=ages, click=self._click)
+        forces = {**predicted, **estimated}
+        return replace(data, forces=forces, forces_from=source, ages=self._ages, click=self._click)
 
     def request_plan(self, goal: np.ndarray) -> str:
         """Ask the server for a plan from the rover's pose to a goal (2,) [m].
@@ -180,7 +180,7 @@ class LiveListener(Node):
 
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         if any(status.name == HEALTH for status in message.status):
-            self._ages[SIGN_OF_LIFE] = TopicAge(SIGN_OF_LIFE, time.monotonic(), True)
+            self._ages[SIGN_OF_LIFE].heard = time.monotonic()
 
     def _on_joint_states(self, state: JointState) -> None:
         known = self._data
@@ -207,10 +207,9 @@ class LiveListener(Node):
             self._data = replace(known, energy=energy, time=time_passed)
 
     def _on_odometry(self, odometry: Odometry) -> None:
-        point, q = odometry.pose.pose.position, odometry.pose.pose.orientation
-        yaw = yaw_from_quaternion(q)
-        roll, pitch, _ = rpy_from_xyzw((q.x, q.y, q.z, q.w))
-        position, known = np.array([point.x, point.y, point.z]), self._data
+        place, known = odometry.pose.pose.position, self._data
+        attitude = read_orientation(odometry.pose.pose.orientation, "odometry orientation")
+        position = np.array([place.x, place.y, place.z])
         if not np.isfinite(position).all():
             return
         moved = 0.0
@@ -219,7 +218,7 @@ class LiveListener(Node):
         self._data = replace(
             known,
             position=position,
-            attitude=np.array([roll, pitch, yaw]),
+            attitude=np.array(attitude),
             speed=float(odometry.twist.twist.linear.x),
             distance=known.distance + moved,
         )
@@ -242,7 +241,7 @@ class LiveListener(Node):
         if not message.status:
             return
         status, now = message.status[0], time.monotonic()
-        self._ages[SIGN_OF_LIFE] = TopicAge(SIGN_OF_LIFE, now, True)
+        self._ages[SIGN_OF_LIFE].heard = now
         about = {one.key: one.value for one in status.values}
         passes = status.level != DiagnosticStatus.ERROR
         name = f"question {about.get('request', '?')}, {about.get('service', '?')}"

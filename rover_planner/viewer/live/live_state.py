@@ -28,7 +28,7 @@ PATIENCE = 2.0
 """Time after which a click without an answer says so [s]."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class TopicAge:
     """The age of a topic's last message."""
 
