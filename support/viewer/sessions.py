@@ -103,13 +103,19 @@ def ask(page: Any, action: Callable[[], Any]) -> None:
 
 
 class Judge:
-    """Judges for a session in a thread, as a page does, until it is closed."""
+    """Judges for a session in a thread, as a page does, until the end of the context."""
 
     def __init__(self, session: ViewSession):
         """Let a session judge in the background; nothing is judged yet."""
         self.session, self._found = session, Inbox[Any]()
         self.work = BackgroundWork[Any](lambda *found: self._found.put(found))
         session.judge = self.work.ask
+
+    def __enter__(self) -> "Judge":
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        assert self.work.close()
 
     def take(self) -> None:
         """Let the session take what was found."""

@@ -159,9 +159,8 @@ def test_a_process_ends_although_work_runs_in_it():
 @pytest.fixture
 def judge():
     """Judges in the background for a session on a ramp."""
-    made = Judge(session_on(ramp))
-    yield made
-    assert made.work.close()
+    with Judge(session_on(ramp)) as made:
+        yield made
 
 
 def test_changes_add_up_although_the_judgements_between_are_dropped(judge):

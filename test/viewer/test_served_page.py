@@ -12,7 +12,6 @@ import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from rover_physics.names import WHEELS
 from rover_planner.studies.rover_values import write_rover
 from rover_planner.viewer.pages.sharing import read_link, write_link
 from support.grounds import make_terrain, waves
@@ -211,38 +210,36 @@ def test_the_ghost_of_a_failure_stays_for_the_next_one_and_hides_without(page):
     assert not ghost.visible and mark.make_room(failure.state) == ""
 
 
-def test_the_link_that_fails_has_the_colour_of_that_and_its_own_again_where_none_does(page):
-    state, canvas = page.session.shown.path.trajectory.state_at(0.0), Canvas(page.server.scene)
-    rover = DrawnRover(canvas, "/test/rover", 0.5)
-    rover.take(LSR1, {})
-    meshes = {link: canvas.nodes[name] for link, (name, _) in rover.meshes.items()}
-    before = {link: mesh.color for link, mesh in meshes.items()}
-    for link in ("bogie_left", "body", "front_left"):
-        rover.show(state, link)
-        assert {name for name, mesh in meshes.items() if mesh.color == REFUSED} == {link}
-        assert meshes[link].opacity == 1.0
-    rover.show(state)
-    for link, colour in before.items():
-        assert link in WHEELS or meshes[link].color == colour
-        assert meshes[link].opacity == 0.5
-    canvas.remove("/test")
-    assert canvas.nodes == {}
-
-
-def test_a_rover_of_another_shape_keeps_the_nodes_that_it_has_too(page):
-    canvas = Canvas(page.server.scene)
-    rover = DrawnRover(canvas, "/test/rover")
+@pytest.fixture
+def drawn(page):
+    """A rover that is drawn beside those of a page, in a state; nothing is left of it."""
+    rover = DrawnRover(Canvas(page.server.scene), "/test/rover", 0.5)
     rover.take(LSR1, {})
     rover.show(page.session.shown.path.trajectory.state_at(0.0))
-    before = dict(canvas.nodes)
-    suspension = replace(LSR1.suspension, rocker_wheel="front")
-    rover.take(replace(LSR1, suspension=suspension, manipulator=None), {})
-    stays = {name for name in canvas.nodes if canvas.nodes[name] is before.get(name)}
-    assert "/test/rover/body" in stays and "/test/rover/body/arm" not in canvas.nodes
-    assert set(before) != set(canvas.nodes) and not any(
-        canvas.nodes[name]._impl.removed for name in canvas.nodes
-    )
-    canvas.remove("/test")
+    yield rover
+    rover._canvas.remove("/test")
+    assert rover._canvas.nodes == {}
+
+
+def test_the_link_that_fails_has_the_colour_of_that_and_its_own_again_where_none_does(drawn):
+    meshes = {link: drawn._canvas.nodes[name] for link, (name, _) in drawn.meshes.items()}
+    before = {link: mesh.color for link, mesh in meshes.items()}
+    for link in ("bogie_left", "body", "front_left"):
+        drawn.show(drawn.state, link)
+        assert {name for name, mesh in meshes.items() if mesh.color == REFUSED} == {link}
+        assert meshes[link].opacity == 1.0
+    drawn.show(drawn.state)
+    for link, colour in before.items():
+        assert meshes[link].color == colour and meshes[link].opacity == 0.5
+
+
+def test_a_rover_of_another_shape_keeps_the_nodes_that_it_has_too(drawn):
+    nodes, suspension = drawn._canvas.nodes, replace(LSR1.suspension, rocker_wheel="front")
+    before = dict(nodes)
+    drawn.take(replace(LSR1, suspension=suspension, manipulator=None), {})
+    stays = {name for name in nodes if nodes[name] is before.get(name)}
+    assert "/test/rover/body" in stays and "/test/rover/body/arm" not in nodes
+    assert set(before) != set(nodes) and not any(node._impl.removed for node in nodes.values())
 
 
 def test_a_path_is_drawn_in_the_colour_of_its_verdict_up_to_where_it_is_refused(page):

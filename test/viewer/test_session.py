@@ -95,8 +95,7 @@ def test_a_kept_reference_takes_the_place_of_the_loaded_rover_also_for_another_p
 
 def test_all_paths_are_judged_again_after_a_value_that_is_refused_and_old_ones_say_why():
     session = session_on(waves)
-    judge = Judge(session)
-    try:
+    with Judge(session) as judge:
         session.change_rover(Z, -0.19)
         with pytest.raises(RoverFileError):
             session.change_rover([("wheel", "radius")], -1.0)
@@ -110,8 +109,6 @@ def test_all_paths_are_judged_again_after_a_value_that_is_refused_and_old_ones_s
         assert "best" in session.refusal
         judge.finish()  # the paths that were left
         assert session.is_complete and "best" in session.refusal
-    finally:
-        assert judge.work.close()
     half = replace(session.shown, scenario=replace(session.wanted))
     rows = describe_paths(half, True)["rows"]
     assert {row["waits"] for row in rows} == {"old, was not judged again"}

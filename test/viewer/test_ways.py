@@ -105,9 +105,8 @@ def test_a_way_that_is_looked_at_stays_when_a_slider_moves_and_others_go_with_th
 @pytest.fixture
 def judge() -> Iterator[Judge]:
     """Judges in the background for a session before a wall with a gap."""
-    made = Judge(walled_session(wall_with_gap))
-    yield made
-    assert made.work.close()
+    with Judge(walled_session(wall_with_gap)) as made:
+        yield made
 
 
 def test_a_search_can_be_cancelled_and_begun_again_and_a_chosen_path_stays_meanwhile(judge):
