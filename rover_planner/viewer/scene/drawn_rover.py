@@ -47,29 +47,31 @@ class DrawnRover:
         """The state that is shown; None hides the rover."""
         self._looks: tuple[Any, ...] = ()
         """What the shape of the rover and the length of its arrows depend on."""
+        self._arm: dict[str, float] = {}
         self.meshes: dict[str, tuple[str, colours.Colour]] = {}
         """Node and colour of each link by its name; that of a wheel is its tyre."""
 
     def take(self, rover: Rover, arm_angles: Mapping[str, float]) -> None:
-        """Draw another rover, with its arm at angles [rad] by joint name, if it looks new."""
+        """Draw another rover, with its arm at angles [rad] by joint name.
+
+        Of a rover that looks like the last one, only the arm is turned.
+        """
         wheel, arm = rover.wheel, rover.manipulator
-        shape = wheel.radius, wheel.width, rover.suspension, rover.belly, arm
-        looks = *shape, rover.weight, dict(arm_angles)
-        if looks == self._looks:
-            self.rover = rover
-            return
-        self._looks, self.rover = (), None  # an error must not leave half a rover
         self._canvas.radius = wheel.radius
-        self._draw(rover)
-        if arm is not None:
+        looks = wheel.radius, wheel.width, rover.suspension, rover.belly, arm, rover.weight
+        is_new = looks != self._looks
+        if is_new:
+            self._looks, self.rover = (), None  # an error must not leave half a rover
+            self._draw(rover)
+        if arm is not None and (is_new or arm_angles != self._arm):
             mesh = make_arm(arm, arm_angles, wheel.radius)
             self._put("arm", BODY, np.zeros(3), mesh, colours.DARK)
-        self._canvas.remove(f"{self._name}/{BODY}", [node for node, _ in self.meshes.values()])
-        self._looks, self.rover = looks, rover
-        self.show(self.state)
+        self._looks, self._arm, self.rover = looks, dict(arm_angles), rover
+        if is_new:
+            self.show(self.state)
 
     def _draw(self, rover: Rover) -> None:
-        """Put all links of a rover but its arm."""
+        """Put all links of a rover, and take away those that it lacks."""
         self.meshes = {}
         self._canvas.show_frame(self._name, visible=self.state is not None)
         self._canvas.show_frame(self._forces)
@@ -77,6 +79,7 @@ class DrawnRover:
         tyre, grousers = make_wheel(rover)
         for side in SIDES:
             self._put_side(rover, side, tyre, grousers)
+        self._canvas.remove(f"{self._name}/{BODY}", [node for node, _ in self.meshes.values()])
 
     def _put(
         self, link: str, above: str, place: Floats, mesh: trimesh.Trimesh, colour: colours.Colour

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rover_physics.chance.failure_chance import FailureChance
 from rover_physics.limits.table import CHANCE, RATIO, Sense, Unit
-from rover_physics.names import WHEEL_POSITIONS, WHEELS
+from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.record import find_column, numbers_of
@@ -283,7 +283,7 @@ def find_failure(rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathL
     at = int(broken[np.argmin(rows.is_between[broken])])
     here, explains = rows.prediction.select([at]), lane.is_explained_at(at)
     link = limits.find_link(lane, at) if explains or verdict.code == "suspension" else ""
-    link = link or _find_link(rover, terrain, verdict.code, rows, at)
+    link = link or _find_link(rover, terrain, verdict, rows, at)
     of_ground = TITLES.get(verdict.code, verdict.code.replace("_", " "))
     words = lane.compare(at) if explains else of_ground if lane.code == GROUND else ""
     where = link.replace("_", " ") + (" wheel" if link in WHEELS else "")
@@ -312,18 +312,13 @@ def level_state(rover: Rover, terrain: Terrain, rows: AskedPoses, at: int) -> Ro
     return place_state(rover, position, np.array([0.0, 0.0, yaw]), **driven)
 
 
-def _find_link(rover: Rover, terrain: Terrain, code: str, rows: AskedPoses, at: int) -> str:
+def _find_link(rover: Rover, terrain: Terrain, verdict: Verdict, rows: AskedPoses, at: int) -> str:
     """Return the link that fails at a row where no lane names one; empty for none."""
-    if code in BODY_CODES:
+    if verdict.code in BODY_CODES:
         return BODY
-    if code in ("off_map", "unknown_ground"):
+    if verdict.code in ("off_map", "unknown_ground"):
         return _find_lost_wheel(rover, terrain, level_state(rover, terrain, rows, at))
-    if code == "steering" and rover.steering is not None:
-        turns = np.tile([name in rover.steering.wheels for name in WHEEL_POSITIONS], 2)
-        allowed = np.where(turns, rover.steering.limit, 0.0)
-        angles = rows.prediction.steering_angle[at]
-        return WHEELS[int(np.argmax(np.abs(angles) - allowed))]
-    return ""
+    return next((name for name in WHEELS if name in verdict.reason), "")
 
 
 def _find_lost_wheel(rover: Rover, terrain: Terrain, state: RoverState) -> str:
