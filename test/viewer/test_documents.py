@@ -340,7 +340,7 @@ def test_a_row_of_a_path_has_the_numbers_of_its_verdict():
 
 def test_each_number_of_the_rover_has_a_slider_and_what_it_changes_of_the_drive_is_listed():
     session = session_on(ramp)
-    labels = [one[0] for part in describe_sliders(LSR1) for one in part["sliders"]]
+    labels = [one[0] for part in describe_sliders(session.wanted) for one in part["sliders"]]
     assert labels == list(read_values(session.wanted))
     before = session.shown.path
     session.change_rover([("friction",)], 0.4)

@@ -34,11 +34,15 @@ def list_sliders(rover: Rover) -> dict[str, list[RoverValue]]:
     return parts
 
 
-def describe_sliders(loaded: Rover) -> list[dict[str, Any]]:
-    """Return the sliders of a rover that was loaded: label, ends and step, by part."""
+def describe_sliders(scenario: Scenario) -> list[dict[str, Any]]:
+    """Return the sliders of the rover as loaded: label, ends, step and its value, by part."""
+    loaded = read_values(replace(scenario, rover=scenario.loaded, arm_angles={}))
     return [
-        {"title": title, "sliders": [[one.label, one.low, one.high, one.step] for one in values]}
-        for title, values in list_sliders(loaded).items()
+        {
+            "title": title,
+            "sliders": [[k.label, k.low, k.high, k.step, loaded[k.label]] for k in values],
+        }
+        for title, values in list_sliders(scenario.loaded).items()
     ]
 
 
@@ -47,13 +51,6 @@ def read_values(scenario: Scenario) -> dict[str, float]:
     data = {**rover_to_dict(scenario.rover), JOINTS: scenario.arm}
     parts = list_sliders(scenario.loaded).values()
     return {one.label: get_value(data, one.keys[0]) for values in parts for one in values}
-
-
-def describe_values(scenario: Scenario) -> dict[str, list[float]]:
-    """Return the numbers now and as loaded, by the label of their slider."""
-    now = read_values(scenario)
-    loaded = read_values(replace(scenario, rover=scenario.loaded, arm_angles={}))
-    return {label: [value, loaded[label]] for label, value in now.items()}
 
 
 def describe_changes(path: Judged, reference: Judged | None, is_kept: bool) -> dict[str, Any]:

@@ -141,21 +141,19 @@ function drawVerdict(one) {
     ...(one.details && one.details.length ? [make("details", { open: open || document.body.className === "sent" },
       make("summary", {}, "the whole reason"), cells("div", one.details))] : []),
   );
-  if (state.advice) drawAdvice(state.advice);
 }
 
 // What would make the path pass: pointed at, a remedy shows its path; clicked, it is judged.
-function drawAdvice({ can_ask: canAsk, seeking, words, rows }) {
-  const refused = state.verdict && state.verdict.passes === false;
+function drawAdvice(advice) {
+  const { words, rows } = advice || { rows: [] };
   const point = (words) => () => ask({ ask: "ghost", words });
-  at("advice").replaceChildren(...(!refused ? []
-    : [make("small", {}, `${words} `), seeking ? button("Stop", { ask: "cancel" }) : "",
-      canAsk ? button("What would help?", { ask: "advise" }) : "",
-      make("ol", {}, ...rows.map((row) => make("li", !row.taken ? { class: "quiet" } : {
-        tabindex: 0, onpointerenter: point(row.words), onpointerleave: point(null),
-        onclick: () => ask({ ask: "remedy", words: row.words }),
-        onkeydown: (event) => { if (event.key === "Enter") event.currentTarget.click(); },
-      }, row.words, make("small", {}, ` (${row.costs})`))))].filter((child) => child !== "")));
+  at("advice").replaceChildren(...(!advice ? [] : [make("small", {}, `${words} `)]),
+    ...(advice?.seeking ? [button("Stop", { ask: "cancel" })] : []),
+    ...(advice?.can_ask ? [button("What would help?", { ask: "advise" })] : []),
+    make("ol", {}, ...rows.map((row) => make("li", !row.taken ? { class: "quiet" } : {
+      tabindex: 0, onpointerenter: point(row.words), onpointerleave: point(null), onkeydown: pressRow,
+      onclick: () => ask({ ask: "remedy", words: row.words }),
+    }, row.words, make("small", {}, ` (${row.costs})`)))));
 }
 
 function drawPaths({ rows, shown }) {
@@ -187,7 +185,7 @@ function pressRow(event) {
 function drawSliders(parts) {
   at("sliders").replaceChildren(...parts.map((part, k) => make("details", { open: k < 2 },
     make("summary", {}, make("b", {}, part.title)),
-    ...part.sliders.map(([label, low, high, step]) => {
+    ...part.sliders.map(([label, low, high, step, loaded]) => {
       const send = (event) => {
         if (event.target.value === "") return;
         ask({ ask: "value", label, value: Number(event.target.value) });
@@ -198,7 +196,7 @@ function drawSliders(parts) {
         drawValues(state.values);
       }, SETTLE);
       const ends = { min: low, max: high, step: "any", "aria-label": label };
-      return make("div", { class: "slider", "data-label": label },
+      return make("div", { class: "slider", "data-label": label, "data-loaded": loaded },
         make("label", {}, label),
         make("input", { type: "range", ...ends, step, oninput: (event) => { move(); send(event); }, onchange: settle }),
         make("input", { type: "number", ...ends, oninput: move, onchange: (event) => { send(event); settle(); } }));
@@ -208,8 +206,8 @@ function drawSliders(parts) {
 
 function drawValues(values) {
   for (const row of at("sliders").querySelectorAll(".slider")) {
-    const [now, loaded] = values[row.dataset.label] || [0, 0];
-    row.toggleAttribute("data-changed", Math.abs(now - loaded) > 1e-9);
+    const now = values[row.dataset.label] ?? 0;
+    row.toggleAttribute("data-changed", Math.abs(now - row.dataset.loaded) > 1e-9);
     if (chosen.moved === row.dataset.label) continue;
     for (const input of row.querySelectorAll("input")) input.value = String(Number(now.toPrecision(6)));
   }

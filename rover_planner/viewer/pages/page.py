@@ -336,10 +336,11 @@ class Page(PageBase):
         is_old, is_judging = bool(work["old"]), self._judging.progress is not None
         made("paths", paths.describe_paths, shown, is_old, is_judging)
         is_seeking = self._advice.progress is not None
-        tell("advice", advice.describe_advice(self._advised, is_seeking, time.monotonic()))
+        helps = advice.describe_advice(self._advised, is_seeking, time.monotonic())
+        tell("advice", None if shown.verdict.traversable else helps)
         made("current", lambda *_: sharing.write_link(self._link()), shown, self.colouring)
-        made("sliders", rover.describe_sliders, wanted.loaded)
-        made("values", rover.describe_values, wanted)
+        made("sliders", lambda _: rover.describe_sliders(wanted), wanted.loaded)
+        made("values", rover.read_values, wanted)
         made("changes", rover.describe_changes, path, reference, session.kept is not None)
         made("limits", paths.describe_limits, path, reference, shown.chance)
         model = wanted.options.model
