@@ -30,6 +30,7 @@ class KnownPoses:
         """Begin with none; `most` is the number of poses that are remembered."""
         self._rows: dict[bytes, int] = {}
         self._keys: list[bytes] = [b""] * most
+        self._places = np.empty((most, 2))
         self._results = unwritten_results(most)
         self._next = 0
 
@@ -47,26 +48,25 @@ class KnownPoses:
             results = numbers_of(self._results)[known].view(RESULT)[:, 0]
             if len(new):
                 place_results(evaluate(poses[new], motions[new]), results, new)
-        self._keep([keys[k] for k in new.tolist()], results, new)
+        self._keep([keys[k] for k in new.tolist()], poses[new, :2], results, new)
         return results
 
     def forget(self, are_near: Callable[[Floats], NDArray[np.bool_]]) -> None:
         """Forget the poses of which `are_near` is True at x, y (n, 2) [m]."""
-        keys = list(self._rows)
-        if not keys:
-            return
-        places = np.frombuffer(b"".join(keys)).reshape(-1, 6)[:, :2]
-        for k in np.flatnonzero(are_near(places)).tolist():
-            del self._rows[keys[k]]
+        rows = np.fromiter(self._rows.values(), np.int64, len(self._rows))
+        for row in rows[are_near(self._places[rows])].tolist():
+            del self._rows[self._keys[row]]
 
-    def _keep(self, keys: list[bytes], results: np.ndarray, rows: NDArray[np.int64]) -> None:
-        """Keep the rows (k,) of RESULTs, in the place of the oldest ones."""
+    def _keep(
+        self, keys: list[bytes], places: Floats, results: np.ndarray, rows: NDArray[np.int64]
+    ) -> None:
+        """Keep the rows (k,) of RESULTs at places (k, 2), where the oldest ones were."""
         most = len(self._keys)
-        keys, rows = keys[-most:], rows[-most:]
+        keys, places, rows = keys[-most:], places[-most:], rows[-most:]
         to = (self._next + np.arange(len(rows))) % most
         for key, row in zip(keys, to.tolist(), strict=True):
             if self._rows.get(self._keys[row]) == row:
                 del self._rows[self._keys[row]]
             self._rows[key], self._keys[row] = row, key
-        numbers_of(self._results)[to] = numbers_of(results)[rows]
+        self._places[to], numbers_of(self._results)[to] = places, numbers_of(results)[rows]
         self._next = (self._next + len(rows)) % most

@@ -57,10 +57,12 @@ class EdgeMemory:
             return []
         if not _is_alike(asked, query):
             return [replace(one, cost=np.nan) for one in pieces]
-        changed, reach = _count_changes(asked, query), _reach_of(query)
+        poses, firsts = np.concatenate([one.poses for one in pieces]), [0]
+        firsts += np.cumsum([len(one.poses) for one in pieces[:-1]]).tolist()
+        near = _count_changes(asked, query).are_near(poses[:, :2], _reach_of(query))
         return [
-            replace(one, cost=np.nan) if changed.are_near(one.poses[:, :2], reach).any() else one
-            for one in pieces
+            replace(one, cost=np.nan) if is_near else one
+            for one, is_near in zip(pieces, np.logical_or.reduceat(near, firsts), strict=True)
         ]
 
     def recall_poses(self, query: SearchQuery) -> PosesByModel:
