@@ -7,6 +7,7 @@ was.
 """
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +27,12 @@ Evaluate = Callable[[Floats, Floats], np.ndarray]
 class KnownPoses:
     """RESULTs of the last poses that one model was asked about, by pose and motion."""
 
-    def __init__(self, most: int = MOST):
-        """Begin with none; `most` is the number of poses that are remembered."""
+    def __init__(self, most: int = MOST, others: "KnownPoses | None" = None):
+        """Begin with none; `most` is the number of poses that are remembered.
+
+        What is not known, `others` of the same model may know.
+        """
+        self._others = others
         self._rows: dict[bytes, int] = {}
         self._keys: list[bytes] = [b""] * most
         self._places = np.empty((most, 2))
@@ -39,6 +44,8 @@ class KnownPoses:
 
         `evaluate` is asked about those that are not known.
         """
+        if self._others is not None:
+            evaluate = partial(self._others.complete, evaluate=evaluate)
         keys = np.hstack([poses, motions]).view(ASKED)[:, 0].tolist()
         known = np.array([self._rows.get(key, -1) for key in keys], np.int64)
         new = np.flatnonzero(known < 0)

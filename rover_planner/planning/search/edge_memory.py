@@ -20,7 +20,8 @@ from rover_planner.planning.search.primitives import Piece, make_primitives
 from rover_planner.planning.search.query import SearchQuery
 
 PosesByModel = tuple[KnownPoses, KnownPoses]
-"""What is known of poses of whole paths, and of pieces, which are judged with other options."""
+"""What is known of poses of whole paths, and of the pieces that a search asks about in numbers,
+with other options if the chance of failure counts."""
 
 
 class EdgeMemory:
@@ -68,7 +69,8 @@ class EdgeMemory:
     def recall_poses(self, query: SearchQuery) -> PosesByModel:
         """Return what is known of poses of whole paths, and of pieces; what is added is kept."""
         if self._poses is None or not _is_alike(self._poses[0], query):
-            known = KnownPoses(), KnownPoses()
+            of_pieces, is_same = KnownPoses(), query.options.accepted_chance >= 1.0
+            known = KnownPoses(others=of_pieces if is_same else None), of_pieces
         else:
             asked, known = self._poses
             changed, reach = _count_changes(asked, query), _reach_of(query)

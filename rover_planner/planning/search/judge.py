@@ -83,9 +83,9 @@ class PathJudge:
     marked: MarkedPlaces = NONE_MARKED
     """Places that are impassable."""
     known: KnownPoses | None = None
-    """What the model has found on this ground so far, None if that is not kept."""
+    """What the model has found along whole paths so far, None if that is not kept."""
     known_in_pieces: KnownPoses | None = None
-    """The same with the friction and torque limit for which pieces are judged."""
+    """The same along pieces, with the friction and torque limit for which they are judged."""
     poses: int = field(default=0, init=False)
     """Number of poses that searches have asked for so far, a measure of the work done."""
 
@@ -220,8 +220,9 @@ class PathJudge:
         poses = [piece.poses for piece in pieces]
         self.poses += sum(map(len, poses))
         (terrain, model), sigmas = self._cautious, self.options.map_sigmas
-        known = self.known if self.options.accepted_chance >= 1.0 else self.known_in_pieces
-        found = judge_pieces(self.rover, terrain, poses, model, sigmas=sigmas, known=known)
+        found = judge_pieces(
+            self.rover, terrain, poses, model, sigmas=sigmas, known=self.known_in_pieces
+        )
         judged = [
             JudgedPiece(verdict.code, find_cost(self.rover, piece.gear, verdict))
             for piece, verdict in zip(pieces, found, strict=True)

@@ -55,10 +55,11 @@ def test_a_path_is_the_same_to_the_bit_with_what_is_known_and_is_not_evaluated_a
 
 
 def test_a_path_of_judged_pieces_is_hardly_evaluated_again(asked):
-    known = KnownPoses()
-    judge_pieces(LSR1, GROUND, [WAY[:51], WAY[50:]], known=known)
+    of_pieces = KnownPoses()
+    judge_pieces(LSR1, GROUND, [WAY[:51], WAY[50:]], known=of_pieces)
     before = asked.poses
-    judge_path(LSR1, GROUND, WAY, known=known)
+    for known in (of_pieces, KnownPoses(others=of_pieces)):
+        judge_path(LSR1, GROUND, WAY, known=known)
     assert asked.poses - before < 0.1 * before
 
 
