@@ -43,6 +43,8 @@ SLIP_SPEED = 0.08
 GRIP_SHARE, GRIP_EXCESS = 0.3, 0.1
 """Slip over rolling from which a wheel proves no grip, be its slip certain or not; and tractions
 beyond what holds the rover, over the weight, from which loads are too wrong for that."""
+CERTAIN_GRIP = 2.0
+"""Standard errors of a mean torque by which it must exceed what a grip proves."""
 LASTING = 3
 """Number of windows in a row in which a wheel that slips does."""
 CERTAIN = 5.0
@@ -122,6 +124,16 @@ class GroundEstimate:
     """The soil, on ground that yields."""
 
 
+@dataclass(frozen=True, eq=False)
+class TorqueNoise:
+    """How unsteady the torques of a window are."""
+
+    fluctuation: Floats
+    """(6,) standard deviations over the means."""
+    error: Floats
+    """(6,) standard errors of the mean tractions [N]."""
+
+
 _SUMS = record_type(
     ("count", float),  # number of rows
     ("sums", float, (WIDTH,)),  # of what was measured
@@ -157,6 +169,7 @@ class GroundLearner:
         self._sense = ContactSense(rover, terrain)
         self._windows = SlipWindows(wheel.radius, wheel.width)
         self._soil = None if soil is None else SoilFit(rover, self._sense.weight, soil)
+        self._least_slip = SLIP_SPEED * rover.nominal_speed
         self._told = told = rover.friction if told is None else told
         self._whole = FrictionFilter(told)
         self._sides = {side: FrictionFilter(told) for side in SIDES}
@@ -171,7 +184,7 @@ class GroundLearner:
         self._spot, self._here = np.full((WHEEL_COUNT, 2), np.inf), np.zeros(WHEEL_COUNT)
         self._marked, self._mark_time = np.full((WHEEL_COUNT, 2), np.inf), -math.inf
         self._time = -math.inf
-        self._recent: deque[tuple[Floats, Floats]] = deque(maxlen=WINDOW)
+        self._recent: deque[tuple[Floats, Floats, Floats]] = deque(maxlen=WINDOW)
         self._resistance, self._resistance_square, self._steady = 0.0, 0.0, 0.0
         self._slip_time: float | None = None
         self._immobilised_time: float | None = None
@@ -250,7 +263,8 @@ class GroundLearner:
         state = self._sense.feel(row, self._forward)
         if state is None:
             return False
-        self._recent.append((row, block["squares"] / np.maximum(known[TORQUES], 1.0)))
+        rows = np.maximum(known[TORQUES], 1.0)
+        self._recent.append((row, block["squares"] / rows, rows))
         window = self._windows.take(float(row[TIME]), block["turned"] / count, state)
         if window is None:
             return False
@@ -298,7 +312,7 @@ class GroundLearner:
             self._slip_time = window.time
         good &= turning
         slips, grips = lasting & good, ~slipping
-        rows = np.array([row for row, _ in self._recent])
+        rows = np.array([row for row, _, _ in self._recent])
         torques = rows[:, TORQUES].mean(axis=0)
         climb = _find_change(rows[:, [PITCH, *_ANGLES]])
         stuck = self._stuck.update(window, torques, climb, self.commanded)
@@ -316,10 +330,14 @@ class GroundLearner:
             *zip(self._sides.values(), _SIDE_WHEELS, strict=True),
             *((self._classes[number], wheels) for number, wheels in on_class.items()),
         ]
-        squares = np.array([squares for _, squares in self._recent]).mean(axis=0)
+        squares = np.array([squares for _, squares, _ in self._recent]).mean(axis=0)
+        count = np.array([count for _, _, count in self._recent]).sum(axis=0)
         spread = np.sqrt(np.maximum(squares - torques**2, 0.0))
-        fluctuation = spread / np.maximum(np.abs(torques), 1e-9)
-        self._learn_friction(window, slips, grips & good, fluctuation, grounds, elapsed)
+        felt = TorqueNoise(
+            fluctuation=spread / np.maximum(np.abs(torques), 1e-9),
+            error=spread / np.sqrt(count) / self._rover.wheel.radius,
+        )
+        self._learn_friction(window, slips, grips & good, felt, grounds, elapsed)
 
     def _turns_freely(self, window: SlipWindow) -> Flags:
         """Return (6,) whether motors are slow enough to give the torque they are asked for."""
@@ -330,7 +348,7 @@ class GroundLearner:
         """Return (6,) whether wheels slip."""
         least = np.maximum(
             np.maximum(SLIP_SHARE * np.abs(window.rolling), CERTAIN * window.deviation),
-            SLIP_SPEED * self._rover.nominal_speed,
+            self._least_slip,
         )
         return np.asarray(window.slip_speed > least + window.scrub + window.uneven)
 
@@ -339,20 +357,17 @@ class GroundLearner:
         window: SlipWindow,
         slips: Flags,
         grips: Flags,
-        fluctuation: Floats,
+        felt: TorqueNoise,
         grounds: Sequence[tuple[FrictionFilter, Flags]],
         elapsed: float,
     ) -> None:
-        """Take what the wheels of a window tell about the friction of the grounds below them.
-
-        `fluctuation` (6,) has the standard deviations of the torques over their means.
-        """
+        """Take what the wheels of a window tell about the friction of the grounds below them."""
         unit = self._sense.weight / WHEEL_COUNT
         loads, tractions = window.loads, window.tractions
         tractions = tractions - self._resistance * loads * np.sign(window.rolling)
         counts = (window.clear > 0.0) & (loads > MIN_LOAD * unit) & (loads < MAX_LOAD * unit)
         along = np.abs(window.slip) / np.maximum(window.slip_speed, 1e-9)
-        sticking = fluctuation * (1.0 - np.abs(window.ratio))
+        sticking = felt.fluctuation * (1.0 - np.abs(window.ratio))
         tells = slips & counts & (along > ALONG) & (window.slip * tractions > 0.0)
         tells &= sticking < MOST_STICKING
         tells &= window.doubts < MOST_DOUBT * loads
@@ -360,10 +375,12 @@ class GroundLearner:
         distance = abs(float(find_median(window.travel))) * elapsed
         weights = self._weigh(window, tells, elapsed)
         beyond = abs(window.excess - float((window.tractions - tractions).sum()))
-        grips = grips & (np.abs(window.ratio) < GRIP_SHARE)
+        most = np.maximum(GRIP_SHARE * np.abs(window.rolling), self._least_slip)
+        grips = grips & (np.abs(window.slip) < most)
         grips &= beyond < GRIP_EXCESS * self._sense.weight
+        proved = np.maximum(np.abs(tractions) - CERTAIN_GRIP * felt.error, 0.0)
         shears = np.abs(tractions) / np.maximum(along, 1e-9) * (1.0 + STICKING_LOSS * sticking)
-        noises = loads * np.hypot(LEAST_NOISE, FLUCTUATION_NOISE * fluctuation)
+        noises = loads * np.hypot(LEAST_NOISE, FLUCTUATION_NOISE * felt.fluctuation)
         for one, own in grounds:
             if own.any():
                 one.drive(distance)
@@ -372,7 +389,7 @@ class GroundLearner:
                 load, doubt = float(loads[told].sum()), window.doubts[told].sum()
                 noise = float(np.linalg.norm([*noises[told], doubt])) / load
                 one.slip(float(shears[told].sum()) / load, noise, float(weights[told].mean()))
-            held = np.sort((np.abs(tractions) / np.maximum(loads, 1e-9))[counts & grips & own])
+            held = np.sort((proved / np.maximum(loads, 1e-9))[counts & grips & own])
             if len(held) >= 2:  # two wheels: the contact of one may be wrong
                 one.grip(float(held[-2]))
 

@@ -115,6 +115,12 @@ def test_torques_beyond_what_holds_the_rover_prove_no_friction():
     assert learn(rows).estimate.friction.low < 1.2 * SLOPE
 
 
+def test_torques_that_fluctuate_prove_no_friction_by_chance():
+    rows = climb(ROVER, SLOPE, 40.0, speed=0.02)[::5]
+    rows[:, TORQUES] *= 1.0 + 0.3 * np.random.default_rng(2).standard_normal((len(rows), 6))
+    assert learn(rows).estimate.friction.low < SLOPE
+
+
 def test_a_gap_and_a_jump_of_the_odometry_are_no_slip():
     rows = climb(ROVER, SLOPE, 20.0)[::5]
     rows = np.delete(rows, slice(60, 80), axis=0)
