@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rover, terrain and options, checked and packed into the records that kernels read."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -27,6 +27,7 @@ from rover_physics.prediction.evaluation import (
     new_work,
     new_works,
 )
+from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.prediction.path_kernels import Wheels
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, POLICIES, SweepOptions
 from rover_physics.results.record import (
@@ -64,6 +65,8 @@ class PackedModel:
     """The limits that are asked of it."""
     ground: Ground
     """The packed terrain. The MODEL holds its addresses, so it must live as long as this one."""
+    known: KnownPoses | None = field(default=None, init=False)
+    """What it has found so far, None if that is not kept. A changed model begins anew."""
 
     def __reduce__(self) -> str:
         raise TypeError(
@@ -96,7 +99,20 @@ class PackedModel:
 
     def change(self, **options: Any) -> "PackedModel":
         """Return the rover on its terrain with other values of some options."""
-        return pack_model(self.rover, self.terrain, replace(self.options, **options))
+        asked = replace(self.options, **options)
+        model = pack_model(self.rover, self.terrain, asked)
+        return model.remember(self.known) if asked == self.options else model
+
+    def remember(self, known: KnownPoses | None) -> "PackedModel":
+        """Return the model with what it has found so far, which grows with what it is asked.
+
+        It must be the same rover with the same options, and the ground near these poses the same.
+        """
+        if known is None:
+            return self
+        model = replace(self)
+        object.__setattr__(model, "known", known)
+        return model
 
     def hold_steering(self, angles: np.ndarray) -> "PackedModel":
         """Return the model with wheels at these angles (6,) [rad], whatever the motion."""
@@ -116,6 +132,13 @@ class PackedModel:
             motions: (n, 3) vx, vy [m/s] and yaw rate [rad/s] of the body origin, as `path_motions`
                 returns them; (0, 3) if all are straight ahead.
         """
+        if self.known is not None and len(motions) and not len(held):
+            return self.known.complete(poses, motions, self._evaluate)
+        return self._evaluate(poses, motions, held)
+
+    def _evaluate(
+        self, poses: np.ndarray, motions: np.ndarray, held: np.ndarray = NONE_HELD
+    ) -> Any:
         results = unwritten_results(len(poses))
         with limit_threads(self.relative_cost(len(poses))) as threads:
             works = new_works(threads, len(poses))

@@ -12,6 +12,7 @@ from rover_physics.chance.failure_chance import check_accepted_chance, find_fail
 from rover_physics.names import EQUAL
 from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.quiet import quiet
+from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_kernels import NO_CROSSINGS
 from rover_physics.prediction.path_motion import check_curvature, motions_of
@@ -52,6 +53,7 @@ def judge_path(
     sigmas: float | None = SIGMAS,
     stop_at_failure: bool = False,
     accepted_chance: float | None = None,
+    known: KnownPoses | None = None,
 ) -> tuple[PathPrediction, Verdict]:
     """Predict a path and judge it, including entrapment.
 
@@ -76,6 +78,8 @@ def judge_path(
             verdict then has the chance, except of a path that stopped at its first failure
             (docs/uncertainty.md); with `stop_at_failure`, one above the accepted chance may be
             larger than told. None does not ask for it.
+        known: What this rover with these options has found on this ground so far; grows. It saves
+            time and changes nothing else.
 
     Returns:
         The prediction, and the verdict on it. With `stop_at_failure`, both end at the first
@@ -96,6 +100,7 @@ def judge_path(
         sigmas=sigmas,
         stop_at_failure=stop_at_failure,
         accepted_chance=accepted_chance,
+        known=known,
     )[0]
 
 
@@ -110,6 +115,7 @@ def judge_paths(
     stop_at_failure: bool = False,
     check_entrapment: bool = True,
     accepted_chance: float | None = None,
+    known: KnownPoses | None = None,
 ) -> list[tuple[PathPrediction, Verdict]]:
     """Judge several paths at once, faster than one by one.
 
@@ -123,6 +129,7 @@ def judge_paths(
         check_entrapment: False where pieces of a longer path are judged, and the whole of it
             later.
         accepted_chance: As for `judge_path`.
+        known: As for `judge_path`.
 
     Returns:
         Prediction and verdict of each path, as of `judge_path`.
@@ -132,7 +139,7 @@ def judge_paths(
     """
     check_sigmas(sigmas)
     check_accepted_chance(accepted_chance)
-    model = pack_model(rover, terrain, options)
+    model = pack_model(rover, terrain, options).remember(known)
     checked = [check_poses(poses) for poses in paths]
     judged = []
     for swept in predict_paths(model, checked, stop_at_failure):

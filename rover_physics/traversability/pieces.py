@@ -23,6 +23,7 @@ from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.numerics.quiet import quiet
 from rover_physics.prediction.crossing import find_crossings, find_turns, list_jumps, turn_wheels
 from rover_physics.prediction.drops import MIN_ANGLE, find_drops
+from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_kernels import Crossings, add_up, angle_ahead, distance_between
 from rover_physics.prediction.path_motion import path_motions
@@ -63,6 +64,7 @@ def judge_pieces(
     options: SweepOptions = DEFAULT_OPTIONS,
     *,
     sigmas: float | None = SIGMAS,
+    known: KnownPoses | None = None,
 ) -> list[PieceVerdict]:
     """Judge pieces of path as `judge_paths` does without the check for entrapment.
 
@@ -74,6 +76,7 @@ def judge_pieces(
         pieces: Poses of each piece, (n, 3) x, y [m] and yaw [rad], map frame.
         options: As for `judge_paths`.
         sigmas: As for `judge_paths`.
+        known: As for `judge_paths`.
 
     Returns:
         The verdict on each piece, in the order of `pieces`.
@@ -83,7 +86,9 @@ def judge_pieces(
     """
     if not len(pieces):
         return []
-    sweep = _Sweep(pack_model(rover, terrain, options), list(map(check_poses, pieces)))
+    known = known or KnownPoses()
+    model = pack_model(rover, terrain, options).remember(known)
+    sweep = _Sweep(model, list(map(check_poses, pieces)))
     found = {k: PieceVerdict(code) for k, code in sweep.find_failures().items()}
     if terrain.elevation_std is None or not sigmas:
         found |= sweep.look_between()
@@ -96,6 +101,7 @@ def judge_pieces(
         sigmas=sigmas,
         stop_at_failure=True,
         check_entrapment=False,
+        known=known,
     )
     for k, (prediction, verdict) in zip(rest, judged, strict=True):
         found[k] = PieceVerdict(verdict.code)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rover_physics.bounds.path import SIGMAS
 from rover_physics.limits.table import CHANCE
+from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.rover.model import Rover
@@ -249,8 +250,11 @@ def check_path(
     options: PathQueryOptions | None = None,
     *,
     stop_at_failure: bool = False,
+    known: KnownPoses | None = None,
 ) -> Candidate:
-    """Evaluate and judge a given path of poses (n, 3); other arguments as `answer_path_query`.
+    """Evaluate and judge a given path of poses (n, 3); `known` is as for `judge_path`.
+
+    Other arguments are as for `answer_path_query`.
 
     With `stop_at_failure`, the waypoints beyond the first failure are left out, and a chance of
     failure above the accepted one may be larger than told. It is asked only of a path that is
@@ -271,6 +275,7 @@ def check_path(
             sigmas=options.map_sigmas,
             stop_at_failure=stop,
             accepted_chance=accepted,
+            known=known,
         )
 
     asked = options.accepted_chance if options.accepted_chance < 1.0 else None

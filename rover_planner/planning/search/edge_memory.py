@@ -1,12 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Remembers judged edges and the last path, from one search to the next."""
 
+import math
 from dataclasses import replace
+from functools import lru_cache, partial
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.rover.steering_joints import swing_radius
+from rover_physics.prediction.known_poses import KnownPoses
+from rover_physics.terrain.ground import BLOCK
 from rover_planner.maps.changes import find_changes, have_same_layers
 from rover_planner.parameters.traverse_server import ALLOW
 from rover_planner.planning.search.cell_counts import CellCounts
@@ -15,17 +19,23 @@ from rover_planner.planning.search.nodes import HEADINGS, Nodes
 from rover_planner.planning.search.primitives import Piece, make_primitives
 from rover_planner.planning.search.query import SearchQuery
 
+PosesByModel = tuple[KnownPoses, KnownPoses]
+"""What is known of poses of whole paths, and of the pieces that a search asks about in numbers,
+with other options if the chance of failure counts."""
+
 
 class EdgeMemory:
-    """The judged edges of the last search.
+    """The judged edges of the last search, its path, and the poses that the model was asked about.
 
-    They are forgotten as a whole if the rover, the arm, an option, the window or the grid of the
-    map change. If heights or other layers of the map change, those that may touch them are.
+    They are forgotten as a whole if the rover, the arm, an option or the grid of the map change,
+    edges also if the window does. If heights or other layers of the map change, those that may
+    touch them are.
     """
 
     def __init__(self) -> None:
-        self._last: tuple[SearchQuery, Edges] | None = None
+        self._edges: tuple[SearchQuery, Edges] | None = None
         self._path: tuple[SearchQuery, list[Piece]] | None = None
+        self._poses: tuple[SearchQuery, PosesByModel] | None = None
 
     def keep_path(self, query: SearchQuery, pieces: list[Piece]) -> None:
         """Keep the pieces of the path that answers a query."""
@@ -46,27 +56,39 @@ class EdgeMemory:
         )
         if not is_same:
             return []
-        changed = None
-        if _is_alike(asked, query):
-            changed = CellCounts(query.terrain, _find_changed(asked, query))
-        reach = _reach_of(query)
+        if not _is_alike(asked, query):
+            return [replace(one, cost=np.nan) for one in pieces]
+        poses, firsts = np.concatenate([one.poses for one in pieces]), [0]
+        firsts += np.cumsum([len(one.poses) for one in pieces[:-1]]).tolist()
+        near = _count_changes(asked, query).are_near(poses[:, :2], _reach_of(query))
         return [
-            replace(one, cost=np.nan)
-            if changed is None or changed.are_near(one.poses[:, :2], reach).any()
-            else one
-            for one in pieces
+            replace(one, cost=np.nan) if is_near else one
+            for one, is_near in zip(pieces, np.logical_or.reduceat(near, firsts), strict=True)
         ]
+
+    def recall_poses(self, query: SearchQuery) -> PosesByModel:
+        """Return what is known of poses of whole paths, and of pieces; what is added is kept."""
+        if self._poses is None or not _is_alike(self._poses[0], query):
+            of_pieces, is_same = KnownPoses(), query.options.accepted_chance >= 1.0
+            known = KnownPoses(others=of_pieces if is_same else None), of_pieces
+        else:
+            asked, known = self._poses
+            changed, reach = _count_changes(asked, query), _reach_of(query)
+            for one in known:
+                one.forget(partial(changed.are_near, reach=reach))
+        self._poses = query, known
+        return known
 
     def recall(self, query: SearchQuery, nodes: Nodes) -> Edges:
         """Return the edges between nodes with what is known of them; what is added is kept."""
-        last = self._last
+        last = self._edges
         if last is None or last[1].nodes != nodes or not _is_alike(last[0], query):
             spacing = query.options.waypoint_spacing
             edges = Edges(nodes, make_primitives(query.rover, nodes.cell, spacing))
         else:
             asked, edges = last
-            edges.forget(_find_touching(query, edges, _find_changed(asked, query)))
-        self._last = query, edges
+            edges.forget(_find_touching(query, edges, _count_changes(asked, query)))
+        self._edges = query, edges
         return edges
 
 
@@ -99,28 +121,40 @@ def _seen(query: SearchQuery) -> NDArray[np.uint8] | None:
     )
 
 
-def _find_changed(asked: SearchQuery, query: SearchQuery) -> NDArray[np.bool_]:
-    """Return (ny, nx) True for cells in which the maps of two queries that are alike differ."""
+@lru_cache(maxsize=1)
+def _count_changes(asked: SearchQuery, query: SearchQuery) -> CellCounts:
+    """Return the cells in which the maps of two queries that are alike differ, as counts."""
     before, now = _seen(asked), _seen(query)
     if asked.terrain is query.terrain and before is now:
-        return np.zeros(query.terrain.elevation.shape, bool)
+        return CellCounts(query.terrain, np.zeros(query.terrain.elevation.shape, bool))
     changed = find_changes(asked.terrain, query.terrain)[1:-1, 1:-1]
     if before is not None and now is not None:
         changed |= before != now
-    return changed
+    return CellCounts(query.terrain, changed)
 
 
 def _reach_of(query: SearchQuery) -> float:
-    """Return how far from the body origin ground may count for a pose [m]."""
-    rover = query.rover
-    return swing_radius(rover) + 2.0 * rover.wheel.radius + 2.0 * query.terrain.resolution
+    """Return how far from the body origin ground may count for a pose [m].
+
+    The kernels look at the blocks of cells that wheels and body touch, however these are turned,
+    and at the cells around them.
+    """
+    rover, suspension = query.rover, query.rover.suspension
+    rocker, bogie = suspension.rocker_pivot, suspension.bogie_pivot
+    farthest = 0.0
+    for name, wheel in suspension.wheels.items():
+        joints = [rocker, bogie, wheel] if name in suspension.bogie_wheels else [rocker, wheel]
+        links = [math.hypot(rocker[0], rocker[2])]
+        links += [math.hypot(b[0] - a[0], b[2] - a[2]) for a, b in pairwise(joints)]
+        farthest = max(farthest, math.hypot(wheel[1], sum(links)))
+    wheel_size = math.hypot(rover.wheel.radius, 0.5 * rover.wheel.width)
+    sides = (max(map(abs, ends)) for ends in (rover.belly.x, rover.belly.y))
+    belly = math.hypot(rover.belly.z, *sides)
+    return max(farthest + wheel_size, belly) + (BLOCK + 1) * query.terrain.resolution
 
 
-def _find_touching(
-    query: SearchQuery, edges: Edges, changed: NDArray[np.bool_]
-) -> NDArray[np.int64]:
+def _find_touching(query: SearchQuery, edges: Edges, changed: CellCounts) -> NDArray[np.int64]:
     """Return the places (k,) of nodes from which an edge may lead over changed cells."""
     longest = max(one.length for own in edges.primitives for one in own)
     places = edges.nodes.poses(np.arange(0, edges.nodes.count, HEADINGS))[:, :2]
-    counts = CellCounts(query.terrain, changed)
-    return np.flatnonzero(counts.are_near(places, longest + _reach_of(query)))
+    return np.flatnonzero(changed.are_near(places, longest + _reach_of(query)))

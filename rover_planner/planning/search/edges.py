@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_planner.planning.angles import wrap
 from rover_planner.planning.search.difficulty import SAMPLE_SHARE, sample_primitives
 from rover_planner.planning.search.nodes import HEADINGS, Nodes
 from rover_planner.planning.search.primitives import Piece, Primitive
@@ -83,12 +84,17 @@ class Edges:
         return self.nodes.count * self.width
 
     def piece(self, edge: int) -> Piece:
-        """Return an edge as a piece of path, with its cost if it was judged."""
+        """Return an edge as a piece of path, with its cost if it was judged.
+
+        It begins and ends exactly at its nodes, so that a path has the poses of its pieces.
+        """
         node, k = divmod(int(edge), self.width)
         primitive = self.primitives[node % HEADINGS][k]
-        x, y, _ = self.nodes.poses(np.array([node]))[0]
-        cost = float(self.cost.flat[edge])
-        return Piece(primitive.poses + np.array([x, y, 0.0]), primitive.gear, cost)
+        ends = self.nodes.poses(np.append(node, self.ends(np.array([edge]))))
+        poses = primitive.poses + np.array([*ends[0, :2], 0.0])
+        poses[:, 2] = wrap(poses[:, 2])
+        poses[[0, -1]] = ends
+        return Piece(poses, primitive.gear, float(self.cost.flat[edge]))
 
     def is_open(self, edge: int) -> bool:
         """Return whether an edge is not judged."""

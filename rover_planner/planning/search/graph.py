@@ -24,9 +24,10 @@ SLACK = 1.1
 """Costs to the goal are measured up to this multiple of the cost from start to goal."""
 FEW = 500
 """Number of nodes that a search may expand beside those of its path before it counts as misled."""
-GUESSED, EAGERNESS = 8000, 1.5
-"""Number of nodes that searches may expand so before costs to the goal that are guessed are
-measured, and guessed costs over those on level ground: the larger, the sooner is a path found."""
+GUESSED, EAGERNESS = 0.25, 1.5
+"""Share of the nodes that searches may expand so before costs to the goal that are guessed are
+measured, which takes about as long, and guessed costs over those on level ground: the larger, the
+sooner is a path found."""
 GIVEN_UP = -2
 """Result of a search that would expand too many nodes."""
 
@@ -355,7 +356,7 @@ class ShortestPaths:
         away = np.maximum(cell * np.hypot(rows - row, columns - column) - radius, 0.0)
         self._to_goal.cost.reshape(-1, HEADINGS)[:] = away.reshape(-1, 1)
         self._to_goal = self._to_goal._replace(limit=np.inf)
-        self._measured = self._most = GUESSED
+        self._measured = self._most = round(GUESSED * nodes.count)
 
     def _search(self, graph: Graph, starts: Seeds, goals: Seeds) -> tuple[int, float]:
         """Return the goal's seed, -1 or GIVEN_UP, and the cost [m] of the shortest path."""

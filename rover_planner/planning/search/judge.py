@@ -23,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.results.uses import find_codes
@@ -81,6 +82,10 @@ class PathJudge:
     """Refuses ground under the belly that was never seen; None allows it."""
     marked: MarkedPlaces = NONE_MARKED
     """Places that are impassable."""
+    known: KnownPoses | None = None
+    """What the model has found along whole paths so far, None if that is not kept."""
+    known_in_pieces: KnownPoses | None = None
+    """The same along pieces, with the friction and torque limit for which they are judged."""
     poses: int = field(default=0, init=False)
     """Number of poses that searches have asked for so far, a measure of the work done."""
 
@@ -163,7 +168,12 @@ class PathJudge:
 
     def _judge_path(self, poses: Pose, *, stop_at_failure: bool = False) -> Candidate:
         return check_path(
-            self.rover, self.terrain, poses, self.options, stop_at_failure=stop_at_failure
+            self.rover,
+            self.terrain,
+            poses,
+            self.options,
+            stop_at_failure=stop_at_failure,
+            known=self.known,
         )
 
     def classify(self, candidate: Candidate) -> tuple[ClassifiedWaypoint, ...]:
@@ -210,7 +220,9 @@ class PathJudge:
         poses = [piece.poses for piece in pieces]
         self.poses += sum(map(len, poses))
         (terrain, model), sigmas = self._cautious, self.options.map_sigmas
-        found = judge_pieces(self.rover, terrain, poses, model, sigmas=sigmas)
+        found = judge_pieces(
+            self.rover, terrain, poses, model, sigmas=sigmas, known=self.known_in_pieces
+        )
         judged = [
             JudgedPiece(verdict.code, find_cost(self.rover, piece.gear, verdict))
             for piece, verdict in zip(pieces, found, strict=True)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.numerics.interruption import check_interruption
+from rover_planner.planning.angles import wrap
 from rover_planner.planning.path_query import Candidate
 from rover_planner.planning.search.connections import Connection
 from rover_planner.planning.search.difficulty import Difficulty, difficulty_of
@@ -36,8 +37,8 @@ that the last search expanded: then both take about as long."""
 FIRST_PIECES = 4
 """Number of pieces of a path that are judged first."""
 MOST_REFUSED = 3
-"""Number of refused connections of start or goal from which on all of its others are judged: it
-may be closed in, and each of them costs a search."""
+"""Number of refused connections of start or goal from which on others are judged, too: it may be
+closed in, and each of them costs a search."""
 NEAR_OPTIMAL = 0.02
 """A path is good enough if no path of the lattice costs less by more than this share."""
 
@@ -82,6 +83,8 @@ class _Ends:
         self.judged = np.zeros(len(connections), bool)
         self.codes: list[str] = []
         """Codes of the connections that were refused."""
+        self.many = MOST_REFUSED
+        """Number of refused connections from which on further ones are judged."""
 
     def piece(self, k: int) -> Piece:
         """Return connection k as a piece of path with its cost."""
@@ -223,15 +226,18 @@ class LatticeSearch:
         return float(difficulty_of(self.difficulty, self.edges.nodes.shape[1], node, k))
 
     def _judge_ends(self) -> None:
-        """Judge all connections of start or goal if many are refused."""
+        """Judge as many further connections of start or goal as were refused, if many were."""
         for ends in self.ends:
-            if len(ends.codes) < MOST_REFUSED or ends.judged.all():
+            refused = int(np.isinf(ends.costs).sum())
+            if refused < ends.many:
                 continue
+            ends.many = 2 * refused
             rows = np.flatnonzero(~ends.judged)
+            rows = rows[np.argsort(ends.costs[rows], kind="stable")][:refused]
             self._stand(np.unique(self._unjudged(ends.nodes[rows])))
             stands = self.edges.standing[ends.nodes[rows]] == PASSES
             self._judge([(ends, k) for k in rows[stands].tolist()])
-            ends.judged[:] = True
+            ends.judged[rows], ends.costs[rows[~stands]] = True, np.inf
 
     def _judge(self, parts: Sequence[Part]) -> bool:
         """Judge parts, keep what is found, and return whether all pass."""
@@ -287,5 +293,5 @@ def join_pieces(pieces: Sequence[Piece]) -> tuple[NDArray[np.float64], NDArray[n
         parts.append(piece.poses[1:])
         owners.append(np.full(len(piece.poses) - 1, index))
     poses = np.concatenate(parts)
-    poses[:, 2] = np.arctan2(np.sin(poses[:, 2]), np.cos(poses[:, 2]))
+    poses[:, 2] = wrap(poses[:, 2])
     return poses, np.concatenate(owners)

@@ -207,12 +207,17 @@ class _PathFinder:
         self._query, self._settings, self._on_progress = query, settings, on_progress
         self._start = _check_end("start", query, may_be_off_map=False)
         self._goal = _check_end("goal", query, may_be_off_map=settings.frontier)
+        self._memory = memory or EdgeMemory()
         self._judge = PathJudge(
-            query.rover, query.terrain, query.options, query.unobserved_check, query.marked
+            query.rover,
+            query.terrain,
+            query.options,
+            query.unobserved_check,
+            query.marked,
+            *self._memory.recall_poses(query),
         )
         cell = settings.cell or 0.25 * query.rover.wheelbase
         self._nodes, self._is_limited = choose_window(query, cell)
-        self._memory = memory or EdgeMemory()
         self._radius = tightest_radius(query.rover)
         self._repeatable, self._to_frontier = True, False
         self._progress = SearchProgress()

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Tests of what is remembered from one search to the next."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rover_physics import Terrain
+from rover_physics.results.record import RESULT
+from rover_planner.planning.path_query import PathQueryOptions, check_path
+from rover_planner.planning.search.edge_memory import EdgeMemory
+from rover_planner.planning.search.judge import PathJudge
+from rover_planner.planning.search.query import SearchQuery
+from support.grounds import make_terrain, waves
+from support.rough_grounds import rocky
+from support.rovers import LSR1
+
+OPTIONS = PathQueryOptions(accepted_chance=1.0)
+WAY = np.column_stack([np.linspace(-1.5, 1.5, 151), np.zeros((151, 2))])
+
+
+def change_at_random(before: Terrain, rng: np.random.Generator) -> Terrain:
+    """Return the ground with other, equal or unknown heights in a rectangle anywhere."""
+    elevation = np.array(before.elevation)
+    rows, columns = (np.sort(rng.integers(0, size + 1, 2)) for size in elevation.shape)
+    part = slice(*rows), slice(*np.minimum(columns, columns[0] + 20))
+    kind = rng.integers(4)
+    if kind == 0:
+        elevation[part] += rng.normal(0.0, 0.05, elevation[part].shape)
+    elif kind == 1:
+        elevation[part] = elevation[part].max(initial=-1.0)
+    elif kind == 2:
+        elevation[part] = np.nan
+    else:
+        elevation[part] += 3.0
+    return replace(before, elevation=elevation)
+
+
+@pytest.mark.parametrize("policy", ["equal", "optimal", "servo"])
+@pytest.mark.parametrize("ground", [rocky(5), make_terrain(waves)], ids=["rocks", "waves"])
+def test_a_path_judged_in_part_after_a_change_of_the_map_is_as_one_judged_whole(ground, policy):
+    options, memory, rng = OPTIONS.change(policy=policy), EdgeMemory(), np.random.default_rng(3)
+    for _ in range(12):
+        query = SearchQuery(LSR1, ground, WAY[0], WAY[-1], options)
+        judge = PathJudge(LSR1, ground, options, None, query.marked, *memory.recall_poses(query))
+        part, whole = judge.check(WAY), check_path(LSR1, ground, WAY, options)
+        assert part.verdict == whole.verdict
+        for one, other in (
+            (part.prediction, whole.prediction),
+            (part.prediction.between, whole.prediction.between),
+        ):
+            for name in RESULT.names:
+                np.testing.assert_array_equal(one.results[name], other.results[name])
+        ground = change_at_random(ground, rng)
