@@ -201,6 +201,15 @@ def test_torques_are_computed_without_ros():
     assert not {name for name in used if name == "rclpy" or name.endswith(("_msgs", "_srvs"))}
 
 
+def test_maps_are_read_and_described_without_ros():
+    program = (
+        "import sys; sys.modules.update(dict.fromkeys(['rclpy', 'builtin_interfaces']));"
+        "import rover_planner.maps.known_map"
+    )
+    ended = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert (ended.returncode, ended.stderr) == (0, "")
+
+
 def test_the_checkout_keeps_no_downloaded_or_built_file():
     listed = subprocess.run(["git", "ls-files"], cwd=TOP, capture_output=True, text=True)
     if listed.returncode != 0:
