@@ -2,7 +2,6 @@
 """A survey as layers of the page: its colours, its legend, and what is refused or said."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -41,7 +40,7 @@ def shown(surveyed):
 
 
 def colour(shown, name, x, y):
-    return shown.colour(name, LSR1, DEFAULT_OPTIONS, SimpleNamespace(pixels=(x, y)))
+    return shown.colour(name, LSR1, DEFAULT_OPTIONS, (x, y))
 
 
 def colour_at(shown, name, place):

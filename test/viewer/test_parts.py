@@ -131,13 +131,13 @@ def test_a_ray_meets_the_ground_where_it_is_aimed_and_nothing_in_the_sky_or_wher
 
 def coloured(ground, layer) -> layers.ColouredGround:
     """Return a ground in the colours of a layer of its own."""
-    return layers.colour_ground(layer, ground, layers.make_grid(ground))
+    return layers.colour_ground(layer, layers.thin(ground))
 
 
 def test_unknown_ground_is_left_out_of_the_mesh():
     whole, holed = (
         ground_mesh.build_ground_mesh(
-            layers.make_grid(ground), np.zeros((2, 2, 3), np.uint8), np.zeros(3)
+            layers.thin(ground), np.zeros((2, 2, 3), np.uint8), np.zeros(3)
         )
         for ground in map(make_terrain, (waves, gap))
     )
@@ -155,7 +155,7 @@ def test_the_friction_of_a_map_is_a_layer_where_it_is_known_and_else_none():
         learned
     ) and layers.FRICTION not in layers.list_layers(plain)
     picture = ground_mesh.draw_picture(
-        layers.make_grid(learned), coloured(learned, layers.FRICTION)
+        layers.thin(learned), coloured(learned, layers.FRICTION)
     ).astype(float)
     known, unknown = picture[:, 10], picture[:, -10]
     assert (known[:, 0] < known[:, 2]).all()  # blue
@@ -178,7 +178,7 @@ def test_the_ground_has_a_layer_for_the_use_of_each_limit_of_a_pose_and_one_for_
     assert every[0] == pytest.approx(np.nanmax(uses.use), rel=1e-6)
     assert np.isnan([tilt[1], every[1]]).all()  # unknown ground
     steep = make_terrain(lambda x, y: x)
-    grid, how = layers.make_grid(steep), layers.Colouring("use of tilt")
+    grid, how = layers.thin(steep), layers.Colouring("use of tilt")
     found = layers.colour_limit(layers.LayerRequest(LSR1, steep, how), grid)
     picture = ground_mesh.draw_picture(grid, found)
     assert np.median(picture[..., 0]) > np.median(picture[..., 2])  # beyond it is vermillion
@@ -188,11 +188,11 @@ def test_the_ground_has_a_layer_for_the_use_of_each_limit_of_a_pose_and_one_for_
 def test_a_ground_is_a_file_that_needs_no_light_and_leaves_no_garbage(monkeypatch):
     terrain, pictures = make_terrain(gap), []
     ground, origin = coloured(terrain, layers.SLOPE), np.array([0.5, -0.25, 0.0])
-    drawn = ground_mesh.draw_picture(layers.make_grid(terrain), ground)
+    drawn = ground_mesh.draw_picture(layers.thin(terrain), ground)
     monkeypatch.setattr(ground_mesh, "draw_picture", lambda *_: pictures.pop())
     pictures.append(drawn.copy())
     held = weakref.ref(pictures[0])
-    file = ground_mesh.write_ground(layers.make_grid(terrain), ground, origin)
+    file = ground_mesh.write_ground(layers.thin(terrain), ground, origin)
     assert held() is None and b"KHR_materials_unlit" in file
     (read,) = trimesh.load(io.BytesIO(file), file_type="glb").geometry.values()
     np.testing.assert_allclose(read.vertices[0] + origin, [*terrain.origin, gap(*terrain.origin)])

@@ -38,48 +38,50 @@ def paint(
     A layer that is predicted for the rover takes seconds.
     """
     yield Progress("ground")
-    name, grid = asked.how.layer, layers.make_grid(asked.terrain)
+    name, ground = asked.how.layer, layers.thin(asked.terrain)
     if survey is not None and name in survey.names:
-        ground = survey.colour(name, asked.rover, asked.options, grid)
+        places = layers.spread(ground, layers.count_pixels(ground))
+        coloured = survey.colour(name, asked.rover, asked.options, places)
     elif asked.how.is_predicted:
-        ground = layers.colour_limit(asked, grid)
+        coloured = layers.colour_limit(asked, ground)
     else:
-        ground = layers.colour_ground(name, asked.terrain, grid)
-    yield write_ground(grid, ground, find_origin(asked.terrain)), ground.legend
+        coloured = layers.colour_ground(name, ground)
+    yield write_ground(ground, coloured, find_origin(asked.terrain)), coloured.legend
 
 
-def draw_picture(grid: layers.GroundGrid, ground: layers.ColouredGround) -> NDArray[np.uint8]:
+def draw_picture(ground: Terrain, coloured: layers.ColouredGround) -> NDArray[np.uint8]:
     """Return the picture (my, mx, 3) on a ground.
 
     It is lit, as light in a picture costs the page nothing, hatched where a limit is broken, and
     has thin lines every metre.
     """
-    x, y = grid.pixels
-    light = hill_shade(grid.heights, grid.step) / LEVEL_SHADE
-    light = np.clip(np.nan_to_num(light, nan=1.0), *SHADES)
-    factor = grid.refine(light.astype(np.float32))  # a whole picture of them: half the memory
-    if ground.beyond is not None:
+    size = layers.count_pixels(ground)
+    x, y = layers.spread(ground, size)
+    light = hill_shade(ground.elevation, ground.resolution) / LEVEL_SHADE
+    light = np.clip(np.nan_to_num(light, nan=1.0), *SHADES).astype(np.float32)
+    factor = layers.refine(light, size)  # a whole picture of them: half the memory
+    if coloured.beyond is not None:
         period = max(MIN_PERIOD, round(HATCH_PERIOD / (x[1] - x[0])))
         row, column = (np.arange(len(at), dtype=np.int16) for at in (y, x))
         stripes = (row[:, None] + column) % period < 0.4 * period
-        np.multiply(factor, HATCH_SHADE, out=factor, where=ground.beyond & stripes)
+        np.multiply(factor, HATCH_SHADE, out=factor, where=coloured.beyond & stripes)
     factor[np.flatnonzero(np.diff(np.floor(y)))] *= LINE_SHADE
     factor[:, np.flatnonzero(np.diff(np.floor(x)))] *= LINE_SHADE
-    picture = np.empty_like(ground.colours)
+    picture = np.empty_like(coloured.colours)
     for k in range(3):  # one by one: all at once take three times the memory
-        picture[..., k] = np.minimum(ground.colours[..., k] * factor, 255.0)
+        picture[..., k] = np.minimum(coloured.colours[..., k] * factor, 255.0)
     return picture
 
 
 def build_ground_mesh(
-    grid: layers.GroundGrid, picture: NDArray[np.uint8], origin: Floats
+    ground: Terrain, picture: NDArray[np.uint8], origin: Floats
 ) -> trimesh.Trimesh:
     """Return the known cells of a ground about an origin (3,) [m] with a picture on them."""
     from PIL import Image
 
-    heights, (gx, gy) = grid.heights, np.meshgrid(grid.x, grid.y)
-    vertices = np.column_stack([gx.ravel(), gy.ravel(), np.nan_to_num(heights).ravel()]) - origin
-    ny, nx = heights.shape
+    heights, (ny, nx) = ground.elevation, ground.elevation.shape
+    x, y = np.meshgrid(*layers.spread(ground, (ny, nx)))
+    vertices = np.column_stack([x.ravel(), y.ravel(), np.nan_to_num(heights).ravel()]) - origin
     u, v = np.meshgrid((np.arange(nx) + 0.5) / nx, (np.arange(ny) + 0.5) / ny)
     visual = trimesh.visual.TextureVisuals(
         np.column_stack([u.ravel(), 1.0 - v.ravel()]),
@@ -89,12 +91,12 @@ def build_ground_mesh(
     return trimesh.Trimesh(vertices, faces, visual=visual, process=False)
 
 
-def write_ground(grid: layers.GroundGrid, ground: layers.ColouredGround, origin: Floats) -> bytes:
+def write_ground(ground: Terrain, coloured: layers.ColouredGround, origin: Floats) -> bytes:
     """Return a coloured ground about an origin (3,) [m] as a binary glTF file, without lights.
 
     It takes a third of a second: most of it to compress the picture.
     """
-    mesh = build_ground_mesh(grid, draw_picture(grid, ground), origin)
+    mesh = build_ground_mesh(ground, draw_picture(ground, coloured), origin)
     file: Any = mesh.export(file_type="glb", tree_postprocessor=_leave_unlit)
     del mesh
     gc.collect()  # meshes of trimesh hold themselves: a page would keep dozens of old grounds

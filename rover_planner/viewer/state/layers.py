@@ -3,7 +3,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -39,49 +38,38 @@ PREDICTED: Mapping[str, str] = {"use of all limits": ""} | {
 """Layers that the model predicts for the rover: the code of the limit, empty for all of them."""
 
 
-@dataclass(frozen=True, eq=False)
-class GroundGrid:
-    """Heights at some cells of a map, and between them; map frame."""
-
-    x: Floats
-    """(nx,) of the cells [m]."""
-    y: Floats
-    """(ny,) of the cells [m]."""
-    heights: Floats
-    """(ny, nx) of the cells [m], NaN where unknown."""
-
-    @cached_property
-    def pixels(self) -> tuple[Floats, Floats]:
-        """X (mx,) and y (my,) [m] of the pixels, of which all cells have the same number."""
-        factor = max(1, min(MOST_IN_CELL, MAX_PIXELS // max(self.heights.shape)))
-        return self.spread(factor * len(self.x)), self.spread(factor * len(self.y), 1)
-
-    def spread(self, count: int, axis: int = 0) -> Floats:
-        """Return x, or y for axis 1, of the middles of so many equal parts of all cells [m]."""
-        cells = (self.x, self.y)[axis]
-        return cells[0] + self.step * (len(cells) * (np.arange(count) + 0.5) / count - 0.5)
-
-    @property
-    def step(self) -> float:
-        """Distance of the cells [m]."""
-        return float(self.x[1] - self.x[0])
-
-    def refine(self, values: NDArray[Any], order: int = 1) -> NDArray[Any]:
-        """Return values (ky, kx, ...) of equal parts of all cells as those of the pixels.
-
-        They are linear between the parts, or with order 0 those of the nearest one.
-        """
-        size = (*(len(at) for at in self.pixels[::-1]), *values.shape[2:])
-        factors, how = np.divide(size, values.shape), {"mode": "nearest", "grid_mode": True}
-        return np.asarray(ndimage.zoom(values, factors, order=order, **how))
-
-
-def make_grid(terrain: Terrain) -> GroundGrid:
-    """Return at most MAX_CELLS cells a side of a ground."""
+def thin(terrain: Terrain) -> Terrain:
+    """Return a ground with at most MAX_CELLS cells a side, as its mesh has them."""
     stride = -(-max(terrain.elevation.shape) // MAX_CELLS)
+    friction = None if terrain.friction is None else terrain.friction[::stride, ::stride]
     heights = terrain.elevation[::stride, ::stride]
-    step, (x, y), (ny, nx) = stride * terrain.resolution, terrain.origin, heights.shape
-    return GroundGrid(x + step * np.arange(nx), y + step * np.arange(ny), heights)
+    return Terrain(heights, stride * terrain.resolution, terrain.origin, friction)
+
+
+def count_pixels(ground: Terrain) -> tuple[int, int]:
+    """Return rows and columns of the picture on a ground, the same number for each cell."""
+    ny, nx = ground.elevation.shape
+    factor = max(1, min(MOST_IN_CELL, MAX_PIXELS // max(ny, nx)))
+    return factor * ny, factor * nx
+
+
+def spread(ground: Terrain, size: tuple[int, int]) -> tuple[Floats, Floats]:
+    """Return x (nx,) and y (ny,) [m] of the middles of equal parts (ny, nx) of all cells."""
+    (left, right, low, high), half = ground.bounds, 0.5 * ground.resolution
+    y, x = (2 * count + 1 for count in size)
+    return (
+        np.linspace(left - half, right + half, x)[1::2],
+        np.linspace(low - half, high + half, y)[1::2],
+    )
+
+
+def refine(values: NDArray[Any], size: tuple[int, int], order: int = 1) -> NDArray[Any]:
+    """Return values (ky, kx, ...) of equal parts of all cells as those of (ny, nx) parts.
+
+    They are linear between the parts, or with order 0 those of the nearest one.
+    """
+    factors = np.divide((*size, *values.shape[2:]), values.shape)
+    return np.asarray(ndimage.zoom(values, factors, order=order, mode="nearest", grid_mode=True))
 
 
 @dataclass(frozen=True)
@@ -151,40 +139,39 @@ def list_layers(terrain: Terrain) -> list[str]:
     return [HEIGHT, SLOPE, *friction, *PREDICTED]
 
 
-def colour_ground(layer: str, terrain: Terrain, grid: GroundGrid) -> ColouredGround:
-    """Return the colours of a layer of the ground alone."""
-    values = heights = grid.heights
-    known = heights[np.isfinite(heights)]
-    low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+def colour_ground(layer: str, ground: Terrain) -> ColouredGround:
+    """Return the colours of a layer of the ground alone, which is thinned."""
+    values = heights = ground.elevation
+    low, high = float(np.nanmin(heights)), float(np.nanmax(heights))
     ends: tuple[str, ...] = f"{low:.2f} m", f"{high:.2f} m"
     if layer == SLOPE:
-        values = np.degrees(np.arctan(np.hypot(*np.gradient(heights, grid.step))))
+        values = np.degrees(np.arctan(np.hypot(*np.gradient(heights, ground.resolution))))
         low, high, ends = 0.0, STEEP, ("0 deg", f"{STEEP:.0f} deg")
-    elif layer == FRICTION and terrain.friction is not None:
-        stride, low, high = round(grid.step / terrain.resolution), 0.0, 1.0
-        values, ends = terrain.friction[::stride, ::stride], ("0.00", "1.00")
-    return ColouredGround(grid.refine(map_colours(values, low, high)), _grade(layer, ends))
+    elif layer == FRICTION and ground.friction is not None:
+        values, low, high, ends = ground.friction, 0.0, 1.0, ("0.00", "1.00")
+    colours = refine(map_colours(values, low, high), count_pixels(ground))
+    return ColouredGround(colours, _grade(layer, ends))
 
 
-def colour_limit(request: LayerRequest, grid: GroundGrid) -> ColouredGround:
-    """Return the colours of the use of a limit with the rover at each place.
+def colour_limit(request: LayerRequest, ground: Terrain) -> ColouredGround:
+    """Return the colours of the use of a limit with the rover at each place of a thinned ground.
 
     The model is asked at MAX_PREDICTED places along a side; all others are as the nearest.
 
     Raises:
         RoverError: The model refuses an option.
     """
-    counts = [min(len(one), MAX_PREDICTED) for one in grid.pixels]
-    asked = [grid.spread(count, axis) for axis, count in enumerate(counts)]
-    used, how = predict_use(request, asked), request.how
+    size, how = count_pixels(ground), request.how
+    rows, columns = (min(count, MAX_PREDICTED) for count in size)
+    used = predict_use(request, spread(ground, (rows, columns)))
     colours = map_colours(used, 0.0, 1.0)
     colours[used > 1.0] = REFUSED
     words = "along the path" if how.along else f"at heading {how.heading:g} deg"
     hatched = ("hatched", "beyond the limit")
     return ColouredGround(
-        grid.refine(colours, 0),
+        refine(colours, size, 0),
         _grade(f"{how.layer} {words}", ("0 %", "100 %"), hatched),
-        grid.refine(used > 1.0, 0),
+        refine(used > 1.0, size, 0),
     )
 
 

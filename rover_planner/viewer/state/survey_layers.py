@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A survey whose layers colour the ground: opened, compared with what is shown, and read."""
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,8 @@ import numpy as np
 
 from rover_physics.files.validation import show_file
 from rover_physics.names import OPTIMAL
+from rover_physics.numerics.arrays import Floats
+from rover_physics.numerics.plain_values import to_plain
 from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain, fingerprint
@@ -26,7 +27,7 @@ from rover_planner.survey.layers import (
 )
 from rover_planner.survey.store import SurveyStore
 from rover_planner.viewer.state.colours import UNKNOWN, to_css
-from rover_planner.viewer.state.layers import ColouredGround, GroundGrid, Legend
+from rover_planner.viewer.state.layers import ColouredGround, Legend
 
 MAX_READ = 1200
 """Most cells along a side that are read of a layer; of more, every second, third, ..."""
@@ -48,11 +49,12 @@ class ShownSurvey:
         self._every = count_skipped(store, MAX_READ)
 
     def colour(
-        self, name: str, rover: Rover, options: SweepOptions, grid: GroundGrid
+        self, name: str, rover: Rover, options: SweepOptions, places: tuple[Floats, Floats]
     ) -> ColouredGround:
         """Return the colours of a layer, and in what it differs from the page's rover and options.
 
-        Each pixel has the colour of the nearest surveyed cell that is read.
+        Each of the places x (mx,) and y (my,) [m] has the colour of the nearest surveyed cell
+        that is read.
         """
         from matplotlib import colormaps
         from matplotlib.colors import ListedColormap, to_hex
@@ -72,7 +74,7 @@ class ShownSurvey:
         differences = self.find_differences(rover, options)
         changed = [f"not as on the page: {'; '.join(differences)}"] if differences else []
         legend = Legend(name, tuple(keys), notes=(self._describe(name), *changed))
-        notes, (x, y), (ny, nx) = self._store.notes, grid.pixels, numbers.shape
+        notes, (x, y), (ny, nx) = self._store.notes, places, numbers.shape
         cell, (left, low) = notes.cell * self._every, notes.frame.origin
         columns = np.rint((x - left) / cell).astype(int).clip(0, nx - 1)
         rows = np.rint((y - low) / cell).astype(int).clip(0, ny - 1)
@@ -83,9 +85,9 @@ class ShownSurvey:
         """Return in what the survey differs from a rover and options that are shown."""
         recorded = self._store.notes.description
         found = []
-        if recorded["rover"] != _as_json(asdict(rover)):
+        if recorded["rover"] != to_plain(asdict(rover)):
             found.append("the rover was changed since")
-        shown = _as_json(asdict(options))
+        shown = to_plain(asdict(options))
         policies = recorded["options"]["policy"], options.policy
         for key, value in recorded["options"].items():
             other = shown.get(key)
@@ -119,7 +121,7 @@ def open_survey(path: Path, rover: Rover, terrain: Terrain | None) -> ShownSurve
     """
     store = SurveyStore(path)
     recorded = store.notes.description
-    if recorded["rover"] != _as_json(asdict(rover)):
+    if recorded["rover"] != to_plain(asdict(rover)):
         other = recorded["rover"]["name"]
         what = "another " + rover.name if other == rover.name else f"{other}, not {rover.name}"
         raise PlanningError(
@@ -162,10 +164,6 @@ def load_map(path: Path, max_cells: int) -> Terrain:
     return Terrain(
         **grids, resolution=frame.resolution, origin=frame.origin, soil_names=source.soil_names
     )
-
-
-def _as_json(value: Any) -> Any:
-    return json.loads(json.dumps(value))
 
 
 def _write_value(value: Any) -> str:
