@@ -39,7 +39,7 @@ def test_a_path_passes_with_the_values_that_a_remedy_has(ground, changes, levers
     session = session_on(ground, *ENDS, OPTIONS, rover)
     path, wanted = session.shown.path, session.wanted
     assert not path.verdict.traversable
-    model = wanted.asked_options.model
+    model = wanted.options.model
     advice = next(
         one
         for one in grow_advice(Case(rover, wanted.terrain, path.poses, model))

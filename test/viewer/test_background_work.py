@@ -173,9 +173,8 @@ def test_changes_add_up_although_the_judgements_between_are_dropped(judge):
     asked = session.shown.scenario
     assert asked is session.wanted and session.is_complete
     assert asked.goal[:2] == (1.5, 0.5) and asked.rover.friction == 0.5
-    assert asked.arm_angles == {"arm_yaw": 0.3} and asked.options.model.soil == "dry_sand"
-    options = asked.options.change(joint_angles=asked.arm_angles)
-    answer = answer_path_query(asked.rover, asked.terrain, asked.start, asked.goal, options)
+    assert asked.arm["arm_yaw"] == 0.3 and asked.options.model.soil == "dry_sand"
+    answer = answer_path_query(asked.rover, asked.terrain, asked.start, asked.goal, asked.options)
     assert [p.verdict for p in session.shown.paths] == [c.verdict for c in answer.candidates]
 
 

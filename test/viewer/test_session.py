@@ -219,7 +219,7 @@ def test_a_replay_keeps_the_soil_the_policy_and_the_arm_it_was_predicted_with(tm
     session = session_on(ground, (-1.0, 0.0, 0.0), options=CANDIDATES)
     session.replay(*read_prediction(file), read_recorded_assumptions(file))
     assert (session.wanted.rover.friction, session.wanted.rover.manipulator.payload) == (0.7, 0.5)
-    assert session.wanted.arm_angles == angles
+    assert session.wanted.options.model.arm_angles == angles
     session.change_rover([("wheel", "width")], 0.07)
     poses, rover = session.shown.path.poses, session.wanted.rover
     again = replace(options, friction=None, payload=None)

@@ -45,13 +45,12 @@ def apply_remedy(scenario: Scenario, remedy: Remedy) -> Scenario:
     Friction, torque, payload and limits are numbers of the rover there, which sliders show.
     """
     case = remedy.judged.case
-    has_path = case.poses is not remedy.refusal.case.poses
+    has_path, model = case.poses is not remedy.refusal.case.poses, case.options
     return replace(
         scenario,
         rover=assume(case.rover, case.options).change(case.rover),
-        arm_angles=case.options.arm_angles or {},
         options=scenario.options.change(
-            policy=case.options.policy, backward=case.options.backward
+            policy=model.policy, backward=model.backward, joint_angles=model.joint_angles
         ),
         recorded=case.poses if has_path else scenario.recorded,
     )
@@ -60,7 +59,7 @@ def apply_remedy(scenario: Scenario, remedy: Remedy) -> Scenario:
 def seek_advice(path: Judged) -> Steps[Advice]:
     """Yield advice on a path that grows."""
     asked = path.scenario
-    return grow_advice(case_of(asked.rover, asked.terrain, path.poses, asked.asked_options))
+    return grow_advice(case_of(asked.rover, asked.terrain, path.poses, asked.options))
 
 
 def describe_advice(advised: Advised | None, is_seeking: bool, now: float) -> dict[str, Any]:

@@ -83,10 +83,12 @@ def _list_policies(shown: Shown) -> list[dict[str, Any]]:
     """Return the verdicts under all policies; none for a replay, whose soil is not known."""
     rows = []
     for policy, title in POLICY_TITLES.items() if shown.scenario.recorded is None else ():
-        one = shown.by_policy.get(policy)
-        passes, reason = (None, "") if one is None else (one.traversable, one.reason)
+        one, asked = shown.by_policy.get(policy, ""), shown.scenario.change_options(policy=policy)
+        passes, reason, old = None, one, not one
+        if isinstance(one, Judged):
+            passes, reason = one.verdict.traversable, one.verdict.reason
+            old = not one.is_of(shown.path.poses, asked)
         word = {None: "not judged", True: "passes", False: "refused"}[passes]
-        old = one is None or one.scenario is not shown.scenario
         row = {"title": title, "word": word, "passes": passes, "old": old}
         rows.append({**row, "reason": reason or word})
     return rows

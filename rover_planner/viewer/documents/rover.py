@@ -2,7 +2,6 @@
 """The rover's numbers as sliders, and what of it and of its drive differs from the reference."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -36,7 +35,7 @@ def list_sliders(rover: Rover) -> dict[str, list[RoverValue]]:
 
 def describe_sliders(scenario: Scenario) -> list[dict[str, Any]]:
     """Return the sliders of the rover as loaded: label, ends, step and its value, by part."""
-    loaded = read_values(replace(scenario, rover=scenario.loaded, arm_angles={}))
+    loaded = read_values(scenario.as_loaded())
     return [
         {
             "title": title,

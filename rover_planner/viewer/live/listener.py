@@ -85,7 +85,8 @@ class LiveListener(Node):
         self._predicted: Mapping[str, np.ndarray] = {}
         self._estimated: Mapping[str, np.ndarray] = {}
         self._ages: dict[str, TopicAge] = {}
-        self._first_time: float | None = None
+        self._worked_at: float | None = None
+        """Stamp of the last rates of the wheels [s]."""
         self._click: Question | None = None
         self._planner = self.create_client(
             GetPlan, f"{SERVER}/can_traverse", qos_profile=service_qos()
@@ -107,7 +108,6 @@ class LiveListener(Node):
         for topic, field in ESTIMATED_FIELDS.items():
             take = partial(self._on_estimate, field)
             self._listen(numbers, f"{CONTROLLER}/{topic}", take, topic_qos(), is_stream=True)
-
         self._ages[SIGN_OF_LIFE] = TopicAge(SIGN_OF_LIFE, None, True)
         self.create_subscription(DiagnosticArray, "diagnostics", self._on_diagnostics, topic_qos())
 
@@ -183,28 +183,21 @@ class LiveListener(Node):
             self._ages[SIGN_OF_LIFE].heard = time.monotonic()
 
     def _on_joint_states(self, state: JointState) -> None:
-        known = self._data
-        joints, efforts = (
-            {**was, **_name_finite(state.name, values)}
-            for was, values in ((known.joints, state.position), (known.efforts, state.effort))
+        """Take angles and torques, and the work of the wheel motors since their last rates."""
+        known, now = self._data, state.header.stamp.sec + 1e-9 * state.header.stamp.nanosec
+        joints, efforts, rates = (
+            _name_finite(state.name, values)
+            for values in (state.position, state.effort, state.velocity)
         )
-        self._data = replace(known, joints=joints, efforts=efforts)
-        if len(state.velocity) == len(state.name):
-            self._add_work(dict(zip(state.name, state.velocity, strict=True)), state)
-
-    def _add_work(self, rates: dict[str, float], state: JointState) -> None:
-        """Add the work of the wheel motors since the last message, rates [rad/s] by joint name."""
-        known = self._data
-        now = state.header.stamp.sec + 1e-9 * state.header.stamp.nanosec
-        self._first_time = now if self._first_time is None else self._first_time
-        passed = now - self._first_time - known.time
-        if passed > 0.0:
-            power = sum(
-                max(known.efforts.get(name, 0.0) * rates.get(name, 0.0), 0.0)
-                for name in WHEEL_JOINTS
-            )
-            energy, time_passed = known.energy + power * passed, known.time + passed
-            self._data = replace(known, energy=energy, time=time_passed)
+        joints, efforts, passed = {**known.joints, **joints}, {**known.efforts, **efforts}, 0.0
+        if rates:
+            last = now if self._worked_at is None else self._worked_at
+            passed, self._worked_at = max(now - last, 0.0), max(now, last)
+        motors = ((efforts.get(name, 0.0), rates.get(name, 0.0)) for name in WHEEL_JOINTS)
+        energy = known.energy + passed * sum(max(effort * rate, 0.0) for effort, rate in motors)
+        self._data = replace(
+            known, joints=joints, efforts=efforts, time=known.time + passed, energy=energy
+        )
 
     def _on_odometry(self, odometry: Odometry) -> None:
         place, known = odometry.pose.pose.position, self._data

@@ -76,7 +76,7 @@ class Page(PageBase):
     def describe_ground(self) -> LayerRequest:
         """Return the ground with what is shown on it."""
         path, now = self.session.shown.path.poses, self.session.shown.scenario
-        options = now.asked_options.model
+        options = now.options.model
         return LayerRequest(now.rover, now.terrain, self.colouring, options, path)
 
     @property
@@ -209,7 +209,7 @@ class Page(PageBase):
             soil=now.options.model.soil or "",
             path=shown.index + 1,
             time=round(self.playback.time, 3),
-            joints=dict(now.arm_angles),
+            joints=now.options.model.arm_angles or {},
             **asdict(self.colouring),
         )
 
@@ -296,7 +296,7 @@ class Page(PageBase):
         if is_new:
             self._ended.wait(PERIOD)
         draw("the failure is not shown", scene.failure.show, asked.rover, path.failure)
-        draw("the rover is not drawn", scene.rover.take, asked.rover, asked.arm_angles)
+        draw("the rover is not drawn", scene.rover.take, asked.rover, asked.arm)
         draw("the cameras are not moved", lambda _: scene.look(FIT, self.points), asked.loaded)
         draw("the paths are not drawn", scene.paths.show, shown.paths, shown.index)
         depends = self.colouring.is_predicted or self.survey is not None

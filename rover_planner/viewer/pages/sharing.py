@@ -128,7 +128,9 @@ def read_scenario(link: PageLink, wanted: Scenario, ground: str) -> Scenario:
         if joint not in known:
             raise PlanningError(f"the link turns the joint {joint!r}, which {loaded.name} lacks")
     same = (link.start, link.goal) == (wanted.start, wanted.goal)
-    options = wanted.options.change(policy=link.policy, soil=link.soil or None)
+    options = wanted.options.change(
+        policy=link.policy, soil=link.soil or None, joint_angles=link.joints
+    )
     if options.model.soil is not None:
         soil_named(options.model.soil)  # before the page shows it as chosen
     return dataclasses.replace(
@@ -138,7 +140,6 @@ def read_scenario(link: PageLink, wanted: Scenario, ground: str) -> Scenario:
         start=link.start,
         goal=link.goal,
         options=options,
-        arm_angles=dict(link.joints),
         recorded=wanted.recorded if same else None,
     )
 

@@ -18,7 +18,7 @@ from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.path_search import SearchResult, find_path
 from rover_planner.planning.search.query import SearchQuery
 from rover_planner.viewer.state.background_work import Progress
-from rover_planner.viewer.state.scenario import Judged, PolicyVerdict, Scenario, Shown
+from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
 
 PATH, COMPARE, POLICY, CHANCE = "path", "reference", "policy", "chance of failure"
 SEARCH, BETTER = "searching a way", "way found, searching a better one"
@@ -56,8 +56,7 @@ def judge_steps(
         shown = yield from _judge_new(asked)
     else:
         shown = yield from _judge_again(asked, before, index)
-    loaded = replace(asked, rover=asked.loaded, arm_angles={})
-    values = asked.take_values(reference or loaded)
+    values = asked.take_values(reference or asked.as_loaded())
     shown = replace(shown, reference=_recall(shown, before, values))
     yield shown
     if shown.reference is None and not shown.path.is_of(shown.path.poses, values):
@@ -105,7 +104,8 @@ def _judge_new(asked: Scenario) -> Generator[Step, None, Shown]:
         yield Progress(PATH, k + 1, len(paths))
         judged.append(_judge(asked, poses))
     chosen = choose(tuple(one.candidate for one in judged)).nearest
-    return Shown(asked, tuple(judged), chosen, len(judged), None, _own_policy(judged[chosen]))
+    policies = {asked.options.model.policy: judged[chosen]}
+    return Shown(asked, tuple(judged), chosen, len(judged), None, policies)
 
 
 def _judge_again(asked: Scenario, before: Shown, index: int) -> Generator[Step, None, Shown]:
@@ -120,7 +120,7 @@ def _judge_again(asked: Scenario, before: Shown, index: int) -> Generator[Step, 
         path = _judge(asked, path.poses)
     paths = (*paths[:index], path, *paths[index + 1 :])
     old = before.by_policy if path.poses is before.path.poses else {}
-    policies = {**old, **_own_policy(path)}
+    policies = {**old, asked.options.model.policy: path}
     around = before.around if same else None
     chance = before.chance if path is before.path else None
     return Shown(asked, paths, index, generated, None, policies, chance, around)
@@ -143,25 +143,18 @@ def _judge_others(shown: Shown) -> Generator[Step, None, Shown]:
     return replace(shown, paths=tuple(paths))
 
 
-def _own_policy(path: Judged) -> dict[str, PolicyVerdict]:
-    """Return the verdict on a path under the policy for which it was judged."""
-    verdict = path.verdict
-    return {verdict.policy: PolicyVerdict(path.scenario, verdict.traversable, verdict.reason)}
-
-
 def _add_policies(shown: Shown) -> Generator[Step, None, Shown]:
     """Return what is shown with the path's verdicts under all policies."""
-    found, asked = dict(shown.by_policy), shown.scenario
+    found, poses = dict(shown.by_policy), shown.path.poses
     for k, policy in enumerate(TORQUE_POLICIES):
-        if policy in found and found[policy].scenario is asked:
+        known, asked = found.get(policy), shown.scenario.change_options(policy=policy)
+        if isinstance(known, Judged) and known.is_of(poses, asked):
             continue
         yield Progress(POLICY, k + 1, len(TORQUE_POLICIES))
         try:
-            options = asked.options.change(policy=policy)
-            verdict = _judge(replace(asked, options=options), shown.path.poses).verdict
-            found[policy] = PolicyVerdict(asked, verdict.traversable, verdict.reason)
+            found[policy] = _judge(asked, poses)
         except RoverError as error:
-            found[policy] = PolicyVerdict(asked, None, str(error))
+            found[policy] = str(error)
     return replace(shown, by_policy=found)
 
 
@@ -173,7 +166,7 @@ def _add_chance(shown: Shown) -> Shown:
     asked, verdict, poses = shown.scenario, shown.verdict, shown.path.poses
     if not verdict.traversable and verdict.code != CHANCE_CODE:
         poses = poses[: verdict.first_failure + 1]
-    model = pack_model(asked.rover, asked.terrain, asked.asked_options.model)
+    model = pack_model(asked.rover, asked.terrain, asked.options.model)
     (swept,) = predict_paths(model, [poses], False)
     return replace(shown, chance=find_failure_chance(model, swept))
 
@@ -185,9 +178,7 @@ def _search_around(shown: Shown, memory: EdgeMemory) -> Iterator[Step]:
     """
     yield Progress(SEARCH)
     asked = shown.scenario
-    question = SearchQuery(
-        asked.rover, asked.terrain, asked.start, asked.goal, asked.asked_options
-    )
+    question = SearchQuery(asked.rover, asked.terrain, asked.start, asked.goal, asked.options)
     first = find_path(question, replace(asked.search, ends_at_first=True), memory)
     yield _add_way(shown, first)
     left = asked.search.budget - first.seconds
@@ -207,6 +198,6 @@ def _add_way(shown: Shown, around: SearchResult) -> Shown:
 
 def _judge(scenario: Scenario, poses: Floats) -> Judged:
     """Judge a path up to its first failure, where its playback ends."""
-    rover, terrain, options = scenario.rover, scenario.terrain, scenario.asked_options
+    rover, terrain, options = scenario.rover, scenario.terrain, scenario.options
     candidate = check_path(rover, terrain, poses, options, stop_at_failure=True)
     return Judged(scenario, replace(candidate, poses=poses))

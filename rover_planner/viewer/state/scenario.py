@@ -4,6 +4,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -43,25 +44,30 @@ class Scenario:
     goal: Pose
     """The same."""
     options: PathQueryOptions = CANDIDATES
-    """Options of the candidates and of the model."""
-    arm_angles: Mapping[str, float] = field(default_factory=dict)
-    """Angles [rad] of the arm's joints by name; joints that are not named are stowed."""
+    """Options of the candidates and of the model, also the pose of the arm."""
     recorded: Floats | None = None
     """Poses (n, 3) of a recorded path that takes the place of candidates."""
     search: LatticeSettings = field(default_factory=LatticeSettings)
     """Options of the search of a path around obstacles."""
 
     @property
-    def asked_options(self) -> PathQueryOptions:
-        """The options with the arm as it is."""
-        return self.options.change(joint_angles=self.arm_angles)
-
-    @property
     def arm(self) -> dict[str, float]:
         """Angles [rad] of all joints of the arm by name."""
         arm = self.loaded.manipulator
         stowed = {} if arm is None else dict(zip(arm.joints, arm.stowed, strict=True))
-        return {**stowed, **self.arm_angles}
+        return {**stowed, **(self.options.model.arm_angles or {})}
+
+    def change_options(self, **changes: Any) -> "Scenario":
+        """Return the scenario with other options of the model.
+
+        Raises:
+            RoverError: A value is out of range.
+        """
+        return replace(self, options=self.options.change(**changes))
+
+    def as_loaded(self) -> "Scenario":
+        """Return the scenario with the rover as it was loaded, its arm stowed."""
+        return replace(self, rover=self.loaded).change_options(joint_angles=None)
 
     def has_paths_of(self, other: "Scenario") -> bool:
         """Return whether the candidate paths are the same, whatever the rover's numbers are."""
@@ -79,7 +85,6 @@ class Scenario:
         return replace(
             self,
             rover=other.rover,
-            arm_angles=other.arm_angles,
             options=other.options,
             recorded=other.recorded if same else self.recorded,
         )
@@ -137,21 +142,11 @@ class Judged:
 
     def is_of(self, poses: Floats, values: Scenario) -> bool:
         """Return whether it is a path with these poses under these values."""
-        mine, others = ((one.rover, one.arm, one.options) for one in (self.scenario, values))
-        same = mine == others
-        return same and (self.poses is poses or np.array_equal(self.poses, poses))
-
-
-@dataclass(frozen=True, eq=False)
-class PolicyVerdict:
-    """The verdict of a path under one torque policy."""
-
-    scenario: Scenario
-    """Values for which it was judged; the policy is another."""
-    traversable: bool | None
-    """True if the rover can drive the path; None if this policy cannot judge it."""
-    reason: str
-    """Reason of a refusal; empty if it can."""
+        mine, others = (
+            (one.rover, one.arm, one.options.change(joint_angles=None))
+            for one in (self.scenario, values)
+        )
+        return mine == others and (self.poses is poses or np.array_equal(self.poses, poses))
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,8 +163,9 @@ class Shown:
     """Number of candidates; paths beyond were searched."""
     reference: Judged | None = None
     """The same path with the values of the reference; None if nothing differs from it."""
-    by_policy: Mapping[str, PolicyVerdict] = field(default_factory=dict)
-    """Its verdicts under torque policies that are known; those for other values are old."""
+    by_policy: Mapping[str, Judged | str] = field(default_factory=dict)
+    """The path under torque policies, as far as it was judged, or why that is not possible; what
+    was judged for other values is old."""
     chance: FailureChance | None = None
     """The chance that the path fails, up to where a limit is broken; None while it is not known,
     or for a replay."""

@@ -5,7 +5,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import islice
-from typing import Any
 
 import numpy as np
 
@@ -105,7 +104,7 @@ class ViewSession:
         Raises:
             RoverError: A value is out of range.
         """
-        self._change(options=self.wanted.options.change(**changes))
+        self.take_change(self.wanted.change_options(**changes))
 
     def change_rover(self, keys: Sequence[Key], value: float) -> None:
         """Change a number of the rover, the same at all of the keys in the rover file.
@@ -113,15 +112,16 @@ class ViewSession:
         Raises:
             RoverError: The changed rover is invalid.
         """
-        self._change(rover=vary(self.wanted.rover, dict.fromkeys(keys, value)))
+        rover = vary(self.wanted.rover, dict.fromkeys(keys, value))
+        self.take_change(replace(self.wanted, rover=rover))
 
     def change_arm(self, joint: str, angle: float) -> None:
         """Turn a joint of the arm to an angle [rad]."""
-        self._change(arm_angles={**self.wanted.arm_angles, joint: angle})
+        self.change_options(joint_angles={**self.wanted.arm, joint: angle})
 
     def reset(self) -> None:
         """Take the numbers of the rover as it was loaded, with its arm stowed."""
-        self._change(rover=self.wanted.loaded, arm_angles={})
+        self.take_change(self.wanted.as_loaded())
 
     def undo(self) -> None:
         """Take the numbers of the rover before the last change.
@@ -140,7 +140,7 @@ class ViewSession:
 
     def take_rover(self, rover: Rover) -> None:
         """Take another rover as it was loaded, and plan again."""
-        self.take_scenario(replace(self.wanted, loaded=rover, rover=rover, arm_angles={}))
+        self.take_scenario(replace(self.wanted, loaded=rover).as_loaded())
 
     def take_scenario(self, scenario: Scenario) -> None:
         """Plan for a whole scenario on the same ground."""
@@ -157,10 +157,6 @@ class ViewSession:
     def judge_again(self) -> None:
         """Judge what is wanted, after it was stopped."""
         self._ask(self.wanted)
-
-    def _change(self, **changes: Any) -> None:
-        """Judge the same paths with other values; one step to undo for each that was judged."""
-        self.take_change(replace(self.wanted, **changes))
 
     def _ask(self, wanted: Scenario, index: int | None = None) -> None:
         """Judge a scenario, and look at a path by its index (default: the same as before)."""
@@ -212,8 +208,7 @@ class ViewSession:
                 wanted,
                 rover=assumptions.change(wanted.rover),
                 options=assumptions.change_options(wanted.options),
-                arm_angles=assumptions.joint_angles or {},
-            )
+            ).change_options(joint_angles=assumptions.joint_angles)
         start, goal = tuple(poses[0].tolist()), tuple(poses[-1].tolist())
         self.wanted = self.kept = replace(wanted, start=start, goal=goal, recorded=poses)
         self.shown, self._index = show_recorded(self.wanted, prediction, reasons), 0

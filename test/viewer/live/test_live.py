@@ -110,8 +110,12 @@ def test_the_energy_is_torque_times_rate_times_time(listener, talker):
         return message
 
     publish_until(talker.joints, state(10), lambda: listener.latest().efforts, "the first state")
-    publish_until(talker.joints, state(12), lambda: listener.latest().time == 2.0, "two seconds")
-    assert listener.latest().energy == pytest.approx(6 * 0.5 * 1.0 * 2.0)
+    unknown = state(11)
+    unknown.velocity[0] = float("nan")  # as of a joint without a sensor
+    publish_until(talker.joints, unknown, lambda: listener.latest().time == 1.0, "a second")
+    assert listener.latest().energy == pytest.approx(5 * 0.5 * 1.0)
+    publish_until(talker.joints, state(13), lambda: listener.latest().time == 3.0, "two seconds")
+    assert listener.latest().energy == pytest.approx(5 * 0.5 * 1.0 + 6 * 0.5 * 1.0 * 2.0)
 
 
 def test_estimates_of_the_controller_take_precedence_over_predictions(listener, talker):
