@@ -35,7 +35,7 @@ def judged_on(height, start=-1.0, **options) -> Judged:
 
 def test_the_values_of_a_lane_are_those_of_the_prediction_at_its_waypoints():
     path = judged_on(waves)
-    limits, prediction = path.limits, path.candidate.prediction
+    limits, prediction = path.limits, path.prediction
     at = ~limits.rows.is_between
     np.testing.assert_array_equal(
         limits.lane("friction").values[at], prediction.friction_utilisation.max(axis=1)
@@ -223,7 +223,7 @@ def test_with_speed_servos_friction_is_no_number_that_a_passing_path_may_cross()
 
 def test_a_failure_between_waypoints_has_the_pose_at_which_the_model_was_asked():
     path = judged_on(stepped, friction=0.4)
-    failure, prediction = path.failure, path.candidate.prediction
+    failure, prediction = path.failure, path.prediction
     assert failure is not None and failure.is_between
     first = path.verdict.first_failure
     before, after = prediction.distance[first - 1 : first + 1]
@@ -237,14 +237,13 @@ def test_a_failure_between_waypoints_has_the_pose_at_which_the_model_was_asked()
 
 def test_of_several_states_at_the_place_of_a_failure_that_which_fails_is_shown():
     path = judged_on(stepped, friction=0.4)
-    prediction, failure = path.candidate.prediction, path.failure
+    prediction, failure = path.prediction, path.failure
     between = prediction.between
     again = between.select([*range(len(between.poses)), 0])  # as where a wheel rolls off an edge
     poses = np.vstack([between.poses, failure.state.here.poses])
     waypoints = np.append(between.waypoint, path.verdict.first_failure)
     again = replace(again, poses=poses, waypoint=waypoints)
-    candidate = replace(path.candidate, prediction=replace(prediction, between=again))
-    twin = Judged(path.scenario, candidate)
+    twin = replace(path, prediction=replace(prediction, between=again))
     assert twin.failure.time == failure.time and twin.failure.headline == failure.headline
     shown = twin.state_at(failure.time)
     np.testing.assert_array_equal(shown.wheel_loads, failure.state.wheel_loads)
@@ -258,7 +257,7 @@ def test_where_the_rover_does_not_settle_a_level_one_stands_and_the_wheel_beyond
     assert failure.headline.startswith("unknown ground, front")
     np.testing.assert_allclose(failure.state.attitude[:2], 0.0)
     wheels = failure.state.wheel_centres - failure.state.position
-    prediction = judged_on(lambda x, y: 0.0 * x).candidate.prediction
+    prediction = judged_on(lambda x, y: 0.0 * x).prediction
     right = prediction.wheel_centres[0] - prediction.position[0]
     np.testing.assert_allclose(np.abs(wheels), np.abs(right), atol=0.01)
 

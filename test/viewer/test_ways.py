@@ -80,7 +80,7 @@ def test_nothing_is_searched_where_a_candidate_passes_off_the_map_or_for_a_recor
         assert session.shown.around is None and session.shown.verdict.traversable == passes
         assert SEARCH not in list_steps(session)
     session.plan_to(np.array([-1.1, 0.1]))
-    session.replay(session.shown.path.candidate.prediction, session.shown.verdict.reasons)
+    session.replay(session.shown.path.prediction, session.shown.verdict.reasons)
     session.change_rover(FRICTION, 0.05)
     assert not session.shown.verdict.traversable and session.shown.around is None
 

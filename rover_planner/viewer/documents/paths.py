@@ -99,7 +99,7 @@ def _list_offers(shown: Shown) -> Sequence[dict[str, Any]]:
     if shown.offer is None:
         return []
     kind = "path" if shown.offer < shown.generated else "way around, path"
-    length = shown.paths[shown.offer].candidate.length
+    length = shown.paths[shown.offer].length
     words = f"{kind} {shown.offer + 1} passes ({length:.1f} m)"
     return [{"words": words, "ask": {"ask": "show", "index": shown.offer}}]
 
@@ -125,7 +125,7 @@ def describe_paths(
 
 
 def _describe_row(path: Judged, number: int, waits: str, best: bool) -> dict[str, Any]:
-    verdict, length = path.verdict, f"{path.candidate.length:.2f}"
+    verdict, length = path.verdict, f"{path.length:.2f}"
     limits = path.limits
     uses = [float(np.nanmax(one.used, initial=0.0)) for one in limits.lanes]
     most = limits.lanes[int(np.argmax(uses))].title

@@ -13,7 +13,7 @@ from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.sweep import predict_paths
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.traversability.verdict import hold_against_limits
-from rover_planner.planning.path_query import Candidate, check_path, choose, generate_paths
+from rover_planner.planning.path_query import check_path, choose, generate_paths
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.path_search import SearchResult, find_path
 from rover_planner.planning.search.query import SearchQuery
@@ -89,7 +89,7 @@ def show_recorded(scenario: Scenario, prediction: PathPrediction, reasons: Seque
         first_failure=first,
         reason=reasons[first] if first >= 0 else "",
     )
-    path = Judged(scenario, Candidate(prediction.poses, prediction, verdict, (0.0, 0.0)))
+    path = Judged(prediction.poses, prediction, verdict, (0.0, 0.0), scenario)
     return Shown(scenario, (path,), 0, 1)
 
 
@@ -103,7 +103,7 @@ def _judge_new(asked: Scenario) -> Generator[Step, None, Shown]:
     for k, poses in enumerate(paths):
         yield Progress(PATH, k + 1, len(paths))
         judged.append(_judge(asked, poses))
-    chosen = choose(tuple(one.candidate for one in judged)).nearest
+    chosen = choose(tuple(judged)).nearest
     policies = {asked.options.model.policy: judged[chosen]}
     return Shown(asked, tuple(judged), chosen, len(judged), None, policies)
 
@@ -192,7 +192,7 @@ def _search_around(shown: Shown, memory: EdgeMemory) -> Iterator[Step]:
 
 def _add_way(shown: Shown, around: SearchResult) -> Shown:
     """Return what is shown with a way as one more path, which nobody looks at yet."""
-    way = () if around.path is None else (Judged(shown.scenario, around.path),)
+    way = () if around.path is None else (Judged(**vars(around.path), scenario=shown.scenario),)
     return replace(shown, paths=(*shown.paths, *way), around=around)
 
 
@@ -200,4 +200,4 @@ def _judge(scenario: Scenario, poses: Floats) -> Judged:
     """Judge a path up to its first failure, where its playback ends."""
     rover, terrain, options = scenario.rover, scenario.terrain, scenario.options
     candidate = check_path(rover, terrain, poses, options, stop_at_failure=True)
-    return Judged(scenario, replace(candidate, poses=poses))
+    return Judged(**vars(replace(candidate, poses=poses)), scenario=scenario)

@@ -91,23 +91,11 @@ class Scenario:
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
+class Judged(Candidate):
     """A path as it was judged for a scenario, and why; what follows is computed once."""
 
     scenario: Scenario
     """Values for which it was judged."""
-    candidate: Candidate
-    """The path, its prediction and its verdict."""
-
-    @property
-    def verdict(self) -> Verdict:
-        """The verdict."""
-        return self.candidate.verdict
-
-    @property
-    def poses(self) -> Floats:
-        """(n, 3) x, y [m] and yaw [rad]."""
-        return self.candidate.poses
 
     @cached_property
     def trajectory(self) -> Trajectory:
@@ -117,7 +105,7 @@ class Judged:
     @cached_property
     def limits(self) -> PathLimits:
         """Its uses of the limits, up to the first failure."""
-        return find_path_limits(self.scenario.rover, self.candidate.prediction, self.verdict)
+        return find_path_limits(self.scenario.rover, self.prediction, self.verdict)
 
     @cached_property
     def failure(self) -> Failure | None:
@@ -192,7 +180,7 @@ class Shown:
     def best(self) -> int | None:
         """Index of the best path that passes, None if none is known."""
         passing = [
-            (one.candidate.cost, k)
+            (one.cost, k)
             for k, one in enumerate(self.paths)
             if k not in self.old and one.verdict.traversable
         ]
