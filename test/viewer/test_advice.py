@@ -15,7 +15,6 @@ from rover_planner.viewer.documents.advice import (
     Advised,
     apply_remedy,
     describe_advice,
-    seek_advice,
 )
 from rover_planner.viewer.pages.page import Page
 from support.grounds import rock_left
@@ -79,7 +78,8 @@ def test_advice_is_sought_when_it_is_asked_for_shown_as_a_ghost_and_taken(page):
 
 def test_a_search_tells_what_was_found_by_a_promised_time_and_that_it_goes_on():
     path, since = session_on(rock_left, *ENDS, OPTIONS).shown.path, 1000.0
-    growing = seek_advice(path)
+    asked = path.scenario
+    growing = grow_advice(Case(asked.rover, asked.terrain, path.poses, asked.options.model))
     none, some = next(growing), next(one for one in growing if one.remedies)
     first, last = (
         Advised(path, growing, since, one) for one in (none, replace(some, complete=True))

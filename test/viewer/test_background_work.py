@@ -167,7 +167,7 @@ def test_changes_add_up_although_the_judgements_between_are_dropped(judge):
     session = judge.session
     session.plan_to(np.array([1.5, 0.5]))
     session.change_rover([("friction",)], 0.5)
-    session.change_arm("arm_yaw", 0.3)
+    session.change_options(joint_angles={"arm_yaw": 0.3})
     session.change_options(soil="dry_sand")
     judge.finish()
     asked = session.shown.scenario

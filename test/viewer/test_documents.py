@@ -9,12 +9,10 @@ import pytest
 
 from rover_physics.names import EQUAL, OPTIMAL, SERVO, SIDES, WHEELS
 from rover_physics.traversability.judge import judge_path
-from rover_physics.traversability.verdict import hold_against_limits
-from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.viewer.documents import paths
 from rover_planner.viewer.documents.rover import compare_drives, describe_sliders, read_values
 from rover_planner.viewer.state.path_limits import Lane
-from rover_planner.viewer.state.scenario import CANDIDATES, Judged
+from rover_planner.viewer.state.scenario import CANDIDATES, Judged, Shown
 from support.grounds import gap, make_terrain, wall_at, waves
 from support.viewer.sessions import LSR1, SURE, ramp, session_on
 
@@ -46,12 +44,6 @@ def test_the_values_of_a_lane_are_those_of_the_prediction_at_its_waypoints():
     np.testing.assert_array_equal(links, np.array(WHEELS)[most_torque])
     uses = limits.lane("torque").wheels
     np.testing.assert_allclose(uses.max(axis=1), limits.lane("torque").used)
-
-
-def test_rows_are_in_the_order_of_the_path_with_the_poses_between_in_their_places():
-    rows = judged_on(stepped).limits.rows
-    assert rows.is_between.any()
-    assert (np.diff(rows.distance) >= 0.0).all() and (np.diff(rows.time) >= 0.0).all()
 
 
 @pytest.mark.parametrize(
@@ -93,13 +85,8 @@ def test_board_lanes_curves_and_verdict_show_one_number_for_the_wheel_that_fails
     lane = paths.describe_limits(path, None)["lanes"][codes.index("friction")]
     assert max(lane["wheels"]["y"][wheel]) == pytest.approx(use, abs=1e-3)
     assert max(lane["now"]["y"][0]) == pytest.approx(use, abs=1e-3)
-    assert list_paths_of(path)["use"] == paths.write_use(use)
-
-
-def list_paths_of(path: Judged) -> dict:
-    asked = path.scenario
-    session = session_on(asked.terrain, asked.start, asked.goal, asked.options)
-    return paths.describe_paths(session.shown)["rows"][0]
+    [row] = paths.describe_paths(Shown(path.scenario, (path,), 0, 1))["rows"]
+    assert row["use"] == paths.write_use(use) and row["reason"] == path.verdict.reason
 
 
 def test_the_worst_so_far_grows_and_has_all_limits_in_one_unit():
@@ -174,16 +161,6 @@ def test_the_chance_of_a_path_that_is_refused_is_that_up_to_its_failure():
     assert told["value"] == f"up to the failure {100.0 * shown.chance.path:.0f} %"
 
 
-def test_a_use_without_bound_is_above_the_limit_in_its_curve():
-    path = judged_on(gap)
-    lane = path.limits.lane(path.failure.code)
-    assert np.isinf(lane.used).any()
-    [told] = (
-        one for one in paths.describe_limits(path, None)["lanes"] if one["code"] == lane.code
-    )
-    assert told["now"]["y"][0][-1] > 1.0
-
-
 def test_a_peak_between_points_of_a_curve_is_kept():
     values = np.zeros((10 * paths.MAX_POINTS, 2))
     values[1237, 1] = 5.0
@@ -223,7 +200,8 @@ def test_with_speed_servos_friction_is_no_number_that_a_passing_path_may_cross()
 
 def test_a_failure_between_waypoints_has_the_pose_at_which_the_model_was_asked():
     path = judged_on(stepped, friction=0.4)
-    failure, prediction = path.failure, path.prediction
+    failure, prediction, rows = path.failure, path.prediction, path.limits.rows
+    assert (np.diff(rows.distance) >= 0.0).all() and (np.diff(rows.time) >= 0.0).all()
     assert failure is not None and failure.is_between
     first = path.verdict.first_failure
     before, after = prediction.distance[first - 1 : first + 1]
@@ -251,8 +229,12 @@ def test_of_several_states_at_the_place_of_a_failure_that_which_fails_is_shown()
 
 
 def test_where_the_rover_does_not_settle_a_level_one_stands_and_the_wheel_beyond_is_named():
-    failure = judged_on(gap).failure
+    path = judged_on(gap)
+    failure, (ground, *_) = path.failure, paths.describe_limits(path, None)["lanes"]
     assert failure is not None and failure.code == "unknown_ground"
+    assert (
+        ground["code"] == "ground" and ground["now"]["y"][0][-1] == paths.MAX_USE
+    )  # not infinite
     assert np.isnan(failure.state.wheel_loads).all() and failure.link.startswith("front")
     assert failure.headline.startswith("unknown ground, front")
     np.testing.assert_allclose(failure.state.attitude[:2], 0.0)
@@ -287,22 +269,6 @@ def test_a_refusal_on_unknown_ground_is_at_the_time_to_which_the_drive_is_played
         paths.describe_paths(session.shown)["rows"],
     ]
     json.dumps(told, allow_nan=False)
-
-
-def test_the_numbers_of_the_only_path_are_those_up_to_its_failure():
-    def slope_beyond(x, y):
-        return gap(x, y) + 0.5 * np.maximum(x - 1.0, 0.0)
-
-    ground, options = make_terrain(slope_beyond), PathQueryOptions(count=1)
-    session = session_on(ground, (-1.5, 0.0, 0.0), (2.5, 0.0, 0.0), options)
-    poses = session.shown.path.poses
-    prediction, verdict = judge_path(LSR1, ground, poses)
-    assert verdict.max_tilt > 0.4
-    before = hold_against_limits(LSR1, prediction.cut(verdict.first_failure + 1))
-    for _ in range(2):
-        assert session.shown.verdict.code == "unknown_ground"
-        assert session.shown.verdict.max_tilt == before.max_tilt < 0.2
-        session.replay(prediction, verdict.reasons)
 
 
 # The board, paths, sliders.

@@ -134,18 +134,6 @@ def coloured(ground, layer) -> layers.ColouredGround:
     return layers.colour_ground(layer, layers.thin(ground))
 
 
-def test_unknown_ground_is_left_out_of_the_mesh():
-    whole, holed = (
-        ground_mesh.build_ground_mesh(
-            layers.thin(ground), np.zeros((2, 2, 3), np.uint8), np.zeros(3)
-        )
-        for ground in map(make_terrain, (waves, gap))
-    )
-    assert len(holed.faces) < len(whole.faces)
-    x = holed.vertices[holed.faces].mean(axis=1)[:, 0]
-    assert not ((x > 0.55) & (x < 0.95)).any()
-
-
 def test_the_friction_of_a_map_is_a_layer_where_it_is_known_and_else_none():
     plain = make_terrain(waves)
     friction = np.full(plain.elevation.shape, np.nan)
@@ -185,7 +173,7 @@ def test_the_ground_has_a_layer_for_the_use_of_each_limit_of_a_pose_and_one_for_
     assert found.legend.keys[0] == ("hatched", "beyond the limit")
 
 
-def test_a_ground_is_a_file_that_needs_no_light_and_leaves_no_garbage(monkeypatch):
+def test_the_known_ground_is_a_file_that_needs_no_light_and_leaves_no_garbage(monkeypatch):
     terrain, pictures = make_terrain(gap), []
     ground, origin = coloured(terrain, layers.SLOPE), np.array([0.5, -0.25, 0.0])
     drawn = ground_mesh.draw_picture(layers.thin(terrain), ground)
@@ -196,6 +184,8 @@ def test_a_ground_is_a_file_that_needs_no_light_and_leaves_no_garbage(monkeypatc
     assert held() is None and b"KHR_materials_unlit" in file
     (read,) = trimesh.load(io.BytesIO(file), file_type="glb").geometry.values()
     np.testing.assert_allclose(read.vertices[0] + origin, [*terrain.origin, gap(*terrain.origin)])
+    x = read.triangles_center[:, 0] + origin[0]
+    assert x.min() < 0.55 and not ((x > 0.55) & (x < 0.95)).any() and x.max() > 0.95
     np.testing.assert_array_equal(np.asarray(read.visual.material.baseColorTexture), drawn)
 
 

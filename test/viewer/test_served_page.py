@@ -196,7 +196,7 @@ def test_the_ghost_of_a_failure_stays_for_the_next_one_and_hides_without(page):
     for friction in (0.4, 0.35):
         session.change_rover([("friction",)], friction)
         failure = session.shown.path.failure
-        mark.show(LSR1, failure)
+        mark.show(failure)
         ghosts.append(canvas.nodes["/failure/body"])
         np.testing.assert_allclose(
             ghosts[-1].position, canvas.to_scene(failure.state.position), rtol=1e-6
@@ -206,7 +206,7 @@ def test_the_ghost_of_a_failure_stays_for_the_next_one_and_hides_without(page):
     assert canvas.nodes[wheel].color == REFUSED
     assert mark.make_room(failure.state) == failure.link and not ghost.visible
     assert mark.make_room(None) == "" and ghost.visible
-    mark.show(LSR1, None)
+    mark.show(None)
     assert not ghost.visible and mark.make_room(failure.state) == ""
 
 

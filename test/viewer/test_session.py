@@ -33,18 +33,11 @@ FRICTION = [("friction",)]
 Z = [("suspension", "wheels", name, 2) for name in ("rear", "middle", "front")]
 
 
-def refused_session() -> ViewSession:
-    """Return a session of which some paths pass, and a person looks at one that is refused."""
-    session = blocked_session()
-    verdicts = [path.verdict.traversable for path in session.shown.paths]
-    assert any(verdicts), "a path that passes is needed, to be offered"
-    session.show_path(verdicts.index(False))
-    return session
-
-
 def test_a_slider_never_swaps_the_path_that_is_looked_at_and_another_that_passes_is_offered():
-    session = refused_session()
-    poses, index = session.shown.path.poses, session.shown.index
+    session = blocked_session()
+    index = [path.verdict.traversable for path in session.shown.paths].index(False)
+    session.show_path(index)
+    poses = session.shown.path.poses
     for friction in (0.85, 0.3, 0.85):
         session.change_rover(FRICTION, friction)
         assert session.shown.index == index and session.shown.path.poses is poses
@@ -70,7 +63,7 @@ def test_before_and_after_stay_while_something_differs_from_the_loaded_rover():
         assert changes["rover"] == [["friction [-]", "0.8", f"{friction:g}"]]
         word = "passes" if passes else "refused"
         assert changes["drive"][0] == ["verdict", "passes", word]
-    session.change_arm("arm_yaw", 0.5)
+    session.change_options(joint_angles={"arm_yaw": 0.5})
     changes = describe_changes(session.shown.path, session.shown.reference, False)
     assert ["arm_yaw [rad]", "3.14159", "0.5"] in changes["rover"]
     session.reset()
@@ -123,7 +116,7 @@ def test_a_refused_change_alters_nothing_and_says_why():
             session.change_rover(keys, value)
     for change in (
         lambda: session.plan_to(np.array([np.nan, 0.0])),
-        lambda: session.change_arm("arm_yaw", float("nan")),
+        lambda: session.change_options(joint_angles={"arm_yaw": float("nan")}),
     ):
         change()
         assert session.refusal and session.shown.path is shown.path
@@ -161,17 +154,14 @@ def test_a_path_is_judged_under_all_policies_and_one_that_cannot_judge_says_so()
     assert servo["word"] == "not judged" and "no bounds" in servo["reason"] and not servo["old"]
 
 
-def recorded(folder, poses):
-    terrain = make_terrain(wall_at(0.5))
-    prediction, verdict = judge_path(LSR1, terrain, poses)
-    write_prediction(folder / "out.npz", prediction, verdict)
+def test_a_recorded_prediction_is_shown_as_it_was_recorded_until_the_rover_is_changed(tmp_path):
+    terrain, file = make_terrain(wall_at(0.5)), tmp_path / "out.npz"
+    prediction, verdict = judge_path(LSR1, terrain, straight())
+    write_prediction(file, prediction, verdict)
+    again, reasons = read_prediction(file)
+    assert read_recorded_assumptions(file) is None
     session = session_on(terrain, goal=(-1.5, 0.0, 0.0))
-    session.replay(*read_prediction(folder / "out.npz"))
-    return session, prediction, verdict
-
-
-def test_a_recorded_prediction_is_shown_as_it_was_recorded(tmp_path):
-    session, prediction, verdict = recorded(tmp_path, straight())
+    session.replay(again, reasons)
     shown = session.shown
     assert shown.verdict.reason == verdict.reason != ""
     assert shown.verdict.first_failure == verdict.first_failure
@@ -179,23 +169,13 @@ def test_a_recorded_prediction_is_shown_as_it_was_recorded(tmp_path):
     row = int(np.searchsorted(prediction.time, 10.0))
     low, high = np.sort(prediction.wheel_loads[row - 1 : row + 1], axis=0)
     assert ((state.wheel_loads >= low - 1e-6) & (state.wheel_loads <= high + 1e-6)).all()
-
-
-def test_a_recorded_reason_takes_precedence_over_the_model(tmp_path):
-    prediction, verdict = judge_path(LSR1, make_terrain(waves), straight())
-    write_prediction(tmp_path / "out.npz", prediction, verdict)
-    again, reasons = read_prediction(tmp_path / "out.npz")
-    assert read_recorded_assumptions(tmp_path / "out.npz") is None
-    session = session_on(waves)
-    session.replay(again, (*reasons[:-1], "the wheel is stuck"))
-    assert not session.shown.verdict.traversable
+    stuck = (*[""] * (len(reasons) - 1), "the wheel is stuck")
+    session.replay(again, stuck)  # which takes precedence over the model
     assert session.shown.verdict.reason == "the wheel is stuck"
-
-
-def test_a_change_of_the_rover_judges_the_recorded_path_again(tmp_path):
-    session, prediction, _ = recorded(tmp_path, straight())
-    session.change_rover([("friction",)], 0.4)
+    assert not session.shown.verdict.traversable
+    session.change_rover(FRICTION, 0.4)
     assert len(session.shown.paths) == 1 and session.shown.scenario.rover.friction == 0.4
+    assert session.shown.verdict.first_failure <= verdict.first_failure
     np.testing.assert_array_equal(session.shown.path.poses, prediction.poses)
     session.plan_to(np.array([2.5, 0.5]))
     assert len(session.shown.paths) > 1 and session.wanted.recorded is None

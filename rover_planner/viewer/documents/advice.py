@@ -4,8 +4,7 @@
 from dataclasses import dataclass, replace
 from typing import Any
 
-from rover_planner.advice.advise import Advice, grow_advice
-from rover_planner.advice.case import case_of
+from rover_planner.advice.advise import Advice
 from rover_planner.advice.remedy import Remedy
 from rover_planner.planning.assumptions import assume
 from rover_planner.viewer.state.background_work import Steps
@@ -56,12 +55,6 @@ def apply_remedy(scenario: Scenario, remedy: Remedy) -> Scenario:
     )
 
 
-def seek_advice(path: Judged) -> Steps[Advice]:
-    """Yield advice on a path that grows."""
-    asked = path.scenario
-    return grow_advice(case_of(asked.rover, asked.terrain, path.poses, asked.options))
-
-
 def describe_advice(advised: Advised | None, is_seeking: bool, now: float) -> dict[str, Any]:
     """Return what is tried, and the remedies found so far, by their words: more are found.
 
@@ -72,13 +65,12 @@ def describe_advice(advised: Advised | None, is_seeking: bool, now: float) -> di
         is_seeking: True if levers are still tried.
         now: The monotonic clock [s].
     """
-    if advised is None:
-        return {"can_ask": not is_seeking, "seeking": is_seeking, "words": "", "rows": []}
+    is_complete = advised is not None and advised.is_complete
     return {
-        "can_ask": not is_seeking and not advised.is_complete,
+        "can_ask": not is_seeking and not is_complete,
         "seeking": is_seeking,
-        "words": _write_progress(advised, is_seeking, now),
-        "rows": [_describe(remedy) for remedy in advised.remedies],
+        "words": "" if advised is None else _write_progress(advised, is_seeking, now),
+        "rows": [] if advised is None else [_describe(remedy) for remedy in advised.remedies],
     }
 
 

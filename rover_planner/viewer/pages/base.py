@@ -113,9 +113,12 @@ class PageBase(ABC):
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
         gui.set_panel_label("Camera")
         self._camera = gui.add_button_group("View", (*VIEWS, FOLLOW))
-        self._camera.on_click(self._request_view)
+        self._camera.on_click(
+            lambda event: self.requests.put(partial(self._look, event.client, event.target.value))
+        )
         for key, (label, words) in HOTKEYS.items():
-            gui.add_command(label, hotkey=key).on_trigger(partial(self._press, words))
+            command = gui.add_command(label, hotkey=key)
+            command.on_trigger(lambda _event, words=words: self.hear(words))
         self.server.on_client_connect(lambda client: self._look(client, START))
         self.server.scene.on_click()(partial(self._request_click, shift=False))
         self.server.scene.on_click(modifier="shift")(partial(self._request_click, shift=True))
@@ -236,13 +239,6 @@ class PageBase(ABC):
     def _show_forces(self, words: Words) -> None:
         self.forces = bool(words["shown"])
         self.scene.show_forces(self.forces)
-
-    def _press(self, words: Words, _event: Any) -> None:
-        self.hear(words)
-
-    def _request_view(self, event: Any) -> None:
-        client, name = event.client, event.target.value
-        self.requests.put(partial(self._look, client, name))
 
     def _look(self, client: Any, name: str) -> None:
         """Show a view, or go along with the rover or not, and name the button by what is next."""

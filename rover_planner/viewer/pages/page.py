@@ -11,7 +11,8 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.rover_file import load_rover, preset_names, rover_to_dict
 from rover_physics.terrain.grid import fingerprint
 from rover_physics.terrain.soil_file import load_soils
-from rover_planner.advice.advise import Advice
+from rover_planner.advice.advise import Advice, grow_advice
+from rover_planner.advice.case import case_of
 from rover_planner.advice.remedy import Remedy
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import read_rover, write_rover
@@ -139,13 +140,13 @@ class Page(PageBase):
         found = [one for values in parts for one in values if one.label == label]
         if not found:
             raise PlanningError(f"the rover has no number {label!r}")
-        (one,) = found
+        (one,), session = found, self.session
         number = min(max(number, one.low), one.high)
-        kind, *name = one.keys[0]
+        kind, name, *_ = (*one.keys[0], "")
         if kind == rover.JOINTS:
-            self.session.change_arm(str(name[0]), number)
+            session.change_options(joint_angles={**session.wanted.arm, str(name): number})
         else:
-            self.session.change_rover(one.keys, number)
+            session.change_rover(one.keys, number)
 
     def _cancel(self) -> None:
         self.session.is_stopped |= self._judging.cancel()
@@ -156,14 +157,16 @@ class Page(PageBase):
         failure = self.session.shown.path.failure
         if failure is not None:
             self.playback.go_to(failure.time)
-            self.scene.look_at_failure(self.session.shown.scenario.rover, failure)
+            self.scene.look_at_failure(failure)
 
     # Advice.
 
     def _advise(self) -> None:
         """Seek advice on the path that is looked at."""
         path = self.session.shown.path
-        self._advised = advice.Advised(path, advice.seek_advice(path), time.monotonic())
+        asked = path.scenario
+        steps = grow_advice(case_of(asked.rover, asked.terrain, path.poses, asked.options))
+        self._advised = advice.Advised(path, steps, time.monotonic())
         self._advice.ask(self._advised.steps)
 
     def _take_advice(self, steps: Steps[Advice], found: Advice | BaseException) -> None:
@@ -295,7 +298,7 @@ class Page(PageBase):
         self._tell_drive()
         if is_new:
             self._ended.wait(PERIOD)
-        draw("the failure is not shown", scene.failure.show, asked.rover, path.failure)
+        draw("the failure is not shown", scene.failure.show, path.failure)
         draw("the rover is not drawn", scene.rover.take, asked.rover, asked.arm)
         draw("the cameras are not moved", lambda _: scene.look(FIT, self.points), asked.loaded)
         draw("the paths are not drawn", scene.paths.show, shown.paths, shown.index)

@@ -184,19 +184,17 @@ class FailureMark:
         self.ghost = DrawnRover(canvas, NAME, OPACITY)
         """The ghost; no forces are drawn where they are not known."""
         self._failure: Failure | None = None
-        self._near = 0.0
 
-    def show(self, rover: Rover, failure: Failure | None) -> None:
+    def show(self, failure: Failure | None) -> None:
         """Draw a failure instead of what was drawn before; None draws nothing."""
         self._failure = failure
         if failure is None:
             self._canvas.remove(REASON)
             self.ghost.show(None)
             return
-        self._near = NEAR * rover.wheelbase
-        self.ghost.take(rover, {})
+        self.ghost.take(failure.state.rover, {})
         self.ghost.show(failure.state, failure.link)
-        self._draw_label(failure, rover.wheel.radius)
+        self._draw_label(failure)
 
     def make_room(self, state: RoverState | None) -> str:
         """Hide the ghost while the played rover stands there; return the link of it that fails."""
@@ -205,16 +203,17 @@ class FailureMark:
             return ""
         if state is not None:
             away = float(np.linalg.norm(state.position - failure.state.position))
-        self._canvas.show_frame(NAME, visible=away > self._near)
-        return "" if away > self._near else failure.link
+        is_away = away > NEAR * failure.state.rover.wheelbase
+        self._canvas.show_frame(NAME, visible=is_away)
+        return "" if is_away else failure.link
 
-    def _draw_label(self, failure: Failure, radius: float) -> None:
+    def _draw_label(self, failure: Failure) -> None:
         """Draw what is broken, with a line from a place above the rover to the wheel or body."""
         words, state = failure.headline.replace(", ", "\n", 1), failure.state
         place = state.position
         if failure.link in WHEELS:
             place = state.wheel_centres[WHEELS.index(failure.link)]
-        top = state.position + np.array([0.0, 0.0, LABEL_HEIGHT * radius])
+        top = state.position + np.array([0.0, 0.0, LABEL_HEIGHT * state.rover.wheel.radius])
         leader = Strand(np.array([top, place]), colours.CASING)
         self._canvas.show_lines(f"{REASON}/leader", [leader], 2.0)
         self._canvas.show_label(f"{REASON}/words", f"{words}\n{failure.place}", top)

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from rover_physics.numerics.arrays import Floats
-from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import swing_radius
 from rover_planner.viewer.scene.canvas import Canvas
 from rover_planner.viewer.scene.drawn_rover import DrawnRover, FailureMark
@@ -106,9 +105,9 @@ class Scene:
             for client in self._clients():
                 self._place(client, at, at + client.camera.position - client.camera.look_at)
 
-    def look_at_failure(self, rover: Rover, failure: Failure) -> None:
+    def look_at_failure(self, failure: Failure) -> None:
         """Let all cameras look at a failure, from the side of what fails."""
-        yaw, at = float(failure.state.attitude[2]), failure.state.position
+        rover, yaw, at = failure.state.rover, failure.state.attitude[2], failure.state.position
         size = rover.suspension.wheels["front"][0] - rover.belly.x[0]
         side = -1.0 if "right" in failure.link else 1.0
         ahead, left = np.array([np.cos(yaw), np.sin(yaw)]), np.array([-np.sin(yaw), np.cos(yaw)])

@@ -282,8 +282,11 @@ def find_failure(rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathL
         broken = np.flatnonzero(is_there & ~rows.is_between)
     at = int(broken[np.argmin(rows.is_between[broken])])
     here, explains = rows.prediction.select([at]), lane.is_explained_at(at)
+    state = RoverState(rover, here, np.zeros(6))
+    if not here.settled[0]:
+        state = level_state(rover, terrain, rows, at)
     link = limits.find_link(lane, at) if explains or verdict.code == "suspension" else ""
-    link = link or _find_link(rover, terrain, verdict, rows, at)
+    link = link or _find_link(terrain, verdict, state)
     of_ground = TITLES.get(verdict.code, verdict.code.replace("_", " "))
     words = lane.compare(at) if explains else of_ground if lane.code == GROUND else ""
     where = link.replace("_", " ") + (" wheel" if link in WHEELS else "")
@@ -296,9 +299,7 @@ def find_failure(rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathL
         time=float(rows.time[at]),
         is_between=bool(rows.is_between[at]),
         row=at,
-        state=RoverState(rover, here, np.zeros(6))
-        if here.settled[0]
-        else level_state(rover, terrain, rows, at),
+        state=state,
     )
 
 
@@ -312,18 +313,18 @@ def level_state(rover: Rover, terrain: Terrain, rows: AskedPoses, at: int) -> Ro
     return place_state(rover, position, np.array([0.0, 0.0, yaw]), **driven)
 
 
-def _find_link(rover: Rover, terrain: Terrain, verdict: Verdict, rows: AskedPoses, at: int) -> str:
-    """Return the link that fails at a row where no lane names one; empty for none."""
+def _find_link(terrain: Terrain, verdict: Verdict, state: RoverState) -> str:
+    """Return the link that fails in a state where no lane names one; empty for none."""
     if verdict.code in BODY_CODES:
         return BODY
     if verdict.code in ("off_map", "unknown_ground"):
-        return _find_lost_wheel(rover, terrain, level_state(rover, terrain, rows, at))
+        return _find_lost_wheel(terrain, state)
     return next((name for name in WHEELS if name in verdict.reason), "")
 
 
-def _find_lost_wheel(rover: Rover, terrain: Terrain, state: RoverState) -> str:
+def _find_lost_wheel(terrain: Terrain, state: RoverState) -> str:
     """Return the wheel with the most of its footprint beyond known ground; empty for none."""
-    offsets = rover.wheel.radius * np.linspace(-1.0, 1.0, 5)
+    offsets = state.rover.wheel.radius * np.linspace(-1.0, 1.0, 5)
     x = state.wheel_centres[:, 0, None, None] + offsets[:, None]
     y = state.wheel_centres[:, 1, None, None] + offsets
     lost = ~np.isfinite(terrain.elevation_at(x + 0.0 * y, y + 0.0 * x)).reshape(6, -1)

@@ -115,10 +115,6 @@ class ViewSession:
         rover = vary(self.wanted.rover, dict.fromkeys(keys, value))
         self.take_change(replace(self.wanted, rover=rover))
 
-    def change_arm(self, joint: str, angle: float) -> None:
-        """Turn a joint of the arm to an angle [rad]."""
-        self.change_options(joint_angles={**self.wanted.arm, joint: angle})
-
     def reset(self) -> None:
         """Take the numbers of the rover as it was loaded, with its arm stowed."""
         self.take_change(self.wanted.as_loaded())
