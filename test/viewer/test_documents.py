@@ -13,7 +13,7 @@ from rover_planner.viewer.documents import paths
 from rover_planner.viewer.documents.rover import compare_drives, describe_sliders, read_values
 from rover_planner.viewer.state.path_limits import Lane
 from rover_planner.viewer.state.scenario import CANDIDATES, Judged, Shown
-from support.grounds import gap, make_terrain, wall_at, waves
+from support.grounds import gap, wall_at, waves
 from support.viewer.sessions import LSR1, SURE, ramp, session_on
 
 
@@ -289,18 +289,6 @@ def test_the_board_has_all_loads_and_unknown_values_are_none_or_a_question_mark(
     assert {one["bars"][0][1] for one in board["wheels"]} == {None}
     json.dumps(board, allow_nan=False)
     assert paths.plain([1.0, np.nan, np.inf]) == [1.0, None, None]
-
-
-def test_a_row_of_a_path_has_the_numbers_of_its_verdict():
-    session = session_on(wall_at(0.5), goal=(1.5, 0.0, 0.0))
-    shown = session.shown
-    rows = paths.describe_paths(shown)["rows"]
-    assert [row["passes"] for row in rows] == [one.verdict.traversable for one in shown.paths]
-    assert [row["number"] for row in rows if row["word"].endswith("best")] == (
-        [] if shown.best is None else [shown.best + 1]
-    )
-    for row, path in zip(rows, shown.paths, strict=True):
-        assert row["reason"] == path.verdict.reason
 
 
 def test_each_number_of_the_rover_has_a_slider_and_what_it_changes_of_the_drive_is_listed():

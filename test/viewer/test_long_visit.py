@@ -20,7 +20,7 @@ MINUTES, ROUNDS = 10.0, 4
 STEADY = 1.02
 """Least memory in the last third of a visit over the most in the rounds after the first and up to
 the second third: it goes up and down."""
-FRICTION, RADIUS, HEIGHT = "friction [-]", "radius [m]", "wheels z [m]"
+FRICTION = "friction [-]"
 
 
 def wait_for_rest(visitor: Visitor) -> None:
@@ -36,21 +36,13 @@ def wait_for_rest(visitor: Visitor) -> None:
     )
 
 
-def find_row(visitor: Visitor, word: str) -> int | None:
-    """Return the index of the first path whose verdict has a word; None without one."""
-    visitor.open_tab("Paths")
-    rows = visitor.texts("#paths tr[tabindex]")
-    return next((k for k, row in enumerate(rows) if word in row), None)
-
-
-def change(visitor: Visitor, **values: str) -> None:
-    """Type values beside sliders, one soon after another."""
+def change(visitor: Visitor, values: dict[str, str]) -> None:
+    """Type values beside sliders by their labels, one soon after another."""
     visitor.open_tab("Rover")
     for closed in visitor.tab.locator("#sliders details:not([open]) summary").all()[::-1]:
         closed.click()
-    names = {"friction": FRICTION, "radius": RADIUS, "height": HEIGHT}
-    for name, value in values.items():
-        visitor.type_number(names[name], value)
+    for label, value in values.items():
+        visitor.type_number(label, value)
 
 
 def take_advice(visitor: Visitor) -> None:
@@ -63,8 +55,8 @@ def take_advice(visitor: Visitor) -> None:
     if remedies.count():
         remedies.first.hover()
         remedies.first.click()
+        wait_until(lambda: visitor.text("#verdict .word") == "traversable", "its verdict")
         wait_for_rest(visitor)
-        assert visitor.text("#verdict .word") == "traversable"
         visitor.open_tab("Rover")
         visitor.press("Undo")
         wait_for_rest(visitor)
@@ -77,23 +69,25 @@ def take_advice(visitor: Visitor) -> None:
 def click_through(visitor: Visitor) -> None:
     """Do once what the page is for, and hold what it shows against what it must."""
     tab = visitor.tab
-    refused = find_row(visitor, "refused")
-    row = 0 if refused is None else refused
+    visitor.open_tab("Paths")
+    rows = visitor.texts("#paths tr[tabindex]")
+    row = next((k for k, words in enumerate(rows) if "refused" in words), 0)
     tab.locator("#paths tr[tabindex]").nth(row).click()
     wait_until(lambda: f"path {row + 1} of" in visitor.text("#verdict"), "the path")
     wait_for_rest(visitor)
-    change(visitor, friction="0.85")
+    change(visitor, {FRICTION: "0.85"})
     wait_for_rest(visitor)
     assert f"path {row + 1} of" in visitor.text("#verdict")  # whatever its verdict is now
     wait_until(lambda: "0.85" in visitor.text("#changes"), "the change")
     wait_until(lambda: tab.locator(".strip i.before").count(), "the lanes before it")
     visitor.press("Keep as reference")
     wait_until(lambda: "nothing differs" in visitor.text("#changes"), "the reference")
-    change(visitor, friction="0.3")
+    change(visitor, {FRICTION: "0.3"})
     wait_for_rest(visitor)
     assert f"path {row + 1} of" in visitor.text("#verdict")
     visitor.press("Compare with loaded")
-    change(visitor, height="-0.15", radius="0.02")  # the second is refused: no candidate stays old
+    # The second value is refused: no candidate stays old.
+    change(visitor, {"wheels z [m]": "-0.15", "radius [m]": "0.02"})
     wait_for_rest(visitor)
     assert visitor.is_on_screen("#verdict .word")
     visitor.press("Reset")
@@ -116,31 +110,25 @@ def click_through(visitor: Visitor) -> None:
     assert visitor.text("#errors") == "" and visitor.page_errors == []
 
 
-@pytest.fixture(scope="module")
-def browser():
-    with open_browser() as chromium:
-        yield chromium
-
-
 @pytest.mark.parametrize("ground", ["made", "spirit", "reef"])
-def test_a_long_visit_keeps_path_comparison_and_memory(ground, browser, tmp_path):
+def test_a_long_visit_keeps_path_comparison_and_memory(ground, tmp_path):
     arguments = ["lsr1", *([] if ground == "made" else [ground])]
     if ground == "reef":
         save_terrain(tmp_path / "reef.npz", made_reef())
         arguments = ["lsr1", str(tmp_path / "reef.npz")]
-    with open_view(*arguments) as (process, url):
-        visitor, begin, memory = Visitor(browser, url), time.monotonic(), []
-        while time.monotonic() - begin < 20.0 * MINUTES or len(memory) < ROUNDS:
-            click_through(visitor)
-            memory.append(memory_of(process))
-        change(visitor, friction="0.7")
-        wait_until(lambda: "friction 0.7" in visitor.text("#subject"), "the verdict on the change")
-        wait_for_rest(visitor)
-    assert max(memory) < MOST_MEMORY, memory
-    third = len(memory) // 3
-    assert min(memory[-third:]) < STEADY * max(memory[1 : third + 2]), memory
-    visitor.wait_for("No connection to the program")
-    with open_view(*arguments, port=int(url.rsplit(":", 1)[1])):
-        visitor.wait_for("The program was started again; what you had changed is taken up.")
-        wait_until(lambda: "friction 0.7" in visitor.text("#subject"), "the changed rover")
-    visitor.tab.close()
+    with open_browser() as browser:
+        with open_view(*arguments) as (process, url):
+            visitor, begin, memory = Visitor(browser, url), time.monotonic(), []
+            while time.monotonic() - begin < 20.0 * MINUTES or len(memory) < ROUNDS:
+                click_through(visitor)
+                memory.append(memory_of(process))
+            change(visitor, {FRICTION: "0.7"})
+            wait_until(lambda: "friction 0.7" in visitor.text("#subject"), "the new verdict")
+            wait_for_rest(visitor)
+        assert max(memory) < MOST_MEMORY, memory
+        third = len(memory) // 3
+        assert min(memory[-third:]) < STEADY * max(memory[1 : third + 2]), memory
+        visitor.wait_for("No connection to the program")
+        with open_view(*arguments, port=int(url.rsplit(":", 1)[1])):
+            visitor.wait_for("The program was started again; what you had changed is taken up.")
+            wait_until(lambda: "friction 0.7" in visitor.text("#subject"), "the changed rover")

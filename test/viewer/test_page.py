@@ -133,7 +133,7 @@ def test_a_row_is_taken_by_click_and_key_and_a_slider_leaves_its_path_and_offers
     visitor.press("Keep as reference")
     visitor.wait_for("nothing differs from the rover as kept")
     visitor.press("Compare with loaded")
-    visitor.press("Reset")
+    visitor.press("Undo")
     wait_until(lambda: session.shown.scenario.rover == LSR1, "the loaded rover")
     wait_for_rest(page)
 

@@ -129,22 +129,16 @@ def test_a_ray_meets_the_ground_where_it_is_aimed_and_nothing_in_the_sky_or_wher
     assert meet(holed, np.array([0.75, 0.0, 2.0]), np.array([0.0, 0.0, -1.0])) is None
 
 
-def coloured(ground, layer) -> layers.ColouredGround:
-    """Return a ground in the colours of a layer of its own."""
-    return layers.colour_ground(layer, layers.thin(ground))
-
-
 def test_the_friction_of_a_map_is_a_layer_where_it_is_known_and_else_none():
     plain = make_terrain(waves)
     friction = np.full(plain.elevation.shape, np.nan)
     friction[:, : friction.shape[1] // 2] = 0.2
     learned = replace(plain, friction=friction)
-    assert layers.FRICTION in layers.list_layers(
-        learned
-    ) and layers.FRICTION not in layers.list_layers(plain)
-    picture = ground_mesh.draw_picture(
-        layers.thin(learned), coloured(learned, layers.FRICTION)
-    ).astype(float)
+    assert layers.FRICTION in layers.list_layers(learned)
+    assert layers.FRICTION not in layers.list_layers(plain)
+    ground = layers.thin(learned)
+    found = layers.colour_ground(layers.FRICTION, ground)
+    picture = ground_mesh.draw_picture(ground, found).astype(float)
     known, unknown = picture[:, 10], picture[:, -10]
     assert (known[:, 0] < known[:, 2]).all()  # blue
     assert np.ptp(unknown, axis=1).max() == 0.0  # grey
@@ -174,13 +168,13 @@ def test_the_ground_has_a_layer_for_the_use_of_each_limit_of_a_pose_and_one_for_
 
 
 def test_the_known_ground_is_a_file_that_needs_no_light_and_leaves_no_garbage(monkeypatch):
-    terrain, pictures = make_terrain(gap), []
-    ground, origin = coloured(terrain, layers.SLOPE), np.array([0.5, -0.25, 0.0])
-    drawn = ground_mesh.draw_picture(layers.thin(terrain), ground)
+    terrain, pictures = layers.thin(make_terrain(gap)), []
+    ground, origin = layers.colour_ground(layers.SLOPE, terrain), np.array([0.5, -0.25, 0.0])
+    drawn = ground_mesh.draw_picture(terrain, ground)
     monkeypatch.setattr(ground_mesh, "draw_picture", lambda *_: pictures.pop())
     pictures.append(drawn.copy())
     held = weakref.ref(pictures[0])
-    file = ground_mesh.write_ground(layers.thin(terrain), ground, origin)
+    file = ground_mesh.write_ground(terrain, ground, origin)
     assert held() is None and b"KHR_materials_unlit" in file
     (read,) = trimesh.load(io.BytesIO(file), file_type="glb").geometry.values()
     np.testing.assert_allclose(read.vertices[0] + origin, [*terrain.origin, gap(*terrain.origin)])

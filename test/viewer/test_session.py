@@ -35,7 +35,15 @@ Z = [("suspension", "wheels", name, 2) for name in ("rear", "middle", "front")]
 
 def test_a_slider_never_swaps_the_path_that_is_looked_at_and_another_that_passes_is_offered():
     session = blocked_session()
-    index = [path.verdict.traversable for path in session.shown.paths].index(False)
+    rows, verdicts = (
+        describe_paths(session.shown)["rows"],
+        [one.verdict for one in session.shown.paths],
+    )
+    assert [row["reason"] for row in rows] == [one.reason for one in verdicts]
+    assert [row["passes"] for row in rows] == [one.traversable for one in verdicts]
+    best = [row["number"] for row in rows if row["word"].endswith("best")]
+    assert best == [session.shown.best + 1]
+    index = next(k for k, one in enumerate(verdicts) if not one.traversable)
     session.show_path(index)
     poses = session.shown.path.poses
     for friction in (0.85, 0.3, 0.85):

@@ -1,10 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Ways around obstacles, without a browser: searched, offered, looked at, cancelled, explained."""
 
-from collections.abc import Iterator
-
 import numpy as np
-import pytest
 
 from rover_physics.traversability.judge import judge_path
 from rover_planner.planning.search.path_search import FOUND, NO_WAY
@@ -99,31 +96,23 @@ def test_a_way_that_is_looked_at_stays_when_a_slider_moves_and_others_go_with_th
     assert session.shown.index == 0 and session.shown.around is not way
 
 
-# In the background.
-
-
-@pytest.fixture
-def judge() -> Iterator[Judge]:
-    """Judges in the background for a session before a wall with a gap."""
-    with Judge(walled_session(wall_with_gap)) as made:
-        yield made
-
-
-def test_a_search_can_be_cancelled_and_begun_again_and_a_chosen_path_stays_meanwhile(judge):
-    session, work = judge.session, judge.work
-    with held(session, SEARCH):
-        session.plan_to(BEYOND)
-        wait_until(lambda: work.progress.what == SEARCH, "the search", 60.0)
-        judge.take()
-        assert not session.is_outdated and not session.shown.verdict.traversable
-        other = 1 if session.shown.index != 1 else 2
-        session.show_path(other)
-        wait_until(lambda: work.progress.what == SEARCH, "the search again", 60.0)
-        judge.take()
-        shown = session.shown
-        work.cancel()
-        judge.take()
-        assert session.shown is shown and shown.around is None
-    session.judge_again()
-    judge.finish()
-    assert session.shown.around.outcome == FOUND and session.shown.index == other
+def test_a_search_can_be_cancelled_and_begun_again_and_a_chosen_path_stays_meanwhile():
+    session = walled_session(wall_with_gap)
+    with Judge(session) as judge:
+        work = judge.work
+        with held(session, SEARCH):
+            session.plan_to(BEYOND)
+            wait_until(lambda: work.progress.what == SEARCH, "the search", 60.0)
+            judge.take()
+            assert not session.is_outdated and not session.shown.verdict.traversable
+            other = 1 if session.shown.index != 1 else 2
+            session.show_path(other)
+            wait_until(lambda: work.progress.what == SEARCH, "the search again", 60.0)
+            judge.take()
+            shown = session.shown
+            work.cancel()
+            judge.take()
+            assert session.shown is shown and shown.around is None
+        session.judge_again()
+        judge.finish()
+        assert session.shown.around.outcome == FOUND and session.shown.index == other

@@ -90,10 +90,6 @@ class Page(PageBase):
     def list_answers(self) -> Mapping[str, Answer]:
         """Return what the page does by the word `ask`."""
         session, playback = self.session, self.playback
-
-        def find_time(distance: float) -> float:
-            return session.shown.path.limits.time_at(distance)
-
         return {
             "show": lambda words: session.show_path(int(words["index"])),
             "value": lambda words: self._change_value(words["label"], float(words["value"])),
@@ -112,7 +108,7 @@ class Page(PageBase):
             "toggle": lambda _words: playback.toggle(),
             "step": lambda words: playback.step(words["by"]),
             "seek": lambda words: playback.go_to(float(words["time"])),
-            "place": lambda words: playback.go_to(find_time(float(words["distance"]))),
+            "place": lambda words: playback.go_to(playback.drive.time_at(words["distance"])),
             "speed": lambda words: setattr(playback, "speed", float(words["times"])),
             "failure": lambda _words: self._go_to_failure(),
             "advise": lambda _words: self._advise(),

@@ -29,6 +29,8 @@ NEAR = 0.5
 """Distance of the played rover at which the ghost makes room for it [wheelbases]."""
 LABEL_HEIGHT = 4.5
 """Height of the label above the body [wheel radii]."""
+LEFT, RIGHT = np.array([1.0, 1.0, 1.0]), np.array([1.0, -1.0, 1.0])
+"""Factors on a point of the left side [m] as it is on a side."""
 
 
 class DrawnRover:
@@ -99,12 +101,13 @@ class DrawnRover:
     ) -> None:
         """Put rocker, bogie and wheels of a side."""
         suspension, beam = rover.suspension, 0.16 * rover.wheel.radius
+        mirror = LEFT if side == "left" else RIGHT
         pivots = {
-            f"rocker_{side}": on_side(suspension.rocker_pivot, side),
-            f"bogie_{side}": on_side(suspension.bogie_pivot, side),
+            f"rocker_{side}": mirror * suspension.rocker_pivot,
+            f"bogie_{side}": mirror * suspension.bogie_pivot,
         }
         rocker, bogie = pivots
-        wheels = {name: on_side(suspension.wheels[name], side) for name in WHEEL_POSITIONS}
+        wheels = {name: mirror * suspension.wheels[name] for name in WHEEL_POSITIONS}
         ends = [pivots[bogie], wheels[suspension.rocker_wheel]]
         beams = make_beams([end - pivots[rocker] for end in ends], beam)
         self._put(rocker, BODY, pivots[rocker], beams, colours.METAL)
@@ -219,12 +222,6 @@ class FailureMark:
         self._canvas.show_label(f"{REASON}/words", f"{words}\n{failure.place}", top)
 
 
-def on_side(point: tuple[float, float, float], side: str) -> Floats:
-    """Return a point (3,) [m] of the left side as it is on a side, "left" or "right"."""
-    x, y, z = point
-    return np.array([x, y if side == "left" else -y, z])
-
-
 def join_meshes(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
     """Return one mesh of several."""
     return cast(trimesh.Trimesh, trimesh.util.concatenate(parts))
@@ -247,7 +244,7 @@ def make_body(rover: Rover) -> trimesh.Trimesh:
     belly, pivot, radius = rover.belly, rover.suspension.rocker_pivot, rover.wheel.radius
     low = np.array([belly.x[0], belly.y[0], belly.z])
     high = np.array([belly.x[1], belly.y[1], belly.z + 1.4 * radius])
-    axle = make_bar(on_side(pivot, "right"), on_side(pivot, "left"), 0.12 * radius)
+    axle = make_bar(RIGHT * pivot, LEFT * pivot, 0.12 * radius)
     return join_meshes([trimesh.creation.box(bounds=[low, high]), axle])
 
 

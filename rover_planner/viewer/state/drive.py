@@ -142,6 +142,10 @@ class Trajectory:
         """Energy spent up to its end [J]."""
         return float(self._driven.energy[-1]) if self.length else 0.0
 
+    def time_at(self, distance: float) -> float:
+        """Return the time at which the rover is at a distance [m]."""
+        return float(np.interp(distance, self.distance, self.times))
+
     def state_at(self, time: float) -> RoverState | None:
         """Return the state at a time [s], linear between poses; None without poses."""
         if not self.length:

@@ -122,10 +122,6 @@ class PathLimits:
         """Return the number of poses up to a time [s], at least 1."""
         return max(int(np.searchsorted(self.rows.time, time + 1e-6, side="right")), 1)
 
-    def time_at(self, distance: float) -> float:
-        """Return the time at which the rover is at a distance [m]."""
-        return float(np.interp(distance, self.rows.distance, self.rows.time))
-
     def lane(self, code: str) -> Lane:
         """Return the lane of a code of a verdict; that of the ground for other codes."""
         found = {lane.code: lane for lane in self.lanes}
