@@ -34,7 +34,7 @@ class Strand:
     """A line of one colour."""
 
     line: Floats
-    """(n, 3) its points [m], map frame, n >= 2."""
+    """(n, 3) its points [m], map frame; of fewer than two nothing is seen."""
     colour: Colour
     """Its colour."""
 
@@ -93,6 +93,7 @@ class Canvas:
         self, name: str, strands: Sequence[Strand], width: float, paint: Colour | None = None
     ) -> None:
         """Show strands of a width [px] as one node, all in a colour `paint` or each in its own."""
+        strands = [one for one in strands if len(one.line) > 1]
         if not strands:
             self.remove(name)
             return

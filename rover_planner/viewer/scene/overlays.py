@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drawings over the ground: candidate paths with their numbers, refused places, start, goal."""
 
-import itertools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -75,18 +74,17 @@ class PathOverlay:
 
     def show_line(self, name: str, path: Floats | None, colour: Colour) -> None:
         """Draw a path (n, 3), or none, instead of the one that had the name."""
-        strands = [] if path is None else self._find_strand(path[:, :2], colour)
+        strands = [] if path is None else [self._find_strand(path[:, :2], colour)]
         self._canvas.show_lines(f"{LINES}/{name}", strands, WIDE)
 
     def show_trail(self, trail: Floats | None) -> None:
         """Draw where (n, 3) something was learned: x, y [m] and a number from 0 to 1."""
         known = np.empty((0, 3)) if trail is None else trail
         colours = map_colours(known[1:, 2], 0.0, 1.0).tolist()
-        steps = [
+        strands = [
             self._find_strand(known[k : k + 2, :2], (red, green, blue))
             for k, (red, green, blue) in enumerate(colours)
         ]
-        strands = [*itertools.chain.from_iterable(steps)]
         self._canvas.show_lines(f"{LINES}/trail", strands, WIDE)
 
     def find_number(self, origin: Floats, direction: Floats) -> int | None:
@@ -120,28 +118,24 @@ class PathOverlay:
         """Return a path in the colour of its verdict, faded from where it is refused."""
         points, verdict = path.poses[:, :2], path.verdict
         if verdict.traversable:
-            return self._find_strand(points, PASSABLE)
+            return [self._find_strand(points, PASSABLE)]
         end = verdict.first_failure
         arms = CROSS * self._canvas.radius * np.array([[1.0, 1.0], [1.0, -1.0]])
-        crossing = [np.array([points[end] - arm, points[end] + arm]) for arm in arms]
-        cross = [self._find_strand(line, REFUSED, 2.0 * CLEARANCE) for line in crossing]
+        cross = [np.array([points[end] - arm, points[end] + arm]) for arm in arms]
         return [
-            *self._find_strand(points[: end + 1], REFUSED),
-            *self._find_strand(points[end:], BEYOND),
-            *itertools.chain.from_iterable(cross),
+            self._find_strand(points[: end + 1], REFUSED),
+            self._find_strand(points[end:], BEYOND),
+            *(self._find_strand(line, REFUSED, 2.0 * CLEARANCE) for line in cross),
         ]
 
-    def _find_strand(
-        self, points: Floats, colour: Colour, height: float = CLEARANCE
-    ) -> list[Strand]:
+    def _find_strand(self, points: Floats, colour: Colour, height: float = CLEARANCE) -> Strand:
         """Return a strand through points (n, 2) at a height above the ground [wheel radii].
 
-        There is none where fewer than two points are on known ground.
+        It leaves out points on unknown ground.
         """
         rows = np.linspace(0, len(points) - 1, min(len(points), MAX_POINTS)).round().astype(int)
         line = self._canvas.lay(points[rows], height)
-        line = line[np.isfinite(line[:, 2])]
-        return [Strand(line, colour)] if len(line) > 1 else []
+        return Strand(line[np.isfinite(line[:, 2])], colour)
 
     def _draw_numbers(self, paths: Sequence[Judged]) -> None:
         """Write the number of each path on it, one after another if there are several."""
