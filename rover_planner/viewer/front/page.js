@@ -93,7 +93,7 @@ const DRAW = {
   subject: drawSubject, errors: drawErrors, scene: drawScene, verdict: drawVerdict, advice: drawAdvice,
   paths: drawPaths, sliders: drawSliders, values: drawValues, changes: drawChanges,
   limits: drawLimits, uses: drawUses, board: drawBoard, drive: drawDrive,
-  legend: drawLegend, chosen: drawChosen, offers: drawOffers, topics: drawTopics, learned: drawLearned,
+  legend: drawLegend, chosen: drawChosen, topics: drawTopics, learned: drawLearned,
   program: greet, file: saveFile, link: drawShare, current: (link) => { chosen.link = link; }, written: drawShare,
 };
 
@@ -217,12 +217,11 @@ function drawChanges({ kept, rover, drive }) {
   const rows = [...rover, ...drive].map(([name, was, now]) => make("tr", {}, cells("td", [name, was, make("b", {}, now)])));
   const differs = rows.length ? table(["", kept ? "reference" : "loaded", "now"], rows)
     : make("div", { class: "quiet" }, `nothing differs from the rover as ${kept ? "kept" : "loaded"}`);
-  const offers = state.offers || { presets: [] };
   at("changes").replaceChildren(
     make("div", { class: "row" },
       button("Undo", { ask: "undo" }), button("Reset", { ask: "reset" }),
       button("Keep as reference", { ask: "keep" }), kept ? button("Compare with loaded", { ask: "drop" }) : "",
-      select("preset", offers.presets.map((name) => [name, name]), state.chosen?.preset, (name) => ({ ask: "preset", name })),
+      select("preset", (state.chosen?.presets || []).map((name) => [name, name]), state.chosen?.preset, (name) => ({ ask: "preset", name })),
       make("label", {}, "Load a file ", make("input", { type: "file", accept: ".yaml,.yml", style: "width:9em", onchange: upload })),
       button("Save as rover file", { ask: "save rover" })),
     differs);
@@ -241,31 +240,25 @@ function select(label, options, now, question) {
   return box;
 }
 
-function drawChosen() {
-  const { offers, chosen: now } = state;
-  if (!offers || !now) return;
+function drawChosen(now) {
   const colour = (changes) => ({ ask: "colour", layer: now.layer, heading: now.heading, along: now.along, ...changes });
   const row = (label, box) => make("div", { class: "row" }, make("label", {}, label), box);
   const check = (label, on, question) => row(label, make("input", { type: "checkbox", "aria-label": label, ...(on ? { checked: true } : {}), onchange: (event) => ask(question(event.target.checked)) }));
   const rows = [];
-  if (offers.policies) rows.push(
+  if (now.policies) rows.push(
     row("A click sets", select("A click sets", [["goal", "goal"], ["start", "start"]], now.sets, (sets) => ({ ask: "click", sets }))),
-    row("Torques", select("Torques", offers.policies, now.policy, (name) => ({ ask: "policy", name }))),
-    row("Soil", select("Soil", [["", "none (Coulomb)"], ...offers.soils.map((name) => [name, name])], now.soil, (name) => ({ ask: "soil", name }))));
-  rows.push(row("Colour by", select("Colour by", offers.layers.map((name) => [name, name]), now.layer, (layer) => colour({ layer }))));
-  if (offers.predicted.includes(now.layer)) rows.push(
+    row("Torques", select("Torques", now.policies, now.policy, (name) => ({ ask: "policy", name }))),
+    row("Soil", select("Soil", [["", "none (Coulomb)"], ...now.soils.map((name) => [name, name])], now.soil, (name) => ({ ask: "soil", name }))));
+  rows.push(row("Colour by", select("Colour by", now.layers.map((name) => [name, name]), now.layer, (layer) => colour({ layer }))));
+  if (now.predicted.includes(now.layer)) rows.push(
     row("Heading [deg]", make("input", { type: "number", min: -180, max: 180, step: 5, value: now.heading, "aria-label": "Heading [deg]", onchange: (event) => ask(colour({ heading: Number(event.target.value) })) })),
     check("Heading along the path", now.along, (along) => colour({ along })));
   rows.push(check("Forces", now.forces, (shown) => ({ ask: "forces", shown })));
   at("chosen").replaceChildren(...rows);
-  if (offers.speeds) at("speed").replaceChildren(select("Speed", offers.speeds.map((one) => [one, `${one} x`]), now.speed, (times) => ({ ask: "speed", times: Number(times) })));
+  if (now.speeds) at("speed").replaceChildren(select("Speed", now.speeds.map((one) => [one, `${one} x`]), now.speed, (times) => ({ ask: "speed", times: Number(times) })));
   drawShare();
   if (state.changes) drawChanges(state.changes);
-}
-
-function drawOffers() {
-  drawChosen();
-  openTab(chosen.tab);
+  if (!now.policies) openTab(chosen.tab);
 }
 
 // ---- Limits: lanes, curves, and their uses at the time that is shown.
@@ -450,7 +443,7 @@ function saveFile({ name, text }) {
 
 function openTab(name) {
   chosen.tab = name;
-  const plans = !state.offers || state.offers.policies; // else it follows a rover, which has its own program
+  const plans = !state.chosen || state.chosen.policies; // else it follows a rover, which has its own program
   const panels = [...at("panels").children].filter((panel) => plans || ["Drive", "Ground"].includes(panel.dataset.tab));
   for (const panel of at("panels").children) panel.toggleAttribute("data-open", panel.dataset.tab === name);
   at("tabs").replaceChildren(...panels.map((panel) => make("button", {

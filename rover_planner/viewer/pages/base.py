@@ -117,8 +117,7 @@ class PageBase(ABC):
             lambda event: self.requests.put(partial(self._look, event.client, event.target.value))
         )
         for key, (label, words) in HOTKEYS.items():
-            command = gui.add_command(label, hotkey=key)
-            command.on_trigger(lambda _event, words=words: self.hear(words))
+            gui.add_command(label, hotkey=key).on_trigger(partial(self._press, words))
         self.server.on_client_connect(lambda client: self._look(client, START))
         self.server.scene.on_click()(partial(self._request_click, shift=False))
         self.server.scene.on_click(modifier="shift")(partial(self._request_click, shift=True))
@@ -206,13 +205,10 @@ class PageBase(ABC):
         surveyed = () if self.survey is None else self.survey.names
         return [*surveyed, *list_layers(self.ground)]
 
-    def list_layers(self) -> dict[str, Any]:
-        """Return the part `offers` as far as each page has it."""
-        return {"layers": list(self.layers), "predicted": list(PREDICTED)}
-
     def list_chosen(self) -> dict[str, Any]:
-        """Return the part `chosen` as far as each page has it."""
-        return {**asdict(self.colouring), "forces": self.forces}
+        """Return the part `chosen` as far as each page has it: what is chosen, and from what."""
+        offers = {"layers": self.layers, "predicted": list(PREDICTED)}
+        return {**asdict(self.colouring), "forces": self.forces, **offers}
 
     def paint(self) -> None:
         """Begin to colour the ground."""
@@ -239,6 +235,9 @@ class PageBase(ABC):
     def _show_forces(self, words: Words) -> None:
         self.forces = bool(words["shown"])
         self.scene.show_forces(self.forces)
+
+    def _press(self, words: Words, _event: Any) -> None:
+        self.hear(words)
 
     def _look(self, client: Any, name: str) -> None:
         """Show a view, or go along with the rover or not, and name the button by what is next."""

@@ -56,7 +56,6 @@ class LivePage(PageBase):
         """Where the rover was first seen (2,) [m]."""
         self._told_at = self._ground_at = 0.0
         super().__init__(rover, terrain, address, ground_name)
-        self.channel.tell("offers", self.list_layers())
         self.paint()
         self.thread.start()
 
@@ -137,7 +136,6 @@ class LivePage(PageBase):
         self.ground, self.ground_name, self._ground_at = terrain, "elevation_cloud", now
         if self.scene.canvas.move_to(terrain):
             self._first = None
-        self.channel.tell("offers", self.list_layers())
         self.paint()
 
     def _turn_arm(self, data: LiveData) -> None:

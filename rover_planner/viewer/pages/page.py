@@ -61,13 +61,12 @@ class Page(PageBase):
         session.judge = self._judging.ask
         self._advised: advice.Advised | None = None
         """The path that is looked at and the advice on it; None if it was not asked for."""
-        offers = {
+        self._offers = {
             "presets": list(preset_names()),
             "soils": list(load_soils()),
             "policies": [[name, title] for name, title in paths.POLICY_TITLES.items()],
             "speeds": list(SPEEDS),
         }
-        self.channel.tell("offers", self.list_layers() | offers)
         self.has_changed("the cameras are not moved", session.wanted.loaded)  # START is theirs
         self._show()
         self.paint()
@@ -344,7 +343,7 @@ class Page(PageBase):
         made("limits", paths.describe_limits, path, reference, shown.chance)
         model = wanted.options.model
         tell("chosen", {
-            **self.list_chosen(), "policy": model.policy, "soil": model.soil or "",
+            **self.list_chosen(), **self._offers, "policy": model.policy, "soil": model.soil or "",
             "sets": self._click_sets, "speed": self.playback.speed, "preset": wanted.loaded.name,
         })  # fmt: skip
 
