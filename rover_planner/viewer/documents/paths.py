@@ -83,11 +83,10 @@ def _list_policies(shown: Shown) -> list[dict[str, Any]]:
     """Return the verdicts under all policies; none for a replay, whose soil is not known."""
     rows = []
     for policy, title in POLICY_TITLES.items() if shown.scenario.recorded is None else ():
-        one, asked = shown.by_policy.get(policy, ""), shown.scenario.change_options(policy=policy)
-        passes, reason, old = None, one, not one
-        if isinstance(one, Judged):
-            passes, reason = one.verdict.traversable, one.verdict.reason
-            old = not one.is_of(shown.path.poses, asked)
+        one = shown.by_policy.get(policy, "")
+        passes, reason = (None, one) if isinstance(one, str) else (one.traversable, one.reason)
+        is_fresh = policy == shown.verdict.policy or shown.policies_for is shown.scenario
+        old = not (one and is_fresh)
         word = {None: "not judged", True: "passes", False: "refused"}[passes]
         row = {"title": title, "word": word, "passes": passes, "old": old}
         rows.append({**row, "reason": reason or word})

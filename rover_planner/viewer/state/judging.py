@@ -104,8 +104,9 @@ def _judge_new(asked: Scenario) -> Generator[Step, None, Shown]:
         yield Progress(PATH, k + 1, len(paths))
         judged.append(_judge(asked, poses))
     chosen = choose(tuple(judged)).nearest
-    policies = {asked.options.model.policy: judged[chosen]}
-    return Shown(asked, tuple(judged), chosen, len(judged), None, policies)
+    verdict = judged[chosen].verdict
+    policies = {verdict.policy: verdict}
+    return Shown(asked, tuple(judged), chosen, len(judged), by_policy=policies)
 
 
 def _judge_again(asked: Scenario, before: Shown, index: int) -> Generator[Step, None, Shown]:
@@ -119,11 +120,13 @@ def _judge_again(asked: Scenario, before: Shown, index: int) -> Generator[Step, 
         yield Progress(PATH)
         path = _judge(asked, path.poses)
     paths = (*paths[:index], path, *paths[index + 1 :])
-    old = before.by_policy if path.poses is before.path.poses else {}
-    policies = {**old, asked.options.model.policy: path}
+    old, judged_for = before.by_policy, before.policies_for
+    if path.poses is not before.path.poses:
+        old, judged_for = {}, None
+    policies = {**old, path.verdict.policy: path.verdict}
     around = before.around if same else None
     chance = before.chance if path is before.path else None
-    return Shown(asked, paths, index, generated, None, policies, chance, around)
+    return Shown(asked, paths, index, generated, None, policies, judged_for, chance, around)
 
 
 def _recall(shown: Shown, before: Shown | None, values: Scenario) -> Judged | None:
@@ -145,17 +148,17 @@ def _judge_others(shown: Shown) -> Generator[Step, None, Shown]:
 
 def _add_policies(shown: Shown) -> Generator[Step, None, Shown]:
     """Return what is shown with the path's verdicts under all policies."""
-    found, poses = dict(shown.by_policy), shown.path.poses
+    asked, found = shown.scenario, dict(shown.by_policy)
     for k, policy in enumerate(TORQUE_POLICIES):
-        known, asked = found.get(policy), shown.scenario.change_options(policy=policy)
-        if isinstance(known, Judged) and known.is_of(poses, asked):
+        if policy == asked.options.model.policy or shown.policies_for is asked:
             continue
         yield Progress(POLICY, k + 1, len(TORQUE_POLICIES))
         try:
-            found[policy] = _judge(asked, poses)
+            values = asked.change_options(policy=policy)
+            found[policy] = _judge(values, shown.path.poses).verdict
         except RoverError as error:
             found[policy] = str(error)
-    return replace(shown, by_policy=found)
+    return replace(shown, by_policy=found, policies_for=asked)
 
 
 def _add_chance(shown: Shown) -> Shown:

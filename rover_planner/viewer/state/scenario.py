@@ -151,9 +151,10 @@ class Shown:
     """Number of candidates; paths beyond were searched."""
     reference: Judged | None = None
     """The same path with the values of the reference; None if nothing differs from it."""
-    by_policy: Mapping[str, Judged | str] = field(default_factory=dict)
-    """The path under torque policies, as far as it was judged, or why that is not possible; what
-    was judged for other values is old."""
+    by_policy: Mapping[str, Verdict | str] = field(default_factory=dict)
+    """Its verdicts under torque policies that are known, or why a policy has none."""
+    policies_for: Scenario | None = None
+    """Values for which those under other policies than its own were judged."""
     chance: FailureChance | None = None
     """The chance that the path fails, up to where a limit is broken; None while it is not known,
     or for a replay."""
