@@ -23,8 +23,7 @@ of a UTM map than 0.25 m.
 def find_origin(terrain: Terrain) -> Floats:
     """Return the origin (3,) of a scene [m] near the middle of a ground, at its median height."""
     x_low, x_high, y_low, y_high = terrain.bounds
-    known = terrain.elevation[np.isfinite(terrain.elevation)]
-    height = float(np.median(known)) if known.size else 0.0
+    height = np.nanmedian(terrain.elevation)
     middle = np.array([0.5 * (x_low + x_high), 0.5 * (y_low + y_high), height])
     return np.asarray(STEP * np.round(middle / STEP))
 
