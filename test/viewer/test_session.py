@@ -173,6 +173,7 @@ def test_a_recorded_prediction_is_shown_as_it_was_recorded_until_the_rover_is_ch
     shown = session.shown
     assert shown.verdict.reason == verdict.reason != ""
     assert shown.verdict.first_failure == verdict.first_failure
+    assert shown.path.limits.rows.prediction.waypoint.max() == verdict.first_failure
     state = shown.path.trajectory.state_at(10.0)
     row = int(np.searchsorted(prediction.time, 10.0))
     low, high = np.sort(prediction.wheel_loads[row - 1 : row + 1], axis=0)
