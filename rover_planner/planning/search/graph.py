@@ -4,6 +4,9 @@
 An edge that is judged costs what the model found, or cannot be driven. One that is not judged
 costs what it would on level ground, times 1 + `caution` x the doubt at its end, and `caution` x
 PRICE x its difficulty more.
+
+A search goes on from the tree of the last one (compare Koenig, Likhachev and Furcy 2004, Lifelong
+Planning A*): what hangs on edges that are dearer now is cut off and reached anew from around it.
 """
 
 import heapq
