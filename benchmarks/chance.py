@@ -154,12 +154,12 @@ def read_driven_paths(file: Path = CHANCES) -> list[DrivenPath]:
 def find_chance(path: ChancePath, model_std: float | None = None) -> tuple[float, bool]:
     """Return the chance that a path fails, and whether the plain verdict refuses it.
 
-    Uncertain are friction and torque limit as they were drawn, and the model; its error is the
-    default one or `model_std`.
+    Uncertain are friction and torque limit as they were drawn, where the follower keeps the rover,
+    and the model; its error is the default one or `model_std`.
     """
     told = Uncertainty(friction=FRICTION_STD, max_torque=TORQUE_STD)
-    drawn = {"friction", "max_torque", "model"}
-    others = {one.name: 0.0 for one in fields(told) if one.name not in drawn}
+    differ = {"friction", "max_torque", "position", "heading", "model"}
+    others = {one.name: 0.0 for one in fields(told) if one.name not in differ}
     known = replace(told, model=told.model if model_std is None else model_std, **others)
     rover = replace(path.rover(path.max_torque), uncertainty=known)
     options = SweepOptions(policy="servo", friction=path.friction)
