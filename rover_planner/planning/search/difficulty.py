@@ -237,7 +237,7 @@ def _look_at(difficulty, heading, j, i):
         column = min(max(i + difficulty.shifts[heading, wheel, 0], 0), nx - 1)
         row = min(max(j + difficulty.shifts[heading, wheel, 1], 0), ny - 1)
         x, y = difficulty.along_x[row, column], difficulty.along_y[row, column]
-        steepness += math.hypot(x, y)
+        steepness += math.sqrt(x * x + y * y)
         most = max(most, abs(difficulty.ahead[heading, 0] * x + difficulty.ahead[heading, 1] * y))
     logit = LEVEL + (ALL_WHEELS * steepness / 6.0 + ONE_WHEEL * most) / difficulty.climb
     return np.uint8(min(STEPS_PER_UNIT * math.log1p(math.exp(min(logit, 8.0))), 254.0))

@@ -4,6 +4,9 @@
 An edge that is judged costs what the model found, or cannot be driven. One that is not judged
 costs what it would on level ground, times 1 + `caution` x the doubt at its end, and `caution` x
 PRICE x its difficulty more.
+
+A search goes on from the tree of the last one (compare Koenig, Likhachev and Furcy 2004, Lifelong
+Planning A*): what hangs on edges that are dearer now is cut off and reached anew from around it.
 """
 
 import heapq
@@ -22,14 +25,14 @@ PRICE = 4.0
 """Price of a unit of difficulty with a caution of 1 [cells]."""
 SLACK = 1.1
 """Costs to the goal are measured up to this multiple of the cost from start to goal."""
-FEW = 500
-"""Number of nodes that a search may expand beside those of its path before it counts as misled."""
 GUESSED, EAGERNESS = 0.25, 1.5
-"""Share of the nodes that searches may expand so before costs to the goal that are guessed are
+"""Share of the nodes that searches may expand before costs to the goal that are guessed are
 measured, which takes about as long, and guessed costs over those on level ground: the larger, the
 sooner is a path found."""
 GIVEN_UP = -2
 """Result of a search that would expand too many nodes."""
+NO_LIMIT = np.iinfo(np.int64).max
+"""Number of nodes that no search expands."""
 
 
 class Graph(NamedTuple):
@@ -80,12 +83,24 @@ class ToGoal(NamedTuple):
 
 
 class SearchTree(NamedTuple):
-    """Nodes that a search has reached, with their costs."""
+    """Nodes that a search has reached, with their costs. Searches write it."""
 
     cost: np.ndarray
-    """(nodes,) cost from the start [m], infinite where nothing leads, written."""
+    """(nodes,) cost from the seeds of the search [m], infinite where nothing leads."""
     parent: np.ndarray
     """(nodes,) edge that leads to a node; -1 - i for seed i. Written where a cost is finite."""
+    is_open: np.ndarray
+    """(nodes,) True where a node is reached, but not expanded at that cost."""
+    reached: np.ndarray
+    """(nodes,) the nodes that were reached."""
+    number: np.ndarray
+    """(1,) how many these are."""
+
+
+def empty_tree(count: int) -> SearchTree:
+    """Return a tree over so many nodes that has reached none."""
+    cost, parent, reached = np.full(count, np.inf), np.empty(count, int), np.empty(count, int)
+    return SearchTree(cost, parent, np.zeros(count, bool), reached, np.zeros(1, int))
 
 
 @exact_kernel
@@ -111,10 +126,11 @@ def edge_cost(graph, node, k, end):
 def _is_too_dear(graph, node, k, here, known):
     """Return whether edge k of a node, entered at cost `here`, leads nowhere below cost `known`.
 
-    It may say no where it does not know: it does not look at the ground.
+    It may say no where it does not know: it takes the ground as level.
     """
     least = graph.table.least_cost[node % HEADINGS, k]
-    return graph.state[node, k] != PASSES and here + least >= known
+    least += graph.caution * PRICE * graph.difficulty.cell * LEAST_DIFFICULTY
+    return here + least >= known and graph.state[node, k] != PASSES
 
 
 @exact_kernel
@@ -157,7 +173,7 @@ def _bound(graph, node, backwards, to_goal):
 
 @allocating_kernel
 def find_shortest(graph, seeds, exits, backwards, to_goal, tree, slack, most):
-    """Find the shortest path from seeds to exits (A*).
+    """Find the shortest path from seeds to exits (A*); go on from what a tree has reached.
 
     Args:
         graph: Graph.
@@ -165,7 +181,7 @@ def find_shortest(graph, seeds, exits, backwards, to_goal, tree, slack, most):
         exits: The same of the other end.
         backwards: Whether the search is from the goal to the start.
         to_goal: ToGoal.
-        tree: SearchTree, written; backwards only its `cost`.
+        tree: SearchTree, empty or mended; written.
         slack: Up to which multiple of the cost of the shortest path it goes on.
         most: Number of nodes that it may expand.
 
@@ -174,28 +190,30 @@ def find_shortest(graph, seeds, exits, backwards, to_goal, tree, slack, most):
         known; its cost [m]; the cost [m] up to which paths are known, infinite for all; and the
         number of nodes expanded.
     """
-    tree.cost[:] = np.inf
     leave = np.full(tree.cost.size, np.int64(-1))
+    best, found, expanded = np.inf, np.int64(-1), 0
     for i in range(exits.nodes.size):
-        other = leave[exits.nodes[i]]
-        if other < 0 or exits.costs[i] < exits.costs[other]:
-            leave[exits.nodes[i]] = i
-    heap = [(0.0, 0.0, np.int64(-1))]
-    heap.clear()
+        node = exits.nodes[i]
+        if leave[node] < 0 or exits.costs[i] < exits.costs[leave[node]]:
+            leave[node] = i
+        if tree.cost[node] + exits.costs[i] < best:
+            best, found = tree.cost[node] + exits.costs[i], np.int64(i)
+    heap = _list_open(graph, backwards, to_goal, tree)
     for i in range(seeds.nodes.size):
         node, cost = seeds.nodes[i], seeds.costs[i]
         if graph.standing[node] < FAILS and cost < tree.cost[node]:
             _enter(graph, node, cost, -1 - i, backwards, to_goal, tree, heap)
-    best, found, expanded = np.inf, np.int64(-1), 0
     width = graph.state.shape[1]
     while len(heap) > 0:
-        estimate, negative, node = heapq.heappop(heap)
+        estimate, negative, node = heap[0]
         if estimate >= slack * best:
             return found, best, slack * best, expanded
-        if -negative > tree.cost[node]:
-            continue
         if expanded == most:
             return np.int64(GIVEN_UP), np.inf, 0.0, expanded
+        heapq.heappop(heap)
+        if not tree.is_open[node]:
+            continue
+        tree.is_open[node] = False
         expanded += 1
         if leave[node] >= 0 and -negative + exits.costs[leave[node]] < best:
             best, found = -negative + exits.costs[leave[node]], leave[node]
@@ -214,14 +232,111 @@ def find_shortest(graph, seeds, exits, backwards, to_goal, tree, slack, most):
 
 
 @allocating_kernel
+def _list_open(graph, backwards, to_goal, tree):
+    """Return the heap of the open nodes of a tree; drop nodes that are not reached any more."""
+    heap = [(0.0, 0.0, np.int64(-1))]
+    heap.clear()
+    number, tree.number[0] = tree.number[0], 0
+    for node in tree.reached[:number]:
+        cost = tree.cost[node]
+        if cost < np.inf:
+            tree.reached[tree.number[0]] = node
+            tree.number[0] += 1
+            if tree.is_open[node]:
+                heap.append((cost + _bound(graph, node, backwards, to_goal), -cost, node))
+    heapq.heapify(heap)
+    return heap
+
+
+@allocating_kernel
 def _enter(graph, node, cost, parent, backwards, to_goal, tree, heap):
     """Enter a node at a cost [m], if there may be a path from there."""
     bound = _bound(graph, node, backwards, to_goal)
     if bound < np.inf:
-        tree.cost[node] = cost
-        if not backwards:
-            tree.parent[node] = parent
+        if tree.cost[node] == np.inf:
+            tree.reached[tree.number[0]] = node
+            tree.number[0] += 1
+        tree.cost[node], tree.parent[node], tree.is_open[node] = cost, parent, True
         heapq.heappush(heap, (cost + bound, -cost, node))
+
+
+@allocating_kernel
+def mend(graph, seeds, tree, changed):
+    """Mend a tree where costs have changed, for `find_shortest` to go on from there.
+
+    What hangs on a dearer edge is cut off and reached anew from around it.
+
+    Args:
+        graph: Graph.
+        seeds: Seeds of the search.
+        tree: SearchTree from seeds on, not backwards; written.
+        changed: (k,) nodes. The edges that end there, and seeds, may cost something else now;
+            edges that are not of the tree cost no less.
+
+    Returns:
+        Number of nodes that were cut off.
+    """
+    cut = [np.int64(-1)]
+    cut.clear()
+    for node in changed:
+        before = tree.cost[node]
+        if before < np.inf:
+            tree.cost[node] = _cost_by_parent(graph, seeds, tree, node)
+            tree.is_open[node] |= tree.cost[node] < before
+            if tree.cost[node] > before:
+                cut.append(node)
+    _cut_off(graph, tree, cut)
+    for node in cut:
+        _reach_from_around(graph, tree, node)
+    return len(cut)
+
+
+@exact_kernel
+def _cost_by_parent(graph, seeds, tree, node):
+    """Return the cost [m] of a reached node by what its parent costs now."""
+    parent = tree.parent[node]
+    if parent < 0:
+        return seeds.costs[-1 - parent] if graph.standing[node] < FAILS else np.inf
+    first, k = divmod(parent, graph.state.shape[1])
+    return tree.cost[first] + edge_cost(graph, first, k, node)
+
+
+@allocating_kernel
+def _cut_off(graph, tree, cut):
+    """Cut nodes off a tree, with all that hang on them; those are added to the list."""
+    for node in cut:
+        tree.cost[node] = np.inf
+    done = 0
+    while done < len(cut):
+        node = cut[done]
+        done += 1
+        tree.is_open[node] = False
+        for i in range(graph.table.links.shape[2]):
+            other, first, k = _neighbour(graph, node, i, False)
+            if k < 0:
+                break
+            if other < 0 or tree.cost[other] == np.inf:
+                continue
+            if tree.parent[other] == first * graph.state.shape[1] + k:
+                tree.cost[other] = np.inf
+                cut.append(other)
+
+
+@exact_kernel
+def _reach_from_around(graph, tree, node):
+    """Reach a node that was cut off by the best edge from an expanded node, if there is one."""
+    for i in range(graph.table.links.shape[2]):
+        other, first, k = _neighbour(graph, node, i, True)
+        if k < 0:
+            break
+        if other < 0 or tree.is_open[other]:
+            continue
+        if _is_too_dear(graph, first, k, tree.cost[other], tree.cost[node]):
+            continue
+        cost = tree.cost[other] + edge_cost(graph, first, k, node)
+        if cost < tree.cost[node]:
+            tree.cost[node], tree.parent[node] = cost, first * graph.state.shape[1] + k
+    tree.is_open[node] = tree.cost[node] < np.inf
 
 
 @allocating_kernel
@@ -303,13 +418,19 @@ class ShortestPaths:
         self._edges, self._doubt, self._difficulty = edges, doubt, difficulty
         nodes, count = edges.nodes, edges.nodes.count
         self._to_goal = ToGoal(np.empty(count), *nodes.surround(starts.nodes), nodes.cell, np.inf)
-        self._measured = self._most = 0
-        self._tree = SearchTree(np.empty(count), np.empty(count, np.int64))
-        self._caution, self._misled = -1.0, 0
+        self._tree, self._changed = empty_tree(count), [starts.nodes]
+        self._caution, self._measured, self._since = -1.0, 0, 0
         self.expanded = 0
         """Number of nodes expanded by all searches."""
         self.last_expanded = 0
         """Number of nodes expanded by the last search."""
+
+    def note(self, nodes: NDArray[np.int64]) -> None:
+        """Note nodes (k,) to which edges may have other costs now.
+
+        All others have those of the last search, and none costs less but those of its path.
+        """
+        self._changed.append(nodes)
 
     def find(self, starts: Seeds, goals: Seeds, caution: float) -> Route | None:
         """Return the shortest path, None if there is none.
@@ -322,12 +443,10 @@ class ShortestPaths:
         graph = self.graph(caution)
         if caution != self._caution:
             self._begin(graph, starts, goals)
-        goal, cost = self._search(graph, starts, goals)
-        if goal == GIVEN_UP:
+        goal, cost = self._search(graph, starts, goals, max(0, self._measured - self._since))
+        if goal == GIVEN_UP:  # the costs to the goal are worn out
             self._measure(graph, starts, goals)
-            goal, cost = self._search(graph, starts, goals)
-        if self._misled > self._measured:  # the costs to the goal are worn out
-            self._measure(graph, starts, goals)
+            goal, cost = self._search(graph, starts, goals, NO_LIMIT)
         if goal < 0:
             return None
         start, edges = self._follow_back(int(goals.nodes[goal]))
@@ -356,25 +475,27 @@ class ShortestPaths:
         away = np.maximum(cell * np.hypot(rows - row, columns - column) - radius, 0.0)
         self._to_goal.cost.reshape(-1, HEADINGS)[:] = away.reshape(-1, 1)
         self._to_goal = self._to_goal._replace(limit=np.inf)
-        self._measured = self._most = round(GUESSED * nodes.count)
+        self._measured = round(GUESSED * nodes.count)
 
-    def _search(self, graph: Graph, starts: Seeds, goals: Seeds) -> tuple[int, float]:
+    def _search(self, graph: Graph, starts: Seeds, goals: Seeds, most: int) -> tuple[int, float]:
         """Return the goal's seed, -1 or GIVEN_UP, and the cost [m] of the shortest path."""
+        changed = np.unique(np.concatenate(self._changed))
+        cut = mend(graph, starts, self._tree, changed)
         goal, cost, _, expanded = find_shortest(
-            graph, starts, goals, False, self._to_goal, self._tree, 1.0, self._most - self._misled
+            graph, starts, goals, False, self._to_goal, self._tree, 1.0, most
         )
-        self.expanded, self.last_expanded = self.expanded + expanded, expanded
-        self._misled += max(0, expanded - FEW)
+        self._changed, self.last_expanded = [starts.nodes], cut + expanded
+        self.expanded += self.last_expanded
+        self._since += self.last_expanded
         return int(goal), float(cost)
 
     def _measure(self, graph: Graph, starts: Seeds, goals: Seeds) -> None:
-        """Measure the costs to the goal again."""
-        self._misled, self._most = 0, np.iinfo(np.int64).max
-        known = SearchTree(self._to_goal.cost, self._tree.parent)
+        """Measure the costs to the goal again, and begin the search anew."""
+        self._tree, known = (empty_tree(self._edges.nodes.count) for _ in range(2))
         _, _, limit, self._measured = find_shortest(
-            graph, goals, starts, True, self._to_goal, known, SLACK, self._most
+            graph, goals, starts, True, self._to_goal, known, SLACK, NO_LIMIT
         )
-        self._to_goal = self._to_goal._replace(limit=limit)
+        self._to_goal, self._since = self._to_goal._replace(cost=known.cost, limit=limit), 0
 
     def _follow_back(self, node: int) -> tuple[int, NDArray[np.int64]]:
         """Return the start's connection and the edges (k,) that lead to a node."""

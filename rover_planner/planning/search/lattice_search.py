@@ -195,6 +195,7 @@ class LatticeSearch:
             return np.ones(0, bool)
         codes = self.judge.stand(self.edges.nodes.poses(nodes))
         self.edges.standing[nodes] = [self.edges.state_of(code) for code in codes]
+        self.shortest.note(nodes)
         return self.edges.standing[nodes] == PASSES
 
     def _judge_route(self, route: Route) -> bool:
@@ -248,14 +249,14 @@ class LatticeSearch:
             kept.write(index, judged.code, judged.cost)
             if kept is self.edges:
                 self.progress.judged += 1
-                if judged.code:
-                    self._doubt_around(index)
+                self._note(index, DOUBT if judged.code else 0.0)
         return not any(judged.code for judged in found)
 
-    def _doubt_around(self, edge: int) -> None:
-        """Doubt the edges that lead where a refused edge does."""
-        end = self.edges.ends(np.array([edge]))
-        self.doubt[self.edges.nodes.around(end)] += DOUBT
+    def _note(self, edge: int, doubt: float) -> None:
+        """Note that the cost of an edge has changed; add to the doubt of those that lead there."""
+        around = self.edges.nodes.around(self.edges.ends(np.array([edge])))
+        self.doubt[around] += doubt
+        self.shortest.note(around)
 
     def _take(self, route: Route) -> bool:
         """Judge a route as a whole and keep it if it is the best; return whether it passes."""
@@ -276,6 +277,7 @@ class LatticeSearch:
         if isinstance(kept, Edges):
             self._refused.append((index, PASSES, float(kept.cost.flat[index])))
             kept.write(index, code, np.inf)
+            self._note(index, 0.0)
         else:
             kept.costs[index] = np.inf
 

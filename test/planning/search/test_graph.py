@@ -97,6 +97,49 @@ def test_the_shortest_path_is_that_of_dijkstra_whatever_is_known():
     assert found > 0
 
 
+def learn_of(route, known, search, rng):
+    """Judge edges of a route, none below its estimate, refuse and doubt nodes beside; note it."""
+    graph = search.graph(1.0)
+    judged = route.edges[rng.random(len(route.edges)) < 0.5]
+    ends = EDGES.ends(judged)
+    for edge, end in zip(judged, ends, strict=True):
+        estimate = cost_of(graph, *divmod(edge, EDGES.width), end)
+        known.cost.flat[edge] = estimate * (1.0 + 0.2 * rng.random())
+        known.state.flat[edge] = rng.choice([PASSES, PASSES, FAILS])
+    beside = NODES.around(EDGES.ends(route.edges))
+    refused, doubted = rng.choice(beside, 6), rng.choice(beside, 30)
+    known.standing[refused] = FAILS
+    graph.doubt[doubted] += 0.3
+    for nodes in (ends, refused, doubted):
+        search.note(nodes)
+
+
+def test_a_search_goes_on_after_all_that_is_learned_as_one_from_scratch():
+    steps = 0
+    for seed in range(8):
+        known, rng = Edges(NODES, PRIMITIVES), np.random.default_rng(seed)
+        estimates = np.zeros(NODES.count, np.float32), hardness(rng)
+        starts, goals = (
+            Seeds(np.array(nodes), rng.random(2)) for nodes in ([16 * 14, 16 * 15], [16 * 60, 16])
+        )
+        search = ShortestPaths(known, *estimates, starts)
+        for caution in [0.0] * 12 + [1.0] * 28:
+            route = search.find(starts, goals, caution)
+            fresh = ShortestPaths(known, *estimates, starts)
+            fresh.find(starts, goals, 0.0)  # the first costs to the goal would be guesses
+            best = fresh.find(starts, goals, caution)
+            if best is None:
+                assert route is None
+                break
+            assert abs(route.cost - best.cost) < 1e-9
+            learn_of(route, known, search, rng)
+            if rng.random() < 0.1:
+                starts.costs[route.start] += 0.2 * rng.random()
+                goals.costs[route.goal] += 0.2 * rng.random()
+            steps += 1
+    assert steps > 100
+
+
 def test_a_search_goes_on_after_edges_are_refused_and_is_exact_again():
     known, *estimates = random_knowledge(7)
     known.standing[:], known.state[:] = 0, 0
@@ -110,6 +153,7 @@ def test_a_search_goes_on_after_edges_are_refused_and_is_exact_again():
         assert route is not None and route.cost >= before - 1e-9
         before = route.cost
         known.state.flat[route.edges[len(route.edges) // 2]] = FAILS
+        search.note(EDGES.ends(route.edges))
     costs = dijkstra(explicit_costs(known, search.graph(0.0)), indices=starts.nodes)
     route = search.find(starts, goals, 0.0)
     assert abs(route.cost - costs[0, goals.nodes[0]]) < 1e-5

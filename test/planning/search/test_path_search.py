@@ -11,8 +11,9 @@ import pytest
 from rover_physics import Terrain, judge_path, load_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
-from rover_planner.planning.search import query
+from rover_planner.planning.search import lattice_search, query
 from rover_planner.planning.search.edge_memory import EdgeMemory
+from rover_planner.planning.search.graph import ShortestPaths, edge_cost
 from rover_planner.planning.search.ground_estimate import FULL_DOUBT, estimate_ground
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.nodes import nodes_within
@@ -31,7 +32,7 @@ from rover_planner.planning.search.query import (
     cut_out,
 )
 from support.grounds import make_terrain, pen, waves
-from support.rough_grounds import rocky
+from support.rough_grounds import fractal, rocky
 from support.rovers import LSR1
 
 OPTIONS = PathQueryOptions(waypoint_spacing=0.04)
@@ -77,6 +78,50 @@ def test_a_search_that_ends_by_itself_is_near_the_best_and_judges_few_edges(arou
     _, answer, _ = around
     assert answer.repeatable and 1.0 <= answer.bound <= 1.0201
     assert 0 < answer.edges_judged < 0.1 * answer.edges and answer.warning == ""
+
+
+class Compared(ShortestPaths):
+    """Compares paths with what their parts cost now and, if exact, with a search from scratch."""
+
+    steps = 0
+
+    def __init__(self, *known):
+        super().__init__(*known)
+        self.known = known
+
+    def find(self, starts, goals, caution):
+        route, edges, graph = (
+            super().find(starts, goals, caution),
+            self.known[0],
+            self.graph(caution),
+        )
+        anew = ShortestPaths(*self.known).find(starts, goals, 0.0) if caution == 0.0 else route
+        Compared.steps += 1
+        if route is None:
+            assert anew is None
+            return None
+        cost = starts.costs[route.start] + goals.costs[route.goal]
+        for edge, end in zip(route.edges, edges.ends(route.edges), strict=True):
+            cost += edge_cost(graph, *divmod(int(edge), edges.width), end)
+        assert [route.cost, route.cost] == pytest.approx([cost, anew.cost], abs=1e-9)
+        return route
+
+
+@pytest.mark.parametrize(
+    ("ground", "ends", "outcome"),
+    [
+        (fractal(1), ((-2.0, 1.5, 0.0), (2.0, -1.5, 0.0)), FOUND),
+        (make_terrain(pen, half=3.2), ((0.0, 0.0, 0.0), GOAL), NO_WAY),
+    ],
+    ids=["relief", "pen"],
+)
+def test_each_step_of_a_search_knows_all_that_was_learned_before(
+    monkeypatch, ground, ends, outcome
+):
+    monkeypatch.setattr(lattice_search, "ShortestPaths", Compared)
+    monkeypatch.setattr(Compared, "steps", 0)
+    assert find_path(ask(ground, *ends), LONG).outcome == outcome
+    assert Compared.steps > 20
 
 
 def test_the_same_query_has_the_same_path_to_the_bit_with_any_number_of_threads(around):
