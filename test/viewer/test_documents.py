@@ -66,16 +66,23 @@ def test_a_limit_is_broken_on_a_lane_exactly_where_the_verdict_refuses_the_path(
         assert stands == (failure.code != "unknown_ground")
 
 
-@pytest.mark.parametrize("policy", [EQUAL, OPTIMAL])
-def test_board_lanes_curves_and_verdict_show_one_number_for_the_wheel_that_fails(policy):
-    path = judged_on(ramp, friction=0.3, policy=policy)
+@pytest.mark.parametrize(
+    ("height", "policy", "is_between"),
+    [(ramp, EQUAL, False), (ramp, OPTIMAL, True), (stepped, EQUAL, True)],
+)
+def test_board_lanes_curves_and_verdict_show_one_number_for_the_wheel_that_fails(
+    height, policy, is_between
+):
+    path = judged_on(height, friction=0.3, policy=policy)
     failure, end = path.failure, path.trajectory.times[-1]
     assert failure.code == "friction" and failure.link in WHEELS
     use = float(path.limits.lane("friction").used[failure.row])
     words = path.limits.lane("friction").compare(failure.row)
     assert failure.headline == f"{words}, {failure.link.replace('_', ' ')} wheel"
     told = words.replace("friction", "utilisation").replace(" of ", ", limit ")
-    assert failure.link in path.verdict.reason and told in path.verdict.reason
+    [reason] = paths.describe_verdict(Shown(path.scenario, (path,), 0, 1))["details"]
+    assert failure.is_between == reason.startswith("at the next waypoint: ") == is_between
+    assert failure.link in reason and (told in reason or is_between)
     wheel, codes = WHEELS.index(failure.link), [lane.code for lane in path.limits.lanes]
     board = paths.describe_board(failure.state, failure.link)["wheels"][wheel]
     assert board["fails"] and board["bars"][0][2] == paths.write_use(use)

@@ -15,7 +15,7 @@ from rover_physics.names import EQUAL, OPTIMAL, SERVO, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_planner.viewer.state.colours import colour_use, to_css
 from rover_planner.viewer.state.drive import RoverState
-from rover_planner.viewer.state.path_limits import Lane, PathLimits, write
+from rover_planner.viewer.state.path_limits import ON_THE_WAY, Lane, PathLimits, write
 from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
 
 POLICY_TITLES = {EQUAL: "equal torques", SERVO: "speed servos", OPTIMAL: "traction control"}
@@ -61,11 +61,18 @@ def describe_verdict(shown: Shown) -> dict[str, Any]:
         "headline": "" if failure is None else failure.headline,
         "where": "" if failure is None else failure.place,
         "chance": "" if shown.chance is None else _write_chance(shown.chance),
-        "details": [*filter(None, (verdict.reason, closed))],
+        "details": [*filter(None, (_write_reason(shown.path), closed))],
         "policies": _list_policies(shown),
         "offers": _list_offers(shown),
         "fails": failure is not None,
     }
+
+
+def _write_reason(path: Judged) -> str:
+    """Return the reason of a verdict; where it is a waypoint's after a worse place, say so."""
+    failure, reason = path.failure, path.verdict.reason
+    is_later = failure is not None and failure.is_between and not reason.startswith(ON_THE_WAY)
+    return f"at the next waypoint: {reason}" if is_later else reason
 
 
 def _write_chance(chance: FailureChance) -> str:

@@ -276,7 +276,8 @@ def find_failure(rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathL
     broken = np.flatnonzero(is_there & (lane.used > 1.0))
     if not broken.size:  # a recorded refusal that this rover does not explain
         broken = np.flatnonzero(is_there & ~rows.is_between)
-    at = int(broken[np.argmin(rows.is_between[broken])])
+    most = lane.used[broken] == lane.used[broken].max()  # what lanes and curves show as the worst
+    at = int(min(broken[most], key=lambda row: rows.is_between[row]))
     here, explains = rows.prediction.select([at]), lane.is_explained_at(at)
     state = RoverState(rover, here, np.zeros(6))
     if not here.settled[0]:
