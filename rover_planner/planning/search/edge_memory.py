@@ -79,6 +79,10 @@ class EdgeMemory:
         self._poses = query, known
         return known
 
+    def forget_poses(self) -> None:
+        """Forget what is known of poses, which is most of the memory."""
+        self._poses = None
+
     def recall(self, query: SearchQuery, nodes: Nodes) -> Edges:
         """Return the edges between nodes with what is known of them; what is added is kept."""
         last = self._edges

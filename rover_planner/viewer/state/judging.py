@@ -75,7 +75,11 @@ def judge_steps(
         shown = _add_chance(shown)
         yield shown
     if shown.needs_search:
-        yield from _search_around(shown, memory or EdgeMemory())
+        memory = memory or EdgeMemory()
+        try:
+            yield from _search_around(shown, memory)
+        finally:
+            memory.forget_poses()  # the next change of the rover makes them useless
 
 
 def show_recorded(scenario: Scenario, prediction: PathPrediction, reasons: Sequence[str]) -> Shown:
