@@ -1,11 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Ways around obstacles, without a browser: searched, offered, looked at, cancelled, explained."""
 
-import gc
-
 import numpy as np
 
-from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.traversability.judge import judge_path
 from rover_planner.planning.search.path_search import FOUND, NO_WAY
 from rover_planner.planning.search.query import LatticeSettings
@@ -55,17 +52,6 @@ def test_beyond_a_wall_with_a_gap_a_way_is_offered_and_the_path_looked_at_stays(
     np.testing.assert_allclose(poses[[0, -1], :2], [shown.scenario.start[:2], BEYOND], atol=1e-9)
     assert np.all(poses[np.abs(poses[:, 0]) < 0.2, 1] > 1.0)
     assert judge_path(LSR1, shown.scenario.terrain, poses)[1].traversable
-
-
-def test_what_a_search_knew_of_poses_takes_no_memory_after_it():
-    def count() -> int:
-        gc.collect()
-        return sum(type(one) is KnownPoses for one in gc.get_objects())
-
-    before = count()
-    session = walled_session(wall_with_gap)
-    session.plan_to(BEYOND)
-    assert session.shown.around.outcome == FOUND and count() == before
 
 
 def test_the_first_way_is_shown_before_a_better_one_is_searched():

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.prediction.known_poses import KnownPoses
+from rover_physics.prediction.known_poses import MOST, KnownPoses
 from rover_physics.terrain.ground import BLOCK
 from rover_planner.maps.changes import find_changes, have_same_layers
 from rover_planner.parameters.traverse_server import ALLOW
@@ -32,7 +32,9 @@ class EdgeMemory:
     touch them are.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, most_poses: int = MOST) -> None:
+        """Know nothing yet; of at most `most_poses` poses it will, twice, of 1.6 kB each."""
+        self._most_poses = most_poses
         self._edges: tuple[SearchQuery, Edges] | None = None
         self._path: tuple[SearchQuery, list[Piece]] | None = None
         self._poses: tuple[SearchQuery, PosesByModel] | None = None
@@ -69,8 +71,9 @@ class EdgeMemory:
     def recall_poses(self, query: SearchQuery) -> PosesByModel:
         """Return what is known of poses of whole paths, and of pieces; what is added is kept."""
         if self._poses is None or not _is_alike(self._poses[0], query):
-            of_pieces, is_same = KnownPoses(), query.options.accepted_chance >= 1.0
-            known = KnownPoses(others=of_pieces if is_same else None), of_pieces
+            most, is_same = self._most_poses, query.options.accepted_chance >= 1.0
+            of_pieces = KnownPoses(most)
+            known = KnownPoses(most, of_pieces if is_same else None), of_pieces
         else:
             asked, known = self._poses
             changed, reach = _count_changes(asked, query), _reach_of(query)
@@ -78,10 +81,6 @@ class EdgeMemory:
                 one.forget(partial(changed.are_near, reach=reach))
         self._poses = query, known
         return known
-
-    def forget_poses(self) -> None:
-        """Forget what is known of poses, which is most of the memory."""
-        self._poses = None
 
     def recall(self, query: SearchQuery, nodes: Nodes) -> Edges:
         """Return the edges between nodes with what is known of them; what is added is kept."""
