@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.prediction.known_poses import MOST, KnownPoses
+from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.terrain.ground import BLOCK
 from rover_planner.maps.changes import find_changes, have_same_layers
 from rover_planner.parameters.traverse_server import ALLOW
@@ -32,9 +32,7 @@ class EdgeMemory:
     touch them are.
     """
 
-    def __init__(self, most_poses: int = MOST) -> None:
-        """Know nothing yet; of at most `most_poses` poses it will, twice, of 1.6 kB each."""
-        self._most_poses = most_poses
+    def __init__(self) -> None:
         self._edges: tuple[SearchQuery, Edges] | None = None
         self._path: tuple[SearchQuery, list[Piece]] | None = None
         self._poses: tuple[SearchQuery, PosesByModel] | None = None
@@ -71,9 +69,8 @@ class EdgeMemory:
     def recall_poses(self, query: SearchQuery) -> PosesByModel:
         """Return what is known of poses of whole paths, and of pieces; what is added is kept."""
         if self._poses is None or not _is_alike(self._poses[0], query):
-            most, is_same = self._most_poses, query.options.accepted_chance >= 1.0
-            of_pieces = KnownPoses(most)
-            known = KnownPoses(most, of_pieces if is_same else None), of_pieces
+            of_pieces, is_same = KnownPoses(), query.options.accepted_chance >= 1.0
+            known = KnownPoses(others=of_pieces if is_same else None), of_pieces
         else:
             asked, known = self._poses
             changed, reach = _count_changes(asked, query), _reach_of(query)

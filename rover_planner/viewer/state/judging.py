@@ -23,9 +23,7 @@ from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
 PATH, COMPARE, POLICY, CHANCE = "path", "reference", "policy", "chance of failure"
 SEARCH, BETTER = "searching a way", "way found, searching a better one"
 """Names of steps."""
-MOST_POSES = 2_000
-"""Number of poses that searches remember: the next change of the rover makes them useless, and
-glibc keeps large tables that threads have freed."""
+
 
 Step = Progress | Shown
 """The beginning of a step, or what is known."""
@@ -77,7 +75,7 @@ def judge_steps(
         shown = _add_chance(shown)
         yield shown
     if shown.needs_search:
-        yield from _search_around(shown, memory or EdgeMemory(MOST_POSES))
+        yield from _search_around(shown, memory or EdgeMemory())
 
 
 def show_recorded(scenario: Scenario, prediction: PathPrediction, reasons: Sequence[str]) -> Shown:

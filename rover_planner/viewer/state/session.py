@@ -17,7 +17,7 @@ from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import Assumptions
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.studies.rover_values import vary
-from rover_planner.viewer.state.judging import MOST_POSES, Step, judge_steps, show_recorded
+from rover_planner.viewer.state.judging import Step, judge_steps, show_recorded
 from rover_planner.viewer.state.scenario import Pose, Scenario, Shown
 
 REFUSALS = (RoverError, PlanningError)
@@ -52,7 +52,7 @@ class ViewSession:
         self.is_stopped = False
         """True if the judgement of `wanted` was cancelled or failed."""
         self._undo: list[Scenario] = []
-        self.find_steps = partial(judge_steps, memory=EdgeMemory(MOST_POSES))
+        self.find_steps = partial(judge_steps, memory=EdgeMemory())
         """Finds what is shown, as `judge_steps` does."""
         self._asked = self.find_steps(self.wanted)
         """The newest steps."""
