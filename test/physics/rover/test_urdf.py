@@ -3,6 +3,7 @@
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,8 +16,9 @@ from rover_physics import Rover, load_rover
 from rover_physics.errors import RoverFileError
 from rover_physics.names import WHEELS
 from rover_physics.rover.rover_file import preset_names, rover_to_dict, save_rover, save_yaml
+from rover_physics.rover.steering_joints import steered_wheels, steering_joints
 from rover_physics.rover.urdf.joint_map import load_joint_map, map_of
-from rover_physics.rover.urdf.read_rover import Levelling, rover_from_urdf
+from rover_physics.rover.urdf.read_rover import Levelling, ReadRover, rover_from_urdf
 from rover_physics.rover.urdf.robot import parse_robot
 from rover_physics.rover.urdf.write_urdf import write_urdf
 from support.project.checkout import TOP
@@ -34,29 +36,23 @@ def numbers_of(contents: Any, key: str = "") -> dict[str, Any]:
     return {k: v for name, item in pairs for k, v in numbers_of(item, f"{key}.{name}").items()}
 
 
-def assert_alike(first: Rover, second: Rover, tolerance: float) -> None:
+def assert_alike(first: Rover, second: Rover) -> None:
     one, other = numbers_of(rover_to_dict(first)), numbers_of(rover_to_dict(second))
     assert one.keys() == other.keys()
     for key, value in one.items():
         if isinstance(value, float):
-            assert other[key] == pytest.approx(value, rel=0.0, abs=tolerance), key
+            assert other[key] == pytest.approx(value, rel=0.0, abs=1e-9), key
         else:
             assert other[key] == value, key
-
-
-def written(rover: Rover, folder: Path) -> tuple[Path, Path]:
-    """Write URDF and joint map of a rover."""
-    urdf, joints = folder / "rover.urdf", folder / "joints.yaml"
-    write_urdf(urdf, rover)
-    save_yaml(joints, map_of(rover))
-    return urdf, joints
 
 
 @pytest.mark.parametrize("name", preset_names())
 def test_a_rover_comes_back_from_its_urdf_and_its_file(name, tmp_path):
     rover = load_rover(name)
-    read = rover_from_urdf(*written(rover, tmp_path))
-    assert_alike(rover, read.rover, 1e-9)
+    write_urdf(tmp_path / "rover.urdf", rover)
+    save_yaml(tmp_path / "joints.yaml", map_of(rover))
+    read = rover_from_urdf(tmp_path / "rover.urdf", tmp_path / "joints.yaml")
+    assert_alike(rover, read.rover)
     assert read.asymmetry < 1e-9 and read.levelling == Levelling()
     save_rover(tmp_path / "rover.yaml", rover, "two\nlines")
     assert load_rover(tmp_path / "rover.yaml") == rover
@@ -82,23 +78,21 @@ def foreign_urdf() -> str:
     text = '<robot name="foreign">' + link("World", 0.0) + link("Body", 10.0)
     text += '<joint name="Root" type="floating"><parent link="World"/><child link="Body"/></joint>'
     for side, y in (("R", 1.0), ("L", -1.0)):
-        text += link(f"Rocker{side}", 2.0) + link(f"Bogie{side}", 1.0)
-        text += joint(f"P{side}", "revolute", "Body", f"Rocker{side}", f"0.1 {0.3 * y} -0.5",
-                      "0 1 0")  # fmt: skip
-        text += joint(f"Q{side}", "revolute", f"Rocker{side}", f"Bogie{side}", "0.2 0 0.05",
-                      "0 -1 0")  # fmt: skip
-        for wheel, parent, x, z in (
-            ("B", f"Rocker{side}", -0.4, 0.2),
-            ("M", f"Bogie{side}", -0.2, 0.15),
-            ("F", f"Bogie{side}", 0.2, 0.15),
+        rocker, bogie = f"Rocker{side}", f"Bogie{side}"
+        tread = (
+            f'<collision><origin xyz="0 {0.05 * y} 0" rpy="1.5707963267948966 0 0"/>'
+            '<geometry><cylinder radius="0.1" length="0.06"/></geometry></collision>'
+        )
+        text += link(rocker, 2.0) + link(bogie, 1.0)
+        text += joint(f"P{side}", "revolute", "Body", rocker, f"0.1 {0.3 * y} -0.5", "0 1 0")
+        text += joint(f"Q{side}", "revolute", rocker, bogie, "0.2 0 0.05", "0 -1 0")
+        for name, parent, place in (
+            (f"B{side}", rocker, "-0.4 0 0.2"),
+            (f"M{side}", bogie, "-0.2 0 0.15"),
+            (f"F{side}", bogie, "0.2 0 0.15"),
         ):
-            tread = (
-                f'<collision><origin xyz="0 {0.05 * y} 0" rpy="1.5707963267948966 0 0"/>'
-                '<geometry><cylinder radius="0.1" length="0.06"/></geometry></collision>'
-            )
-            text += link(f"Wheel{wheel}{side}", 0.5, tread)
-            text += joint(f"W{wheel}{side}", "continuous", parent, f"Wheel{wheel}{side}",
-                          f"{x} 0 {z}", "0 1 0")  # fmt: skip
+            text += link(f"Wheel{name}", 0.5, tread)
+            text += joint(f"W{name}", "continuous", parent, f"Wheel{name}", place, "0 1 0")
     return text + "</robot>"
 
 
@@ -123,16 +117,23 @@ def foreign_map() -> dict[str, Any]:
     }
 
 
-def read_foreign(folder: Path, text: str = "", **keys: Any) -> Rover:
+def read_foreign(folder: Path, text: str = "", **keys: Any) -> ReadRover:
     """Read the foreign rover with keys of its map changed; None leaves a key out."""
     (folder / "foreign.urdf").write_text(text or foreign_urdf())
     contents = {k: v for k, v in (foreign_map() | keys).items() if v is not None}
     save_yaml(folder / "foreign.yaml", contents)
-    return rover_from_urdf(folder / "foreign.urdf", folder / "foreign.yaml").rover
+    return rover_from_urdf(folder / "foreign.urdf", folder / "foreign.yaml")
+
+
+def turned(text: str, place: str, angle: float) -> str:
+    """Return a URDF with the joints at a place turned about y."""
+    origin = f'<origin xyz="{place}"'
+    assert f"{origin}/>" in text
+    return text.replace(f"{origin}/>", f'{origin} rpy="0 {angle} 0"/>')
 
 
 def test_a_urdf_of_another_convention_is_turned_into_the_body_frame(tmp_path):
-    rover = read_foreign(tmp_path)
+    rover = read_foreign(tmp_path).rover
     suspension, masses = rover.suspension, rover.masses
     assert suspension.rocker_pivot == pytest.approx((0.0, 0.3, 0.0))
     assert suspension.bogie_pivot == pytest.approx((0.2, 0.3, -0.05))
@@ -153,41 +154,29 @@ def test_a_urdf_of_another_convention_is_turned_into_the_body_frame(tmp_path):
 
 
 def test_angles_of_the_map_bring_the_rover_onto_flat_ground(tmp_path):
-    straight = read_foreign(tmp_path)
-    turned = foreign_urdf()
-    for side, y in (("R", 0.3), ("L", -0.3)):
-        place = f'<origin xyz="0.1 {y} -0.5"/>'
-        turned = turned.replace(place, place.replace("/>", ' rpy="0 0.1 0"/>'))
-        assert place not in turned, side
-    again = read_foreign(tmp_path, turned, angles={"PR": -0.1, "PL": -0.1})
-    assert_alike(
-        Rover(**{**vars(straight), "suspension": again.suspension}), Rover(**{**vars(again)}), 1e-9
-    )
+    straight = read_foreign(tmp_path).rover
+    text = turned(turned(foreign_urdf(), "0.1 0.3 -0.5", 0.1), "0.1 -0.3 -0.5", 0.1)
+    again = read_foreign(tmp_path, text, angles={"PR": -0.1, "PL": -0.1}).rover
+    assert_alike(replace(straight, suspension=again.suspension), again)
     assert again.suspension.wheels["rear"] == pytest.approx(straight.suspension.wheels["rear"])
     assert again.suspension.rocker_limits == pytest.approx((-0.6, 0.3))
 
 
 def test_wheels_that_are_not_level_are_brought_onto_level_ground(tmp_path):
     nose_down, turn = -0.02, 0.015
-    straight = read_foreign(tmp_path)
-    tilted = foreign_urdf()
-    for place, angle in (
-        ("0.1 0.3 -0.5", nose_down),
-        ("0.1 -0.3 -0.5", nose_down),
-        ("0.2 0 0.05", turn),
-    ):
-        # The file has y to the right, so its pitch is positive with the nose up.
-        turned = f'<origin xyz="{place}" rpy="0 {angle} 0"/>'
-        assert f'<origin xyz="{place}"/>' in tilted
-        tilted = tilted.replace(f'<origin xyz="{place}"/>', turned)
-    rover = read_foreign(tmp_path, tilted)
-    read = rover_from_urdf(tmp_path / "foreign.urdf", tmp_path / "foreign.yaml")
+    straight = read_foreign(tmp_path).rover
+    # The file has y to the right, so its pitch is positive with the nose up.
+    text = turned(foreign_urdf(), "0.2 0 0.05", turn)
+    for place in ("0.1 0.3 -0.5", "0.1 -0.3 -0.5"):
+        text = turned(text, place, nose_down)
+    read = read_foreign(tmp_path, text)
+    suspension = read.rover.suspension
     # The rockers are turned back by the pitch of the body, the bogies by their own angle.
     assert read.levelling.pitch == pytest.approx(nose_down, abs=1e-6)
     assert read.levelling.bogie == pytest.approx(turn, abs=1e-6)
     for wheel, place in straight.suspension.wheels.items():
-        assert rover.suspension.wheels[wheel] == pytest.approx(place, abs=1e-6)
-    assert rover.suspension.bogie_limits == pytest.approx((-0.4 - turn, 0.5 - turn), abs=1e-6)
+        assert suspension.wheels[wheel] == pytest.approx(place, abs=1e-6)
+    assert suspension.bogie_limits == pytest.approx((-0.4 - turn, 0.5 - turn), abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -249,14 +238,14 @@ def test_a_wrong_urdf_is_refused_with_what_is_wrong(old, new, said, tmp_path):
         read_foreign(tmp_path, text.replace(old, new, 1))
 
 
-def insert_link(text: str, joint: str, kind: str, axis: str = "0 0 1") -> str:
-    """Return a URDF with a link between a joint's parent and the joint, on a joint of its own."""
+def insert_link(text: str, joint: str, axis: str = "0 1 0") -> str:
+    """Return a URDF with a link between a joint's parent and the joint, on a pivot of its own."""
     before, after = text.split(f'<joint name="{joint}" ')
     own, after = after.split("</joint>", 1)
     parent = re.search('<parent link="(.*?)"/>', own)[1]
     own = own.replace(f'<parent link="{parent}"/>', f'<parent link="On{joint}"/>')
     return (
-        f'{before}<link name="On{joint}"/><joint name="To{joint}" type="{kind}">'
+        f'{before}<link name="On{joint}"/><joint name="To{joint}" type="revolute">'
         f'<parent link="{parent}"/><child link="On{joint}"/><axis xyz="{axis}"/></joint>'
         f'<joint name="{joint}" {own}</joint>{after}'
     )
@@ -266,25 +255,25 @@ def test_what_moves_between_a_rocker_and_its_wheels_is_refused_unless_it_is_name
     tmp_path,
 ):
     """A second lambda between bogie and wheels was frozen in silence."""
-    straight = read_foreign(tmp_path)
+    straight = read_foreign(tmp_path).rover
     text = foreign_urdf()
     for side in "RL":
-        text = insert_link(text, f"WM{side}", "revolute", "0 1 0")
+        text = insert_link(text, f"WM{side}")
     with pytest.raises(
         RoverFileError, match="wheels.middle_.*: it hangs on joint ToWM., which is"
     ):
         read_foreign(tmp_path, text)
-    assert_alike(read_foreign(tmp_path, text, fixed=["ToWMR", "ToWML"]), straight, 1e-9)
+    assert_alike(read_foreign(tmp_path, text, fixed=["ToWMR", "ToWML"]).rover, straight)
 
 
 @pytest.mark.parametrize("on_body", [False, True])
 def test_a_rocker_in_parts_that_have_joints_of_their_own_is_one_rocker(tmp_path, on_body):
     """As in models of Curiosity: the arm to the bogie, or that to the lone wheel, has a joint."""
-    straight = read_foreign(tmp_path)
+    straight = read_foreign(tmp_path).rover
     text = foreign_urdf()
     for side, y in (("R", 0.3), ("L", -0.3)):
         joint = f"WB{side}" if on_body else f"Q{side}"
-        text = insert_link(text, joint, "revolute", "0 1 0")
+        text = insert_link(text, joint)
         if on_body:  # what carries the lone wheel hangs on the body, where the rocker does
             at = f'<parent link="Rocker{side}"/><child link="OnWB{side}"/>'
             assert at in text
@@ -294,7 +283,7 @@ def test_a_rocker_in_parts_that_have_joints_of_their_own_is_one_rocker(tmp_path,
     names = [f"To{'WB' if on_body else 'Q'}{side}" for side in "RL"]
     with pytest.raises(RoverFileError, match="fixed"):
         read_foreign(tmp_path, text)
-    assert_alike(read_foreign(tmp_path, text, fixed=names), straight, 1e-9)
+    assert_alike(read_foreign(tmp_path, text, fixed=names).rover, straight)
 
 
 def tilted(text: str, slope: float) -> str:
@@ -307,9 +296,8 @@ def tilted(text: str, slope: float) -> str:
 
 def test_pivots_of_rockers_that_rise_outwards_are_taken_as_level_and_told(tmp_path):
     """As in models of Curiosity, by 0.2 rad."""
-    straight = read_foreign(tmp_path)
-    assert_alike(read_foreign(tmp_path, tilted(foreign_urdf(), 0.2)), straight, 1e-9)
-    read = rover_from_urdf(tmp_path / "foreign.urdf", tmp_path / "foreign.yaml")
+    read = read_foreign(tmp_path, tilted(foreign_urdf(), 0.2))
+    assert_alike(read.rover, read_foreign(tmp_path).rover)
     assert read.tilt == pytest.approx(math.atan(0.2))
     with pytest.raises(RoverFileError, match=r"rocker.right: joint PR turns about \[0.0, -0.9"):
         read_foreign(tmp_path, tilted(foreign_urdf(), 0.4))
@@ -318,7 +306,7 @@ def test_pivots_of_rockers_that_rise_outwards_are_taken_as_level_and_told(tmp_pa
 @pytest.mark.parametrize("kind", ["rocker", "bogie"])
 def test_a_rover_of_three_bogies_is_refused_by_name(kind, tmp_path):
     """The one across the rover is on both sides, whatever it was thought to be."""
-    text = insert_link(foreign_urdf(), "Root", "revolute", "1 0 0")
+    text = insert_link(foreign_urdf(), "Root", "1 0 0")
     with pytest.raises(RoverFileError, match="a rover of three bogies has neither"):
         read_foreign(tmp_path, text, **{kind: {"right": "ToRoot", "left": "ToRoot"}})
 
@@ -379,9 +367,8 @@ def test_mujoco_has_masses_and_wheels_of_the_urdf_where_the_model_has_them(name,
     angles |= dict(zip(("bogie_right", "bogie_left"), BOGIES, strict=True))
     if rover.manipulator is not None:
         angles |= dict(zip(rover.manipulator.joints, rover.manipulator.stowed, strict=True))
-    for wheel, side_and_place in enumerate(WHEELS):
-        if side_and_place.split("_")[0] in rover.steering.wheels:
-            angles[f"{side_and_place}_steering"] = steering[0, wheel] = TURN
+    angles |= dict.fromkeys(steering_joints(rover), TURN)
+    steering[0, steered_wheels(rover)] = TURN
     for joint, angle in angles.items():
         data.joint(joint).qpos = angle
     mujoco.mj_kinematics(model, data)
