@@ -15,11 +15,12 @@ from scipy.ndimage import gaussian_filter
 from scipy.special import bdtrik
 
 from rover_physics import Rover, SweepOptions, Terrain, judge_path
-from rover_physics.bounds.path import bound_path, forget_terrains, prepare_bounds
+from rover_physics.bounds.path import forget_terrains, prepare_bounds
 from rover_physics.errors import ModelError
 from rover_physics.results.path_prediction import BOUNDED_VALUES
 from rover_physics.status import BoundStatus
-from rover_physics.traversability.verdict import hold_against_limits, refuse_worst_case
+from support.grounds import make_terrain
+from support.paths import arc_of, poses_at
 from support.rough_grounds import RESOLUTION, fractal, plane, rocky, with_std
 from support.rovers import LSR1, M2020
 
@@ -29,9 +30,7 @@ ROUNDING = 1e-6
 
 def step(height: float) -> Terrain:
     """Return level ground with a step up of `height` [m] at x = 0.3."""
-    flat = plane(0.0, 0.0, half=3.0)
-    x = flat.origin[0] + RESOLUTION * np.arange(flat.elevation.shape[1])
-    return replace(flat, elevation=flat.elevation + height * (x > 0.3))
+    return make_terrain(lambda x, y: height * (x > 0.3), RESOLUTION, 3.0)
 
 
 def uncertain_grounds(rover: Rover) -> dict[str, Terrain]:
@@ -50,19 +49,15 @@ def path_across(seed: int, count: int = 24) -> np.ndarray:
     rng = np.random.default_rng(seed)
     heading, aside = rng.uniform(-0.5, 0.5), rng.uniform(-0.6, 0.6)
     along = np.linspace(-1.0, 1.0, count)
-    x, y = along * np.cos(heading), aside + along * np.sin(heading)
-    return np.column_stack([x, y, np.full(count, heading)])
+    return poses_at(along * np.cos(heading), aside + along * np.sin(heading), heading)
 
 
 def arc_across(seed: int, size: float, count: int = 24) -> np.ndarray:
     """Return an arc (count, 3) near the middle of a ground, of radius 0.5 or 1 m times `size`."""
     rng = np.random.default_rng(seed)
     radius, heading = rng.choice([-0.5, -1.0, 0.5, 1.0]) * size, rng.uniform(-np.pi, np.pi)
-    turn = np.linspace(0.0, 0.8 * size, count) / radius
-    x, y = radius * np.sin(turn), radius * (1.0 - np.cos(turn))
-    c, s = np.cos(heading), np.sin(heading)
     start = rng.uniform(-0.3, 0.3, 2) * size
-    return np.column_stack([start[0] + c * x - s * y, start[1] + s * x + c * y, heading + turn])
+    return arc_of(1.0 / radius, np.linspace(0.0, 0.8 * size, count), heading) + poses_at(*start)
 
 
 def draw_maps(terrain: Terrain, length: float, count: int, seed: int) -> Iterator[Terrain]:
@@ -76,27 +71,22 @@ def draw_maps(terrain: Terrain, length: float, count: int, seed: int) -> Iterato
     """
     rng = np.random.default_rng(seed)
     shape, width = terrain.elevation.shape, length / terrain.resolution / 2.0
+    smooth = partial(gaussian_filter, sigma=width, mode="wrap")
     impulse = np.zeros(shape)
     impulse[shape[0] // 2, shape[1] // 2] = 1.0
-    scale = 1.0 / np.sqrt((_smooth(impulse, width) ** 2).sum())
+    scale = 1.0 / np.sqrt((smooth(impulse) ** 2).sum())
     for _ in range(count):
-        error = scale * _smooth(rng.standard_normal(shape), width)
+        error = scale * smooth(rng.standard_normal(shape))
         yield replace(terrain, elevation=terrain.elevation + terrain.elevation_std * error)
-
-
-def _smooth(values: np.ndarray, width: float) -> np.ndarray:
-    return gaussian_filter(values, width, mode="wrap") if width > 0.0 else values
 
 
 SLOPE = plane(0.2, 0.1, half=3.0)
 PATH = path_across(4)
 
 
-def bounds_on(rover, terrain, poses=PATH, sigmas=3.0, **arguments):
+def bounds_on(rover, terrain, poses=PATH, **arguments):
     prediction = judge_path(rover, terrain, poses, SweepOptions(**arguments))[0]
-    return prediction, bound_path(
-        rover, terrain, prediction, SweepOptions(**arguments), sigmas=sigmas
-    )
+    return prediction, prediction.bounds
 
 
 def draw_path(rover, terrain, poses, length, count, seed, policy="equal"):
@@ -288,13 +278,12 @@ def test_each_limit_is_held_against_its_bound(rover, code):
 def test_the_foot_of_a_wall_has_no_bounds_and_says_why():
     """Just before its front wheels climb, noise decides on which level they stand."""
     ground = with_std(step(1.6 * M2020.wheel.radius), 0.006)
-    x = np.arange(-1.2, 0.0, 0.02)
-    poses = np.column_stack([x, 0.0 * x + 0.05, 0.0 * x + 0.03])
-    prediction, bounds = bounds_on(M2020, ground, poses)
-    edges = bounds.status == BoundStatus.ON_EDGE
-    assert 0 < edges.sum() < 0.2 * len(x)
-    assert np.all(np.isnan(bounds.roll[edges]))
-    verdict = refuse_worst_case(M2020, prediction, bounds, hold_against_limits(M2020, prediction))
+    prediction, verdict = judge_path(
+        M2020, ground, poses_at(np.arange(-1.2, 0.0, 0.02), 0.05, 0.03)
+    )
+    edges = prediction.bounds.status == BoundStatus.ON_EDGE
+    assert 0 < edges.sum() < 0.2 * len(edges)
+    assert np.all(np.isnan(prediction.bounds.roll[edges]))
     reasons = {verdict.reasons[i] for i in np.flatnonzero(edges) if "edge" in verdict.reasons[i]}
     assert reasons == {"a wheel may climb or fall off an edge within 3 sigma of the map"}
 
@@ -308,13 +297,12 @@ def test_unknown_ground_and_the_end_of_the_map_within_reach_are_told_apart(last,
     ground = plane(0.0, 0.0, half=1.2)
     elevation = ground.elevation.copy()
     elevation[:, last + 1 :] = np.nan
-    ground = replace(ground, elevation=elevation, elevation_std=np.full(elevation.shape, 0.015))
+    ground = with_std(replace(ground, elevation=elevation), 0.015)
     edge = ground.origin[0] + ground.resolution * last
     poses = np.array([[edge - 0.501, 0.0, 0.0], [edge - 0.7, 0.0, 0.0]])
-    prediction, bounds = bounds_on(LSR1, ground, poses)
+    prediction, verdict = judge_path(LSR1, ground, poses)
     assert prediction.settled.all()
-    assert bounds.status.tolist() == [status, BoundStatus.BOUNDED]
-    verdict = judge_path(LSR1, ground, poses)[1]
+    assert prediction.bounds.status.tolist() == [status, BoundStatus.BOUNDED]
     assert verdict.codes[0] == code
     assert verdict.reasons[0].endswith("within 3 sigma of the map")
 
@@ -339,10 +327,7 @@ def test_soil_and_its_sinkage_are_bounded(policy):
     assert bounds.bounded.all()
     assert np.all(bounds.sinkage[..., 1] > prediction.sinkage)
     assert np.all(bounds.friction_utilisation[..., 1] > prediction.friction_utilisation)
-    for seed in range(2):
-        rng = np.random.default_rng(seed)
-        error = 0.001 * rng.standard_normal(terrain.elevation.shape)
-        sample = replace(terrain, elevation=terrain.elevation + error)
+    for sample in draw_maps(terrain, 0.0, 2, 0):
         swept = judge_path(LSR1, sample, PATH, SweepOptions(soil="dry_sand", policy=policy))[0]
         assert np.all(swept.friction_utilisation <= bounds.friction_utilisation[..., 1])
         assert np.all(swept.torque_saturation <= bounds.torque_saturation[..., 1])

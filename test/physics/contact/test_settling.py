@@ -1,20 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """Settling: all six wheels touch, where MuJoCo says; the belly is clear of what is below."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rover_physics import PoseStatus, Terrain, judge_path, judge_poses, load_rover
+from rover_physics import PoseStatus, Terrain, judge_path, judge_poses
 from rover_physics.results.record import QUANTITIES
 from rover_physics.rover.urdf.read_rover import rover_from_urdf
+from support.grounds import make_terrain
+from support.paths import poses_at
+from support.project.checkout import TOP
 from support.reference_cases import reference_predictions, steered_predictions
 from support.rough_grounds import fractal, plane, random_poses, rocky, scaled_for, smooth
 from support.rover_geometry import ANGLE, GAP, attitude_of, place_rover, wheel_axes, wheel_gaps
-from support.rovers import LSR1
+from support.rovers import LSR1, M2020
 
 slopes = st.floats(-0.4, 0.4)
 headings = st.floats(-np.pi, np.pi)
@@ -75,8 +76,7 @@ def test_a_peak_below_a_wheel_is_found_wherever_it_is():
     ground = Terrain(heights, 0.01, (-1.2, -1.2))
     x = LSR1.suspension.wheels["middle"][0]
     aside = 0.45 * LSR1.wheel.width * np.linspace(-1.0, 1.0, 19)
-    poses = np.column_stack([np.full(19, -x), aside, np.zeros(19)])
-    prediction = judge_poses(LSR1, ground, poses, np.zeros(19))[0]
+    prediction = judge_poses(LSR1, ground, poses_at(-x, aside), np.zeros(19))[0]
     assert prediction.settled.all()
     lift = prediction.wheel_centres[:, 1, 2] - LSR1.wheel.radius
     assert lift == pytest.approx(0.03, abs=2e-3)
@@ -84,7 +84,7 @@ def test_a_peak_below_a_wheel_is_found_wherever_it_is():
 
 def test_a_wheel_whose_rim_touches_the_edge_of_a_step_settles():
     """The rim slips off the edge while the rover is turned; the edge below the wheel holds it."""
-    files = Path(__file__).parents[3] / "examples" / "rover"
+    files = TOP / "examples" / "rover"
     rover = rover_from_urdf(files / "kit_rover.urdf", files / "kit_rover_joints.yaml").rover
     x = np.arange(-1.0, 1.0, 0.01)
     ground = Terrain(np.tile(np.where(x > 0.0, 0.06, 0.0), (101, 1)), 0.01, (-1.0, -0.5))
@@ -111,9 +111,8 @@ def test_contact_points_lie_on_the_wheels_and_on_the_ground(predict, count):
 # Kinematics
 
 
-@pytest.mark.parametrize("preset", ["lsr1", "m2020"])
-def test_wheel_centres_follow_from_pose_and_suspension_angles(preset):
-    rover = load_rover(preset)
+@pytest.mark.parametrize("rover", [LSR1, M2020], ids=lambda rover: rover.name)
+def test_wheel_centres_follow_from_pose_and_suspension_angles(rover):
     ground, poses = scaled_for(rover, fractal(3), random_poses(1, 20, 0.8))
     prediction = judge_path(rover, ground, poses)[0]
     assert prediction.settled.all()
@@ -143,12 +142,8 @@ def test_on_a_plane_the_rover_lies_like_the_plane(slope_x, slope_y, height, yaw)
 # It settles nearly everywhere, and says so where it doesn't
 
 
-def known_to_the_left_of(x_edge: float) -> Terrain:
-    ground = plane(0.0, 0.0)
-    elevation = ground.elevation.copy()
-    x = ground.origin[0] + np.arange(elevation.shape[1]) * ground.resolution
-    elevation[:, x > x_edge] = np.nan
-    return Terrain(elevation, ground.resolution, ground.origin)
+def known_to_the_left_of(edge: float) -> Terrain:
+    return make_terrain(lambda x, y: np.where(x > edge, np.nan, 0.0), 0.04, 1.2)
 
 
 LEVEL = plane(0.0, 0.0)
@@ -174,11 +169,8 @@ def test_wheels_over_unknown_ground_and_off_the_map_are_told_apart(ground, x, st
 
 
 def test_a_wall_across_the_rover_is_never_settled_by_a_guess():
-    x = (np.arange(121) - 60) * 0.04
-    wall = np.where(np.abs(x) < 0.10, 1.5, 0.0)
-    ground = Terrain(np.broadcast_to(wall, (121, 121)).copy(), 0.04, (x[0], x[0]))
-    poses = np.column_stack([np.linspace(-0.6, 0.6, 9), np.zeros((9, 2))])
-    prediction = judge_path(LSR1, ground, poses)[0]
+    ground = make_terrain(lambda x, y: np.where(np.abs(x) < 0.10, 1.5, 0.0), 0.04, 2.4)
+    prediction = judge_path(LSR1, ground, poses_at(np.linspace(-0.6, 0.6, 9)))[0]
     for i in np.flatnonzero(prediction.settled):
         assert np.abs(wheel_gaps(LSR1, ground, prediction, i)).max() <= 5e-3
     assert (prediction.status == PoseStatus.NOT_SETTLED).any()

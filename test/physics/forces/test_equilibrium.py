@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rover_physics import PoseStatus, Rover, SweepOptions, judge_path, judge_poses, load_rover
+from rover_physics import PoseStatus, Rover, SweepOptions, judge_path, judge_poses
 from rover_physics.forces.stability import tip_over_angles
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.rover.manipulator import link_points
-from rover_physics.rover.model import Steering
 from rover_physics.traversability.torque_ranges import evaluate_in_turn
+from support.paths import poses_at
 from support.reference_cases import reference_grounds, reference_predictions, steered_predictions
 from support.rough_grounds import fractal, plane, random_poses, rocky, scaled_for, smooth
 from support.rover_geometry import (
@@ -24,7 +24,7 @@ from support.rover_geometry import (
     place_rover,
     turned_round,
 )
-from support.rovers import LSR1, M2020
+from support.rovers import ALL_STEER, LSR1, M2020
 
 ROVERS = (LSR1, M2020, turned_round(LSR1), turned_round(M2020))
 seeds = st.integers(0, 10_000)
@@ -161,10 +161,8 @@ def test_wheels_that_are_hardly_turned_share_as_straight_ones():
 
 
 def test_in_a_crab_up_a_slope_the_tractions_carry_the_weight_along_it():
-    crab = replace(LSR1, steering=Steering(("rear", "middle", "front"), np.pi / 2, 0.35))
-    y = np.linspace(-0.2, 0.2, 9)
-    poses = np.column_stack([0.0 * y, y, 0.0 * y])
-    prediction = judge_path(crab, plane(0.0, np.tan(0.2)), poses)[0]
+    poses = poses_at(0.0, np.linspace(-0.2, 0.2, 9))
+    prediction = judge_path(ALL_STEER, plane(0.0, np.tan(0.2)), poses)[0]
     expected = np.full((9, 6), LSR1.weight * np.sin(0.2) / 6.0)
     assert prediction.tangential == pytest.approx(expected, rel=1e-4)
     assert np.abs(prediction.lateral).max() <= 1e-3 * LSR1.weight
@@ -209,9 +207,8 @@ def test_a_moment_that_turns_over_the_nearest_edge_takes_from_the_margin():
     assert turned[0] == pytest.approx(angle(0.0))  # a moment about the vertical tips nothing
 
 
-@pytest.mark.parametrize("preset", ["lsr1", "m2020"])
-def test_on_flat_ground_both_measures_are_one(preset):
-    rover = load_rover(preset)
+@pytest.mark.parametrize("rover", [LSR1, M2020], ids=lambda rover: rover.name)
+def test_on_flat_ground_both_measures_are_one(rover):
     prediction = judge_path(rover, plane(0.0, 0.0, half=3.0), [[0.1, 0, 0], [0, 0.2, 1.0]])[0]
     assert prediction.tip_over_ratio == pytest.approx([1.0, 1.0], abs=1e-9)
     assert prediction.tip_over_force_angle == pytest.approx([1.0, 1.0], abs=1e-9)

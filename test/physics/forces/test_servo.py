@@ -31,6 +31,7 @@ from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.status import Stall
 from rover_physics.traversability.torque_ranges import evaluate_in_turn
+from support.paths import poses_at
 from support.rough_grounds import fractal, plane, random_poses, rocky, smooth
 from support.rover_geometry import balance_residuals
 from support.rovers import FIXED, LSR1, M2020
@@ -45,11 +46,6 @@ few = settings(max_examples=12)
 
 def with_droop(rover, droop):
     return replace(rover, wheel=replace(rover.wheel, servo_droop=droop))
-
-
-def straight(length: float, count: int) -> np.ndarray:
-    x = np.linspace(-0.5 * length, 0.5 * length, count)
-    return np.column_stack([x, 0.0 * x, 0.0 * x])
 
 
 def servos_at(rover, ground, poses, options, curvature):
@@ -80,7 +76,7 @@ def test_the_nine_equations_hold(rover, curvature, ground, half, options, least)
 
 def test_without_turning_the_forces_balance_by_an_independent_model():
     narrow = replace(LSR1, wheel=replace(LSR1.wheel, width=1e-3))  # no scrub
-    prediction = judge_path(narrow, fractal(3), straight(3.0, 30), SERVO)[0]
+    prediction = judge_path(narrow, fractal(3), poses_at(np.linspace(-1.5, 1.5, 30)), SERVO)[0]
     assert prediction.settled.all() and (prediction.speed_share > 0.5).all()
     for i in range(30):
         residuals = balance_residuals(narrow, prediction, i)
@@ -166,10 +162,9 @@ def test_a_slope_beyond_the_ground_slides_and_one_beyond_the_motors_stalls(
 
 @pytest.mark.parametrize(("slope", "soil"), [(0.3, None), (0.05, "dry_sand")])
 def test_energy_and_time_count_slip_and_droop(slope, soil):
+    ground, path = plane(slope, 0.0), poses_at(np.linspace(-0.3, 0.3, 13))
     servo, equal = (
-        judge_path(
-            LSR1, plane(slope, 0.0), straight(0.6, 13), SweepOptions(soil=soil, policy=policy)
-        )[0]
+        judge_path(LSR1, ground, path, SweepOptions(policy, soil=soil))[0]
         for policy in ("servo", "equal")
     )
     assert servo.time[-1] == pytest.approx(equal.time[-1] / servo.speed_share[0], rel=1e-3)

@@ -9,6 +9,8 @@ import pytest
 from rover_physics import SweepOptions, Terrain, judge_path
 from rover_physics.prediction.drops import FACE
 from rover_physics.traversability.verdict import hold_against_limits
+from support.grounds import make_terrain
+from support.paths import poses_at
 from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import plane, smooth
 from support.rover_geometry import balance_residuals
@@ -20,9 +22,7 @@ RADIUS = LSR1.wheel.radius
 
 def sharp_step(size: float, resolution: float = 0.005) -> Terrain:
     """Return the step of `size` [m] with a face one fine cell long."""
-    axis = -2.2 + resolution * np.arange(round(4.4 / resolution) + 1)
-    height = size * np.clip(axis / resolution + 0.5, 0.0, 1.0)
-    return Terrain(np.tile(height, (len(axis), 1)), resolution, (-2.2, -2.2))
+    return make_terrain(lambda x, y: size * np.clip(x / resolution + 0.5, 0, 1), resolution, 2.2)
 
 
 def drive(ground, rover=FREE, **options):
@@ -36,10 +36,7 @@ def drive(ground, rover=FREE, **options):
 
 def falling_away(degrees: float) -> Terrain:
     """Return level ground that goes over into a slope down along +x, at x = 0."""
-    level = plane(0.0, 0.0, half=2.2)
-    x = level.origin[0] + level.resolution * np.arange(level.elevation.shape[1])
-    fall = np.where(x > 0.0, -np.tan(np.radians(degrees)) * x, 0.0)
-    return replace(level, elevation=np.broadcast_to(fall, level.elevation.shape))
+    return make_terrain(lambda x, y: -np.tan(np.radians(degrees)) * np.maximum(x, 0.0), 0.04, 2.2)
 
 
 @pytest.mark.parametrize(
@@ -97,11 +94,8 @@ def test_a_wheel_that_meets_an_edge_is_judged_as_it_leaves_the_ground_wherever_w
     height = 0.8 * RADIUS
     needed = []
     for shift in (0.0, 0.0034, 0.0068, 0.0071, 0.0142):
-        poses = drive_path(0.02) + np.array([shift, 0.0, 0.0])
-        prediction = judge_path(
-            FREE, sharp_step(height), poses, SweepOptions(policy="optimal", friction=0.5)
-        )[0]
-        between = prediction.between
+        poses, options = drive_path(0.02) + poses_at(shift), SweepOptions("optimal", friction=0.5)
+        between = judge_path(FREE, sharp_step(height), poses, options)[0].between
         front = (between.poses[:, 0] < -0.3) & (between.contact_angle[:, 2] > 0.0)
         needed.append(between.friction_utilisation[front].max())
         leaving = np.arccos(1.0 - height / RADIUS)
@@ -114,7 +108,7 @@ def test_at_the_foot_of_a_step_every_pose_settles(height=0.15):
     reach = np.sqrt(RADIUS**2 - max(RADIUS - height, 0.0) ** 2)
     place = -LSR1.suspension.wheels["front"][0] - reach
     x = place + np.arange(-0.03, 0.03, 0.0001)
-    prediction = judge_path(FREE, sharp_step(height), np.column_stack([x, 0 * x, 0 * x]))[0]
+    prediction = judge_path(FREE, sharp_step(height), poses_at(x))[0]
     assert prediction.settled.all()
 
 
@@ -123,7 +117,7 @@ def test_at_the_foot_of_a_wall_a_wheel_touches_tread_and_face_at_once(height=0.2
     ground = sharp_step(height)
     place = -LSR1.suspension.wheels["front"][0] - RADIUS
     x = place + np.arange(-0.01, 0.02, 0.0005)
-    prediction = judge_path(FREE, ground, np.column_stack([x, 0 * x, 0 * x]))[0]
+    prediction = judge_path(FREE, ground, poses_at(x))[0]
     centre = prediction.wheel_centres[:, 2]
     before = centre[:, 2] < RADIUS + 1e-3
     assert prediction.settled.all()
@@ -135,21 +129,17 @@ def test_at_the_foot_of_a_wall_a_wheel_touches_tread_and_face_at_once(height=0.2
     assert np.degrees(prediction.between.contact_angle).max() > 85.0
 
 
+EDGE = drive_ground("step", -0.15)
+"""A step of 15 cm that goes down along +x."""
 SLIPPERY = 0.27
 """Friction that holds a wheel up to 15 degrees: it falls from the edge almost at once."""
-
-
-def edge_down(height: float) -> Terrain:
-    """Return a step of `height` [m] that goes down along +x."""
-    up = drive_ground("step", height)
-    return Terrain(height - up.elevation, up.resolution, up.origin)
 
 
 @pytest.mark.parametrize("height", [0.05, 0.2])
 def test_a_wheel_rolls_over_an_edge_and_drops_by_the_rest_of_its_height(height):
     """It rolls until the forces do not balance, at most until the edge is a face below it."""
     rolled = RADIUS * (1.0 - np.cos(FACE))
-    prediction, _ = drive(edge_down(height), friction=SLIPPERY)
+    prediction, _ = drive(drive_ground("step", -height), friction=SLIPPERY)
     drops = prediction.wheel_drop.max(axis=0)
     assert (drops <= height + 1e-3).all() and (drops >= height - rolled - 1e-3).all()
 
@@ -160,31 +150,30 @@ def test_a_wheel_rolls_over_an_edge_and_drops_by_the_rest_of_its_height(height):
 def test_no_friction_hides_a_fall_from_a_wall_that_is_too_high(policy, friction):
     """Too high is the limit and what a wheel rolls over the edge before it falls."""
     rolled = RADIUS * (1.0 - np.cos(FACE))
-    down = edge_down(LSR1.limits.wheel_drop + rolled + 5e-3)
+    down = drive_ground("step", -(LSR1.limits.wheel_drop + rolled + 5e-3))
     assert "wheel_drop" in drive(down, LSR1, friction=friction, policy=policy)[1].codes
 
 
 def test_a_drop_does_not_depend_on_where_waypoints_are():
     drops = []
     for x in (0.0, 0.004, 0.009, 0.015):
-        path = drive_path(0.02) + np.array([x, 0.0, 0.0])
-        prediction = judge_path(FREE, edge_down(0.15), path, SweepOptions(friction=0.8))[0]
+        path = drive_path(0.02) + poses_at(x)
+        prediction = judge_path(FREE, EDGE, path, SweepOptions(friction=0.8))[0]
         drops.append(prediction.wheel_drop.max(axis=0))
     assert np.ptp(drops, axis=0).max() < 1e-3
 
 
 @pytest.mark.parametrize(("policy", "friction"), [("equal", 0.3), ("optimal", 0.2)])
 def test_a_wheel_rolls_down_a_smooth_bump_however_slippery_if_the_others_hold_it(policy, friction):
-    ground = plane(0.0, 0.0, half=3.0)
-    y, x = (ground.origin[k] + ground.resolution * np.arange(n) for k, n in ((1, 301), (0, 301)))
-    wave = 0.14 * np.cos(np.pi * x / 0.8) ** 2 * (np.abs(x) < 0.4)
-    bump = replace(ground, elevation=(y > 0.0)[:, None] * wave)
-    _, verdict = drive(bump, LSR1, friction=friction, policy=policy)
+    def bump(x, y):
+        return 0.14 * np.cos(np.pi * x / 0.8) ** 2 * ((np.abs(x) < 0.4) & (y > 0.0))
+
+    _, verdict = drive(make_terrain(bump, 0.04, 3.0), LSR1, friction=friction, policy=policy)
     assert verdict.traversable and verdict.max_wheel_drop == 0.0
 
 
 def test_a_drop_is_told_where_the_wheel_lands():
-    prediction, _ = drive(edge_down(0.15))
+    prediction, _ = drive(EDGE)
     for name, wheel in (("rear", 0), ("middle", 1), ("front", 2)):
         where = prediction.poses[prediction.wheel_drop[:, wheel].argmax(), 0]
         assert 0.0 < where + LSR1.suspension.wheels[name][0] <= 2.0 * RADIUS
@@ -192,7 +181,7 @@ def test_a_drop_is_told_where_the_wheel_lands():
 
 def test_a_drop_beyond_the_limit_is_refused_by_its_own_code():
     allowed, refused = (
-        drive(edge_down(0.15), replace(FREE, limits=replace(FREE.limits, wheel_drop=limit)))[1]
+        drive(EDGE, replace(FREE, limits=replace(FREE.limits, wheel_drop=limit)))[1]
         for limit in (0.16, 0.05)
     )
     assert allowed.traversable
@@ -202,7 +191,7 @@ def test_a_drop_beyond_the_limit_is_refused_by_its_own_code():
 
 
 def test_while_a_wheel_falls_neither_friction_nor_torque_are_asked_for():
-    prediction, verdict = drive(edge_down(0.2), friction=0.4)
+    prediction, verdict = drive(drive_ground("step", -0.2), friction=0.4)
     needed = prediction.friction_utilisation[prediction.falling.any(axis=1)]
     assert len(needed) and needed.max() > 1.0
     assert verdict.traversable and verdict.max_friction_utilisation < 1.0

@@ -13,12 +13,12 @@ from rover_physics.errors import PoseError
 from rover_physics.names import TORQUE_POLICIES
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
-from rover_physics.rover.model import Steering
 from rover_physics.traversability.judge import PartwiseJudge
+from support.grounds import make_terrain
+from support.paths import arc_of, poses_at
 from support.rough_grounds import plane, random_poses
-from support.rovers import FIXED, LSR1, M2020
+from support.rovers import ALL_STEER, FIXED, LSR1, M2020
 
-ALL_STEER = replace(LSR1, steering=Steering(("rear", "middle", "front"), 1.57, 0.35))
 LEVEL = Terrain(np.zeros((401, 401)), 0.02, (-4.0, -4.0))
 SPEED = LSR1.nominal_speed
 
@@ -30,29 +30,21 @@ def motions(poses, rover=LSR1, backward=False, curvature=None):
 
 def straight(count=20, spacing=0.05, yaw=0.7):
     way = spacing * np.arange(count)
-    return np.column_stack([way * np.cos(yaw), way * np.sin(yaw), np.full(count, yaw)])
+    return poses_at(way * np.cos(yaw), way * np.sin(yaw), yaw)
 
 
 def arc(curvature, spacing=0.05, length=1.5, yaw=0.3):
-    turn = curvature * np.arange(0.0, length, spacing)
-    x, y = np.sin(turn) / curvature, (1.0 - np.cos(turn)) / curvature
-    c, s = np.cos(yaw), np.sin(yaw)
-    return np.column_stack([c * x - s * y, s * x + c * y, yaw + turn])
+    return arc_of(curvature, np.arange(0.0, length, spacing), yaw)
 
 
 def spot(turn=2.0 * np.pi, count=37):
-    return np.column_stack([np.zeros((count, 2)), np.linspace(0.0, turn, count)])
-
-
-def moved(poses, x):
-    """Return poses moved along the map's x."""
-    return np.column_stack([poses[:, 0] + x, poses[:, 1:]])
+    return poses_at(0.0, 0.0, np.linspace(0.0, turn, count))
 
 
 def with_chord_headings(poses):
     """Return poses that point to the next place, the last one as the one before it."""
     ahead = np.arctan2(*np.diff(poses[:, :2], axis=0).T[::-1])
-    return np.column_stack([poses[:, :2], np.append(ahead, ahead[-1])])
+    return poses_at(*poses[:, :2].T, np.append(ahead, ahead[-1]))
 
 
 @given(st.floats(-3.1, 3.1), st.booleans())
@@ -98,8 +90,7 @@ def test_repeated_waypoints_keep_the_motion_before_them():
 
 
 def test_a_sideways_path_is_a_crab_for_a_rover_that_can():
-    poses = straight(yaw=0.0)
-    poses[:, 2] = -0.5
+    poses = poses_at(0.05 * np.arange(20), yaw=-0.5)
     found = motions(poses, ALL_STEER)
     expected = SPEED * np.array([np.cos(0.5), np.sin(0.5), 0.0])
     assert found == pytest.approx(np.tile(expected, (20, 1)), abs=1e-15)
@@ -109,8 +100,7 @@ def test_a_sideways_path_is_a_crab_for_a_rover_that_can():
 
 
 def test_a_crab_with_fixed_wheels_is_refused_by_wheel_and_angle():
-    poses = straight(yaw=0.0)
-    poses[:, 2] = -0.5
+    poses = poses_at(0.05 * np.arange(20), yaw=-0.5)
     prediction, verdict = judge_path(LSR1, LEVEL, poses)
     assert verdict.code == "steering" and verdict.first_failure == 0
     assert verdict.reason == (
@@ -122,8 +112,8 @@ def test_a_crab_with_fixed_wheels_is_refused_by_wheel_and_angle():
 
 
 def test_a_curve_tighter_than_the_limit_is_refused_by_wheel_and_angle():
-    stiff = replace(LSR1, steering=Steering(("rear", "front"), 0.4, 0.35))
-    path = np.vstack([straight(10, yaw=0.0), moved(arc(1.0, yaw=0.0)[1:], 0.45)])
+    stiff = replace(LSR1, steering=replace(LSR1.steering, limit=0.4))
+    path = np.vstack([straight(10, yaw=0.0), arc(1.0, yaw=0.0)[1:] + poses_at(0.45)])
     _, verdict = judge_path(stiff, LEVEL, path)
     assert (verdict.code, verdict.first_failure) == ("steering", 10)
     assert verdict.reason == (
@@ -135,9 +125,8 @@ def test_a_curve_tighter_than_the_limit_is_refused_by_wheel_and_angle():
 def test_the_swing_of_the_middle_axle_of_m2020_is_no_crab():
     """Driven so that the fixed middle wheels, behind the origin, do not skid."""
     turn = 0.6 * np.arange(0.0, 3.0, 0.2)
-    axle = np.column_stack([np.sin(turn), 1.0 - np.cos(turn)]) / 0.6
-    origin = axle + 0.304 * np.column_stack([np.cos(turn), np.sin(turn)])
-    found = motions(np.column_stack([origin, turn]), M2020)
+    ahead = 0.304 * poses_at(np.cos(turn), np.sin(turn))
+    found = motions(arc_of(0.6, turn / 0.6) + ahead, M2020)
     assert (found[:, 1] == 0.0).all() and (found[:, 2] > 0.0).all()
 
 
@@ -148,7 +137,7 @@ def test_poses_that_form_no_path_have_their_wheels_ahead():
 
 
 def test_a_long_step_leaves_the_way_open():
-    poses = np.vstack([arc(1.0), moved(arc(1.0), 5.0)])
+    poses = np.vstack([arc(1.0), arc(1.0) + poses_at(5.0)])
     found = motions(poses)
     assert found[len(arc(1.0))].tolist() == [SPEED, 0.0, 0.0]
     assert np.delete(found[:, 2], len(arc(1.0))) == pytest.approx(SPEED)
@@ -190,7 +179,7 @@ def test_curvatures_that_are_none_are_refused(curvature, what):
 
 
 def test_the_drive_waits_for_wheels_that_turn():
-    path = np.vstack([straight(11, yaw=0.0), moved(spot(np.pi, 19)[1:], 0.5)])
+    path = np.vstack([straight(11, yaw=0.0), spot(np.pi, 19)[1:] + poses_at(0.5)])
     prediction = judge_path(LSR1, LEVEL, path)[0]
     turning = np.arctan2(0.40, 0.31) / 0.35
     step = np.pi / 18.0 * np.hypot(0.40, 0.31) / SPEED
@@ -203,9 +192,8 @@ def test_the_drive_waits_for_wheels_that_turn():
 
 def test_wheels_that_turn_beside_a_wall_are_judged_whole_and_split_alike():
     """The straight wheels pass the wall at 2 cm, the turned ones would be in it."""
-    y = np.tile(-3.0 + 0.02 * np.arange(301), (301, 1)).T
-    wall = Terrain(0.5 * np.clip((y - 0.37) / 0.02, 0.0, 1.0), 0.02, (-3.0, -3.0))
-    path = np.vstack([straight(11, yaw=0.0), moved(spot(0.3, 10)[1:], 0.5)])
+    wall = make_terrain(lambda x, y: 0.5 * np.clip((y - 0.37) / 0.02, 0.0, 1.0), 0.02, 3.0)
+    path = np.vstack([straight(11, yaw=0.0), spot(0.3, 10)[1:] + poses_at(0.5)])
     whole = judge_path(LSR1, wall, path)[1]
     before, after = (judge_path(LSR1, wall, part)[1] for part in (path[:11], path[10:]))
     assert before.traversable and not after.traversable and after.first_failure == 0
@@ -220,51 +208,40 @@ def test_power_is_what_each_wheel_spends_on_its_own_way():
     assert prediction.power == pytest.approx(spent)
 
 
-ROVERS = {"lsr1": LSR1, "m2020": M2020}
-HALF_TURN = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, np.pi]])
-SPACING = 0.02
+HALF_TURN, DENSE = spot(np.pi, 2), spot(np.pi, 101)
+BEARING = np.radians(65.0)
 
 
-def dense(path, count=101):
-    """Return the turn between the two poses of a path in `count` poses."""
-    return path[0] + np.linspace(0.0, 1.0, count)[:, None] * (path[1] - path[0])
+def post(x, y):
+    """Return level ground with a post of 0.3 m, 0.52 m away from the origin."""
+    away = np.hypot(x - 0.52 * np.cos(BEARING), y - 0.52 * np.sin(BEARING))
+    return np.where(away < 0.06, 0.3, 0.0)
 
 
-def ground_with_a_post(bearing: float, height: float = 0.3) -> Terrain:
-    """Return level ground with a post, 0.52 m away from the origin, at a bearing [rad]."""
-    axis = np.arange(-2.0, 2.0 + SPACING, SPACING)
-    x, y = np.meshgrid(axis, axis)
-    away = np.hypot(x - 0.52 * np.cos(bearing), y - 0.52 * np.sin(bearing))
-    return Terrain(np.where(away < 0.06, height, 0.0), SPACING, (-2.0, -2.0))
-
-
-def ask(path, ground, rover=LSR1, **options):
-    return judge_path(rover, ground, path, SweepOptions(**options))
+POST = make_terrain(post, 0.02, 2.0)
 
 
 @pytest.mark.parametrize("policy", TORQUE_POLICIES)
 def test_a_turn_fails_where_only_its_middle_does(policy):
-    ground = ground_with_a_post(np.radians(65.0))
-    prediction, verdict = ask(HALF_TURN, ground, policy=policy)
-    assert not ask(HALF_TURN[:1], ground, policy=policy)[1].reasons[0]
+    options = SweepOptions(policy)
+    prediction, verdict = judge_path(LSR1, POST, HALF_TURN, options)
+    assert not judge_path(LSR1, POST, HALF_TURN[:1], options)[1].reasons[0]
     assert prediction.settled.all()
     assert verdict.first_failure == 1
-    assert not ask(dense(HALF_TURN), ground, policy=policy)[1].traversable
+    assert not judge_path(LSR1, POST, DENSE, options)[1].traversable
 
 
 def test_a_path_that_stops_at_its_failure_and_a_long_one_judge_turns_too():
-    rover, ground = LSR1, ground_with_a_post(np.radians(65.0))
-    verdict = ask(HALF_TURN, ground)[1]
-    stopped = judge_path(rover, ground, HALF_TURN, SweepOptions(), stop_at_failure=True)[1]
-    in_parts = PartwiseJudge(rover, ground, HALF_TURN)
+    verdict = judge_path(LSR1, POST, HALF_TURN)[1]
+    stopped = judge_path(LSR1, POST, HALF_TURN, stop_at_failure=True)[1]
+    in_parts = PartwiseJudge(LSR1, POST, HALF_TURN)
     assert len(list(in_parts.parts())) == 1
     assert stopped.reasons == in_parts.verdict().reasons == verdict.reasons
 
 
-@pytest.mark.parametrize("name", ROVERS)
-def test_within_a_long_turn_no_wheel_goes_farther_than_a_quarter_of_its_radius(name):
-    rover = ROVERS[name]
-    prediction, verdict = ask(HALF_TURN, LEVEL, rover)
+@pytest.mark.parametrize("rover", [LSR1, M2020], ids=lambda rover: rover.name)
+def test_within_a_long_turn_no_wheel_goes_farther_than_a_quarter_of_its_radius(rover):
+    prediction, verdict = judge_path(rover, LEVEL, HALF_TURN)
     between = prediction.between
     assert verdict.traversable
     yaw = np.concatenate([[0.0], np.unwrap(between.poses[:, 2]), [-np.pi]])
@@ -274,8 +251,9 @@ def test_within_a_long_turn_no_wheel_goes_farther_than_a_quarter_of_its_radius(n
 
 
 def test_the_drift_of_fixed_wheels_in_a_turn_is_that_of_dense_waypoints():
-    slope = plane(0.15, 0.0, half=3.0)
-    coarse = ask(HALF_TURN, slope, FIXED, policy="servo")[0]
-    fine = ask(dense(HALF_TURN), slope, FIXED, policy="servo")[0]
+    coarse, fine = (
+        judge_path(FIXED, plane(0.15, 0.0, half=3.0), path, SweepOptions("servo"))[0]
+        for path in (HALF_TURN, DENSE)
+    )
     assert coarse.drift[1] == pytest.approx(fine.drift.max(axis=0), rel=0.05)
     assert coarse.drift[1].max() > 0.0

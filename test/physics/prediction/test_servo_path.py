@@ -6,21 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics import SweepOptions, Terrain, judge_path
-from rover_physics.prediction.packed_model import pack_model
-from rover_physics.prediction.sweep import predict_in_parts
+from rover_physics import SweepOptions, judge_path
 from rover_physics.traversability.verdict import hold_against_limits
+from support.grounds import make_terrain
+from support.paths import arc_of
 from support.reference_drives import drive_ground, drive_path, unlimited
 from support.rough_grounds import plane
 from support.rovers import FIXED, LSR1
 
 ROVER = unlimited(LSR1)
 SERVO = SweepOptions(policy="servo")
-
-
-def arc(curvature: float, length: float = 1.2) -> np.ndarray:
-    turn = curvature * np.linspace(0.0, length, 61)
-    return np.column_stack([np.sin(turn), 1.0 - np.cos(turn), curvature * turn]) / curvature
 
 
 def drive(kind: str, size: float, policy: str = "servo", spacing: float = 0.01, **options):
@@ -59,11 +54,9 @@ def test_a_wheel_that_falls_into_a_slot_as_wide_as_itself_is_wedged():
 
 def over_a_hill(speed: float, max_torque: float):
     """Return prediction and verdict of the way up a hill of 0.1 m at a speed [m/s]."""
-    x = np.linspace(-2.0, 2.0, 201)
-    ground = Terrain(np.tile(0.05 * np.cos(np.pi * x / 1.5), (201, 1)), 0.02, (-2.0, -2.0))
-    path = drive_path()[:130]
+    ground = make_terrain(lambda x, y: 0.05 * np.cos(np.pi * x / 1.5), 0.02, 2.0)
     options = replace(SERVO, friction=0.8, max_torque=max_torque)
-    return judge_path(replace(ROVER, nominal_speed=speed), ground, path, options)
+    return judge_path(replace(ROVER, nominal_speed=speed), ground, drive_path()[:130], options)
 
 
 def test_momentum_carries_a_rover_over_a_place_where_little_force_is_missing():
@@ -86,27 +79,13 @@ def test_a_rover_that_its_motors_cannot_hold_runs_away_on_a_long_slope_alone():
 
 def test_a_rover_that_cannot_steer_turns_off_an_arc_and_one_that_can_does_not():
     flat = plane(0.0, 0.0, half=2.0)
-    path = arc(0.6)
+    path = arc_of(0.6, np.linspace(0.0, 1.2, 61))
     skidding, refused = judge_path(FIXED, flat, path, SERVO)
     drift = skidding.drift[:, 0]
     assert drift[-1] > 0.2 and (np.diff(drift[:40]) >= -1e-9).all()
     assert "turns off its path" in refused.reason
     steered, verdict = judge_path(LSR1, flat, path, SERVO)
     assert steered.drift.max() < 0.02 and verdict.traversable
-
-
-def test_a_path_in_parts_is_the_whole_path(monkeypatch):
-    monkeypatch.setattr("rover_physics.prediction.sweep.PART", 50)
-    options = replace(SERVO, friction=1.0, max_torque=2.44)
-    whole = drive("bump_one_side", 0.18, friction=1.0, max_torque=2.44)[0]
-    model = pack_model(ROVER, drive_ground("bump_one_side", 0.18), options)
-    for part in predict_in_parts(model, drive_path()):
-        rows = slice(part.context, None)
-        here = part.first + np.arange(len(part.prediction.poses) - part.context)
-        for name in ("wheel_loads", "torque", "speed_share", "time", "energy", "drift"):
-            np.testing.assert_allclose(
-                getattr(part.prediction, name)[rows], getattr(whole, name)[here], rtol=1e-9
-            )
 
 
 def test_a_higher_step_costs_more_energy_hardly_depending_on_the_spacing_of_waypoints():

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from rover_physics import Rover
 from rover_physics.errors import ModelError
 from rover_physics.rover.linkage import pack_linkage
-from rover_physics.rover.model import Steering
 from rover_physics.rover.steered_drive import STAND_ERROR, SteeredDrive, steer_wheels
 from rover_physics.rover.steering_joints import (
     can_turn_on_the_spot,
@@ -20,9 +19,8 @@ from rover_physics.rover.steering_joints import (
     steering_joints,
     tightest_radius,
 )
-from support.rovers import FIXED, LSR1, M2020
+from support.rovers import ALL_STEER, FIXED, LSR1, M2020
 
-ALL_STEER = replace(LSR1, steering=Steering(("rear", "middle", "front"), np.pi / 2, 0.35))
 speeds = st.floats(-0.1, 0.1)
 
 
@@ -33,6 +31,10 @@ def steer(rover: Rover, *motion: float) -> tuple[bool, np.ndarray, np.ndarray]:
     angles, rolling = np.full(6, np.nan), np.full(6, np.nan)
     can_follow = steer_wheels(linkage, np.array(motion, float), angles, rolling)
     return bool(can_follow), angles, rolling
+
+
+def with_limit(rover: Rover, limit: float) -> Rover:
+    return replace(rover, steering=replace(rover.steering, limit=limit))
 
 
 def wheels_of(rover: Rover) -> np.ndarray:
@@ -69,17 +71,12 @@ def test_on_the_spot_the_right_wheels_roll_forwards_and_the_left_ones_back():
 
 
 def test_a_limit_that_is_rounded_down_from_a_right_angle_allows_it():
-    rounded = replace(ALL_STEER, steering=Steering(("rear", "middle", "front"), 1.57, 0.35))
-    can_follow, angles, rolling = steer(rounded, 0.0, 0.03, 0.0)
+    can_follow, angles, rolling = steer(with_limit(ALL_STEER, 1.57), 0.0, 0.03, 0.0)
     assert can_follow
     assert angles.tolist() == [1.57] * 6 and rolling == pytest.approx([0.03] * 6)
 
 
 # How tightly a rover turns
-
-
-def with_limit(rover: Rover, limit: float) -> Rover:
-    return replace(rover, steering=replace(rover.steering, limit=limit))
 
 
 @pytest.mark.parametrize("rover", [LSR1, M2020], ids=lambda rover: rover.name)

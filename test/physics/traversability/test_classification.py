@@ -19,11 +19,15 @@ from rover_physics.traversability.classification import (
     deciding_waypoint,
 )
 from rover_physics.traversability.verdict import hold_against_limits
+from support.grounds import make_terrain
+from support.paths import poses_at
 from support.reference_drives import drive_ground, drive_path, unlimited
-from support.rough_grounds import bowl, plane, random_poses, rocky
+from support.rough_grounds import bowl, plane, random_poses, rocky, with_std
 from support.rovers import LSR1
 
 POSE = [[0.0, 0.0, 0.0]]
+STEEP = plane(0.45, 0.0)
+"""A slope on which equal torques slip and optimal ones use 0.58 of the friction of 0.8."""
 ONTO_A_BUMP = drive_path()[54:59]
 """Waypoints at which the right front wheel climbs a bump; the third one follows the climb."""
 WEAK = SweepOptions(friction=1.0, max_torque=1.0)
@@ -41,8 +45,8 @@ def test_a_passable_waypoint_names_its_tightest_constraint():
 
 
 def test_with_speed_servos_the_margin_is_that_of_the_whole_rover():
-    found = classify_path(LSR1, plane(0.45, 0.0), POSE)[0]
-    servo = judge_path(LSR1, plane(0.45, 0.0), POSE, SweepOptions(policy="servo"))[0]
+    found = classify_path(LSR1, STEEP, POSE)[0]
+    servo = judge_path(LSR1, STEEP, POSE, SweepOptions(policy="servo"))[0]
     shear = np.hypot(servo.tangential[0], servo.lateral[0]).sum()
     assert (found.policy, found.constraint) == ("servo", "friction")
     assert found.margin == pytest.approx(1.0 - shear / (0.8 * servo.wheel_loads[0].sum()))
@@ -102,13 +106,8 @@ def test_classes_agree_with_the_verdicts_of_all_policies():
     assert len(seen) >= 3
 
 
-def xs(ground) -> np.ndarray:
-    return ground.origin[0] + ground.resolution * np.arange(ground.elevation.shape[1])[None, :]
-
-
 def test_where_the_rover_would_be_trapped_the_waypoint_is_impassable_for_that():
-    ground, x = bowl(0.7, 1.2, np.radians(18.0)), np.arange(-5.0, 0.0, 0.04)
-    poses = np.column_stack([x, 0.0 * x, 0.0 * x])
+    ground, poses = bowl(0.7, 1.2, np.radians(18.0)), poses_at(np.arange(-5.0, 0.0, 0.04))
     verdict = judge_path(LSR1, ground, poses, SweepOptions(policy="optimal", soil="dry_sand"))[1]
     classes = classify_path(LSR1, ground, poses, SweepOptions(soil="dry_sand"))
     assert verdict.code == "trapped"
@@ -122,15 +121,13 @@ def test_where_the_rover_would_be_trapped_the_waypoint_is_impassable_for_that():
 
 @pytest.mark.parametrize("policy", ["equal", "servo", "optimal"])
 def test_classes_do_not_depend_on_the_policy_that_was_judged_first(policy):
-    ground = plane(0.45, 0.0)
-    judged = judge_path(LSR1, ground, POSE, SweepOptions(policy=policy))
-    found = classify_judged(LSR1, ground, *judged, SweepOptions())
-    assert found == classify_path(LSR1, ground, POSE)
+    judged = judge_path(LSR1, STEEP, POSE, SweepOptions(policy=policy))
+    found = classify_judged(LSR1, STEEP, *judged, SweepOptions())
+    assert found == classify_path(LSR1, STEEP, POSE)
 
 
 def test_on_uncertain_ground_speed_servos_are_not_asked_about():
-    steep = plane(0.45, 0.0)
-    uncertain = replace(steep, elevation_std=np.full(steep.elevation.shape, 1e-4))
+    uncertain = with_std(STEEP, 1e-4)
     found = classify_path(LSR1, uncertain, POSE)
     assert found[0].traversability_class == WITH_TRACTION_CONTROL
     with pytest.raises(ModelError, match="policy 'servo' has no bounds"):
@@ -139,9 +136,7 @@ def test_on_uncertain_ground_speed_servos_are_not_asked_about():
 
 def test_a_path_hangs_on_its_worst_waypoint():
     poses = [[x, 0.0, 0.0] for x in (-0.3, -0.1, 0.1, 0.3)]
-    level = plane(0.0, 0.0)
-    height = 0.08 * np.clip(xs(level) + 1.2, 0.0, None) ** 2
-    rising = replace(level, elevation=level.elevation + height)
+    rising = make_terrain(lambda x, y: 0.08 * (x + 1.2) ** 2, 0.04, 1.2)
     classes = classify_path(LSR1, rising, poses)
     assert {waypoint.traversability_class for waypoint in classes} == {PASSABLE}
     margins = [waypoint.margin for waypoint in classes]
@@ -151,16 +146,14 @@ def test_a_path_hangs_on_its_worst_waypoint():
 
 
 OPTIMAL = SweepOptions(policy="optimal")
-STEEP = plane(0.45, 0.0)
-"""A slope on which equal torques slip and optimal ones use 0.58 of the friction of 0.8."""
 
 
 @pytest.mark.parametrize(("margin", "passes"), [(0.0, True), (0.2, True), (0.3, False)])
 def test_a_waypoint_that_needs_traction_control_keeps_the_margin(margin, passes):
     rover, bump = unlimited(LSR1), drive_ground("bump_one_side", 0.1)
-    options = replace(OPTIMAL, friction=1.0, max_torque=1.0, control_margin=margin)
-    verdict = judge_path(rover, bump, drive_path()[54:59], options)[1]
-    found = classify_path(rover, bump, drive_path()[54:59], options)[2]
+    options = replace(WEAK, policy="optimal", control_margin=margin)
+    verdict = judge_path(rover, bump, ONTO_A_BUMP, options)[1]
+    found = classify_path(rover, bump, ONTO_A_BUMP, options)[2]
     assert verdict.traversable is passes
     assert found.traversability_class == (WITH_TRACTION_CONTROL if passes else IMPASSABLE)
     assert ("1 less control margin 0.3" in verdict.reason) is not passes
@@ -191,13 +184,12 @@ def test_what_equal_torques_pass_needs_no_margin():
 
 
 def test_the_margin_holds_within_the_bounds_of_an_uncertain_map():
-    std = np.full(STEEP.elevation.shape, 2e-4)
-    ground = replace(STEEP, elevation_std=std)
-    options = replace(OPTIMAL, control_margin=0.0)
-    _, physical = judge_path(LSR1, ground, POSE, options)
+    ground = with_std(STEEP, 2e-4)
+    _, physical = judge_path(LSR1, ground, POSE, OPTIMAL)
     bound = physical.friction_utilisation_bound
     assert physical.traversable and bound > physical.max_friction_utilisation
     between = 1.0 - 0.5 * (bound + physical.max_friction_utilisation)
-    assert judge_path(LSR1, STEEP, POSE, replace(options, control_margin=between))[1].traversable
-    refused = judge_path(LSR1, ground, POSE, replace(options, control_margin=between))[1]
+    options = replace(OPTIMAL, control_margin=between)
+    assert judge_path(LSR1, STEEP, POSE, options)[1].traversable
+    refused = judge_path(LSR1, ground, POSE, options)[1]
     assert "control margin" in refused.reason and "at worst" in refused.reason

@@ -9,33 +9,29 @@ import numpy as np
 import pytest
 
 from rover_physics import SweepOptions, Terrain, judge_path
+from support.grounds import make_terrain
+from support.paths import poses_at
+from support.reference_drives import drive_ground
 from support.rough_grounds import bowl
 from support.rovers import LSR1
 
 RESOLUTION = 0.02
 DEEP_DROPS = replace(LSR1, limits=replace(LSR1.limits, wheel_drop=1.0))
-X = np.tile(-3.0 + RESOLUTION * np.arange(301), (301, 1))
+DOWN, UP = drive_ground("step", -0.15), drive_ground("step", 0.15)
 
 
-def edge(height: float) -> Terrain:
-    """Return ground that changes by `height` [m] at x = 0."""
-    step = height * np.clip(X / RESOLUTION + 0.5, 0.0, 1.0)
-    return Terrain(step, RESOLUTION, (-3.0, -3.0))
+def hole(depth: float) -> Terrain:
+    """Return ground with a hole of 1.6 m across the way, around x = 0."""
+
+    def inside(x, y):
+        return np.clip((0.8 - np.abs(x)) / RESOLUTION + 0.5, 0.0, 1.0)
+
+    return make_terrain(lambda x, y: -depth * inside(x, y), RESOLUTION, 3.0)
 
 
-def hole(depth: float, width: float = 1.6) -> Terrain:
-    """Return ground with a hole across the way, `depth` and `width` [m], around x = 0."""
-    inside = np.clip((0.5 * width - np.abs(X)) / RESOLUTION + 0.5, 0.0, 1.0)
-    return Terrain(-depth * inside, RESOLUTION, (-3.0, -3.0))
-
-
-def way(start: float, end: float) -> np.ndarray:
-    x = np.arange(start, end, 0.01)
-    return np.column_stack([x, 0.0 * x, 0.0 * x])
-
-
-def verdict_on(ground: Terrain, start: float, end: float, rover=DEEP_DROPS, **arguments):
-    return judge_path(rover, ground, way(start, end), SweepOptions(**arguments))[1]
+def verdict_on(ground, start, end, rover=DEEP_DROPS, spacing=0.01, **arguments):
+    poses = poses_at(np.arange(start, end, spacing))
+    return judge_path(rover, ground, poses, SweepOptions(**arguments))[1]
 
 
 @pytest.mark.parametrize("end", [0.1, 1.6])
@@ -43,7 +39,7 @@ def test_a_hole_without_way_out_is_refused_as_trapped_where_the_rover_goes_in(en
     """Whether the path ends in it or would go on."""
     verdict = verdict_on(hole(0.15), -1.6, end)
     assert (verdict.traversable, verdict.code) == (False, "trapped")
-    assert way(-1.6, end)[verdict.first_failure, 0] < 0.0
+    assert -1.6 + 0.01 * verdict.first_failure < 0.0
     assert verdict.codes[verdict.first_failure] == "trapped"
     if end < 0.5:
         assert "no way on" in verdict.reason and "no way back" in verdict.reason
@@ -64,25 +60,18 @@ def test_a_shallow_hole_traps_nobody(policy):
 @pytest.mark.parametrize("policy", ["equal", "optimal"])
 def test_a_step_down_to_open_ground_is_no_trap(policy):
     """Back up may be impossible, but the way on is open."""
-    assert verdict_on(edge(-0.15), -1.2, 1.2, policy=policy).traversable
-    assert verdict_on(edge(-0.15), -1.2, 1.2, rover=LSR1).code == "wheel_drop"
-    assert not verdict_on(edge(0.15), -1.2, 1.2, max_torque=0.5).traversable
+    assert verdict_on(DOWN, -1.2, 1.2, policy=policy).traversable
+    assert verdict_on(DOWN, -1.2, 1.2, rover=LSR1).code == "wheel_drop"
+    assert not verdict_on(UP, -1.2, 1.2, max_torque=0.5).traversable
 
 
 def test_an_end_below_an_edge_before_the_map_ends_is_a_trap():
     """Nobody can say that the way on is open."""
-    whole = edge(-0.15)
-    ground = Terrain(whole.elevation[:, :231], RESOLUTION, whole.origin)
+    ground = Terrain(DOWN.elevation[:, :231], RESOLUTION, DOWN.origin)
     verdict = verdict_on(ground, -1.2, 1.0, max_torque=0.5)
     assert verdict.code == "trapped"
     assert "off the map" in verdict.reason
-    assert verdict_on(whole, -1.2, 1.0, max_torque=0.5).traversable
-
-
-def verdict_in(ground: Terrain, start: float, end: float, **arguments):
-    x = np.arange(start, end, 0.04)
-    poses = np.column_stack([x, 0.0 * x, 0.0 * x])
-    return judge_path(LSR1, ground, poses, SweepOptions(**arguments))[1]
+    assert verdict_on(DOWN, -1.2, 1.0, max_torque=0.5).traversable
 
 
 CRATER = bowl(0.7, 1.2, np.radians(18.0))
@@ -91,29 +80,26 @@ CRATER = bowl(0.7, 1.2, np.radians(18.0))
 @pytest.mark.parametrize("policy", ["equal", "servo", "optimal"])
 def test_a_crater_of_soft_soil_is_a_trap_that_has_no_edges(policy):
     """Down its walls the soil brakes the rover, up any of them the soil holds it too."""
-    ending = verdict_in(CRATER, -5.0, 0.0, soil="dry_sand", policy=policy)
-    passing = verdict_in(CRATER, -5.0, 5.0, soil="dry_sand", policy=policy)
-    for verdict in (ending, passing):
+    for end in (0.0, 5.0):  # within it and beyond
+        verdict = verdict_on(CRATER, -5.0, end, LSR1, 0.04, soil="dry_sand", policy=policy)
         assert verdict.code == "trapped"
         assert "no way on" in verdict.reason and "no way back" in verdict.reason
         assert -5.0 + 0.04 * verdict.first_failure < -1.0
 
 
 def test_down_a_sandy_slope_to_a_wall_there_is_a_way_round_it():
-    x = np.tile(np.arange(-6.0, 6.001, 0.05), (241, 1))
-    ramp = np.clip(-x * np.tan(0.3), 0.0, 0.7)
-    wall = Terrain(np.where(x > 3.0, 1.0, ramp), 0.05, (-6.0, -6.0))
-    verdict = verdict_in(wall, -4.5, 3.0, soil="dry_sand")
+    def ramp_and_wall(x, y):
+        return np.where(x > 3.0, 1.0, np.clip(-x * np.tan(0.3), 0.0, 0.7))
+
+    ground = make_terrain(ramp_and_wall, half=6.0)
+    verdict = verdict_on(ground, -4.5, 3.0, LSR1, 0.04, soil="dry_sand")
     assert verdict.code not in ("", "trapped")
-    assert verdict_in(wall, -4.5, 1.4, soil="dry_sand").traversable
+    assert verdict_on(ground, -4.5, 1.4, LSR1, 0.04, soil="dry_sand").traversable
 
 
 def test_poses_close_together_before_an_edge_do_not_take_the_time_and_the_memory(close=1e-12):
-    x = 0.05 * np.arange(120) - 3.0
-    heights = np.where(x < 0.5, 0.0, -0.09) + np.where(x > 1.6, 0.5, 0.0)
-    edge = Terrain(np.tile(heights, (120, 1)), 0.05, (-3.0, -3.0))
-    way = np.concatenate([-1.0 + close * np.arange(100), np.arange(-0.98, 0.7, 0.02)])
-    poses = np.column_stack([way, 0.0 * way, 0.0 * way])
+    edge = make_terrain(lambda x, y: 0.5 * (x > 1.6) - 0.09 * (x > 0.475), half=3.0)
+    poses = poses_at([*(-1.0 + close * np.arange(100)), *np.arange(-0.98, 0.7, 0.02)])
     slippery = SweepOptions(friction=0.4)
     judge_path(LSR1, edge, poses, slippery)
     before, began = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.perf_counter()

@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Paths for tests: poses on lines and arcs."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+
+def poses_at(x: ArrayLike, y: ArrayLike = 0.0, yaw: ArrayLike = 0.0) -> np.ndarray:
+    """Return poses (n, 3) of places [m] and headings [rad], each one number or n of them."""
+    return np.column_stack(np.broadcast_arrays(x, y, yaw))
+
+
+def arc_of(curvature: float, along: np.ndarray, yaw: float = 0.0) -> np.ndarray:
+    """Return poses on an arc through the origin, where it has a heading `yaw` [rad].
+
+    Args:
+        curvature: Its curvature [1/m], positive to the left.
+        along: (n,) way of each pose from the origin [m].
+        yaw: Heading at the origin [rad].
+    """
+    turn = curvature * along
+    x, y = np.sin(turn) / curvature, (1.0 - np.cos(turn)) / curvature
+    c, s = np.cos(yaw), np.sin(yaw)
+    return poses_at(c * x - s * y, s * x + c * y, yaw + turn)
