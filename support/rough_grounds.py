@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Grounds for tests: rough ones from a seed, planes, a crater; rotated and mirrored grounds."""
+"""Grounds for tests: rough ones from a seed, planes, a crater; the same for larger rovers."""
 
 from dataclasses import replace
 
@@ -87,19 +87,6 @@ def random_poses(seed: int, count: int, half: float) -> np.ndarray:
     rng = np.random.default_rng(seed)
     places = rng.uniform(-half, half, (count, 2))
     return np.column_stack([places, rng.uniform(-np.pi, np.pi, count)])
-
-
-def mirrored(terrain: Terrain, poses: np.ndarray) -> tuple[Terrain, np.ndarray]:
-    """Return ground and poses mirrored: y -> -y."""
-    ymax = terrain.bounds[3]
-    friction = None if terrain.friction is None else terrain.friction[::-1].copy()
-    flipped = replace(
-        terrain,
-        elevation=terrain.elevation[::-1].copy(),
-        origin=(terrain.origin[0], -ymax),
-        friction=friction,
-    )
-    return flipped, poses * [1.0, -1.0, -1.0]
 
 
 def scaled_for(

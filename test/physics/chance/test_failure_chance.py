@@ -3,7 +3,6 @@
 
 import re
 from dataclasses import fields, replace
-from pathlib import Path
 from statistics import NormalDist
 
 import numpy as np
@@ -17,12 +16,16 @@ from rover_physics.errors import ModelError, RoverFileError
 from rover_physics.limits.table import CHANCE
 from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
 from rover_physics.rover.uncertainty import Uncertainty
+from support.grounds import make_terrain
+from support.paths import poses_at
+from support.project.checkout import TOP
 from support.reference_drives import drive_ground, drive_path, unlimited
-from support.rough_grounds import plane
+from support.rough_grounds import plane, with_std
 
 EXACT = Uncertainty(**{one.name: 0.0 for one in fields(Uncertainty)})
 FRICTION = 0.5
-DOCS = Path(__file__).resolve().parents[3] / "docs" / "uncertainty.md"
+SLIPPERY = SweepOptions(friction=FRICTION)
+DOCS = TOP / "docs" / "uncertainty.md"
 ONE = 1.5 / SAMPLES
 """A sample and a half: what the samples may miss of a chance."""
 
@@ -31,37 +34,38 @@ def rover_with(**uncertainty: float):
     return replace(unlimited(load_rover("lsr1")), uncertainty=replace(EXACT, **uncertainty))
 
 
-def uphill(slope: float) -> Terrain:
-    """Return a plane that rises along x."""
-    return plane(slope, 0.0)
-
-
 def straight(n: int) -> np.ndarray:
-    return np.column_stack([np.linspace(-0.2, 0.2, n), np.zeros((n, 2))])
+    return poses_at(np.linspace(-0.2, 0.2, n))
 
 
-def chance_on(ground: Terrain, rover, policy: str = "equal", n: int = 5):
-    options = SweepOptions(policy=policy, friction=FRICTION)
+def chance_on(ground: Terrain, rover, options=SLIPPERY, n: int = 5):
     return judge_path(rover, ground, straight(n), options, accepted_chance=1.0)[1]
+
+
+def chance_near_torque(ground: Terrain, rover) -> float:
+    """Return the chance on ground that grips, with motors of which 0.9 is used."""
+    used = chance_on(ground, rover).max_torque_saturation * rover.wheel.max_torque
+    options = SweepOptions(friction=1.5, max_torque=used / 0.9)
+    return chance_on(ground, rover, options).failure_chance
 
 
 @pytest.mark.parametrize("slope", [0.26, 0.3, 0.33])
 def test_the_chance_is_that_of_a_friction_below_what_the_slope_needs(slope):
-    found = chance_on(uphill(slope), rover_with(friction=0.1))
+    found = chance_on(plane(slope, 0.0), rover_with(friction=0.1))
     expected = NormalDist(1.0, 0.1).cdf(found.max_friction_utilisation)
     assert 0.005 < expected < 0.995
     assert found.failure_chance == pytest.approx(expected, abs=ONE)
 
 
 def test_a_path_that_passes_in_the_best_sample_alone_does_not_fail_for_sure():
-    rover, ground = rover_with(max_torque=0.1), uphill(0.2)
+    rover, ground = rover_with(max_torque=0.1), plane(0.2, 0.0)
     used = chance_on(ground, rover).max_torque_saturation * rover.wheel.max_torque
     weak = replace(rover, wheel=replace(rover.wheel, max_torque=used / 1.19))
     assert chance_on(ground, weak).failure_chance == 1.0 - 1.0 / SAMPLES
 
 
 def test_what_fails_for_sure_further_on_changes_no_chance_before_it():
-    ground, rover = uphill(0.3), rover_with(friction=0.1)
+    ground, rover = plane(0.3, 0.0), rover_with(friction=0.1)
     x = ground.origin[0] + ground.resolution * np.arange(ground.elevation.shape[1])
     friction = np.broadcast_to(np.where(x > 0.45, 0.05, FRICTION), ground.elevation.shape)
     layered = replace(ground, friction=friction)
@@ -71,11 +75,11 @@ def test_what_fails_for_sure_further_on_changes_no_chance_before_it():
 
 
 def test_a_control_margin_is_not_asked_of_samples():
-    rover, ground = rover_with(friction=0.1), uphill(0.42)
-    options = SweepOptions("optimal", friction=FRICTION)
+    rover, ground = rover_with(friction=0.1), plane(0.42, 0.0)
+    optimal = replace(SLIPPERY, policy="optimal")
     told, kept = (
-        judge_path(rover, ground, straight(5), one, accepted_chance=1.0)[1]
-        for one in (options, replace(options, control_margin=0.1))
+        chance_on(ground, rover, options)
+        for options in (optimal, replace(optimal, control_margin=0.1))
     )
     assert kept.traversable and 0.0 < kept.failure_chance == told.failure_chance < 0.5
 
@@ -89,17 +93,13 @@ def test_optimal_torques_give_way_to_a_wheel_that_has_less():
 
 @pytest.mark.parametrize("name", ["max_torque", "model"])
 def test_the_torque_limit_counts_like_friction(name):
-    rover, ground = rover_with(**{name: 0.1}), uphill(0.2)
-    used = chance_on(ground, rover).max_torque_saturation * rover.wheel.max_torque
-    options = SweepOptions(friction=1.5, max_torque=used / 0.9)
-    found = judge_path(rover, ground, straight(5), options, accepted_chance=1.0)[1]
-    assert found.failure_chance == pytest.approx(NormalDist(1.0, 0.1).cdf(0.9), abs=ONE)
+    found = chance_near_torque(plane(0.2, 0.0), rover_with(**{name: 0.1}))
+    assert found == pytest.approx(NormalDist(1.0, 0.1).cdf(0.9), abs=ONE)
 
 
 def test_a_peak_between_waypoints_counts_though_the_position_is_uncertain():
-    x = np.arange(-1.5, 1.5, 0.02)
-    step = Terrain(np.where(x > 0.3, 0.06, 0.0) * np.ones((150, 1)), 0.02, (-1.5, -1.5))
-    poses = np.column_stack([np.arange(-0.3, 0.5, 0.037), np.zeros((22, 2))])
+    step = make_terrain(lambda x, y: 0.06 * (x > 0.29), 0.02, 1.5)
+    poses = poses_at(np.arange(-0.3, 0.5, 0.037))
     rover = rover_with(friction=0.1, position=0.02)
     options = SweepOptions(friction=0.6)
     prediction, found = judge_path(rover, step, poses, options, accepted_chance=1.0)
@@ -109,7 +109,7 @@ def test_a_peak_between_waypoints_counts_though_the_position_is_uncertain():
 
 
 def test_what_is_common_stays_common_along_a_path():
-    rover, ground = rover_with(friction=0.1), uphill(0.3)
+    rover, ground = rover_with(friction=0.1), plane(0.3, 0.0)
     few, many = (chance_on(ground, rover, n=n) for n in (1, 40))
     assert many.failure_chance == few.failure_chance > 0.0
     assert set(many.failure_chance_at) == {few.failure_chance}
@@ -126,28 +126,22 @@ def test_deviations_count_near_the_limit_of_friction(name, std):
     [("mass", 1.0), ("heading", 0.3), ("wheel_radius", 0.1), ("max_torque_per_wheel", 0.1)],
 )
 def test_deviations_count_near_the_limit_of_torque(name, std):
-    rover, ground = rover_with(**{name: std}), plane(0.1, 0.2)
-    used = chance_on(ground, rover).max_torque_saturation * rover.wheel.max_torque
-    options = SweepOptions(friction=1.5, max_torque=used / 0.9)
-    found = judge_path(rover, ground, straight(5), options, accepted_chance=1.0)[1]
-    assert 0.0 < found.failure_chance < 1.0
+    assert 0.0 < chance_near_torque(plane(0.1, 0.2), rover_with(**{name: std})) < 1.0
 
 
 def test_uncertain_heights_count():
-    ground, rover, options = uphill(0.25), rover_with(), SweepOptions(friction=FRICTION)
+    ground, rover = plane(0.25, 0.0), rover_with()
     assert chance_on(ground, rover).failure_chance == 0.0
-    uncertain = replace(ground, elevation_std=np.full(ground.elevation.shape, 0.003))
-    asked = {"sigmas": 0, "accepted_chance": 1.0}
-    assert judge_path(rover, uncertain, straight(5), options, **asked)[1].failure_chance > 0.0
+    asked = rover, with_std(ground, 0.003), straight(5), SLIPPERY
+    assert judge_path(*asked, sigmas=0, accepted_chance=1.0)[1].failure_chance > 0.0
 
 
 def test_an_accepted_chance_decides():
-    rover, ground = rover_with(friction=0.1), uphill(0.3)
-    options = SweepOptions(friction=FRICTION)
+    rover, ground = rover_with(friction=0.1), plane(0.3, 0.0)
 
     def judge(accepted: float | None, **others: bool):
-        poses, told = straight(5), {"accepted_chance": accepted, **others}
-        return judge_path(rover, ground, poses, options, **told)[1]
+        asked = rover, ground, straight(5), SLIPPERY
+        return judge_path(*asked, accepted_chance=accepted, **others)[1]
 
     assert judge(0.3).traversable and not judge(0.3).code
     refused = judge(0.05)

@@ -11,6 +11,7 @@ import pytest
 
 from rover_physics import PathPrediction, PoseStatus, Terrain, judge_path, judge_poses
 from rover_physics.traversability.verdict import hold_against_limits
+from support.paths import poses_at
 from support.rough_grounds import bouldered, fractal, random_poses
 from support.rover_geometry import wheel_axes, wheel_gap, wheel_gaps
 from support.rovers import LSR1
@@ -83,8 +84,7 @@ def test_a_refined_copy_of_a_surface_gives_the_same_poses_and_verdicts(make):
         copy = refined(ground)
         for _ in range(3):
             (x, y), yaw = rng.uniform(-1.5, 1.5, 2), rng.uniform(-np.pi, np.pi)
-            places = x + ALONG * np.cos(yaw), y + ALONG * np.sin(yaw), np.full_like(ALONG, yaw)
-            poses = np.column_stack(places)
+            poses = poses_at(x + ALONG * np.cos(yaw), y + ALONG * np.sin(yaw), yaw)
             (here, verdict), (there, other) = (
                 judge_path(LSR1, terrain, poses) for terrain in (ground, copy)
             )

@@ -9,14 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rover_physics import SweepOptions, Terrain, judge_poses
-from support.rough_grounds import (
-    mirrored,
-    plane,
-    random_poses,
-    rocky,
-    scaled_for,
-    smooth,
-)
+from support.rough_grounds import plane, random_poses, rocky, scaled_for, smooth
 from support.rover_geometry import ANGLE, GAP, turned_round
 from support.rovers import FIXED, LSR1, M2020
 
@@ -36,6 +29,13 @@ def quarter_turn(terrain: Terrain, poses: np.ndarray) -> tuple[Terrain, np.ndarr
         terrain, elevation=np.ascontiguousarray(terrain.elevation.T[:, ::-1]), origin=(-ymax, xmin)
     )
     return turned, np.column_stack([-poses[:, 1], poses[:, 0], poses[:, 2] + 0.5 * np.pi])
+
+
+def mirrored(terrain: Terrain, poses: np.ndarray) -> tuple[Terrain, np.ndarray]:
+    """Return ground and poses mirrored: y -> -y."""
+    origin = terrain.origin[0], -terrain.bounds[3]
+    flipped = replace(terrain, elevation=terrain.elevation[::-1].copy(), origin=origin)
+    return flipped, poses * [1.0, -1.0, -1.0]
 
 
 def assert_mirrored(rover, ground, poses, curvature, options, loads=1e-3, torques=2e-3) -> int:

@@ -30,6 +30,7 @@ from rover_planner.survey.request import SurveyRequest
 from rover_planner.survey.tile_survey import survey_tile
 from rover_planner.viewer.state.path_limits import find_path_limits
 from support.grounds import make_terrain, waves
+from support.paths import poses_at
 
 HEAVIEST = Limit(
     "wheel_load",
@@ -42,8 +43,7 @@ HEAVIEST = Limit(
 )
 """The largest load of a wheel [N], as a team might add it."""
 GROUND = make_terrain(waves)
-X = np.arange(-1.5, 1.5, 0.05)
-PATH = np.column_stack([X, np.full_like(X, 0.3), np.zeros_like(X)])
+PATH = poses_at(np.arange(-1.5, 1.5, 0.05), 0.3)
 
 
 def rover_with(newtons: float):

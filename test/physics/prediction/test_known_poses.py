@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tests of what is remembered of poses: it saves time and changes nothing else."""
 
-from unittest import mock
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,31 +10,25 @@ from rover_physics import SweepOptions, judge_path, judge_pieces
 from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.results.record import RESULT, numbers_of
+from support.paths import poses_at
 from support.rough_grounds import rocky
 from support.rovers import LSR1
 
 GROUND = rocky(5)
-WAY = np.column_stack([np.linspace(-1.0, 1.0, 101), np.zeros((101, 2))])
-
-
-class Asked:
-    """Counts the poses that models evaluate."""
-
-    def __init__(self):
-        self.poses, evaluate = 0, PackedModel._evaluate
-
-        def count(model, poses, *rest):
-            self.poses += len(poses)
-            return evaluate(model, poses, *rest)
-
-        self.watch = mock.patch.object(PackedModel, "_evaluate", count)
+WAY = poses_at(np.linspace(-1.0, 1.0, 101))
 
 
 @pytest.fixture
-def asked():
-    counts = Asked()
-    with counts.watch:
-        yield counts
+def asked(monkeypatch):
+    """Return the number of poses that models evaluate, as its `poses`."""
+    counts, evaluate = SimpleNamespace(poses=0), PackedModel._evaluate
+
+    def count(model, poses, *rest):
+        counts.poses += len(poses)
+        return evaluate(model, poses, *rest)
+
+    monkeypatch.setattr(PackedModel, "_evaluate", count)
+    return counts
 
 
 @pytest.mark.parametrize("policy", ["equal", "optimal", "servo"])

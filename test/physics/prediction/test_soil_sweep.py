@@ -11,12 +11,12 @@ from rover_physics.errors import SoilError
 from rover_physics.forces.soil import SoilWheel, effective_friction, pack_soils, solve_wheel
 from rover_physics.rover.model import Part
 from rover_physics.traversability.verdict import hold_against_limits
+from support.paths import poses_at
 from support.rough_grounds import plane, random_poses, smooth
 from support.rover_geometry import turned_round
 from support.rovers import LSR1
 
 POSE = [[0.0, 0.0, 0.0]]
-AHEAD = np.column_stack([np.linspace(-0.5, 0.5, 51), np.zeros(51), np.zeros(51)])
 FORCES = ("wheel_loads", "tangential", "lateral")
 ON_SOIL = (
     "torque", "friction", "friction_utilisation", "slip_ratio", "torque_saturation", "sinkage",
@@ -99,8 +99,8 @@ def test_a_soil_of_a_map_without_a_name_among_the_presets_is_refused():
 
 @pytest.mark.parametrize(("soil", "policy"), [(None, "equal"), ("dry_sand", "optimal")])
 def test_up_a_slope_backwards_is_as_forwards_of_the_rover_turned_round(soil, policy):
-    ground, poses, options = plane(0.1, 0.05), AHEAD[::25], SweepOptions(policy, soil=soil)
-    there = poses + np.array([0.0, 0.0, np.pi])
+    ground, options = plane(0.1, 0.05), SweepOptions(policy, soil=soil)
+    poses, there = (poses_at([-0.5, 0.0, 0.5], yaw=yaw) for yaw in (0.0, np.pi))
     back = judge_path(LSR1, ground, there, replace(options, backward=True))[0]
     ahead = judge_path(turned_round(LSR1), ground, poses, options)[0]
     other = [5, 4, 3, 2, 1, 0]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sweeps: bad arguments, waypoints on their own, time and energy, scores, several at once."""
 
-import threading
+from concurrent.futures import ThreadPoolExecutor
 from unittest.mock import Mock
 
 import numpy as np
@@ -26,6 +26,7 @@ from rover_physics.results.record import QUANTITIES
 from rover_physics.traversability.verdict import hold_against_limits
 from support.grounds import gap, make_terrain, waves
 from support.grounds import rocky as low_rock
+from support.paths import poses_at
 from support.rough_grounds import plane, random_poses, rocky, with_std
 from support.rovers import LSR1
 
@@ -37,9 +38,9 @@ ALONG_THE_PATH = GROWING | {"wheel_drop", "falling", "between", "waypoint", "bou
 few = settings(max_examples=8)
 
 
-def line(start: float, end: float, count: int = 41, yaw: float = 0.0) -> np.ndarray:
+def line(start: float, end: float, count: int = 41) -> np.ndarray:
     """Return a straight path along x."""
-    return np.column_stack([np.linspace(start, end, count), np.zeros(count), np.full(count, yaw)])
+    return poses_at(np.linspace(start, end, count))
 
 
 def columns(prediction):
@@ -185,31 +186,18 @@ def test_a_map_is_swept_cell_by_cell(monkeypatch):
 
 
 def test_sweeps_at_once_have_the_bits_of_sweeps_alone():
-    exact = make_terrain(low_rock)
-    uncertain = with_std(exact, 0.002)
+    exact, poses = make_terrain(low_rock), line(-2.5, 2.5, 60) + poses_at(0.0, -0.5)
     asked = [
-        (terrain, line(-2.5, 2.5, 60) + np.array([0.0, y, 0.0]), SweepOptions(policy=policy))
-        for terrain in (exact, uncertain)
-        for y in (-0.5,)
+        (terrain, poses, SweepOptions(policy=policy))
+        for terrain in (exact, with_std(exact, 0.002))
         for policy in ("equal", "optimal")
     ]
     alone = [judge_path(LSR1, *one) for one in asked]
-    found: dict[int, list] = {k: [] for k in range(len(asked))}
-
-    def sweep(k):
-        for _ in range(2):
-            found[k].append(judge_path(LSR1, *asked[k]))
-
-    threads = [threading.Thread(target=sweep, args=(k,)) for k in found]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    for k, (prediction, verdict) in enumerate(alone):
-        assert len(found[k]) == 2
-        for other, other_verdict in found[k]:
-            assert other_verdict.codes == verdict.codes
-            assert_identical(other, prediction)
+    with ThreadPoolExecutor(len(asked)) as pool:
+        found = list(pool.map(lambda one: judge_path(LSR1, *one), asked * 2))
+    for (prediction, verdict), (other, other_verdict) in zip(alone * 2, found, strict=True):
+        assert other_verdict.codes == verdict.codes
+        assert_identical(other, prediction)
 
 
 def test_a_check_that_raises_ends_the_sweep_and_the_next_one_runs():

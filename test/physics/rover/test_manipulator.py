@@ -82,16 +82,13 @@ def test_a_payload_too_heavy_for_the_rover_tips_it_and_a_file_that_has_it_is_ref
         judge_path(heavy, LEVEL, POSE)[0]
 
 
-AHEAD = {"arm_yaw": 0.0, "arm_shoulder": 0.0, "arm_elbow": 0.0}
-
-
 @pytest.mark.parametrize("share", [0.98, 1.02])
 @pytest.mark.parametrize("kind", ["tool_force", "tool_moment"])
 def test_the_margin_is_gone_when_a_load_empties_one_side(kind, share):
     # The wheels stand 0.31 m from the middle, 0.30 m below the body's origin, the tip 0.15 above.
     tipping = share * LSR1.weight * 0.31
     load = [0.0, tipping / 0.45, 0.0] if kind == "tool_force" else [-tipping, 0.0, 0.0]
-    options = SweepOptions(joint_angles=AHEAD, friction=50.0, **{kind: load})
+    options = SweepOptions(joint_angles=pose_of(), friction=50.0, **{kind: load})
     prediction = judge_path(LSR1, LEVEL, POSE, options)[0]
     right = prediction.wheel_loads[0, :3].sum()
     assert right == pytest.approx((LSR1.weight * 0.31 - tipping) / 0.62, abs=1e-4)

@@ -28,10 +28,11 @@ from rover_physics.prediction.sweep import predict_poses
 from rover_physics.results.record import QUANTITIES
 from rover_physics.traversability.verdict import hold_against_limits, refuse_worst_case
 from rover_planner.planning.path_query import path_cost
-from support.rough_grounds import plane
+from support.paths import poses_at
+from support.rough_grounds import plane, with_std
 from support.rovers import LSR1
 
-POSES = np.column_stack([np.linspace(-0.2, 0.2, 5), np.zeros(5), np.zeros(5)])
+POSES = poses_at(np.linspace(-0.2, 0.2, 5))
 LEVEL = plane(0.0, 0.0)
 DECISIVE = (
     "roll", "pitch", "rocker_angle", "bogie_angle", "wheel_loads", "friction_utilisation",
@@ -146,8 +147,7 @@ def test_a_nan_breaks_each_limit_and_names_the_quantity(name):
 
 
 def test_a_bound_that_is_no_number_is_a_refusal():
-    ground = replace(LEVEL, elevation_std=np.full(LEVEL.elevation.shape, 1e-4))
-    prediction, verdict = judge_path(LSR1, ground, POSES)
+    prediction, verdict = judge_path(LSR1, with_std(LEVEL, 1e-4), POSES)
     assert verdict.traversable and prediction.bounds is not None
     values = prediction.bounds.values.copy()
     values["wheel_loads"][2, 4, 0] = math.nan
@@ -160,13 +160,10 @@ def test_a_bound_that_is_no_number_is_a_refusal():
 def test_only_the_clearance_over_unknown_ground_may_be_unknown():
     elevation = np.zeros((121, 121))
     elevation[57:64] = math.nan  # the wheels' tracks at y = -0.31 and 0.31 m stay known
-    std = np.full(elevation.shape, 1e-4)
-    for ground in (
-        Terrain(elevation, 0.05, (-3.0, -3.0)),
-        Terrain(elevation, 0.05, (-3.0, -3.0), elevation_std=std),
-    ):
-        narrow = replace(LSR1, belly=replace(LSR1.belly, y=(-0.1, 0.1)))
-        prediction, verdict = judge_path(narrow, ground, POSES)
+    ground = Terrain(elevation, 0.05, (-3.0, -3.0))
+    narrow = replace(LSR1, belly=replace(LSR1.belly, y=(-0.1, 0.1)))
+    for asked in (ground, with_std(ground, 1e-4)):
+        prediction, verdict = judge_path(narrow, asked, POSES)
         assert np.isnan(prediction.belly_clearance).all() and verdict.traversable
 
 
@@ -176,20 +173,11 @@ def test_a_path_of_unknown_energy_costs_more_than_any_other():
     assert path_cost(unknown, verdict) == (math.inf, math.inf)
 
 
-@given(
-    x=st.floats(),
-    y=st.floats(),
-    yaw=st.floats(),
-    height=st.floats(),
-    friction=st.floats(),
-    resolution=st.floats(),
-)
+@given(*[st.floats()] * 6)
 def test_no_ground_or_pose_passes_without_numbers(x, y, yaw, height, friction, resolution):
-    shape = (41, 41)
+    elevation, layer = np.full((41, 41), height), np.full((41, 41), friction)
     try:
-        ground = Terrain(
-            np.full(shape, height), resolution, (x, y), friction=np.full(shape, friction)
-        )
+        ground = Terrain(elevation, resolution, (x, y), friction=layer)
         prediction, verdict = judge_path(LSR1, ground, [[x + 1.0, y + 1.0, yaw]])
     except RoverError:
         return
