@@ -6,6 +6,7 @@ import numpy as np
 from rover_physics import PathPrediction, Rover, Terrain, judge_path
 from rover_physics.traction.balance import MeasuredState
 from rover_physics.traction.contact_ekf import Motion
+from support.paths import poses_at
 from support.rover_geometry import wheel_axes
 
 
@@ -23,32 +24,40 @@ def state_of(rover: Rover, prediction: PathPrediction, i: int) -> MeasuredState:
     )
 
 
-def drive_states(rover: Rover, ground: Terrain):
-    """Return prediction, motions and time step [s] of a drive along +x at 3 cm/s."""
-    x = np.linspace(-1.2, 1.2, 1201)
-    prediction = judge_path(rover, ground, np.column_stack([x, 0.0 * x, 0.0 * x]))[0]
-    duration = (x[1] - x[0]) / 0.03
+STRAIGHT = poses_at(np.linspace(-1.2, 1.2, 1201))
+SPEED = 0.03
+"""Speed of a drive [m/s]."""
+
+
+def drive_states(rover: Rover, ground: Terrain, path: np.ndarray = STRAIGHT):
+    """Return prediction, motions and time step [s] of a drive along poses of equal distances."""
+    prediction = judge_path(rover, ground, path)[0]
+    duration = np.hypot(*(path[1] - path[0])[:2]) / SPEED
 
     def rate(values):
         return np.gradient(values, duration, axis=0)
 
-    roll, pitch = prediction.roll, prediction.pitch
-    turning = np.column_stack(
-        [rate(roll), rate(pitch) * np.cos(roll), -rate(pitch) * np.sin(roll)]
-    )
+    roll, pitch, steering = prediction.roll, prediction.pitch, prediction.steering_angle
+    roll_rate, pitch_rate, yaw_rate = rate(roll), rate(pitch), rate(path[:, 2])
+    turning = np.column_stack([
+        roll_rate - np.sin(pitch) * yaw_rate,
+        np.cos(roll) * pitch_rate + np.sin(roll) * np.cos(pitch) * yaw_rate,
+        -np.sin(roll) * pitch_rate + np.cos(roll) * np.cos(pitch) * yaw_rate,
+    ])  # fmt: skip
     rocker, bogie = rate(prediction.rocker_angle), rate(prediction.bogie_angle)
     speeds = np.linalg.norm(rate(prediction.wheel_centres), axis=2)
     names = ("rear", "middle", "front")
     hung = np.array([name != rover.suspension.rocker_wheel for name in names] * 2)
     sides = np.repeat([0, 1], 3)
     links = turning[:, [1]] + rocker[:, sides] + bogie[:, sides] * hung
+    about_axles = links * np.cos(steering) - turning[:, [0]] * np.sin(steering)
     motions = [
         Motion(
             np.array([roll[i], pitch[i]]),
             np.array([prediction.rocker_angle[i, 0], *prediction.bogie_angle[i]]),
             np.array([rocker[i, 0], *bogie[i]]),
-            speeds[i] / rover.wheel.radius - links[i], turning[i], np.zeros(6),
+            speeds[i] / rover.wheel.radius - about_axles[i], turning[i], steering[i],
         )
-        for i in range(len(x))
+        for i in range(len(path))
     ]  # fmt: skip
     return prediction, motions, duration

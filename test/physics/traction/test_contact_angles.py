@@ -4,15 +4,16 @@
 import numpy as np
 import pytest
 
-from rover_physics import Terrain, load_rover
+from rover_physics import Terrain
 from rover_physics.errors import ModelError
 from rover_physics.traction.balance import MeasuredState
 from rover_physics.traction.contact_ekf import MotionContactEstimator
 from rover_physics.traction.map_contacts import MapContactFinder
+from support.paths import arc_of, poses_at
 from support.reference_drives import drive_ground
 from support.rough_grounds import fractal, plane, rocky
 from support.rover_geometry import turned_round
-from support.rovers import LSR1
+from support.rovers import LSR1, M2020
 from support.traction_states import drive_states, state_of
 
 
@@ -31,9 +32,7 @@ def rms(errors):
     return float(np.sqrt(np.mean(errors[150:] ** 2)))
 
 
-@pytest.mark.parametrize(
-    ("rover", "slope"), [(LSR1, (0.1, 0.25)), (load_rover("m2020"), (-0.3, 0.0))]
-)
+@pytest.mark.parametrize(("rover", "slope"), [(LSR1, (0.1, 0.25)), (M2020, (-0.3, 0.0))])
 def test_on_an_even_slope_the_angles_are_known_at_rest_and_in_motion(rover, slope):
     prediction, motions, duration = drive_states(rover, plane(*slope, half=4.0))
     still = motions[0]._replace(wheel_rates=np.zeros(6), body_rates=np.zeros(3))
@@ -59,6 +58,14 @@ def test_motion_tells_the_angles_where_zero_is_far_off(rover, ground, share):
     assert rms(angles - truth) < share * rms(truth)
     outside = np.abs(angles - truth)[150:] > 3.0 * deviations[150:]
     assert outside.mean() < 0.02
+
+
+@pytest.mark.parametrize("rover", [LSR1, M2020], ids=lambda rover: rover.name)
+def test_motion_tells_the_contact_angles_on_an_arc_across_a_slope(rover):
+    path = arc_of(1.0 / 3.0, np.linspace(0.0, 3.6, 400)) - poses_at(1.5, 1.0)
+    prediction, motions, duration = drive_states(rover, plane(0.25, 0.1, half=6.0), path)
+    angles, _ = follow(rover, motions, duration)
+    assert np.abs(angles - prediction.contact_angle)[100:-1].max() < 0.05
 
 
 def test_at_rest_nothing_is_learnt_or_forgotten():

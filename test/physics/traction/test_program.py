@@ -10,7 +10,6 @@ import pytest
 from rover_physics import judge_path, judge_poses
 from rover_physics.errors import ModelError
 from rover_physics.traction.balance import LOADS, TRACTIONS, BalanceWriter, MeasuredState
-from rover_physics.traction.contact_ekf import Motion, MotionContactEstimator
 from rover_physics.traction.map_contacts import MapContactFinder
 from rover_physics.traction.program import ProgramInputs
 from rover_physics.traction.solver import TractionWorkspace, solve_traction
@@ -200,35 +199,3 @@ def test_the_map_tells_the_contact_angles_whatever_height_odometry_says(drift):
             assert found.source == "map"
             errors.append(found.angles - prediction.contact_angle[i])
     assert np.median(np.abs(errors)) < 0.03
-
-
-@BOTH
-def test_motion_tells_the_contact_angles_on_an_arc_across_a_slope(rover):
-    ground, radius = plane(0.25, 0.1, half=6.0), 3.0
-    yaw = np.linspace(0.0, 1.2, 400)
-    path = np.column_stack([radius * np.sin(yaw) - 1.5, radius * (1 - np.cos(yaw)) - 1.0, yaw])
-    prediction = judge_path(rover, ground, path)[0]
-    duration, rates = 0.1, []
-    angles = prediction.rocker_angle, prediction.bogie_angle, prediction.roll, prediction.pitch
-    rocker, bogie, roll, pitch = (np.gradient(value, duration, axis=0) for value in angles)
-    turn = np.gradient(yaw, duration)
-    c, s = np.cos(prediction.roll), np.sin(prediction.roll)
-    nose = np.cos(prediction.pitch)
-    rates = np.column_stack(
-        [roll - np.sin(prediction.pitch) * turn, c * pitch + s * nose * turn,
-         -s * pitch + c * nose * turn]
-    )  # fmt: skip
-    speeds = np.linalg.norm(np.gradient(prediction.wheel_centres, duration, axis=0), axis=2)
-    estimator, found = MotionContactEstimator(rover), []
-    for i in range(len(path)):
-        steering = prediction.steering_angle[i]
-        # A link's rate about the axle; wheel joints turn relative to it.
-        about_axle = rates[i, 1] * np.cos(steering) - rates[i, 0] * np.sin(steering)
-        motion = Motion(
-            [prediction.roll[i], prediction.pitch[i]],
-            [prediction.rocker_angle[i, 0], *prediction.bogie_angle[i]], [rocker[i, 0], *bogie[i]],
-            speeds[i] / rover.wheel.radius - about_axle, rates[i], steering,
-        )  # fmt: skip
-        found.append(estimator.update(motion, duration).angles)
-    errors = np.abs(np.array(found) - prediction.contact_angle)[100:-1]
-    assert errors.max() < 0.05
