@@ -57,9 +57,6 @@ def servos_at(rover, ground, poses, options, curvature):
             yield work.servo
 
 
-# The solution
-
-
 @pytest.mark.parametrize(("rover", "curvature"), [(LSR1, 0.0), (LSR1, 0.8), (FIXED, np.inf)])
 @pytest.mark.parametrize(
     ("ground", "half", "options", "least"),
@@ -103,9 +100,6 @@ def test_the_jacobian_is_that_of_finite_differences(ground, half, options, apart
         np.testing.assert_allclose(J, found, atol=apart * np.abs(found).max())
 
 
-# Firm ground
-
-
 @pytest.mark.parametrize(("rover", "slope"), [(LSR1, 0.1), (LSR1, 0.3), (M2020, 0.2)])
 def test_uphill_the_speed_lost_is_that_of_droop_and_creep(rover, slope):
     ground = plane(slope, 0.0, half=4.0)
@@ -116,9 +110,6 @@ def test_uphill_the_speed_lost_is_that_of_droop_and_creep(rover, slope):
     assert 1.0 - stiff.speed_share[0] <= 3.0 * CREEP
     weight_along = rover.weight * np.sin(np.arctan(slope))
     assert found.tangential.sum() == pytest.approx(weight_along, rel=1e-5)
-
-
-# Firm ground and soil
 
 
 @pytest.mark.parametrize("slope", [0.25, -0.25])
@@ -179,9 +170,6 @@ def test_energy_and_time_count_slip_and_droop(slope, soil):
     # The servo's droop gives the rim's speed, and the slip what is left of it.
     rim = 1.0 - LSR1.wheel.servo_droop * servo.torque[0] / LSR1.wheel.max_torque
     assert rim * (1.0 - servo.slip_ratio[0]) == pytest.approx(servo.speed_share[0], abs=0.02)
-
-
-# Soil
 
 
 @few

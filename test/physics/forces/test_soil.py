@@ -149,9 +149,6 @@ def test_a_lifted_wheel_has_no_grip(name, N):
         assert friction_of(soil, 0.1, 0.08, N) == MIN_FRICTION
 
 
-# Coulomb ground.
-
-
 @given(st.floats(0.1, 1000.0), st.floats(-1000.0, 1000.0), st.floats(-1000.0, 1000.0))
 def test_coulomb_ground_sticks_or_slips(N, T, S):
     soil = pack_soils()[0]

@@ -151,9 +151,6 @@ def test_no_wheel_is_faster_than_its_drive():
     assert np.abs(prediction.wheel_speed).max() == pytest.approx(LSR1.wheel.max_speed)
 
 
-# Given curvatures
-
-
 @given(st.floats(-3.0, 3.0))
 def test_a_given_curvature_is_the_one_of_the_arc(curvature):
     found = motions([[0.0, 0.0, 0.3]], curvature=[curvature])[0]
@@ -173,9 +170,6 @@ def test_a_given_curvature_is_the_one_of_the_arc(curvature):
 def test_curvatures_that_are_none_are_refused(curvature, what):
     with pytest.raises(PoseError, match=what):
         judge_poses(LSR1, LEVEL, np.zeros((3, 3)), curvature)[0]
-
-
-# What follows from the motions
 
 
 def test_the_drive_waits_for_wheels_that_turn():

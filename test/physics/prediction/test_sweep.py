@@ -54,9 +54,6 @@ def assert_identical(prediction, expected, rows=slice(None)):
         assert values.tobytes() == columns(expected)[name][rows].tobytes(), name
 
 
-# Bad input
-
-
 @pytest.mark.parametrize(
     ("poses", "words"),
     [
@@ -87,9 +84,6 @@ def test_bad_arguments_are_refused_by_name_and_value(arguments, words):
         judge_path(LSR1, LEVEL, POSE, SweepOptions(**arguments))[0]
 
 
-# Each waypoint on its own
-
-
 @few
 @given(st.integers(0, 10_000), st.integers(1, 70))
 def test_any_choice_of_poses_gives_identical_rows(seed, count):
@@ -116,9 +110,6 @@ def test_paths_swept_together_are_as_swept_one_by_one(policy):
                 assert getattr(part, name).tobytes() == getattr(expected, name).tobytes(), name
 
 
-# Time, distance, energy
-
-
 def test_the_way_up_a_slope_takes_longer_than_its_shadow():
     prediction = judge_path(LSR1, plane(0.4, 0.0), line(-0.3, 0.3))[0]
     way = 0.6 * np.hypot(1.0, 0.4)
@@ -133,9 +124,6 @@ def test_energy_uphill_is_the_weight_lifted_and_braking_downhill_gives_nothing_b
     lifted = LSR1.weight * np.ptp(prediction.position[:, 2])
     assert prediction.energy[0] == 0.0
     assert prediction.energy[-1] == pytest.approx(lifted, rel=1e-4)
-
-
-# Scores
 
 
 def poses_on(terrain: Terrain, shape) -> np.ndarray:
@@ -180,9 +168,6 @@ def test_a_map_is_swept_cell_by_cell(monkeypatch):
     assert status.shape == (31, 41, 3) and tilt.dtype == np.float32
     pose = [-1.0 + 0.1 * 20, 2.0 + 0.1 * 15, 2.0 * np.pi / 3.0]
     np.testing.assert_allclose(tilt[15, 20, 1], score_poses(LSR1, terrain, pose).tilt, rtol=1e-6)
-
-
-# Several sweeps at once, and in slices
 
 
 def test_sweeps_at_once_have_the_bits_of_sweeps_alone():

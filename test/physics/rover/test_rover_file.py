@@ -60,9 +60,6 @@ def all_keys(data: dict[str, Any], path: str = "") -> dict[str, Any]:
     return found
 
 
-# What is read
-
-
 def test_presets_have_the_numbers_of_the_contract():
     assert preset_names() == ("lsr1", "m2020")
     lsr1, m2020 = load_rover("lsr1"), load_rover("m2020")
@@ -97,9 +94,6 @@ def test_optional_keys_may_be_left_out_or_empty_and_integers_are_numbers():
     arm = read("manipulator.joint_limits", limits).manipulator
     assert arm.joint_limits == tuple(map(tuple, limits))
     assert read("manipulator.joint_limits").manipulator.joint_limits is None
-
-
-# What is refused
 
 
 @pytest.mark.parametrize("key", [key for key in all_keys(LSR1) if key not in OPTIONAL])

@@ -25,25 +25,19 @@ from support.project.checkout import TOP
 from support.rover_geometry import place_rover, wheel_axes
 
 
-def numbers_of(contents: Any, key: str = "") -> dict[str, Any]:
+def values_of(contents: Any, key: str = "") -> dict[str, Any]:
     """Return all values of nested contents by their dotted key."""
-    if isinstance(contents, dict):
-        pairs = contents.items()
-    elif isinstance(contents, list):
-        pairs = enumerate(contents)
-    else:
+    if isinstance(contents, list):
+        contents = dict(enumerate(contents))
+    if not isinstance(contents, dict):
         return {key: contents}
-    return {k: v for name, item in pairs for k, v in numbers_of(item, f"{key}.{name}").items()}
+    found = [values_of(item, f"{key}.{name}") for name, item in contents.items()]
+    return {place: value for part in found for place, value in part.items()}
 
 
 def assert_alike(first: Rover, second: Rover) -> None:
-    one, other = numbers_of(rover_to_dict(first)), numbers_of(rover_to_dict(second))
-    assert one.keys() == other.keys()
-    for key, value in one.items():
-        if isinstance(value, float):
-            assert other[key] == pytest.approx(value, rel=0.0, abs=1e-9), key
-        else:
-            assert other[key] == value, key
+    one, other = (values_of(rover_to_dict(rover)) for rover in (first, second))
+    assert other == pytest.approx(one, abs=1e-9)
 
 
 @pytest.mark.parametrize("name", preset_names())
@@ -345,8 +339,6 @@ def test_limits_that_no_joint_reaches_count_as_none():
     assert (joint.lower, joint.upper) == (-math.inf, math.inf)
     assert (joint.effort, joint.velocity) == (math.inf, math.inf)
 
-
-# As MuJoCo reads it
 
 ROCKER, BOGIES, TURN = 0.2, np.array([0.3, -0.25]), 0.4
 """Angles of the right rocker, of both bogies and of the steered wheels [rad]."""

@@ -2,29 +2,18 @@
 """Soil files: the presets, and what is refused by name."""
 
 import math
-from pathlib import Path
 
 import pytest
 
 from rover_physics import RoverError
 from rover_physics.errors import SoilError
 from rover_physics.terrain.soil_file import load_soils, soil_named, soils_from_dict
+from support.project.checkout import TOP
 
-
-def dry_sand(**changes):
-    """Return the entry of dry sand, with keys changed, or left out where None."""
-    entry = {
-        "model": "bekker_wong",
-        "cohesion": 1040.0,
-        "friction_angle": 0.488692,
-        "k_c": 990.0,
-        "k_phi": 1528430.0,
-        "n": 1.1,
-        "shear_modulus": 0.025,
-        "source": "a book",
-        **changes,
-    }
-    return {key: value for key, value in entry.items() if value is not None}
+DUNE = {
+    "model": "bekker_wong", "cohesion": 1040.0, "friction_angle": 0.488692, "k_c": 990.0,
+    "k_phi": 1528430.0, "n": 1.1, "shear_modulus": 0.025, "source": "a book",
+}  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -47,11 +36,8 @@ def test_presets_have_the_published_values_in_si_units(
     assert math.isnan(soil.friction)
 
 
-DOCS = Path(__file__).resolve().parents[3] / "docs"
-
-
 def test_every_preset_says_where_it_is_from_and_is_in_the_docs():
-    text = (DOCS / "soil.md").read_text(encoding="utf-8")
+    text = (TOP / "docs" / "soil.md").read_text(encoding="utf-8")
     for name, soil in load_soils().items():
         assert soil.source.strip()
         assert f"`{name}`" in text
@@ -72,34 +58,27 @@ def test_an_unknown_soil_lists_the_soils_there_are():
     assert issubclass(SoilError, RoverError)
 
 
-@pytest.mark.parametrize(
-    ("changes", "text"),
-    [
-        ({"model": "mohr"}, "dune.model is 'mohr'; it must be coulomb or bekker_wong"),
-        ({"cohesion": "1e3"}, "dune.cohesion is '1e3'.*YAML reads it as text"),
-        ({"friction_angle": 28.0}, "dune.friction_angle is 28.0; .* at most 1.2 in rad"),
-        ({"friction_angle": 0.0, "cohesion": 0.0}, "dune.cohesion is 0.0; .*some strength"),
-        ({"k_phi": 0.0}, r"dune.k_phi is 0.0; it must be a number above 0 in N/m\^\(n\+2\)"),
-    ],
-)
-def test_a_wrong_value_is_refused_by_its_key(changes, text):
-    with pytest.raises(SoilError, match=rf"my soils: {text}"):
-        soils_from_dict({"dune": dry_sand(**changes)}, "my soils")
-
-
 COULOMB = {"model": "coulomb", "source": "s"}
 
 
 @pytest.mark.parametrize(
     ("data", "text"),
     [
-        *[(data, "is .*; it must be a mapping of names to soils")
-          for data in ({}, "dune")],
-        ({7: dry_sand()}, "soil name is 7; it must be a text"),
+        *[(data, "is .*; it must be a mapping of names to soils") for data in ({}, "dune")],
+        ({7: COULOMB}, "soil name is 7; it must be a text"),
         ({"slab": COULOMB | {"n": 1.0}}, r"unknown key slab\.n"),
         ({"slab": COULOMB | {"friction": 0.0}}, r"slab\.friction is 0\.0; it must be .*above 0"),
+        ({"dune": DUNE | {"model": "mohr"}},
+         "dune.model is 'mohr'; it must be coulomb or bekker_wong"),
+        ({"dune": DUNE | {"cohesion": "1e3"}}, "dune.cohesion is '1e3'.*YAML reads it as text"),
+        ({"dune": DUNE | {"friction_angle": 28.0}},
+         "dune.friction_angle is 28.0; .* at most 1.2 in rad"),
+        ({"dune": DUNE | {"friction_angle": 0.0, "cohesion": 0.0}},
+         "dune.cohesion is 0.0; .*some strength"),
+        ({"dune": DUNE | {"k_phi": 0.0}},
+         r"dune.k_phi is 0.0; it must be a number above 0 in N/m\^\(n\+2\)"),
     ],
 )  # fmt: skip
-def test_what_is_no_mapping_of_soils_or_no_coulomb_soil_is_refused(data, text):
-    with pytest.raises(SoilError, match=f"x: {text}"):
-        soils_from_dict(data, "x")
+def test_what_is_no_mapping_of_soils_and_wrong_values_are_refused_by_their_key(data, text):
+    with pytest.raises(SoilError, match=f"my soils: {text}"):
+        soils_from_dict(data, "my soils")
