@@ -8,12 +8,7 @@ import pytest
 
 from rover_physics import Terrain, load_rover
 from rover_planner.maps.layers import FOOTPRINT, CellSources
-from rover_planner.maps.unobserved_ground import (
-    SEEN,
-    UNSEEN,
-    ObservedGround,
-    observed_ground,
-)
+from rover_planner.maps.unobserved_ground import SEEN, UNSEEN, ObservedGround, observed_ground
 from rover_planner.parameters.traverse_server import ALLOW, ALLOW_FOOTPRINT, REFUSE
 
 LSR1 = load_rover("lsr1")  # its belly is 0.6 m x 0.4 m
