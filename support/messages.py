@@ -17,6 +17,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
+from msg_adapters.paths import stamped_pose
 from msg_adapters.stamps import ns_to_stamp
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
@@ -41,6 +42,14 @@ def row_messages(row: Floats, begin: float) -> tuple[JointState, Odometry]:
     place.x, place.y = float(row[log.X]), float(row[log.Y])
     turn.x, turn.y, turn.z, turn.w = xyzw_from_rpy(*row[[log.ROLL, log.PITCH, log.YAW]]).tolist()
     return joints, odometry
+
+
+def odometry_at(pose, height: float = 0.0, frame: str = "map") -> Odometry:
+    """Return odometry of a level rover at a pose: x, y [m], yaw [rad]."""
+    odometry = Odometry(child_frame_id="base_link")
+    odometry.header.frame_id, odometry.pose.pose = frame, stamped_pose(pose, frame).pose
+    odometry.pose.pose.position.z = height
+    return odometry
 
 
 def make_target(x=1.0, y=2.0, z=0.3, frame="map") -> PoseStamped:

@@ -22,6 +22,7 @@ from rover_planner.nodes.result_topics import RESULT_KINDS
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.ros.qos import map_qos, result_qos, topic_qos
 from rover_planner.shell import kernels
+from support.messages import odometry_at
 from support.ros_fixtures import RosRun, call
 from support.waiting import wait_until
 
@@ -41,12 +42,10 @@ def spin_server(ros: RosRun, **overrides) -> TraverseServer:
     """
     load_kernels()
     values = {"time_budget": 60.0, "map_folder": "/", "waypoint_spacing": 0.05} | overrides
-    parameters = [Parameter(name, value=value) for name, value in values.items()]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(kernels, "LOADING_DELAY", 1e6)
         patch.setattr(traverse_server, "EXACT", ())
-        server = TraverseServer(context=ros.context, parameter_overrides=parameters)
-    return ros.spin(server)
+        return ros.start(TraverseServer, **values)
 
 
 class PlannerClient(Node):
@@ -91,10 +90,7 @@ class PlannerClient(Node):
 
     def send_odometry(self, pose, height=0.0) -> None:
         """Publish odometry of a level pose (3,)."""
-        odometry = Odometry(child_frame_id="base_link")
-        odometry.header.frame_id, odometry.pose.pose = "map", stamped_pose(pose, "map").pose
-        odometry.pose.pose.position.z = height
-        self.send(self._odometry, odometry)
+        self.send(self._odometry, odometry_at(pose, height))
 
     def can_traverse(self, start, goal, tolerance=0.0, frame="map") -> Path:
         """Ask for a plan between two poses (3,)."""

@@ -10,7 +10,6 @@ import pytest
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Bool, String
 
@@ -113,8 +112,7 @@ def drive(node: GroundLearnerNode, rover: Rover, rows: np.ndarray) -> None:
 
 
 def test_a_drive_is_learned_and_a_rover_that_gets_stuck_is_stopped_and_its_place_marked(ros):
-    wishes = [Parameter(f"{what}_when_stuck", value=True) for what in ("stop", "mark")]
-    node = ros.spin(GroundLearnerNode(context=ros.context, parameter_overrides=wishes))
+    node = ros.start(GroundLearnerNode, stop_when_stuck=True, mark_when_stuck=True)
     rover = ros.spin(Rover(ros))
     wait_until(rover.is_heard, "the node's subscriptions")
     ground = ramp(SLOPE)

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import Point, Quaternion
-from nav_msgs.msg import Odometry
+from geometry_msgs.msg import Quaternion
 from nav_msgs.msg import Path as PathMessage
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
@@ -28,6 +27,7 @@ from rover_planner.cli import main
 from rover_planner.nodes.result_topics import RESULT_KINDS
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.bags.bag_files import GRID_MAP, GRID_MAP_FIELDS, GRID_MAP_INFO_FIELDS
+from support.messages import odometry_at
 from support.rovers import LSR1
 
 BEGIN = 1_700_000_000_000_000_000
@@ -41,15 +41,6 @@ def waves() -> Terrain:
     return Terrain(0.03 * np.sin(4.0 * X + 0.8 * Y), 0.04, (-1.0, -2.0))
 
 
-def odometry_at(x: float, frame: str = "map") -> Odometry:
-    """Return a level rover at x [m] on the x axis of a frame."""
-    message = Odometry()
-    message.header.frame_id = frame
-    message.pose.pose.position = Point(x=x)
-    message.pose.pose.orientation.w = 1.0
-    return message
-
-
 def drive(length: float) -> list[tuple[str, object]]:
     """Return the messages of a drive along x: odometry and the model's suspension each 2 cm."""
     x = np.arange(0.5, 0.5 + length, 0.02)
@@ -59,7 +50,7 @@ def drive(length: float) -> list[tuple[str, object]]:
     for k, place in enumerate(x.tolist()):
         values = np.concatenate([prediction.rocker_angle[k], prediction.bogie_angle[k]])
         joints = JointState(name=list(SUSPENSION_JOINTS), position=values.tolist())
-        messages += [("/joint_states", joints), ("/odometry", odometry_at(place))]
+        messages += [("/joint_states", joints), ("/odometry", odometry_at((place, 0.0, 0.0)))]
     return messages
 
 
@@ -162,7 +153,7 @@ def test_predictions_are_recorded_as_a_server_publishes_them(tmp_path, capsys):
 def test_each_new_map_is_asked_for_a_goal_from_the_odometry(tmp_path, capsys):
     flat = Terrain(np.zeros((100, 250)), 0.04, (-1.0, -2.0))
     messages = [
-        ("/odometry", odometry_at(1.0)),
+        ("/odometry", odometry_at((1.0, 0.0, 0.0))),
         ("/elevation_cloud", cloud(waves())),
         ("/elevation_cloud", cloud(waves())),  # the same again
         ("/elevation_cloud", cloud(flat, BEGIN + 1)),
@@ -179,7 +170,7 @@ def test_messages_that_cannot_be_used_are_counted_and_told(tmp_path, capsys):
     messages = [
         ("/elevation_cloud", cloud(waves(), frame="odom")),
         ("/elevation_cloud", cloud(waves())),
-        ("/odometry", odometry_at(1.0, frame="odom")),
+        ("/odometry", odometry_at((1.0, 0.0, 0.0), frame="odom")),
         ("/joint_states", JointState(name=["bogie_left"], position=[float("nan")])),
         ("/imu", Imu(orientation=Quaternion(w=0.0))),
     ]
@@ -196,7 +187,7 @@ def test_messages_that_cannot_be_used_are_counted_and_told(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("messages", "words", "said"),
     [
-        ([("/odometry", odometry_at(0.0))], (), "has no map: PointCloud2 or GridMap"),
+        ([("/odometry", odometry_at((0.0, 0.0, 0.0)))], (), "has no map: PointCloud2 or GridMap"),
         ([("/a", cloud(waves())), ("/b", cloud(waves()))], (), "choose one by --map-topic"),
         ([("/a", cloud(waves()))], ("--map-topic", "/c"), "no topic /c of type .* it has /a"),
         ([("/a", cloud(waves()))], ("--parameters", "none.yaml"), "none.yaml"),
@@ -231,10 +222,7 @@ def test_recorded_transforms_place_odometry_and_clouds_on_the_map(tmp_path, caps
     mount = Rigid.from_rpy(0.4, 0.0, 0.6, 0.0, 0.5, 0.0)
     on_map = Rigid.from_rpy(1.0, 0.0, 0.25, 0.0, 0.0, 0.0)
     in_odom, in_camera = map_odom.inverse().then(on_map), on_map.then(mount).inverse()
-    odometry = odometry_at(0.0, "odom")
-    place, turn = odometry.pose.pose.position, odometry.pose.pose.orientation
-    place.x, place.y, place.z = in_odom.translation.tolist()
-    turn.x, turn.y, turn.z, turn.w = in_odom.rotation.as_quat().tolist()
+    odometry = odometry_at(in_odom.xyyaw, in_odom.translation[2], "odom")
     odometry.header.stamp = ns_to_stamp(BEGIN)
     plain, seen = cloud(waves()), cloud(waves(), frame="camera")
     points = np.frombuffer(plain.data, "<f4").reshape(-1, 3)

@@ -11,7 +11,6 @@ from geometry_msgs.msg import Twist, TwistStamped
 from rcl_interfaces.msg import Log
 from rclpy.context import Context
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool, Float64MultiArray, String
@@ -175,9 +174,8 @@ def start_controller(ros):
     """Return a function that starts an enabled, patient controller with other parameters."""
 
     def start(**values):
-        values = {"rate": RATE, "enabled_at_start": True, **PATIENT} | values
-        parameters = [Parameter(name, value=value) for name, value in values.items()]
-        return ros.spin(TractionController(context=ros.context, parameter_overrides=parameters))
+        given = {"rate": RATE, "enabled_at_start": True, **PATIENT} | values
+        return ros.start(TractionController, **given)
 
     return start
 

@@ -6,18 +6,13 @@ import time
 import pytest
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from msg_adapters.stamps import NANOSECONDS
+from msg_adapters.stamps import NANOSECONDS, ns_to_stamp
 from support.waiting import wait_until
 
 BOUND = 1.5
 """Longest time from the cause to zero or hold [s]: the timeouts below, and
 what a busy machine adds; docs/validation.md has what was measured with the defaults."""
-TIGHT = {
-    "joint_states_timeout": 0.3,
-    "imu_timeout": 0.3,
-    "watchdog_timeout": 0.3,
-    "clock_timeout": 0.3,
-}
+TIGHT = {f"{what}_timeout": 0.3 for what in ("joint_states", "imu", "watchdog", "clock")}
 """Several times the defaults, for the sake of busy machines."""
 
 
@@ -33,10 +28,7 @@ class SimulatedClock:
     def _tick(self):
         self.time += self.step
         if self.step:
-            message = ClockMessage()
-            message.clock.sec = self.time // NANOSECONDS
-            message.clock.nanosec = self.time % NANOSECONDS
-            self._publisher.publish(message)
+            self._publisher.publish(ClockMessage(clock=ns_to_stamp(self.time)))
 
 
 def wait_for_rest(rover, began):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Odometry of another frame, and of a robot with another origin, is placed on the map."""
+"""Odometry and clouds of another frame are placed on the map."""
 
 from functools import partial
 
@@ -12,7 +12,7 @@ from sensor_msgs.msg import PointCloud2
 from msg_adapters.elevation import terrain_to_point_cloud
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.qos import map_qos, sensor_qos
-from support.messages import send_transforms
+from support.messages import odometry_at, send_transforms
 from support.rough_grounds import RESOLUTION, plane
 from support.waiting import TIMEOUT, wait_until
 
@@ -24,9 +24,7 @@ MAP_ODOM = Rigid.from_rpy(1.0, -0.5, 0.4, 0.0, 0.0, np.pi / 2)
 def drive_in_odom(rover):
     """Return a function that sends odometry in odom until a condition holds."""
     sender = rover.create_publisher(Odometry, "odometry", sensor_qos())
-    odometry = Odometry(child_frame_id="base_link")
-    odometry.header.frame_id = "odom"
-    odometry.pose.pose.position.x = 0.5
+    odometry = odometry_at((0.5, 0.0, 0.0), frame="odom")
 
     def drive(holds, what):
         def send():
@@ -59,14 +57,6 @@ def test_odometry_in_odom_serves_on_a_map_in_map(rover, start_controller, drive_
     drive_in_odom(lambda: contact_source(rover) == "map", "contacts from the map")
     right = (1.0, 0.0, 0.4, np.pi / 2)
     np.testing.assert_allclose(controller.service._pose, right, atol=1e-9)
-
-
-def test_odometry_of_a_robot_with_another_origin_is_that_of_the_body(
-    start_controller, drive_in_odom
-):
-    controller = start_controller(base_offset=[0.3, 0.0, 0.2, 0.0, 0.0, 0.0], map_frame="odom")
-    drive_in_odom(lambda: controller.service._pose.any(), "odometry")
-    np.testing.assert_allclose(controller.service._pose, (0.8, 0.0, 0.2, 0.0), atol=1e-9)
 
 
 def test_a_cloud_in_odom_is_placed_on_the_map_and_refused_without_a_transform(

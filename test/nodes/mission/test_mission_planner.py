@@ -4,14 +4,10 @@
 import json
 import threading
 
-import pytest
-
-pytest.importorskip("rclpy", reason="needs ROS 2")
-
 import numpy as np
+import pytest
 import rclpy
 from nav_msgs.msg import Odometry, Path
-from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -26,6 +22,7 @@ from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.planning.answering.budget import STOPPING
 from rover_planner.shell.poses import Pose
 from support.grounds import make_terrain, rock_left, wall_at, waves
+from support.messages import odometry_at
 from support.ros_fixtures import domain_id, run_in_executor
 from support.waiting import wait_until
 
@@ -34,14 +31,11 @@ START, NEAR, BEYOND = "--start=-2,0,0", "--goal=-0.5,0,0", "--goal=2,0,0"
 
 
 @pytest.fixture
-def planner():
-    """Return a planner in a context of its own."""
-    context = Context()
-    rclpy.init(context=context, domain_id=domain_id())
-    planner = MissionPlanner(context=context)
+def planner(ros):
+    """Return a planner."""
+    planner = MissionPlanner(context=ros.context)
     yield planner
     planner.destroy_node()
-    rclpy.try_shutdown(context=context)
 
 
 def test_ros_that_is_shut_down_while_the_node_waits_is_the_end_of_waiting(planner):
@@ -198,11 +192,9 @@ def test_a_second_planner_waits_for_the_end_of_the_first_and_a_path_from_elsewhe
     first.send_path(np.zeros((1, 3)))
     with pytest.raises(NoAnswerError, match="the end of first, which sends the rover paths"):
         second.send_path(np.zeros((1, 3)))
-    there = Odometry(child_frame_id="base_link")
-    there.header.frame_id = "map"
 
     def is_told() -> bool:
-        odometry.publish(there)
+        odometry.publish(odometry_at((0.0, 0.0, 0.0)))
         rover.create_publisher(Path, "path", 10).publish(poses_path(np.ones((2, 3)), "map"))
         try:
             first.wait_for_pose(lambda pose: True, 0.1)
