@@ -27,11 +27,12 @@ from rover_planner.cli import main
 from rover_planner.nodes.result_topics import RESULT_KINDS
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.bags.bag_files import GRID_MAP, GRID_MAP_FIELDS, GRID_MAP_INFO_FIELDS
-from support.messages import odometry_at
+from support.messages import grid_map_of, odometry_at
 from support.rovers import LSR1
 
 BEGIN = 1_700_000_000_000_000_000
 """Time of the first message [ns]."""
+GRID_MAPS = "/elevation_map"
 STORAGES = {"sqlite": StoragePlugin.SQLITE3, "mcap": StoragePlugin.MCAP}
 
 
@@ -110,13 +111,17 @@ def transforms_of(parent: str, child: str, rigid: Rigid):
 
 @pytest.mark.parametrize("storage", STORAGES)
 def test_a_drive_is_judged_in_stretches_with_what_was_measured(storage, tmp_path, capsys):
-    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves())), *drive(1.6)], storage)
+    seen, name = cloud(waves()), "/elevation_cloud"
+    if storage == "sqlite":
+        ground = waves()
+        seen, name = grid_map_of({"elevation": ground.elevation}, 0.04, (3.98, -0.02)), GRID_MAPS
+    bag = record(tmp_path / "bag", [(name, seen), *drive(1.6)], storage)
     answers, total = replay(capsys, bag, tmp_path / "out", "--stretch", "1")
     assert [answer["kind"] for answer in answers] == ["driven"] * 2
     assert all(answer["traversable"] for answer in answers)
     assert total["refused_messages"] == {} and total["answers"] == 2
     assert total["topics"] == {
-        "map": "/elevation_cloud", "joints": "/joint_states", "odometry": "/odometry",
+        "map": name, "joints": "/joint_states", "odometry": "/odometry",
     }  # fmt: skip
     for answer in answers:
         # Poses are kept 5 cm apart, the ground turns the bogies by up to 0.12 rad in 10 cm.
