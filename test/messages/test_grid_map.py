@@ -92,25 +92,20 @@ def _set(path, value):
     return change
 
 
-def _huge(message):
-    message.info.length_x = message.info.length_y = 1e6
-
-
-def _turn(message):
-    message.info.pose.orientation = SimpleNamespace(x=0.0, y=0.0, z=0.1, w=0.995)
+TURN = SimpleNamespace(x=0.0, y=0.0, z=0.1, w=0.995)
 
 
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        (_turn, "grid map is turned"),
+        (_set("info.pose.orientation", TURN), "grid map is turned"),
         (_set("layers", ["height"]), "no layer 'elevation'; it has height: set elevation_layer"),
         (_set("layers", ["elevation", "elevation"]), "2 layers and 1 arrays"),
         (_set("basic_layers", ["seen"]), "basic layer 'seen'"),
         (_set("info.length_x", 0.26), "length_x 0.26"),
         (_set("info.length_y", float("nan")), "length_y nan"),
         (_set("info.resolution", 0.0), "resolution 0.0"),
-        (_huge, "at most 25000000"),
+        (_set("info.length_x", 1e6), "at most 25000000"),
         (_set("outer_start_index", 5), "starts at row 5"),
         (_set("data.0.data", HEIGHTS.ravel()[:-1]), "34 values"),
         (_set("data.0.layout.data_offset", 2), "37"),
