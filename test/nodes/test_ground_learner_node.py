@@ -53,18 +53,13 @@ class Rover(Node):
         kinds = {"joint_states": JointState, "odometry": Odometry, "cmd_vel": TwistStamped}
         kinds["imu"] = Imu
         self._senders = {n: self.create_publisher(k, n, topic_qos()) for n, k in kinds.items()}
-        self.create_subscription(
-            String, ESTIMATE, lambda m: self.estimates.append(json.loads(m.data)), latched_qos()
-        )
-        self.create_subscription(
-            Odometry, "ground_learner/odometry", self.wheels.append, sensor_qos()
-        )
-        self.create_subscription(
-            String, MARK_PLACE, lambda m: self.marks.append(m.data), latched_qos()
-        )
-        self.create_subscription(
-            Bool, EMERGENCY_STOP, lambda m: self.stops.append(m.data), latched_qos()
-        )
+        for kind, topic, hear, qos in (
+            (String, ESTIMATE, lambda m: self.estimates.append(json.loads(m.data)), latched_qos()),
+            (Odometry, "ground_learner/odometry", self.wheels.append, sensor_qos()),
+            (String, MARK_PLACE, lambda m: self.marks.append(m.data), latched_qos()),
+            (Bool, EMERGENCY_STOP, lambda m: self.stops.append(m.data), latched_qos()),
+        ):
+            self.create_subscription(kind, topic, hear, qos)
 
     def is_heard(self) -> bool:
         """Return whether all topics are connected."""
@@ -79,15 +74,9 @@ class Rover(Node):
         """Send what a row holds; the joints first, which the row of the odometry has."""
         joints, odometry = row_messages(row, BEGIN)
         self._senders["joint_states"].publish(joints)
-        self._senders["imu"].publish(
-            imu_message(
-                xyzw_from_rpy(*row[[ROLL, PITCH, YAW]]),
-                np.zeros(3),
-                3.7,
-                1e-3,
-                odometry.header.stamp,
-            )
-        )
+        attitude = xyzw_from_rpy(*row[[ROLL, PITCH, YAW]])
+        imu = imu_message(attitude, np.zeros(3), 3.7, 1e-3, odometry.header.stamp)
+        self._senders["imu"].publish(imu)
         self._senders["odometry"].publish(odometry)
 
 

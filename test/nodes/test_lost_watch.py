@@ -31,11 +31,9 @@ class Ear(Node):
         super().__init__("ear", context=ros.context)
         self.states: list[tuple[float, str]] = []
         self.speed = 0.0
-        for kind, topic, hear, qos in (
-            (String, "traction_controller/state", self._hear_state, latched_qos()),
-            (Odometry, "odometry", self._hear_odometry, sensor_qos()),
-        ):
-            self.create_subscription(kind, topic, hear, qos)
+        state = "traction_controller/state"
+        self.create_subscription(String, state, self._hear_state, latched_qos())
+        self.create_subscription(Odometry, "odometry", self._hear_odometry, sensor_qos())
 
     def _hear_state(self, message):
         self.states.append((time.monotonic(), message.data))

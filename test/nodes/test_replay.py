@@ -27,12 +27,15 @@ from rover_planner.cli import main
 from rover_planner.nodes.result_topics import RESULT_KINDS
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.bags.bag_files import GRID_MAP, GRID_MAP_FIELDS, GRID_MAP_INFO_FIELDS
-from support.messages import grid_map_of, odometry_at
+from support.messages import grid_map_of, odometry_at, transform_message
 from support.rovers import LSR1
 
+TF_MESSAGE = "tf2_msgs/msg/TFMessage"
 BEGIN = 1_700_000_000_000_000_000
 """Time of the first message [ns]."""
 GRID_MAPS = "/elevation_map"
+NOT_ON_PYPI = {GRID_MAPS: GRID_MAP, **dict.fromkeys(("/tf", "/tf_static"), TF_MESSAGE)}
+"""Types of messages that are objects with their fields, by topic."""
 STORAGES = {"sqlite": StoragePlugin.SQLITE3, "mcap": StoragePlugin.MCAP}
 
 
@@ -66,21 +69,19 @@ def path_to(x: float) -> PathMessage:
 
 
 def record(folder: Path, messages: list[tuple[str, Any]], storage: str = "mcap") -> Path:
-    """Write messages 10 ms apart to a new bag: those of ROS, of the bag's library, or GridMaps."""
+    """Write messages 10 ms apart to a new bag."""
     types = get_typestore(Stores.ROS2_JAZZY)
     for name, fields in (("GridMapInfo", GRID_MAP_INFO_FIELDS), ("GridMap", GRID_MAP_FIELDS)):
         types.register(get_types_from_msg(fields, f"grid_map_msgs/msg/{name}"))
     with Writer(folder, version=9, storage_plugin=STORAGES[storage]) as writer:
         connections = {}
         for k, (topic, message) in enumerate(messages):
-            module, name = type(message).__module__.split(".")[0], type(message).__name__
-            is_grid_map = isinstance(message, SimpleNamespace)
-            kind = GRID_MAP if is_grid_map else getattr(message, "__msgtype__", "")
+            kind = NOT_ON_PYPI.get(topic, "")
             raw = types.serialize_cdr(message, kind) if kind else serialize_message(message)
             if topic not in connections:
-                connections[topic] = writer.add_connection(
-                    topic, kind or f"{module}/msg/{name}", typestore=types
-                )
+                module, name = type(message).__module__.split(".")[0], type(message).__name__
+                kind = kind or f"{module}/msg/{name}"
+                connections[topic] = writer.add_connection(topic, kind, typestore=types)
             writer.write(connections[topic], BEGIN + 10_000_000 * k, raw)
     return folder
 
@@ -90,23 +91,6 @@ def replay(capsys, bag: Path, out: Path, *words: str) -> tuple[list[dict], dict]
     assert main(["replay", str(bag), str(out), *words]) == 0, capsys.readouterr().err
     *answers, total = map(json.loads, capsys.readouterr().out.splitlines())
     return answers, total
-
-
-def transforms_of(parent: str, child: str, rigid: Rigid):
-    """Return a TFMessage of the bag's library; tf2_msgs is not on PyPI."""
-    types = get_typestore(Stores.ROS2_JAZZY).types
-    geometry = {
-        name: types[f"geometry_msgs/msg/{name}"]
-        for name in ("TransformStamped", "Transform", "Vector3", "Quaternion")
-    }
-    time = types["builtin_interfaces/msg/Time"](BEGIN // 10**9, BEGIN % 10**9)
-    transform = geometry["Transform"](
-        geometry["Vector3"](*rigid.translation.tolist()),
-        geometry["Quaternion"](*rigid.rotation.as_quat().tolist()),
-    )
-    header = types["std_msgs/msg/Header"](time, parent)
-    stamped = geometry["TransformStamped"](header, child, transform)
-    return types["tf2_msgs/msg/TFMessage"]([stamped])
 
 
 @pytest.mark.parametrize("storage", STORAGES)
@@ -233,12 +217,13 @@ def test_recorded_transforms_place_odometry_and_clouds_on_the_map(tmp_path, caps
     points = np.frombuffer(plain.data, "<f4").reshape(-1, 3)
     moved = in_camera.rotation.apply(points) + in_camera.translation
     seen.data = moved.astype("<f4").tobytes()
-    transforms = {
-        "/tf": transforms_of("map", "odom", map_odom),
-        "/tf_static": transforms_of("base_link", "camera", mount),
-    }
-    messages = [("/odometry", odometry), ("/elevation_cloud", seen)]
-    bag = record(tmp_path / "bag", [*transforms.items(), *messages])
+    edges = {"/tf": ("map", "odom", map_odom), "/tf_static": ("base_link", "camera", mount)}
+    messages = [
+        (topic, SimpleNamespace(transforms=[transform_message(*edge, ns_to_stamp(BEGIN))]))
+        for topic, edge in edges.items()
+    ]
+    messages += [("/odometry", odometry), ("/elevation_cloud", seen)]
+    bag = record(tmp_path / "bag", messages)
     words = ["--resolution", "0.04", "--goal", "3,0.2,0"]
     (answer,), total = replay(capsys, bag, tmp_path / "out", *words)
     assert total["refused_messages"] == {} and total["topics"]["tf"] == "/tf"

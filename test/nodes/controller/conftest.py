@@ -145,6 +145,10 @@ class DrivenRover(Node):
         now = time.time_ns()
         return wait_until(lambda: self._sent_at if self._sent_at > now else 0, "a message")
 
+    def wait_until_driven(self) -> None:
+        """Wait until the controller drives and the wheels push."""
+        wait_until(lambda: self.state == "driving" and self.push > 0.0, "driving")
+
     def count_lines(self, text: str) -> int:
         """Return how many lines of the controller's log have a text."""
         return sum(text in line for line in self.log)
@@ -184,5 +188,5 @@ def start_controller(ros):
 def controller(rover, start_controller):
     """Return a patient controller that drives the rover."""
     node = start_controller()
-    wait_until(lambda: rover.state == "driving" and rover.push > 0.0, "driving")
+    rover.wait_until_driven()
     return node

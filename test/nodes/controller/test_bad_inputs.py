@@ -51,7 +51,7 @@ def test_what_cannot_be_used_stops_the_rover_is_said_once_and_passes_by_itself(
         assert sum(push > 0.0 for _, push in rover.commands_after(spoilt)) <= CYCLES_IN_A_TENTH
         told = len(rover.log)
         rover.joints, rover.imu = kept
-        wait_until(lambda: rover.state == "driving" and rover.push > 0.0, "driving again")
+        rover.wait_until_driven()
         wait_until(lambda told=told: GOOD in " ".join(rover.log[told:]), "the good news")
         assert rover.count_lines(text) == 1
     assert ros.is_alive(controller)

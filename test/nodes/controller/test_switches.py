@@ -36,7 +36,7 @@ def test_a_node_starts_disabled_and_drives_once_it_is_enabled(
     assert spacing == pytest.approx(1.0 / node.values.rate, rel=0.3)
     answer = enable(True)
     assert (answer.success, answer.message) == (True, "enabled")
-    wait_until(lambda: rover.state == "driving" and rover.push > 0.0, "driving")
+    rover.wait_until_driven()
     late = start_rover(kind=None)
     wait_until(lambda: late.state == "driving" and late.brakes[-1:] == [False], "latched state")
     assert enable(False).message == "disabled"

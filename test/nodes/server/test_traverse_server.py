@@ -20,7 +20,7 @@ from rover_planner.nodes.result_topics import WHEEL_TOPICS
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.qos import map_qos
 from support.grounds import gap, make_terrain, rocky, waves
-from support.messages import send_transforms
+from support.messages import send_map_odom
 from support.planner_client import GOAL, SERVER, START, PlannerClient, ask, verdict_of
 from support.ros_fixtures import call
 from support.waiting import wait_until
@@ -79,7 +79,7 @@ def test_a_goal_on_the_map_gets_the_answer_of_one_frame(start_server, client):
     server.service.take_terrain(make_terrain(rocky))
     single, _ = client.next_results(lambda: client.can_traverse(START, GOAL, frame="odom"))
     map_odom = Rigid.from_rpy(30.0, -12.0, 0.4, 0.0, 0.0, 2.2)
-    send_transforms(server, server.frames.take, ("map", "odom", map_odom))
+    send_map_odom(server, map_odom)
     start, goal = (
         stamped_pose(map_odom.then(Rigid.from_rpy(x, y, 0.0, 0.0, 0.0, yaw)).xyyaw, "map")
         for x, y, yaw in (START, GOAL)
