@@ -5,7 +5,7 @@ import contextlib
 import os
 import threading
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
@@ -60,10 +60,10 @@ class RosRun:
         self._spinning.append((node, executor, thread))
         return node
 
-    def start(self, kind: Callable[..., Node], **values: Any) -> Any:
-        """Spin a new node of a kind, with values of parameters."""
-        parameters = [Parameter(name, value=value) for name, value in values.items()]
-        return self.spin(kind(context=self.context, parameter_overrides=parameters))
+    def start(self, kind: Callable[..., Node], words: Sequence[str] = (), **values: Any) -> Any:
+        """Spin a new node of a kind, with words of its command line and values of parameters."""
+        given = [Parameter(name, value=value) for name, value in values.items()]
+        return self.spin(kind(context=self.context, cli_args=[*words], parameter_overrides=given))
 
     def is_alive(self, node: Node) -> bool:
         """Return whether a node is still being spun; an exception in a callback ends spinning."""

@@ -22,6 +22,16 @@ def signal_handlers():
 
 
 @pytest.fixture
+def planner(ros):
+    """Return a mission planner, which ends with the test: the next one would wait for its end."""
+    from rover_planner.nodes.mission_planner import MissionPlanner
+
+    planner = MissionPlanner(context=ros.context)
+    yield planner
+    planner.destroy_node()
+
+
+@pytest.fixture
 def start_process():
     """Return a function that starts a node with parameters; what is left at the end is killed."""
     processes = []

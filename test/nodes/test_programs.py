@@ -12,7 +12,6 @@ import sys
 import pytest
 import yaml
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 
 from rover_planner.nodes import start
 from rover_planner.nodes.programs import PROGRAMS
@@ -135,16 +134,15 @@ def test_wrong_words_are_exit_code_2_and_named(name, words, said, capfd, monkeyp
 def test_a_node_in_a_namespace_has_the_topics_of_the_help_and_tells_of_wrong_parameters(
     name, ros, capfd
 ):
-    words, wrong, file = ["-r", "__ns:=/one"], [], PARAMETER_FILES / f"{name}.yaml"
+    words, wrong, file = ["-r", "__ns:=/one"], {}, PARAMETER_FILES / f"{name}.yaml"
     if file.exists():
         words += ["--params-file", str(file), "-r", "diagnostics:=/diagnostics"]
-        wrong = [Parameter("rovr", value="lsr1"), Parameter("use_sim_time", value=False)]
+        wrong = {"rovr": "lsr1", "use_sim_time": False}
     (kind,) = (
         one for one in vars(MODULES[name]).values()
         if isinstance(one, type) and issubclass(one, Node) and one.__module__.endswith(name)
     )  # fmt: skip
-    node = kind(context=ros.context, cli_args=["--ros-args", *words], parameter_overrides=wrong)
-    ros.spin(node)
+    node = ros.start(kind, ["--ros-args", *words], **wrong)
     assert node.get_fully_qualified_name() == f"/one/{name}"
     if file.exists():
         for key, value in yaml.safe_load(file.read_text())["/**"]["ros__parameters"].items():

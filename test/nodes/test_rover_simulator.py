@@ -19,7 +19,6 @@ from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.rover.steering_joints import steering_joints
 from rover_planner.errors import PlanningError
 from rover_planner.nodes.mission.drive import Drive, DriveSettings
-from rover_planner.nodes.mission_planner import MissionPlanner
 from rover_planner.nodes.rover_simulator import RoverSimulator
 from rover_planner.nodes.traction_controller import TractionController
 from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
@@ -139,11 +138,10 @@ def test_bad_parameters_are_refused_by_name(start_simulator):
 
 @pytest.mark.slow
 def test_simulator_server_controller_and_planner_drive_together_to_a_goal(
-    ros, start_simulator, start_server
+    ros, start_simulator, start_server, planner
 ):
     simulator = start_simulator(follow_commands=True)
     server, controller = start_server(planner="fan"), start_controller(ros)
-    planner = MissionPlanner(context=ros.context)
     planner.wait_for_server()
     wait_until(lambda: server.service.terrain is not None, "the map")
     place = simulator.simulation.plant.pose()

@@ -6,7 +6,6 @@ import pytest
 
 from rover_physics import load_rover, save_terrain
 from rover_planner.nodes.mission.drive import Drive, DriveSettings
-from rover_planner.nodes.mission_planner import MissionPlanner
 from rover_planner.nodes.rover_simulator import RoverSimulator
 from rover_planner.nodes.traction_controller import TractionController
 from rover_planner.nodes.traverse_server import TraverseServer
@@ -19,7 +18,7 @@ from support.waiting import wait_until
 @pytest.mark.slow
 @pytest.mark.timed
 @pytest.mark.parametrize("engine", ["quasi_static", "mujoco"])
-def test_a_rover_drives_around_boulders_that_it_sees_on_the_way(ros, tmp_path, engine):
+def test_a_rover_drives_around_boulders_that_it_sees_on_the_way(ros, planner, tmp_path, engine):
     terrain = make_mars_terrain(4, 8.0, rock_cover=0.25, crater_density=0.0)
     start, goal = (-0.01, -0.45, 0.45), (2.8, -0.25, 2.02)
     save_terrain(tmp_path / "ground.npz", terrain)
@@ -49,7 +48,6 @@ def test_a_rover_drives_around_boulders_that_it_sees_on_the_way(ros, tmp_path, e
         follow_commands=True,
         speed=0.1,
     )
-    planner = MissionPlanner(context=ros.context)
     planner.wait_for_server()
     wait_until(lambda: server.service.terrain is not None, "the map")
     known = np.isfinite(server.service.terrain.elevation).sum()

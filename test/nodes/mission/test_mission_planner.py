@@ -10,7 +10,6 @@ import rclpy
 from nav_msgs.msg import Odometry, Path
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 
 from msg_adapters.paths import poses_path
 from rover_planner.advice import seek
@@ -28,14 +27,6 @@ from support.waiting import wait_until
 
 START, NEAR, BEYOND = "--start=-2,0,0", "--goal=-0.5,0,0", "--goal=2,0,0"
 """Words for a start, a goal before the wall at x = 0.5 m, and one behind it."""
-
-
-@pytest.fixture
-def planner(ros):
-    """Return a planner."""
-    planner = MissionPlanner(context=ros.context)
-    yield planner
-    planner.destroy_node()
 
 
 def test_ros_that_is_shut_down_while_the_node_waits_is_the_end_of_waiting(planner):
@@ -149,10 +140,7 @@ def test_without_a_server_it_gives_up_in_time_and_says_what_it_waited_for(run_pl
 
 def test_a_server_with_another_name_is_found_by_remapping(ros, run_planner):
     judge = ["--ros-args", "-r", "__node:=judge"]
-    patient = [Parameter("time_budget", value=60.0)]
-    server = ros.spin(
-        TraverseServer(context=ros.context, cli_args=judge, parameter_overrides=patient)
-    )
+    server = ros.start(TraverseServer, judge, time_budget=60.0)
     server.service.take_terrain(make_terrain(waves))
     names = ("can_traverse", "verdict", "wheel_loads", "slip_ratios")
     words = [f"traverse_server/{name}:=judge/{name}" for name in names]
