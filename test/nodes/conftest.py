@@ -22,13 +22,25 @@ def signal_handlers():
 
 
 @pytest.fixture
-def planner(ros):
-    """Return a mission planner, which ends with the test: the next one would wait for its end."""
+def make_planner(ros):
+    """Return a function that makes a mission planner; the next test's would wait for its end."""
     from rover_planner.nodes.mission_planner import MissionPlanner
 
-    planner = MissionPlanner(context=ros.context)
-    yield planner
-    planner.destroy_node()
+    planners = []
+
+    def make(**given):
+        planners.append(MissionPlanner(context=ros.context, **given))
+        return planners[-1]
+
+    yield make
+    for planner in planners:
+        planner.destroy_node()
+
+
+@pytest.fixture
+def planner(make_planner):
+    """Return a mission planner."""
+    return make_planner()
 
 
 @pytest.fixture

@@ -15,7 +15,7 @@ from msg_adapters.paths import poses_path
 from rover_planner.advice import seek
 from rover_planner.advice.levers import LEVERS
 from rover_planner.nodes.mission.drive import DriveFailedError
-from rover_planner.nodes.mission_planner import MissionPlanner, NoAnswerError, main
+from rover_planner.nodes.mission_planner import NoAnswerError, main
 from rover_planner.nodes.programs import MissionOptions, read_arguments
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.planning.answering.budget import STOPPING
@@ -168,14 +168,14 @@ def test_a_question_that_a_server_does_not_answer_because_it_ends_is_asked_again
 
 
 def test_a_second_planner_waits_for_the_end_of_the_first_and_a_path_from_elsewhere_ends_a_drive(
-    ros, capfd
+    ros, make_planner
 ):
     rover = ros.spin(Node("follower", context=ros.context))
     odometry = rover.create_publisher(Odometry, "odometry", 10)
     rover.create_subscription(Path, "path", lambda path: None, 10)
     first, second = (
-        MissionPlanner(timeout=2.0, context=ros.context, cli_args=["--ros-args", "-r", r])
-        for r in ("__node:=first", "__node:=second")
+        make_planner(timeout=2.0, cli_args=["--ros-args", "-r", f"__node:={name}"])
+        for name in ("first", "second")
     )
     first.send_path(np.zeros((1, 3)))
     with pytest.raises(NoAnswerError, match="the end of first, which sends the rover paths"):
