@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Odometry from wheels and an IMU that knows how wheels slip, with a covariance; without ROS.
 
-Wheels under load creep: forward by a share of their way that grows with the slope, and down a side
-slope. How much is learned wherever the motion is measured without the wheels, piece by piece of
-way, and taken off where it is not. The misses that are left are the noise of the odometry.
+Wheels under load creep: forward by a share of their way that grows with what they push, and down a
+side slope. How much is learned wherever the motion is measured without the wheels, piece by piece
+of way, and taken off where it is not. The misses that are left are the noise of the odometry.
 
 Wheels that need all friction slide: a rover that pushes against an obstacle stands, and its wheels
 turn on. Their torques tell how much they push, and the ground's friction how much they can.
@@ -21,7 +21,7 @@ from rover_planner.planning.angles import wrap
 
 FORWARD_PRIOR, SIDE_PRIOR = (0.03, 0.2), (0.2,)
 """Standard deviations before anything was learned: of the share of way that is lost everywhere,
-of that per slope, and of the way aside per side slope."""
+of that per push, and of the way aside per side slope."""
 MISS, MISS_COUNT = 0.03, 4.0
 """Standard deviation of the miss of a piece over its way, and for how many pieces it counts."""
 GYRO_NOISE, GYRO_BIAS = 2e-3, 1e-4
@@ -125,13 +125,12 @@ class WheelOdometry:
         slope, aside = -math.tan(motion.pitch), math.tan(motion.roll)
         raw = float(ahead.sum()) / len(ahead) * math.cos(motion.pitch)
         self._take_traction(float(motion.torques.sum()) * self._per_torque, slope, elapsed)
-        slid, slide = self._find_slide(math.copysign(1.0, raw) * self._traction, aside)
+        push = self._traction if raw > 0.0 else -self._traction
+        slid, slide = self._find_slide(push, aside)
         rolled = (1.0 - slid) * raw
         step = rolled * elapsed
-        # Slip grows with the load on the wheels against the motion, so with the slope ahead.
-        uphill = slope if raw > 0.0 else -slope
-        everywhere, per_slope = self.forward.mean.tolist()
-        lost, drift = everywhere + per_slope * uphill, float(self.side.mean[0]) * aside
+        everywhere, per_push = self.forward.mean.tolist()
+        lost, drift = everywhere + per_push * push, float(self.side.mean[0]) * aside
         self.speed = rolled * (1.0 - lost)
         along = float(self.forward.variance)
         across = float(self.side.variance) * (aside**2 + 1.0)
@@ -145,10 +144,10 @@ class WheelOdometry:
         ahead_noise = piece * (along * c**2 + across * s**2)
         aside_noise = piece * (along * s**2 + across * c**2)
         self._sums += step * np.array([
-            c, c * uphill, s, s * uphill,  # forward ways
+            c, c * push, s, s * push,  # forward ways
             ahead_noise, mixed, mixed, aside_noise,
             -s * aside, c * aside,  # way aside
-            1.0, uphill, aside,  # ways of the piece
+            1.0, push, aside,  # ways of the piece
         ])  # fmt: skip
         self._slide += raw * elapsed * slide * np.array([c, s])
         self._elapsed += elapsed
