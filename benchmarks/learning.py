@@ -295,7 +295,14 @@ def measure_motion(rows: np.ndarray, truth: np.ndarray, seed: int) -> list[Wheel
     noise = GYRO_NOISE / np.sqrt(np.median(np.diff(times))) * rng.standard_normal(len(rows))
     yaw_rates = np.gradient(truth[:, YAW], times) + noise + GYRO_BIAS * rng.standard_normal()
     return [
-        WheelMotion(row[TIME], row[RATES], np.nan_to_num(row[STEERING]), row[ROLL], row[PITCH], w)
+        WheelMotion(
+            row[TIME],
+            row[RATES],
+            np.nan_to_num(row[STEERING]),
+            *row[[ROLL, PITCH]],
+            w,
+            row[TORQUES],
+        )
         for row, w in zip(rows, yaw_rates, strict=True)
     ]
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from rover_physics import Terrain, save_terrain
+from rover_planner.shell.run_program import MAX_LINE
 
 N = 30
 """Number of poses of the path in `write_ground_and_path`."""
@@ -29,10 +30,10 @@ def predict_arguments(
 
 
 def assert_refused(capfd, code: int, word: str) -> None:
-    """Assert that the exit code is 2 and that stderr has one line, which contains `word`."""
-    err = capfd.readouterr().err
-    assert code == 2
-    assert err.count("\n") == 1
-    assert err.startswith("rover_planner: ")
-    assert word in err
-    assert "Traceback" not in err
+    """Assert that the exit code is 2 and that stderr has one short line, which has a word."""
+    line = capfd.readouterr().err
+    assert code == 2, line
+    assert line.startswith("rover_planner: ")
+    assert line.count("\n") == 1 and len(line) <= MAX_LINE + 1
+    assert line[:-1].isprintable() and "Traceback" not in line
+    assert word in line

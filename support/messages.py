@@ -5,7 +5,6 @@ A GridMap is an object with the fields of grid_map_msgs/GridMap; tf2_msgs is not
 """
 
 import copy
-from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,18 +13,15 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseStamped, TransformStamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rclpy.duration import Duration
-from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
+from msg_adapters.paths import stamped_pose
 from msg_adapters.stamps import ns_to_stamp
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_planner.learning import drive_log as log
 from rover_planner.planning.navigation.transforms import Rigid
-
-Edge = tuple[str, str, Rigid]
-"""Parent frame, child frame, and where the child is in the parent."""
 
 
 def row_messages(row: Floats, begin: float) -> tuple[JointState, Odometry]:
@@ -34,13 +30,19 @@ def row_messages(row: Floats, begin: float) -> tuple[JointState, Odometry]:
     joints.position = [*row[log.SUSPENSION].tolist(), *([0.0] * len(WHEEL_JOINTS))]
     joints.velocity = [0.0] * len(SUSPENSION_JOINTS) + row[log.RATES].tolist()
     joints.effort = [0.0] * len(SUSPENSION_JOINTS) + row[log.TORQUES].tolist()
-    odometry = Odometry()
-    odometry.header.frame_id = "map"
+    odometry = odometry_at(row[[log.X, log.Y, log.YAW]])
     odometry.header.stamp = ns_to_stamp(int((begin + row[log.TIME]) * 1e9))
-    place, turn = odometry.pose.pose.position, odometry.pose.pose.orientation
-    place.x, place.y = float(row[log.X]), float(row[log.Y])
+    turn = odometry.pose.pose.orientation
     turn.x, turn.y, turn.z, turn.w = xyzw_from_rpy(*row[[log.ROLL, log.PITCH, log.YAW]]).tolist()
     return joints, odometry
+
+
+def odometry_at(pose, height: float = 0.0, frame: str = "map") -> Odometry:
+    """Return odometry of a level rover at a pose: x, y [m], yaw [rad]."""
+    odometry = Odometry(child_frame_id="base_link")
+    odometry.header.frame_id, odometry.pose.pose = frame, stamped_pose(pose, frame).pose
+    odometry.pose.pose.position.z = height
+    return odometry
 
 
 def make_target(x=1.0, y=2.0, z=0.3, frame="map") -> PoseStamped:
@@ -70,12 +72,11 @@ def transform_message(parent: str, child: str, rigid: Rigid, stamp: Time) -> Tra
     return message
 
 
-def send_transforms(
-    node: Node, take: Callable[[Any], object], *edges: Edge, age: float = 0.0
-) -> None:
-    """Give the callback of a node transforms of an age [s] as a TFMessage."""
+def send_map_odom(node: Any, rigid: Rigid, age: float = 0.0, is_static: bool = False) -> None:
+    """Tell the frames of a node in a TFMessage of an age [s] where odom is on the map."""
     stamp = (node.get_clock().now() - Duration(seconds=age)).to_msg()
-    take(SimpleNamespace(transforms=[transform_message(*edge, stamp) for edge in edges]))
+    transform = transform_message("map", "odom", rigid, stamp)
+    node.frames.take(SimpleNamespace(transforms=[transform]), is_static=is_static)
 
 
 def grid_map_of(

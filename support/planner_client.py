@@ -3,7 +3,6 @@
 
 from functools import cache, partial
 
-import numpy as np
 import pytest
 from nav_msgs.msg import Odometry, Path
 from nav_msgs.srv import GetPlan, LoadMap
@@ -11,10 +10,12 @@ from rcl_interfaces.msg import Log
 from rcl_interfaces.srv import SetParameters
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.task import Future
 from sensor_msgs.msg import JointState, PointCloud2
 from std_srvs.srv import Trigger
 
 from msg_adapters.elevation import terrain_to_point_cloud
+from msg_adapters.identity import path_hash
 from msg_adapters.paths import poses_path, stamped_pose
 from rover_physics.warm_up import warm_up
 from rover_planner.nodes import traverse_server
@@ -22,6 +23,7 @@ from rover_planner.nodes.result_topics import RESULT_KINDS
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.ros.qos import map_qos, result_qos, topic_qos
 from rover_planner.shell import kernels
+from support.messages import odometry_at
 from support.ros_fixtures import RosRun, call
 from support.waiting import wait_until
 
@@ -41,12 +43,10 @@ def spin_server(ros: RosRun, **overrides) -> TraverseServer:
     """
     load_kernels()
     values = {"time_budget": 60.0, "map_folder": "/", "waypoint_spacing": 0.05} | overrides
-    parameters = [Parameter(name, value=value) for name, value in values.items()]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(kernels, "LOADING_DELAY", 1e6)
         patch.setattr(traverse_server, "EXACT", ())
-        server = TraverseServer(context=ros.context, parameter_overrides=parameters)
-    return ros.spin(server)
+        return ros.start(TraverseServer, **values)
 
 
 class PlannerClient(Node):
@@ -91,19 +91,15 @@ class PlannerClient(Node):
 
     def send_odometry(self, pose, height=0.0) -> None:
         """Publish odometry of a level pose (3,)."""
-        odometry = Odometry(child_frame_id="base_link")
-        odometry.header.frame_id, odometry.pose.pose = "map", stamped_pose(pose, "map").pose
-        odometry.pose.pose.position.z = height
-        self.send(self._odometry, odometry)
+        self.send(self._odometry, odometry_at(pose, height))
 
-    def can_traverse(self, start, goal, tolerance=0.0, frame="map") -> Path:
+    def can_traverse(self, start, goal, frame="map") -> Path:
         """Ask for a plan between two poses (3,)."""
-        return self.plan(stamped_pose(start, frame), stamped_pose(goal, frame), tolerance)
+        return self.plan(stamped_pose(start, frame), stamped_pose(goal, frame))
 
-    def plan(self, start, goal, tolerance=0.0) -> Path:
+    def plan(self, start, goal) -> Path:
         """Ask for a plan between two PoseStamped."""
-        request = GetPlan.Request(start=start, goal=goal, tolerance=float(tolerance))
-        plan = call(self._plan, request).plan
+        plan = call(self._plan, GetPlan.Request(start=start, goal=goal)).plan
         self._answers += 1
         return plan
 
@@ -115,14 +111,9 @@ class PlannerClient(Node):
 
     def check_poses(self, server, poses) -> Trigger.Response:
         """Publish a path of poses (n, 3), wait until the server has it, and check it."""
-        self.send_path(poses_path(poses, "map"))
-        wait_until(
-            lambda: (
-                server.service.path is not None
-                and np.array_equal(server.service.path[:, :2], np.asarray(poses)[:, :2])
-            ),
-            "the path to arrive",
-        )
+        path = poses_path(poses, "map")
+        self.send_path(path)
+        wait_until(lambda: server.service.given_path.hash == path_hash(path), "the path")
         return self.check_path()
 
     def load_map(self, url: str) -> LoadMap.Response:
@@ -165,6 +156,15 @@ class PlannerClient(Node):
         """Publish a message as soon as someone hears it."""
         wait_until(lambda: publisher.get_subscription_count() > 0, publisher.topic_name)
         publisher.publish(message)
+
+
+def begin_plan(ros: RosRun, start=START, goal=GOAL) -> tuple[GetPlan.Request, Future]:
+    """Ask for a plan from a node of its own, without waiting; return request and future."""
+    asker = ros.spin(Node("asker", context=ros.context))
+    service = asker.create_client(GetPlan, f"{SERVER}/can_traverse")
+    assert service.wait_for_service(20.0)
+    request = GetPlan.Request(start=stamped_pose(start, "map"), goal=stamped_pose(goal, "map"))
+    return request, service.call_async(request)
 
 
 def verdict_of(results: dict) -> dict[str, str]:

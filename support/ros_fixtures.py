@@ -5,13 +5,14 @@ import contextlib
 import os
 import threading
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import rclpy
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from rover_planner.ros.guard import GuardedExecutor
 from support.waiting import TIMEOUT, wait_until
@@ -59,19 +60,24 @@ class RosRun:
         self._spinning.append((node, executor, thread))
         return node
 
+    def start(self, kind: Callable[..., Node], words: Sequence[str] = (), **values: Any) -> Any:
+        """Spin a new node of a kind, with words of its command line and values of parameters."""
+        given = [Parameter(name, value=value) for name, value in values.items()]
+        return self.spin(kind(context=self.context, cli_args=[*words], parameter_overrides=given))
+
     def is_alive(self, node: Node) -> bool:
         """Return whether a node is still being spun; an exception in a callback ends spinning."""
         return any(thread.is_alive() for other, _, thread in self._spinning if other is node)
 
     def close(self) -> None:
-        """End all nodes and the context."""
+        """End all nodes and the context, unless a test has shut that down."""
         self._ending.set()
         for node, executor, thread in self._spinning:
             executor.create_task(lambda: None)  # what `wake` alone wakes goes on waiting
             thread.join(TIMEOUT)
             executor.shutdown()
             node.destroy_node()
-        rclpy.shutdown(context=self.context)
+        rclpy.try_shutdown(context=self.context)
 
     def _spin(self, executor: SingleThreadedExecutor) -> None:
         # executor.spin() is not used: it sometimes misses executor.shutdown().

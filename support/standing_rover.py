@@ -8,9 +8,9 @@ from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from std_msgs.msg import Bool
 
-from msg_adapters.paths import stamped_pose
 from rover_planner.ros.qos import latched_qos
 from support.grounds import waves
+from support.messages import odometry_at
 from support.ros_fixtures import RosRun
 from support.waiting import wait_until
 
@@ -43,9 +43,7 @@ class StandingRover(Node):
         self.statuses += [one for one in message.status if one.name.endswith(": monitor")]
 
     def _publish(self) -> None:
-        odometry = Odometry(child_frame_id="base_link")
-        odometry.header.frame_id, odometry.pose.pose = "map", stamped_pose(START, "map").pose
-        self._odometry.publish(odometry)
+        self._odometry.publish(odometry_at(START))
 
     def wait_for_stop(self, value: bool = True) -> float:
         """Wait until the last stop has a value; return when that was heard [s]."""

@@ -2,6 +2,7 @@
 """The command `rover_planner view`: a web page that shows the rover on a terrain."""
 
 import contextlib
+import ctypes
 import gc
 import math
 from functools import partial
@@ -31,6 +32,8 @@ MAX_DEMO_LENGTH = 10.0
 """Largest distance between start and goal if they are chosen automatically [m]."""
 PLACES_TRIED = 41
 """Grid points along each side of the map that are tried for start and goal."""
+M_MMAP_THRESHOLD, LARGE_BLOCK = -3, 128 * 1024
+"""Number of an option of the C library in `malloc.h`, and its value here [byte]."""
 End = tuple[float, float, float]
 """x, y [m] and yaw [rad], map frame."""
 
@@ -65,6 +68,7 @@ def view(
         raise PlanningError("--follow and --survey exclude each other: live or surveyed")
     if prediction is not None and terrain is None:
         raise PlanningError("--prediction needs TERRAIN, the map that the prediction is about")
+    _return_freed_blocks()
     need("viser", "the page")
     if follow:
         need("rclpy", "--follow")
@@ -108,6 +112,17 @@ def view(
         with contextlib.suppress(KeyboardInterrupt):
             page.wait()
     typer.echo("ended")
+
+
+def _return_freed_blocks() -> None:
+    """Let large blocks of memory go back to the system when they are freed.
+
+    By default glibc raises this size to 32 MB, and keeps for the threads to come what searches
+    have freed in earlier ones. Other C libraries have no such option.
+    """
+    set_option = getattr(ctypes.CDLL(None), "mallopt", None)
+    if set_option is not None:
+        set_option(M_MMAP_THRESHOLD, LARGE_BLOCK)
 
 
 def name_ground(terrain: str | None, survey: Path | None) -> str:

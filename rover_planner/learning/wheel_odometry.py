@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Odometry from wheels and an IMU that knows how wheels slip, with a covariance; without ROS.
 
-Wheels under load creep: forward by a share of their way that grows with the slope, and down a side
-slope. How much is learned wherever the motion is measured without the wheels, piece by piece of
-way, and taken off where it is not. The misses that are left are the noise of the odometry.
+Wheels under load creep: forward by a share of their way that grows with what they push, and down a
+side slope. How much is learned wherever the motion is measured without the wheels, piece by piece
+of way, and taken off where it is not. The misses that are left are the noise of the odometry.
+
+Wheels that need all friction slide: a rover that pushes against an obstacle stands, and its wheels
+turn on. Their torques tell how much they push, and the ground's friction how much they can.
 """
 
 import math
@@ -18,15 +21,18 @@ from rover_planner.planning.angles import wrap
 
 FORWARD_PRIOR, SIDE_PRIOR = (0.03, 0.2), (0.2,)
 """Standard deviations before anything was learned: of the share of way that is lost everywhere,
-of that per slope, and of the way aside per side slope."""
+of that per push, and of the way aside per side slope."""
 MISS, MISS_COUNT = 0.03, 4.0
 """Standard deviation of the miss of a piece over its way, and for how many pieces it counts."""
 GYRO_NOISE, GYRO_BIAS = 2e-3, 1e-4
 """Noise of the yaw rate [rad/sqrt(s)], and its unknown bias [rad/s]."""
-LIMIT = 4
-"""Power of used over known friction by which wheels begin to slide."""
-MOST_SLIDE = 1.0
-"""Standard deviation of the way over the way where all friction is used."""
+HALF_SLIDE, SLIDE_SPREAD = 0.85, 0.1
+"""Use of friction at which wheels that slide lose half of the way, and the standard deviation of
+its logarithm."""
+UNKNOWN = 0.6
+"""Standard deviation of friction that was only told, over it."""
+TRACTION_TIME = 0.5
+"""Time over which the traction is averaged [s]: it jumps where wheels hop."""
 
 
 class Regression:
@@ -73,6 +79,8 @@ class WheelMotion:
     """Attitude [rad]."""
     yaw_rate: float
     """Rate of the yaw [rad/s]."""
+    torques: Floats
+    """(6,) wheel torques [N m]; NaN where none was measured."""
 
 
 class WheelOdometry:
@@ -86,8 +94,11 @@ class WheelOdometry:
         self._radius, self._piece = rover.wheel.radius, 0.5 * rover.wheelbase
         self.forward, self.side = Regression(FORWARD_PRIOR), Regression(SIDE_PRIOR)
         """Shares of the distance lost ahead and gone aside; may be those of another drive."""
-        self.friction = rover.friction
-        """Friction of the ground, as far as it is known."""
+        self._per_torque = 1.0 / (rover.wheel.radius * rover.weight)
+        self.friction, self.friction_deviation = rover.friction, UNKNOWN * rover.friction
+        """Friction of the ground, as far as it is known, and its standard deviation."""
+        self._traction = 0.0
+        """What all wheels pull, over the weight."""
         self.pose = np.zeros(3)
         """x, y [m] and yaw [rad] from where it started."""
         self.speed = 0.0
@@ -95,10 +106,10 @@ class WheelOdometry:
         self.speed_deviation = 0.0
         """Standard deviation of it [m/s]."""
         self._last: WheelMotion | None = None
-        self._sums = np.zeros(15)
+        self._sums, self._slide = np.zeros(13), np.zeros(2)
         self._forward_ways, self._noise = self._sums[:8].reshape(2, 2, 2)
-        self._side_way, self._slide = self._sums[8:12].reshape(2, 2)
-        self._piece_ways, self._way, self._elapsed = self._sums[12:], 0.0, 0.0
+        self._side_way, self._piece_ways = self._sums[8:10], self._sums[10:]
+        self._way = self._elapsed = 0.0
         self._begin: Floats | None = None
 
     def take(self, motion: WheelMotion) -> None:
@@ -110,20 +121,20 @@ class WheelOdometry:
         ahead = self._find_speeds(motion)
         if not len(ahead):
             return
-        # Plain numbers and one sum: arrays of two elements take several times as long.
+        # Plain numbers and few sums: arrays of two elements take several times as long.
         slope, aside = -math.tan(motion.pitch), math.tan(motion.roll)
         raw = float(ahead.sum()) / len(ahead) * math.cos(motion.pitch)
-        step = raw * elapsed
-        # Slip grows with the load on the wheels against the motion, so with the slope ahead.
-        uphill = slope if raw > 0.0 else -slope
-        everywhere, per_slope = self.forward.mean.tolist()
-        lost, drift = everywhere + per_slope * uphill, float(self.side.mean[0]) * aside
-        used = min(math.hypot(slope, aside) / max(self.friction, 1e-3), 1.0)
-        slide = MOST_SLIDE * used**LIMIT
-        self.speed = raw * (1.0 - lost)
+        self._take_traction(float(motion.torques.sum()) * self._per_torque, slope, elapsed)
+        push = self._traction if raw > 0.0 else -self._traction
+        slid, slide = self._find_slide(push, aside)
+        rolled = (1.0 - slid) * raw
+        step = rolled * elapsed
+        everywhere, per_push = self.forward.mean.tolist()
+        lost, drift = everywhere + per_push * push, float(self.side.mean[0]) * aside
+        self.speed = rolled * (1.0 - lost)
         along = float(self.forward.variance)
         across = float(self.side.variance) * (aside**2 + 1.0)
-        self.speed_deviation = abs(raw) * math.hypot(math.sqrt(along), slide)
+        self.speed_deviation = math.hypot(rolled * math.sqrt(along), raw * slide)
         self.pose[2] += 0.5 * elapsed * (motion.yaw_rate + last.yaw_rate)
         c, s = math.cos(self.pose[2]), math.sin(self.pose[2])
         self.pose[0] += step * ((1.0 - lost) * c + drift * s)
@@ -133,13 +144,34 @@ class WheelOdometry:
         ahead_noise = piece * (along * c**2 + across * s**2)
         aside_noise = piece * (along * s**2 + across * c**2)
         self._sums += step * np.array([
-            c, c * uphill, s, s * uphill,  # forward ways
+            c, c * push, s, s * push,  # forward ways
             ahead_noise, mixed, mixed, aside_noise,
-            -s * aside, c * aside, c * slide, s * slide,  # way aside, slide
-            1.0, uphill, aside,  # ways of the piece
+            -s * aside, c * aside,  # way aside
+            1.0, push, aside,  # ways of the piece
         ])  # fmt: skip
+        self._slide += raw * elapsed * slide * np.array([c, s])
         self._elapsed += elapsed
         self._way += abs(step)
+
+    def _take_traction(self, measured: float, slope: float, elapsed: float) -> None:
+        """Go on to what all wheels pull, over the weight: without torques that is the slope."""
+        pull = slope if math.isnan(measured) else measured
+        self._traction += min(elapsed / TRACTION_TIME, 1.0) * (pull - self._traction)
+
+    def _find_slide(self, push: float, aside: float) -> tuple[float, float]:
+        """Return the share of the way that sliding wheels lose, and its standard deviation.
+
+        The share is that at the known friction, whose error is in the deviation.
+
+        Args:
+            push: What all wheels pull in the direction of the motion, over the weight.
+            aside: Slope to the side.
+        """
+        friction = max(self.friction, 1e-3)
+        spread = math.hypot(SLIDE_SPREAD, self.friction_deviation / friction)
+        likely = _chance_to_slide(push / friction, SLIDE_SPREAD)
+        possible = _chance_to_slide(math.hypot(push, aside) / friction, spread)
+        return likely, math.sqrt((possible - likely) ** 2 + possible * (1.0 - possible))
 
     def _find_speeds(self, motion: WheelMotion) -> Floats:
         """Return the speeds of the body [m/s] that the wheels tell, those that were measured."""
@@ -182,3 +214,10 @@ class WheelOdometry:
         result[2, 2] = yaw
         result[2, :2] = result[:2, 2] = 0.5 * yaw * across
         return result
+
+
+def _chance_to_slide(used: float, spread: float) -> float:
+    """Return the chance that wheels slide at a use of friction, if its logarithm has a spread."""
+    if not used > 0.0:
+        return 0.0
+    return 0.5 * math.erfc(math.log(HALF_SLIDE / used) / (math.sqrt(2.0) * spread))

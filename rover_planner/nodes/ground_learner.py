@@ -157,7 +157,8 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
                 self._marks.publish(String(data=json.dumps(asdict(place))))
         if now - self._sent >= PERIOD or bool(stuck) != bool(before):
             self._sent = now
-            self._wheels.friction = learner.estimate.friction.mean
+            friction = learner.estimate.friction
+            self._wheels.friction, self._wheels.friction_deviation = friction.mean, friction.std
             contents = describe(learner.estimate, self._told)
             self._estimates.publish(String(data=json.dumps(contents)))
 

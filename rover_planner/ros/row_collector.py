@@ -84,11 +84,11 @@ class RowCollector:
     def motion(self, time: float) -> WheelMotion | None:
         """Return what wheels and IMU measure at a time [s]; None until both were heard."""
         row = self._row
-        rates, steering = row[RATES].copy(), row[STEERING].copy()
+        rates, steering, torques = (row[part].copy() for part in (RATES, STEERING, TORQUES))
         if math.isnan(self._yaw_rate) or np.isnan(rates).all():
             return None
         steering[np.isnan(steering)] = 0.0
-        return WheelMotion(time, rates, steering, row[ROLL], row[PITCH], self._yaw_rate)
+        return WheelMotion(time, rates, steering, row[ROLL], row[PITCH], self._yaw_rate, torques)
 
     def take_odometry(self, message: Any, time: float, frame: str = "") -> Floats:
         """Take a pose; return the row of its time [s].

@@ -11,8 +11,7 @@ import rover_physics
 from rover_physics import load_rover, load_terrain, save_terrain
 from rover_planner.cli import app, main
 from rover_planner.shell.poses import join_poses
-from rover_planner.shell.run_program import MAX_LINE
-from support.command_line import write_ground_and_path
+from support.command_line import assert_refused, write_ground_and_path
 from support.grounds import make_terrain, wall_with_gap
 
 COMMANDS = typer.main.get_command(app).commands
@@ -185,16 +184,6 @@ def files(tmp_path, monkeypatch):
     return write_ground_and_path(tmp_path)
 
 
-def assert_one_short_line(capfd, words, names):
-    code = main(words)
-    line = capfd.readouterr().err
-    assert code == 2, line
-    assert line.startswith("rover_planner: ")
-    assert line.count("\n") == 1 and len(line) <= MAX_LINE + 1
-    assert line[:-1].isprintable() and "Traceback" not in line
-    assert names in line
-
-
 def predict(*more, rover="lsr1", terrain="terrain.npz", poses="poses.npz", out="out.npz"):
     return ["predict", rover, terrain, poses, out, *more]
 
@@ -223,7 +212,7 @@ REFUSED = [
     ("words", "names"), REFUSED, ids=["-".join(words)[:40] for words, _ in REFUSED]
 )
 def test_bad_input_is_refused_in_one_short_line(files, capfd, words, names):
-    assert_one_short_line(capfd, words, names)
+    assert_refused(capfd, main(words), names)
 
 
 @pytest.mark.parametrize(
@@ -235,11 +224,12 @@ def test_bad_input_is_refused_in_one_short_line(files, capfd, words, names):
         (["--start", "nan", "0", "0"], "'nan,0,0' is no pose"),
         (["--start", "-300", "0", "0"], "start is (-300, 0) m; it must be on the map"),
         (["--goal", "1", "2e5", "0"], "goal is (1, 200000) m; it must be on the map"),
+        (["--survey", ".", "--follow"], "--follow and --survey exclude each other"),
     ],
 )
 def test_view_refuses_what_it_cannot_serve_instead_of_waiting(files, capfd, words, names):
     pytest.importorskip("viser", reason="needs viser")
-    assert_one_short_line(capfd, ["view", "lsr1", "terrain.npz", "--port", "0", *words], names)
+    assert_refused(capfd, main(["view", "lsr1", "terrain.npz", "--port", "0", *words]), names)
 
 
 def test_names_with_control_characters_are_shown_escaped(files, capfd):

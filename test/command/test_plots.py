@@ -47,9 +47,7 @@ def test_a_picture_shows_accepted_and_refused_answers_each_with_its_curves(tmp_p
     assert [title for title in titles if title not in text] == []
 
 
-def test_the_picture_of_a_plan_names_rover_and_map_and_shows_the_use_of_each_limit(
-    tmp_path,
-):
+def test_the_picture_of_a_plan_names_rover_and_map_and_shows_the_use_of_each_limit(tmp_path):
     ground = Terrain(np.zeros((41, 41)), 0.1, (-2.0, -2.0))
     question = SearchQuery(LSR1, ground, (-1.0, 0.0, 0.0), (1.0, 0.0, 0.0), PathQueryOptions())
     answer = find_path(question, LatticeSettings(budget=5.0, ends_at_first=True))

@@ -11,7 +11,7 @@ from rover_physics.rover.rover_file import save_rover
 from rover_physics.terrain.grid import load_terrain, save_terrain
 from rover_planner.cli import main
 from rover_planner.learning.drive_log import TIME
-from support.command_line import assert_refused
+from support.command_line import assert_refused, predict_arguments
 from support.learning_drives import NAMES, climb, ramp, write_csv
 from support.rovers import LSR1 as ROVER
 
@@ -110,7 +110,7 @@ def test_a_prediction_takes_what_was_learned(folder, capfd):
     learned, out = folder / "learned.json", folder / "out.npz"
     poses = np.column_stack([np.linspace(-1.0, 1.0, 9), np.zeros(9), np.zeros(9)])
     np.savez(folder / "poses.npz", poses=poses)
-    words = ["predict", "lsr1", *(str(folder / n) for n in ("ramp.npz", "poses.npz", "out.npz"))]
+    words = predict_arguments(folder, terrain="ramp.npz")
     used = {}
     for mean in (0.8, 0.4):
         friction = {"mean": mean, "std": 0.1, "low": 0.3, "high": 1.0}

@@ -8,6 +8,7 @@ from rover_planner.learning.wheel_odometry import WheelMotion, WheelOdometry
 from support.rovers import LSR1 as ROVER
 
 SPEED, RATE = 0.06, 10.0
+UNKNOWN = np.full(6, np.nan)
 CREEP, DRIFT, SCATTER = 0.12, 0.18, 0.02
 """Share of the way that is lost per slope, gone aside per side slope, and its scatter."""
 
@@ -21,7 +22,7 @@ def drive(odometry, seed, pitch, roll, seconds=60.0, teach=False):
             piece = SCATTER * rng.standard_normal()
         yaw_rate = 0.02 * np.sin(0.01 * k)
         rates = np.full(6, SPEED / ROVER.wheel.radius)
-        odometry.take(WheelMotion(k / RATE, rates, np.zeros(6), roll, pitch, yaw_rate))
+        odometry.take(WheelMotion(k / RATE, rates, np.zeros(6), roll, pitch, yaw_rate, UNKNOWN))
         if k:
             step = SPEED * np.cos(pitch) / RATE
             true[2] += yaw_rate / RATE
@@ -45,10 +46,11 @@ def taught():
     return odometry
 
 
-def follow(taught, seed, pitch, roll):
-    """Return odometry and truth of a drive without another measurement of the motion."""
+def follow(taught, seed, pitch, roll, friction=ROVER.friction):
+    """Return odometry and truth of a drive on known ground, not measured in another way."""
     odometry = WheelOdometry(ROVER)
     odometry.forward, odometry.side = taught.forward, taught.side
+    odometry.friction, odometry.friction_deviation = friction, 0.05 * friction
     return odometry, drive(odometry, seed, pitch, roll)
 
 
@@ -74,7 +76,26 @@ def test_the_covariance_is_that_of_the_misses(taught):
 
 def test_where_all_friction_is_used_the_way_is_not_known(taught):
     sure, _ = follow(taught, 3, -0.2, 0.0)
+    unsure, _ = follow(taught, 3, -0.2, 0.0, friction=0.21)
+    assert unsure.covariance[0, 0] > 25.0 * sure.covariance[0, 0]
+
+
+def test_on_ground_of_unknown_friction_the_way_up_a_slope_is_less_sure(taught):
+    known, _ = follow(taught, 3, -0.3, 0.0)
+    unknown = WheelOdometry(ROVER)
+    unknown.forward, unknown.side = taught.forward, taught.side
+    drive(unknown, 3, -0.3, 0.0)
+    assert unknown.covariance[0, 0] > 4.0 * known.covariance[0, 0]
+
+
+@pytest.mark.parametrize(("deviation", "furthest"), [(0.03, 0.2), (0.3, 1.2)])
+def test_a_rover_that_pushes_against_an_obstacle_with_all_friction_stands(deviation, furthest):
     odometry = WheelOdometry(ROVER)
-    odometry.forward, odometry.side, odometry.friction = taught.forward, taught.side, 0.21
-    drive(odometry, 3, -0.2, 0.0)
-    assert odometry.covariance[0, 0] > 25.0 * sure.covariance[0, 0]
+    odometry.friction, odometry.friction_deviation = 0.5, deviation
+    rates = np.full(6, SPEED / ROVER.wheel.radius)
+    torques = np.full(6, 0.98 * 0.5 * ROVER.weight * ROVER.wheel.radius / 6.0)
+    for k in range(200):
+        odometry.take(WheelMotion(k / RATE, rates, np.zeros(6), 0.0, 0.0, 0.0, torques))
+    assert odometry.pose[0] < furthest
+    assert odometry.pose[0] ** 2 < 5.99 * odometry.covariance[0, 0]
+    assert odometry.speed < SPEED

@@ -13,9 +13,7 @@ from rover_planner.maps.ground_beneath import Standing
 from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.traverse_server import FAN, MERGE, TraverseServerParameters
-from rover_planner.planning.answering.service_settings import (
-    load_service_settings,
-)
+from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.simulator.simulation import Simulation, load_simulation_settings
 from support.grounds import make_terrain, waves

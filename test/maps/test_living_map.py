@@ -26,6 +26,13 @@ def local_map(origin, height=0.0, shape=(20, 20), resolution=0.05, std=None):
     return Terrain(elevation, resolution, origin, elevation_std=deviations)
 
 
+def loaded(terrain=PRIOR, **rules) -> LivingMap:
+    """Return a living map with a loaded one, and rules other than the defaults."""
+    living = LivingMap(TraverseServerParameters(**rules))
+    living.load(terrain, 0.0)
+    return living
+
+
 def cell(living, x, y):
     """Return height, name of source and time of the cell nearest to a point."""
     now = living.snapshot()
@@ -59,8 +66,7 @@ def test_a_map_that_replaces_the_last_one_is_not_copied_for_the_watch_waits_for_
 
 
 def test_a_loaded_map_survives_100_local_updates_to_the_bit():
-    living = LivingMap()
-    living.load(PRIOR, 0.0)
+    living = loaded()
     rng = np.random.default_rng(1)
     seen = np.zeros(PRIOR.elevation.shape, bool)
     for k in range(100):
@@ -123,8 +129,7 @@ def test_a_loaded_map_without_deviations_gets_those_of_the_rules_or_stays_exact(
 
 
 def test_earlier_snapshots_do_not_change():
-    living = LivingMap()
-    living.load(PRIOR, 0.0)
+    living = loaded()
     living.merge(local_map((0.0, 0.0), 0.3), TOPIC, 1.0)
     before = living.snapshot()
     heights, times = before.terrain.elevation.copy(), before.sources.time.copy()
@@ -147,8 +152,7 @@ def test_a_map_grows_with_what_is_seen_and_keeps_its_cells():
 
 
 def test_a_window_rolls_with_the_rover_and_takes_the_loaded_map_anew():
-    living = LivingMap(TraverseServerParameters(map_window=2.0))
-    living.load(PRIOR, 0.0)
+    living = loaded(map_window=2.0)
     for k in range(40):
         place = -2.0 + 0.1 * k, 0.0
         living.merge(local_map((place[0] - 0.5, -0.5), 1.0), TOPIC, 1.0 + k, place)
@@ -165,8 +169,7 @@ def test_a_window_rolls_with_the_rover_and_takes_the_loaded_map_anew():
 
 
 def test_a_loaded_map_stays_whole_until_the_first_local_map():
-    living = LivingMap(TraverseServerParameters(map_window=2.0))
-    living.load(PRIOR, 0.0)
+    living = loaded(map_window=2.0)
     patch = lay_onto(local_map((-4.5, 0.0), 0.1), living.grid)
     assert living.fill(patch, np.zeros((20, 20), bool), 1.0)
     terrain = living.snapshot().terrain
@@ -176,8 +179,7 @@ def test_a_loaded_map_stays_whole_until_the_first_local_map():
 
 def test_cells_between_those_of_the_loaded_map_are_interpolated():
     plane = make_terrain(lambda x, y: 0.3 * x - 0.2 * y)
-    living = LivingMap()
-    living.load(PRIOR, 0.0)
+    living = loaded()
     shifted = replace(plane, origin=(plane.origin[0] + 0.02, plane.origin[1] + 0.02))
     living.merge(shifted, TOPIC, 1.0)
     height, source, _ = cell(living, 1.0, 1.0)
@@ -186,8 +188,7 @@ def test_cells_between_those_of_the_loaded_map_are_interpolated():
 
 
 def test_the_highest_of_several_finer_cells_counts():
-    living = LivingMap()
-    living.load(make_terrain(waves, 0.1), 0.0)
+    living = loaded(make_terrain(waves, 0.1))
     living.merge(local_map((-4.0, -4.0), 0.0, (40, 40), 0.1), TOPIC, 1.0)
     fine = np.zeros((80, 80))
     fine[41, 41] = 0.5
@@ -198,8 +199,7 @@ def test_the_highest_of_several_finer_cells_counts():
 
 def test_a_coarse_loaded_map_takes_the_cells_of_a_finer_first_local_map():
     coarse = make_terrain(lambda x, y: 0.1 * x, 1.0)
-    living = LivingMap()
-    living.load(coarse, 0.0)
+    living = loaded(coarse)
     living.merge(local_map((0.0, 0.0), 0.7), TOPIC, 1.0)
     assert living.snapshot().terrain.resolution == 0.05
     assert cell(living, 0.5, 0.5)[0] == 0.7
@@ -211,8 +211,7 @@ def test_soil_and_friction_of_the_loaded_map_stay():
     prior = replace(
         PRIOR, soil=soil, soil_names=("dry_sand", "loam"), friction=np.full(soil.shape, 0.4)
     )
-    living = LivingMap()
-    living.load(prior, 0.0)
+    living = loaded(prior)
     living.merge(local_map((0.0, 0.0), 0.1), TOPIC, 1.0)
     terrain = living.snapshot().terrain
     assert terrain.soil_names == prior.soil_names and (terrain.soil == 1).all()
@@ -220,9 +219,7 @@ def test_soil_and_friction_of_the_loaded_map_stay():
 
 
 def test_classes_stay_where_a_newer_map_has_none_and_the_most_frequent_of_finer_cells_counts():
-    living = LivingMap()
-    shape = PRIOR.elevation.shape
-    living.load(replace(PRIOR, ground_class=np.full(shape, 2.0)), 0.0)
+    living = loaded(replace(PRIOR, ground_class=np.full(PRIOR.elevation.shape, 2.0)))
     local = local_map((0.0, 0.0), 0.1)
     classes = np.full(local.elevation.shape, np.nan)
     classes[0, 0] = 5.0
@@ -238,8 +235,7 @@ def test_classes_stay_where_a_newer_map_has_none_and_the_most_frequent_of_finer_
 
 
 def test_a_local_map_of_tiny_cells_is_refused_and_leaves_all_as_it_was():
-    living = LivingMap(TraverseServerParameters(max_map_cells=1_000_000))
-    living.load(PRIOR, 0.0)
+    living = loaded(max_map_cells=1_000_000)
     with pytest.raises(PlanningError, match="max_map_cells is 1000000"):
         living.merge(local_map((0.0, 0.0), resolution=1e-5), TOPIC, 1.0)
     assert living.snapshot().terrain is PRIOR
@@ -250,8 +246,7 @@ def test_a_local_map_of_tiny_cells_is_refused_and_leaves_all_as_it_was():
 
 def test_a_coarse_map_is_laid_only_onto_the_cells_of_a_window():
     orbital = Terrain(np.add.outer(np.arange(1000.0), np.arange(1000.0)), 1.0, (-500.0, -500.0))
-    living = LivingMap(TraverseServerParameters(map_window=4.0))
-    living.load(orbital, 0.0)  # on cells of 1 cm it would have 1e10
+    living = loaded(orbital, map_window=4.0)  # on cells of 1 cm it would have 1e10
     living.merge(local_map((0.0, 0.0), height=1.0, resolution=0.01), TOPIC, 1.0, (0.0, 0.0))
     assert living.snapshot().terrain.elevation.shape == (400, 400)
     height, source, _ = cell(living, 1.5, 1.25)

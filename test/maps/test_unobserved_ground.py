@@ -2,37 +2,30 @@
 """The share of never seen ground under the belly is counted along a path, cell by cell."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from rover_physics import Terrain, load_rover
 from rover_planner.maps.layers import FOOTPRINT, CellSources
-from rover_planner.maps.unobserved_ground import (
-    SEEN,
-    UNSEEN,
-    ObservedGround,
-    observed_ground,
-)
+from rover_planner.maps.unobserved_ground import SEEN, UNSEEN, ObservedGround, observed_ground
 from rover_planner.parameters.traverse_server import ALLOW, ALLOW_FOOTPRINT, REFUSE
 
 LSR1 = load_rover("lsr1")  # its belly is 0.6 m x 0.4 m
 PATH = np.column_stack([np.arange(0.0, 2.0, 0.02), np.zeros(100), np.zeros(100)])
 
 
-def ground(shape=(81, 161)):
-    return Terrain(np.zeros(shape), 0.05, (-2.0, -2.0))
-
-
-def with_holes(x_low, x_high, value=np.nan):
-    elevation = np.zeros((81, 161))
-    x = -2.0 + 0.05 * np.arange(161)
-    elevation[:, (x >= x_low) & (x < x_high)] = value
-    return Terrain(elevation, 0.05, (-2.0, -2.0))
+SHAPE = (81, 161)
+LEVEL = Terrain(np.zeros(SHAPE), 0.05, (-2.0, -2.0))
+X = -2.0 + 0.05 * np.arange(161)
+"""Where the columns of cells are [m]."""
 
 
 def test_the_share_is_that_of_the_cells_under_the_belly():
-    share = observed_ground(with_holes(1.0, 1.5), None).share(LSR1, PATH)
+    elevation = np.zeros(SHAPE)
+    elevation[:, (X >= 1.0) & (X < 1.5)] = np.nan
+    share = observed_ground(replace(LEVEL, elevation=elevation), None).share(LSR1, PATH)
     # The belly sweeps x from -0.3 to 2.28 m: 53 columns of cells, of which 10 are unknown.
     assert share.unobserved_share == pytest.approx(10 / 53, abs=0.01)
     assert share.footprint_share == 0.0
@@ -40,25 +33,23 @@ def test_the_share_is_that_of_the_cells_under_the_belly():
 
 
 def test_the_start_footprint_is_told_apart():
-    terrain = ground()
-    source = np.full((81, 161), 4, np.uint8)
-    x = -2.0 + 0.05 * np.arange(161)
-    source[:, x < 0.5] = FOOTPRINT
-    sources = CellSources(source, np.zeros(source.shape))
-    share = observed_ground(terrain, sources).share(LSR1, PATH)
+    source = np.full(SHAPE, 4, np.uint8)
+    source[:, X < 0.5] = FOOTPRINT
+    sources = CellSources(source, np.zeros(SHAPE))
+    share = observed_ground(LEVEL, sources).share(LSR1, PATH)
     assert share.unobserved_share == share.footprint_share == pytest.approx(16 / 53, abs=0.02)
     assert share.first == 0 and share.first_beyond_footprint == -1
     assert [share.first_refused(rule) for rule in (ALLOW, ALLOW_FOOTPRINT, REFUSE)] == [-1, -1, 0]
 
 
 def test_ground_off_the_map_was_not_seen():
-    kinds = np.full((81, 161), SEEN, np.uint8)
+    kinds = np.full(SHAPE, SEEN, np.uint8)
     far = PATH + np.array([5.0, 0.0, 0.0])
-    share = ObservedGround(ground(), kinds).share(LSR1, far)
+    share = ObservedGround(LEVEL, kinds).share(LSR1, far)
     assert share.first == share.first_beyond_footprint
     assert 5.6 < far[share.first, 0] + 0.3 + 0.06 < 6.2
     assert share.unobserved_share == 0.0  # the shares are those of cells on the map
-    away = ObservedGround(ground(), kinds).share(LSR1, PATH + np.array([1e7, 0.0, 0.0]))
+    away = ObservedGround(LEVEL, kinds).share(LSR1, PATH + np.array([1e7, 0.0, 0.0]))
     assert (away.unobserved_share, away.first) == (1.0, 0)
 
 
@@ -66,18 +57,18 @@ def test_a_long_path_off_the_map_takes_no_time():
     x = np.arange(0.0, 20_000.0, 0.02)
     path = np.column_stack([x, 0.0 * x, 0.0 * x])
     began = time.process_time()
-    share = observed_ground(ground(), None).share(LSR1, path)
+    share = observed_ground(LEVEL, None).share(LSR1, path)
     assert time.process_time() - began < 2.0
     assert 5.6 < path[share.first, 0] + 0.3 < 6.2 + 0.6
 
 
 def test_a_long_path_counts_each_cell_once():
-    kinds = np.full((81, 161), SEEN, np.uint8)
+    kinds = np.full(SHAPE, SEEN, np.uint8)
     kinds[:, 60] = UNSEEN
-    seen = ObservedGround(ground(), kinds)
-    beside = np.full((81, 161), SEEN, np.uint8)
+    seen = ObservedGround(LEVEL, kinds)
+    beside = np.full(SHAPE, SEEN, np.uint8)
     beside[46:] = UNSEEN  # y of 0.3 m and more; the belly ends at 0.2 m
-    assert ObservedGround(ground(), beside).share(LSR1, PATH).unobserved_share == 0.0
+    assert ObservedGround(LEVEL, beside).share(LSR1, PATH).unobserved_share == 0.0
     often = np.vstack([PATH] * 30)
     whole, once = seen.share(LSR1, often), seen.share(LSR1, PATH)
     assert whole.unobserved_share == once.unobserved_share > 0.0 and whole.first == once.first

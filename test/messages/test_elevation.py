@@ -36,22 +36,23 @@ def rough_terrain(resolution=0.05, origin=(-1.2, 3.4)):
 
 def cloud_of(points, names=XYZ, kind="<f8", gap=0, height=1, row_padding=0):
     """Lay out points (n, k) as a cloud with `gap` bytes before each field and padded rows."""
-    points = np.asarray(points, dtype=np.float64)
-    size = np.dtype(kind).itemsize
-    offsets = [gap + i * (size + gap) for i in range(len(names))]
-    step = len(names) * (size + gap) + gap
-    unnamed = [f"f{i}" for i in range(len(names))]
-    layout = {"names": unnamed, "formats": [kind] * len(names), "offsets": offsets}
-    laid = np.zeros(len(points), np.dtype(layout | {"itemsize": step}))
-    for i, name in enumerate(unnamed):
-        laid[name] = points[:, i]
+    size, count = np.dtype(kind).itemsize, len(names)
+    offsets = [gap + i * (size + gap) for i in range(count)]
+    layout = {"names": names, "formats": [kind] * count, "offsets": offsets}
+    laid = np.zeros(len(points), np.dtype(layout | {"itemsize": count * (size + gap) + gap}))
+    for name, values in zip(names, np.transpose(points), strict=True):
+        laid[name] = values
+    return cloud_from(laid, height, row_padding)
+
+
+def cloud_from(laid, height=1, row_padding=0):
+    """Return a cloud of points, records that have a field x, with padded rows."""
     raw = np.pad(laid.view(np.uint8).reshape(height, -1), ((0, 0), (0, row_padding)))
-    cloud = PointCloud2(height=height, width=len(points) // height, point_step=step)
-    cloud.row_step, cloud.is_bigendian = raw.shape[1], kind[0] == ">"
-    datatype = FLOAT32 if size == 4 else FLOAT64
+    cloud = PointCloud2(height=height, width=len(laid) // height, point_step=laid.itemsize)
+    cloud.row_step, cloud.is_bigendian = raw.shape[1], laid.dtype["x"].str[0] == ">"
     cloud.fields = [
-        PointField(name=name, offset=offset, count=1, datatype=datatype)
-        for name, offset in zip(names, offsets, strict=True)
+        PointField(name=name, offset=offset, count=1, datatype=1 + KINDS.index(kind.str[1:]))
+        for name, (kind, offset) in laid.dtype.fields.items()
     ]
     cloud.data = array.array("B", raw.tobytes())
     return cloud
@@ -277,17 +278,10 @@ def test_classes_of_any_datatype_are_read_and_negative_ones_are_none(kind, shuff
         points["class"][3] = -1
     if shuffled:
         points = np.random.default_rng(1).permutation(points)
-    cloud = PointCloud2(height=1, width=6, point_step=points.itemsize, row_step=points.nbytes)
-    datatypes = dict.fromkeys(XYZ, FLOAT32) | {"class": 1 + KINDS.index(kind)}
-    cloud.fields = [
-        PointField(name=name, offset=points.dtype.fields[name][1], count=1, datatype=datatype)
-        for name, datatype in datatypes.items()
-    ]
-    cloud.data = array.array("B", points.tobytes())
     right = numbers.astype(float)
     if kind[0] != "u":
         right[1, 0] = np.nan
-    np.testing.assert_array_equal(terrain_from_point_cloud(cloud).ground_class, right)
+    np.testing.assert_array_equal(terrain_from_point_cloud(cloud_from(points)).ground_class, right)
 
 
 LINE = np.column_stack([np.arange(5) * 0.1, np.zeros(5), np.zeros(5)])

@@ -12,20 +12,12 @@ from hypothesis import strategies as st
 
 from msg_adapters.errors import MessageError
 from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
+from rover_physics.terrain.grid import fingerprint
 from support.messages import grid_map_of, move_buffer, store_by_rows
 
 RNG = np.random.default_rng(3)
 HEIGHTS = RNG.normal(0.0, 0.3, (7, 5)).astype(np.float32)
 HEIGHTS[2, 3] = HEIGHTS[0, 1] = np.nan
-
-
-def assert_same(one, other):
-    for name in ("elevation", "friction", "elevation_std"):
-        a, b = getattr(one, name), getattr(other, name)
-        assert (a is None) == (b is None)
-        if a is not None:
-            assert a.tobytes() == b.tobytes()
-    assert (one.resolution, one.origin) == (other.resolution, other.origin)
 
 
 def test_heights_ascend_along_x_and_y_from_the_cell_of_smallest_x_and_y():
@@ -45,7 +37,8 @@ def test_a_moved_buffer_start_gives_the_same_terrain_to_the_bit(row, column, by_
     if by_rows:
         moved = store_by_rows(moved)
     assert (row, column) == (0, 0) or list(moved.data[0].data) != list(unmoved.data[0].data)
-    assert_same(terrain_from_grid_map(moved), terrain_from_grid_map(unmoved))
+    hashes = {fingerprint(terrain_from_grid_map(message)) for message in (moved, unmoved)}
+    assert len(hashes) == 1
 
 
 def test_variance_becomes_a_standard_deviation_and_friction_and_classes_stay():
@@ -92,25 +85,20 @@ def _set(path, value):
     return change
 
 
-def _huge(message):
-    message.info.length_x = message.info.length_y = 1e6
-
-
-def _turn(message):
-    message.info.pose.orientation = SimpleNamespace(x=0.0, y=0.0, z=0.1, w=0.995)
+TURN = SimpleNamespace(x=0.0, y=0.0, z=0.1, w=0.995)
 
 
 @pytest.mark.parametrize(
     ("change", "text"),
     [
-        (_turn, "grid map is turned"),
+        (_set("info.pose.orientation", TURN), "grid map is turned"),
         (_set("layers", ["height"]), "no layer 'elevation'; it has height: set elevation_layer"),
         (_set("layers", ["elevation", "elevation"]), "2 layers and 1 arrays"),
         (_set("basic_layers", ["seen"]), "basic layer 'seen'"),
         (_set("info.length_x", 0.26), "length_x 0.26"),
         (_set("info.length_y", float("nan")), "length_y nan"),
         (_set("info.resolution", 0.0), "resolution 0.0"),
-        (_huge, "at most 25000000"),
+        (_set("info.length_x", 1e6), "at most 25000000"),
         (_set("outer_start_index", 5), "starts at row 5"),
         (_set("data.0.data", HEIGHTS.ravel()[:-1]), "34 values"),
         (_set("data.0.layout.data_offset", 2), "37"),

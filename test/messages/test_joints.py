@@ -12,12 +12,12 @@ from msg_adapters.commands import joint_order
 from msg_adapters.errors import MessageError
 from msg_adapters.joints import OWN_NAMES, JointNames, read_joint_map
 from msg_adapters.results.predictions import JOINTS, joint_trajectory
-from rover_physics import judge_path, load_rover
+from rover_physics import judge_path
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.rover.steering_joints import RIGHT
 from support.grounds import make_terrain, waves
+from support.rovers import LSR1
 
-KNOWN = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
 WANTED = ("rocker_left", "bogie_left")
 
 
@@ -67,7 +67,7 @@ def test_steering_is_converted_to_positive_left_and_back_and_nothing_else_is():
 
 
 def test_angles_and_rates_are_those_of_the_model():
-    names = read_joint_map(["rocker_left:rl:-1:0.1", "bogie_left: bl "], KNOWN)
+    names = read_joint_map(["rocker_left:rl:-1:0.1", "bogie_left: bl "], JOINTS)
     state = JointState(name=["rl", "bl", "rocker_right"])
     state.position, state.velocity = [0.3, 0.2, 0.5], [1.0, 2.0, 3.0]
     assert names.positions(state, SUSPENSION_JOINTS) == pytest.approx(
@@ -84,11 +84,11 @@ def test_angles_and_rates_are_those_of_the_model():
 def test_a_predicted_trajectory_is_read_back_as_the_model_has_it():
     entries = [f"{name}:{name}_j:-1:0.3" for name in SUSPENSION_JOINTS]
     entries += [f"{name}:{name}_j:-1" for name in WHEEL_JOINTS]
-    names, rover = read_joint_map(entries, KNOWN), load_rover("lsr1")
+    names = read_joint_map(entries, JOINTS)
     poses = [(0.1 * k, 0.0, 0.0) for k in range(5)]
-    prediction = judge_path(rover, make_terrain(waves), poses)[0]
-    ours = joint_trajectory(prediction, rover, "map", Time())
-    theirs = joint_trajectory(prediction, rover, "map", Time(), names=names)
+    prediction = judge_path(LSR1, make_terrain(waves), poses)[0]
+    ours = joint_trajectory(prediction, LSR1, "map", Time())
+    theirs = joint_trajectory(prediction, LSR1, "map", Time(), names=names)
     state, own = JointState(name=theirs.joint_names), ours.points[3]
     state.position, state.velocity = theirs.points[3].positions, theirs.points[3].velocities
     for back, right in (
@@ -101,7 +101,7 @@ def test_a_predicted_trajectory_is_read_back_as_the_model_has_it():
 
 
 def test_the_order_of_commands_is_given_in_names_of_the_robot_or_the_model():
-    names = read_joint_map([f"{name}:j{k}" for k, name in enumerate(WHEEL_JOINTS)], KNOWN)
+    names = read_joint_map([f"{name}:j{k}" for k, name in enumerate(WHEEL_JOINTS)], JOINTS)
     assert joint_order(["j5", "j4", "j3", "j2", "j1", "j0"], names).tolist() == [5, 4, 3, 2, 1, 0]
     assert joint_order(WHEEL_JOINTS, names).tolist() == list(range(6))
     with pytest.raises(MessageError, match="j0, j1"):
@@ -123,4 +123,4 @@ def test_the_order_of_commands_is_given_in_names_of_the_robot_or_the_model():
 )
 def test_a_wrong_entry_of_the_map_is_refused_with_the_reason(entries, text):
     with pytest.raises(MessageError, match=text):
-        read_joint_map(entries, KNOWN)
+        read_joint_map(entries, JOINTS)

@@ -83,9 +83,9 @@ def spoilt(field, value):
     return path
 
 
-def long_path():
-    path = poses_path(np.zeros((1, 3)), "map")
-    path.poses = path.poses * (MAX_POSES + 1)
+def path_of(count, frame="map"):
+    path = poses_path(np.zeros((1, 3)), frame)
+    path.poses = path.poses * count
     return path
 
 
@@ -100,7 +100,7 @@ def long_path():
             lambda: spoilt("pose.position.x", math.nan),
             r"path pose 2 has position x .* within 1e\+09",
         ),
-        (long_path, r"path has 100001 poses; it may have 100000: leave"),
+        (lambda: path_of(MAX_POSES + 1), r"path has 100001 poses; it may have 100000: leave"),
     ],
 )
 def test_a_path_is_refused_by_its_bad_part(make, text):
@@ -168,8 +168,6 @@ def test_stamps_do_not_count_and_poses_order_and_frame_do():
 @pytest.mark.parametrize("frame", ["", "map", "odom", "rover_1/map"])
 def test_the_poses_of_a_path_are_counted_without_reading_it(frame):
     for count in (0, 1, 300):
-        path = poses_path(np.zeros((1, 3)), frame)
-        path.poses = path.poses * count
-        assert count_poses(serialize_message(path)) == count
+        assert count_poses(serialize_message(path_of(count, frame))) == count
     with pytest.raises(MessageError, match="7 bytes were received that are no Path"):
         count_poses(b"\0\1\0\0map")

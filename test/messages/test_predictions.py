@@ -26,6 +26,7 @@ from rover_physics.traversability import classification
 from support.rovers import FIXED, LSR1
 
 STAMP = Time(sec=12, nanosec=34)
+FLAT = Terrain(np.zeros((81, 81)), 0.05, (-2.0, -2.0))
 
 
 @pytest.fixture(scope="module")
@@ -97,8 +98,7 @@ def test_a_trajectory_of_points_filled_anew_is_the_same_as_one_of_new_points(pre
 def test_a_trajectory_has_the_angles_of_the_steered_wheels_with_the_sign_of_the_rover():
     turned = np.linspace(0.0, 0.5, 30)
     path = np.column_stack([np.sin(turned), 1.0 - np.cos(turned), turned])
-    flat = Terrain(np.zeros((81, 81)), 0.05, (-2.0, -2.0))
-    prediction = judge_path(LSR1, flat, path)[0]
+    prediction = judge_path(LSR1, FLAT, path)[0]
     for positive, sign in (("left", 1.0), ("right", -1.0)):
         names = JointNames(steering=positive)
         message = joint_trajectory(prediction, LSR1, "map", STAMP, names=names)
@@ -109,15 +109,14 @@ def test_a_trajectory_has_the_angles_of_the_steered_wheels_with_the_sign_of_the_
                 sign * prediction.steering_angle[i, steered_wheels(LSR1)]
             )
         assert sign * own["front_left_steering"] > 0.3
-    message = joint_trajectory(judge_path(FIXED, flat, path)[0], FIXED, "map", STAMP)
+    message = joint_trajectory(judge_path(FIXED, FLAT, path)[0], FIXED, "map", STAMP)
     assert tuple(message.joint_names) == JOINTS and len(message.points[0].positions) == 10
 
 
 def test_in_a_turn_on_the_spot_wheels_of_one_side_roll_forwards_and_of_the_other_back():
     turned = np.linspace(0.0, 1.0, 30)
-    flat = Terrain(np.zeros((81, 81)), 0.05, (-2.0, -2.0))
     path = np.column_stack([0.0 * turned, 0.0 * turned, turned])
-    last = joint_trajectory(judge_path(LSR1, flat, path)[0], LSR1, "map", STAMP).points[-1]
+    last = joint_trajectory(judge_path(LSR1, FLAT, path)[0], LSR1, "map", STAMP).points[-1]
     reach = np.hypot([0.4, 0.0, 0.4], 0.31) / LSR1.wheel.radius
     assert last.positions[4:10] == pytest.approx([*reach, *-reach], rel=0.01)
     assert (np.sign(last.velocities[4:10]) == np.sign(last.positions[4:10])).all()

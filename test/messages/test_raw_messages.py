@@ -16,14 +16,6 @@ from msg_adapters.raw_messages import SensorReader
 STAMP = Time(sec=7, nanosec=8)
 
 
-def joints(names: list[str], *values: list[float]) -> JointState:
-    """Return joint states with positions, velocities and efforts, those that there are."""
-    message = JointState(name=names)
-    for field, some in zip(("position", "velocity", "effort"), values, strict=False):
-        setattr(message, field, some)
-    return message
-
-
 def imu() -> Imu:
     """Return an IMU message whose numbers all differ."""
     message = Imu()
@@ -86,10 +78,10 @@ def fields_of(message, like) -> object:
         odometry("base"),
         twist(),
         cloud(),
-        joints([]),
-        joints(["a"], [1.0]),
-        joints(["a", "bcdefg"], [], [2.0, math.inf], [3.0, 4.0]),
-        joints(["wheel", "", "räd"], [1.0, 2.0, 3.0], [], [4.0, 5.0, 6.0]),
+        JointState(),
+        JointState(name=["a"], position=[1.0]),
+        JointState(name=["a", "bcdefg"], velocity=[2.0, math.inf], effort=[3.0, 4.0]),
+        JointState(name=["wheel", "", "räd"], position=[1.0, 2.0, 3.0], effort=[4.0, 5.0, 6.0]),
     ],
 )
 def test_fields_are_those_that_rclpy_reads(message, frame):
@@ -104,24 +96,25 @@ def test_a_command_without_header_has_the_same_fields():
     assert plain == SensorReader().read(serialize_message(twist()), TwistStamped).twist
 
 
-def test_damaged_bytes_are_refused():
-    whole = serialize_message(joints(["wheel"], [1.0]))
-    for damaged in (b"", whole[:20], whole[:40]):
-        with pytest.raises(MessageError, match="no JointState"):
-            SensorReader().read(damaged, JointState)
+@pytest.mark.parametrize(
+    ("message", "lengths"),
+    [(JointState(name=["wheel"], position=[1.0]), (0, 20, 40)), (cloud(), (0, 60, -9))],
+)
+def test_damaged_bytes_are_refused(message, lengths):
+    kind, whole = type(message), serialize_message(message)
+    for length in lengths:
+        with pytest.raises(MessageError, match=f"no {kind.__name__}"):
+            SensorReader().read(whole[:length], kind)
 
 
 def test_the_data_of_a_cloud_are_read_where_they_are():
     message = serialize_message(cloud())
     assert SensorReader().read(message, PointCloud2).data.obj is message
-    for damaged in (message[:-9], message[:60], b""):
-        with pytest.raises(MessageError, match="no PointCloud2"):
-            SensorReader().read(damaged, PointCloud2)
 
 
 def test_the_joints_of_several_publishers_keep_their_names():
     reader = SensorReader()
     for names in (["a", "b"], ["c"], [], ["a", "b"], ["a", "b"]):
-        message = joints(names, [0.5] * len(names))
+        message = JointState(name=names, position=[0.5] * len(names))
         read = reader.read(serialize_message(message), JointState)
         assert (list(read.name), list(read.position)) == (names, [0.5] * len(names))

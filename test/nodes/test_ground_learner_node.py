@@ -10,7 +10,6 @@ import pytest
 from geometry_msgs.msg import TwistStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from sensor_msgs.msg import Imu, JointState, PointCloud2
 from std_msgs.msg import Bool, String
 
@@ -54,18 +53,13 @@ class Rover(Node):
         kinds = {"joint_states": JointState, "odometry": Odometry, "cmd_vel": TwistStamped}
         kinds["imu"] = Imu
         self._senders = {n: self.create_publisher(k, n, topic_qos()) for n, k in kinds.items()}
-        self.create_subscription(
-            String, ESTIMATE, lambda m: self.estimates.append(json.loads(m.data)), latched_qos()
-        )
-        self.create_subscription(
-            Odometry, "ground_learner/odometry", self.wheels.append, sensor_qos()
-        )
-        self.create_subscription(
-            String, MARK_PLACE, lambda m: self.marks.append(m.data), latched_qos()
-        )
-        self.create_subscription(
-            Bool, EMERGENCY_STOP, lambda m: self.stops.append(m.data), latched_qos()
-        )
+        for kind, topic, hear, qos in (
+            (String, ESTIMATE, lambda m: self.estimates.append(json.loads(m.data)), latched_qos()),
+            (Odometry, "ground_learner/odometry", self.wheels.append, sensor_qos()),
+            (String, MARK_PLACE, lambda m: self.marks.append(m.data), latched_qos()),
+            (Bool, EMERGENCY_STOP, lambda m: self.stops.append(m.data), latched_qos()),
+        ):
+            self.create_subscription(kind, topic, hear, qos)
 
     def is_heard(self) -> bool:
         """Return whether all topics are connected."""
@@ -80,15 +74,9 @@ class Rover(Node):
         """Send what a row holds; the joints first, which the row of the odometry has."""
         joints, odometry = row_messages(row, BEGIN)
         self._senders["joint_states"].publish(joints)
-        self._senders["imu"].publish(
-            imu_message(
-                xyzw_from_rpy(*row[[ROLL, PITCH, YAW]]),
-                np.zeros(3),
-                3.7,
-                1e-3,
-                odometry.header.stamp,
-            )
-        )
+        attitude = xyzw_from_rpy(*row[[ROLL, PITCH, YAW]])
+        imu = imu_message(attitude, np.zeros(3), 3.7, 1e-3, odometry.header.stamp)
+        self._senders["imu"].publish(imu)
         self._senders["odometry"].publish(odometry)
 
 
@@ -113,8 +101,7 @@ def drive(node: GroundLearnerNode, rover: Rover, rows: np.ndarray) -> None:
 
 
 def test_a_drive_is_learned_and_a_rover_that_gets_stuck_is_stopped_and_its_place_marked(ros):
-    wishes = [Parameter(f"{what}_when_stuck", value=True) for what in ("stop", "mark")]
-    node = ros.spin(GroundLearnerNode(context=ros.context, parameter_overrides=wishes))
+    node = ros.start(GroundLearnerNode, stop_when_stuck=True, mark_when_stuck=True)
     rover = ros.spin(Rover(ros))
     wait_until(rover.is_heard, "the node's subscriptions")
     ground = ramp(SLOPE)

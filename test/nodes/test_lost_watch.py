@@ -13,7 +13,6 @@ from rclpy.node import Node
 from std_msgs.msg import String
 
 from rover_physics import save_terrain
-from rover_planner.nodes.mission_planner import MissionPlanner
 from rover_planner.ros.qos import latched_qos, sensor_qos
 from support.grounds import make_terrain, waves
 from support.project.launch_files import simulation_commands
@@ -31,11 +30,9 @@ class Ear(Node):
         super().__init__("ear", context=ros.context)
         self.states: list[tuple[float, str]] = []
         self.speed = 0.0
-        for kind, topic, hear, qos in (
-            (String, "traction_controller/state", self._hear_state, latched_qos()),
-            (Odometry, "odometry", self._hear_odometry, sensor_qos()),
-        ):
-            self.create_subscription(kind, topic, hear, qos)
+        state = "traction_controller/state"
+        self.create_subscription(String, state, self._hear_state, latched_qos())
+        self.create_subscription(Odometry, "odometry", self._hear_odometry, sensor_qos())
 
     def _hear_state(self, message):
         self.states.append((time.monotonic(), message.data))
@@ -67,26 +64,24 @@ def start_simulation(tmp_path):
         process.wait()
 
 
-def start_drive(ros) -> MissionPlanner:
+def start_drive(planner) -> None:
     """Ask for a path of 3 m, and let the rover drive it."""
-    planner = MissionPlanner(context=ros.context)
     planner.wait_for_server()
     planner.wait_for_pose(lambda pose: True, 30.0)
     answer = planner.ask((0.0, 0.0, 0.0), (3.0, 0.0, 0.0))
     assert answer["traversable"], answer["reason"]
     planner.send_path(np.array(answer["poses"]))
-    return planner
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
 def test_the_rover_stops_within_half_a_second_of_the_loss_of_the_server(
-    ros, start_simulation, how
+    ros, start_simulation, planner, how
 ):
     processes, ear = start_simulation(), ros.spin(Ear(ros))
     wait_until(lambda: ear.state, "the controller", 120.0)
     assert ear.state == "fault"  # nothing was accepted yet
-    planner = start_drive(ros)
+    start_drive(planner)
     wait_until(lambda: ear.state == "driving" and ear.speed > 0.02, "the drive", 60.0)
     processes["traverse_server"].send_signal(how)
     lost = time.monotonic()

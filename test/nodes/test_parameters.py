@@ -14,7 +14,6 @@ from rover_planner.errors import PlanningError
 from rover_planner.parameters.__main__ import TABLES, parameters_document
 from rover_planner.parameters.declare import declare_parameters
 from rover_planner.parameters.table import ParameterError, specs_of
-from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.ros.node import RoverNode
 
@@ -69,32 +68,24 @@ def test_defaults_are_of_the_type_of_their_field_and_allowed(table):
 
 
 @pytest.mark.parametrize(
-    ("table", "name", "value", "text"),
+    ("name", "value", "text"),
     [
-        (TraverseServerParameters, name, value, text)
-        for name, value, text in [
-            ("friction", math.nan, "friction is nan; it must be a finite number"),
-            ("friction", -0.1, "friction is -0.1; it must be in 0 to 10"),
-            ("friction", "rough", "friction is 'rough'; it must be of type double"),
-            ("friction", 1, "friction is 1; it must be of type double, such as 0.0"),
-            ("candidate_count", 0, "candidate_count is 0; it must be in 1 to 99"),
-            ("waypoint_spacing", 0.0, r"waypoint_spacing is 0.0; it must be in 0.001 to 1 m"),
-            ("plan_spacing", 0.0009, r"it must be 0, or at least 0\.001 m"),
-            ("policy", "fair", "policy is 'fair'; it must be one of equal, servo, optimal"),
-            ("map_frame", "", "map_frame is empty; it must be a text such as 'map'"),
-        ]
-    ]
-    + [
-        (TractionControllerParameters, name, value, text)
-        for name, value, text in [
-            ("joints", ("a", ""), r"joints is \['a', ''\]; it must hold texts"),
-            ("imu_mounting", (0.0, 0.0), "imu_mounting is .*; it must hold 3 finite numbers"),
-        ]
+        ("friction", math.nan, "friction is nan; it must be a finite number"),
+        ("friction", -0.1, "friction is -0.1; it must be in 0 to 10"),
+        ("friction", "rough", "friction is 'rough'; it must be of type double"),
+        ("friction", 1, "friction is 1; it must be of type double, such as 0.0"),
+        ("candidate_count", 0, "candidate_count is 0; it must be in 1 to 99"),
+        ("waypoint_spacing", 0.0, r"waypoint_spacing is 0.0; it must be in 0.001 to 1 m"),
+        ("plan_spacing", 0.0009, r"it must be 0, or at least 0\.001 m"),
+        ("policy", "fair", "policy is 'fair'; it must be one of equal, servo, optimal"),
+        ("map_frame", "", "map_frame is empty; it must be a text such as 'map'"),
+        ("joint_map", ("a", ""), r"joint_map is \['a', ''\]; it must hold texts"),
+        ("imu_mounting", (0.0, 0.0), "imu_mounting is .*; it must hold 3 finite numbers"),
     ],
 )
-def test_a_table_with_a_bad_value_cannot_be_made(table, name, value, text):
+def test_a_table_with_a_bad_value_cannot_be_made(name, value, text):
     with pytest.raises(ParameterError, match=text):
-        replace(table(), **{name: value})
+        replace(TraverseServerParameters(), **{name: value})
 
 
 @pytest.mark.parametrize("table", TABLES.values())

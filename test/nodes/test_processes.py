@@ -11,34 +11,8 @@ import numpy as np
 import pytest
 
 from rover_physics import Terrain, save_terrain
-from rover_planner.nodes.traverse_server import main
 from rover_planner.ros.process import PROFILES, TRANSPORTS, take_priority
 from support.project.without_disk import fill_disk
-from support.ros_fixtures import domain_id
-
-
-@pytest.fixture
-def start_process():
-    """Return a function that starts a node with parameters; what is left at the end is killed."""
-    processes = []
-
-    def start(name, *parameters, **options):
-        arguments = [word for text in parameters for word in ("-p", text)]
-        process = subprocess.Popen(
-            [sys.executable, "-m", f"rover_planner.nodes.{name}", "--ros-args", *arguments],
-            env=os.environ | {"ROS_DOMAIN_ID": str(domain_id()), "PYTHONUNBUFFERED": "1"},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            **options,
-        )
-        processes.append(process)
-        return process
-
-    yield start
-    for process in processes:
-        process.kill()
-        process.communicate()
 
 
 def read_until(process, text):
@@ -118,13 +92,6 @@ def test_a_thread_that_ends_while_threads_take_priority_is_no_refusal(tmp_path, 
 def test_a_server_starts_on_a_full_disk_without_a_log_file_and_says_so(start_process):
     process = start_process("traverse_server", preexec_fn=fill_disk)
     read_until(process, "no log file is written: File too large")
-
-
-def test_a_wrong_parameter_ends_a_server_with_one_line(monkeypatch, capfd):
-    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id()))
-    assert main(["--ros-args", "-p", "terrain_file:=/no/such/file.npz"]) == 2
-    output = capfd.readouterr().err
-    assert "Traceback" not in output and "/no/such/file.npz" in output.strip().splitlines()[-1]
 
 
 PROGRAM = """

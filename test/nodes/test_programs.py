@@ -12,12 +12,12 @@ import sys
 import pytest
 import yaml
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 
 from rover_planner.nodes import start
 from rover_planner.nodes.programs import PROGRAMS
 from rover_planner.shell.extras import PLAIN
 from support.project.checkout import TOP, setup_arguments
+from support.ros_fixtures import domain_id
 from support.waiting import wait_until
 
 MODULES = {name: importlib.import_module(f"rover_planner.nodes.{name}") for name in PROGRAMS}
@@ -117,30 +117,32 @@ def test_what_a_plain_installation_brings_is_known_by_its_modules():
     [
         ("traverse_server", ["--colour", "red"], "--colour"),
         ("rover_simulator", ["terrain_file:=mars.npz"], "--ros-args -p"),
+        ("rover_simulator", ["--engine", "horses"], "'horses'; it must be one of quasi_static"),
+        ("traverse_server", ["--ros-args", "-p", "terrain_file:=/no/file.npz"], "/no/file.npz"),
         ("traction_controller", ["--ros-args", "-p", "friction"], "-p friction"),
         ("mission_planner", ["--ros-args", "--colour"], "--colour"),
     ],
 )
-def test_wrong_words_are_exit_code_2_and_named(name, words, said, capfd):
+def test_wrong_words_are_exit_code_2_and_named(name, words, said, capfd, monkeypatch):
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id()))
     assert MODULES[name].main(words) == 2
     err = capfd.readouterr().err
-    assert said in err and "Traceback" not in err and "/rcl/" not in err
+    assert said in err.strip().splitlines()[-1] and "Traceback" not in err and "/rcl/" not in err
 
 
 @pytest.mark.parametrize("name", PROGRAMS)
 def test_a_node_in_a_namespace_has_the_topics_of_the_help_and_tells_of_wrong_parameters(
     name, ros, capfd
 ):
-    words, wrong, file = ["-r", "__ns:=/one"], [], PARAMETER_FILES / f"{name}.yaml"
+    words, wrong, file = ["-r", "__ns:=/one"], {}, PARAMETER_FILES / f"{name}.yaml"
     if file.exists():
         words += ["--params-file", str(file), "-r", "diagnostics:=/diagnostics"]
-        wrong = [Parameter("rovr", value="lsr1"), Parameter("use_sim_time", value=False)]
+        wrong = {"rovr": "lsr1", "use_sim_time": False}
     (kind,) = (
         one for one in vars(MODULES[name]).values()
         if isinstance(one, type) and issubclass(one, Node) and one.__module__.endswith(name)
     )  # fmt: skip
-    node = kind(context=ros.context, cli_args=["--ros-args", *words], parameter_overrides=wrong)
-    ros.spin(node)
+    node = ros.start(kind, ["--ros-args", *words], **wrong)
     assert node.get_fully_qualified_name() == f"/one/{name}"
     if file.exists():
         for key, value in yaml.safe_load(file.read_text())["/**"]["ros__parameters"].items():

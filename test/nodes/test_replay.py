@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import Point, Quaternion
-from nav_msgs.msg import Odometry
+from geometry_msgs.msg import Quaternion
 from nav_msgs.msg import Path as PathMessage
 from rclpy.serialization import deserialize_message, serialize_message
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
@@ -28,10 +27,15 @@ from rover_planner.cli import main
 from rover_planner.nodes.result_topics import RESULT_KINDS
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.bags.bag_files import GRID_MAP, GRID_MAP_FIELDS, GRID_MAP_INFO_FIELDS
+from support.messages import grid_map_of, odometry_at, transform_message
 from support.rovers import LSR1
 
+TF_MESSAGE = "tf2_msgs/msg/TFMessage"
 BEGIN = 1_700_000_000_000_000_000
 """Time of the first message [ns]."""
+GRID_MAPS = "/elevation_map"
+NOT_ON_PYPI = {GRID_MAPS: GRID_MAP, **dict.fromkeys(("/tf", "/tf_static"), TF_MESSAGE)}
+"""Types of messages that are objects with their fields, by topic."""
 STORAGES = {"sqlite": StoragePlugin.SQLITE3, "mcap": StoragePlugin.MCAP}
 
 
@@ -39,15 +43,6 @@ def waves() -> Terrain:
     """Return ground 10 m x 4 m with waves that turn the suspension."""
     X, Y = np.meshgrid(np.arange(-1.0, 9.0, 0.04), np.arange(-2.0, 2.0, 0.04))
     return Terrain(0.03 * np.sin(4.0 * X + 0.8 * Y), 0.04, (-1.0, -2.0))
-
-
-def odometry_at(x: float, frame: str = "map") -> Odometry:
-    """Return a level rover at x [m] on the x axis of a frame."""
-    message = Odometry()
-    message.header.frame_id = frame
-    message.pose.pose.position = Point(x=x)
-    message.pose.pose.orientation.w = 1.0
-    return message
 
 
 def drive(length: float) -> list[tuple[str, object]]:
@@ -59,7 +54,7 @@ def drive(length: float) -> list[tuple[str, object]]:
     for k, place in enumerate(x.tolist()):
         values = np.concatenate([prediction.rocker_angle[k], prediction.bogie_angle[k]])
         joints = JointState(name=list(SUSPENSION_JOINTS), position=values.tolist())
-        messages += [("/joint_states", joints), ("/odometry", odometry_at(place))]
+        messages += [("/joint_states", joints), ("/odometry", odometry_at((place, 0.0, 0.0)))]
     return messages
 
 
@@ -74,21 +69,19 @@ def path_to(x: float) -> PathMessage:
 
 
 def record(folder: Path, messages: list[tuple[str, Any]], storage: str = "mcap") -> Path:
-    """Write messages 10 ms apart to a new bag: those of ROS, of the bag's library, or GridMaps."""
+    """Write messages 10 ms apart to a new bag."""
     types = get_typestore(Stores.ROS2_JAZZY)
     for name, fields in (("GridMapInfo", GRID_MAP_INFO_FIELDS), ("GridMap", GRID_MAP_FIELDS)):
         types.register(get_types_from_msg(fields, f"grid_map_msgs/msg/{name}"))
     with Writer(folder, version=9, storage_plugin=STORAGES[storage]) as writer:
         connections = {}
         for k, (topic, message) in enumerate(messages):
-            module, name = type(message).__module__.split(".")[0], type(message).__name__
-            is_grid_map = isinstance(message, SimpleNamespace)
-            kind = GRID_MAP if is_grid_map else getattr(message, "__msgtype__", "")
+            kind = NOT_ON_PYPI.get(topic, "")
             raw = types.serialize_cdr(message, kind) if kind else serialize_message(message)
             if topic not in connections:
-                connections[topic] = writer.add_connection(
-                    topic, kind or f"{module}/msg/{name}", typestore=types
-                )
+                module, name = type(message).__module__.split(".")[0], type(message).__name__
+                kind = kind or f"{module}/msg/{name}"
+                connections[topic] = writer.add_connection(topic, kind, typestore=types)
             writer.write(connections[topic], BEGIN + 10_000_000 * k, raw)
     return folder
 
@@ -100,32 +93,19 @@ def replay(capsys, bag: Path, out: Path, *words: str) -> tuple[list[dict], dict]
     return answers, total
 
 
-def transforms_of(parent: str, child: str, rigid: Rigid):
-    """Return a TFMessage of the bag's library; tf2_msgs is not on PyPI."""
-    types = get_typestore(Stores.ROS2_JAZZY).types
-    geometry = {
-        name: types[f"geometry_msgs/msg/{name}"]
-        for name in ("TransformStamped", "Transform", "Vector3", "Quaternion")
-    }
-    time = types["builtin_interfaces/msg/Time"](BEGIN // 10**9, BEGIN % 10**9)
-    transform = geometry["Transform"](
-        geometry["Vector3"](*rigid.translation.tolist()),
-        geometry["Quaternion"](*rigid.rotation.as_quat().tolist()),
-    )
-    header = types["std_msgs/msg/Header"](time, parent)
-    stamped = geometry["TransformStamped"](header, child, transform)
-    return types["tf2_msgs/msg/TFMessage"]([stamped])
-
-
 @pytest.mark.parametrize("storage", STORAGES)
 def test_a_drive_is_judged_in_stretches_with_what_was_measured(storage, tmp_path, capsys):
-    bag = record(tmp_path / "bag", [("/elevation_cloud", cloud(waves())), *drive(1.6)], storage)
+    seen, name = cloud(waves()), "/elevation_cloud"
+    if storage == "sqlite":
+        ground = waves()
+        seen, name = grid_map_of({"elevation": ground.elevation}, 0.04, (3.98, -0.02)), GRID_MAPS
+    bag = record(tmp_path / "bag", [(name, seen), *drive(1.6)], storage)
     answers, total = replay(capsys, bag, tmp_path / "out", "--stretch", "1")
     assert [answer["kind"] for answer in answers] == ["driven"] * 2
     assert all(answer["traversable"] for answer in answers)
     assert total["refused_messages"] == {} and total["answers"] == 2
     assert total["topics"] == {
-        "map": "/elevation_cloud", "joints": "/joint_states", "odometry": "/odometry",
+        "map": name, "joints": "/joint_states", "odometry": "/odometry",
     }  # fmt: skip
     for answer in answers:
         # Poses are kept 5 cm apart, the ground turns the bogies by up to 0.12 rad in 10 cm.
@@ -162,7 +142,7 @@ def test_predictions_are_recorded_as_a_server_publishes_them(tmp_path, capsys):
 def test_each_new_map_is_asked_for_a_goal_from_the_odometry(tmp_path, capsys):
     flat = Terrain(np.zeros((100, 250)), 0.04, (-1.0, -2.0))
     messages = [
-        ("/odometry", odometry_at(1.0)),
+        ("/odometry", odometry_at((1.0, 0.0, 0.0))),
         ("/elevation_cloud", cloud(waves())),
         ("/elevation_cloud", cloud(waves())),  # the same again
         ("/elevation_cloud", cloud(flat, BEGIN + 1)),
@@ -179,7 +159,7 @@ def test_messages_that_cannot_be_used_are_counted_and_told(tmp_path, capsys):
     messages = [
         ("/elevation_cloud", cloud(waves(), frame="odom")),
         ("/elevation_cloud", cloud(waves())),
-        ("/odometry", odometry_at(1.0, frame="odom")),
+        ("/odometry", odometry_at((1.0, 0.0, 0.0), frame="odom")),
         ("/joint_states", JointState(name=["bogie_left"], position=[float("nan")])),
         ("/imu", Imu(orientation=Quaternion(w=0.0))),
     ]
@@ -196,7 +176,7 @@ def test_messages_that_cannot_be_used_are_counted_and_told(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("messages", "words", "said"),
     [
-        ([("/odometry", odometry_at(0.0))], (), "has no map: PointCloud2 or GridMap"),
+        ([("/odometry", odometry_at((0.0, 0.0, 0.0)))], (), "has no map: PointCloud2 or GridMap"),
         ([("/a", cloud(waves())), ("/b", cloud(waves()))], (), "choose one by --map-topic"),
         ([("/a", cloud(waves()))], ("--map-topic", "/c"), "no topic /c of type .* it has /a"),
         ([("/a", cloud(waves()))], ("--parameters", "none.yaml"), "none.yaml"),
@@ -231,21 +211,19 @@ def test_recorded_transforms_place_odometry_and_clouds_on_the_map(tmp_path, caps
     mount = Rigid.from_rpy(0.4, 0.0, 0.6, 0.0, 0.5, 0.0)
     on_map = Rigid.from_rpy(1.0, 0.0, 0.25, 0.0, 0.0, 0.0)
     in_odom, in_camera = map_odom.inverse().then(on_map), on_map.then(mount).inverse()
-    odometry = odometry_at(0.0, "odom")
-    place, turn = odometry.pose.pose.position, odometry.pose.pose.orientation
-    place.x, place.y, place.z = in_odom.translation.tolist()
-    turn.x, turn.y, turn.z, turn.w = in_odom.rotation.as_quat().tolist()
+    odometry = odometry_at(in_odom.xyyaw, in_odom.translation[2], "odom")
     odometry.header.stamp = ns_to_stamp(BEGIN)
     plain, seen = cloud(waves()), cloud(waves(), frame="camera")
     points = np.frombuffer(plain.data, "<f4").reshape(-1, 3)
     moved = in_camera.rotation.apply(points) + in_camera.translation
     seen.data = moved.astype("<f4").tobytes()
-    transforms = {
-        "/tf": transforms_of("map", "odom", map_odom),
-        "/tf_static": transforms_of("base_link", "camera", mount),
-    }
-    messages = [("/odometry", odometry), ("/elevation_cloud", seen)]
-    bag = record(tmp_path / "bag", [*transforms.items(), *messages])
+    edges = {"/tf": ("map", "odom", map_odom), "/tf_static": ("base_link", "camera", mount)}
+    messages = [
+        (topic, SimpleNamespace(transforms=[transform_message(*edge, ns_to_stamp(BEGIN))]))
+        for topic, edge in edges.items()
+    ]
+    messages += [("/odometry", odometry), ("/elevation_cloud", seen)]
+    bag = record(tmp_path / "bag", messages)
     words = ["--resolution", "0.04", "--goal", "3,0.2,0"]
     (answer,), total = replay(capsys, bag, tmp_path / "out", *words)
     assert total["refused_messages"] == {} and total["topics"]["tf"] == "/tf"

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Quaternion
-from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu, JointState
 
-from msg_adapters.paths import poses_path, stamped_pose
+from msg_adapters.paths import poses_path
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_planner.parameters.traverse_server import TraverseServerParameters
@@ -19,7 +18,7 @@ from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.frames import Frames
 from rover_planner.ros.server_inputs import LOOK_PERIOD, ServerInputs
 from support.grounds import make_terrain, waves
-from support.messages import grid_map_of, move_buffer, transform_message
+from support.messages import grid_map_of, move_buffer, odometry_at, transform_message
 
 PRIOR = make_terrain(waves)
 
@@ -31,14 +30,6 @@ def inputs_with(*edges, clock=time.monotonic, **parameters) -> ServerInputs:
     for edge in edges:
         frames.take_transform(transform_message(*edge, Time()), is_static=True)
     return ServerInputs(values, frames, clock)
-
-
-def odometry_at(pose, height=0.0) -> Odometry:
-    message = Odometry(child_frame_id="base_link")
-    message.header.frame_id = "map"
-    message.pose.pose = stamped_pose(pose, "map").pose
-    message.pose.pose.position.z = height
-    return message
 
 
 def test_a_path_on_the_map_is_one_in_odom_and_of_the_body_where_the_robot_has_another_origin():

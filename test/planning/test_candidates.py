@@ -85,18 +85,15 @@ def test_the_fan_spreads_by_the_spacing_to_both_sides():
     ],
 )
 def test_bad_requests_are_refused_by_name(change, names):
-    arguments = {"start": (0, 0, 0), "goal": (4, 1, 0)} | change
-    start, goal = arguments.pop("start"), arguments.pop("goal")
     with pytest.raises(PlanningError, match=names):
-        generate_candidates(start, goal, **arguments)
+        generate_candidates(**({"start": (0, 0, 0), "goal": (4, 1, 0)} | change))
 
 
 @given(POSES, POSES)
 def test_a_point_turn_leads_from_start_to_goal_in_small_steps_that_turn_or_drive(start, goal):
     path, length = turn_and_drive(np.array(start), np.array(goal), SWING, SPACING)
     assert path[0, :2] == pytest.approx(start[:2]) and path[-1, :2] == pytest.approx(goal[:2])
-    for pose, end in ((path[0], start), (path[-1], goal)):
-        assert np.cos(pose[2] - end[2]) == pytest.approx(1.0, abs=1e-6)
+    assert np.cos(path[[0, -1], 2] - (start[2], goal[2])) == pytest.approx(1.0, abs=1e-6)
     steps = np.diff(path, axis=0)
     driven, turned = np.hypot(steps[:, 0], steps[:, 1]), np.abs(wrap(steps[:, 2]))
     assert (driven <= SPACING * (1 + 1e-9)).all() and (SWING * turned <= SPACING + 1e-3).all()

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The query sweeps the candidates, chooses by risk and then energy, and explains a refusal."""
 
-import dataclasses
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -30,10 +30,7 @@ def test_level_ground_is_traversable_on_the_straight_connection():
 
 
 def test_a_rock_in_the_way_is_driven_around():
-    def rock(x, y):
-        return np.where(np.hypot(x, y - 0.3) < 0.15, 0.5, 0.0)
-
-    terrain = make_terrain(rock)
+    terrain = make_terrain(lambda x, y: np.where(np.hypot(x, y - 0.3) < 0.15, 0.5, 0.0))
     answer = answer_path_query(LSR1, terrain, (-3, 0, 0), (3, 0, 0), COARSE)
     assert not answer.candidates[0].verdict.traversable
     assert answer.traversable and answer.nearest > 0
@@ -46,35 +43,27 @@ def test_a_ridge_across_all_candidates_is_refused_with_its_reason():
     assert not answer.traversable
     assert answer.chosen.verdict.reason
     assert answer.chosen.verdict.reason in answer.explain()
-    assert answer.chosen.passable_share == max(
-        candidate.passable_share for candidate in answer.candidates
-    )
-    assert 0 < answer.chosen.passable_share < 1
+    best = max(candidate.passable_share for candidate in answer.candidates)
+    assert 0 < answer.chosen.passable_share == best < 1
 
 
 def test_the_safer_path_wins_and_energy_decides_between_equals():
     answer = answer_path_query(LSR1, FLAT, (-2, 0, 0), (2, 0, 0), COARSE)
     first, second, third = answer.candidates[:3]
-    safe = dataclasses.replace(second, cost=(0.3, 90.0))
-    thrifty = dataclasses.replace(third, cost=(0.3, 80.0))
-    risky = dataclasses.replace(first, cost=(0.5, 10.0))
+    safe = replace(second, cost=(0.3, 90.0))
+    thrifty = replace(third, cost=(0.3, 80.0))
+    risky = replace(first, cost=(0.5, 10.0))
     assert choose((risky, safe, thrifty)).nearest == 2
-    refused = dataclasses.replace(
-        thrifty, verdict=dataclasses.replace(thrifty.verdict, traversable=False)
-    )
+    refused = replace(thrifty, verdict=replace(thrifty.verdict, traversable=False))
     assert choose((risky, safe, refused)).nearest == 1
 
 
 def test_on_an_uncertain_map_the_bounds_are_the_risk():
-    ground = FLAT
-    uncertain = dataclasses.replace(ground, elevation_std=np.full(ground.elevation.shape, 0.003))
-    pose = np.array([[0.0, 0.0, 0.0]])
-    sure = check_path(LSR1, ground, pose, COARSE).verdict.risk
-    risks = [
-        check_path(
-            LSR1, uncertain, pose, dataclasses.replace(COARSE, map_sigmas=sigmas)
-        ).verdict.risk
-        for sigmas in (0.0, 1.0, 3.0)
-    ]
-    assert risks[0] == sure
-    assert sure < risks[1] < risks[2] < 1.0
+    uncertain = replace(FLAT, elevation_std=np.full(FLAT.elevation.shape, 0.003))
+
+    def risk_on(ground, sigmas):
+        options = replace(COARSE, map_sigmas=sigmas)
+        return check_path(LSR1, ground, np.zeros((1, 3)), options).verdict.risk
+
+    sure = risk_on(FLAT, 3.0)
+    assert sure == risk_on(uncertain, 0.0) < risk_on(uncertain, 1.0) < risk_on(uncertain, 3.0) < 1

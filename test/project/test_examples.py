@@ -35,8 +35,7 @@ def test_every_example_is_tested_and_in_the_table_of_the_folder():
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=pytest.mark.long if name > "02" else ()) for name in SHOWN],
+    "name", [pytest.param(name, marks=pytest.mark.long if name > "02" else ()) for name in SHOWN]
 )
 def test_an_example_prints_and_draws_what_it_claims(name, tmp_path):
     from matplotlib.image import imread

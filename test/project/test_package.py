@@ -52,6 +52,12 @@ def package_xml() -> ElementTree.Element:
     return ElementTree.parse(TOP / "package.xml").getroot()
 
 
+def ros_packages(names: set[str]) -> set[str]:
+    """Return which of the packages of these names are of ROS."""
+    ros = {"rclpy", "rcl_interfaces", "builtin_interfaces"}
+    return {name for name in names if name in ros or name.endswith(("_msgs", "_srvs"))}
+
+
 def test_manifest_and_setup_have_the_version_of_the_code():
     assert setup_arguments()["version"] == rover_physics.__version__
     assert package_xml().findtext("version") == rover_physics.__version__
@@ -71,9 +77,7 @@ def test_the_manifest_depends_on_every_ros_package_that_is_imported():
         for path in sources(package)
         for module in imported_names(path)
     }
-    ros = {name for name in used if name == "rclpy" or name.endswith(("_msgs", "_srvs"))}
-    ros |= used & {"rcl_interfaces", "builtin_interfaces"}
-    assert ros - {"grid_map_msgs", "nav2_msgs"} <= declared
+    assert ros_packages(used) - {"grid_map_msgs", "nav2_msgs"} <= declared
 
 
 def test_every_console_script_is_a_function_that_exists():
@@ -197,8 +201,7 @@ def test_torques_are_computed_without_ros():
             reached.add(module)
             ahead += imports().get(module, ())
     used = {name.split(".")[0] for one in reached for name in imported_names(modules()[one])}
-    assert "osqp" in used
-    assert not {name for name in used if name == "rclpy" or name.endswith(("_msgs", "_srvs"))}
+    assert "osqp" in used and not ros_packages(used)
 
 
 def test_maps_are_read_and_described_without_ros():

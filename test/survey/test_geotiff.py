@@ -16,6 +16,7 @@ from rover_planner.survey.geotiff import GeoTiffMap
 from rover_planner.survey.map_source import MapFrame
 from rover_planner.survey.survey import prepare_survey
 from rover_planner.viewer.state.survey_layers import load_map
+from support.command_line import assert_refused
 from support.survey_maps import (
     assert_same_bits,
     compute_here,
@@ -162,9 +163,8 @@ def test_a_projection_in_kilometres_is_refused_in_one_line(tmp_path, capfd):
     kilometres = "+proj=stere +lat_0=-90 +R=1737400 +units=km"
     path = write_tif(tmp_path / "map.tif", np.zeros((40, 50), np.float32), crs=kilometres)
     capfd.readouterr()
-    assert main(["survey", "lsr1", str(path), str(tmp_path / "out")]) == 2
-    err = capfd.readouterr().err
-    assert "has coordinates in kilometre" in err and err.count("\n") == 1, err
+    code = main(["survey", "lsr1", str(path), str(tmp_path / "out")])
+    assert_refused(capfd, code, "has coordinates in kilometre")
 
 
 @pytest.mark.parametrize("share", [0.0, 0.5, None])

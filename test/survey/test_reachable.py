@@ -28,6 +28,7 @@ from rover_planner.survey.reachable import (
     search_area,
 )
 from rover_planner.survey.store import NOTES
+from support.command_line import assert_refused
 from support.survey_maps import make_request, survey_here
 
 CELL = 0.25
@@ -195,6 +196,5 @@ def test_places_in_the_coordinates_of_a_projection_are_told_to_a_millimetre(tmp_
 
 
 def test_a_place_that_is_none_is_one_line_and_exit_code_2(capfd):
-    assert main(["reachable", "nothing", "--from", "nan,1"]) == 2
-    err = capfd.readouterr().err
-    assert "--from is 'nan,1'; it must be two numbers" in err and err.count("\n") == 1
+    code = main(["reachable", "nothing", "--from", "nan,1"])
+    assert_refused(capfd, code, "--from is 'nan,1'; it must be two numbers")

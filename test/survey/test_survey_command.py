@@ -4,8 +4,8 @@
 import json
 import resource
 import signal
-import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +17,7 @@ pytest.importorskip("distributed", reason="install the extra survey")
 import dask
 from distributed import LocalCluster
 
-from rover_physics import save_terrain
+from rover_physics import load_terrain, save_terrain
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.shell.run_program import end_as_by_ctrl_c
@@ -29,6 +29,7 @@ from rover_planner.survey.layout import Index
 from rover_planner.survey.runner import run_survey
 from rover_planner.survey.store import create_store
 from rover_planner.survey.survey import prepare_survey
+from support.command_line import assert_refused
 from support.survey_maps import (
     assert_same_bits,
     compute_here,
@@ -43,13 +44,10 @@ from support.survey_maps import (
 )
 from support.waiting import wait_until
 
-SIDE = 70
-"""Cells of a side of the map; at every fourth cell it has 4 chunks of up to 16 cells."""
-
 
 @pytest.fixture
 def ground(tmp_path) -> Path:
-    """Return a map, which is not surveyed."""
+    """Return a map that is not surveyed; at each fourth cell it has 4 chunks of 16 cells."""
     save_terrain(tmp_path / "map.npz", make_rough_map(70, 70))
     return tmp_path / "map.npz"
 
@@ -78,13 +76,11 @@ def survey(map_file, *words) -> int:
 
 @pytest.mark.slow
 def test_a_cluster_finds_what_one_process_finds_and_a_second_run_does_nothing(
-    tmp_path, scheduler, capfd
+    tmp_path, ground, scheduler, capfd
 ):
-    terrain, request = make_rough_map(SIDE, SIDE), make_request(step=4)
-    whole = survey_here(tmp_path / "whole", terrain, request, chunk=48)
-    map_file, picture = tmp_path / "map.npz", tmp_path / "p.png"
-    save_terrain(map_file, terrain)
-    words = map_file, "--step", 4, "--picture", picture
+    request, picture = make_request(step=4), tmp_path / "p.png"
+    whole = survey_here(tmp_path / "whole", load_terrain(ground), request, chunk=48)
+    words = ground, "--step", 4, "--picture", picture
     assert survey(*words, "--chunk", 16, "--scheduler", scheduler) == 0
     out, err = capfd.readouterr()
     report = json.loads(out)
@@ -92,7 +88,7 @@ def test_a_cluster_finds_what_one_process_finds_and_a_second_run_does_nothing(
     assert report["chunks_failed"] == [] and report["poses"] == 18 * 18 * 4
     assert sum(report["best_class"].values()) == pytest.approx(1.0, abs=1e-5)
     assert picture.stat().st_size > 10_000
-    done = prepare_survey(request, str(map_file), tmp_path / "out")
+    done = prepare_survey(request, str(ground), tmp_path / "out")
     assert_same_bits(layers_of(done), layers_of(whole))
     (tmp_path / "out" / ".lock").unlink()
     (tmp_path / "out" / ".lock").mkdir()  # as on a read-only disk, to which nothing is written
@@ -196,16 +192,13 @@ def test_signals_end_a_survey_but_those_that_are_ignored_stay_so():
     finally:
         for one, handler in before.items():
             signal.signal(one, handler)
-    done = []
 
-    def enter():  # another thread, which may set no signals
+    def enter():  # in another thread, which may set no signals
         with end_as_by_ctrl_c():
-            done.append(True)
+            return True
 
-    thread = threading.Thread(target=enter)
-    thread.start()
-    thread.join(timeout=10.0)
-    assert done == [True]
+    with ThreadPoolExecutor() as other:
+        assert other.submit(enter).result(10.0)
 
 
 # Workers.
@@ -246,9 +239,8 @@ def test_a_scheduler_without_workers_or_with_small_ones_is_refused(ground, monke
         run_survey(prepared.job, prepared.chunks, ClusterSettings(started.scheduler_address))
     capfd.readouterr()
     with start_cluster(1, memory_limit="300MB", threads_per_worker=1) as started:
-        assert survey(ground, "--scheduler", started.scheduler_address) == 2
-    err = capfd.readouterr().err
-    assert "a worker has 300 MB: give a smaller --chunk" in err
+        code = survey(ground, "--scheduler", started.scheduler_address)
+    assert_refused(capfd, code, "a worker has 300 MB: give a smaller --chunk")
     assert not ground.with_name("out").exists()
 
 
@@ -270,6 +262,5 @@ def test_a_scheduler_without_workers_or_with_small_ones_is_refused(ground, monke
 )
 def test_bad_input_is_one_line_before_a_store_is_made(ground, monkeypatch, words, said, capfd):
     monkeypatch.setattr(dask_cluster, "CONNECT_TIME", 0.5)
-    assert survey(ground, *words) == 2
-    err = capfd.readouterr().err
-    assert said in err and err.count("\n") == 1 and not ground.with_name("out").exists()
+    assert_refused(capfd, survey(ground, *words), said)
+    assert not ground.with_name("out").exists()

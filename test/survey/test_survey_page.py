@@ -11,7 +11,6 @@ pytest.importorskip("zarr", reason="install the extra survey")
 
 from rover_physics import SweepOptions, Terrain, load_rover
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS
-from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.survey.layers import CLASS_COLOURS, CLASS_NUMBERS
 from rover_planner.viewer.state.colours import UNKNOWN
@@ -86,9 +85,3 @@ def test_a_survey_of_another_rover_or_map_is_refused(surveyed, rover, heights, s
     terrain = load_map(surveyed, 10_000) if heights is None else Terrain(heights, 0.1)
     with pytest.raises(PlanningError, match=said):
         open_survey(surveyed, rover, terrain)
-
-
-def test_the_command_takes_no_survey_of_a_live_graph(capfd):
-    assert main(["view", "lsr1", "--port", "0", "--survey", ".", "--follow"]) == 2
-    err = capfd.readouterr().err
-    assert "--follow and --survey exclude each other" in err and err.count("\n") == 1

@@ -9,11 +9,7 @@ pytest.importorskip("matplotlib", reason="install the extra plots")
 import matplotlib.image
 import numpy as np
 
-from rover_planner.figures.survey_picture import (
-    choose_bar,
-    draw_reachable,
-    draw_survey,
-)
+from rover_planner.figures.survey_picture import choose_bar, draw_reachable, draw_survey
 from rover_planner.survey.reachable import find_reachable
 from support.survey_maps import make_request, make_rough_map, survey_here
 

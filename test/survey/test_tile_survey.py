@@ -45,6 +45,15 @@ def places_on(terrain: Terrain, every=4) -> np.ndarray:
     return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
 
 
+def with_layers(terrain: Terrain, columns: int, rows: int) -> Terrain:
+    """Return the ground slippery in its first columns, and of sand from a row on."""
+    friction = np.full(terrain.elevation.shape, np.nan)
+    friction[:, :columns] = 0.2
+    soil = np.full(terrain.elevation.shape, -1, np.int32)
+    soil[rows:] = 0
+    return replace(terrain, friction=friction, soil=soil, soil_names=("dry_sand",))
+
+
 def poses_at(places: np.ndarray, request) -> np.ndarray:
     poses = np.empty((len(places), request.headings, 3))
     poses[:, :, :2], poses[:, :, 2] = places[:, None], request.yaws
@@ -73,11 +82,7 @@ def test_limits_and_classes_are_those_of_predict(ground, policy, std):
         std = np.where(np.isnan(ground.elevation), np.nan, std)
         ground, places = replace(ground, elevation_std=std), places[::5]
     else:  # layers of the ground count as in predict
-        friction = np.where(np.arange(110) < 30, 0.2, np.nan) * np.ones((110, 1))
-        soil = np.where(np.arange(110)[:, None] > 80, 0, -1) * np.ones((1, 110))
-        ground = replace(
-            ground, friction=friction, soil=soil.astype(np.int32), soil_names=("dry_sand",)
-        )
+        ground = with_layers(ground, 30, 81)
     layers, poses = survey_tile(request, ground, places), poses_at(places, request)
     verdict = judged(request, ground, poses)[1]
     clear = is_clear(ground, places)
@@ -185,21 +190,16 @@ def test_bits_come_back(headings):
 
 @pytest.mark.parametrize(("step", "chunk"), [(1, 32), (3, 1)])
 def test_any_chunks_give_the_same_bits(tmp_path, step, chunk):
-    terrain, request = make_rough_map(40, 50), make_request(headings=2, step=step)
-    soil = np.where(np.arange(40)[:, None] > 25, 0, -1) * np.ones((1, 50), np.int32)
-    friction = np.where(np.arange(50) < 20, 0.2, np.nan) * np.ones((40, 1))
-    terrain = replace(
-        terrain, friction=friction, soil=soil.astype(np.int32), soil_names=("dry_sand",)
-    )
+    request = make_request(headings=2, step=step)
+    terrain = with_layers(make_rough_map(40, 50), 20, 26)
     whole = survey_here(tmp_path / "whole", terrain, request, chunk=2000)
     parts = survey_here(tmp_path / "parts", terrain, request, chunk=chunk)
     assert len(parts.chunks) >= len(whole.chunks) == 1
     found = layers_of(whole)
     assert_same_bits(found, layers_of(parts))
     assert step > 1 or len(np.unique(found["first_limit"])) > 3
-    x, y = (np.arange(0, count, step) * terrain.resolution for count in (50, 40))
-    places = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
-    tile = survey_tile(request, replace(terrain, origin=(0.0, 0.0)), places)["first_limit"]
+    moved = replace(terrain, origin=(0.0, 0.0))
+    tile = survey_tile(request, moved, places_on(terrain, step))["first_limit"]
     assert (tile != found["first_limit"].ravel()).mean() < 1e-3  # coordinates round differently
 
 

@@ -125,6 +125,7 @@ def test_a_long_visit_keeps_path_comparison_and_memory(ground, tmp_path):
             change(visitor, {FRICTION: "0.7"})
             wait_until(lambda: "friction 0.7" in visitor.text("#subject"), "the new verdict")
             wait_for_rest(visitor)
+        print(ground, [round(one) for one in memory])
         assert max(memory) < MOST_MEMORY, memory
         third = len(memory) // 3
         assert min(memory[-third:]) < STEADY * max(memory[1 : third + 2]), memory

@@ -94,9 +94,8 @@ def test_number_of_rocks_integrates_to_the_area_they_cover(k):
     assert area == pytest.approx(expected, rel=1e-4)
 
 
-@pytest.mark.parametrize("k", [0.1])
-def test_drawn_rocks_follow_the_size_frequency_law(k):
-    area, smallest, largest = 20_000.0, 0.1, 2.0
+def test_drawn_rocks_follow_the_size_frequency_law():
+    k, area, smallest, largest = 0.1, 20_000.0, 0.1, 2.0
     diameters = rocks.sample_diameters(np.random.default_rng(7), k, area, smallest, largest)
     assert diameters.min() >= smallest
     assert diameters.max() <= largest

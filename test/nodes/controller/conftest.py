@@ -11,7 +11,6 @@ from geometry_msgs.msg import Twist, TwistStamped
 from rcl_interfaces.msg import Log
 from rclpy.context import Context
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Bool, Float64MultiArray, String
@@ -146,6 +145,10 @@ class DrivenRover(Node):
         now = time.time_ns()
         return wait_until(lambda: self._sent_at if self._sent_at > now else 0, "a message")
 
+    def wait_until_driven(self) -> None:
+        """Wait until the controller drives and the wheels push."""
+        wait_until(lambda: self.state == "driving" and self.push > 0.0, "driving")
+
     def count_lines(self, text: str) -> int:
         """Return how many lines of the controller's log have a text."""
         return sum(text in line for line in self.log)
@@ -175,9 +178,8 @@ def start_controller(ros):
     """Return a function that starts an enabled, patient controller with other parameters."""
 
     def start(**values):
-        values = {"rate": RATE, "enabled_at_start": True, **PATIENT} | values
-        parameters = [Parameter(name, value=value) for name, value in values.items()]
-        return ros.spin(TractionController(context=ros.context, parameter_overrides=parameters))
+        given = {"rate": RATE, "enabled_at_start": True, **PATIENT} | values
+        return ros.start(TractionController, **given)
 
     return start
 
@@ -186,5 +188,5 @@ def start_controller(ros):
 def controller(rover, start_controller):
     """Return a patient controller that drives the rover."""
     node = start_controller()
-    wait_until(lambda: rover.state == "driving" and rover.push > 0.0, "driving")
+    rover.wait_until_driven()
     return node

@@ -13,6 +13,7 @@ from sensor_msgs.msg import PointCloud2
 from msg_adapters.elevation import terrain_to_point_cloud
 from rover_planner.nodes.warm_up import JOINTS
 from rover_planner.ros.qos import map_qos, sensor_qos
+from support.messages import odometry_at
 from support.ros_fixtures import run_in_executor
 from support.rough_grounds import plane
 from support.waiting import repeat_until, wait_until
@@ -50,18 +51,10 @@ def test_what_cannot_be_used_stops_the_rover_is_said_once_and_passes_by_itself(
         assert sum(push > 0.0 for _, push in rover.commands_after(spoilt)) <= CYCLES_IN_A_TENTH
         told = len(rover.log)
         rover.joints, rover.imu = kept
-        wait_until(lambda: rover.state == "driving" and rover.push > 0.0, "driving again")
+        rover.wait_until_driven()
         wait_until(lambda told=told: GOOD in " ".join(rover.log[told:]), "the good news")
         assert rover.count_lines(text) == 1
     assert ros.is_alive(controller)
-
-
-def spoilt_odometry(field):
-    odometry = Odometry(child_frame_id="mast" if field == "frame" else "base_link")
-    odometry.header.frame_id = "map"
-    if field == "covariance":
-        odometry.pose.covariance[7] = math.nan
-    return odometry
 
 
 @pytest.fixture
@@ -78,15 +71,15 @@ def test_corrupt_odometry_and_maps_are_not_used_and_the_rover_drives_on_with_the
     sender = rover.create_publisher(Odometry, "odometry", sensor_qos())
     cloud_sender.publish(FLAT)
     refused = "odometry not used: odometry "
-    for field in ("covariance", "frame"):
+    place, unsure, of_mast = (odometry_at((0.0, 0.0, 0.0), height=0.3) for _ in range(3))
+    unsure.pose.covariance[7], of_mast.child_frame_id = math.nan, "mast"
+    for spoilt in (unsure, of_mast):
         heard = len(rover.commands)
         repeat_until(
-            lambda field=field: sender.publish(spoilt_odometry(field)),
+            lambda spoilt=spoilt: sender.publish(spoilt),
             lambda heard=heard: rover.count_lines(refused) and rover.pushes_on(heard, 10),
             "the refusal in the log",
         )
-    place = spoilt_odometry("nothing")
-    place.pose.pose.position.z = 0.3
 
     def source_is_map():
         last = controller.statistics.last

@@ -6,18 +6,13 @@ import time
 import pytest
 from rosgraph_msgs.msg import Clock as ClockMessage
 
-from msg_adapters.stamps import NANOSECONDS
+from msg_adapters.stamps import NANOSECONDS, ns_to_stamp
 from support.waiting import wait_until
 
 BOUND = 1.5
 """Longest time from the cause to zero or hold [s]: the timeouts below, and
 what a busy machine adds; docs/validation.md has what was measured with the defaults."""
-TIGHT = {
-    "joint_states_timeout": 0.3,
-    "imu_timeout": 0.3,
-    "watchdog_timeout": 0.3,
-    "clock_timeout": 0.3,
-}
+TIGHT = {f"{what}_timeout": 0.3 for what in ("joint_states", "imu", "watchdog", "clock")}
 """Several times the defaults, for the sake of busy machines."""
 
 
@@ -33,10 +28,7 @@ class SimulatedClock:
     def _tick(self):
         self.time += self.step
         if self.step:
-            message = ClockMessage()
-            message.clock.sec = self.time // NANOSECONDS
-            message.clock.nanosec = self.time % NANOSECONDS
-            self._publisher.publish(message)
+            self._publisher.publish(ClockMessage(clock=ns_to_stamp(self.time)))
 
 
 def wait_for_rest(rover, began):
@@ -50,29 +42,18 @@ def wait_for_rest(rover, began):
     return (max(pushes, default=began) - began) / NANOSECONDS
 
 
-@pytest.fixture
-def drive(rover, start_controller):
-    """Return a function that starts a controller and waits until it drives."""
-
-    def start(**values):
-        controller = start_controller(**(TIGHT | values))
-        wait_until(lambda: rover.state == "driving" and rover.push > 0.0, "driving")
-        return controller
-
-    return start
-
-
 @pytest.mark.timed
 def test_a_simulated_clock_that_stops_and_stamps_that_do_not_advance_are_faults_in_time(
-    rover, drive
+    rover, start_controller
 ):
     clock = SimulatedClock(rover)
-    drive(use_sim_time=True)
+    start_controller(use_sim_time=True, **TIGHT)
+    rover.wait_until_driven()
     began, clock.step = time.time_ns(), 0
     assert wait_for_rest(rover, began) < BOUND
     wait_until(lambda: "/clock stands still" in rover.status.message, "the reason")
     clock.step = 10_000_000
-    wait_until(lambda: rover.state == "driving" and rover.push > 0.0, "driving again")
+    rover.wait_until_driven()
     began, frozen = time.time_ns(), clock.time
     rover.stamp = lambda: frozen
     assert wait_for_rest(rover, began) < BOUND
@@ -80,8 +61,9 @@ def test_a_simulated_clock_that_stops_and_stamps_that_do_not_advance_are_faults_
 
 
 @pytest.mark.timed
-def test_the_watchdog_sends_zeros_and_the_brake_while_the_executor_hangs(rover, drive):
-    controller = drive()
+def test_the_watchdog_sends_zeros_and_the_brake_while_the_executor_hangs(rover, start_controller):
+    controller = start_controller(**TIGHT)
+    rover.wait_until_driven()
     began = time.time_ns()
     controller.create_guard_condition(lambda: time.sleep(1.5)).trigger()
     controller.executor.wake()

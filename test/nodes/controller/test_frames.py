@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Odometry of another frame, and of a robot with another origin, is placed on the map."""
+"""Odometry and clouds of another frame are placed on the map."""
 
 from functools import partial
 
@@ -12,61 +12,34 @@ from sensor_msgs.msg import PointCloud2
 from msg_adapters.elevation import terrain_to_point_cloud
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.qos import map_qos, sensor_qos
-from support.messages import send_transforms
+from support.messages import odometry_at, send_map_odom
 from support.rough_grounds import RESOLUTION, plane
-from support.waiting import TIMEOUT, wait_until
+from support.waiting import TIMEOUT, repeat_until, wait_until
 
 MAP_ODOM = Rigid.from_rpy(1.0, -0.5, 0.4, 0.0, 0.0, np.pi / 2)
 """Where odometry began, on the map."""
-
-
-@pytest.fixture
-def drive_in_odom(rover):
-    """Return a function that sends odometry in odom until a condition holds."""
-    sender = rover.create_publisher(Odometry, "odometry", sensor_qos())
-    odometry = Odometry(child_frame_id="base_link")
-    odometry.header.frame_id = "odom"
-    odometry.pose.pose.position.x = 0.5
-
-    def drive(holds, what):
-        def send():
-            sender.publish(odometry)
-            return holds()
-
-        wait_until(send, what)
-
-    return drive
 
 
 def contact_source(rover):
     return {one.key: one.value for one in rover.status.values}.get("contact_source")
 
 
-def test_odometry_in_odom_serves_on_a_map_in_map(rover, start_controller, drive_in_odom):
+def test_odometry_in_odom_serves_on_a_map_in_map(rover, start_controller):
     cloud = rover.create_publisher(PointCloud2, "elevation_cloud", map_qos())
     cloud.publish(terrain_to_point_cloud(plane(0.0, 0.0, half=3.0), "map", Time()))
     controller = start_controller(transform_timeout=5.0)
-    known = controller.frames
-    send_transforms(controller, known.take, ("map", "odom", MAP_ODOM), age=7.5)
+    sender = rover.create_publisher(Odometry, "odometry", sensor_qos())
+    send = partial(sender.publish, odometry_at((0.5, 0.0, 0.0), frame="odom"))
+    send_map_odom(controller, MAP_ODOM, age=7.5)
     stale = "the transform from 'odom' to 'map' is stale: it is "
-    drive_in_odom(lambda: rover.count_lines(stale), "the refusal of a stale transform")
+    repeat_until(send, lambda: rover.count_lines(stale), "the refusal of a stale transform")
     line = next(line for line in rover.log if stale in line)
     assert 7.5 <= float(line.partition(stale)[2].split()[0]) < 7.5 + TIMEOUT
-    drive_in_odom(lambda: contact_source(rover) == "motion", "the drive without the map")
-    send_transforms(
-        controller, partial(known.take, is_static=True), ("map", "odom", MAP_ODOM), age=0.0
-    )
-    drive_in_odom(lambda: contact_source(rover) == "map", "contacts from the map")
+    repeat_until(send, lambda: contact_source(rover) == "motion", "the drive without the map")
+    send_map_odom(controller, MAP_ODOM, is_static=True)
+    repeat_until(send, lambda: contact_source(rover) == "map", "contacts from the map")
     right = (1.0, 0.0, 0.4, np.pi / 2)
     np.testing.assert_allclose(controller.service._pose, right, atol=1e-9)
-
-
-def test_odometry_of_a_robot_with_another_origin_is_that_of_the_body(
-    start_controller, drive_in_odom
-):
-    controller = start_controller(base_offset=[0.3, 0.0, 0.2, 0.0, 0.0, 0.0], map_frame="odom")
-    drive_in_odom(lambda: controller.service._pose.any(), "odometry")
-    np.testing.assert_allclose(controller.service._pose, (0.8, 0.0, 0.2, 0.0), atol=1e-9)
 
 
 def test_a_cloud_in_odom_is_placed_on_the_map_and_refused_without_a_transform(
@@ -79,8 +52,7 @@ def test_a_cloud_in_odom_is_placed_on_the_map_and_refused_without_a_transform(
     refusal = "the last map stays: no transforms connect the frames 'odom' and 'map'"
     wait_until(lambda: rover.count_lines(refusal), "the refusal")
     assert controller.service.terrain is None
-    take = controller.frames.take
-    send_transforms(controller, take, ("map", "odom", MAP_ODOM))
+    send_map_odom(controller, MAP_ODOM)
     wait_until(lambda: controller.service.terrain is not None, "the map, without a new message")
     assert controller.service.terrain.bounds == pytest.approx((0.0, 2.0, -1.5, 0.5), abs=1e-6)
     assert rover.count_lines(refusal) == 1

@@ -7,13 +7,13 @@ The shipped controllers of ros2_control are held against the controller's order 
 import numpy as np
 from std_msgs.msg import Float64MultiArray
 
-from rover_physics import load_rover
 from rover_physics.names import STEERING_JOINTS, WHEEL_JOINTS
 from rover_physics.rover.steered_drive import SteeredDrive
 from rover_physics.rover.steering_joints import steering_joints
 from rover_planner.nodes.traction_controller import NODE_NAME
 from rover_planner.nodes.warm_up import JOINTS
 from rover_planner.ros.qos import topic_qos
+from support.rovers import LSR1
 from support.waiting import wait_until
 
 SIGNS = {name: -1.0 if "left" in name else 1.0 for name in JOINTS}
@@ -23,14 +23,14 @@ SPEED, YAW_RATE = 0.03, 0.03
 
 
 def test_rates_and_steering_angles_are_those_of_the_commanded_motion(rover, start_controller):
-    lsr1, heard = load_rover("lsr1"), {}
+    heard = {}
     for group in ("commands", "velocity_commands", "steering_commands"):
         rover.create_subscription(
             Float64MultiArray, f"{NODE_NAME}/{group}",
             lambda message, group=group: heard.__setitem__(group, np.array(message.data)),
             topic_qos(),
         )  # fmt: skip
-    aims = SteeredDrive(lsr1).aim(SPEED, YAW_RATE)
+    aims = SteeredDrive(LSR1).aim(SPEED, YAW_RATE)
     steering = dict(zip((f"{n.removesuffix('_wheel')}_steering" for n in WHEEL_JOINTS),
                         aims.angles.tolist(), strict=True))  # fmt: skip
     angles = dict.fromkeys(JOINTS, 0.0) | {name: steering[name] for name in STEERING_JOINTS}
@@ -46,8 +46,8 @@ def test_rates_and_steering_angles_are_those_of_the_commanded_motion(rover, star
         ],
         joints=[f"robot_{name}" for name in WHEEL_JOINTS[::-1]],
     )
-    rates = aims.speeds / lsr1.wheel.radius * [SIGNS[name] for name in WHEEL_JOINTS]
-    turned = np.array([SIGNS[name] * steering[name] for name in steering_joints(lsr1)])
+    rates = aims.speeds / LSR1.wheel.radius * [SIGNS[name] for name in WHEEL_JOINTS]
+    turned = np.array([SIGNS[name] * steering[name] for name in steering_joints(LSR1)])
 
     def commands(group: str, right: np.ndarray) -> bool:
         return group in heard and np.allclose(heard[group], right, rtol=0.0, atol=1e-6)

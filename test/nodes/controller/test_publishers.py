@@ -26,7 +26,7 @@ def test_cmd_vel_without_a_stamp_is_driven_where_the_parameter_says_so(
 ):
     rover = start_rover(other_context, Twist)
     start_controller(cmd_vel_stamped=False)
-    wait_until(lambda: rover.state == "driving" and rover.push > 0.0, "driving")
+    rover.wait_until_driven()
 
 
 def test_cmd_vel_of_another_type_is_named_with_the_parameter(

@@ -2,10 +2,7 @@
 """Enabling, emergency stop, rest and the end of the node over DDS."""
 
 import math
-import os
 import signal
-import subprocess
-import sys
 import time
 from dataclasses import replace
 
@@ -16,7 +13,7 @@ from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
 from rover_planner.nodes.traction_controller import TractionController
-from support.ros_fixtures import PATIENT, call, domain_id, run_in_executor
+from support.ros_fixtures import PATIENT, call, run_in_executor
 from support.waiting import wait_until
 
 
@@ -39,7 +36,7 @@ def test_a_node_starts_disabled_and_drives_once_it_is_enabled(
     assert spacing == pytest.approx(1.0 / node.values.rate, rel=0.3)
     answer = enable(True)
     assert (answer.success, answer.message) == (True, "enabled")
-    wait_until(lambda: rover.state == "driving" and rover.push > 0.0, "driving")
+    rover.wait_until_driven()
     late = start_rover(kind=None)
     wait_until(lambda: late.state == "driving" and late.brakes[-1:] == [False], "latched state")
     assert enable(False).message == "disabled"
@@ -113,22 +110,12 @@ def test_a_node_that_ends_sends_zeros_last(rover, controller):
 
 
 @pytest.mark.long
-def test_a_process_that_is_told_to_end_sends_zeros_last(rover):
+def test_a_process_that_is_told_to_end_sends_zeros_last(rover, start_process):
     values = {"enabled_at_start": "true"} | PATIENT
-    words = ["--ros-args"]
-    for name, value in values.items():
-        words += ["-p", f"{name}:={value}"]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "rover_planner.nodes.traction_controller", *words],
-        env=os.environ | {"ROS_DOMAIN_ID": str(domain_id())},
-        stderr=subprocess.DEVNULL,
-    )
-    try:
-        wait_until(lambda: rover.commands, "the node", 120.0)
-        wait_until(lambda: rover.push > 0.0, "torque")
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(timeout=20.0) == 0
-    finally:
-        process.kill()
-        process.wait()
+    given = [f"{name}:={value}" for name, value in values.items()]
+    process = start_process("traction_controller", *given)
+    wait_until(lambda: rover.commands, "the node", 120.0)
+    wait_until(lambda: rover.push > 0.0, "torque")
+    process.send_signal(signal.SIGTERM)
+    assert process.wait(timeout=20.0) == 0
     wait_until(lambda: rover.torque == 0.0, "zeros")

@@ -4,44 +4,29 @@
 import json
 import threading
 
-import pytest
-
-pytest.importorskip("rclpy", reason="needs ROS 2")
-
 import numpy as np
+import pytest
 import rclpy
 from nav_msgs.msg import Odometry, Path
-from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 
 from msg_adapters.paths import poses_path
 from rover_planner.advice import seek
 from rover_planner.advice.levers import LEVERS
 from rover_planner.nodes.mission.drive import DriveFailedError
-from rover_planner.nodes.mission_planner import MissionPlanner, NoAnswerError, main
+from rover_planner.nodes.mission_planner import NoAnswerError, main
 from rover_planner.nodes.programs import MissionOptions, read_arguments
 from rover_planner.nodes.traverse_server import TraverseServer
 from rover_planner.planning.answering.budget import STOPPING
 from rover_planner.shell.poses import Pose
 from support.grounds import make_terrain, rock_left, wall_at, waves
+from support.messages import odometry_at
 from support.ros_fixtures import domain_id, run_in_executor
 from support.waiting import wait_until
 
 START, NEAR, BEYOND = "--start=-2,0,0", "--goal=-0.5,0,0", "--goal=2,0,0"
 """Words for a start, a goal before the wall at x = 0.5 m, and one behind it."""
-
-
-@pytest.fixture
-def planner():
-    """Return a planner in a context of its own."""
-    context = Context()
-    rclpy.init(context=context, domain_id=domain_id())
-    planner = MissionPlanner(context=context)
-    yield planner
-    planner.destroy_node()
-    rclpy.try_shutdown(context=context)
 
 
 def test_ros_that_is_shut_down_while_the_node_waits_is_the_end_of_waiting(planner):
@@ -155,10 +140,7 @@ def test_without_a_server_it_gives_up_in_time_and_says_what_it_waited_for(run_pl
 
 def test_a_server_with_another_name_is_found_by_remapping(ros, run_planner):
     judge = ["--ros-args", "-r", "__node:=judge"]
-    patient = [Parameter("time_budget", value=60.0)]
-    server = ros.spin(
-        TraverseServer(context=ros.context, cli_args=judge, parameter_overrides=patient)
-    )
+    server = ros.start(TraverseServer, judge, time_budget=60.0)
     server.service.take_terrain(make_terrain(waves))
     names = ("can_traverse", "verdict", "wheel_loads", "slip_ratios")
     words = [f"traverse_server/{name}:=judge/{name}" for name in names]
@@ -186,23 +168,21 @@ def test_a_question_that_a_server_does_not_answer_because_it_ends_is_asked_again
 
 
 def test_a_second_planner_waits_for_the_end_of_the_first_and_a_path_from_elsewhere_ends_a_drive(
-    ros, capfd
+    ros, make_planner
 ):
     rover = ros.spin(Node("follower", context=ros.context))
     odometry = rover.create_publisher(Odometry, "odometry", 10)
     rover.create_subscription(Path, "path", lambda path: None, 10)
     first, second = (
-        MissionPlanner(timeout=2.0, context=ros.context, cli_args=["--ros-args", "-r", r])
-        for r in ("__node:=first", "__node:=second")
+        make_planner(timeout=2.0, cli_args=["--ros-args", "-r", f"__node:={name}"])
+        for name in ("first", "second")
     )
     first.send_path(np.zeros((1, 3)))
     with pytest.raises(NoAnswerError, match="the end of first, which sends the rover paths"):
         second.send_path(np.zeros((1, 3)))
-    there = Odometry(child_frame_id="base_link")
-    there.header.frame_id = "map"
 
     def is_told() -> bool:
-        odometry.publish(there)
+        odometry.publish(odometry_at((0.0, 0.0, 0.0)))
         rover.create_publisher(Path, "path", 10).publish(poses_path(np.ones((2, 3)), "map"))
         try:
             first.wait_for_pose(lambda pose: True, 0.1)

@@ -4,26 +4,24 @@
 import json
 from concurrent.futures import Future
 
-from nav_msgs.srv import GetPlan
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from msg_adapters.paths import stamped_pose
 from rover_planner.advice import seek
 from rover_planner.advice.levers import LEVERS
 from rover_planner.ros.qos import latched_qos
 from support.grounds import make_terrain, rock_left
-from support.planner_client import SERVER
+from support.planner_client import SERVER, begin_plan
 from support.ros_fixtures import call
 from support.waiting import wait_until
 
 START, GOAL = (-1.0, 0.0, 0.0), (1.2, 0.0, 0.0)
 
 
-def send_request(client, kind, name, request) -> Future:
-    service = client.create_client(kind, f"{SERVER}/{name}")
+def send_request(client, name) -> Future:
+    service = client.create_client(Trigger, f"{SERVER}/{name}")
     assert service.wait_for_service(20.0)
-    return service.call_async(request)
+    return service.call_async(Trigger.Request())
 
 
 def test_advice_is_about_the_path_that_was_refused_last(start_server, client, ros, monkeypatch):
@@ -49,23 +47,19 @@ def test_advice_is_about_the_path_that_was_refused_last(start_server, client, ro
 
 
 def test_advice_in_work_gives_way_to_questions_and_ends_when_it_is_cancelled(
-    start_server, client, endless
+    start_server, client, ros, endless
 ):
     server = start_server(planner="fan", candidate_count=1, advice_time=600.0, time_budget=600.0)
     client.send_terrain(make_terrain(rock_left))
     assert not client.can_traverse(START, GOAL).poses
     with endless():  # a question that lasts
-        ends = stamped_pose(START, "map"), stamped_pose(GOAL, "map")
-        question = send_request(
-            client, GetPlan, "can_traverse", GetPlan.Request(start=ends[0], goal=ends[1])
-        )
+        _, question = begin_plan(ros, START, GOAL)
         wait_until(lambda: server.desk.open_count == 1, "the question")
-        advice = send_request(client, Trigger, "advise", Trigger.Request())
-        busy = send_request(client, Trigger, "advise", Trigger.Request())
+        advice, busy = send_request(client, "advise"), send_request(client, "advise")
         wait_until(busy.done, "the refusal of the second")
         assert json.loads(busy.result().message)["code"] == "busy"
         assert not advice.done()
-        cancel = send_request(client, Trigger, "cancel", Trigger.Request())
+        cancel = send_request(client, "cancel")
         wait_until(cancel.done, "the answer")
         assert cancel.result().message.startswith("2 ")
     wait_until(advice.done, "the end of the advice")
@@ -79,7 +73,7 @@ def test_advice_that_has_begun_is_cancelled_too(start_server, client):
     client.create_subscription(String, f"{SERVER}/advice", grown.append, latched_qos())
     client.send_terrain(make_terrain(rock_left))
     assert not client.can_traverse(START, GOAL).poses
-    advice = send_request(client, Trigger, "advise", Trigger.Request())
+    advice = send_request(client, "advise")
     wait_until(lambda: grown, "the first advice")
     assert call(client.create_client(Trigger, f"{SERVER}/cancel"), Trigger.Request()).success
     wait_until(advice.done, "the end of the advice")

@@ -7,16 +7,14 @@ from statistics import median
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
-from nav_msgs.srv import GetPlan
 from rclpy.node import Node
 from std_srvs.srv import SetBool
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.identity import path_hash
-from msg_adapters.paths import stamped_pose
 from rover_planner.nodes.navigation.path_watch import PathWatch
 from support.grounds import make_terrain, wall_at, waves
-from support.planner_client import SERVER, verdict_of
+from support.planner_client import SERVER, begin_plan, verdict_of
 from support.ros_fixtures import call
 from support.standing_rover import GOAL, START, StandingRover, rock_ahead
 from support.waiting import wait_until
@@ -117,14 +115,10 @@ def test_a_busy_executor_does_not_delay_the_heartbeat_and_one_that_hangs_ends_it
 @pytest.mark.timed
 def test_a_question_in_work_does_not_delay_the_stop(watched, client, ros, endless):
     server, rover = watched
-    asker = ros.spin(Node("asker", context=ros.context))
-    service = asker.create_client(GetPlan, f"{SERVER}/can_traverse")
-    assert service.wait_for_service(20.0)
-    there = stamped_pose(START, "map"), stamped_pose((3.0, 0.5, 0.0), "map")
     delays = []
     for _ in range(3):
         with endless():
-            future = service.call_async(GetPlan.Request(start=there[0], goal=there[1]))
+            _, future = begin_plan(ros, START, (3.0, 0.5, 0.0))
             wait_until(lambda: server.desk.open_count == 1, "the question")
             time.sleep(0.2)
             delays.append(time_stop(rover, client))

@@ -6,56 +6,32 @@ import time
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from nav_msgs.srv import GetPlan
-from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import Trigger
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.identity import path_hash, plan_request_hash
-from msg_adapters.paths import stamped_pose
 from rover_planner.planning.answering.snapshot import Snapshot
 from support.grounds import gap, make_terrain, wall_at, waves
-from support.planner_client import GOAL, SERVER, START, verdict_of
+from support.planner_client import GOAL, SERVER, START, begin_plan, verdict_of
 from support.ros_fixtures import call
 from support.waiting import wait_until
 
-FAR = (3.0, 0.5, 0.0)
 
-
-def begin(ros, start=START, goal=FAR):
-    """Ask ~/can_traverse from a node of its own; return request and future."""
-    asker = ros.spin(Node("asker", context=ros.context))
-    service = asker.create_client(GetPlan, f"{SERVER}/can_traverse")
-    assert service.wait_for_service(20.0)
-    request = GetPlan.Request(start=stamped_pose(start, "map"), goal=stamped_pose(goal, "map"))
-    return request, service.call_async(request)
-
-
-@pytest.fixture
-def working(start_server, client, ros, endless):
-    """Return a mapped server at work on a long question, and the question's future."""
+def test_parameters_maps_and_a_cancel_are_served_while_a_question_is_in_work(
+    start_server, client, ros, endless
+):
     server = start_server(time_budget=600.0)
     client.send_terrain(make_terrain(waves))
+    service = client.create_client(Trigger, f"{SERVER}/cancel")
     with endless():
-        _, future = begin(ros)
+        _, future = begin_plan(ros)
         wait_until(lambda: server.desk.open_count == 1, "the question")
-        yield server, future
-
-
-def best_effort() -> QoSProfile:
-    return QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
-
-
-def test_parameters_maps_and_a_cancel_are_served_while_a_question_is_in_work(working, client, ros):
-    server, future = working
-    assert client.set_parameter("friction", 0.7) == (True, "")
-    client.send_terrain(make_terrain(wall_at(0.5)))
-    assert not future.done() and server.desk.open_count == 1
-    canceller = ros.spin(Node("canceller", context=ros.context))
-    service = canceller.create_client(Trigger, f"{SERVER}/cancel")
-    answer = call(service, Trigger.Request())
+        assert client.set_parameter("friction", 0.7) == (True, "")
+        client.send_terrain(make_terrain(wall_at(0.5)))
+        assert not future.done() and server.desk.open_count == 1
+        answer = call(service, Trigger.Request())
     assert answer.success and answer.message == "1 open questions cancelled"
     wait_until(future.done, "the answer")
     assert future.result().plan.poses == []
@@ -74,7 +50,8 @@ def test_stamps_of_answers_differ_even_while_the_clock_is_paused(start_server, c
 
 def test_a_best_effort_map_is_heard_where_the_parameter_says_so(start_server, client):
     server = start_server(input_reliability="best_effort")
-    publisher = client.create_publisher(PointCloud2, "elevation_cloud", best_effort())
+    qos = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+    publisher = client.create_publisher(PointCloud2, "elevation_cloud", qos)
     cloud = terrain_to_point_cloud(make_terrain(waves), "map")
 
     def heard() -> bool:
@@ -120,7 +97,7 @@ def test_a_question_keeps_the_map_it_was_asked_about(shared, monkeypatch):
         return find(snapshot, *asked)
 
     monkeypatch.setattr(Snapshot, "answer", find_later)
-    _, future = begin(shared.ros)
+    _, future = begin_plan(shared.ros)
     assert begun.wait(20.0), "the work on the question"
     client.send_terrain(make_terrain(wall_at(0.5)))
     go_on.set()
@@ -134,7 +111,7 @@ def test_a_question_keeps_the_map_it_was_asked_about(shared, monkeypatch):
 def test_each_client_can_tell_its_own_verdict(shared):
     client = shared.client
     client.heard["verdict"].clear()
-    requests = [begin(shared.ros, goal=(1.0 + 0.1 * k, 0.0, 0.0)) for k in range(3)]
+    requests = [begin_plan(shared.ros, goal=(1.0 + 0.1 * k, 0.0, 0.0)) for k in range(3)]
     for _, future in requests:
         wait_until(future.done, "the answers")
     told = client.heard["verdict"]

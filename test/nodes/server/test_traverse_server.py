@@ -17,8 +17,10 @@ from msg_adapters.paths import path_to_poses, stamped_pose
 from msg_adapters.results.predictions import array_values
 from rover_physics.traversability.classification import PASSABLE
 from rover_planner.nodes.result_topics import WHEEL_TOPICS
+from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.qos import map_qos
-from support.grounds import gap, make_terrain, waves
+from support.grounds import gap, make_terrain, rocky, waves
+from support.messages import send_map_odom
 from support.planner_client import GOAL, SERVER, START, PlannerClient, ask, verdict_of
 from support.ros_fixtures import call
 from support.waiting import wait_until
@@ -70,6 +72,26 @@ def test_a_plan_has_a_pose_where_the_class_changes(start_server, client):
     assert len(changes) and len(plan.poses) == 2 + len(changes)
     found = [pose.pose.position.x for pose in plan.poses[1:-1]]
     np.testing.assert_allclose(found, -1.5 + 0.05 * changes, atol=1e-9)
+
+
+def test_a_goal_on_the_map_gets_the_answer_of_one_frame(start_server, client):
+    server = start_server(map_frame="odom", transform_timeout=30.0)
+    server.service.take_terrain(make_terrain(rocky))
+    single, _ = client.next_results(lambda: client.can_traverse(START, GOAL, frame="odom"))
+    map_odom = Rigid.from_rpy(30.0, -12.0, 0.4, 0.0, 0.0, 2.2)
+    send_map_odom(server, map_odom)
+    start, goal = (
+        stamped_pose(map_odom.then(Rigid.from_rpy(x, y, 0.0, 0.0, 0.0, yaw)).xyyaw, "map")
+        for x, y, yaw in (START, GOAL)
+    )
+    both, _ = client.next_results(lambda: client.plan(start, goal))
+    assert single.poses and both.header.frame_id == "odom"
+    one, other = path_to_poses(single, "odom"), path_to_poses(both, "odom")
+    assert one.shape == other.shape
+    assert np.abs(one - other)[:, :2].max() < 1e-3
+    assert np.abs(one - other)[:, 2].max() < 1e-4
+    mixed, _ = client.next_results(lambda: client.plan(stamped_pose(START, "odom"), goal))
+    assert np.abs(path_to_poses(mixed, "odom") - one)[:, :2].max() < 1e-3
 
 
 def test_a_passable_goal_gets_a_plan_and_the_results_of_the_model_with_one_stamp(shared):

@@ -6,9 +6,10 @@ import json
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import PoseStamped
 from sensor_msgs.msg import PointCloud2
 
-from msg_adapters.paths import poses_path
+from msg_adapters.paths import poses_path, stamped_pose
 from rover_physics import save_terrain
 from rover_planner.planning.answering.snapshot import Snapshot
 from support.grounds import make_terrain, waves
@@ -39,8 +40,13 @@ def test_questions_before_any_map_or_path_are_refused_and_answered_after_it(serv
 def test_bad_requests_maps_and_paths_are_refused_with_their_reason_and_the_node_lives_on(shared):
     server, client = shared.server, shared.client
     before = server.service.known_map.fingerprint
-    asked = lambda: client.can_traverse(START, GOAL, frame="odom")  # noqa: E731
-    assert_refused(client, "bad_request", "start is in frame 'odom'", asked)
+    goal = stamped_pose(GOAL, "map")
+    for start, text in (
+        (stamped_pose(START, "odom"), "start is in frame 'odom'"),
+        (PoseStamped(), "start is empty, which means where the rover is"),
+        (stamped_pose(START, ""), "start is without a frame_id"),  # but is not empty
+    ):
+        assert_refused(client, "bad_request", text, lambda start=start: client.plan(start, goal))
     empty = PointCloud2()
     empty.header.frame_id = "map"
     client.send_cloud(empty)

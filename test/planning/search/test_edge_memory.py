@@ -46,10 +46,8 @@ def test_a_path_judged_in_part_after_a_change_of_the_map_is_as_one_judged_whole(
         judge = PathJudge(LSR1, ground, options, None, query.marked, *memory.recall_poses(query))
         part, whole = judge.check(WAY), check_path(LSR1, ground, WAY, options)
         assert part.verdict == whole.verdict
-        for one, other in (
-            (part.prediction, whole.prediction),
-            (part.prediction.between, whole.prediction.between),
-        ):
-            for name in RESULT.names:
-                np.testing.assert_array_equal(one.results[name], other.results[name])
+        one, other = part.prediction, whole.prediction
+        for name in RESULT.names:
+            np.testing.assert_array_equal(one.results[name], other.results[name])
+            np.testing.assert_array_equal(one.between.results[name], other.between.results[name])
         ground = change_at_random(ground, rng)

@@ -52,8 +52,7 @@ def cost_of(graph, node, k, end):
 
 def explicit_costs(known, graph):
     """Return the matrix of the costs of all edges that are not refused."""
-    rows, columns, costs = [], [], []
-    shape = EDGES.nodes.shape
+    best, shape = {}, EDGES.nodes.shape
     for node in range(EDGES.nodes.count):
         place, heading = divmod(node, 16)
         row, column = divmod(place, shape[1])
@@ -63,14 +62,10 @@ def explicit_costs(known, graph):
                 continue
             end = (y * shape[1] + x) * 16 + primitive.end_heading
             if known.state[node, k] < FAILS and known.standing[end] < FAILS:
-                rows.append(node), columns.append(end)
-                costs.append(cost_of(graph, node, k, end))
-    count = EDGES.nodes.count
-    best = {}
-    for row, column, cost in zip(rows, columns, costs, strict=True):
-        best[row, column] = min(cost, best.get((row, column), np.inf))
+                cost = cost_of(graph, node, k, end)
+                best[node, end] = min(cost, best.get((node, end), np.inf))
     ends = np.array(list(best), int).reshape(-1, 2)
-    return csr_array((list(best.values()), (ends[:, 0], ends[:, 1])), shape=(count, count))
+    return csr_array((list(best.values()), tuple(ends.T)), shape=2 * (EDGES.nodes.count,))
 
 
 def test_the_shortest_path_is_that_of_dijkstra_whatever_is_known():
@@ -143,10 +138,7 @@ def test_a_search_goes_on_after_all_that_is_learned_as_one_from_scratch():
 def test_a_search_goes_on_after_edges_are_refused_and_is_exact_again():
     known, *estimates = random_knowledge(7)
     known.standing[:], known.state[:] = 0, 0
-    starts, goals = (
-        Seeds(np.array([16 * 14]), np.zeros(1)),
-        Seeds(np.array([16 * 60]), np.zeros(1)),
-    )
+    starts, goals = (Seeds(np.array([node]), np.zeros(1)) for node in (16 * 14, 16 * 60))
     search, before = ShortestPaths(known, *estimates, starts), 0.0
     for _ in range(30):
         route = search.find(starts, goals, 0.0)

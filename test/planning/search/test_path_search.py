@@ -25,12 +25,7 @@ from rover_planner.planning.search.path_search import (
     START_REFUSED,
     find_path,
 )
-from rover_planner.planning.search.query import (
-    LatticeSettings,
-    SearchQuery,
-    choose_window,
-    cut_out,
-)
+from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from support.grounds import make_terrain, pen, waves
 from support.rough_grounds import fractal, rocky
 from support.rovers import LSR1
@@ -90,11 +85,8 @@ class Compared(ShortestPaths):
         self.known = known
 
     def find(self, starts, goals, caution):
-        route, edges, graph = (
-            super().find(starts, goals, caution),
-            self.known[0],
-            self.graph(caution),
-        )
+        route = super().find(starts, goals, caution)
+        edges, graph = self.known[0], self.graph(caution)
         anew = ShortestPaths(*self.known).find(starts, goals, 0.0) if caution == 0.0 else route
         Compared.steps += 1
         if route is None:
@@ -165,10 +157,7 @@ def test_out_of_time_is_not_no_way():
 
 
 def test_ends_where_the_rover_cannot_stand_are_named_with_the_reason():
-    def holes(x, y):
-        return np.where(np.hypot(x - 2.5, y) < 1.0, np.nan, waves(x, y))
-
-    ground = make_terrain(holes)
+    ground = make_terrain(lambda x, y: np.where(np.hypot(x - 2.5, y) < 1.0, np.nan, waves(x, y)))
     answer = find_path(ask(ground))
     assert answer.outcome == GOAL_REFUSED
     assert answer.reason == "the rover cannot stand at the goal: unknown ground under a wheel"
@@ -197,7 +186,7 @@ def test_after_a_change_of_the_map_what_is_remembered_gives_the_way_of_a_new_sea
     elevation = np.array(before.elevation)
     x = before.origin[0] + before.resolution * np.arange(elevation.shape[1])
     elevation[np.ix_((x > 1.9) & (x < 2.3), np.abs(x) < 0.1)] += 1.0  # a longer wall
-    after = Terrain(elevation, before.resolution, before.origin)
+    after = replace(before, elevation=elevation)
     warm, cold = find_path(ask(after), LONG, memory), find_path(ask(after), LONG)
     assert not np.array_equal(first.path.poses, cold.path.poses)
     assert warm.outcome == cold.outcome == FOUND
@@ -212,7 +201,7 @@ def test_the_last_way_is_the_first_path_after_a_change_of_the_map_that_it_passes
     before, memory = question.terrain, deepcopy(memory)
     elevation = np.array(before.elevation)
     elevation[:3] += 0.02  # far from the way
-    after = Terrain(elevation, before.resolution, before.origin)
+    after = replace(before, elevation=elevation)
     asked = replace(LONG, ends_at_first=True)
     again = find_path(ask(after), asked, memory)
     assert again.outcome == FOUND and again.expanded == 0
@@ -227,7 +216,7 @@ def test_nodes_without_ground_are_none_on_which_the_rover_can_stand():
     rng = np.random.default_rng(1)
     elevation[rng.random(elevation.shape) < 0.02] = np.nan
     elevation[: len(elevation) // 2] = np.nan
-    ground = Terrain(elevation, ground.resolution, ground.origin)
+    ground = replace(ground, elevation=elevation)
     nodes = nodes_within(0.1, (-3.2, -3.2), (3.2, 3.2))
     estimate = estimate_ground(LSR1, ground, nodes)
     groundless = np.flatnonzero(estimate.groundless)
@@ -251,12 +240,12 @@ def test_only_the_heights_around_the_window_are_looked_at(monkeypatch):
     monkeypatch.setattr(query, "MAX_NODES", 150_000)
     wide = Terrain(np.zeros((600, 600), np.float32), 0.1, (-30.0, -30.0))
     question = ask(wide, (10.0, 12.0, 0.0), (14.0, 12.0, 0.0))
-    nodes, is_limited = choose_window(question, 0.2)
+    nodes, is_limited = query.choose_window(question, 0.2)
     assert is_limited and nodes.count <= 150_000
     row, column = np.array(nodes.shape) / 2
     centre = nodes.cell * (nodes.first[0] + column), nodes.cell * (nodes.first[1] + row)
     np.testing.assert_allclose(centre, (12.0, 12.0), atol=0.5)
-    part = cut_out(question, nodes)
+    part = query.cut_out(question, nodes)
     assert part.elevation.size < 0.15 * wide.elevation.size
     estimate = estimate_ground(LSR1, part, nodes)
     assert not estimate.groundless.any() and not estimate.doubt.any()
@@ -269,16 +258,8 @@ def test_only_the_heights_around_the_window_are_looked_at(monkeypatch):
     assert "m around start and goal" in refused.reason
 
 
-def half_known(goal):
-    """Return a question for a goal; the ground beyond x = 1.5 m is unknown."""
-    ground = make_terrain(waves)
-    elevation = np.array(ground.elevation)
-    elevation[:, round((1.5 - ground.origin[0]) / ground.resolution) :] = np.nan
-    return ask(Terrain(elevation, ground.resolution, ground.origin), goal=goal)
-
-
 def test_a_way_to_unknown_ground_ends_at_the_frontier_only_if_that_is_wanted():
-    question = half_known(GOAL)
+    question = ask(make_terrain(lambda x, y: np.where(x > 1.475, np.nan, waves(x, y))))
     assert find_path(question, LONG).outcome == GOAL_REFUSED
     answer = find_path(question, replace(LONG, frontier=True))
     assert answer.outcome == FOUND and answer.path.verdict.traversable

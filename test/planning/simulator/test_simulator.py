@@ -10,6 +10,7 @@ from rover_physics import judge_path, load_rover
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
+from rover_planner.planning.angles import wrap
 from rover_planner.simulator.mujoco_plant import MujocoPlant
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
@@ -20,16 +21,22 @@ from support.grounds import make_terrain, waves
 from support.rough_grounds import plane
 from support.rovers import FIXED, LSR1
 
-STEP = 0.02
-WAVY = make_terrain(waves, half=3.0)
-AHEAD = (0.06, 0.0)
-"""Command that keeps the wheels straight: speed [m/s] and yaw rate [rad/s]."""
+STEP, SPEED = 0.02, 0.06
+WAVY, LEVEL = make_terrain(waves, half=3.0), plane(0.0, 0.0, half=3.0)
 
 
-def drive(plant, seconds: float, speed: float = 0.06, yaw_rate: float = 0.0):
+def drive(plant, seconds: float, speed: float = SPEED, yaw_rate: float = 0.0):
+    """Drive a plant by a command; return its last state."""
     for _ in range(round(seconds / STEP)):
         plant.drive(speed, yaw_rate, STEP)
     return plant.state()
+
+
+def pull(plant, seconds: float, torques) -> float:
+    """Pull a plant straight ahead with torques [N m]; return where it comes along x [m]."""
+    for _ in range(round(seconds / STEP)):
+        plant.pull(torques, (SPEED, 0.0), STEP)
+    return plant.pose()[0]
 
 
 def test_the_rover_is_where_the_model_settles_it():
@@ -79,23 +86,15 @@ def test_torques_that_hold_the_slope_keep_the_speed_and_more_drive_it_up():
     ground = plane(np.tan(np.radians(10.0)), 0.0, half=3.0)
     plant = QuasiStaticPlant(LSR1, ground, (-1.0, 0.0, 0.0))
     needed = np.full(6, LSR1.weight * np.sin(np.radians(10.0)) * LSR1.wheel.radius / 6.0)
-    for _ in range(50):
-        plant.pull(needed, AHEAD, STEP)
-    assert plant.pose()[0] == pytest.approx(-1.0, abs=1e-3)
-    for _ in range(50):
-        plant.pull(1.3 * needed, AHEAD, STEP)
-    assert plant.pose()[0] > -0.99
-    before = plant.pose()[0]
-    for _ in range(100):
-        plant.pull(0.5 * needed, AHEAD, STEP)
-    assert plant.pose()[0] < before
+    assert pull(plant, 1.0, needed) == pytest.approx(-1.0, abs=1e-3)
+    high = pull(plant, 1.0, 1.3 * needed)
+    assert high > -0.99 and pull(plant, 2.0, 0.5 * needed) < high
 
 
 @pytest.mark.parametrize("engine", [QuasiStaticPlant, MujocoPlant])
 def test_a_brake_stops_the_rover_and_holds_it_on_a_slope(engine):
     plant = engine(LSR1, plane(-np.tan(np.radians(3.0)), 0.0, half=3.0), (-1.0, 0.0, 0.0))
-    for _ in range(25):
-        plant.pull(np.zeros(6), AHEAD, STEP)
+    pull(plant, 0.5, np.zeros(6))
     assert plant.state().velocity[0] > 0.05
     places = []
     for _ in range(100):
@@ -103,7 +102,7 @@ def test_a_brake_stops_the_rover_and_holds_it_on_a_slope(engine):
         places.append(plant.pose()[0])
     assert places[-1] - places[50] < 1e-3  # 0.25 m without the brake
     assert np.abs(list(plant.state().joint_velocities.values())).max() < 0.01
-    plant.pull(np.full(6, 0.5), AHEAD, STEP)
+    pull(plant, STEP, np.full(6, 0.5))
     assert plant.state().velocity[0] > 0.01
 
 
@@ -250,6 +249,7 @@ def follow(path, start, speed=0.05, step=0.2, most=4000):
         if follower.has_arrived(pose):
             return np.array(poses), np.array(commands)
         pose += step * np.array([v * np.cos(pose[2]), v * np.sin(pose[2]), rate])
+        pose[2] = wrap(pose[2])
         poses.append(pose.copy()), commands.append((v, rate))
     raise AssertionError(f"did not arrive; it is at {pose}")
 
@@ -282,7 +282,7 @@ def test_a_change_from_forwards_to_backwards_is_driven_to_its_corner():
 
 # Wheels that steer
 
-SPEED, LOOK_AHEAD = 0.06, 0.4
+LOOK_AHEAD = 0.4
 REACH = float(np.hypot(0.4, 0.31))
 ENGINES = pytest.mark.parametrize("engine", [QuasiStaticPlant, MujocoPlant])
 
@@ -315,7 +315,7 @@ def drive_along(plant, path):
 
 @pytest.mark.parametrize(("engine", "side"), [(QuasiStaticPlant, 1.0), (MujocoPlant, -1.0)])
 def test_a_curve_is_driven_with_its_wheels_turned(engine, side):
-    plant = engine(LSR1, plane(0.0, 0.0, half=3.0), (0.0, 0.0, 0.0))
+    plant = engine(LSR1, LEVEL, (0.0, 0.0, 0.0))
     path = arc(side * 1.2, side * 0.6)
     away, poses, states = drive_along(plant, path)
     assert away < 0.02
@@ -329,7 +329,7 @@ def test_a_curve_is_driven_with_its_wheels_turned(engine, side):
 
 
 def test_a_turn_on_the_spot_stays_there_and_the_drive_goes_on():
-    plant = QuasiStaticPlant(LSR1, plane(0.0, 0.0, half=3.0), (0.0, 0.0, 0.0))
+    plant = QuasiStaticPlant(LSR1, LEVEL, (0.0, 0.0, 0.0))
     away, poses, _ = drive_along(plant, turn_and_go(0.5, 0.2))
     assert away < 0.03
     turning = poses[poses[:, 2] < 0.4]
@@ -340,21 +340,15 @@ def test_a_turn_on_the_spot_stays_there_and_the_drive_goes_on():
 @ENGINES
 def test_a_curve_beyond_the_limit_stops_the_rover_with_the_wheel(engine):
     narrow = replace(LSR1, steering=replace(LSR1.steering, limit=0.4))
-    plant = engine(narrow, plane(0.0, 0.0, half=3.0), (0.0, 0.0, 0.0))
-    for _ in range(20):
-        plant.drive(0.0, 0.1, STEP)
-    assert "wheel needs a steering angle of" in plant.state().stopped
-    for _ in range(50):
-        plant.drive(SPEED, 0.0, STEP)
-    assert not plant.state().stopped and plant.pose()[0] > 0.02
+    plant = engine(narrow, LEVEL, (0.0, 0.0, 0.0))
+    assert "wheel needs a steering angle of" in drive(plant, 0.4, 0.0, 0.1).stopped
+    assert not drive(plant, 1.0).stopped and plant.pose()[0] > 0.02
 
 
 @ENGINES
 def test_fixed_wheels_have_no_steering_joints_and_skid_in_curves(engine):
-    plant = engine(FIXED, plane(0.0, 0.0, half=3.0), (0.0, 0.0, 0.0))
-    for _ in range(200):
-        plant.drive(SPEED, SPEED, STEP)
-    state = plant.state()
+    plant = engine(FIXED, LEVEL, (0.0, 0.0, 0.0))
+    state = drive(plant, 4.0, SPEED, SPEED)
     assert not set(STEERING_JOINTS) & set(state.joint_positions)
     assert plant.pose()[2] > 0.05
     right, left = (state.joint_velocities[f"middle_{side}_wheel"] for side in ("right", "left"))
@@ -362,17 +356,11 @@ def test_fixed_wheels_have_no_steering_joints_and_skid_in_curves(engine):
 
 
 def test_a_turn_by_more_than_half_a_circle_goes_the_way_of_the_path():
-    turned = np.linspace(0.0, 4.0, 60)
-    path = np.column_stack([0.0 * turned, 0.0 * turned, np.mod(turned + np.pi, 2 * np.pi) - np.pi])
-    follower, pose, total = PathFollower(path, LOOK_AHEAD, REACH), np.zeros(3), 0.0
-    for _ in range(2000):
-        speed, yaw_rate = follower.steer(pose, SPEED)
-        if follower.has_arrived(pose):
-            break
-        assert speed == 0.0 and yaw_rate > 0.0
-        total += 0.1 * yaw_rate
-        pose[2] = np.mod(pose[2] + 0.1 * yaw_rate + np.pi, 2 * np.pi) - np.pi
-    assert total == pytest.approx(4.0, abs=0.02)
+    path = line((0.0, 0.0), (0.0, 0.0), 0.0, 60)
+    path[:, 2] = wrap(np.linspace(0.0, 4.0, 60))
+    _, commands = follow(path, (0.0, 0.0, 0.0), SPEED, 0.1)
+    assert (commands[:, 0] == 0.0).all() and (commands[:, 1] > 0.0).all()
+    assert 0.1 * commands[:, 1].sum() == pytest.approx(4.0, abs=0.02)
 
 
 def test_a_rover_that_stands_while_it_steers_is_given_its_time():
