@@ -6,14 +6,15 @@ are judged in ways on and back too are part of the rocky ones.
 """
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 import numba
 import numpy as np
 
 from benchmarks.grounds import real_maps, straight
-from benchmarks.measure import Figure, median_time, median_times, peak_memory, run_command
+from benchmarks.measure import Figure, median_time, median_times, peak_memory, run_predict
 from rover_physics import (
     Rover,
     SweepOptions,
@@ -21,7 +22,6 @@ from rover_physics import (
     judge_path,
     load_rover,
     load_terrain,
-    save_terrain,
     score_poses,
 )
 from rover_physics.names import EQUAL, SERVO
@@ -64,8 +64,7 @@ def cases(mars: Terrain) -> dict[str, tuple[Terrain, list[np.ndarray], float]]:
     spirit = load_terrain("spirit")
     row, column = np.argwhere(np.isfinite(spirit.elevation)).mean(axis=0)
     x, y = spirit.origin + spirit.resolution * np.array([column, row])
-    turn = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    across = straight(4.0) @ turn + (x, y, 0.5 * np.pi)
+    across = straight(4.0)[:, [1, 0, 2]] + (x, y, 0.5 * np.pi)
     rocks = bouldered(3, half=6.0, count=600)
     found = {
         "waves": (make_terrain(waves, half=8.0), [straight(10.0, y=k) for k in (-3, 0, 2)], 1.6),
@@ -81,19 +80,19 @@ def cases(mars: Terrain) -> dict[str, tuple[Terrain, list[np.ndarray], float]]:
     return found
 
 
+def sum_times(paths: Sequence[np.ndarray], *calls: Callable[[np.ndarray], object]) -> np.ndarray:
+    """Return the times of calls for all paths together [s], in turns."""
+    times = [median_times([partial(call, path) for call in calls], REPEATS) for path in paths]
+    return np.sum(times, axis=0)
+
+
 def measure_ratios(
     rover: Rover, name: str, ground: Terrain, paths: Sequence[np.ndarray], most: float
 ) -> list[Figure]:
     """Compare judged paths with their scored poses, in turns."""
-    sums = np.zeros(3)
-    for path in paths:
-        calls = [
-            lambda: score_poses(rover, ground, path),  # noqa: B023
-            lambda: judge_path(rover, ground, path),  # noqa: B023
-            lambda: judge_path(rover, ground, path, stop_at_failure=True),  # noqa: B023
-        ]
-        sums += median_times(calls, REPEATS)
-    scored, judged, stopped = (1e6 * sums / sum(map(len, paths))).tolist()
+    score, judge = partial(score_poses, rover, ground), partial(judge_path, rover, ground)
+    times = sum_times(paths, score, judge, partial(judge, stop_at_failure=True))
+    scored, judged, stopped = (1e6 * times / sum(map(len, paths))).tolist()
     ratio = {"unit": "x", "against": "poses scored, in turns", "repeats": REPEATS}
     return [
         Figure("paths", f"{name}: a waypoint judged", judged, "us", repeats=REPEATS),
@@ -104,21 +103,14 @@ def measure_ratios(
 
 def measure_chances(
     rover: Rover, name: str, ground: Terrain, paths: Sequence[np.ndarray]
-) -> list[Figure]:
+) -> Iterator[Figure]:
     """Compare verdicts with chances of failure with those without, in turns."""
-    figures = []
     for policy in (EQUAL, SERVO):
-        options, sums = SweepOptions(policy=policy), np.zeros(2)
-        for path in paths:
-            calls = [
-                lambda: judge_path(rover, ground, path, options),  # noqa: B023
-                lambda: judge_path(rover, ground, path, options, accepted_chance=1.0),  # noqa: B023
-            ]
-            sums += median_times(calls, REPEATS)
-        words = "paths", f"{name}: chance under {policy}", float(sums[1] / sums[0]), "x"
-        against = "judged without, in turns"
-        figures.append(Figure(*words, MOST_FOR_CHANCE, against=against, repeats=REPEATS))
-    return figures
+        judge = partial(judge_path, rover, ground, options=SweepOptions(policy=policy))
+        without, told = sum_times(paths, judge, partial(judge, accepted_chance=1.0)).tolist()
+        words, against = f"{name}: chance under {policy}", "judged without, in turns"
+        ratio = {"target": MOST_FOR_CHANCE, "against": against, "repeats": REPEATS}
+        yield Figure("paths", words, told / without, "x", **ratio)
 
 
 def measure_files(rover: Rover, mars: Terrain, folder: Path) -> list[Figure]:
@@ -148,11 +140,7 @@ def measure_question(
 
 def measure_memory(mars: Terrain, folder: Path) -> Figure:
     """Measure the peak memory of `predict` for a path to and fro, in a process of its own."""
-    save_terrain(folder / "ground.npz", mars)
     there = straight(10.0, y=-3.0)
-    course = np.concatenate([there, there[::-1]])
-    np.savez(folder / "poses.npz", poses=np.resize(course, (MANY, 3)))
-    files = (folder / name for name in ("ground.npz", "poses.npz", "out.npz"))
-    run_command("predict", "lsr1", *files)
+    run_predict(folder, mars, np.resize(np.concatenate([there, there[::-1]]), (MANY, 3)))
     name = f"predict {MANY:,} poses: peak memory"
     return Figure("paths", name, peak_memory(), "MiB", 1024.0, repeats=1)

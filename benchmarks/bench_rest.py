@@ -41,7 +41,7 @@ def _measure_rest() -> list[Figure]:
         found = {name: nodes.start_module(*words[2:]) for name, words in commands.items()}
         graph = nodes.client().connect().node
         wait_until(lambda: set(found) <= set(graph.get_node_names()), "all programs", START_TIME)
-        return _watch(found, "at rest", None)
+        return _watch(found, "at rest")
 
 
 def _measure_learner() -> Figure:
@@ -50,38 +50,31 @@ def _measure_learner() -> Figure:
         nodes.start("rover_simulator", terrain_file=GROUND, **start)
         found = {LEARNER: nodes.start(LEARNER)}
         driver = Node("driver", context=nodes.ros.context)
-        try:
-            wait_until(lambda: LEARNER in driver.get_node_names(), "the learner", START_TIME)
-            return _watch(found, "in a drive", driver)[0]
-        finally:
-            driver.destroy_node()
+        commands = driver.create_publisher(TwistStamped, "cmd_vel", topic_qos())
+
+        def drive() -> None:
+            command = TwistStamped()
+            command.header.stamp = driver.get_clock().now().to_msg()
+            command.twist.linear.x = SPEED
+            commands.publish(command)
+
+        wait_until(lambda: LEARNER in driver.get_node_names(), "the learner", START_TIME)
+        driver.create_timer(COMMAND_PERIOD, drive)
+        nodes.ros.spin(driver)
+        return _watch(found, "in a drive")[0]
 
 
-def _watch(found: Mapping[str, ChildProcess], when: str, driver: Node | None) -> list[Figure]:
-    """Return the CPU time of programs; a driver drives the rover meanwhile."""
-    _wait(SETTLING, driver)
+def _watch(found: Mapping[str, ChildProcess], when: str) -> list[Figure]:
+    """Return the CPU time of programs."""
+    time.sleep(SETTLING)
     before, begin = {name: cpu_time(one.pid) for name, one in found.items()}, time.monotonic()
-    _wait(SECONDS, driver)
+    time.sleep(SECONDS)
     used = {name: cpu_time(one.pid) - before[name] for name, one in found.items()}
     taken = time.monotonic() - begin
     return [
         Figure("rest", f"{name}: CPU {when}", 100.0 * one / taken, "%", MOST[name], repeats=1)
         for name, one in used.items()
     ]
-
-
-def _wait(seconds: float, driver: Node | None) -> None:
-    if driver is None:
-        time.sleep(seconds)
-        return
-    commands = driver.create_publisher(TwistStamped, "cmd_vel", topic_qos())
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        command = TwistStamped()
-        command.header.stamp = driver.get_clock().now().to_msg()
-        command.twist.linear.x = SPEED
-        commands.publish(command)
-        time.sleep(COMMAND_PERIOD)
 
 
 def cpu_time(pid: int) -> float:

@@ -15,7 +15,7 @@ from collections.abc import Callable
 import numpy as np
 from sensor_msgs.msg import PointCloud2
 
-from benchmarks.measure import Figure, median_times, quantile
+from benchmarks.measure import Figure, median_times
 from benchmarks.processes import ECHO, SERVER, Client, open_nodes
 from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cloud
 from rover_physics import Terrain, load_rover
@@ -81,7 +81,10 @@ def _time(ask: Callable[[], object], pause: float) -> float:
 def make_figures(asked: str, times: dict[str, list[float]], poses: int) -> list[Figure]:
     """Return the figures of the times [s] of all responders."""
     middle = {name: 1e3 * statistics.median(values) for name, values in times.items()}
-    late = {name: 1e3 * quantile(values, 0.99) for name, values in times.items()}
+    late = {
+        name: 1e3 * float(np.quantile(values, 0.99, method="inverted_cdf"))
+        for name, values in times.items()
+    }
     spread = {name: late[name] / middle[name] for name in times}
     overhead = middle["server"] - middle["echo"] - middle["computation"]
     rows = [

@@ -10,13 +10,10 @@ import tempfile
 import time
 from pathlib import Path
 
-import numpy as np
-
 from benchmarks.bench_service import GOAL, START
 from benchmarks.grounds import straight
-from benchmarks.measure import Figure, run_command
+from benchmarks.measure import Figure, run_predict
 from benchmarks.processes import SERVER, memory_of, open_nodes
-from rover_physics import save_terrain
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 STARTS = 5
@@ -63,11 +60,9 @@ def measure_cold_start() -> Figure:
 
 def measure_command() -> Figure:
     """Measure the CPU time of `rover_planner predict` for a short path, imports included."""
+    ground = make_mars_terrain(1, 24.0, 0.05)
+    poses = straight(0.02 * WAYPOINTS, y=-6.0)[:WAYPOINTS]
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        save_terrain(folder / "ground.npz", make_mars_terrain(1, 24.0, 0.05))
-        np.savez(folder / "poses.npz", poses=straight(0.02 * WAYPOINTS, y=-6.0)[:WAYPOINTS])
-        files = [folder / name for name in ("ground.npz", "poses.npz", "out.npz")]
-        times = [run_command("predict", "lsr1", *files).cpu for _ in range(1 + STARTS)]
+        times = [run_predict(Path(name), ground, poses).cpu for _ in range(1 + STARTS)]
     name = f"predict of {WAYPOINTS} waypoints, CPU time"
     return Figure("start", name, statistics.median(times[1:]), "s", 0.7, repeats=STARTS)

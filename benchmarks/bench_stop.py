@@ -6,16 +6,14 @@ count, each for maps of several sizes, exact and with standard deviations.
 """
 
 import time
-from dataclasses import replace
 from statistics import median
-
-import numpy as np
 
 from benchmarks.measure import Figure
 from benchmarks.processes import SERVER, START_TIME, open_nodes
 from msg_adapters.elevation import terrain_to_point_cloud
 from support.grounds import make_terrain, waves
 from support.planner_client import PlannerClient
+from support.rough_grounds import with_std
 from support.standing_rover import GOAL, START, StandingRover, rock_ahead
 from support.waiting import wait_until
 
@@ -32,27 +30,22 @@ def measure() -> list[Figure]:
 
 
 def _measure(half: float, resolution: float, std: float) -> list[Figure]:
-    free, blocked = (
-        make_terrain(height, half=half, resolution=resolution) for height in (waves, rock_ahead)
-    )
-    if std:
-        layer = np.full(free.elevation.shape, std)
-        free, blocked = (replace(one, elevation_std=layer) for one in (free, blocked))
-    clouds = [terrain_to_point_cloud(one, "map") for one in (free, blocked)]
+    clouds = []
+    for height in (waves, rock_ahead):
+        ground = make_terrain(height, resolution, half)
+        ground = with_std(ground, std) if std else ground
+        clouds.append(terrain_to_point_cloud(ground, "map"))
     with open_nodes() as nodes:
-        client, rover = (
-            nodes.ros.spin(PlannerClient(nodes.ros)),
-            nodes.ros.spin(StandingRover(nodes.ros)),
-        )
+        client = nodes.ros.spin(PlannerClient(nodes.ros))
+        rover = nodes.ros.spin(StandingRover(nodes.ros))
         nodes.start(SERVER, monitor=True, monitor_timeout=60.0)
         wait_until(lambda: rover.stops, "the server", START_TIME)
         delays = [_time_stop(client, rover, clouds) for _ in range(REPEATS)]
-    cells = f"{free.elevation.size:,} cells{', with elevation_std' if std else ''}"
+    cells, later = f"{ground.elevation.size:,} cells", delays[1:]
+    cells += ", with elevation_std" if std else ""
     return [
         Figure("stop", f"first stop, {cells}", delays[0], "ms", LIMIT, repeats=1),
-        Figure(
-            "stop", f"later stops, {cells}", median(delays[1:]), "ms", LIMIT, repeats=REPEATS - 1
-        ),
+        Figure("stop", f"later stops, {cells}", median(later), "ms", LIMIT, repeats=len(later)),
     ]
 
 

@@ -6,7 +6,6 @@ controller and server run in separate processes. The controller's diagnostics re
 time of its updates (estimate, build, solve, publish) and the number of missed cycles.
 """
 
-import os
 import threading
 import time
 
@@ -126,12 +125,11 @@ def measure_together() -> list[Figure]:
         nodes.start(CONTROLLER, rate=RATE, realtime_priority=PRIORITY, enabled_at_start=True)
         start = {"start_x": START[0], "start_y": START[1], "follow_commands": True}
         nodes.start("rover_simulator", rate=RATE, terrain_file=ground, **start)
-        before, stolen = reader.wait_for_updates(int(RATE)), stolen_time()
+        before = reader.wait_for_updates(int(RATE))
         stop = threading.Event()
         asked = threading.Thread(target=_ask_on, args=(client, stop))
         asked.start()
         time.sleep(TOGETHER_TIME)
-        stolen = stolen_time() - stolen
         stop.set()
         asked.join()
         after = reader.wait_for_updates(int(before["updates"] + 0.9 * RATE * TOGETHER_TIME))
@@ -142,17 +140,9 @@ def measure_together() -> list[Figure]:
         ("the same: 99 of 100 within", after["update_time_p99_ms"], "ms", 2.0),
         ("cycles missed at 100 Hz in a minute, a server busy beside it",
          after["missed_cycles"] - before["missed_cycles"], "", 0.0),
-        ("time that the host of a virtual machine took from it meanwhile",
-         1e3 * stolen, "ms", None),
         ("updates that fell back to equal torques", after["fallbacks"], "", None),
     )  # fmt: skip
     return [Figure("traction", *row, repeats=updates) for row in rows]
-
-
-def stolen_time() -> float:
-    """Return the time for which the host let the processors of this machine wait [s]."""
-    with open("/proc/stat", encoding="ascii") as file:
-        return int(file.readline().split()[8]) / os.sysconf("SC_CLK_TCK")
 
 
 def _ask_on(client: Client, stop: threading.Event) -> None:

@@ -64,7 +64,7 @@ SURE = 0.95
 """Share of draws from which a path counts as one that passes."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ChancePath:
     """A path over a ground of the reference drives, or over rocks or relief."""
 
@@ -125,30 +125,21 @@ def draw_truths(seed: int, number: int, path: ChancePath, draws: int) -> np.ndar
     return np.array([path.friction, path.max_torque]) * (1.0 + z * [FRICTION_STD, TORQUE_STD])
 
 
-@dataclass(frozen=True)
-class DrivenPath:
-    """A path and what became of its drives."""
+@dataclass(frozen=True, kw_only=True)
+class DrivenPath(ChancePath):
+    """A path and what became of its drives: a line of a file."""
 
-    path: ChancePath
-    """The path."""
     stream: int
     """Seed of `draw_path`."""
+    number: int
+    """Number of the path in this stream."""
     passed: str
     """1 for each drive that arrived, 0 for the others, in the order of `draw_truths`."""
 
 
 def read_driven_paths(file: Path = CHANCES) -> list[DrivenPath]:
     """Return the paths of a file of benchmarks.chance_drives."""
-    rows = map(json.loads, file.read_text().splitlines())
-    names = [field.name for field in fields(ChancePath)]
-    return [
-        DrivenPath(
-            ChancePath(**{name: row[name] for name in names if name in row}),
-            row["stream"],
-            row["passed"],
-        )
-        for row in rows
-    ]
+    return [DrivenPath(**json.loads(line)) for line in file.read_text().splitlines()]
 
 
 def find_chance(path: ChancePath, model_std: float | None = None) -> tuple[float, bool]:
@@ -178,36 +169,39 @@ class Compared:
     drives: np.ndarray
     """(n,) number of drives."""
     failed: np.ndarray
-    """(n,) share of them that failed."""
+    """(n,) number of them that failed."""
+
+    @property
+    def shares(self) -> np.ndarray:
+        """(n,) share of the drives that failed."""
+        return self.failed / self.drives
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The 95 % interval (Wilson) of the share of all drives that fail."""
+        if not len(self.drives):
+            return 0.0, 1.0
+        test = scipy.stats.binomtest(self.failed.sum(), self.drives.sum())
+        return test.proportion_ci(method="wilson")
+
+    def average(self, values: np.ndarray) -> float:
+        """Return the mean over drives of values of paths (n,)."""
+        return float(np.average(values, weights=self.drives))
 
     def brier(self, told: np.ndarray) -> float:
         """Return the Brier score of told chances (n,), over drives."""
-        squares = self.failed * (1.0 - told) ** 2 + (1.0 - self.failed) * told**2
-        return float(np.average(squares, weights=self.drives))
+        return self.average(self.shares * (1.0 - told) ** 2 + (1.0 - self.shares) * told**2)
 
     def select(self, rows: np.ndarray) -> "Compared":
         """Return the paths where `rows` (n,) is True."""
-        return Compared(*(getattr(self, name)[rows] for name in vars(self)))
+        return Compared(*(values[rows] for values in vars(self).values()))
 
 
 def compare(paths: Sequence[DrivenPath], model_std: float | None = None) -> Compared:
     """Predict paths, with a model error other than the default if one is given."""
-    found = [find_chance(one.path, model_std) for one in paths]
-    chance, refused = np.array(found, float).T
-    passed = [np.array(list(one.passed), int) for one in paths]
-    return Compared(
-        chance,
-        refused > 0.5,
-        np.array([len(one) for one in passed]),
-        np.array([1.0 - one.mean() for one in passed]),
-    )
-
-
-def wilson(count: float, of: int) -> tuple[float, float]:
-    """Return the 95 % interval (Wilson) of a share."""
-    if not of:
-        return 0.0, 1.0
-    return scipy.stats.binomtest(round(count), of).proportion_ci(method="wilson")
+    chance, refused = zip(*(find_chance(path, model_std) for path in paths), strict=True)
+    counts = [(len(path.passed), path.passed.count("0")) for path in paths]
+    return Compared(np.array(chance), np.array(refused), *np.array(counts).T)
 
 
 def split_by_chance(found: Compared) -> Iterator[tuple[str, Compared]]:
@@ -218,36 +212,28 @@ def split_by_chance(found: Compared) -> Iterator[tuple[str, Compared]]:
             yield f"{low:g} to {high:g}", part
 
 
-def reliability(found: Compared) -> Iterator[tuple[str, ...]]:
-    """Yield the rows of the reliability table."""
-    for name, part in split_by_chance(found):
-        drives = part.drives.sum()
-        failed = (part.failed * part.drives).sum()
-        low, high = wilson(failed, drives)
-        told = np.average(part.chance, weights=part.drives)
-        yield (
-            name, f"{len(part.chance)}", f"{drives}", f"{told:.3f}",
-            f"{failed / drives:.3f}", f"{low:.3f} to {high:.3f}",
-        )  # fmt: skip
+def reliability(name: str, part: Compared) -> tuple[str | float, ...]:
+    """Return the row of the reliability table for a range of chances."""
+    low, high = part.interval
+    told, failed = part.average(part.chance), part.failed.sum() / part.drives.sum()
+    interval = f"{low:.3f} to {high:.3f}"
+    return name, len(part.chance), part.drives.sum(), told, failed, interval
 
 
-def summary(name: str, found: Compared) -> tuple[str, ...]:
+def summary(name: str, found: Compared) -> tuple[str | float, ...]:
     """Return a row about a group of paths."""
-    if not len(found.chance):
-        return (name, "0", *4 * ("",))
-    accepted = found.select(found.chance < ACCEPTED)
-    drives, failed = accepted.drives.sum(), (accepted.failed * accepted.drives).sum()
-    low, high = wilson(failed, drives)
-    sure = found.select(found.failed <= 1.0 - SURE)
-    refused = int((sure.chance >= ACCEPTED).sum())
-    chance, plain = found.brier(found.chance), found.brier(found.refused.astype(float))
+    accepted, sure = (
+        found.select(found.chance < ACCEPTED),
+        found.select(found.shares <= 1.0 - SURE),
+    )
+    low, high = accepted.interval
     return (
         name,
-        f"{len(found.chance)}",
-        f"{chance:.3f}",
-        f"{plain:.3f}",
-        f"{failed:.0f} of {drives} ({low:.1%} to {high:.1%})",
-        f"{refused} of {len(sure.chance)}",
+        len(found.chance),
+        found.brier(found.chance),
+        found.brier(found.refused),
+        f"{accepted.failed.sum()} of {accepted.drives.sum()} ({low:.1%} to {high:.1%})",
+        f"{(sure.chance >= ACCEPTED).sum()} of {len(sure.chance)}",
     )
 
 
@@ -257,11 +243,10 @@ def calibrate(paths: Sequence[DrivenPath]) -> None:
     for std in MODEL_STDS:
         found = compare(paths, std)
         told = found.chance.clip(0.005, 0.995)
-        loss = -(found.failed * np.log(told) + (1.0 - found.failed) * np.log(1.0 - told))
-        likelihood = np.average(loss, weights=found.drives)
-        rows.append((f"{std:g}", f"{found.brier(found.chance):.4f}", f"{likelihood:.4f}"))
-    headings = ("model error", "Brier score", "log loss")
-    print_table(f"Calibration on {len(paths)} paths", headings, rows)
+        loss = -(found.shares * np.log(told) + (1.0 - found.shares) * np.log(1.0 - told))
+        rows.append((f"{std:g}", found.brier(found.chance), found.average(loss)))
+    columns = {"model error": "", "Brier score": ".4f", "log loss": ".4f"}
+    print_table(f"Calibration on {len(paths)} paths", columns, rows)
 
 
 def draw_picture(file: Path, found: Compared) -> None:
@@ -272,13 +257,12 @@ def draw_picture(file: Path, found: Compared) -> None:
     axes = figure.subplots()
     axes.plot([0, 1], [0, 1], "k:", lw=1)
     shift = 0.012 * np.random.default_rng(0).standard_normal((2, len(found.chance)))
-    axes.plot(found.chance + shift[0], found.failed + shift[1], "o", ms=4, alpha=0.35,
+    axes.plot(found.chance + shift[0], found.shares + shift[1], "o", ms=4, alpha=0.35,
               label=f"a path, {found.drives.max()} drives")  # fmt: skip
     for number, (_, part) in enumerate(split_by_chance(found)):
-        drives, share = part.drives.sum(), np.average(part.failed, weights=part.drives)
-        at = np.average(part.chance, weights=part.drives)
-        axes.plot([at, at], wilson(share * drives, drives), "C3", lw=2)
-        axes.plot(at, share, "C3s", label="" if number else "range, 95 %")
+        at = part.average(part.chance)
+        axes.plot([at, at], part.interval, "C3", lw=2)
+        axes.plot(at, part.average(part.shares), "C3s", label="" if number else "range, 95 %")
     axes.set_xlabel("predicted chance of failure")
     axes.set_ylabel("share of drives that failed")
     axes.legend(frameon=False)
@@ -294,21 +278,21 @@ def main(
 ) -> None:
     """Print the tables."""
     driven = read_driven_paths(file)
-    held = [one for one in driven if one.stream == HELD_OUT]
+    held = [path for path in driven if path.stream == HELD_OUT]
     if calibrate_too:
-        calibrate([one for one in driven if one.stream != HELD_OUT])
+        calibrate([path for path in driven if path.stream != HELD_OUT])
     found = compare(held)
-    headings = ("chance", "paths", "drives", "told", "failed", "95 %")
-    print_table(f"Reliability; {TOLD}", headings, reliability(found))
-    kinds = np.array([one.path.kind for one in held])
-    curved = np.array([one.path.curvature != 0.0 for one in held])
+    columns = {"chance": "", "paths": "", "drives": "", "told": ".3f", "failed": ".3f", "95 %": ""}
+    rows = itertools.starmap(reliability, split_by_chance(found))
+    print_table(f"Reliability; {TOLD}", columns, rows)
+    kinds = np.array([path.kind for path in held])
+    curved = np.array([path.curvature != 0.0 for path in held])
     groups = {"all": curved | True, "curves": curved, "side slopes": kinds == "cross_slope"}
     groups |= {kind: kinds == kind for kind in sorted(set(kinds.tolist()))}
-    print_table(
-        "Paths",
-        ("paths", "number", "Brier", "plain", f"failed below {ACCEPTED:g}", "sure ones refused"),
-        [summary(name, found.select(rows)) for name, rows in groups.items()],
-    )
+    columns = {"paths": "", "number": "", "Brier": ".3f", "plain": ".3f"}
+    columns |= {f"failed below {ACCEPTED:g}": "", "sure ones refused": ""}
+    some = [summary(name, found.select(own)) for name, own in groups.items() if own.any()]
+    print_table("Paths", columns, some)
     if picture is not None:
         draw_picture(picture, found)
 

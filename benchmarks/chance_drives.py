@@ -13,7 +13,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from benchmarks.chance import FAST, ChancePath, draw_path, draw_truths
+from benchmarks.chance import FAST, ChancePath, draw_path, draw_truths, read_driven_paths
 from benchmarks.drives import LOOK_AHEAD, MAX_TILT
 from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.simulator.path_follower import PathFollower
@@ -54,23 +54,19 @@ def main(
     seed: Annotated[int, typer.Option(help="Seed of the paths.")] = 1,
     paths: Annotated[int, typer.Option(help="Number of paths.")] = 40,
     draws: Annotated[int, typer.Option(help="Draws of friction and torque limit per path.")] = 20,
-    first: Annotated[int, typer.Option(help="Number of the first path.")] = 0,
-    step: Annotated[int, typer.Option(help="Every which path.")] = 1,
     speed: Annotated[float, typer.Option(help="Nominal speed [m/s].")] = FAST,
 ) -> None:
     """Drive the paths that the file does not have."""
-    lines = file.read_text().splitlines() if file.exists() else []
-    known = {(row["stream"], row["number"]) for row in map(json.loads, lines)}
-    for number in range(first, paths, step):
-        if (seed, number) in known:
-            continue
+    file.touch()
+    known = {path.number for path in read_driven_paths(file) if path.stream == seed}
+    for number in sorted({*range(paths)} - known):
         path = replace(draw_path(seed, number), speed=speed)
         truths = draw_truths(seed, number, path, draws).tolist()
         passed = "".join("01"[passes(path, *truth)] for truth in truths)
-        row = asdict(path) | {"stream": seed, "number": number, "passed": passed}
+        line = json.dumps(asdict(path) | {"stream": seed, "number": number, "passed": passed})
         with file.open("a") as target:
-            target.write(json.dumps(row) + "\n")
-        print(json.dumps(row), flush=True)
+            target.write(line + "\n")
+        print(line, flush=True)
 
 
 if __name__ == "__main__":

@@ -38,12 +38,9 @@ TORQUES = 0.3, 2.5
 """Smallest and largest torque limit [N m]; their logarithm is uniform."""
 MARGINS = (0.0, 0.1, 0.2, 0.3)
 """Control margins that are tried."""
-KNOWN = {
-    "friction": 0.0,
-    "friction_per_wheel": 0.0,
-    "max_torque": 0.0,
-    "max_torque_per_wheel": 0.0,
-}
+KNOWN = dict.fromkeys(
+    ("friction", "friction_per_wheel", "max_torque", "max_torque_per_wheel"), 0.0
+)
 """Uncertainty of what the drives have as the planner is told it."""
 PROMISES = (
     *(f"control margin {margin:g}" for margin in MARGINS),
@@ -90,12 +87,12 @@ def find_promises(obstacle: Obstacle) -> tuple[bool, ...]:
     return (*margins, *chances)
 
 
-def draw_passable(count: int, seed: int, workers: int) -> dict[Obstacle, tuple[bool, ...]]:
+def draw_passable(count: int, seed: int) -> dict[Obstacle, tuple[bool, ...]]:
     """Return obstacles that are passable with traction control and not without, with PROMISES."""
     rng, promised = np.random.default_rng(seed), {}
     while True:
         drawn = [draw_obstacle(rng) for _ in range(BATCH)]
-        found = run_in_processes(find_promises, [(obstacle,) for obstacle in drawn], workers)
+        found = run_in_processes(find_promises, [(obstacle,) for obstacle in drawn])
         for obstacle, promises in zip(drawn, found, strict=True):
             if promises[0]:
                 promised[obstacle] = promises
@@ -107,25 +104,23 @@ def main(
     count: Annotated[int, typer.Option(help="Number of obstacles.")] = 100,
     seed: Annotated[int, typer.Option(help="Seed of the obstacles.")] = 1,
     source: Annotated[str, typer.Option(help="Contact angles from: map or motion.")] = "map",
-    workers: Annotated[int, typer.Option(help="Number of processes.")] = 2,
 ) -> None:
     """Draw, judge and drive; print how many promises are kept, and what of the rest passes."""
-    promised = draw_passable(count, seed, workers)
+    promised = draw_passable(count, seed)
     jobs = [(obstacle, SOURCES[source], TRIES, MOST_TIME) for obstacle in promised]
-    drives = run_in_processes(drive, jobs, workers)
-    passed = np.array([one.passed for one in drives])
+    passed = np.array([one.passed for one in run_in_processes(drive, jobs)])
     rows = []
     for name, given in zip(PROMISES, np.array(list(promised.values())).T, strict=True):
-        kept, all_kept = int((given & passed).sum()), int(given.sum())
-        rows.append(
-            (
-                name,
-                f"{kept} of {all_kept} ({kept / max(all_kept, 1):.1%})",
-                f"{kept} of {passed.sum()} ({kept / max(passed.sum(), 1):.1%})",
-            )
-        )
+        kept = int((given & passed).sum())
+        rows.append((name, share(kept, int(given.sum())), share(kept, int(passed.sum()))))
     title = f"{count} obstacles that need traction control, contact angles from {source}"
-    print_table(title, ("promised by", "promises kept", "promised of what passes"), rows)
+    columns = dict.fromkeys(("promised by", "promises kept", "promised of what passes"), "")
+    print_table(title, columns, rows)
+
+
+def share(count: int, of: int) -> str:
+    """Return a share as text."""
+    return f"{count} of {of} ({count / max(of, 1):.1%})"
 
 
 if __name__ == "__main__":

@@ -86,8 +86,6 @@ class DriveResult:
     """True if the rover reached the end."""
     end: float
     """x of the body's origin at the end [m]."""
-    duration: float
-    """Duration [s]."""
     mean_utilisation: float
     """Mean over time of the largest friction utilisation of the six wheels."""
     peak_utilisation: float
@@ -115,34 +113,19 @@ OBSTACLES = tuple(
 """Obstacles of the benchmarks: frictions from 0.4 to 1.0."""
 
 
-class DriveSteering:
-    """Follows the x axis: what a path follower commands, and what this asks of the wheels."""
-
-    def __init__(self, plant: MujocoRover, tries: int):
-        """Prepare for a rover at the start of its path, with a number of attempts at a place."""
-        path = np.array([[START, 0.0, 0.0], [END + LOOK_AHEAD, 0.0, 0.0]])
-        self.follower = SecondTry(PathFollower(path, LOOK_AHEAD), tries)
-        self._plant = plant
-
-    def steer(self) -> tuple[tuple[float, float], np.ndarray]:
-        """Steer; return speed [m/s] and yaw rate [rad/s] that are commanded, and what wheels do.
-
-        Those are the rates (6,) of the wheels [rad/s] in the commanded motion.
-        """
-        plant = self._plant
-        command = self.follower.steer(plant.pose[[0, 1, 3]], SPEED, plant.time)
-        return command, plant.steer(command) / plant.rover.wheel.radius
-
-
 def make_controller(
-    name: str, plant: MujocoRover, obstacle: Obstacle, steering: DriveSteering
-) -> Callable[[], np.ndarray]:
-    """Return a function that advances the plant by PERIOD and returns its torques (6,) [N m]."""
+    name: str, plant: MujocoRover, obstacle: Obstacle
+) -> Callable[[tuple[float, float], np.ndarray], np.ndarray]:
+    """Return a function that advances the plant by PERIOD and returns its torques (6,) [N m].
+
+    Its arguments are the commanded speed [m/s] and yaw rate [rad/s], and the rates (6,) of the
+    wheels [rad/s] in the commanded motion.
+    """
     if name == SERVO:
-        return lambda: plant.servo(steering.steer()[1], PERIOD)
+        return lambda _, rates: plant.servo(rates, PERIOD)
     if name == DROOP:
         droop = plant.rover.wheel.servo_droop
-        return lambda: plant.servo_with_droop(steering.steer()[1], droop, PERIOD)
+        return lambda _, rates: plant.servo_with_droop(rates, droop, PERIOD)
     values: dict[str, Any] = {"policy": EQUAL if name == EQUAL_TORQUES else OPTIMAL}
     if obstacle.max_torque is not None:
         values["max_torque"] = obstacle.max_torque
@@ -151,17 +134,40 @@ def make_controller(
     if name == BY_MAP:
         service.take_terrain(obstacle.ground)
 
-    def control() -> np.ndarray:
+    def control(command: tuple[float, float], _: np.ndarray) -> np.ndarray:
         now = plant.time
         service.take_joints(plant.joint_positions, plant.joint_velocities, now)
         service.take_attitude(*plant.attitude, plant.body_rates, now)
-        service.take_command(*steering.steer()[0], now)
+        service.take_command(*command, now)
         service.take_odometry(plant.pose, 0.0, now)
         torques = service.update(now).torques
         plant.step(torques, PERIOD)
         return torques
 
     return control
+
+
+def follow_axis(
+    plant: MujocoRover, obstacle: Obstacle, name: str, tries: int = 1, most_time: float = 2.0
+) -> Iterator[np.ndarray]:
+    """Drive along the x axis; yield the torques (6,) [N m] of each PERIOD, until END or lost.
+
+    Args:
+        plant: The rover, at START.
+        obstacle: What the controller is told.
+        name: One of CONTROLLERS.
+        tries: Attempts at one place; a rover that stands still backs off before another one.
+        most_time: Time after which a rover counts as stuck, as a multiple of the time at SPEED.
+    """
+    path = np.array([[START, 0.0, 0.0], [END + LOOK_AHEAD, 0.0, 0.0]])
+    follower = SecondTry(PathFollower(path, LOOK_AHEAD), tries)
+    control = make_controller(name, plant, obstacle)
+    while plant.time < most_time * (END - START) / SPEED and plant.pose[0] < END:
+        command = follower.steer(plant.pose[[0, 1, 3]], SPEED, plant.time)
+        torques = control(command, plant.steer(command) / plant.rover.wheel.radius)
+        if plant.tilt > MAX_TILT or abs(plant.pose[1]) > MAX_OFFSET or follower.given_up:
+            return
+        yield torques
 
 
 def drive(
@@ -171,25 +177,12 @@ def drive(
     most_time: float = 2.0,
     timestep: float = TIMESTEP,
 ) -> DriveResult:
-    """Drive the rover lsr1 over an obstacle.
-
-    Args:
-        obstacle: The obstacle.
-        name: One of CONTROLLERS.
-        tries: Attempts at one place; a rover that stands still backs off before another one.
-        most_time: Time after which a rover counts as stuck, as a multiple of the time at SPEED.
-        timestep: Time step of MuJoCo [s].
-    """
+    """Drive the rover lsr1 over an obstacle, as `follow_axis`, with a time step of MuJoCo [s]."""
     rover = obstacle.rover
     plant = MujocoRover(rover, obstacle.ground, (START, 0.0, 0.0), obstacle.friction, timestep)
-    steering = DriveSteering(plant, tries)
-    control = make_controller(name, plant, obstacle, steering)
     slip = torque = energy = 0.0
     peaks: list[float] = []
-    while plant.time < most_time * (END - START) / SPEED and plant.pose[0] < END:
-        torques = control()
-        if plant.tilt > MAX_TILT or abs(plant.pose[1]) > MAX_OFFSET or steering.follower.given_up:
-            break
+    for torques in follow_axis(plant, obstacle, name, tries, most_time):
         contacts = plant.measure_contacts()
         slip += contacts.slip_speeds.mean() * PERIOD
         torque += np.abs(torques).mean() * PERIOD
@@ -202,7 +195,6 @@ def drive(
     return DriveResult(
         passed=bool(plant.pose[0] >= END),
         end=float(plant.pose[0]),
-        duration=plant.time,
         mean_utilisation=float(np.mean(peaks)),
         peak_utilisation=float(np.percentile(peaks, 95)),
         slip=float(slip),
@@ -211,10 +203,10 @@ def drive(
     )
 
 
-def run_in_processes(function: Callable, jobs: Sequence[tuple], workers: int | None) -> Iterator:
-    """Yield function(*job) for each job in order, from processes (default: one per core)."""
+def run_in_processes(function: Callable, jobs: Sequence[tuple]) -> Iterator:
+    """Yield function(*job) for each job in order, from processes, one per core."""
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context) as pool:
+    with ProcessPoolExecutor(mp_context=context) as pool:
         futures = [pool.submit(function, *job) for job in jobs]
         for future in track(futures, function.__name__, console=console(stderr=True)):
             yield future.result()

@@ -7,6 +7,8 @@ Each drive is drawn at random from what the model lets pass: straight, curves, t
 backward, rests. All sensors have noise. It needs the extra `bench`.
 """
 
+import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Annotated
@@ -18,7 +20,7 @@ from scipy.stats import chi2
 from benchmarks.drives import PERIOD, SPEED, run_in_processes
 from benchmarks.grounds import all_grounds
 from benchmarks.learned_soil import make_ground
-from benchmarks.learning import add_noise, told_rover
+from benchmarks.learning import add_noise, has_truth, told_rover
 from benchmarks.measure import print_table
 from rover_physics import Rover, Terrain, judge_poses
 from rover_physics.prediction.sweep_options import SweepOptions
@@ -26,7 +28,6 @@ from rover_planner.errors import PlanningError
 from rover_planner.learning.drive_log import RATES, TIME, YAW, X, Y
 from rover_planner.learning.ground_learner import GroundEstimate, GroundLearner
 from rover_planner.simulator.mujoco_plant import MujocoPlant
-from rover_planner.simulator.plant import Plant
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from support.learning_drives import row_of_plant
 from support.reference_drives import drive_ground
@@ -82,6 +83,12 @@ class Alarms:
     is_within: bool
     """Whether the interval of the friction has the truth."""
 
+    @property
+    def counts(self) -> tuple[bool, ...]:
+        """What is false of slip, sticking, sensors and the friction, then what is true."""
+        false = self.slip is False, self.stuck is False, bool(self.faults), not self.is_within
+        return (*false, self.slip is True, self.stuck is True)
+
 
 @lru_cache(maxsize=1)
 def grounds() -> dict[str, Terrain]:
@@ -126,40 +133,36 @@ def draw_part(rng: np.random.Generator) -> tuple[float, float, float]:
     return 0.0, 0.0, LASTS[0]
 
 
+def commands_of(parts: np.ndarray, period: float) -> np.ndarray:
+    """Return speed and yaw rate (n, 2) in each period of a course."""
+    return np.repeat(parts[:, :2], np.round(parts[:, 2] / period).astype(int), axis=0)
+
+
 def follow(start: np.ndarray, parts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return poses (n, 3) each half second along a course, and their curvatures (n,)."""
-    poses, curvatures, period = [start], [0.0], 0.5
-    for speed, turn, duration in parts:
-        for _ in range(round(duration / period)):
-            yaw = poses[-1][2] + 0.5 * turn * period
-            step = period * np.array([speed * np.cos(yaw), speed * np.sin(yaw), turn])
-            poses.append(poses[-1] + step)
-            curvatures.append(turn / speed if speed else np.sign(turn) * np.inf if turn else 0.0)
-    return np.array(poses), np.array(curvatures)
+    period = 0.5
+    speed, turn = commands_of(parts, period).T
+    yaw = start[2] + period * (np.cumsum(turn) - 0.5 * turn)
+    steps = period * np.column_stack([speed * np.cos(yaw), speed * np.sin(yaw), turn])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        curvatures = np.where(turn == 0.0, 0.0, turn / speed)
+    return np.cumsum(np.vstack([start, steps]), axis=0), np.append(0.0, curvatures)
 
 
-def drive(
-    outing: Outing, start: np.ndarray, parts: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def drive(outing: Outing, start: np.ndarray, parts: np.ndarray) -> Iterator[np.ndarray]:
     """Return rows of a drive without noise, slip speeds (n, 6) and commanded speeds (n,)."""
-    rover, ground = told_rover(), grounds()[outing.ground]
-    rows, slips, commands, place = [], [], [], tuple(start.tolist())
-    if outing.simulator == MUJOCO:
-        plant: Plant = MujocoPlant(rover, ground, place)
-        period = PERIOD
-    else:
-        soil = SOFT if outing.simulator == SOIL else None
-        plant, period = QuasiStaticPlant(rover, ground, place, soil=soil), STEP
-    for speed, turn, duration in parts:
-        for _ in range(round(duration / period)):
-            plant.drive(speed, turn, period)
-            rows.append(row_of_plant(plant, (len(rows) + 1) * period))
-            is_exact = isinstance(plant, MujocoPlant)
-            slips.append(plant.simulated.measure_contacts().slip_speeds if is_exact else [0.0] * 6)
-            commands.append(speed)
-            if plant.state().stopped:
-                return np.array(rows), np.array(slips), np.array(commands)
-    return np.array(rows), np.array(slips), np.array(commands)
+    placed = told_rover(), grounds()[outing.ground], tuple(start.tolist())
+    soil, is_exact = SOFT if outing.simulator == SOIL else None, outing.simulator == MUJOCO
+    plant = MujocoPlant(*placed) if is_exact else QuasiStaticPlant(*placed, soil=soil)
+    period, driven = PERIOD if is_exact else STEP, []
+    for speed, turn in commands_of(parts, period).tolist():
+        plant.drive(speed, turn, period)
+        row = row_of_plant(plant, (len(driven) + 1) * period)
+        slips = plant.simulated.measure_contacts().slip_speeds if is_exact else np.zeros(6)
+        driven.append((row, slips, speed))
+        if plant.state().stopped:
+            break
+    return map(np.array, zip(*driven, strict=True))
 
 
 def listen(outing: Outing) -> Alarms | None:
@@ -180,14 +183,13 @@ def listen(outing: Outing) -> Alarms | None:
         if learner.take(row):
             faults |= learner.estimate.faults
     told = learner.estimate
-    friction = told.friction
     return Alarms(
         outing,
         float(rows[-1, TIME] - rows[0, TIME]),
         None if outing.simulator == SOIL else slipped_in_truth(told, rows, slips, rover),
         stuck_in_truth(told, rows, rover),
         ", ".join(f"{wheel}: {why}" for wheel, why in faults.items()),
-        outing.simulator == SOIL or friction.low <= rover.friction <= (friction.high or np.inf),
+        outing.simulator == SOIL or has_truth(told.friction, rover.friction),
     )
 
 
@@ -197,8 +199,8 @@ def slipped_in_truth(
     """Return whether a wheel slipped in truth when it was said; None if it was not."""
     if told.slip_time is None:
         return None
-    times = rows[:, TIME]
-    then = (times > told.slip_time - BEFORE) & (times <= told.slip_time + 0.1)
+    since = rows[:, TIME] - told.slip_time
+    then = (since > -BEFORE) & (since <= 0.1)
     rolled = rover.wheel.radius * np.abs(rows[then][:, RATES]).mean(axis=0)
     return bool((slips[then].mean(axis=0) > TRUE_SLIP * np.maximum(rolled, 0.1 * SPEED)).any())
 
@@ -207,10 +209,8 @@ def stuck_in_truth(told: GroundEstimate, rows: np.ndarray, rover: Rover) -> bool
     """Return whether the rover was stuck in truth when it was said; None if it was not."""
     if told.immobilised_time is None:
         return None
-    times = rows[:, TIME]
-    then = rows[
-        (times > told.immobilised_time - STAYED_FOR - 0.3) & (times <= told.immobilised_time)
-    ]
+    since = rows[:, TIME] - told.immobilised_time
+    then = rows[(since > -STAYED_FOR - 0.3) & (since <= 0.0)]
     way = np.hypot(*(then[-1] - then[0])[[X, Y]]) + LEVER * abs(then[-1, YAW] - then[0, YAW])
     rolled = rover.wheel.radius * np.abs(then[:, RATES].mean(axis=0)).mean()
     return bool(way < STAYS * rolled * (then[-1, TIME] - then[0, TIME]))
@@ -238,30 +238,23 @@ def main(
         for simulator in simulators
         for k in range(count)
     ]
-    heard = [one for one in run_in_processes(listen, [(o,) for o in outings], 2) if one]
-    table = []
-    for simulator in simulators:
-        for name in (*names, "all"):
-            own = [
-                one
-                for one in heard
-                if one.outing.simulator == simulator and name in (one.outing.ground, "all")
-            ]
-            driven = sum(one.seconds for one in own) / 3600.0
-            false = [sum(getattr(o, what) is False for o in own) for what in ("slip", "stuck")]
-            false.append(sum(bool(one.faults) for one in own))
-            true = [sum(getattr(o, what) is True for o in own) for what in ("slip", "stuck")]
-            cells = [rate(n, driven) if name == "all" else str(n) for n in false]
-            outside = sum(not one.is_within for one in own)
-            table.append((simulator, name, f"{driven:.2f}", *cells, *map(str, true), str(outside)))
+    heard = [one for one in run_in_processes(listen, [(o,) for o in outings]) if one]
+    rows: list[tuple] = []
+    for simulator, name in itertools.product(simulators, (*names, "all")):
+        here = [one for one in heard if one.outing.simulator == simulator]
+        own = [one for one in here if name in (one.outing.ground, "all")]
+        driven = sum(one.seconds for one in own) / 3600.0
+        *false, outside, slipped, stuck = (
+            np.array([one.counts for one in own]).reshape(-1, 6).sum(axis=0)
+        )
+        cells = [rate(n, driven) for n in false] if name == "all" else false
+        rows.append((simulator, name, driven, *cells, slipped, stuck, outside))
     for one in heard:
-        if one.slip is False or one.stuck is False or one.faults or not one.is_within:
+        if any(one.counts[:4]):
             print(one)
-    headings = "simulator", "ground", "hours", "slip", "stuck", "sensor"
-    more = "slipped in truth", "stuck in truth", "friction outside"
-    print_table(
-        "False alarms in ordinary drives; in the last row per hour", (*headings, *more), table
-    )
+    headings = "slip", "stuck", "sensor", "slipped in truth", "stuck in truth", "friction outside"
+    columns = {"simulator": "", "ground": "", "hours": ".2f"} | dict.fromkeys(headings, "")
+    print_table("False alarms in ordinary drives; in the last row per hour", columns, rows)
 
 
 if __name__ == "__main__":

@@ -71,10 +71,14 @@ def main(grounds: Annotated[int, typer.Option(help="Number of grounds.")] = 3) -
     table = []
     for name, own in found.items():
         errors, scores, apart = np.array(own, float).T
-        shares = np.median(errors), np.mean(scores < 1.96), apart.mean()
-        table.append((name, *(f"{share:.0%}" for share in shares)))
-    headings = "quantity", "median error", "within 1.96 std", "told apart"
-    print_table("Drives over soil, where another one was told", headings, table)
+        table.append((name, np.median(errors), np.mean(scores < 1.96), apart.mean()))
+    columns = {
+        "quantity": "",
+        "median error": ".0%",
+        "within 1.96 std": ".0%",
+        "told apart": ".0%",
+    }
+    print_table("Drives over soil, where another one was told", columns, table)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ It needs the extra `bench`. Drives are drawn at random: ground, friction, contro
 
 import hashlib
 import tempfile
-import time
+from collections import defaultdict
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
@@ -19,37 +19,22 @@ from benchmarks.drives import (
     BY_MOTION,
     DROOP,
     END,
-    MAX_OFFSET,
-    MAX_TILT,
     PERIOD,
     SERVO,
     SPEED,
     START,
-    DriveSteering,
     Obstacle,
-    make_controller,
+    follow_axis,
     run_in_processes,
 )
 from benchmarks.measure import print_table
 from rover_physics import Rover, Terrain, load_rover
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.terrain.grid import save_terrain
-from rover_planner.learning.drive_log import (
-    PITCH,
-    RATES,
-    ROLL,
-    STEERING,
-    SUSPENSION,
-    TIME,
-    TORQUES,
-    WIDTH,
-    YAW,
-    X,
-    Y,
-)
+from rover_planner.learning import drive_log as log
 from rover_planner.learning.friction_filter import FrictionEstimate
 from rover_planner.learning.ground_learner import GroundEstimate, GroundLearner
-from rover_planner.learning.wheel_odometry import WheelMotion, WheelOdometry
+from rover_planner.learning.wheel_odometry import GYRO_BIAS, GYRO_NOISE, WheelMotion, WheelOdometry
 from rover_planner.simulator.mujoco_rover import MujocoRover
 from support.learning_drives import write_csv
 
@@ -113,16 +98,15 @@ class LearningDrive:
         ground = self.obstacle.ground
         if self.layout == CONSTANT:
             return ground
-        x = np.linspace(ground.bounds[0], ground.bounds[1], ground.elevation.shape[1])
-        y = np.linspace(ground.bounds[2], ground.bounds[3], ground.elevation.shape[0])
-        first = y[:, None] + 0.0 * x < 0.0 if self.layout == SIDES else x + 0.0 * y[:, None] < 0.0
-        return replace(ground, friction=np.where(first, *self.frictions))
+        rows, columns = np.indices(ground.elevation.shape)
+        cells = ground.origin + ground.resolution * np.stack([columns, rows], axis=-1)
+        return replace(ground, friction=self.find_friction(cells))
 
     def find_friction(self, places: np.ndarray) -> np.ndarray:
-        """Return the friction (n,) at places (n, 2)."""
+        """Return the friction (...) at places (..., 2)."""
         if self.layout == CONSTANT:
-            return np.full(len(places), self.frictions[0])
-        return np.where(places[:, 1 if self.layout == SIDES else 0] < 0.0, *self.frictions)
+            return np.full(places.shape[:-1], self.frictions[0])
+        return np.where(places[..., 1 if self.layout == SIDES else 0] < 0.0, *self.frictions)
 
     def add_noise(self, rows: np.ndarray) -> np.ndarray:
         """Return the rows that are kept, with noise."""
@@ -148,7 +132,7 @@ class Recorded:
     """A drive as it was."""
 
     rows: np.ndarray
-    """(n, WIDTH) rows without noise."""
+    """(n, log.WIDTH) rows without noise."""
     passed: bool
     """Whether it reached its end."""
 
@@ -174,27 +158,17 @@ def draw_drive(seed: int, number: int) -> LearningDrive:
     )
 
 
-def record(drive: LearningDrive, keep: Path | None = None) -> Recorded:
-    """Drive in MuJoCo; a folder keeps what was driven."""
-    file = None if keep is None else keep / f"{abs(hash_of(drive)):016x}.npz"
-    if file is not None and file.exists():
+def record(drive: LearningDrive, keep: Path) -> Recorded:
+    """Drive in MuJoCo, unless a folder has what was driven; keep it there."""
+    file = keep / f"{hash_of(drive):016x}.npz"
+    if file.exists():
         with np.load(file) as kept:
             return Recorded(kept["rows"], bool(kept["passed"]))
-    obstacle = drive.obstacle
-    plant = MujocoRover(
-        obstacle.rover, drive.ground, (START, 0.0, 0.0), drive.frictions[0], drive.timestep
-    )
-    steering = DriveSteering(plant, 1)
-    control = make_controller(drive.controller, plant, obstacle, steering)
-    rows = []
-    while plant.time < 1.5 * (END - START) / SPEED and plant.pose[0] < END:
-        control()
-        if plant.tilt > MAX_TILT or abs(plant.pose[1]) > MAX_OFFSET:
-            break
-        rows.append(row_of(plant))
-    recorded = Recorded(np.array(rows).reshape(-1, WIDTH), bool(plant.pose[0] >= END))
-    if file is not None:
-        np.savez(file, rows=recorded.rows, passed=recorded.passed)
+    obstacle, start = drive.obstacle, (START, 0.0, 0.0)
+    plant = MujocoRover(obstacle.rover, drive.ground, start, drive.frictions[0], drive.timestep)
+    rows = [row_of(plant) for _ in follow_axis(plant, obstacle, drive.controller, most_time=1.5)]
+    recorded = Recorded(np.array(rows).reshape(-1, log.WIDTH), bool(plant.pose[0] >= END))
+    np.savez(file, rows=recorded.rows, passed=recorded.passed)
     return recorded
 
 
@@ -206,13 +180,13 @@ def hash_of(drive: LearningDrive) -> int:
 
 def row_of(plant: MujocoRover) -> np.ndarray:
     """Return what is measured now."""
-    row = np.full(WIDTH, np.nan)
+    row = np.full(log.WIDTH, np.nan)
     pose, joints = plant.pose, plant.joint_positions
-    row[[TIME, X, Y, YAW]] = plant.time, pose[0], pose[1], pose[3]
-    row[[ROLL, PITCH]] = plant.attitude
-    row[SUSPENSION] = [joints[name] for name in SUSPENSION_JOINTS]
-    row[RATES], row[TORQUES] = plant.wheel_rates, plant.wheel_torques
-    row[STEERING] = plant.steering_angles
+    row[[log.TIME, log.X, log.Y, log.YAW]] = plant.time, pose[0], pose[1], pose[3]
+    row[[log.ROLL, log.PITCH]] = plant.attitude
+    row[log.SUSPENSION] = [joints[name] for name in SUSPENSION_JOINTS]
+    row[log.RATES], row[log.TORQUES] = plant.wheel_rates, plant.wheel_torques
+    row[log.STEERING] = plant.steering_angles
     return row
 
 
@@ -221,18 +195,22 @@ def add_noise(rows: np.ndarray, noise: str, seed: int, step: int = 1) -> np.ndar
     rows = rows[::step].copy()
     position, drift, attitude, suspension, torque, rate = NOISE[noise]
     rng = np.random.default_rng(seed)
-    ways = np.append(0.0, np.hypot(*np.diff(rows[:, [X, Y]], axis=0).T))
+    ways = np.append(0.0, np.hypot(*np.diff(rows[:, [log.X, log.Y]], axis=0).T))
     for columns, sigma in (
-        ([X, Y], position),
-        ([YAW, ROLL, PITCH], attitude),
-        (SUSPENSION, suspension),
-        (TORQUES, torque),
-        (RATES, rate),
+        ([log.X, log.Y], position),
+        ([log.YAW, log.ROLL, log.PITCH], attitude),
+        (log.SUSPENSION, suspension),
+        (log.TORQUES, torque),
+        (log.RATES, rate),
     ):
         rows[:, columns] += sigma * rng.standard_normal(rows[:, columns].shape)
     course = rng.uniform(-np.pi, np.pi)
-    rows[:, [X, Y]] += drift * np.cumsum(ways)[:, None] * [np.cos(course), np.sin(course)]
+    rows[:, [log.X, log.Y]] += drift * np.cumsum(ways)[:, None] * [np.cos(course), np.sin(course)]
     return rows
+
+
+Pair = tuple[FrictionEstimate, float]
+"""An estimate and the truth."""
 
 
 @dataclass(frozen=True)
@@ -245,115 +223,108 @@ class Learned:
     """The estimate at its end."""
     under: np.ndarray
     """(6,) friction under the wheels at its end."""
-    early: tuple[float, bool] | None
-    """Error of the mean, relative, when slip first bounds it; whether the interval has the truth.
-    For constant friction only."""
+    early: FrictionEstimate | None
+    """The friction when slip first bounds it."""
     stuck_time: float | None
     """When the rover was stuck in truth [s]."""
     passed: bool
     """Whether it reached its end."""
-    cost: float
-    """CPU time over the time of the drive."""
+
+    @property
+    def friction(self) -> Pair:
+        """The friction, and that under most wheels."""
+        return self.estimate.friction, float(np.median(self.under))
+
+    @property
+    def pairs(self) -> list[Pair]:
+        """The friction; per side, each with its own."""
+        if self.drive.layout != SIDES:
+            return [self.friction]
+        truths = np.median(self.under.reshape(2, -1), axis=1).tolist()
+        return list(zip(self.estimate.sides.values(), truths, strict=True))
 
 
-def learn(drive: LearningDrive, keep: Path | None = None) -> Learned | None:
+def learn(drive: LearningDrive, keep: Path) -> Learned | None:
     """Drive and learn; None where the rover could not stand at the start, or left the map."""
     recorded = record(drive, keep)
     if len(recorded.rows) < 50:
         return None
-    rover = told_rover()
-    learner = GroundLearner(rover, drive.obstacle.ground)
+    learner, early = GroundLearner(told_rover(), drive.obstacle.ground), None
     learner.commanded = SPEED
-    rows = drive.add_noise(recorded.rows)
-    early = None
-    began = time.process_time()
-    for row in rows:
+    for row in drive.add_noise(recorded.rows):
         if learner.take(row) and early is None:
             estimate = learner.estimate
             if estimate.slip_time is not None and estimate.friction.high is not None:
                 early = estimate.friction
-    cost = (time.process_time() - began) / (rows[-1, TIME] - rows[0, TIME])
-    first = None
-    if early is not None and drive.layout == CONSTANT:
-        mu = drive.frictions[0]
-        first = early.mean / mu - 1.0, early.low <= mu <= (early.high or np.inf)
     if learner.window is None:
         return None
     under = drive.find_friction(learner.window.places)
-    return Learned(
-        drive, learner.estimate, under, first, find_stuck(recorded), recorded.passed, cost
-    )
+    return Learned(drive, learner.estimate, under, early, find_stuck(recorded), recorded.passed)
 
 
-GYRO_NOISE, GYRO_BIAS = 2e-3, 1e-4
-"""Noise [rad/sqrt(s)] and standard deviation of the bias [rad/s] of the yaw rate."""
+def has_truth(estimate: FrictionEstimate, truth: float) -> bool:
+    """Return whether the interval of a friction has the truth."""
+    return estimate.low <= truth <= (estimate.high or np.inf)
 
 
 def measure_motion(rows: np.ndarray, truth: np.ndarray, seed: int) -> list[WheelMotion]:
     """Return what wheels and IMU measured in a drive, of rows with noise and without."""
-    rng, times = np.random.default_rng(seed), rows[:, TIME]
+    rng, times = np.random.default_rng(seed), rows[:, log.TIME]
     noise = GYRO_NOISE / np.sqrt(np.median(np.diff(times))) * rng.standard_normal(len(rows))
-    yaw_rates = np.gradient(truth[:, YAW], times) + noise + GYRO_BIAS * rng.standard_normal()
+    yaw_rates = np.gradient(truth[:, log.YAW], times) + noise + GYRO_BIAS * rng.standard_normal()
     return [
         WheelMotion(
-            row[TIME],
-            row[RATES],
-            np.nan_to_num(row[STEERING]),
-            *row[[ROLL, PITCH]],
-            w,
-            row[TORQUES],
+            row[log.TIME],
+            row[log.RATES],
+            steering,
+            *row[[log.ROLL, log.PITCH]],
+            rate,
+            row[log.TORQUES],
         )
-        for row, w in zip(rows, yaw_rates, strict=True)
+        for row, steering, rate in zip(
+            rows, np.nan_to_num(rows[:, log.STEERING]), yaw_rates, strict=True
+        )
     ]
 
 
 def print_odometry(drives: list[LearningDrive], keep: Path) -> None:
     """Print misses at the ends of drives without visual odometry, after those before with it."""
     rover = told_rover()
-    radius, teacher = rover.wheel.radius, WheelOdometry(rover)
-    found: dict[str, list[tuple[float, float, float]]] = {}
+    teacher, found = WheelOdometry(rover), defaultdict[str, list[tuple[float, ...]]](list)
     for drive in drives:
         recorded = record(drive, keep)
         if not recorded.passed:
             continue
         truth, rows = recorded.rows[:: drive.step], drive.add_noise(recorded.rows)
         motions = measure_motion(rows, truth, drive.seed)
-        known, pupil, plain = WheelOdometry(rover), WheelOdometry(rover), np.zeros(2)
+        known, pupil, yaws = WheelOdometry(rover), WheelOdometry(rover), []
         for one in (known, pupil):
             one.forward, one.side = teacher.forward, teacher.side
         for motion in motions:
-            before = known.pose[2]
             known.take(motion)
-            if motion is not motions[0]:
-                yaw = 0.5 * (before + known.pose[2])
-                way = radius * motion.rates.mean() * PERIOD * drive.step
-                plain += way * np.array([np.cos(yaw), np.sin(yaw)])
-        c, s = np.cos(truth[0, YAW]), np.sin(truth[0, YAW])
-        end = np.array([[c, s], [-s, c]]) @ (truth[-1] - truth[0])[[X, Y]]
+            yaws.append(known.pose[2])
+        between = 0.5 * np.add(yaws[:-1], yaws[1:])
+        ways = rover.wheel.radius * rows[1:, log.RATES].mean(axis=1) * PERIOD * drive.step
+        plain = np.array([np.cos(between), np.sin(between)]) @ ways
+        c, s = np.cos(truth[0, log.YAW]), np.sin(truth[0, log.YAW])
+        end = np.array([[c, s], [-s, c]]) @ (truth[-1] - truth[0])[[log.X, log.Y]]
         miss = known.pose[:2] - end
-        nees = float(miss @ np.linalg.solve(known.covariance[:2, :2], miss))
+        nees = miss @ np.linalg.solve(known.covariance[:2, :2], miss)
         if drive is not drives[0]:
-            sizes = float(np.hypot(*miss)), float(np.hypot(*(plain - end)))
-            found.setdefault(drive.kind, []).append((*sizes, nees))
+            found[drive.kind].append((np.hypot(*miss), np.hypot(*(plain - end)), nees))
         for motion, row in zip(motions, rows, strict=True):
             pupil.take(motion)
-            pupil.learn(row[[X, Y, YAW]])
+            pupil.learn(row[[log.X, log.Y, log.YAW]])
     table = []
     for kind, values in found.items():
         own, plain_miss, nees = np.array(values).T
-        table.append(
-            (
-                kind,
-                f"{len(own)}",
-                f"{own.mean():.3f}",
-                f"{plain_miss.mean():.3f}",
-                f"{plain_miss.mean() / own.mean():.1f}",
-                f"{nees.mean():.1f}",
-                f"{np.mean(nees < 5.99):.0%}",
-            )
-        )
-    headings = "ground", "drives", "miss [m]", "plain [m]", "times better", "NEES", "within 95 %"
-    print_table("Wheel odometry at the ends of drives, without visual odometry", headings, table)
+        better = plain_miss.mean() / own.mean()
+        means = own.mean(), plain_miss.mean(), better, nees.mean()
+        table.append((kind, len(own), *means, np.mean(nees < 5.99)))
+    columns = {"ground": "", "drives": "", "miss [m]": ".3f", "plain [m]": ".3f"}
+    columns |= {"times better": ".1f", "NEES": ".1f", "within 95 %": ".0%"}
+    title = "Wheel odometry at the ends of drives, without visual odometry"
+    print_table(title, columns, table)
 
 
 def told_rover() -> Rover:
@@ -363,7 +334,7 @@ def told_rover() -> Rover:
 
 def find_stuck(recorded: Recorded) -> float | None:
     """Return the time [s] from which a rover stayed to the end, None if it did not."""
-    times, places = recorded.rows[:, TIME], recorded.rows[:, [X, Y]]
+    times, places = recorded.rows[:, log.TIME], recorded.rows[:, [log.X, log.Y]]
     away = np.hypot(*(places - places[-1]).T) >= STAYED
     half = round(0.5 * MOTION_TIME / PERIOD)
     before, after = slice(None, -2 * half), slice(2 * half, None)
@@ -384,94 +355,71 @@ def main(
     ] = None,
 ) -> None:
     """Learn from drives and print errors, coverage and times."""
-    if example is not None:
-        example.mkdir(parents=True, exist_ok=True)
-        write_csv(example / "drive.csv", EXAMPLE.add_noise(record(EXAMPLE).rows))
-        save_terrain(example / "terrain.npz", EXAMPLE.obstacle.ground)
-        return
     keep = keep or Path(tempfile.mkdtemp())
     keep.mkdir(parents=True, exist_ok=True)
+    if example is not None:
+        example.mkdir(parents=True, exist_ok=True)
+        write_csv(example / "drive.csv", EXAMPLE.add_noise(record(EXAMPLE, keep).rows))
+        save_terrain(example / "terrain.npz", EXAMPLE.obstacle.ground)
+        return
     jobs = [(draw_drive(seed, number), keep) for number in range(drives)]
-    learned = [one for one in run_in_processes(learn, jobs, 2) if one is not None]
-    rows = []
-    for one in learned:
-        friction, sides = one.estimate.friction, one.estimate.sides
-        truth = float(np.median(one.under))
-        times = one.estimate.slip_time, one.stuck_time, one.estimate.immobilised_time
-        high = "-" if friction.high is None else f"{friction.high:.2f}"
-        rows.append(
-            (
-                one.drive.label,
-                f"{friction.mean:.2f} [{friction.low:.2f}, {high}]",
-                "" if friction.high is None else f"{friction.mean / truth - 1.0:+.0%}",
-                "" if is_within(one) else "outside",
-                "" if one.early is None else f"{one.early[0]:+.0%}",
-                " ".join(f"{s.mean:.2f}" for s in sides.values()),
-                *("" if t is None else f"{t:.1f}" for t in times),
-                " ".join(one.estimate.faults.values()),
-            )
-        )
-    headings = "drive", "friction", "error", "interval", "early", "right left"
-    print_table(
-        "What was learned", (*headings, "slip [s]", "stuck [s]", "noticed [s]", "faults"), rows
-    )
+    learned = [one for one in run_in_processes(learn, jobs) if one is not None]
+    columns = {"drive": "", "friction": "", "error": "+.0%", "interval": "", "early": "+.0%"}
+    columns |= {"right left": "", "slip [s]": ".1f", "stuck [s]": ".1f", "noticed [s]": ".1f"}
+    print_table("What was learned", columns | {"faults": ""}, map(describe, learned))
     print_summary(learned)
     print_odometry([job[0] for job in jobs], keep)
 
 
-def compare(one: Learned) -> list[tuple[FrictionEstimate, float]]:
-    """Return estimates with the friction under most wheels; per side, each with its own."""
-    if one.drive.layout == SIDES:
-        truths = np.median(one.under.reshape(2, -1), axis=1).tolist()
-        return list(zip(one.estimate.sides.values(), truths, strict=True))
-    return [(one.estimate.friction, float(np.median(one.under)))]
-
-
-def is_within(one: Learned) -> bool:
-    """Return whether the intervals have the truth."""
-    return all(e.low <= mu and (e.high is None or mu <= e.high) for e, mu in compare(one))
+def describe(one: Learned) -> tuple[str | float | None, ...]:
+    """Return the row of a drive."""
+    estimate, (friction, truth) = one.estimate, one.friction
+    early, high = one.early if one.drive.layout == CONSTANT else None, friction.high
+    return (
+        one.drive.label,
+        f"{friction.mean:.2f} [{friction.low:.2f}, {f'{high:.2f}' if high else '-'}]",
+        friction.mean / truth - 1.0 if high else None,
+        "" if all(has_truth(*pair) for pair in one.pairs) else "outside",
+        early.mean / truth - 1.0 if early else None,
+        " ".join(f"{side.mean:.2f}" for side in estimate.sides.values()),
+        estimate.slip_time,
+        one.stuck_time,
+        estimate.immobilised_time,
+        " ".join(estimate.faults.values()),
+    )
 
 
 def print_summary(learned: list[Learned]) -> None:
-    """Print the summary of all drives by layout."""
+    """Print errors and coverage by layout of the friction, and what was noticed of sticking."""
+    groups = {
+        layout: [one.pairs for one in learned if one.drive.layout == layout]
+        for layout in (CONSTANT, SIDES, LINE)
+    }
+    groups[f"{CONSTANT}, when slip first bounds it"] = [
+        [(one.early, one.drive.frictions[0])]
+        for one in learned
+        if one.early is not None and one.drive.layout == CONSTANT
+    ]
     rows = []
-    for layout in (CONSTANT, SIDES, LINE):
-        own = [one for one in learned if one.drive.layout == layout]
-        pairs = [pair for one in own for pair in compare(one)]
-        errors = [abs(e.mean / mu - 1.0) for e, mu in pairs if e.high is not None]
-        rows.append(
-            (
-                layout,
-                f"{len(own)}",
-                f"{len(errors)}",
-                f"{np.median(errors):.1%}" if errors else "",
-                f"{np.mean(np.array(errors) < 0.1):.0%}" if errors else "",
-                f"{np.mean([is_within(one) for one in own]):.0%}",
-            )
-        )
-    print_table(
-        "By layout of the friction",
-        ("friction", "drives", "bounded", "median error", "within 10 %", "interval has it"),
-        rows,
-    )
-    first = [one.early for one in learned if one.early is not None]
-    print(
-        f"constant, when slip first bounds it: {np.median([abs(e[0]) for e in first]):.0%} off, "
-        f"within 10 % in {np.mean([abs(e[0]) < 0.1 for e in first]):.0%}, "
-        f"interval has it in {np.mean([e[1] for e in first]):.0%} of {len(first)}"
-    )
-    stuck = [one for one in learned if one.stuck_time is not None]
-    noticed = [one.estimate.immobilised_time for one in stuck]
+    for name, drives in groups.items():
+        bounded = [pair for pairs in drives for pair in pairs if pair[0].high is not None]
+        errors = np.array([abs(friction.mean / truth - 1.0) for friction, truth in bounded])
+        within = [all(has_truth(*pair) for pair in pairs) for pairs in drives]
+        shares = (np.median(errors), np.mean(errors < 0.1)) if bounded else (None, None)
+        rows.append((name, len(drives), len(errors), *shares, np.mean(within)))
+    columns = {"friction": "", "drives": "", "bounded": "", "median error": ".1%"}
+    columns |= {"within 10 %": ".0%", "interval has it": ".0%"}
+    print_table("By layout of the friction", columns, rows)
+    stuck = [(one.stuck_time, one.estimate.immobilised_time) for one in learned]
     delays = sorted(
-        t - one.stuck_time
-        for t, one in zip(noticed, stuck, strict=True)
-        if t is not None and one.stuck_time is not None
+        noticed - since for since, noticed in stuck if since is not None and noticed is not None
     )
-    false = [one for one in learned if one.passed and one.estimate.immobilised_time is not None]
+    passed = [one.estimate.immobilised_time for one in learned if one.passed]
     late = ", ".join(f"{delay:.1f}" for delay in delays)
-    print(f"stuck: {len(stuck)}, noticed {len(delays)}, after [s]: {late}")
-    print(f"passed: {sum(one.passed for one in learned)}, said to be stuck: {len(false)}")
-    print(f"CPU: {100 * np.median([one.cost for one in learned]):.1f} % of a core")
+    count = sum(since is not None for since, _ in stuck)
+    print(f"stuck: {count}, noticed {len(delays)}, after [s]: {late}")
+    false = sum(noticed is not None for noticed in passed)
+    print(f"passed: {len(passed)}, said to be stuck: {false}")
 
 
 if __name__ == "__main__":

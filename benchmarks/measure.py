@@ -5,20 +5,22 @@ Functions that are compared run in turns, so that other load on the machine affe
 """
 
 import json
-import math
 import resource
 import statistics
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
+
+from rover_physics import Terrain, save_terrain
 
 REPEATS = 5
 """Default number of repeats of a measurement."""
@@ -79,6 +81,14 @@ def run_command(*words: object) -> Run:
     return Run(time.perf_counter() - began, cpu, printed)
 
 
+def run_predict(folder: Path, ground: Terrain, poses: np.ndarray) -> Run:
+    """Run `predict` of the rover lsr1 for poses (n, 3), with its files in a folder."""
+    files = [folder / name for name in ("ground.npz", "poses.npz", "out.npz")]
+    save_terrain(files[0], ground)
+    np.savez(files[1], poses=poses)
+    return run_command("predict", "lsr1", *files)
+
+
 def peak_memory(whose: int = resource.RUSAGE_CHILDREN) -> float:
     """Return the peak memory so far [MiB] of a child process, or of this one by RUSAGE_SELF."""
     return resource.getrusage(whose).ru_maxrss / 1024
@@ -110,12 +120,6 @@ def median_times(
     return [statistics.median(taken) for taken in times]
 
 
-def quantile(values: Sequence[float], share: float) -> float:
-    """Return the quantile of the values for a share of 0 to 1, without interpolation."""
-    ordered = sorted(values)
-    return ordered[max(0, math.ceil(share * len(ordered)) - 1)]
-
-
 def console(stderr: bool = False) -> Console:
     """Return a console whose tables are not cut off where the output is a file."""
     made = Console(stderr=stderr)
@@ -123,32 +127,47 @@ def console(stderr: bool = False) -> Console:
     return made
 
 
-def print_table(title: str, headings: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
-    """Print rows of texts and numbers as a table; columns of numbers are aligned to the right."""
-    table, cells = Table(title=escape(title)), [list(row) for row in rows]
-    for column, heading in enumerate(headings):
-        numeric = bool(cells) and all(str(row[column])[:1] in "-+0123456789" for row in cells)
+def print_table(
+    title: str, columns: Mapping[str, str], rows: Iterable[Sequence[str | float | None]]
+) -> None:
+    """Print rows of texts and numbers as a table; numbers are aligned to the right.
+
+    Args:
+        title: What the table has.
+        columns: Format of the numbers in each column, by heading.
+        rows: The cells; None stays empty.
+    """
+    table = Table(title=escape(title))
+    forms = list(columns.values())
+    texts = [list(map(_text, row, forms)) for row in rows]
+    for k, heading in enumerate(columns):
+        numeric = bool(texts) and all(row[k][:1] in "-+0123456789" for row in texts)
         table.add_column(escape(heading), justify="right" if numeric else "left")
-    for row in cells:
-        table.add_row(*(escape(str(cell)) for cell in row))
+    for row in texts:
+        table.add_row(*map(escape, row))
     console().print(table)
+
+
+def _text(cell: str | float | None, form: str) -> str:
+    if cell is None:
+        return ""
+    return cell if isinstance(cell, str) else format(cell, form)
 
 
 def print_figures(figures: Sequence[Figure]) -> None:
     """Print figures as a table."""
     headings = ("topic", "measured", "against", "repeats", "value", "target", "")
-    print_table("Medians; targets with a tick are met", headings, map(_row, figures))
+    title = "Medians; targets with a tick are met"
+    print_table(title, dict.fromkeys(headings, ""), map(_row, figures))
 
 
-def _row(figure: Figure) -> list[Any]:
-    large = abs(figure.value) >= 1000.0
-    value = f"{figure.value:,.0f}" if large else f"{figure.value:.3g}"
-    target = mark = ""
-    if figure.target is not None:
-        target = f"{'>=' if figure.at_least else '<='} {figure.target:,g}"
-        mark = "✓" if figure.met else "✗"
-    value = f"{value} {figure.unit}".strip()
-    return [figure.topic, figure.name, figure.against, figure.repeats, value, target, mark]
+def _row(figure: Figure) -> tuple[str | float, ...]:
+    value = f"{figure.value:{',.0f' if abs(figure.value) >= 1000.0 else '.3g'}} {figure.unit}"
+    sign = ">=" if figure.at_least else "<="
+    target = "" if figure.target is None else f"{sign} {figure.target:,g}"
+    mark = {None: "", True: "✓", False: "✗"}[figure.met]
+    shown = value.strip(), target, mark
+    return (figure.topic, figure.name, figure.against, figure.repeats, *shown)
 
 
 def write_figures(figures: Sequence[Figure], path: Path) -> None:

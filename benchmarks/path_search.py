@@ -6,9 +6,7 @@ Run from the repository, on one core: taskset -c 0 python -m benchmarks.path_sea
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from pathlib import Path
+from dataclasses import replace
 from typing import Annotated, Any
 from unittest import mock
 
@@ -17,8 +15,8 @@ import typer
 from numpy.typing import NDArray
 
 from benchmarks.grounds import real_maps
-from benchmarks.measure import console, print_table, quantile, write_rows
-from rover_physics import Rover, Terrain, judge_path, load_rover
+from benchmarks.measure import console, print_table
+from rover_physics import Terrain, judge_path, load_rover
 from rover_physics.names import EQUAL
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.edge_memory import EdgeMemory
@@ -38,110 +36,82 @@ MADE = {
     "craters": {"seed": 18, "rock_cover": 0.01, "crater_density": 0.1},
 }
 """Arguments of the made Mars terrains, 24 x 24 m at 5 cm."""
+ROVER, OPTIONS = load_rover("lsr1"), PathQueryOptions(accepted_chance=1.0).change(policy=EQUAL)
+"""The rover, and the options of `rover_planner plan`."""
 DRAWN = 2000
 """Number of poses drawn at a time."""
 SIDE, CHANGE = 1.0, 0.02
 """Side of the square of the map that changes, and largest change of the heights in it [m]."""
 
 
-@dataclass(frozen=True, eq=False)
-class SearchCase:
-    """A rover on a ground."""
-
-    name: str
-    """Name of the ground."""
-    rover: Rover
-    """The rover."""
-    terrain: Terrain
-    """The ground."""
-    policy: str = EQUAL
-    """Torque policy."""
-
-    @cached_property
-    def options(self) -> PathQueryOptions:
-        """The options of `rover_planner plan`."""
-        return PathQueryOptions(accepted_chance=1.0).change(policy=self.policy)
-
-    @property
-    def judge(self) -> PathJudge:
-        """A new judge."""
-        return PathJudge(self.rover, self.terrain, self.options)
-
-    def question(self, pair: Pair, terrain: Terrain | None = None) -> SearchQuery:
-        """Return the question for a path between two poses."""
-        return SearchQuery(self.rover, terrain or self.terrain, *pair, self.options)
-
-    def search(
-        self,
-        pair: Pair,
-        budget: float,
-        memory: EdgeMemory | None = None,
-        terrain: Terrain | None = None,
-        ends_at_first: bool = False,
-    ) -> SearchResult:
-        """Search a path; CPU time is its clock, so that other programs do not cut its budget."""
-        settings = LatticeSettings(budget=budget, ends_at_first=ends_at_first)
-        with mock.patch("time.perf_counter", time.process_time):
-            return find_path(self.question(pair, terrain), settings, memory)
-
-    def pairs(self, count: int, seed: int) -> list[Pair]:
-        """Return random pairs of poses on which the rover can stand, NEAREST to FURTHEST apart."""
-        rng, found = np.random.default_rng(seed), []
-        standing = self._standing(rng)
-        start, misses = next(standing), 0
-        while len(found) < count:
-            goal = next(standing)
-            if NEAREST <= np.hypot(*(goal - start)[:2]) <= FURTHEST:
-                found.append((start, goal))
-                start, misses = next(standing), 0
-            elif (misses := misses + 1) > 100:
-                start, misses = next(standing), 0
-        return found
-
-    def _standing(self, rng: np.random.Generator) -> Iterator[NDArray[np.float64]]:
-        """Yield random poses (3,) on which the rover can stand, without end."""
-        xmin, xmax, ymin, ymax = self.terrain.bounds
-        while True:
-            poses = rng.uniform((xmin, ymin, -np.pi), (xmax, ymax, np.pi), (DRAWN, 3))
-            stands = np.array([code == "" for code in self.judge.stand(poses)])
-            if not stands.any():
-                raise ValueError(f"the rover stands at none of {DRAWN} poses on {self.name}")
-            yield from poses[stands]
+def search(
+    terrain: Terrain,
+    pair: Pair,
+    budget: float,
+    memory: EdgeMemory | None = None,
+    ends_at_first: bool = False,
+) -> SearchResult:
+    """Search a path; CPU time is its clock, so that other programs do not cut its budget."""
+    settings = LatticeSettings(budget=budget, ends_at_first=ends_at_first)
+    with mock.patch("time.perf_counter", time.process_time):
+        return find_path(SearchQuery(ROVER, terrain, *pair, OPTIONS), settings, memory)
 
 
-def run_case(case: SearchCase, asked: dict[str, Any]) -> Iterator[dict[str, Any]]:
+def draw_pairs(terrain: Terrain, count: int, seed: int) -> list[Pair]:
+    """Return random pairs of poses on which the rover can stand, NEAREST to FURTHEST apart."""
+    rng, found = np.random.default_rng(seed), []
+    standing = draw_standing(terrain, rng)
+    start, misses = next(standing), 0
+    while len(found) < count:
+        goal = next(standing)
+        if NEAREST <= np.hypot(*(goal - start)[:2]) <= FURTHEST:
+            found.append((start, goal))
+            start, misses = next(standing), 0
+        elif (misses := misses + 1) > 100:
+            start, misses = next(standing), 0
+    return found
+
+
+def draw_standing(terrain: Terrain, rng: np.random.Generator) -> Iterator[NDArray[np.float64]]:
+    """Yield random poses (3,) on which the rover can stand, without end."""
+    xmin, xmax, ymin, ymax = terrain.bounds
+    while True:
+        poses = rng.uniform((xmin, ymin, -np.pi), (xmax, ymax, np.pi), (DRAWN, 3))
+        codes = PathJudge(ROVER, terrain, OPTIONS).stand(poses)
+        stands = np.array([code == "" for code in codes])
+        if not stands.any():
+            raise ValueError(f"the rover stands at none of {DRAWN} poses")
+        yield from poses[stands]
+
+
+def run_case(name: str, terrain: Terrain, asked: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """Yield what is found of each pair of a ground.
 
     `asked` has the options of `main`: count, seed, budget, longest and warm.
     """
-    pairs = case.pairs(asked["count"], asked["seed"])
-    case.search(pairs[0], asked["budget"])  # compiles, and reads the code from the disk
+    pairs, budget = draw_pairs(terrain, asked["count"], asked["seed"]), asked["budget"]
+    search(terrain, pairs[0], budget)  # compiles, and reads the code from the disk
     for index, pair in enumerate(pairs):
-        row = try_pair(case, pair, asked["budget"])
-        if row["outcome"] == OUT_OF_TIME and asked["longest"] > asked["budget"]:
-            late = case.search(pair, asked["longest"], ends_at_first=True)
+        row = {"ground": name} | try_pair(terrain, pair, budget)
+        if row["outcome"] == OUT_OF_TIME and asked["longest"] > budget:
+            late = search(terrain, pair, asked["longest"], ends_at_first=True)
             row |= {"late": late.outcome == FOUND, "seconds_first": late.seconds_first}
         if index < asked["warm"]:
-            answer = try_warm(case, pair, asked["budget"], index)
+            answer = try_warm(terrain, pair, budget, index)
             row |= {"warm_outcome": answer.outcome, "warm_first": answer.seconds_first}
         yield row
 
 
-def try_pair(case: SearchCase, pair: Pair, budget: float) -> dict[str, Any]:
+def try_pair(terrain: Terrain, pair: Pair, budget: float) -> dict[str, Any]:
     """Search a path, judge it once more as `predict` does, and return what was found."""
-    answer = case.search(pair, budget)
-    passes = None
+    answer, passes = search(terrain, pair, budget), None
     if answer.path is not None:
-        options = case.options.model
-        passes = judge_path(case.rover, case.terrain, answer.path.poses, options)[1].traversable
+        passes = judge_path(ROVER, terrain, answer.path.poses, OPTIONS.model)[1].traversable
     return {
-        "ground": case.name,
         "distance": float(np.hypot(*(pair[1] - pair[0])[:2])),
         "outcome": answer.outcome,
         "seconds_first": answer.seconds_first,
         "seconds": answer.seconds,
-        "length": np.nan if answer.path is None else answer.path.length,
-        "cost": answer.cost,
         "bound": answer.bound,
         "judged_share": answer.edges_judged / max(1, answer.edges),
         "repeatable": answer.repeatable,
@@ -149,18 +119,18 @@ def try_pair(case: SearchCase, pair: Pair, budget: float) -> dict[str, Any]:
     }
 
 
-def try_warm(case: SearchCase, pair: Pair, budget: float, seed: int) -> SearchResult:
+def try_warm(terrain: Terrain, pair: Pair, budget: float, seed: int) -> SearchResult:
     """Return the answer after a change of the map near a path.
 
     The path is searched first, then heights in a square on it change, and it is searched again
     with what is known. Without a first path, the square lies midway between start and goal.
     """
     memory = EdgeMemory()
-    before = case.search(pair, budget, memory)
+    before = search(terrain, pair, budget, memory)
     middle = 0.5 * (pair[0] + pair[1])
     if before.path is not None:
         middle = before.path.poses[len(before.path.poses) // 2]
-    return case.search(pair, budget, memory, change_heights(case.terrain, middle, seed))
+    return search(change_heights(terrain, middle, seed), pair, budget, memory)
 
 
 def change_heights(terrain: Terrain, middle: np.ndarray, seed: int) -> Terrain:
@@ -173,12 +143,13 @@ def change_heights(terrain: Terrain, middle: np.ndarray, seed: int) -> Terrain:
     return replace(terrain, elevation=terrain.elevation + height * shape)
 
 
-def describe(values: Sequence[float], digits: int = 2) -> str:
+def describe(values: Sequence[float]) -> str:
     """Return the median and the 95th percentile of values as text."""
     known = [value for value in values if np.isfinite(value)]
     if not known:
         return "-"
-    return f"{quantile(known, 0.5):.{digits}f}; {quantile(known, 0.95):.{digits}f}"
+    median, late = np.quantile(known, (0.5, 0.95), method="inverted_cdf")
+    return f"{median:.2f}; {late:.2f}"
 
 
 def summarise(rows: Rows) -> Iterator[tuple[str, str]]:
@@ -212,8 +183,9 @@ def show(rows: Rows) -> None:
     names = list(dict.fromkeys(row["ground"] for row in rows))
     columns = [dict(summarise([row for row in rows if row["ground"] == name])) for name in names]
     lines = dict.fromkeys(line for values in columns for line in values)
-    cells = [(line, *(values.get(line, "") for values in columns)) for line in lines]
-    print_table("Median; 95th percentile. Times are CPU time", ("", *names), cells)
+    cells = [(line, *(values.get(line) for values in columns)) for line in lines]
+    headings = dict.fromkeys(("", *names), "")
+    print_table("Median; 95th percentile. Times are CPU time", headings, cells)
 
 
 def main(
@@ -225,11 +197,8 @@ def main(
     longest: Annotated[
         float, typer.Option(help="Budget in s of a second search where the first found none.")
     ] = 60.0,
-    policy: Annotated[str, typer.Option(help="Torque policy.")] = EQUAL,
-    rover: Annotated[str, typer.Option(help="Rover.")] = "lsr1",
     seed: Annotated[int, typer.Option(help="Seed of the pairs.")] = 0,
     warm: Annotated[int, typer.Option(help="Pairs asked again after a change of the map.")] = 0,
-    out: Annotated[Path | None, typer.Option(help="Write all rows as JSON.")] = None,
 ) -> None:
     """Search paths between random poses and print what was found, in what time."""
     asked, rows = dict(locals()), []
@@ -238,13 +207,11 @@ def main(
         if ground and not any(name.startswith(beginning) for beginning in ground):
             continue
         began = time.perf_counter()
-        for row in run_case(SearchCase(name, load_rover(rover), terrain, policy), asked):
+        for row in run_case(name, terrain, asked):
             rows.append(row)
             taken = time.perf_counter() - began
             console(stderr=True).print(f"{name} {len(rows)}, {taken:.0f} s", row)
     show(rows)
-    if out is not None:
-        write_rows(rows, out)
 
 
 if __name__ == "__main__":

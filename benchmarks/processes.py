@@ -21,7 +21,7 @@ from nav_msgs.msg import Path as PathMessage
 from nav_msgs.srv import GetPlan
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import SetParameters
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message, serialize_message
@@ -65,17 +65,10 @@ class NodeProcesses:
         self, module: str, *words: str, environment: Mapping[str, str] | None = None
     ) -> ChildProcess:
         """Start a module of this checkout, with additions to this process's environment."""
-        settings = {
-            "ROS_DOMAIN_ID": str(DOMAIN),
-            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-            "PYTHONPATH": str(ROOT),
-        }
-        child = ChildProcess(
-            module,
-            words,
-            {**os.environ, **settings, **(environment or {})},
-            self.folder / f"{len(self._children)}.log",
-        )
+        settings = {"ROS_DOMAIN_ID": str(DOMAIN), "PYTHONPATH": str(ROOT)}
+        settings |= {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"} | dict(environment or {})
+        log = self.folder / f"{len(self._children)}.log"
+        child = ChildProcess(module, words, os.environ | settings, log)
         self._children.append(child)
         return child
 
@@ -147,7 +140,8 @@ class Client:
 
     def begin_plan(self, start: Pose, goal: Pose, node: str = SERVER) -> Any:
         """Call ~/can_traverse; return the future."""
-        return self._plans[node].call_async(plan_request(start, goal))
+        ends = {"start": stamped_pose(start, "map"), "goal": stamped_pose(goal, "map")}
+        return self._plans[node].call_async(GetPlan.Request(**ends))
 
     def check(self, timeout: float = 60.0) -> dict[str, Any]:
         """Return the verdict on the last path; raise LostAnswerError after a timeout [s]."""
@@ -169,11 +163,6 @@ class Client:
         message: ParameterMessage = Parameter(name, value=value).to_parameter_msg()
         request = SetParameters.Request(parameters=[message])
         return finish(self._parameters.call_async(request), 10.0).results[0].successful
-
-
-def plan_request(start: Pose, goal: Pose) -> GetPlan.Request:
-    """Return a request to ~/can_traverse."""
-    return GetPlan.Request(start=stamped_pose(start, "map"), goal=stamped_pose(goal, "map"))
 
 
 def finish(future: Any, timeout: float) -> Any:
@@ -202,10 +191,8 @@ def serve_plan(file: Path) -> None:
         return response
 
     node.create_service(GetPlan, "~/can_traverse", answer)
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
     with contextlib.suppress(KeyboardInterrupt, ExternalShutdownException):
-        executor.spin()
+        rclpy.spin(node)
     rclpy.try_shutdown()
 
 

@@ -36,7 +36,6 @@ from std_msgs.msg import Float64MultiArray, String
 from benchmarks.processes import (
     ROOT,
     START_TIME,
-    Client,
     LostAnswerError,
     NodeProcesses,
     finish,
@@ -85,7 +84,7 @@ class Ear(Node):
         super().__init__("ear", context=ros.context)
         self.pose = np.full(3, np.nan)
         self.faults: Counter[str] = Counter()
-        self.rest, self._fault = RestWatch(), ""
+        self._fault, self._sent = "", list[tuple[float, str, bool]]()
         torques = QoSProfile(depth=QUEUE)
         states = QoSProfile(depth=QUEUE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         for kind, topic, hear, qos in (
@@ -100,10 +99,10 @@ class Ear(Node):
         self.pose = odometry_to_pose(odometry, "map")[0][[0, 1, 5]]
 
     def _hear_state(self, state: String, about: dict[str, int]) -> None:
-        self.rest.take(sent_at(about), state=state.data)
+        self._sent.append((sent_at(about), state.data, False))
 
     def _hear_torques(self, message: Float64MultiArray, about: dict[str, int]) -> None:
-        self.rest.take(sent_at(about), turns=any(message.data))
+        self._sent.append((sent_at(about), "", any(message.data)))
 
     def _hear_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
@@ -112,22 +111,11 @@ class Ear(Node):
                 self.faults[fault] += bool(fault) and fault != self._fault
                 self._fault = fault
 
+    def find_torques_at_rest(self) -> list[str]:
+        """Return the state of each torque sent at rest until now, and for how long it had been so.
 
-class RestWatch:
-    """Counts the torques that a controller sends while it is to rest.
-
-    The first torques of a drive, which are sent before its state, are zero.
-    """
-
-    def __init__(self) -> None:
-        self._sent = list[tuple[float, str, bool]]()
-
-    def take(self, sent: float, state: str = "", turns: bool = False) -> None:
-        """Take a state, or whether torques turn a wheel, sent at a time [s]."""
-        self._sent.append((sent, state, turns))
-
-    def find_torques(self) -> list[str]:
-        """Return the state of each torque until now, and for how long it had been so."""
+        The first torques of a drive, which are sent before its state, are zero.
+        """
         found, since, rest = [], np.inf, ""
         for at, state, turns in sorted(self._sent):  # messages come in another order
             if state:
@@ -155,68 +143,41 @@ class Programs:
     """The programs by name; each can be killed and started again."""
 
     def __init__(self, nodes: NodeProcesses, terrain: Path):
-        self._nodes, self._clock = nodes, SteppedClock(nodes.folder)
-        self._steps = itertools.cycle(STEPS)
-        rests = self._write(
-            "simulated_traction_controller",
-            rest_policy="brake",  # no torques
-            realtime_priority=PRIORITY,
-        )
-        drives = self._write("rover_simulator", realtime_priority=PRIORITY)
-        reads = self._write(
-            "traverse_server", map_folder=str(nodes.folder), realtime_priority=PRIORITY
-        )
+        self._nodes, self.clock = nodes, SteppedClock(nodes.folder)
+        self.running: dict[str, ChildProcess] = {}
+        rests = self._write("simulated_traction_controller", rest_policy="brake")  # no torques
         commands = simulation_commands(
             terrain_file=str(terrain),
             speed="0.08",
-            rover_simulator_parameters=drives,
+            rover_simulator_parameters=self._write("rover_simulator"),
             traction_controller_parameters=rests,
-            traverse_server_parameters=reads,
+            traverse_server_parameters=self._write(
+                "traverse_server", map_folder=str(nodes.folder)
+            ),
         )
         self._modules = {name: words[2:] for name, words in commands.items()}  # behind python -m
         page = [PAGE, "lsr1", str(terrain), "--follow", "--port", "0"]
         self._modules[PAGE] = ["rover_planner", *page]
-        self._running: dict[str, ChildProcess] = {}
         for name in self._modules:
             self.start(name)
 
-    def _write(self, stem: str, **values: str | int) -> str:
+    def _write(self, stem: str, **values: str) -> str:
         """Write a parameter file of the package with other values; return its name."""
         content = yaml.safe_load((PARAMETERS / f"{stem}.yaml").read_text())
-        content["/**"]["ros__parameters"] |= values
+        content["/**"]["ros__parameters"] |= {"realtime_priority": PRIORITY} | values
         file = self._nodes.folder / f"{stem}.yaml"
         file.write_text(yaml.dump(content))
         return str(file)
 
-    def start_mission(self, *words: str) -> None:
-        """Start a mission planner."""
-        self.start(MISSION, ["rover_planner.nodes.mission_planner", *words])
-
     def start(self, name: str, module: list[str] | None = None) -> None:
         """Start a program, with its module and words or others."""
-        words, environment = module or self._modules[name], {**self._clock.environment, **LOOPBACK}
-        self._running[name] = self._nodes.start_module(*words, environment=environment)
+        words, environment = module or self._modules[name], {**self.clock.environment, **LOOPBACK}
+        self.running[name] = self._nodes.start_module(*words, environment=environment)
 
     def kill(self, name: str) -> None:
         """Kill a program."""
-        if self.exit_code(name) is None:
-            os.kill(self._running[name].pid, signal.SIGKILL)
-
-    def step_clock(self) -> None:
-        """Step the system clock of all programs."""
-        self._clock.set_ahead(next(self._steps))
-
-    def exit_code(self, name: str) -> int | None:
-        """Return the exit code of a program, None while it runs."""
-        return self._running[name].exit_code
-
-    def last_words(self, name: str) -> str:
-        """Return what a program said last."""
-        return self._running[name].last_line()
-
-    def memory(self) -> dict[str, float]:
-        """Return the memory [MB] of each program that runs."""
-        return {name: memory_of(child) for name, child in self._running.items() if child.running}
+        if self.running[name].running:
+            os.kill(self.running[name].pid, signal.SIGKILL)
 
 
 def run_soak(minutes: float, calm: float, every: float, load: int, seed: int) -> dict[str, object]:
@@ -224,53 +185,48 @@ def run_soak(minutes: float, calm: float, every: float, load: int, seed: int) ->
     with open_nodes() as nodes:
         for _ in range(load):
             nodes.start_module("timeit", "-n", str(10**12), "pass")
-        maps = [nodes.folder / f"{cover}.npz" for cover in ROCKS]
-        for file, cover in zip(maps, ROCKS, strict=True):
-            ground = make_mars_terrain(seed, 24.0, 0.05, rock_cover=cover, crater_density=0.0)
-            save_terrain(file, ground)
-        programs, ear = Programs(nodes, maps[0]), nodes.ros.spin(Ear(nodes.ros))
-        client = nodes.client("soak")
-        wait_until(lambda: np.isfinite(ear.pose).all(), "the simulator", START_TIME)
-        client.connect()
-        rng = np.random.default_rng(seed)
-        soak = Soak(programs, ear, client, maps, rng)
-        report: dict[str, object] = {"at the start": soak.measure()}
-        report["disturbed"] = soak.run(minutes, every)
-        report["calm"] = soak.run(calm, np.inf)
-        return report | {"torques at rest": ear.rest.find_torques()}
+        soak = Soak(nodes, seed)
+        return {
+            "at the start": soak.measure(),
+            "disturbed": soak.run(minutes, every),
+            "calm": soak.run(calm, np.inf),
+            "torques at rest": soak.ear.find_torques_at_rest(),
+        }
 
 
 class Soak:
     """Drives and disturbances, and what becomes of them."""
 
-    def __init__(
-        self,
-        programs: Programs,
-        ear: Ear,
-        client: Client,
-        maps: list[Path],
-        rng: np.random.Generator,
-    ):
-        self._programs, self._ear, self._client, self._rng = programs, ear, client, rng
+    def __init__(self, nodes: NodeProcesses, seed: int):
+        self._rng, maps = np.random.default_rng(seed), []
+        for cover in ROCKS:
+            ground = make_mars_terrain(seed, 24.0, 0.05, rock_cover=cover, crater_density=0.0)
+            maps.append(nodes.folder / f"{cover}.npz")
+            save_terrain(maps[-1], ground)
+        self._programs, self.ear = Programs(nodes, maps[0]), nodes.ros.spin(Ear(nodes.ros))
+        self._client = nodes.client("soak")
+        wait_until(lambda: np.isfinite(self.ear.pose).all(), "the simulator", START_TIME)
+        self._client.connect()
         self._maps, self._victims = itertools.cycle(maps), itertools.cycle(VICTIMS)
-        self._load = client.node.create_client(LoadMap, "/traverse_server/load_map")
+        self._steps = itertools.cycle(STEPS)
+        self._load = self._client.node.create_client(LoadMap, "/traverse_server/load_map")
         self._drives, self._events = Counter[str](), Counter[str]()
         self._disturbances = itertools.cycle((self._kill, self._change_map, self._step_clock))
         self._start_mission()
 
     def run(self, minutes: float, every: float) -> dict[str, object]:
         """Drive for some time, with a disturbance each so many seconds; return the report."""
-        for counter in (self._ear.faults, self._drives, self._events):
+        for counter in (self.ear.faults, self._drives, self._events):
             counter.clear()
-        programs, loads = self._programs, [os.getloadavg()[0]]
+        loads = [os.getloadavg()[0]]
         begin = time.monotonic()
         end, due = begin + 60.0 * minutes, begin + every
         while time.monotonic() < end:
             time.sleep(0.5)
             loads.append(os.getloadavg()[0])
-            code = programs.exit_code(MISSION)
-            if code is not None:
-                how = _ENDS.get(code) or without_numbers(programs.last_words(MISSION))
+            mission = self._programs.running[MISSION]
+            if mission.exit_code is not None:
+                how = _ENDS.get(mission.exit_code) or without_numbers(mission.last_line())
                 self._drives[how] += 1
                 self._start_mission()
             if time.monotonic() > due:
@@ -281,13 +237,15 @@ class Soak:
             "median and largest load of the machine": np.quantile(loads, (0.5, 1.0)).tolist(),
             "drives": dict(self._drives),
             "disturbances": dict(self._events),
-            "faults": {cause: count for cause, count in self._ear.faults.items() if count},
+            "faults": {cause: count for cause, count in self.ear.faults.items() if count},
             **self.measure(),
         }
 
     def measure(self) -> dict[str, object]:
         """Return memory and latency now."""
-        return {"memory [MB]": self._programs.memory(), "answer [ms]": self._find_latency()}
+        running = self._programs.running
+        memory = {name: memory_of(child) for name, child in running.items() if child.running}
+        return {"memory [MB]": memory, "answer [ms]": self._find_latency()}
 
     def _kill(self) -> None:
         victim = next(self._victims)
@@ -307,26 +265,27 @@ class Soak:
             self._events["changes of map and friction"] += 1
 
     def _step_clock(self) -> None:
-        self._programs.step_clock()
+        self._programs.clock.set_ahead(next(self._steps))
         self._events["steps of the clock"] += 1
 
     def _start_mission(self) -> None:
         """Send the rover to a goal near it, towards the middle of the ground."""
-        (x, y, yaw), rng = self._ear.pose, self._rng
+        (x, y, yaw), rng = self.ear.pose, self._rng
         is_far = np.hypot(x, y) > 2.0 * REACH
         bearing = np.arctan2(-y, -x) if is_far else rng.uniform(-np.pi, np.pi)
         bearing += rng.uniform(-0.5, 0.5)
         far = rng.uniform(0.5, 1.0) * REACH
         start = f"{x:.3f},{y:.3f},{yaw:.3f}"
         goal = f"{x + far * np.cos(bearing):.3f},{y + far * np.sin(bearing):.3f},{bearing:.3f}"
-        self._programs.start_mission(f"--start={start}", f"--goal={goal}", "--drive")
+        words = f"--start={start}", f"--goal={goal}", "--drive"
+        self._programs.start(MISSION, ["rover_planner.nodes.mission_planner", *words])
 
     def _find_latency(self) -> float:
         """Return the median time of a question of 1 m [ms]."""
         taken = []
         for _ in range(10):
             begin = time.monotonic()
-            x, y, yaw = self._ear.pose.tolist()
+            x, y, yaw = self.ear.pose.tolist()
             with contextlib.suppress(LostAnswerError):
                 self._client.plan((x, y, yaw), (x + np.cos(yaw), y + np.sin(yaw), yaw), PATIENCE)
             taken.append(1e3 * (time.monotonic() - begin))

@@ -47,35 +47,27 @@ def sum_up(drives: Drives, kinds: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Return sums and means by controller, over the obstacles of these kinds that all passed."""
     obstacles = [o for o, name in drives if name == SERVO and o.kind in kinds]
     common = [o for o in obstacles if all(drives[o, name].passed for name in CONTROLLERS)]
-    sums = {}
+    sums: dict[str, dict[str, Any]] = {}
     for name in CONTROLLERS:
-        sums[name] = {
-            "passed": sum(drives[o, name].passed for o in obstacles),
-            "of": len(obstacles),
-            "lost": [
-                o.label for o in obstacles if drives[o, SERVO].passed > drives[o, name].passed
-            ],
-            **{
-                key: float(join([getattr(drives[o, name], key) for o in common] or [np.nan]))
-                for key, (_, _, join) in SUMS.items()
-            },
-        }
+        lost = [o.label for o in obstacles if drives[o, SERVO].passed > drives[o, name].passed]
+        passed = sum(drives[o, name].passed for o in obstacles)
+        sums[name] = {"passed": passed, "of": len(obstacles), "lost": lost}
+        for key, (_, _, join) in SUMS.items():
+            values = [getattr(drives[o, name], key) for o in common] or [np.nan]
+            sums[name][key] = float(join(values))
     return sums
 
 
 def print_drives(drives: Drives) -> None:
     """Print a row for each drive."""
-    headings = ("obstacle", "controller", "end [m]", "utilisation mean", "95 %", "slip [m]",
-                "torque [N m]", "energy [J]")  # fmt: skip
-    rows = [
-        (
-            obstacle.label, name, "passed" if row.passed else f"{row.end:.2f}",
-            f"{row.mean_utilisation:.2f}", f"{row.peak_utilisation:.2f}", f"{row.slip:.3f}",
-            f"{row.torque:.3f}", f"{row.energy:.1f}",
-        )
-        for (obstacle, name), row in drives.items()
-    ]  # fmt: skip
-    print_table("LSR-1 in MuJoCo, 2.4 m at 6 cm/s", headings, rows)
+    columns = {"obstacle": "", "controller": "", "end [m]": ".2f", "utilisation mean": ".2f"}
+    columns |= {"95 %": ".2f", "slip [m]": ".3f", "torque [N m]": ".3f", "energy [J]": ".1f"}
+    rows = []
+    for (obstacle, name), row in drives.items():
+        used = row.mean_utilisation, row.peak_utilisation
+        end = "passed" if row.passed else row.end
+        rows.append((obstacle.label, name, end, *used, row.slip, row.torque, row.energy))
+    print_table("LSR-1 in MuJoCo, 2.4 m at 6 cm/s", columns, rows)
 
 
 def print_sums(sums: dict[str, dict[str, Any]], title: str) -> None:
@@ -85,32 +77,28 @@ def print_sums(sums: dict[str, dict[str, Any]], title: str) -> None:
         change = 100.0 * (row[key] / sums[SERVO][key] - 1.0) if sums[SERVO][key] else 0.0
         return f"{row[key]:.{digits}f} ({change:+.0f} %)"
 
-    rows = [
-        (
-            name, f"{row['passed']} of {row['of']}", ", ".join(row["lost"]),
-            *(compare(row, key, digits) for key, (_, digits, _) in SUMS.items()),
-        )
-        for name, row in sums.items()
-    ]  # fmt: skip
+    rows = []
+    for name, row in sums.items():
+        cells = [compare(row, key, digits) for key, (_, digits, _) in SUMS.items()]
+        rows.append((name, f"{row['passed']} of {row['of']}", ", ".join(row["lost"]), *cells))
     headings = ("controller", "passed", "lost", *(heading for heading, _, _ in SUMS.values()))
-    print_table(title, headings, rows)
+    print_table(title, dict.fromkeys(headings, ""), rows)
 
 
 def draw_sums(sums: dict[str, dict[str, Any]], picture: Path) -> None:
     """Draw slip, torque, energy and utilisation of the controllers relative to the servos."""
-    import matplotlib
+    from matplotlib.figure import Figure
 
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    figure, axes = pyplot.subplots(figsize=(7.0, 3.2), layout="constrained")
+    figure = Figure(figsize=(7.0, 3.2), layout="constrained")
+    axes = figure.subplots()
     width, places = 0.8 / len(CONTROLLERS), np.arange(len(SUMS))
     colours = ("#999999", "#e69f00", "#56b4e9", "#0072b2")
     for k, (name, colour) in enumerate(zip(CONTROLLERS, colours, strict=True)):
         shares = [sums[name][key] / sums[SERVO][key] for key in SUMS]
         axes.bar(places + k * width, shares, width, label=name, color=colour)
-    axes.set_xticks(places + 1.5 * width)
-    axes.set_xticklabels(("slip distance", "torque effort", "energy", "utilisation"))
+    axes.set_xticks(
+        places + 1.5 * width, ("slip distance", "torque effort", "energy", "utilisation")
+    )
     axes.set_ylabel("share of the speed servos'")
     figure.legend(loc="outside upper center", ncols=len(CONTROLLERS), frameon=False)
     figure.savefig(picture, dpi=150)
@@ -123,7 +111,7 @@ def main(
     """Run the drives, print tables, and write JSON and a picture."""
     obstacles = OBSTACLES[::QUICK_STEP] if quick else OBSTACLES
     jobs = [(obstacle, name) for obstacle in obstacles for name in CONTROLLERS]
-    drives = dict(zip(jobs, run_in_processes(drive, jobs, None), strict=True))
+    drives = dict(zip(jobs, run_in_processes(drive, jobs), strict=True))
     everything = sum_up(drives, [obstacle.kind for obstacle in obstacles])
     rough = sum_up(drives, ROUGH)
     print_drives(drives)

@@ -7,7 +7,8 @@ With --energy, which needs the extra `bench`, drives are made anew and their ene
 """
 
 import json
-from collections.abc import Iterator
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Annotated
@@ -37,6 +38,9 @@ from support.reference_drives import KEPT, drive_ground, drive_path, unlimited
 PASSED = "passed"
 GROUNDS = {"ramp": "slope", "tilt": "cross_slope", "rocks": "caps"}
 """Grounds of drives that curves have, by the name they have there."""
+DRIVES = {"drive": "", "mu": "", "limit [N m]": ".2f", "in MuJoCo": "", "ended at x [m]": ".2f"}
+CURVES = {"curve": "", "mu": "", "path in MuJoCo": ""}
+"""Columns of tables beside the verdict."""
 LENGTH, TURN = 2.4, np.pi
 """Length of an arc [m] and angle of a turn on the spot [rad]."""
 
@@ -59,11 +63,15 @@ class ReferenceDrive:
     """x at the end of the drive [m]."""
 
     @property
-    def label(self) -> str:
-        """Kind and size, such as step 0.163."""
-        return (
-            f"{self.kind} {self.size:.3f}" if self.size < 1.0 else f"{self.kind} {self.size:.1f}"
-        )
+    def kept(self) -> bool:
+        """True if it passed."""
+        return self.outcome == PASSED
+
+    @property
+    def cells(self) -> tuple[str | float, ...]:
+        """What DRIVES says of it; kind and size are such as step 0.163."""
+        label = f"{self.kind} {self.size:.{3 if self.size < 1.0 else 1}f}"
+        return label, self.friction, self.max_torque, self.outcome, self.end
 
 
 def judge_drives(policy: str) -> Iterator[tuple[ReferenceDrive, Verdict]]:
@@ -107,9 +115,10 @@ class Curve:
     """(k, 6) mean torque of each wheel since the pose before [N m]."""
 
     @property
-    def label(self) -> str:
-        """Ground and mode."""
-        return f"{self.kind} {self.size:g} {self.mode} {self.curvature:g}"
+    def cells(self) -> tuple[str | float, ...]:
+        """What CURVES says of it."""
+        label = f"{self.kind} {self.size:g} {self.mode} {self.curvature:g}"
+        return label, self.friction, "kept" if self.kept else "left"
 
     @property
     def steered(self) -> bool:
@@ -178,23 +187,24 @@ def _read(row: dict) -> Curve:
 
 def settled_errors(cases) -> dict[str, np.ndarray]:
     """Return absolute errors of settled cases by quantity; the name has the unit."""
-    errors: dict[str, list[np.ndarray]] = {}
+    errors = defaultdict[str, list[np.ndarray]](list)
     weight = load_rover("lsr1").weight
     for case, prediction in cases:
         centres = np.linalg.norm(prediction.wheel_centres - case.wheel_centres, axis=2)
         attitude = np.column_stack([prediction.roll, prediction.pitch]) - case.attitude
         joints = np.hstack([prediction.rocker_angle, prediction.bogie_angle]) - case.joints
-        shares = [prediction.wheel_loads, prediction.tangential, prediction.lateral]
-        forces = np.sqrt(sum(share**2 for share in shares))
-        force_errors = forces - np.linalg.norm(case.forces, axis=2)
-        for name, values in (
-            ("wheel centres [mm]", 1e3 * centres),
-            ("roll and pitch [deg]", np.degrees(attitude)),
-            ("suspension angles [deg]", np.degrees(joints)),
-            ("wheel forces [% of the weight]", 100.0 * force_errors / weight),
-        ):
-            errors.setdefault(name, []).append(np.abs(values).ravel())
-    return {name: np.concatenate(parts) for name, parts in errors.items()}
+        forces = size_of_forces(prediction) - np.linalg.norm(case.forces, axis=2)
+        errors["wheel centres [mm]"].append(1e3 * centres)
+        errors["roll and pitch [deg]"].append(np.degrees(attitude))
+        errors["suspension angles [deg]"].append(np.degrees(joints))
+        errors["wheel forces [% of the weight]"].append(100.0 * forces / weight)
+    return {name: np.abs(np.concatenate(parts)).ravel() for name, parts in errors.items()}
+
+
+def size_of_forces(prediction: PathPrediction) -> np.ndarray:
+    """Return the sizes (n, 6) of the forces on the wheels [N]."""
+    parts = [prediction.wheel_loads, prediction.tangential, prediction.lateral]
+    return np.linalg.norm(parts, axis=0)
 
 
 def print_settled(name: str, cases) -> None:
@@ -202,48 +212,23 @@ def print_settled(name: str, cases) -> None:
     count = sum(len(case.poses) for case, _ in cases)
     settled = sum(int(prediction.settled.sum()) for _, prediction in cases)
     rows = [
-        (what, *(f"{v:.3f}" for v in (np.median(e), np.percentile(e, 95), e.max())))
-        for what, e in settled_errors(cases).items()
+        (what, np.median(error), np.percentile(error, 95), error.max())
+        for what, error in settled_errors(cases).items()
     ]
-    headings = ("absolute error of", "median", "95 %", "worst")
-    print_table(f"{name}: {settled} of {count} settle", headings, rows)
+    columns = {"absolute error of": "", "median": ".3f", "95 %": ".3f", "worst": ".3f"}
+    print_table(f"{name}: {settled} of {count} settle", columns, rows)
 
 
-def print_drives(policy: str) -> None:
-    """Print the drives whose outcome differs from the verdict under `policy`."""
-    rows, agree, wrongly_passed = [], 0, 0
-    for drive, verdict in judge_drives(policy):
-        if verdict.traversable == (drive.outcome == PASSED):
-            agree += 1
-            continue
-        wrongly_passed += verdict.traversable
-        numbers = f"{drive.friction}", f"{drive.max_torque:.2f}"
-        cells = drive.outcome, f"{drive.end:.2f}", verdict.reason or "passable"
-        rows.append((drive.label, *numbers, *cells))
+def print_differences(
+    title: str, columns: dict[str, str], judged: Sequence[tuple[ReferenceDrive | Curve, Verdict]]
+) -> None:
+    """Print the drives whose outcome differs from the verdict on their path."""
+    wrong = [(drive, verdict) for drive, verdict in judged if drive.kept != verdict.traversable]
+    agree, passable = len(judged) - len(wrong), sum(verdict.traversable for _, verdict in wrong)
     print_table(
-        f"Drives under {policy} torques: {agree} of {agree + len(rows)} agree, "
-        f"{wrongly_passed} passable that got stuck or tipped",
-        ("drive", "mu", "limit [N m]", "in MuJoCo", "ended at x [m]", "verdict"),
-        sorted(rows),
-    )
-
-
-def print_curves() -> None:
-    """Print the curves whose outcome differs from the verdict under "servo"."""
-    rows, agree, wrongly_passed = [], 0, 0
-    for curve in read_curves():
-        verdict = judge_path(curve.rover, curve.ground, curve.path, curve.options)[1]
-        if verdict.traversable == curve.kept:
-            agree += 1
-            continue
-        wrongly_passed += verdict.traversable
-        kept = "kept" if curve.kept else "left"
-        rows.append((curve.label, f"{curve.friction}", kept, verdict.reason or "passable"))
-    print_table(
-        f"Curves under servo torques: {agree} of {agree + len(rows)} agree, "
-        f"{wrongly_passed} passable that left their path",
-        ("curve", "mu", "path in MuJoCo", "verdict"),
-        rows,
+        f"{title}: {agree} of {len(judged)} agree, {passable} passable that failed",
+        columns | {"verdict": ""},
+        sorted((*drive.cells, verdict.reason or "passable") for drive, verdict in wrong),
     )
 
 
@@ -256,25 +241,22 @@ def print_traces() -> None:
     """
     weight, rows = load_rover("lsr1").weight, []
     for mode in ("steered", "spot", "skid", "skid_spot"):
-        forces, torques, scatter = [], [], []
+        forces, torques = [], []
         for curve in read_curves():
             if curve.mode == mode and len(curve.poses):
                 found = curve.predict_trace()
                 drives = (found.speed_share > 0.0) & (np.arange(len(curve.poses)) > 0)
-                parts = (found.wheel_loads, found.tangential, found.lateral)
-                errors = np.sqrt(sum(part**2 for part in parts)) - curve.forces
-                forces.append(100.0 * np.abs(errors[drives]).ravel() / weight)
+                errors = np.abs(size_of_forces(found) - curve.forces)[drives]
+                forces.append(100.0 * errors.ravel() / weight)
                 ours, theirs = np.abs([found.torque[drives], curve.torques[drives]]).mean((1, 2))
-                torques.append((100.0 * (ours / theirs - 1.0), theirs - ours))
                 rest = curve.torques[drives] - found.torque[drives]
-                scatter.append(rest.std(axis=0).mean())
-        share, missing = np.median(torques, axis=0)
-        error = f"{np.median(np.concatenate(forces)):.1f}"
-        torque = f"{share:.1f}", f"{missing:.3f}", f"{np.median(scatter):.3f}"
-        rows.append((mode, len(forces), error, *torque))
-    torque_headings = "mean torque [%]", "missing [N m]", "scatter [N m]"
-    headings = ("mode", "curves", "wheel force [% of the weight]", *torque_headings)
-    print_table("Along the traces of curves, under servo torques", headings, rows)
+                scatter = rest.std(axis=0).mean()
+                torques.append((100.0 * (ours / theirs - 1.0), theirs - ours, scatter))
+        force = np.median(np.concatenate(forces))
+        rows.append((mode, len(forces), force, *np.median(torques, axis=0)))
+    columns = {"mode": "", "curves": "", "wheel force [% of the weight]": ".1f"}
+    columns |= {"mean torque [%]": ".1f", "missing [N m]": ".3f", "scatter [N m]": ".3f"}
+    print_table("Along the traces of curves, under servo torques", columns, rows)
 
 
 def print_bands() -> None:
@@ -295,9 +277,9 @@ def print_bands() -> None:
     shares = 100.0 * np.array(loads) / rover.weight
     beyond = np.maximum(low - shares, shares - high)
     inside = f"{100.0 * np.mean(beyond <= 0.1):.0f} % of {len(loads)}"
-    row = f"{np.median(high - low):.1f}", f"{np.quantile(high - low, 0.95):.1f}", inside
-    headings = "width [% of the weight]", "95 %", "loads in MuJoCo within"
-    print_table("Bands of the loads of turned wheels at rest", headings, [row])
+    columns = {"width [% of the weight]": ".1f", "95 %": ".1f", "loads in MuJoCo within": ""}
+    row = np.median(high - low), np.quantile(high - low, 0.95), inside
+    print_table("Bands of the loads of turned wheels at rest", columns, [row])
 
 
 def load_bands(balance, friction: float) -> list[tuple[float, float]]:
@@ -321,21 +303,20 @@ def print_energy() -> None:
 
     MuJoCo's time step is 2 ms: with the usual 4 ms its wheels chatter on their contacts.
     """
-    from benchmarks.drives import DROOP, END, OBSTACLES, START, drive, run_in_processes
+    from benchmarks.drives import DROOP, OBSTACLES, drive, run_in_processes
 
-    x = np.linspace(START, END, round((END - START) / 0.01) + 1)
-    path, rows, errors = np.column_stack([x, 0.0 * x, 0.0 * x]), [], []
+    errors, rows = [], []
     jobs = [(obstacle, DROOP, 1, 2.0, 0.002) for obstacle in OBSTACLES]
-    for obstacle, row in zip(OBSTACLES, run_in_processes(drive, jobs, None), strict=True):
+    for obstacle, row in zip(OBSTACLES, run_in_processes(drive, jobs), strict=True):
         if row.passed:
             options = SweepOptions(policy="servo", friction=obstacle.friction)
             rover, ground = unlimited(obstacle.rover), obstacle.ground
-            ours = float(judge_path(rover, ground, path, options)[0].energy[-1])
+            ours = float(judge_path(rover, ground, drive_path(), options)[0].energy[-1])
             errors.append(abs(ours / row.energy - 1.0))
-            rows.append((obstacle.label, f"{row.energy:.1f}", f"{ours:.1f}"))
-    rows.append(("median error", "", f"{np.median(errors):.0%}"))
-    title = "Speed servos over 2.4 m at 6 cm/s"
-    print_table(title, ("obstacle", "energy in MuJoCo [J]", "of the model [J]"), rows)
+            rows.append((obstacle.label, row.energy, ours))
+    rows.append(("median error", None, f"{np.median(errors):.0%}"))
+    columns = {"obstacle": "", "energy in MuJoCo [J]": ".1f", "of the model [J]": ".1f"}
+    print_table("Speed servos over 2.4 m at 6 cm/s", columns, rows)
 
 
 def main(
@@ -347,8 +328,12 @@ def main(
     print_bands()
     for policy in ("optimal", "servo", "equal"):
         with console(stderr=True).status(f"drives, {policy}"):
-            print_drives(policy)
-    print_curves()
+            print_differences(f"Drives under {policy} torques", DRIVES, [*judge_drives(policy)])
+    curves = [
+        (curve, judge_path(curve.rover, curve.ground, curve.path, curve.options)[1])
+        for curve in read_curves()
+    ]
+    print_differences("Curves under servo torques", CURVES, curves)
     print_traces()
     if energy:
         print_energy()

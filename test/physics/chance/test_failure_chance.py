@@ -180,7 +180,7 @@ def test_a_rover_file_tells_what_is_uncertain():
 @pytest.mark.long
 def test_chances_score_better_than_verdicts_on_drives_and_what_they_accept_passes():
     paths = [one for one in read_driven_paths() if one.stream == HELD_OUT]
-    told = np.array([find_chance(one.path) for one in paths], float)
+    told = np.array([find_chance(one) for one in paths], float)
     failed = np.array([one.passed.count("0") / len(one.passed) for one in paths])
     chance, refused = ((1.0 - failed) * side**2 + failed * (1.0 - side) ** 2 for side in told.T)
     assert chance.mean() < refused.mean()
