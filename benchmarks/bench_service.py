@@ -11,12 +11,14 @@ import array
 import statistics
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from sensor_msgs.msg import PointCloud2
 
+from benchmarks.grounds import made_square
 from benchmarks.measure import Figure, median_times
-from benchmarks.processes import ECHO, SERVER, Client, open_nodes
+from benchmarks.processes import ECHO, SERVER, open_nodes
 from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cloud
 from rover_physics import Terrain, load_rover
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
@@ -30,8 +32,8 @@ WARM_UP = 20
 """Queries before these that are not timed."""
 NINES = 50
 """Questions with nine candidates."""
-CELLS, RESOLUTION = 1_000, 0.05
-"""Cells along each side of the map that is sent, and their size [m]."""
+CELLS = 1_000
+"""Cells along each side of the map that is sent."""
 ASKERS = (("after a pause", 0.03, 1), ("at once", 0.0, 20))
 """Name, pause before a query [s], and queries to one responder before the next has its turn."""
 
@@ -107,9 +109,8 @@ def measure_nine(ground: Terrain) -> Figure:
     """Measure the query with the default of nine candidates."""
     with open_nodes() as nodes:
         nodes.start(SERVER, terrain_file=ground)
-        client: Client = nodes.client()
+        client, pause = nodes.client(), ASKERS[0][1]
         client.first_plan(START, GOAL)
-        pause = ASKERS[0][1]
         times = [_time(lambda: client.plan(START, GOAL), pause) for _ in range(NINES + 10)]
     middle = 1e3 * statistics.median(times[10:])
     return Figure("service", "p50, nine candidates", middle, "ms", repeats=NINES)
@@ -117,18 +118,18 @@ def measure_nine(ground: Terrain) -> Figure:
 
 def measure_map_message() -> list[Figure]:
     """Measure a cloud of a million points, by rows and in random order, until it is a terrain."""
-    ground, rng = make_mars_terrain(2, CELLS * RESOLUTION, RESOLUTION), np.random.default_rng(0)
-    elevation = ground.elevation[:CELLS, :CELLS].copy()
-    elevation[rng.random(elevation.shape) < 0.02] = np.nan
-    cloud = terrain_to_point_cloud(Terrain(elevation, RESOLUTION, ground.origin), "map")
+    ground, rng = made_square(2, CELLS), np.random.default_rng(0)
+    holes = rng.random(ground.elevation.shape) < 0.02
+    ground = replace(ground, elevation=np.where(holes, np.nan, ground.elevation))
+    cloud, half = terrain_to_point_cloud(ground, "map"), 0.5 * ground.resolution
     points = rng.permutation(np.frombuffer(cloud.data, "<f4").reshape(-1, 3))
-    points[:, :2] += rng.uniform(-0.5 * RESOLUTION, 0.5 * RESOLUTION, (len(points), 2))
+    points[:, :2] += rng.uniform(-half, half, (len(points), 2))
     mixed = PointCloud2(height=1, width=len(points), point_step=12, row_step=12 * len(points))
     mixed.header, mixed.fields = cloud.header, cloud.fields
     mixed.data = array.array("B", points.astype("<f4").tobytes())
     calls = [
         lambda: terrain_from_point_cloud(cloud),
-        lambda: terrain_from_point_cloud(mixed, RESOLUTION),
+        lambda: terrain_from_point_cloud(mixed, ground.resolution),
     ]
     rows, scattered = (1e3 * taken for taken in median_times(calls, clock=time.perf_counter))
     return [

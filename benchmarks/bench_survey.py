@@ -11,15 +11,13 @@ from pathlib import Path
 import numba
 import numpy as np
 
+from benchmarks.grounds import made_square
 from benchmarks.measure import Figure, Run, median_time, peak_memory, run_command
 from rover_physics import Terrain, load_rover, save_terrain, score_poses
-from rover_planner.worlds.mars_terrain import make_mars_terrain
 
 CELLS = (192, 576)
 """Sides of the small and of the large map [cells]."""
 HEADINGS = 8
-RESOLUTION = 0.05
-"""Cell size [m]."""
 WORKERS = (1, 2)
 """Numbers of workers that are compared."""
 POSES = 20_000
@@ -30,7 +28,7 @@ def measure() -> list[Figure]:
     """Survey both maps with one worker and with two, then search what can be reached."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        grounds = [make_ground(cells) for cells in CELLS]
+        grounds = [made_square(7, cells) for cells in CELLS]
         runs: dict[tuple[int, int], Run] = {}
         for cells, ground in zip(CELLS, grounds, strict=True):
             save_terrain(folder / f"{cells}.npz", ground)
@@ -44,19 +42,13 @@ def measure() -> list[Figure]:
     return make_figures(runs, reached, time_of_pose(grounds[1]))
 
 
-def make_ground(cells: int) -> Terrain:
-    """Return a made Mars of so many cells a side."""
-    ground = make_mars_terrain(7, cells * RESOLUTION, RESOLUTION)
-    return Terrain(ground.elevation[:cells, :cells], RESOLUTION, ground.origin)
-
-
 def time_of_pose(ground: Terrain) -> float:
     """Return the CPU time of a pose at a random cell and heading by `score_poses` [s]."""
     numba.set_num_threads(1)
     rng, rover = np.random.default_rng(1), load_rover("lsr1")
     cells = rng.integers(0, ground.elevation.shape[::-1], (POSES, 2))
     yaw = 2.0 * np.pi / HEADINGS * rng.integers(0, HEADINGS, POSES)
-    poses = np.column_stack([cells * RESOLUTION + ground.origin, yaw])
+    poses = np.column_stack([cells * ground.resolution + ground.origin, yaw])
     return median_time(lambda: score_poses(rover, ground, poses)) / POSES
 
 

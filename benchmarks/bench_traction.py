@@ -6,7 +6,6 @@ controller and server run in separate processes. The controller's diagnostics re
 time of its updates (estimate, build, solve, publish) and the number of missed cycles.
 """
 
-import threading
 import time
 
 import numpy as np
@@ -18,7 +17,7 @@ from rclpy.parameter import Parameter
 
 from benchmarks.bench_service import GOAL, START
 from benchmarks.measure import Figure
-from benchmarks.processes import CONTROLLER, DOMAIN, SERVER, Client, open_nodes
+from benchmarks.processes import CONTROLLER, DOMAIN, SERVER, open_nodes
 from rover_physics import load_rover
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.traction.contact_ekf import Motion
@@ -55,11 +54,9 @@ class DiagnosticsReader:
             if status.name.startswith(CONTROLLER):
                 self.values = {item.key: item.value for item in status.values}
 
-    def wait_for_updates(self, count: int) -> dict[str, float]:
+    def wait_for_updates(self, count: float) -> dict[str, float]:
         """Return the numeric values once `count` updates were made."""
-        wait_until(
-            lambda: float(self.values.get("updates", 0)) >= count, f"{count} updates", 120.0
-        )
+        wait_until(lambda: float(self.values.get("updates", 0)) >= count, "updates", 120.0)
         return {key: float(self.values[key]) for key in REPORTED}
 
 
@@ -125,14 +122,11 @@ def measure_together() -> list[Figure]:
         nodes.start(CONTROLLER, rate=RATE, realtime_priority=PRIORITY, enabled_at_start=True)
         start = {"start_x": START[0], "start_y": START[1], "follow_commands": True}
         nodes.start("rover_simulator", rate=RATE, terrain_file=ground, **start)
-        before = reader.wait_for_updates(int(RATE))
-        stop = threading.Event()
-        asked = threading.Thread(target=_ask_on, args=(client, stop))
-        asked.start()
-        time.sleep(TOGETHER_TIME)
-        stop.set()
-        asked.join()
-        after = reader.wait_for_updates(int(before["updates"] + 0.9 * RATE * TOGETHER_TIME))
+        before = reader.wait_for_updates(RATE)
+        end = time.monotonic() + TOGETHER_TIME
+        while time.monotonic() < end:
+            client.plan(START, GOAL)
+        after = reader.wait_for_updates(before["updates"] + 0.9 * RATE * TOGETHER_TIME)
     updates = int(after["updates"] - before["updates"])
     together = "the same beside simulator and busy server, by the clock"
     rows = (
@@ -143,9 +137,3 @@ def measure_together() -> list[Figure]:
         ("updates that fell back to equal torques", after["fallbacks"], "", None),
     )  # fmt: skip
     return [Figure("traction", *row, repeats=updates) for row in rows]
-
-
-def _ask_on(client: Client, stop: threading.Event) -> None:
-    """Send one query after another until `stop` is set."""
-    while not stop.is_set():
-        client.plan(START, GOAL)

@@ -1,25 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drives in MuJoCo with traction control, and which of them the planner promises.
 
-Run from the repository: python -m benchmarks.control_margin [--count N] [--seed S] [--source map]
+Run from the repository: python -m benchmarks.control_margin [--count N] [--seed S]
 It needs the extra `bench`. Its results are in docs/validation.md.
 """
 
 from dataclasses import replace
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
 
-from benchmarks.drives import BY_MAP, BY_MOTION, Obstacle, drive, run_in_processes
+from benchmarks.drives import BY_MAP, Obstacle, drive, run_in_processes
 from benchmarks.measure import print_table
-from rover_physics import SweepOptions, judge_path, load_rover
+from rover_physics import Rover, SweepOptions, judge_path, load_rover
 from rover_physics.names import EQUAL, OPTIMAL
 from rover_physics.rover.uncertainty import ACCEPTED_CHANCE
 from support.reference_drives import drive_path, unlimited
 
-SOURCES = {"map": BY_MAP, "motion": BY_MOTION}
-"""Controllers by the source of their contact angles."""
 TRIES, MOST_TIME = 3, 5.0
 """Attempts at one place, and time after which a rover has failed over that of the drive."""
 SIZES = {
@@ -71,20 +69,19 @@ def find_promises(obstacle: Obstacle) -> tuple[bool, ...]:
     The rover has only the limits that MuJoCo knows.
     """
     rover, ground, path = unlimited(load_rover("lsr1")), obstacle.ground, drive_path()
-    asked = SweepOptions(friction=obstacle.friction, max_torque=obstacle.max_torque, policy=EQUAL)
-    if judge_path(rover, ground, path, asked)[1].traversable:
-        return (False,) * len(PROMISES)
-    asked = replace(asked, policy=OPTIMAL)
-    margins = [
-        judge_path(rover, ground, path, replace(asked, control_margin=margin))[1].traversable
-        for margin in MARGINS
-    ]
     known = replace(rover, uncertainty=replace(rover.uncertainty, **KNOWN))
-    chances = [
-        judge_path(one, ground, path, asked, accepted_chance=ACCEPTED_CHANCE)[1].traversable
-        for one in (rover, known)
-    ]
-    return (*margins, *chances)
+    asked = SweepOptions(
+        friction=obstacle.friction, max_torque=obstacle.max_torque, policy=OPTIMAL
+    )
+
+    def passes(one: Rover, accepted: float | None = None, **changes: Any) -> bool:
+        options = replace(asked, **changes)
+        return judge_path(one, ground, path, options, accepted_chance=accepted)[1].traversable
+
+    if passes(rover, policy=EQUAL):
+        return (False,) * len(PROMISES)
+    margins = [passes(rover, control_margin=margin) for margin in MARGINS]
+    return (*margins, passes(rover, ACCEPTED_CHANCE), passes(known, ACCEPTED_CHANCE))
 
 
 def draw_passable(count: int, seed: int) -> dict[Obstacle, tuple[bool, ...]]:
@@ -103,17 +100,16 @@ def draw_passable(count: int, seed: int) -> dict[Obstacle, tuple[bool, ...]]:
 def main(
     count: Annotated[int, typer.Option(help="Number of obstacles.")] = 100,
     seed: Annotated[int, typer.Option(help="Seed of the obstacles.")] = 1,
-    source: Annotated[str, typer.Option(help="Contact angles from: map or motion.")] = "map",
 ) -> None:
     """Draw, judge and drive; print how many promises are kept, and what of the rest passes."""
     promised = draw_passable(count, seed)
-    jobs = [(obstacle, SOURCES[source], TRIES, MOST_TIME) for obstacle in promised]
+    jobs = [(obstacle, BY_MAP, TRIES, MOST_TIME) for obstacle in promised]
     passed = np.array([one.passed for one in run_in_processes(drive, jobs)])
     rows = []
     for name, given in zip(PROMISES, np.array(list(promised.values())).T, strict=True):
         kept = int((given & passed).sum())
         rows.append((name, share(kept, int(given.sum())), share(kept, int(passed.sum()))))
-    title = f"{count} obstacles that need traction control, contact angles from {source}"
+    title = f"{count} obstacles that need traction control, contact angles from the map"
     columns = dict.fromkeys(("promised by", "promises kept", "promised of what passes"), "")
     print_table(title, columns, rows)
 

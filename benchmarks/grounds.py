@@ -31,6 +31,12 @@ def real_maps() -> dict[str, Terrain]:
     return {path.stem: load_terrain(path) for path in sorted(folder.glob("*.npz"))}
 
 
+def made_square(seed: int, cells: int) -> Terrain:
+    """Return a made Mars of so many cells a side, of 5 cm each."""
+    ground = make_mars_terrain(seed, cells * 0.05, 0.05)
+    return Terrain(ground.elevation[:cells, :cells], 0.05, ground.origin)
+
+
 def made_reef() -> Terrain:
     """Return ground as rough as a coral reef: steep heads and holes on relief, in small cells."""
     rng, half, resolution = np.random.default_rng(1), 2.5, 0.01

@@ -17,7 +17,7 @@ from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.state.scenario import Pose, Scenario
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.worlds.mars_terrain import make_mars_terrain
-from support.viewer.browser import ARGUMENTS, PROGRAM, Visitor, sync_api
+from support.viewer.browser import Visitor, open_browser
 from support.viewer.sessions import is_at_rest
 from support.viewer.sessions import wait_patiently as wait_until
 
@@ -53,11 +53,9 @@ chooses) of each picture. The first shows the page as it opens, the others a ref
 
 def write_pictures(folder: Path, names: list[str]) -> Iterator[str]:
     """Write the pictures and yield their names with what they show."""
-    with sync_api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=PROGRAM, args=ARGUMENTS)
+    with open_browser() as browser:
         for name in names:
             yield f"{name}: {_write(browser, folder / name)}"
-        browser.close()
 
 
 def _write(browser: Any, file: Path) -> str:
