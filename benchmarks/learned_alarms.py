@@ -244,9 +244,8 @@ def main(
         here = [one for one in heard if one.outing.simulator == simulator]
         own = [one for one in here if name in (one.outing.ground, "all")]
         driven = sum(one.seconds for one in own) / 3600.0
-        *false, outside, slipped, stuck = (
-            np.array([one.counts for one in own]).reshape(-1, 6).sum(axis=0)
-        )
+        counts = np.array([one.counts for one in own], int).reshape(-1, 6).sum(axis=0)
+        *false, outside, slipped, stuck = counts.tolist()
         cells = [rate(n, driven) for n in false] if name == "all" else false
         rows.append((simulator, name, driven, *cells, slipped, stuck, outside))
     for one in heard:

@@ -36,7 +36,7 @@ from rover_planner.learning.friction_filter import FrictionEstimate
 from rover_planner.learning.ground_learner import GroundEstimate, GroundLearner
 from rover_planner.learning.wheel_odometry import GYRO_BIAS, GYRO_NOISE, WheelMotion, WheelOdometry
 from rover_planner.simulator.mujoco_rover import MujocoRover
-from support.learning_drives import write_csv
+from support.learning_drives import scatter, write_csv
 
 CONSTANT, SIDES, LINE = "constant", "per side", "at a line"
 LAYOUTS = (CONSTANT, CONSTANT, SIDES, LINE)
@@ -52,11 +52,11 @@ SIZES = {
 """Smallest and largest size of each kind of ground."""
 NOISE = {
     "none": (0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    "usual": (0.001, 0.01, 0.003, 0.002, 0.03, 0.003),
-    "strong": (0.004, 0.03, 0.01, 0.005, 0.10, 0.01),
+    "usual": (0.01, 0.001, 0.003, 0.002, 0.03, 0.003),
+    "strong": (0.03, 0.004, 0.01, 0.005, 0.10, 0.01),
 }
-"""Standard deviations: position [m], its drift over the way, attitude and yaw [rad], suspension
-[rad], torque [N m], wheel rates [rad/s]."""
+"""Drift of the position over the way, then standard deviations: position [m], attitude and yaw
+[rad], suspension [rad], torque [N m], wheel rates [rad/s]."""
 STAYED, HALTED, STUCK_FOR = 0.02, 0.1, 4.0
 """A rover that goes no farther than this [m], slower than this share of the commanded speed at
 first, in more than this time [s] to the end, is stuck; one that slides along a step is not."""
@@ -193,17 +193,10 @@ def row_of(plant: MujocoRover) -> np.ndarray:
 def add_noise(rows: np.ndarray, noise: str, seed: int, step: int = 1) -> np.ndarray:
     """Return every `step`-th row with noise, a key of NOISE."""
     rows = rows[::step].copy()
-    position, drift, attitude, suspension, torque, rate = NOISE[noise]
+    drift, *sigmas = NOISE[noise]
     rng = np.random.default_rng(seed)
     ways = np.append(0.0, np.hypot(*np.diff(rows[:, [log.X, log.Y]], axis=0).T))
-    for columns, sigma in (
-        ([log.X, log.Y], position),
-        ([log.YAW, log.ROLL, log.PITCH], attitude),
-        (log.SUSPENSION, suspension),
-        (log.TORQUES, torque),
-        (log.RATES, rate),
-    ):
-        rows[:, columns] += sigma * rng.standard_normal(rows[:, columns].shape)
+    scatter(rows, rng, *sigmas)
     course = rng.uniform(-np.pi, np.pi)
     rows[:, [log.X, log.Y]] += drift * np.cumsum(ways)[:, None] * [np.cos(course), np.sin(course)]
     return rows

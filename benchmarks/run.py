@@ -11,11 +11,13 @@ of the project, and the table has the ratios of the medians.
 import importlib
 import json
 import os
-import statistics
 import subprocess
 import sys
 import tempfile
+from collections import defaultdict
+from enum import StrEnum
 from pathlib import Path
+from statistics import median
 from typing import Annotated
 
 import typer
@@ -26,6 +28,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 RESULTS = ROOT / "bench_output" / "results.json"
 TOPICS = tuple(sorted(path.stem.removeprefix("bench_") for path in HERE.glob("bench_*.py")))
+Topic = StrEnum("Topic", TOPICS)
 
 
 def run_topic(topic: str, checkout: Path = ROOT) -> list[Figure]:
@@ -41,45 +44,28 @@ def run_topic(topic: str, checkout: Path = ROOT) -> list[Figure]:
 
 def compare(topic: str, other: Path, rounds: int, this: Path = ROOT) -> list[Figure]:
     """Return the ratios of a topic's figures, this checkout's over another's, run in turns."""
-    found: dict[Path, list[list[Figure]]] = {this: [], other: []}
+    here, there = defaultdict[str, list[float]](list), defaultdict[str, list[float]](list)
     for turn in range(rounds):
         for checkout in (this, other) if turn % 2 else (other, this):
-            found[checkout].append(run_topic(topic, checkout))
-    here, there = (_medians(figures) for figures in found.values())
+            for figure in run_topic(topic, checkout):
+                (here if checkout == this else there)[figure.name].append(figure.value)
+    theirs = {name: median(values) for name, values in there.items() if name in here}
+    ratio = {"unit": "x", "repeats": rounds}
     return [
-        Figure(topic, name, here[name] / value, "x", against=f"{value:.4g} there", repeats=rounds)
-        for name, value in there.items()
-        if name in here and value
+        Figure(topic, name, median(here[name]) / value, against=f"{value:.4g} there", **ratio)
+        for name, value in theirs.items()
+        if value
     ]
 
 
-def _medians(rounds: list[list[Figure]]) -> dict[str, float]:
-    """Return the median of each figure over all rounds, by name."""
-    names = [figure.name for figure in rounds[0]]
-    return {
-        name: statistics.median(f.value for figures in rounds for f in figures if f.name == name)
-        for name in names
-    }
-
-
-def check_topics(topics: list[str] | None) -> list[str] | None:
-    """Return the topics; refuse one that is not there."""
-    for topic in topics or ():
-        if topic not in TOPICS:
-            raise typer.BadParameter(f"no topic {topic!r}; topics are {', '.join(TOPICS)}")
-    return topics
-
-
 def main(
-    topics: Annotated[
-        list[str] | None, typer.Argument(help="Default: all.", callback=check_topics)
-    ] = None,
+    topics: Annotated[list[Topic] | None, typer.Argument(help="Default: all.")] = None,
     against: Annotated[Path | None, typer.Option(help="Another checkout.")] = None,
     rounds: Annotated[int, typer.Option(min=1, help="Rounds with --against.")] = 3,
 ) -> None:
     """Run topics, print a table, and write it to bench_output/results.json."""
     figures: list[Figure] = []
-    for topic in topics or TOPICS:
+    for topic in topics or list(Topic):
         console(stderr=True).print(f"measuring: {topic}")
         figures += compare(topic, against.resolve(), rounds) if against else run_topic(topic)
     print_figures(figures)

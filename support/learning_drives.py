@@ -9,19 +9,7 @@ from rover_physics import Rover, Terrain
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import matrix_from_xyzw
-from rover_planner.learning.drive_log import (
-    PITCH,
-    RATES,
-    ROLL,
-    STEERING,
-    SUSPENSION,
-    TIME,
-    TORQUES,
-    WIDTH,
-    YAW,
-    X,
-    Y,
-)
+from rover_planner.learning import drive_log as log
 from rover_planner.simulator.plant import Plant
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from support.rough_grounds import plane
@@ -42,21 +30,25 @@ def climb(rover: Rover, slope: float, seconds: float, speed: float = 0.06) -> Fl
 
     The torques hold it up, with different shares of the wheels.
     """
-    rng = np.random.default_rng(0)
     time = np.arange(round(RATE * seconds)) / RATE
-    rows = np.zeros((len(time), WIDTH))
-    rows[:, STEERING.stop :] = np.nan
+    rows = np.zeros((len(time), log.WIDTH))
+    rows[:, log.STEERING.stop :] = np.nan
     angle = np.arctan(slope)
-    rows[:, TIME], rows[:, X] = time, -0.5 * speed * seconds + speed * np.cos(angle) * time
-    rows[:, PITCH] = -angle
-    rows[:, RATES] = speed / rover.wheel.radius
+    rows[:, log.TIME], rows[:, log.X] = time, -0.5 * speed * seconds + speed * np.cos(angle) * time
+    rows[:, log.PITCH] = -angle
+    rows[:, log.RATES] = speed / rover.wheel.radius
     shares = np.array([1.3, 1.0, 0.7, 1.2, 1.0, 0.8])
-    rows[:, TORQUES] = rover.weight * np.sin(angle) * rover.wheel.radius / 6.0 * shares
-    for columns, sigma in (([X, Y], 2e-4), ([YAW, ROLL, PITCH], 1e-3), (SUSPENSION, 1e-3)):
-        rows[:, columns] += sigma * rng.standard_normal(rows[:, columns].shape)
-    rows[:, TORQUES] += 0.01 * rng.standard_normal((len(rows), 6))
-    rows[:, RATES] += 1e-3 * rng.standard_normal((len(rows), 6))
+    rows[:, log.TORQUES] = rover.weight * np.sin(angle) * rover.wheel.radius / 6.0 * shares
+    scatter(rows, np.random.default_rng(0), 2e-4, 1e-3, 1e-3, 0.01, 1e-3)
     return rows
+
+
+def scatter(rows: Floats, rng: np.random.Generator, *sigmas: float) -> None:
+    """Add noise with standard deviations to place, attitude, suspension, torques and rates."""
+    place, attitude = [log.X, log.Y], [log.YAW, log.ROLL, log.PITCH]
+    measured = place, attitude, log.SUSPENSION, log.TORQUES, log.RATES
+    for columns, sigma in zip(measured, sigmas, strict=True):
+        rows[:, columns] += sigma * rng.standard_normal(rows[:, columns].shape)
 
 
 def drive_over_soil(rover: Rover, ground: Terrain, soil: str, seconds: float) -> Floats:
@@ -67,19 +59,19 @@ def drive_over_soil(rover: Rover, ground: Terrain, soil: str, seconds: float) ->
         if plant.state().stopped:
             break
         rows.append(row_of_plant(plant, (step + 1) * period))
-    return np.array(rows).reshape(-1, WIDTH)
+    return np.array(rows).reshape(-1, log.WIDTH)
 
 
 def row_of_plant(plant: Plant, time: float) -> Floats:
     """Return what is measured of a simulated rover at a time [s]."""
-    state, row = plant.state(), np.full(WIDTH, np.nan)
+    state, row = plant.state(), np.full(log.WIDTH, np.nan)
     R = matrix_from_xyzw(state.orientation)
-    row[[TIME, X, Y, YAW]] = time, *plant.pose()
-    row[[ROLL, PITCH]] = np.arctan2(R[2, 1], R[2, 2]), np.arcsin(-R[2, 0])
-    row[SUSPENSION] = [state.joint_positions[name] for name in SUSPENSION_JOINTS]
-    row[RATES] = [state.joint_velocities[name] for name in WHEEL_JOINTS]
-    row[STEERING] = [state.joint_positions.get(name, 0.0) for name in STEERING_JOINTS]
-    row[TORQUES] = state.wheel_torques
+    row[[log.TIME, log.X, log.Y, log.YAW]] = time, *plant.pose()
+    row[[log.ROLL, log.PITCH]] = np.arctan2(R[2, 1], R[2, 2]), np.arcsin(-R[2, 0])
+    row[log.SUSPENSION] = [state.joint_positions[name] for name in SUSPENSION_JOINTS]
+    row[log.RATES] = [state.joint_velocities[name] for name in WHEEL_JOINTS]
+    row[log.STEERING] = [state.joint_positions.get(name, 0.0) for name in STEERING_JOINTS]
+    row[log.TORQUES] = state.wheel_torques
     return row
 
 

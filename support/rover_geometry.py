@@ -11,7 +11,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rover_physics import PathPrediction, Rover, Terrain
-from rover_physics.rover.model import Part
 
 UP = np.array([0.0, 0.0, 1.0])
 GAP = 3e-5
@@ -181,16 +180,13 @@ def free_balance_matrix(
     All forces are in units of the weight; each wheel has an independent lateral force S.
     """
     placed, frames = place_rover(rover, prediction, i), contact_frames(rover, prediction, i)
-    columns = []
+    sums = []
     for kind in range(3):
         for wheel in range(6):
             forces = np.zeros((6, 3))
             forces[wheel] = rover.weight * frames[wheel, kind]
-            columns.append(forces)
-    sums = [
-        balance_sums(rover, placed, _on_wheels(prediction, i, placed, forces))
-        for forces in columns
-    ]
+            acting = _on_wheels(prediction, i, placed, forces)
+            sums.append(balance_sums(rover, placed, acting))
     return np.array(sums).T, -balance_sums(rover, placed, _weights(rover, placed))
 
 
@@ -274,6 +270,8 @@ def turned_round(rover: Rover) -> Rover:
         return (-point[0], point[1], point[2])
 
     suspension, masses, belly = rover.suspension, rover.masses, rover.belly
+    parts = {name: getattr(masses, name) for name in ("body", "rocker", "bogie")}
+    flipped = {name: replace(part, com=flip(part.com)) for name, part in parts.items()}
     other = {"rear": "front", "front": "rear", "middle": "middle"}
     low, high = suspension.rocker_limits, suspension.bogie_limits
     return replace(
@@ -289,11 +287,6 @@ def turned_round(rover: Rover) -> Rover:
             rocker_limits=(-low[1], -low[0]),
             bogie_limits=(-high[1], -high[0]),
         ),
-        masses=replace(
-            masses,
-            body=Part(masses.body.mass, flip(masses.body.com)),
-            rocker=Part(masses.rocker.mass, flip(masses.rocker.com)),
-            bogie=Part(masses.bogie.mass, flip(masses.bogie.com)),
-        ),
+        masses=replace(masses, **flipped),
         belly=replace(belly, x=(-belly.x[1], -belly.x[0])),
     )
