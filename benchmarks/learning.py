@@ -10,7 +10,7 @@ import tempfile
 from collections import defaultdict
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import typer
@@ -280,41 +280,50 @@ def measure_motion(rows: np.ndarray, truth: np.ndarray, seed: int) -> list[Wheel
     ]
 
 
-def print_odometry(drives: list[LearningDrive], keep: Path) -> None:
-    """Print misses at the ends of drives without visual odometry, after those before with it."""
+def print_odometry(learned: list[Learned], keep: Path) -> None:
+    """Print misses at the ends of drives without visual odometry, after those before with it.
+
+    Friction is that which is told, and that which was learned on the drive with visual odometry.
+    """
     rover = told_rover()
-    teacher, found = WheelOdometry(rover), defaultdict[str, list[tuple[float, ...]]](list)
-    for drive in drives:
-        recorded = record(drive, keep)
+    teacher, found = WheelOdometry(rover), defaultdict[tuple[str, ...], list[Any]](list)
+    for one in learned:
+        drive, recorded = one.drive, record(one.drive, keep)
         if not recorded.passed:
             continue
         truth, rows = recorded.rows[:: drive.step], drive.add_noise(recorded.rows)
         motions = measure_motion(rows, truth, drive.seed)
-        known, pupil, yaws = WheelOdometry(rover), WheelOdometry(rover), []
-        for one in (known, pupil):
-            one.forward, one.side = teacher.forward, teacher.side
+        told, known, pupil = (WheelOdometry(rover) for _ in range(3))
+        for odometry in (told, known, pupil):
+            odometry.forward, odometry.side = teacher.forward, teacher.side
+        friction = one.estimate.friction
+        known.friction, known.friction_deviation = friction.mean, friction.std
+        yaws = []
         for motion in motions:
+            told.take(motion)
             known.take(motion)
-            yaws.append(known.pose[2])
+            yaws.append(told.pose[2])
         between = 0.5 * np.add(yaws[:-1], yaws[1:])
         ways = rover.wheel.radius * rows[1:, log.RATES].mean(axis=1) * PERIOD * drive.step
         plain = np.array([np.cos(between), np.sin(between)]) @ ways
         c, s = np.cos(truth[0, log.YAW]), np.sin(truth[0, log.YAW])
         end = np.array([[c, s], [-s, c]]) @ (truth[-1] - truth[0])[[log.X, log.Y]]
-        miss = known.pose[:2] - end
-        nees = miss @ np.linalg.solve(known.covariance[:2, :2], miss)
-        if drive is not drives[0]:
-            found[drive.kind].append((np.hypot(*miss), np.hypot(*(plain - end)), nees))
+        for name, odometry in {"told": told, "learned": known}.items():
+            miss = odometry.pose[:2] - end
+            nees = miss @ np.linalg.solve(odometry.covariance[:2, :2], miss)
+            if one is not learned[0]:
+                sizes = np.hypot(*miss), np.hypot(*(plain - end))
+                found[drive.kind, name].append((*sizes, nees))
         for motion, row in zip(motions, rows, strict=True):
             pupil.take(motion)
             pupil.learn(row[[log.X, log.Y, log.YAW]])
     table = []
-    for kind, values in found.items():
+    for kind, values in sorted(found.items()):
         own, plain_miss, nees = np.array(values).T
         better = plain_miss.mean() / own.mean()
         means = own.mean(), plain_miss.mean(), better, nees.mean()
-        table.append((kind, len(own), *means, np.mean(nees < 5.99)))
-    columns = {"ground": "", "drives": "", "miss [m]": ".3f", "plain [m]": ".3f"}
+        table.append((*kind, len(own), *means, np.mean(nees < 5.99)))
+    columns = {"ground": "", "friction": "", "drives": "", "miss [m]": ".3f", "plain [m]": ".3f"}
     columns |= {"times better": ".1f", "NEES": ".1f", "within 95 %": ".0%"}
     title = "Wheel odometry at the ends of drives, without visual odometry"
     print_table(title, columns, table)
@@ -361,7 +370,7 @@ def main(
     columns |= {"right left": "", "slip [s]": ".1f", "stuck [s]": ".1f", "noticed [s]": ".1f"}
     print_table("What was learned", columns | {"faults": ""}, map(describe, learned))
     print_summary(learned)
-    print_odometry([job[0] for job in jobs], keep)
+    print_odometry(learned, keep)
 
 
 def describe(one: Learned) -> tuple[str | float | None, ...]:
