@@ -16,6 +16,7 @@ import numpy as np
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
+from rover_planner.learning.friction_filter import PRIOR_SPREAD
 from rover_planner.learning.wheel_slip import LONGEST_GAP
 from rover_planner.planning.angles import wrap
 
@@ -29,8 +30,6 @@ GYRO_NOISE, GYRO_BIAS = 2e-3, 1e-4
 HALF_SLIDE, SLIDE_SPREAD = 0.85, 0.1
 """Use of friction at which wheels that slide lose half of the way, and the standard deviation of
 its logarithm."""
-UNKNOWN = 0.6
-"""Standard deviation of friction that was only told, over it."""
 TRACTION_TIME = 0.5
 """Time over which the traction is averaged [s]: it jumps where wheels hop."""
 
@@ -95,7 +94,7 @@ class WheelOdometry:
         self.forward, self.side = Regression(FORWARD_PRIOR), Regression(SIDE_PRIOR)
         """Shares of the distance lost ahead and gone aside; may be those of another drive."""
         self._per_torque = 1.0 / (rover.wheel.radius * rover.weight)
-        self.friction, self.friction_deviation = rover.friction, UNKNOWN * rover.friction
+        self.friction, self.friction_deviation = rover.friction, PRIOR_SPREAD * rover.friction
         """Friction of the ground, as far as it is known, and its standard deviation."""
         self._traction = 0.0
         """What all wheels pull, over the weight."""
