@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from msg_adapters.errors import MessageError
 from rover_physics.numerics.arrays import seal_array
@@ -236,11 +237,12 @@ def check_precision(xy: NDArray[np.float64], precision: float, cell: float) -> N
 def combine(cells, values, grid: CloudGrid, how: str) -> NDArray[np.float64]:
     """Combine the values (n,) of each cell; NaN in cells without a value."""
     size = grid.rows * grid.columns
+    combined = np.full(size, np.nan)
     if how in ("max", "min"):
-        combined = np.full(size, np.nan)
         (np.fmax if how == "max" else np.fmin).at(combined, cells, values)
     elif how == "median":
-        combined = _medians(cells, values, size)
+        some = np.flatnonzero(np.bincount(cells, minlength=size))
+        combined[some] = ndimage.median(values, cells, some)
     elif how == "most frequent":
         combined = most_frequent(cells, values, size)
     else:
@@ -248,19 +250,6 @@ def combine(cells, values, grid: CloudGrid, how: str) -> NDArray[np.float64]:
         sums = np.bincount(cells, weights=values, minlength=size)
         combined = np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
     return combined.reshape(grid.rows, grid.columns)
-
-
-def _medians(cells, values, size: int) -> NDArray[np.float64]:
-    """Return the medians (size,) of the values of each cell; NaN in cells without a value."""
-    ordered = values[np.lexsort((values, cells))]
-    counts = np.bincount(cells, minlength=size)
-    ends = np.cumsum(counts)
-    medians = np.full(size, np.nan)
-    some = counts > 0
-    low = (ends - counts + (counts - 1) // 2)[some]
-    high = (ends - counts + counts // 2)[some]
-    medians[some] = 0.5 * (ordered[low] + ordered[high])
-    return medians
 
 
 def most_frequent(cells, values, size: int) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from sensor_msgs.msg import Imu
 
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_norm
-from rover_physics.numerics.quaternions import matrix_from_xyzw, rpy_from_xyzw, xyzw_from_rpy
+from rover_physics.numerics.quaternions import matrix_from_xyzw, xyzw_from_rpy
 
 NOT_MEASURED = -1.0
 """First element of a covariance in sensor_msgs/Imu if the quantity is not measured."""
@@ -36,10 +36,7 @@ class ImuMounting:
         """Take the frame of the IMU, and roll, pitch, yaw of its axes in the body frame [rad]."""
         self.frame_id = frame_id
         """Frame that its messages must have; one without a frame_id is taken as well."""
-        self._is_turned = any(rpy)
-        turn = xyzw_from_rpy(*rpy)
-        self._matrix = matrix_from_xyzw(turn)
-        self._body_in_imu = tuple((turn * (-1.0, -1.0, -1.0, 1.0)).tolist())
+        self._turn = matrix_from_xyzw(xyzw_from_rpy(*rpy)) if any(rpy) else None
 
     def check_frame(self, frame_id: str) -> None:
         """Check the frame of a message.
@@ -53,22 +50,9 @@ class ImuMounting:
                 "parameters imu_frame and imu_mounting must tell how it is mounted"
             )
 
-    def turn_orientation(self, xyzw: tuple[float, ...]) -> tuple[float, ...]:
-        """Return the orientation of the body from that of the IMU, quaternions x, y, z, w."""
-        if not self._is_turned:
-            return xyzw
-        ax, ay, az, aw = xyzw
-        bx, by, bz, bw = self._body_in_imu
-        return (
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-            aw * bw - ax * bx - ay * by - az * bz,
-        )
-
-    def turn_rates(self, rates: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return angular velocities (3,) in the body frame from those in the IMU's frame."""
-        return self._matrix @ rates if self._is_turned else rates
+    def turn(self, vector: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return a vector (3,) in the body frame from one in the IMU's frame."""
+        return vector if self._turn is None else self._turn @ vector
 
 
 def imu_to_attitude(imu: Imu, mounting: ImuMounting | None = None) -> Attitude:
@@ -91,8 +75,9 @@ def imu_to_attitude(imu: Imu, mounting: ImuMounting | None = None) -> Attitude:
     q = imu.orientation
     xyzw = (q.x, q.y, q.z, q.w)
     norm = check_norm(xyzw, "imu orientation")
-    body = xyzw if mounting is None else mounting.turn_orientation(xyzw)
-    roll, pitch, _ = rpy_from_xyzw(body, squared_norm=norm**2)
+    turn = (lambda vector: vector) if mounting is None else mounting.turn
+    x, y, z = turn(matrix_from_xyzw(np.array(xyzw) / norm)[2]).tolist()  # upwards
+    roll, pitch = math.atan2(y, z), -math.asin(max(-1.0, min(1.0, x)))
     if imu.angular_velocity_covariance[0] == NOT_MEASURED:
         return Attitude(roll, pitch, None)
     rate = imu.angular_velocity
@@ -100,5 +85,4 @@ def imu_to_attitude(imu: Imu, mounting: ImuMounting | None = None) -> Attitude:
         raise MessageError(
             f"imu has angular velocity {[rate.x, rate.y, rate.z]}; it must be finite, in rad/s"
         )
-    rates = np.array([rate.x, rate.y, rate.z])
-    return Attitude(roll, pitch, rates if mounting is None else mounting.turn_rates(rates))
+    return Attitude(roll, pitch, turn(np.array([rate.x, rate.y, rate.z])))

@@ -7,8 +7,9 @@ read, under the same names, and the data of a cloud are a view of its bytes.
 """
 
 import struct
+from collections import namedtuple
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
@@ -31,17 +32,8 @@ class DamagedMessageError(MessageError):
         )
 
 
-class _Vector(NamedTuple):
-    x: float
-    y: float
-    z: float
-
-
-class _Quaternion(NamedTuple):
-    x: float
-    y: float
-    z: float
-    w: float
+_Vector = namedtuple("_Vector", "x y z")
+_Quaternion = namedtuple("_Quaternion", "x y z w")
 
 
 class SensorReader:
