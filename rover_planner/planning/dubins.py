@@ -40,7 +40,9 @@ def dubins_paths(
     words = _words_between(start, goal, radius)
     lengths = words.sum(axis=1)
     shortest = np.argsort(lengths, kind="stable")[: np.isfinite(lengths).sum()]
-    return [_drive(start, _WORDS[k], words[k], radius, waypoint_spacing) for k in shortest[:most]]
+    return [
+        drive_word(start, _WORDS[k], words[k], radius, waypoint_spacing) for k in shortest[:most]
+    ]
 
 
 def shortest_dubins_path(start, goal, radius, waypoint_spacing) -> np.ndarray:
@@ -101,8 +103,8 @@ def _solve_left(a: Angles, b: Angles, d: Angles) -> list[list[Angles]]:
     return [same, crossed, [t, p, _turn(b - a - t + p)]]
 
 
-def _drive(start, word, pieces, radius, waypoint_spacing):
-    """Sample a word from the start; return equidistant poses (n, 3)."""
+def drive_word(start, word, pieces, radius, waypoint_spacing):
+    """Sample a word of three pieces [radii] from the start; return equidistant poses (n, 3)."""
     ends = np.concatenate([[0.0], np.cumsum(pieces)])
     steps = count_steps(ends[-1] * radius, waypoint_spacing)
     driven = np.linspace(0.0, ends[-1], steps + 1)

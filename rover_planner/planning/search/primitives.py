@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import can_turn_on_the_spot, swing_radius, tightest_radius
 from rover_planner.planning.angles import wrap
-from rover_planner.planning.dubins import count_steps
+from rover_planner.planning.candidates import turn_on_the_spot
+from rover_planner.planning.dubins import count_steps, drive_word
 from rover_planner.planning.search.nodes import HEADINGS, STEPS, YAWS, opposite
 
 CURVES = {1: 2, 2: 1}
@@ -135,51 +136,28 @@ def _curves(
 ) -> list[Primitive]:
     """Return the curves that turn by some headings, the shortest first."""
     end = (heading + turn) % HEADINGS
-    ahead = np.array([_unit(YAWS[heading]), _unit(YAWS[end])]).T
+    yaws = YAWS[[heading, end]]
+    ahead = np.array([np.cos(yaws), np.sin(yaws)])
     angle = float(wrap(YAWS[end] - YAWS[heading]))
+    slope = np.tan(0.5 * abs(angle))
     cells = np.arange(-_SEARCH_RADIUS, _SEARCH_RADIUS + 1)
     steps = np.stack(np.meshgrid(cells, cells, indexing="ij"), axis=-1).reshape(-1, 2)
     legs = np.linalg.solve(ahead, cell * steps.T).T  # from either end to where the lines meet
     arc_legs = legs.min(axis=1)
-    fits = arc_legs >= radius * np.tan(0.5 * abs(angle)) - 1e-9
+    fits = arc_legs >= radius * slope - 1e-9
     lengths = legs.sum(axis=1) - 2.0 * arc_legs
-    lengths += abs(angle) / np.tan(0.5 * abs(angle)) * arc_legs
+    lengths += abs(angle) / slope * arc_legs
     rows = np.flatnonzero(fits)
     order = rows[np.lexsort((steps[rows, 1], steps[rows, 0], lengths[rows].round(9)))]
     found: list[Primitive] = []
-    for row in order:
-        if len(found) == max(CURVES.values()):
-            break
-        poses = _drive_curve(YAWS[heading], angle, legs[row], lengths[row], spacing)
+    for row in order[: max(CURVES.values())]:
+        bend = arc_legs[row] / slope
+        before, behind = (legs[row] - arc_legs[row]) / bend
+        word, start = "SLS" if angle > 0.0 else "SRS", np.array([0.0, 0.0, YAWS[heading]])
+        poses = drive_word(start, word, (before, abs(angle), behind), bend, spacing)
         step = (int(steps[row, 0]), int(steps[row, 1]))
         found.append(Primitive(step, end, Gear.FORWARD, float(lengths[row]), poses))
     return found
-
-
-def _drive_curve(
-    yaw: float, angle: float, legs: np.ndarray, length: float, spacing: float
-) -> np.ndarray:
-    """Return the waypoints (n, 3) of a line of the first leg's excess, an arc, and the second's.
-
-    Args:
-        yaw: First heading [rad].
-        angle: Turn [rad], positive to the left.
-        legs: (2,) distances [m] from the ends to where the lines through them meet.
-        length: Length of the curve [m].
-        spacing: Largest distance between waypoints [m].
-    """
-    arc_leg, side = legs.min(), np.sign(angle)
-    radius = arc_leg / np.tan(0.5 * abs(angle))
-    driven = np.linspace(0.0, length, 1 + count_steps(length, spacing))
-    on_arc = np.clip(driven - (legs[0] - arc_leg), 0.0, radius * abs(angle))
-    before = np.minimum(driven, legs[0] - arc_leg)
-    behind = np.maximum(driven - before - on_arc, 0.0)
-    yaws = yaw + side * on_arc / radius
-    chord = 2.0 * radius * np.sin(0.5 * on_arc / radius)
-    middle = yaw + 0.5 * side * on_arc / radius
-    places = before[:, None] * _unit(yaw) + behind[:, None] * _unit(yaw + angle)
-    places += chord[:, None] * np.column_stack([np.cos(middle), np.sin(middle)])
-    return np.column_stack([places, yaws])
 
 
 def _reverse(forward: Primitive) -> Primitive:
@@ -196,12 +174,6 @@ def _turns(heading: int, swing: float, spacing: float) -> list[Primitive]:
     for side in (1, -1):
         end = (heading + side) % HEADINGS
         angle = float(wrap(YAWS[end] - YAWS[heading]))
-        length = swing * abs(angle)
-        yaws = YAWS[heading] + np.linspace(0.0, angle, 1 + count_steps(length, spacing))
-        poses = np.column_stack([np.zeros((len(yaws), 2)), yaws])
-        found.append(Primitive((0, 0), end, Gear.ON_THE_SPOT, length, poses))
+        poses = turn_on_the_spot(np.zeros(2), YAWS[heading], angle, spacing / swing)
+        found.append(Primitive((0, 0), end, Gear.ON_THE_SPOT, swing * abs(angle), poses))
     return found
-
-
-def _unit(yaw: float) -> np.ndarray:
-    return np.array([np.cos(yaw), np.sin(yaw)])
