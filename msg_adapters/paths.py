@@ -198,8 +198,7 @@ class PoseStock:
 def settled_path(
     prediction: PathPrediction,
     rows: Sequence[int] | NDArray[np.intp],
-    frame_id: str,
-    stamp,
+    header: Header,
     stock: PoseStock | None = None,
 ) -> Path:
     """Convert settled waypoints of a prediction into a path with the body's full orientation.
@@ -207,12 +206,11 @@ def settled_path(
     Args:
         prediction: Prediction of n waypoints.
         rows: Indices of the waypoints to write, in order; all must have settled.
-        frame_id: Map frame.
-        stamp: builtin_interfaces/Time of the path and of every pose.
+        header: Frame and stamp of the path and of every pose.
         stock: Poses to reuse; None makes new ones.
     """
     stock = stock or PoseStock()
-    stock.header.frame_id, stock.header.stamp = frame_id, stamp
+    stock.header.frame_id, stock.header.stamp = header.frame_id, header.stamp
     rows = np.asarray(rows, dtype=np.intp)
     positions = prediction.position[rows].tolist()
     rotations = xyzw_from_rpy(
@@ -221,30 +219,17 @@ def settled_path(
     return Path(header=stock.header, poses=stock.fill(positions, rotations))
 
 
-def empty_path(frame_id: str, stamp=None) -> Path:
-    """Return a path without poses, the answer if no path is traversable."""
-    path = Path()
-    path.header.frame_id = frame_id
-    if stamp is not None:
-        path.header.stamp = stamp
-    return path
-
-
-def stamped_pose(pose: ArrayLike, frame_id: str, stamp=None) -> PoseStamped:
+def stamped_pose(pose: ArrayLike, frame_id: str) -> PoseStamped:
     """Convert a pose (3,) x, y [m], yaw [rad] into a level one, such as the goal of a request."""
     x, y, yaw = (float(value) for value in np.asarray(pose, dtype=np.float64))
-    stamped = PoseStamped()
-    stamped.header.frame_id = frame_id
-    if stamp is not None:
-        stamped.header.stamp = stamp
+    stamped = PoseStamped(header=Header(frame_id=frame_id))
     stamped.pose.position.x, stamped.pose.position.y = x, y
     turn = stamped.pose.orientation
     turn.x, turn.y, turn.z, turn.w = xyzw_from_yaw(yaw)
     return stamped
 
 
-def poses_path(poses: ArrayLike, frame_id: str, stamp=None) -> Path:
+def poses_path(poses: ArrayLike, frame_id: str) -> Path:
     """Convert poses (n, 3) x, y [m], yaw [rad] into a path of level poses to be checked."""
-    path = empty_path(frame_id, stamp)
-    path.poses = [stamped_pose(pose, frame_id, stamp) for pose in np.asarray(poses)]
-    return path
+    stamped = [stamped_pose(pose, frame_id) for pose in np.asarray(poses)]
+    return Path(header=Header(frame_id=frame_id), poses=stamped)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from std_msgs.msg import Header
 
 VERDICT = "traverse_server: can the rover traverse"
 HEALTH, MONITOR, SEARCH = (f"traverse_server: {part}" for part in ("health", "monitor", "search"))
@@ -46,13 +47,6 @@ def make_status(
     return status
 
 
-def diagnostics(statuses: Sequence[DiagnosticStatus], stamp: Any) -> DiagnosticArray:
-    """Return statuses as a message with a stamp, builtin_interfaces/Time."""
-    message = DiagnosticArray(status=list(statuses))
-    message.header.stamp = stamp
-    return message
-
-
 def traction_diagnostics(
     values: Mapping[str, Any],
     state: str,
@@ -91,7 +85,8 @@ def traction_diagnostics(
     else:
         text = ADVICE.get(state, state)
     entries = {"state": state, **values, "warning": "; ".join(problems)}
-    return diagnostics([make_status(TRACTION, level, text, entries, hardware_id)], stamp)
+    status = make_status(TRACTION, level, text, entries, hardware_id)
+    return DiagnosticArray(header=Header(stamp=stamp), status=[status])
 
 
 def verdict_to_diagnostics(
@@ -99,8 +94,7 @@ def verdict_to_diagnostics(
     reason: str,
     summary: Mapping[str, Any],
     hardware_id: str,
-    frame_id: str,
-    stamp: Any,
+    header: Header,
 ) -> DiagnosticArray:
     """Write a verdict as one status.
 
@@ -110,17 +104,14 @@ def verdict_to_diagnostics(
         summary: Each entry becomes a key and a value. Texts are copied, other values are written
             as JSON.
         hardware_id: Name of the rover.
-        frame_id: Map frame.
-        stamp: builtin_interfaces/Time.
+        header: Frame of the map, and stamp.
     """
     entries = {
         key: value if isinstance(value, str) else json.dumps(value)
         for key, value in summary.items()
     }
     status = make_status(VERDICT, level, reason or "traversable", entries, hardware_id)
-    message = diagnostics([status], stamp)
-    message.header.frame_id = frame_id
-    return message
+    return DiagnosticArray(header=header, status=[status])
 
 
 def to_json(report: Mapping[str, Any]) -> str:

@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Writes values of cells as occupancy grids: known ground, classes, areas that were reached."""
 
-from typing import Any
-
 import numpy as np
 from nav_msgs.msg import OccupancyGrid
 from numpy.typing import NDArray
+from std_msgs.msg import Header
 
 from rover_physics.terrain.grid import Terrain
 
@@ -19,7 +18,7 @@ _TABLE = np.array([*VALUES, UNKNOWN], np.int8)
 
 
 def occupancy_grid(
-    values: NDArray[np.int8], cell: float, first: tuple[float, float], frame: str, stamp: Any
+    values: NDArray[np.int8], cell: float, first: tuple[float, float], header: Header
 ) -> OccupancyGrid:
     """Return values (rows, columns), row 0 at the smallest y, as an occupancy grid.
 
@@ -27,11 +26,10 @@ def occupancy_grid(
         values: -1 to 100.
         cell: Cell size [m].
         first: x, y of the centre of cell [0, 0] [m], map frame; the grid has that of its corner.
-        frame: Frame of the map.
-        stamp: builtin_interfaces/Time.
+        header: Frame of the map, and stamp.
     """
-    message = empty_grid(frame, stamp)
-    message.info.map_load_time = stamp
+    message = OccupancyGrid(header=header)
+    message.info.map_load_time = header.stamp
     message.info.resolution = float(cell)
     message.info.height, message.info.width = values.shape
     message.info.origin.position.x = first[0] - 0.5 * cell
@@ -41,36 +39,29 @@ def occupancy_grid(
     return message
 
 
-def empty_grid(frame: str, stamp: Any) -> OccupancyGrid:
-    """Return a grid without cells, such as that of an area that was not searched."""
-    message = OccupancyGrid()
-    message.header.frame_id, message.header.stamp = frame, stamp
-    return message
-
-
 def area_to_grid(
-    places: NDArray[np.bool_], cell: float, first: tuple[float, float], frame: str, stamp: Any
+    places: NDArray[np.bool_], cell: float, first: tuple[float, float], header: Header
 ) -> OccupancyGrid:
     """Return an area as a grid: REACHED where `places` (rows, columns) is True, else NOT_REACHED.
 
     The rest is as for `occupancy_grid`; a cell is a place.
     """
     values = np.where(places, REACHED, NOT_REACHED).astype(np.int8)
-    return occupancy_grid(values, cell, first, frame, stamp)
+    return occupancy_grid(values, cell, first, header)
 
 
 def classes_to_grid(
-    classes: NDArray[np.int8], cell: float, first: tuple[float, float], frame: str, stamp: Any
+    classes: NDArray[np.int8], cell: float, first: tuple[float, float], header: Header
 ) -> OccupancyGrid:
     """Return traversability classes (ny, nx), -1 where unknown, as a grid of VALUES and UNKNOWN.
 
     The rest is as for `occupancy_grid`.
     """
     values = _TABLE[classes]  # -1 is the last of the table
-    return occupancy_grid(values, cell, first, frame, stamp)
+    return occupancy_grid(values, cell, first, header)
 
 
-def terrain_to_occupancy_grid(terrain: Terrain, frame_id: str, stamp: Any) -> OccupancyGrid:
+def terrain_to_occupancy_grid(terrain: Terrain, header: Header) -> OccupancyGrid:
     """Convert a terrain into a grid of known (0) and unknown (-1) cells."""
     values = np.where(np.isnan(terrain.elevation), UNKNOWN, 0).astype(np.int8)
-    return occupancy_grid(values, terrain.resolution, terrain.origin, frame_id, stamp)
+    return occupancy_grid(values, terrain.resolution, terrain.origin, header)

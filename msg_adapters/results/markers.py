@@ -35,8 +35,7 @@ def path_markers(
     prediction: PathPrediction,
     reasons: Sequence[str],
     rows: NDArray[np.intp],
-    frame_id: str,
-    stamp,
+    header: Header,
     waypoint_classes: Sequence[str] = (),
 ) -> MarkerArray:
     """Return markers of a judged path; the first one deletes the markers drawn before.
@@ -45,12 +44,10 @@ def path_markers(
         prediction: Prediction of n waypoints.
         reasons: (n,) reason why each waypoint is not passable, empty if passable.
         rows: Indices of waypoints to draw; the first failing waypoint is always drawn.
-        frame_id: Map frame.
-        stamp: builtin_interfaces/Time.
+        header: Frame of the map, and stamp.
         waypoint_classes: (n,) classes, which set the colours; without them the reasons do.
     """
-    markers = cleared_markers(frame_id, stamp)
-    header = markers.markers[0].header
+    markers = cleared_markers(header)
     positions = _drawable_positions(prediction)
     failures = [i for i, reason in enumerate(reasons) if reason]
     rows = np.unique(np.concatenate([rows, failures[:1]]).astype(np.intp))
@@ -87,9 +84,9 @@ def _colour(reason: str, traversability_class: str) -> ColorRGBA:
     )
 
 
-def cleared_markers(frame_id: str, stamp) -> MarkerArray:
+def cleared_markers(header: Header) -> MarkerArray:
     """Return a marker that deletes all markers drawn before."""
-    marker = _marker("", Marker.CUBE, Header(frame_id=frame_id, stamp=stamp), (0.0, 0.0, 0.0))
+    marker = _marker("", Marker.CUBE, header, (0.0, 0.0, 0.0))
     marker.action = Marker.DELETEALL
     return MarkerArray(markers=[marker])
 

@@ -5,7 +5,7 @@ import array
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64MultiArray, Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from msg_adapters.commands import doubles, labelled_array
@@ -63,8 +63,7 @@ def tip_over_array(prediction: PathPrediction | None) -> Float64MultiArray:
 def joint_trajectory(
     prediction: PathPrediction | None,
     rover: Rover,
-    frame_id: str,
-    stamp,
+    header: Header,
     stock: list[JointTrajectoryPoint] | None = None,
     names: JointNames = OWN_NAMES,
 ) -> JointTrajectory:
@@ -79,15 +78,13 @@ def joint_trajectory(
     Args:
         prediction: Prediction of n waypoints; None makes a trajectory without points.
         rover: The rover.
-        frame_id: Map frame.
-        stamp: builtin_interfaces/Time.
+        header: Frame of the map, and stamp.
         stock: Points to reuse, because making them takes most of the time. The list grows as
             needed. One message must be sent before the next one is made from it.
         names: Names, signs and offsets of the joints in messages.
     """
     joints = [*JOINTS, *steering_joints(rover)]
-    trajectory = JointTrajectory(joint_names=list(names.robot_names(joints)))
-    trajectory.header.frame_id, trajectory.header.stamp = frame_id, stamp
+    trajectory = JointTrajectory(header=header, joint_names=list(names.robot_names(joints)))
     if prediction is None:
         return trajectory
     count = len(prediction.settled)

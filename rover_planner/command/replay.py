@@ -175,13 +175,15 @@ class _Results:
 
     def _write_messages(self, answer: "ReplayAnswer") -> None:
         """Write the messages that a server would publish, under its topics."""
+        from std_msgs.msg import Header
+
         from msg_adapters.stamps import ns_to_stamp
         from rover_planner.nodes.result_topics import RESULT_KINDS, ResultMessages
 
         messages = ResultMessages(
             answer.judgement,
             answer.identity,
-            ns_to_stamp(answer.stamp),
+            Header(frame_id=self._parameters.map_frame, stamp=ns_to_stamp(answer.stamp)),
             self._rover,
             self._parameters,
             self._work.inputs,

@@ -12,6 +12,7 @@ import numpy as np
 from nav_msgs.srv import LoadMap
 from rclpy.exceptions import InvalidHandle
 from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Header
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.results.grids import terrain_to_occupancy_grid
@@ -136,7 +137,8 @@ class MapTopics(MapIntake):
         source = show_file(url)
         self._note(source, self._inputs.keep(snapshot, source))
         stamp = self._node.get_clock().now().to_msg()
-        response.map = terrain_to_occupancy_grid(terrain, self.values.map_frame, stamp)
+        header = Header(frame_id=self.values.map_frame, stamp=stamp)
+        response.map = terrain_to_occupancy_grid(terrain, header)
         response.result = LoadMap.Response.RESULT_SUCCESS
 
     def look_under_rover(self) -> None:

@@ -15,8 +15,9 @@ from functools import partial
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray
+from std_msgs.msg import Header
 
-from msg_adapters.results.diagnostics import SEARCH, diagnostics, make_status
+from msg_adapters.results.diagnostics import SEARCH, make_status
 from rover_planner.nodes.map_topics import MapTopics
 from rover_planner.planning.answering.budget import STOPPING, Budget
 from rover_planner.planning.answering.question_queue import Asked, QuestionQueue
@@ -128,9 +129,9 @@ class QuestionDesk:
             "a path is found, a better one is searched" if report["found"] else "no path found yet"
         )
         name = self._service.settings.rover.name
-        stamp = self._node.get_clock().now().to_msg()
+        header = Header(stamp=self._node.get_clock().now().to_msg())
         status = make_status(SEARCH, "ok", text, report, name)
-        self._progress.publish(diagnostics([status], stamp))
+        self._progress.publish(DiagnosticArray(header=header, status=[status]))
 
     def identify(self, service: str, path_hash: str, snapshot: Snapshot) -> IdentityReport:
         """Return a new number with what a judgement that nobody asked for is about."""

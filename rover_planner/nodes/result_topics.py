@@ -6,17 +6,16 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
 import numpy as np
-from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import OccupancyGrid, Path
 from numpy.typing import NDArray
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64MultiArray, Header
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 from visualization_msgs.msg import MarkerArray
 
-from msg_adapters.paths import PoseStock, decimate, empty_path, settled_path
+from msg_adapters.paths import PoseStock, decimate, settled_path
 from msg_adapters.results.diagnostics import verdict_to_diagnostics
-from msg_adapters.results.grids import area_to_grid, empty_grid
+from msg_adapters.results.grids import area_to_grid
 from msg_adapters.results.markers import cleared_markers, path_markers
 from msg_adapters.results.predictions import joint_trajectory, tip_over_array, wheel_array
 from msg_adapters.stamps import ns_to_stamp
@@ -80,9 +79,10 @@ class ResultTopics:
             The plan, whose poses are valid until the next plan is made, and a function that
             returns the report.
         """
-        stamp, rover = ns_to_stamp(self._next_stamp()), self._inputs.service.settings.rover
+        values, rover = self._node.values, self._inputs.service.settings.rover
+        header = Header(frame_id=values.map_frame, stamp=ns_to_stamp(self._next_stamp()))
         kept = self._inputs, self._poses, self._points
-        results = ResultMessages(judgement, identity, stamp, rover, self._node.values, *kept)
+        results = ResultMessages(judgement, identity, header, rover, values, *kept)
         plan = results.plan()
         if judgement.traversable and not identity.path_hash:
             path_hash, path_stamp = describe_path(plan)
@@ -134,8 +134,8 @@ class ResultMessages:
     """The judgement."""
     identity: IdentityReport
     """What it is about."""
-    stamp: Time
-    """Stamp of all messages."""
+    header: Header
+    """Frame of the map, and stamp, of all messages."""
     rover: Rover
     """The rover of the question."""
     values: TraverseServerParameters
@@ -146,11 +146,6 @@ class ResultMessages:
     """Poses to reuse."""
     points: list[JointTrajectoryPoint] = field(default_factory=list)
     """Points to reuse."""
-
-    @property
-    def frame(self) -> str:
-        """Frame of the map."""
-        return self.values.map_frame
 
     @property
     def prediction(self) -> PathPrediction | None:
@@ -181,11 +176,9 @@ class ResultMessages:
         """Return the path to drive, without poses if none is traversable."""
         candidate = self.judgement.candidate
         if candidate is None or not self.judgement.traversable:
-            return empty_path(self.frame, self.stamp)
+            return Path(header=self.header)
         return self.inputs.frames.to_base(
-            settled_path(
-                candidate.prediction, self._rows_to_show(), self.frame, self.stamp, self.poses
-            )
+            settled_path(candidate.prediction, self._rows_to_show(), self.header, self.poses)
         )
 
     def _verdict(self) -> DiagnosticArray:
@@ -193,31 +186,29 @@ class ResultMessages:
         level = "warning" if report.has_warning else "ok"
         return verdict_to_diagnostics(
             level if judgement.traversable else "error", judgement.reason, report.summary(),
-            self.rover.name, self.frame, self.stamp,
+            self.rover.name, self.header,
         )  # fmt: skip
 
     def _closed_area(self) -> OccupancyGrid:
         """Return the area that start or goal are closed in; without places if they are not."""
         around = self.judgement.around
         if around is None or around.closed is None:
-            return empty_grid(self.frame, self.stamp)
+            return OccupancyGrid(header=self.header)
         cell, (column, row) = around.nodes.cell, around.nodes.first
         first = cell * column, cell * row
-        return area_to_grid(around.closed.places, cell, first, self.frame, self.stamp)
+        return area_to_grid(around.closed.places, cell, first, self.header)
 
     def _joints(self) -> JointTrajectory:
-        return joint_trajectory(
-            self.prediction, self.rover, self.frame, self.stamp, self.points,
-            self.inputs.joint_names,
-        )  # fmt: skip
+        names = self.inputs.joint_names
+        return joint_trajectory(self.prediction, self.rover, self.header, self.points, names)
 
     def _markers(self) -> MarkerArray:
         candidate = self.judgement.candidate
         if candidate is None:
-            return cleared_markers(self.frame, self.stamp)
+            return cleared_markers(self.header)
         classes = [waypoint.traversability_class for waypoint in self.judgement.classes]
         reasons, rows = candidate.verdict.reasons, self._rows_to_show()
-        return path_markers(candidate.prediction, reasons, rows, self.frame, self.stamp, classes)
+        return path_markers(candidate.prediction, reasons, rows, self.header, classes)
 
     def _rows_to_show(self) -> NDArray[np.intp]:
         """Return indices of waypoints about `plan_spacing` apart and where the class changes."""

@@ -18,7 +18,7 @@ from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock as ClockMessage
 from sensor_msgs.msg import Imu, JointState, PointCloud2
-from std_msgs.msg import Bool, Float64MultiArray, String
+from std_msgs.msg import Bool, Float64MultiArray, Header, String
 
 from msg_adapters.commands import joint_order, twist_to_speeds
 from msg_adapters.elevation import terrain_to_point_cloud
@@ -26,7 +26,7 @@ from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash
 from msg_adapters.joints import JointNames
 from msg_adapters.paths import path_to_poses
-from msg_adapters.results.diagnostics import SIMULATOR, diagnostics, make_status
+from msg_adapters.results.diagnostics import SIMULATOR, make_status
 from msg_adapters.sensing import BASE_FRAME, imu_message, joint_state, odometry_message
 from msg_adapters.stamps import NANOSECONDS, ns_to_stamp
 from rover_physics.names import WHEEL_JOINTS
@@ -223,7 +223,8 @@ class RoverSimulator(RoverNode[RoverSimulatorParameters]):
             ("error", state.stopped) if state.stopped else ("ok", "nothing stops the rover")
         )
         status = make_status(SIMULATOR, level, text, values, self._settings.rover.name)
-        self._diagnostics.publish(diagnostics([status], self._stamp))
+        header = Header(stamp=self._stamp)
+        self._diagnostics.publish(DiagnosticArray(header=header, status=[status]))
 
     def destroy_node(self) -> None:
         """Finish the map in work, and destroy the node."""

@@ -12,13 +12,13 @@ from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Odometry, Path
 from nav_msgs.srv import GetPlan
 from sensor_msgs.msg import Imu, JointState
-from std_msgs.msg import String
+from std_msgs.msg import Header, String
 from std_srvs.srv import Trigger
 
 from msg_adapters.errors import MessageError
 from msg_adapters.identity import path_hash, plan_request_hash
 from msg_adapters.paths import count_poses
-from msg_adapters.results.diagnostics import HEALTH, MONITOR, diagnostics, make_status, to_json
+from msg_adapters.results.diagnostics import HEALTH, MONITOR, make_status, to_json
 from msg_adapters.stamps import NANOSECONDS
 from rover_physics.errors import RoverError
 from rover_physics.numerics.kernel_cache import kernel_cache_note
@@ -358,7 +358,8 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
             make_status(status, one.level, one.message, one.values, name)
             for status, one in ((HEALTH, health), (MONITOR, self.watch.describe()))
         ]
-        self._diagnostics.publish(diagnostics(statuses, now.to_msg()))
+        header = Header(stamp=now.to_msg())
+        self._diagnostics.publish(DiagnosticArray(header=header, status=statuses))
 
 
 def main(argv: Sequence[str] | None = None) -> int:

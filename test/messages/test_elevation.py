@@ -12,6 +12,7 @@ from builtin_interfaces.msg import Time
 from hypothesis import given
 from hypothesis import strategies as st
 from sensor_msgs.msg import PointCloud2, PointField
+from std_msgs.msg import Header
 
 from msg_adapters.elevation import terrain_from_point_cloud, terrain_to_point_cloud
 from msg_adapters.errors import MAX_TEXT, MessageError
@@ -219,7 +220,7 @@ def test_moved_points_are_those_that_were_moved_before_and_invalid_ones_are_left
 
 def test_the_occupancy_grid_tells_known_from_unknown():
     terrain = rough_terrain()
-    occupancy = terrain_to_occupancy_grid(terrain, "map", Time(sec=3))
+    occupancy = terrain_to_occupancy_grid(terrain, Header(frame_id="map", stamp=Time(sec=3)))
     info = occupancy.info
     assert (info.height, info.width) == terrain.elevation.shape
     assert (info.origin.position.x, info.origin.position.y) == pytest.approx((-1.225, 3.375))

@@ -5,8 +5,8 @@ import math
 
 import numpy as np
 import pytest
-from builtin_interfaces.msg import Time
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 
 from msg_adapters.commands import joint_order
 from msg_adapters.errors import MessageError
@@ -87,8 +87,8 @@ def test_a_predicted_trajectory_is_read_back_as_the_model_has_it():
     names = read_joint_map(entries, JOINTS)
     poses = [(0.1 * k, 0.0, 0.0) for k in range(5)]
     prediction = judge_path(LSR1, make_terrain(waves), poses)[0]
-    ours = joint_trajectory(prediction, LSR1, "map", Time())
-    theirs = joint_trajectory(prediction, LSR1, "map", Time(), names=names)
+    ours = joint_trajectory(prediction, LSR1, Header())
+    theirs = joint_trajectory(prediction, LSR1, Header(), names=names)
     state, own = JointState(name=theirs.joint_names), ours.points[3]
     state.position, state.velocity = theirs.points[3].positions, theirs.points[3].velocities
     for back, right in (

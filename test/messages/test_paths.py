@@ -154,7 +154,10 @@ def test_the_hash_is_the_documented_one():
 
 def test_stamps_do_not_count_and_poses_order_and_frame_do():
     path = poses_path(POSES, "map")
-    assert path_hash(poses_path(POSES, "map", Time(sec=5))) == path_hash(path)
+    later = poses_path(POSES, "map")
+    for stamped in (later, *later.poses):
+        stamped.header.stamp = Time(sec=5)
+    assert path_hash(later) == path_hash(path)
     others = [
         poses_path(POSES[::-1], "map"),
         poses_path(POSES[:1], "map"),

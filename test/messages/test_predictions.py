@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64MultiArray, Header
 from visualization_msgs.msg import Marker
 
 from msg_adapters.errors import MessageError
@@ -26,6 +26,7 @@ from rover_physics.traversability import classification
 from support.rovers import FIXED, LSR1
 
 STAMP = Time(sec=12, nanosec=34)
+HEADER = Header(frame_id="map", stamp=STAMP)
 FLAT = Terrain(np.zeros((81, 81)), 0.05, (-2.0, -2.0))
 
 
@@ -65,7 +66,7 @@ def test_an_array_whose_length_disagrees_is_refused():
 
 
 def test_the_trajectory_names_its_joints_and_ends_where_the_rover_cannot_settle(prediction):
-    message = joint_trajectory(prediction, LSR1, "map", STAMP)
+    message = joint_trajectory(prediction, LSR1, HEADER)
     assert message.header.frame_id == "map" and message.header.stamp == STAMP
     assert JOINTS == SUSPENSION_JOINTS + WHEEL_JOINTS
     assert tuple(message.joint_names) == JOINTS + steering_joints(LSR1)
@@ -90,9 +91,9 @@ def test_a_trajectory_of_points_filled_anew_is_the_same_as_one_of_new_points(pre
         results = prediction.results.copy()
         results["status"][~cut] = PoseStatus.NOT_SETTLED
         part = replace(prediction, results=results)
-        trajectory = joint_trajectory(part, LSR1, "map", STAMP, stock)
+        trajectory = joint_trajectory(part, LSR1, HEADER, stock)
         assert len(trajectory.points) == unsettled
-        assert trajectory == joint_trajectory(part, LSR1, "map", STAMP)
+        assert trajectory == joint_trajectory(part, LSR1, HEADER)
 
 
 def test_a_trajectory_has_the_angles_of_the_steered_wheels_with_the_sign_of_the_rover():
@@ -101,7 +102,7 @@ def test_a_trajectory_has_the_angles_of_the_steered_wheels_with_the_sign_of_the_
     prediction = judge_path(LSR1, FLAT, path)[0]
     for positive, sign in (("left", 1.0), ("right", -1.0)):
         names = JointNames(steering=positive)
-        message = joint_trajectory(prediction, LSR1, "map", STAMP, names=names)
+        message = joint_trajectory(prediction, LSR1, HEADER, names=names)
         for i, point in enumerate(message.points):
             angles = dict(zip(message.joint_names, point.positions, strict=True))
             own = {name: angles[name] for name in steering_joints(LSR1)}
@@ -109,14 +110,14 @@ def test_a_trajectory_has_the_angles_of_the_steered_wheels_with_the_sign_of_the_
                 sign * prediction.steering_angle[i, steered_wheels(LSR1)]
             )
         assert sign * own["front_left_steering"] > 0.3
-    message = joint_trajectory(judge_path(FIXED, FLAT, path)[0], FIXED, "map", STAMP)
+    message = joint_trajectory(judge_path(FIXED, FLAT, path)[0], FIXED, HEADER)
     assert tuple(message.joint_names) == JOINTS and len(message.points[0].positions) == 10
 
 
 def test_in_a_turn_on_the_spot_wheels_of_one_side_roll_forwards_and_of_the_other_back():
     turned = np.linspace(0.0, 1.0, 30)
     path = np.column_stack([0.0 * turned, 0.0 * turned, turned])
-    last = joint_trajectory(judge_path(LSR1, FLAT, path)[0], LSR1, "map", STAMP).points[-1]
+    last = joint_trajectory(judge_path(LSR1, FLAT, path)[0], LSR1, HEADER).points[-1]
     reach = np.hypot([0.4, 0.0, 0.4], 0.31) / LSR1.wheel.radius
     assert last.positions[4:10] == pytest.approx([*reach, *-reach], rel=0.01)
     assert (np.sign(last.velocities[4:10]) == np.sign(last.positions[4:10])).all()
@@ -125,12 +126,12 @@ def test_in_a_turn_on_the_spot_wheels_of_one_side_roll_forwards_and_of_the_other
 def test_a_path_of_poses_filled_anew_is_the_same_as_one_of_new_poses(prediction):
     stock = PoseStock()
     for rows in ([0, 10, 49], [5], range(50), [49, 48]):
-        path = settled_path(prediction, rows, "map", STAMP, stock)
-        assert path == settled_path(prediction, rows, "map", STAMP)
+        path = settled_path(prediction, rows, HEADER, stock)
+        assert path == settled_path(prediction, rows, HEADER)
 
 
 def test_a_settled_path_has_height_and_full_orientation(prediction):
-    path = settled_path(prediction, [0, 10, 49], "map", STAMP)
+    path = settled_path(prediction, [0, 10, 49], HEADER)
     for pose, i in zip(path.poses, (0, 10, 49), strict=True):
         place = pose.pose.position
         np.testing.assert_array_equal((place.x, place.y, place.z), prediction.position[i])
@@ -145,7 +146,7 @@ def test_a_settled_path_has_height_and_full_orientation(prediction):
 
 def test_markers_colour_the_path_and_show_where_it_fails(prediction):
     reasons = [""] * 50 + ["off the map"] * 10
-    markers = path_markers(prediction, reasons, np.arange(0, 60, 7), "map", STAMP).markers
+    markers = path_markers(prediction, reasons, np.arange(0, 60, 7), HEADER).markers
     by_namespace = {marker.ns: marker for marker in markers}
     assert markers[0].action == Marker.DELETEALL
     line = by_namespace["path"]
@@ -161,7 +162,7 @@ def test_markers_colour_the_path_and_show_where_it_fails(prediction):
     )
     assert all(marker.header.stamp == STAMP for marker in markers)
     classes = [classification.WITH_SPEED_SERVOS] * 60
-    drawn = path_markers(prediction, [""] * 60, np.arange(0, 60, 7), "map", STAMP, classes)
+    drawn = path_markers(prediction, [""] * 60, np.arange(0, 60, 7), HEADER, classes)
     assert WITH_SPEED_SERVOS in next(m for m in drawn.markers if m.ns == "path").colors
 
 
@@ -173,8 +174,8 @@ def test_every_entry_of_a_verdict_becomes_a_key_and_a_value():
         "mismatch": {"rocker_left": 0.25},
         "goal": [1.0, None],
     }
-    message = verdict_to_diagnostics("error", "tilt 0.6 rad", entries, "lsr1", "map", Time(sec=5))
-    assert message.header.frame_id == "map" and message.header.stamp.sec == 5
+    message = verdict_to_diagnostics("error", "tilt 0.6 rad", entries, "lsr1", HEADER)
+    assert message.header.frame_id == "map" and message.header.stamp == STAMP
     (status,) = message.status
     assert status.level == DiagnosticStatus.ERROR and status.message == "tilt 0.6 rad"
     assert status.hardware_id == "lsr1" and status.name

@@ -65,7 +65,9 @@ def cloud(terrain: Terrain, stamp: int = BEGIN, frame: str = "map") -> PointClou
 
 def path_to(x: float) -> PathMessage:
     """Return a path along the x axis from 1 m to x [m]."""
-    return poses_path([(1.0, 0.0, 0.0), (x, 0.0, 0.0)], "map", ns_to_stamp(BEGIN + 5))
+    path = poses_path([(1.0, 0.0, 0.0), (x, 0.0, 0.0)], "map")
+    path.header.stamp = ns_to_stamp(BEGIN + 5)
+    return path
 
 
 def record(folder: Path, messages: list[tuple[str, Any]], storage: str = "mcap") -> Path:

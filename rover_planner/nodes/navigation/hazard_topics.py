@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap
+from std_msgs.msg import Header
 
 from msg_adapters.results.grids import classes_to_grid
 from rover_physics.errors import RoverError
@@ -84,7 +85,7 @@ class HazardTopics:
         shown, self._shown = self._shown, None
         if shown is None:
             return
-        blank = shown.without_classes(self._node.get_clock().now().to_msg())
+        blank = shown.without_classes(self._make_header())
         for name, topic in self._topics.items():
             topic.publish(partial(blank.grid, name))
 
@@ -176,9 +177,12 @@ class HazardTopics:
         view = hazards.view()
         if view is None:
             return
-        stamp = self._node.get_clock().now().to_msg()
-        shown = _Shown(view, map_hash, hazards.stale_count, self._node.values.map_frame, stamp)
+        shown = _Shown(view, map_hash, hazards.stale_count, self._make_header())
         self._node.handover.call(partial(self._publish, shown, withdrawals))
+
+    def _make_header(self) -> Header:
+        stamp = self._node.get_clock().now().to_msg()
+        return Header(frame_id=self._node.values.map_frame, stamp=stamp)
 
     def _publish(self, shown: "_Shown", withdrawals: int) -> None:
         """Publish a view, but none of before a withdrawal; called in the executor's thread."""
@@ -199,15 +203,13 @@ class _Shown:
     """Fingerprint of the map they were judged on."""
     stale: int
     """Number of poses that were not judged yet; they are unknown."""
-    frame: str
-    """Frame of the map."""
-    stamp: Any
-    """builtin_interfaces/Time of all grids."""
+    header: Header
+    """Frame of the map, and stamp, of all grids."""
 
-    def without_classes(self, stamp: Any) -> "_Shown":
+    def without_classes(self, header: Header) -> "_Shown":
         """Return the same cells, none of them judged, at another time."""
         unknown = np.full_like(self.view.classes, UNKNOWN)
-        return replace(self, view=replace(self.view, classes=unknown), stamp=stamp)
+        return replace(self, view=replace(self.view, classes=unknown), header=header)
 
     def grid(self, name: str) -> OccupancyGrid:
         """Return the grid of a topic."""
@@ -216,4 +218,4 @@ class _Shown:
             classes = view.worst() if name == "worst" else view.best()
         else:
             classes = view.classes[int(name.removeprefix("heading_"))]
-        return classes_to_grid(classes, view.resolution, view.origin, self.frame, self.stamp)
+        return classes_to_grid(classes, view.resolution, view.origin, self.header)
