@@ -14,6 +14,7 @@ from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.traverse_server import FAN, MERGE, TraverseServerParameters
 from rover_planner.planning.answering.service_settings import load_service_settings
+from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.simulator.simulation import Simulation, load_simulation_settings
 from support.grounds import make_terrain, waves
@@ -64,7 +65,7 @@ class Drive:
 def test_the_first_drive_is_accepted_and_reaches_its_goal():
     drive = Drive(make_terrain(waves), footprint_margin=MARGIN)
     drive.look()
-    first = drive.service.answer(START, GOAL)
+    first = drive.service.snapshot().answer(START, GOAL)
     assert first.traversable, first.reason
     assert 0.1 < first.ground.footprint_share <= first.ground.unobserved_share < 0.5
     path = first.candidate.poses
@@ -74,8 +75,8 @@ def test_the_first_drive_is_accepted_and_reaches_its_goal():
         assert drive.time < 200.0
         drive.look()
         # What was seen stays: the path is still passable where the camera does not look.
-        drive.service.take_path(path)
-        assert drive.service.check_last_path().traversable
+        drive.service.given_path = GivenPath(path, "")
+        assert drive.service.snapshot().check_path().traversable
     assert np.hypot(*(drive.simulation.plant.pose() - GOAL)[:2]) < 0.1
     names = drive.service.known_map.cells.count()
     assert names["elevation_cloud"] > 0 and names["footprint"] > 0 and names["contact"] > 0
@@ -85,13 +86,13 @@ def test_without_the_footprint_the_start_is_unknown_ground():
     for parameters in ({"fill_under_rover": False}, {"footprint_margin": 0.0}):
         drive = Drive(make_terrain(waves), **parameters)
         drive.look()
-        assert drive.service.answer(START, GOAL).code == "unknown_ground"
+        assert drive.service.snapshot().answer(START, GOAL).code == "unknown_ground"
 
 
 def test_blind_ground_is_refused_where_the_parameter_says_so():
     drive = Drive(make_terrain(waves), footprint_margin=MARGIN, blind_ground="refuse")
     drive.look()
-    refused = drive.service.answer(START, GOAL)
+    refused = drive.service.snapshot().answer(START, GOAL)
     assert refused.code == "blind_ground" and not refused.traversable
     report = refused.report.to_dict()
     assert "never seen" in refused.reason and report["first_failure"] == 0

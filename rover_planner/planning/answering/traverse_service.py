@@ -6,9 +6,6 @@ import time
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
 from rover_physics.bounds.path import forget_terrains, prepare_bounds
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.terrain.grid import Terrain, fingerprint
@@ -16,7 +13,6 @@ from rover_physics.terrain.ground import pack_ground
 from rover_planner.maps.known_map import KnownMap
 from rover_planner.maps.layers import CellSources
 from rover_planner.parameters.traverse_server import OFF
-from rover_planner.planning.answering.judgement import PathJudgement
 from rover_planner.planning.answering.measurements import Measurements
 from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
@@ -51,11 +47,6 @@ class TraverseService(Measurements):
     def terrain(self) -> Terrain | None:
         """The last valid map, with small gaps interpolated if so set; None if there is none."""
         return None if self.known_map is None else self.known_map.terrain
-
-    @property
-    def path(self) -> NDArray[np.float64] | None:
-        """Poses (n, 3) of the last path; None if there is none or it was refused."""
-        return self.given_path.poses
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -112,16 +103,6 @@ class TraverseService(Measurements):
         if terrain is not None:
             pack_ground(terrain)
             prepare_bounds(terrain, self.settings.query.map_sigmas)
-
-    def take_path(self, poses: NDArray[np.float64], path_hash: str = "", stamp: str = "") -> None:
-        """Keep a path for `check_last_path`.
-
-        Args:
-            poses: (n, 3) x, y [m] and yaw [rad], map frame.
-            path_hash: `msg_adapters.identity.path_hash` of the message.
-            stamp: Its stamp, "seconds.nanoseconds".
-        """
-        self.given_path = GivenPath(poses, "", path_hash, stamp)
 
     def refuse_path(self, reason: str, path_hash: str = "", stamp: str = "") -> None:
         """Discard the path and keep the reason; later queries must not use an outdated one."""
@@ -183,14 +164,6 @@ class TraverseService(Measurements):
             pack_ground(laid.terrain)
             self._laid = known, classes, laid
         return classes, self._laid[2]
-
-    def answer(self, start: ArrayLike, goal: ArrayLike, tolerance: float = 0.0) -> PathJudgement:
-        """Find a path from start to goal; see `Snapshot.answer`."""
-        return self.snapshot().answer(start, goal, tolerance)
-
-    def check_last_path(self) -> PathJudgement:
-        """Judge the last path that was received; see `Snapshot.check_path`."""
-        return self.snapshot().check_path()
 
     def _keep_map(self, about: KnownMap) -> bool:
         """Keep a map, of which only terrain and fingerprint are missing; return whether it is new.

@@ -15,7 +15,7 @@ from rover_planner.maps.known_map import stamp_text
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.judgement import PathJudgement, refusal
 from rover_planner.planning.answering.questions import Register
-from rover_planner.planning.answering.snapshot import Snapshot
+from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
 from rover_planner.planning.navigation.sensor_mounts import sensor_poses
 from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.bags.bag_files import IMU, JOINTS, MAP, ODOMETRY, PATH, TF_STATIC, Recorded
@@ -149,8 +149,7 @@ class Replay:
     def _judge_drive(self) -> ReplayAnswer:
         """Judge the drive on the map that was known when it began; begin the next stretch."""
         drive, self._drive = self._drive, self._drive.rest()
-        self._service.take_path(np.array(drive.poses))
-        path = self._service.given_path
+        path = self._service.given_path = GivenPath(np.array(drive.poses), "")
         begun = replace(self._begun, path=path, measured_pose=None)
         answer = self._ask(DRIVEN, drive.stamps[0], Snapshot.check_path, begun)
         candidate = answer.judgement.candidate

@@ -100,7 +100,7 @@ def test_a_passable_goal_gets_a_plan_and_the_results_of_the_model_with_one_stamp
     assert verdict["traversability_class"] == PASSABLE and "codes" not in verdict
     poses = path_to_poses(plan, "map")
     np.testing.assert_allclose(poses[[0, -1]], [START, GOAL], atol=1e-9)
-    answer = shared.server.service.answer(np.array(START), np.array(GOAL))
+    answer = shared.server.service.snapshot().answer(np.array(START), np.array(GOAL))
     expected = answer.candidate.prediction
     for topic, field in WHEEL_TOPICS.items():
         np.testing.assert_array_equal(array_values(results[topic]), getattr(expected, field))

@@ -48,11 +48,11 @@ def test_a_stale_map_is_refused_and_the_same_map_again_is_not():
     service = TraverseService(settings)
     assert service.take_terrain(make_terrain(waves))
     time.sleep(0.3)
-    assert service.answer((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)).code == "stale_map"
+    assert service.snapshot().answer((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)).code == "stale_map"
 
     def is_answered_after_it_came_again() -> bool:
         service.renew_map(None)
-        return service.answer((0.0, 0.0, 0.0), (0.5, 0.0, 0.0)).traversable
+        return service.snapshot().answer((0.0, 0.0, 0.0), (0.5, 0.0, 0.0)).traversable
 
     # A busy machine may take the time between the two.
     wait_until(is_answered_after_it_came_again, "an answer on the same map")

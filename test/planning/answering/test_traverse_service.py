@@ -13,6 +13,7 @@ from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.questions import Register
 from rover_planner.planning.answering.search_watch import NewerMapError, SearchWatch
 from rover_planner.planning.answering.service_settings import load_service_settings
+from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.path_geometry import densify
@@ -38,21 +39,22 @@ def test_an_uncertain_map_is_judged_by_its_bounds_as_the_settings_say():
     uncertain = replace(certain, elevation_std=np.full(certain.elevation.shape, 0.005))
     start, goal = (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
     service = make_service(uncertain, **FAN)
-    refused = service.answer(start, goal).report.to_dict()
+    refused = service.snapshot().answer(start, goal).report.to_dict()
     assert not refused["traversable"]
     assert refused["reason"].endswith("at worst within 3 sigma of the map")
     assert refused["map_sigmas"] == 3.0
     assert refused["friction_utilisation_bound"] > refused["max_friction_utilisation"]
     service.settings = load(map_sigmas=0.0, **FAN)
-    passed = service.answer(start, goal).report.to_dict()
+    passed = service.snapshot().answer(start, goal).report.to_dict()
     assert passed["traversable"] and passed["map_sigmas"] == 0.0
     assert passed["friction_utilisation_bound"] is None
-    assert passed == make_service(certain, **FAN).answer(start, goal).report.to_dict()
+    assert passed == make_service(certain, **FAN).snapshot().answer(start, goal).report.to_dict()
 
 
 def test_a_goal_far_off_the_map_costs_no_more_than_the_way_to_its_edge():
     """All of the way was judged, and its classes: seconds, up to the time budget."""
-    judged = make_service(make_terrain(waves)).answer((0.0, 0.0, 0.0), (900.0, 0.0, 0.0))
+    service = make_service(make_terrain(waves))
+    judged = service.snapshot().answer((0.0, 0.0, 0.0), (900.0, 0.0, 0.0))
     whole = judged.complete()
     assert whole.code == "off_map" and whole.report.to_dict()["reason"]
     assert len(whole.candidate.prediction.poses) < 0.01 * len(whole.candidate.poses)
@@ -61,8 +63,8 @@ def test_a_goal_far_off_the_map_costs_no_more_than_the_way_to_its_edge():
 
 def friction_used(service):
     """Return the largest use of friction on a path."""
-    service.take_path(np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
-    return float(service.check_last_path().candidate.verdict.max_friction_utilisation)
+    service.given_path = GivenPath(np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), "")
+    return float(service.snapshot().check_path().candidate.verdict.max_friction_utilisation)
 
 
 @pytest.mark.parametrize(
@@ -136,7 +138,7 @@ def test_gaps_are_filled_or_not_as_the_settings_say_even_afterwards():
 def test_no_goal_beyond_the_tolerance_is_taken(tolerance):
     wall = make_terrain(wall_at(2.0))
     goal = np.array([1.9, 0.0, 0.0])
-    judgement = make_service(wall).answer((-2.0, 0.0, 0.0), goal, tolerance)
+    judgement = make_service(wall).snapshot().answer((-2.0, 0.0, 0.0), goal, tolerance)
     if judgement.traversable:
         end = judgement.candidate.poses[-1]
         assert np.hypot(*(end - goal)[:2]) <= tolerance and end[2] == 0.0
@@ -146,45 +148,47 @@ def test_no_goal_beyond_the_tolerance_is_taken(tolerance):
 def test_an_impossible_tolerance_is_refused():
     for tolerance in (-0.1, math.nan, math.inf):
         with pytest.raises(PlanningError, match="tolerance is"):
-            make_service().answer((0, 0, 0), (1, 0, 0), tolerance)
+            make_service().snapshot().answer((0, 0, 0), (1, 0, 0), tolerance)
 
 
 def test_the_measured_suspension_is_compared_with_the_predicted_one():
     service = make_service(make_terrain(rocky))
-    service.take_path(np.array([[0.0, 0.0, 0.3], [1.0, 0.3, 0.3]]))
-    free = service.check_last_path()
+    service.given_path = GivenPath(np.array([[0.0, 0.0, 0.3], [1.0, 0.3, 0.3]]), "")
+    free = service.snapshot().check_path()
     assert free.suspension is None and "suspension_mismatch" not in free.report.to_dict()
     prediction = free.candidate.prediction
     angles = [*prediction.rocker_angle[0], *prediction.bogie_angle[0]]
     predicted = dict(zip(SUSPENSION_JOINTS, angles, strict=True))
     assert abs(predicted["rocker_left"]) > 0.001
     service.take_joints(predicted)
-    assert service.check_last_path().suspension is None  # where the rover stands is not known
+    judgement = service.snapshot().check_path()
+    assert judgement.suspension is None  # where the rover stands is not known
     service.take_pose(np.array([0.0, 0.0, 0.3]))
-    judgement = service.check_last_path()
+    judgement = service.snapshot().check_path()
     assert judgement.suspension.suspension_agrees and not judgement.report.has_warning
     assert judgement.suspension.suspension_mismatch == dict.fromkeys(SUSPENSION_JOINTS, 0.0)
     service.take_joints({"bogie_left": predicted["bogie_left"] + 0.2})
     service.take_pose(np.array([0.0, 0.0, 0.3]))
-    service.take_path(np.array([[0.5, 0.15, 0.3], [1.0, 0.3, 0.3]]))  # starts elsewhere
-    judgement = service.check_last_path()
+    elsewhere = np.array([[0.5, 0.15, 0.3], [1.0, 0.3, 0.3]])
+    service.given_path = GivenPath(elsewhere, "")
+    judgement = service.snapshot().check_path()
     assert judgement.report.has_warning and judgement.traversable
     assert judgement.suspension.suspension_mismatch["bogie_left"] == pytest.approx(0.2)
 
 
 def test_the_arm_moves_the_balance_once_all_its_joints_are_known():
     service = make_service(make_terrain(waves))
-    service.take_path(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]))
-    stowed = service.check_last_path().candidate.prediction.wheel_loads
+    service.given_path = GivenPath(np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), "")
+    stowed = service.snapshot().check_path().candidate.prediction.wheel_loads
     manipulator = service.settings.rover.manipulator
     stretched = dict(zip(manipulator.joints, (0.0, 0.0, 0.0), strict=True))
     first = manipulator.joints[0]
     service.take_joints({first: stretched[first]})
     np.testing.assert_array_equal(
-        service.check_last_path().candidate.prediction.wheel_loads, stowed
+        service.snapshot().check_path().candidate.prediction.wheel_loads, stowed
     )
     service.take_joints(stretched)
-    moved = service.check_last_path().candidate.prediction.wheel_loads
+    moved = service.snapshot().check_path().candidate.prediction.wheel_loads
     assert np.abs(moved - stowed).max() > 0.05
     assert moved[:, [2, 5]].sum() > stowed[:, [2, 5]].sum()
 

@@ -34,7 +34,7 @@ def service():
 @pytest.fixture(scope="module")
 def full(service):
     """Return the judgement of a refused request about which all there is can be said."""
-    return service.answer((-2.0, 0.0, 0.0), (2.0, 0.0, 0.0))
+    return service.snapshot().answer((-2.0, 0.0, 0.0), (2.0, 0.0, 0.0))
 
 
 def test_the_docs_have_the_keys_of_a_full_report_and_no_other(full, service):

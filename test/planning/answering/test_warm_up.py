@@ -17,6 +17,7 @@ from rover_planner.nodes.warm_up import GROUPS
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
 from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.service_settings import load_service_settings
+from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.simulator.simulation import Simulation, SimulationSettings
 from support.grounds import make_terrain, wall_at, waves
@@ -49,9 +50,9 @@ for parameters, asked in (
     answering = service(**parameters)
     for ground in asked:
         answering.take_terrain(ground)
-        answering.answer(start, goal, 0.3).complete()
-        answering.take_path(np.array([start, goal]))
-        answering.check_last_path().complete()
+        answering.snapshot().answer(start, goal, 0.3).complete()
+        answering.given_path = GivenPath(np.array([start, goal]), "")
+        answering.snapshot().check_path().complete()
 given = RoverSimulatorParameters(start_x=-1.0)
 simulation = Simulation(SimulationSettings(load_rover("lsr1"), grounds[0], given))
 simulation.take_path(np.array([[-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))

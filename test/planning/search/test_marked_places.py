@@ -16,6 +16,7 @@ from rover_planner.parameters.traverse_server import (
     TraverseServerParameters,
 )
 from rover_planner.planning.answering.service_settings import load_service_settings
+from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.marked_places import (
     MARKED_CODE,
@@ -50,18 +51,18 @@ def straight(first: float, last: float) -> np.ndarray:
 
 def test_an_answer_leads_around_a_marked_place_until_it_is_cleared(service):
     service.mark(PLACE)
-    judged = service.answer(START, GOAL)
+    judged = service.snapshot().answer(START, GOAL)
     assert judged.traversable, judged.reason
     away = np.hypot(judged.candidate.poses[:, 0] - PLACE.x, judged.candidate.poses[:, 1])
     assert away.min() >= PLACE.radius
     service.marked = NONE_MARKED
-    assert np.abs(service.answer(START, GOAL).candidate.poses[:, 1]).max() < 0.05
+    assert np.abs(service.snapshot().answer(START, GOAL).candidate.poses[:, 1]).max() < 0.05
 
 
 def test_a_path_into_a_marked_place_is_refused_with_reason_and_date(service):
     service.mark(PLACE)
-    service.take_path(straight(0.0, 3.0))
-    judged = service.check_last_path()
+    service.given_path = GivenPath(straight(0.0, 3.0), "")
+    judged = service.snapshot().check_path()
     assert judged.code == MARKED_CODE
     assert PLACE.reason in judged.reason and PLACE.date in judged.reason
     rim = judged.candidate.poses[judged.candidate.verdict.first_failure]
