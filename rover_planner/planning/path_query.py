@@ -105,6 +105,12 @@ class PathAnswer:
     nearest: int
     """Index of the explained candidate: the best, which is the traversable one with the lowest
     cost, or the one that gets furthest."""
+    goal: Pose | None = None
+    """Goal of the candidates of a search: the requested one or another one near it."""
+    goal_offset: float = 0.0
+    """Its distance from the requested goal [m]."""
+    alternatives_tried: int = 0
+    """Number of other goals that the search has tried."""
 
     @property
     def chosen(self) -> Candidate:
@@ -139,34 +145,15 @@ class PathAnswer:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class PathSearch:
-    """The answer to a query and the goal of its paths."""
-
-    answer: PathAnswer
-    """The candidate paths to the goal."""
-    asked_goal: Pose
-    """The requested goal."""
-    goal: Pose
-    """The goal of the candidates: the requested one or another one near it."""
-    alternatives_tried: int
-    """Number of other goals that were tried."""
-
-    @property
-    def goal_offset(self) -> float:
-        """Distance between `goal` and the requested goal [m]."""
-        return float(np.hypot(*(self.goal - self.asked_goal)[:2]))
-
-
-def add_path(search: PathSearch | None, path: Candidate, goal: Pose) -> PathSearch:
-    """Return the search with a traversable path as the chosen one, after its own candidates.
+def add_path(answer: PathAnswer | None, path: Candidate, goal: Pose) -> PathAnswer:
+    """Return the answer with a traversable path as the chosen one, after its own candidates.
 
     The path may end elsewhere than at the requested `goal`.
     """
-    candidates = (path,) if search is None else (*search.answer.candidates, path)
-    last = len(candidates) - 1
-    tried = 0 if search is None else search.alternatives_tried
-    return PathSearch(PathAnswer(candidates, last), goal, path.poses[-1], tried)
+    candidates = (path,) if answer is None else (*answer.candidates, path)
+    tried = 0 if answer is None else answer.alternatives_tried
+    offset = float(np.hypot(*(path.poses[-1] - goal)[:2]))
+    return PathAnswer(candidates, len(candidates) - 1, path.poses[-1], offset, tried)
 
 
 def answer_path_query(

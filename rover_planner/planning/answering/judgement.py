@@ -15,7 +15,7 @@ from rover_physics.traversability.classification import ClassifiedWaypoint, deci
 from rover_physics.traversability.verdict import BOUNDS, EXTREMES
 from rover_planner.maps.unobserved_ground import UnobservedShare
 from rover_planner.planning.answering.budget import QuestionStoppedError
-from rover_planner.planning.path_query import Candidate, PathSearch
+from rover_planner.planning.path_query import Candidate, PathAnswer
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.path_search import SearchResult
 from rover_planner.planning.verdict_report import SuspensionReport, VerdictReport
@@ -38,7 +38,7 @@ class PathJudgement:
     """The model that has judged it; None if the request was refused before."""
     suspension: SuspensionReport | None = None
     """Comparison with the measured suspension; None without measurements."""
-    search: PathSearch | None = None
+    search: PathAnswer | None = None
     """The search that found the path; None if the path was given."""
     around: SearchResult | None = None
     """The search around obstacles; None if there was none."""
@@ -183,15 +183,15 @@ def _report_class(classes: Sequence[ClassifiedWaypoint]) -> dict[str, Any]:
     }
 
 
-def _report_search(search: PathSearch) -> dict[str, Any]:
+def _report_search(search: PathAnswer) -> dict[str, Any]:
     """Return what was tried to find a path to a goal."""
-    candidates = search.answer.candidates
+    candidates = search.candidates
     return {
         "goal": search.goal,
         "goal_offset": search.goal_offset,
         "alternative_goals_tried": search.alternatives_tried,
         "candidates": len(candidates),
         "traversable_candidates": sum(one.verdict.traversable for one in candidates),
-        "chosen_candidate": search.answer.number,
-        "explanation": search.answer.explain(),
+        "chosen_candidate": search.number,
+        "explanation": search.explain(),
     }

@@ -21,7 +21,7 @@ from rover_planner.planning.answering.service_settings import ServiceSettings
 from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.marked_places import NONE_MARKED, MarkedPlaces
 from rover_planner.planning.path_geometry import densify
-from rover_planner.planning.path_query import Candidate, PathSearch, Pose, add_path
+from rover_planner.planning.path_query import Candidate, PathAnswer, Pose, add_path
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.planning.search.judge import PathJudge
 from rover_planner.planning.search.lattice_search import SearchProgress
@@ -110,11 +110,11 @@ class Snapshot:
         if not (are_on_map or tolerance):  # no candidate helps: one tells as much as all
             judge = replace(judge, options=judge.options.change(count=1))
         search = judge.search(*ends, tolerance)
-        judged = self._describe(judge, search.answer.chosen, search)
+        judged = self._describe(judge, search.chosen, search)
         if not are_on_map and not judged.traversable:
             return replace(judged, is_brief=True)  # of what lies off the map nothing is told
         starts_unobserved = (
-            judged.code == UNOBSERVED_CODE and search.answer.chosen.verdict.first_failure == 0
+            judged.code == UNOBSERVED_CODE and search.chosen.verdict.first_failure == 0
         )
         is_final = judged.traversable or starts_unobserved
         if is_final or self.settings.parameters.planner == FAN:
@@ -223,7 +223,7 @@ class Snapshot:
         return PathJudge(settings.rover, self.known_map.terrain, options, check, self.marked)
 
     def _describe(
-        self, judge: PathJudge, candidate: Candidate, search: PathSearch | None = None
+        self, judge: PathJudge, candidate: Candidate, search: PathAnswer | None = None
     ) -> PathJudgement:
         """Return the judgement of a judged path; classes and the rest of it follow on demand."""
         code, reason = candidate.verdict.code, candidate.verdict.reason

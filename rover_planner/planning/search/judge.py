@@ -40,7 +40,6 @@ from rover_planner.planning.path_query import (
     Candidate,
     PathAnswer,
     PathQueryOptions,
-    PathSearch,
     Pose,
     answer_path_query,
     check_path,
@@ -89,7 +88,7 @@ class PathJudge:
     poses: int = field(default=0, init=False)
     """Number of poses that searches have asked for so far, a measure of the work done."""
 
-    def search(self, start: Pose, goal: Pose, tolerance: float = 0.0) -> PathSearch:
+    def search(self, start: Pose, goal: Pose, tolerance: float = 0.0) -> PathAnswer:
         """Find a path from start to goal, or to a goal near it, among candidate paths.
 
         Args:
@@ -111,8 +110,14 @@ class PathJudge:
                 tried += 1
                 other = self._query(start, alternative)
                 if other.traversable:
-                    return PathSearch(self._hold(other), goal, alternative, tried)
-        return PathSearch(self._hold(answer), goal, goal, tried)
+                    offset = float(np.hypot(*(alternative - goal)[:2]))
+                    return replace(
+                        self._hold(other),
+                        goal=alternative,
+                        goal_offset=offset,
+                        alternatives_tried=tried,
+                    )
+        return replace(self._hold(answer), goal=goal, alternatives_tried=tried)
 
     def _query(self, start: Pose, goal: Pose) -> PathAnswer:
         return answer_path_query(self.rover, self.terrain, start, goal, self.options)
