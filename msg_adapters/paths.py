@@ -79,18 +79,6 @@ def pose_to_array(pose: Pose, what: str = "pose") -> NDArray[np.float64]:
     return np.array([x, y, yaw_from_quaternion(pose.orientation, f"{what} orientation")])
 
 
-def stamped_pose_to_array(
-    stamped: PoseStamped, map_frame: str, what: str = "pose"
-) -> NDArray[np.float64]:
-    """Return (3,) x, y [m] and yaw [rad] of a pose in the map frame.
-
-    Raises:
-        MessageError: Another frame, or a pose that `pose_to_array` refuses.
-    """
-    check_frame(stamped.header.frame_id, map_frame, what)
-    return pose_to_array(stamped.pose, what)
-
-
 def path_to_poses(path: Path, map_frame: str) -> NDArray[np.float64]:
     """Return (n, 3) x, y [m] and yaw [rad] of a path's poses.
 

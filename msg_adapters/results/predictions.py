@@ -90,7 +90,7 @@ def joint_trajectory(
     count = len(prediction.settled)
     if not prediction.settled.all():
         count = int(np.argmin(prediction.settled))
-    suspension = suspension_angles(prediction)[:count]
+    suspension = np.hstack([prediction.rocker_angle, prediction.bogie_angle])[:count]
     steering = prediction.steering_angle[:count, steered_wheels(rover)]
     times = prediction.time[:count]
     rolled = _rolled_angles(prediction, rover.wheel.radius, count)
@@ -112,11 +112,6 @@ def joint_trajectory(
         start = point.time_from_start
         start.sec, start.nanosec = divmod(round(time * 1e9), 1_000_000_000)
     return trajectory
-
-
-def suspension_angles(prediction: PathPrediction) -> NDArray[np.float64]:
-    """Return angles (n, 4) [rad] of SUSPENSION_JOINTS at each of n waypoints."""
-    return np.hstack([prediction.rocker_angle, prediction.bogie_angle])
 
 
 def _rolled_angles(

@@ -51,7 +51,6 @@ from rover_planner.planning.answering.service_settings import (
 from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.planning.marked_places import NONE_MARKED, parse_place
-from rover_planner.planning.navigation.sensor_mounts import sensor_poses
 from rover_planner.planning.path_query import Pose
 from rover_planner.planning.verdict_report import IdentityReport, VerdictReport
 from rover_planner.ros.deferred import Reply, serve_later
@@ -86,7 +85,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         behind = (*behind, *HAZARDS) if self.values.hazard_map else behind
         # Other nodes discover this one meanwhile, which may take DDS three seconds.
         self._behind = load_kernels(EXACT, behind, self.get_logger().info)
-        self.frames = NodeFrames(self, self.values, sensor_poses(self.values))
+        self.frames = NodeFrames(self, self.values)
         """Transforms poses to the map frame."""
         self.frames.listen()
         self._inputs = ServerInputs(self.values, self.frames)

@@ -14,18 +14,13 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from msg_adapters.errors import MessageError
 from msg_adapters.frames import check_frame, check_transform
 from msg_adapters.odometry import odometry_to_pose
-from msg_adapters.paths import path_to_poses, pose_to_array, stamped_pose_to_array
+from msg_adapters.paths import path_to_poses, pose_to_array
 from msg_adapters.stamps import stamp_to_ns
 from rover_physics.numerics.arrays import Floats
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.navigation.sensor_mounts import SensorPoses
-from rover_planner.planning.navigation.transforms import (
-    Rigid,
-    TransformError,
-    TransformTree,
-    move_path,
-)
+from rover_planner.planning.navigation.sensor_mounts import read_mounts
+from rover_planner.planning.navigation.transforms import Rigid, TransformError, TransformTree
 from rover_planner.ros.optional_types import find_type
 
 TF_DEPTH = 100
@@ -43,32 +38,30 @@ class Frames:
     silence = ""
     """Reason why transforms are not heard, to be added to a refusal."""
 
-    def __init__(
-        self,
-        parameters: FrameParameters,
-        now: Callable[[], int],
-        sensors: SensorPoses | None = None,
-    ):
-        """Know only the frame of the map.
+    def __init__(self, parameters: FrameParameters, now: Callable[[], int]):
+        """Know only the frame of the map, and mounts if there is a parameter of them.
 
         Args:
-            parameters: Names of frames, offset and timeout.
+            parameters: Names of frames, offset, timeout and mounts.
             now: Returns the present time [ns].
-            sensors: The mounts; None knows where sensors are by transforms alone.
+
+        Raises:
+            PlanningError: The parameter sensor_mounts is wrong.
         """
         self._map, self._base = parameters.map_frame, parameters.base_frame
         self.now = now
         """Returns the present time [ns]."""
-        self._sensors = sensors
+        self._mounts: dict[str, Rigid] | None = None
+        if isinstance(parameters, TraverseServerParameters):
+            self._mounts = {self._base: Rigid.none(), **read_mounts(parameters.sensor_mounts)}
         self._tree = TransformTree(parameters.transform_timeout)
+        self._driven = TransformTree(parameters.transform_timeout)  # the robot by odometry
         offset = parameters.base_offset
         self._offset = Rigid.from_rpy(*offset) if any(offset) else None
 
     def apply_timeout(self, timeout: float) -> None:
         """Take the age from which transforms, and odometry for clouds, are refused [s]."""
-        self._tree.timeout = timeout
-        if self._sensors is not None:
-            self._sensors.driven.timeout = timeout
+        self._tree.timeout = self._driven.timeout = timeout
 
     def take_transform(self, transform: TransformStamped, *, is_static: bool) -> None:
         """Take a transform of /tf or /tf_static.
@@ -89,15 +82,46 @@ class Frames:
     def find(self, frame: str, stamp: int | None) -> Rigid:
         """Return where a frame is in the map frame at a time [ns]; None is the newest.
 
+        The mount of a sensor on the robot is that of the parameter, else that of /tf. The robot is
+        where /tf says; if /tf does not connect it with the map, where odometry does.
+
         Raises:
-            TransformError: As `SensorPoses.find`, else as `TransformTree.find`, with `silence`.
+            TransformError: The mount is not known, or the robot's pose is not known then, or
+                stale; with `silence`.
         """
         try:
-            if self._sensors is not None:
-                return self._sensors.find(frame, stamp, self.now(), self._tree)
-            return self._tree.find(self._map, frame, stamp, self.now())
+            if self._mounts is None:
+                return self._find_by_tf(self._map, frame, stamp)
+            mount = self._mounts.get(frame)
+            if mount is None:
+                if self._tree.connects(self._map, frame):
+                    return self._find_by_tf(self._map, frame, stamp)
+                if not self._tree.connects(self._base, frame):
+                    raise TransformError(
+                        f"the message is in frame {frame!r}; it must be in {self._map!r}, or in a "
+                        "frame of /tf or sensor_mounts; known are "
+                        + ", ".join(sorted({*self._mounts, *self._tree.frames()}))
+                    )
+                mount = self._find_by_tf(self._base, frame, stamp)
+            return self._find_robot(stamp).then(mount)
         except TransformError as error:
             raise TransformError(f"{error}{self.silence}") from None
+
+    def _find_by_tf(self, target: str, source: str, stamp: int | None) -> Rigid:
+        return self._tree.find(target, source, stamp, self.now())
+
+    def _find_robot(self, stamp: int | None) -> Rigid:
+        """Return where the robot's frame is in that of the map, by /tf or by odometry."""
+        if self._tree.connects(self._map, self._base):
+            return self._find_by_tf(self._map, self._base, stamp)
+        if not self._driven.has_parent(self._base):
+            raise TransformError(
+                f"neither /tf nor odometry says where {self._base!r} is in {self._map!r}"
+            )
+        try:
+            return self._driven.find(self._map, self._base, stamp, self.now())
+        except TransformError as error:
+            raise TransformError(f"by odometry: {error}") from None
 
     def find_source(self, frame: str, stamp: int | None, what: str) -> Rigid | None:
         """Return where the frame of a message is in that of the map; None if it is that.
@@ -119,8 +143,7 @@ class Frames:
         """
         if not self._tree.has_parent(self._base):
             return None
-        robot = self._tree.find(self._map, self._base, None, self.now())
-        return self._to_body(robot).xyyaw
+        return self._to_body(self._find_by_tf(self._map, self._base, None)).xyyaw
 
     def place_level(self, pose: tuple[float, float, float]) -> tuple[float, float, float]:
         """Return x, y [m], yaw [rad] of the body where the robot is level at such a pose."""
@@ -138,7 +161,10 @@ class Frames:
             TransformError: As `TransformTree.find`.
         """
         moved = self._move(stamped.header, stamped.pose, what)
-        return stamped_pose_to_array(stamped, self._map, what) if moved is None else moved.xyyaw
+        if moved is not None:
+            return moved.xyyaw
+        check_frame(stamped.header.frame_id, self._map, what)
+        return pose_to_array(stamped.pose, what)
 
     def read_path(self, path: Path) -> Floats:
         """Return the poses (n, 3) of the body by a path of the robot; see `read_pose`."""
@@ -173,9 +199,10 @@ class Frames:
         pose, deviation = odometry_to_pose(odometry, frame, base_frame)
         if moved is not None:
             pose = moved.xyzrpy
-        if self._sensors is not None:
-            stamp, robot = stamp_to_ns(header.stamp), self._to_robot(Rigid.from_rpy(*pose))
-            self._sensors.take(robot, self.now() if stamp is None else stamp)
+        if self._mounts is not None:
+            body, stamp = Rigid.from_rpy(*pose), stamp_to_ns(header.stamp)
+            robot = body if self._offset is None else body.then(self._offset.inverse())
+            self._driven.take(self._map, self._base, stamp or self.now(), robot)
         return pose, deviation
 
     def _move(self, header: Any, pose: Any, what: str) -> Rigid | None:
@@ -192,29 +219,31 @@ class Frames:
         robot = Rigid.of(pose.position, pose.orientation)
         if not is_here:
             stamp = stamp_to_ns(header.stamp)
-            robot = self._tree.find(self._map, frame, stamp, self.now()).then(robot)
+            robot = self._find_by_tf(self._map, frame, stamp).then(robot)
         return self._to_body(robot)
 
     def to_base(self, path: Path) -> Path:
         """Change a path of the body into one of the robot, in place, and return it."""
-        moved: Path = move_path(path, None if self._offset is None else self._offset.inverse())
-        return moved
+        if self._offset is None:
+            return path
+        back = self._offset.inverse()
+        for stamped in path.poses:
+            place, turn = stamped.pose.position, stamped.pose.orientation
+            robot = Rigid.of(place, turn).then(back)
+            place.x, place.y, place.z = robot.translation.tolist()
+            turn.x, turn.y, turn.z, turn.w = robot.rotation.as_quat().tolist()
+        return path
 
     def _to_body(self, robot: Rigid) -> Rigid:
         return robot if self._offset is None else robot.then(self._offset)
-
-    def _to_robot(self, body: Rigid) -> Rigid:
-        return body if self._offset is None else body.then(self._offset.inverse())
 
 
 class NodeFrames(Frames):
     """Knows the frames of a node; without tf2_msgs only that of the map."""
 
-    def __init__(
-        self, node: Node, parameters: FrameParameters, sensors: SensorPoses | None = None
-    ):
+    def __init__(self, node: Node, parameters: FrameParameters):
         """See `Frames`; `listen` hears of transforms."""
-        super().__init__(parameters, lambda: int(node.get_clock().now().nanoseconds), sensors)
+        super().__init__(parameters, lambda: int(node.get_clock().now().nanoseconds))
         self._node, self._listens = node, False
         if find_type(TF_MESSAGE) is None:
             self.silence = "; /tf needs tf2_msgs, which is not installed"

@@ -22,9 +22,9 @@ from msg_adapters.paths import (
     count_poses,
     decimate,
     path_to_poses,
+    pose_to_array,
     poses_path,
     stamped_pose,
-    stamped_pose_to_array,
     yaw_from_quaternion,
 )
 from rover_physics.numerics.quaternions import xyzw_from_rpy
@@ -33,7 +33,7 @@ from rover_physics.numerics.quaternions import xyzw_from_rpy
 @pytest.mark.parametrize("yaw", [-3.0, -math.pi / 2, 0.0, 2.5])
 def test_place_and_heading_survive_a_message(yaw):
     poses = np.array([[1.5, -2.5, yaw], [1.0, 0.1, 0.2]])
-    alone = stamped_pose_to_array(stamped_pose(poses[0], "map"), "map")
+    alone = pose_to_array(stamped_pose(poses[0], "map").pose)
     np.testing.assert_allclose(alone, poses[0], atol=1e-15)
     np.testing.assert_allclose(path_to_poses(poses_path(poses, "map"), "map"), poses, atol=1e-15)
 

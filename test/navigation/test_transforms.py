@@ -3,10 +3,16 @@
 
 import numpy as np
 import pytest
+from nav_msgs.msg import Odometry
+from std_msgs.msg import Header
 
+from msg_adapters.stamps import ns_to_stamp
 from rover_planner.errors import PlanningError
-from rover_planner.planning.navigation.sensor_mounts import SensorPoses, read_mounts
+from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.planning.navigation.sensor_mounts import read_mounts
 from rover_planner.planning.navigation.transforms import Rigid, TransformError, TransformTree
+from rover_planner.ros.frames import Frames
+from support.messages import transform_message
 
 SECOND = 1_000_000_000
 NOW = 1000 * SECOND
@@ -86,8 +92,31 @@ ENTRY = "front_camera:0.3:0.1:0.4:0.0:0.5:-0.2"
 HERE, THERE = (1.0, 2.0, 0.3, 0.02, 0.05, 0.7), (1.1, 2.0, 0.3, 0.02, 0.05, 0.7)
 
 
-def poses_with(mounts=(ENTRY,)) -> SensorPoses:
-    return SensorPoses(read_mounts(mounts), "map", "base_link", 0.5)
+class World:
+    """What a server hears of its robot and its sensors."""
+
+    def __init__(self):
+        self.now = 0
+        parameters = TraverseServerParameters(sensor_mounts=(ENTRY,))
+        self.frames = Frames(parameters, lambda: self.now)
+
+    def drive(self, robot: Rigid, stamp: int) -> None:
+        """Have odometry say where the robot is."""
+        odometry = Odometry(header=Header(frame_id="map", stamp=ns_to_stamp(stamp)))
+        pose = odometry.pose.pose
+        pose.position.x, pose.position.y, pose.position.z = robot.translation.tolist()
+        turn = pose.orientation
+        turn.x, turn.y, turn.z, turn.w = robot.rotation.as_quat().tolist()
+        self.frames.take_odometry(odometry)
+
+    def tell(self, parent: str, child: str, stamp: int, rigid: Rigid, is_static=False) -> None:
+        """Have /tf say where a frame is."""
+        message = transform_message(parent, child, rigid, ns_to_stamp(stamp))
+        self.frames.take_transform(message, is_static=is_static)
+
+    def find(self, frame: str, stamp: int | None, now: int) -> Rigid:
+        self.now = now
+        return self.frames.find(frame, stamp)
 
 
 def assert_same(one: Rigid, other: Rigid) -> None:
@@ -96,55 +125,56 @@ def assert_same(one: Rigid, other: Rigid) -> None:
 
 
 def test_odometry_and_the_mount_tell_where_a_sensor_was_at_the_stamp():
-    sensors, tree = poses_with(), TransformTree(0.5)
-    sensors.take(Rigid.from_rpy(*HERE), 10 * SECOND)
-    sensors.take(Rigid.from_rpy(*THERE), 11 * SECOND)
-    then = sensors.find("front_camera", 10 * SECOND + SECOND // 2, 11 * SECOND, tree)
+    world = World()
+    world.drive(Rigid.from_rpy(*HERE), 10 * SECOND)
+    world.drive(Rigid.from_rpy(*THERE), 11 * SECOND)
+    then = world.find("front_camera", 10 * SECOND + SECOND // 2, 11 * SECOND)
     halfway = Rigid.from_rpy(1.05, *HERE[1:])
     assert_same(then, halfway.then(MOUNT))
-    newest = sensors.find("front_camera", None, 11 * SECOND, tree)
+    newest = world.find("front_camera", None, 11 * SECOND)
     assert_same(newest, Rigid.from_rpy(*THERE).then(MOUNT))
-    robot = sensors.find("base_link", None, 11 * SECOND, tree)
+    robot = world.find("base_link", None, 11 * SECOND)
     assert_same(robot, Rigid.from_rpy(*THERE))
 
 
 def test_tf_comes_before_odometry_and_knows_further_mounts():
-    sensors, tree = poses_with(), TransformTree(0.5)
-    sensors.take(Rigid.from_rpy(*THERE), 10 * SECOND)
+    world = World()
+    world.drive(Rigid.from_rpy(*THERE), 10 * SECOND)
     on_mast = Rigid.from_rpy(0.0, 0.0, 1.2, 0.0, 0.3, 0.0)
-    tree.take("base_link", "mast", 0, on_mast, is_static=True)
-    by_odometry = sensors.find("mast", 10 * SECOND, 10 * SECOND, tree)
+    world.tell("base_link", "mast", 0, on_mast, is_static=True)
+    by_odometry = world.find("mast", 10 * SECOND, 10 * SECOND)
     assert_same(by_odometry, Rigid.from_rpy(*THERE).then(on_mast))
-    tree.take("map", "base_link", 10 * SECOND, Rigid.from_rpy(*HERE))
+    world.tell("map", "base_link", 10 * SECOND, Rigid.from_rpy(*HERE))
     for frame, mount in (("mast", on_mast), ("front_camera", MOUNT)):
-        found = sensors.find(frame, 10 * SECOND, 10 * SECOND, tree)
+        found = world.find(frame, 10 * SECOND, 10 * SECOND)
         assert_same(found, Rigid.from_rpy(*HERE).then(mount))
 
 
 def test_clouds_beside_the_robot_need_no_robot_and_tf_off_the_map_leaves_it_to_odometry():
-    sensors, tree, survey = poses_with(), TransformTree(0.5), Rigid.from_rpy(30, -12, 0, 0, 0, 2.2)
-    tree.take("survey", "map", 10 * SECOND, survey.inverse())
-    assert_same(sensors.find("survey", 10 * SECOND, 10 * SECOND, tree), survey)
-    tree.take("odom", "base_link", 10 * SECOND, Rigid.from_rpy(*THERE))
-    sensors.take(Rigid.from_rpy(*HERE), 10 * SECOND)
-    found = sensors.find("front_camera", 10 * SECOND, 10 * SECOND, tree)
+    world = World()
+    survey = Rigid.from_rpy(30, -12, 0, 0, 0, 2.2)
+    world.tell("survey", "map", 10 * SECOND, survey.inverse())
+    assert_same(world.find("survey", 10 * SECOND, 10 * SECOND), survey)
+    world.tell("odom", "base_link", 10 * SECOND, Rigid.from_rpy(*THERE))
+    world.drive(Rigid.from_rpy(*HERE), 10 * SECOND)
+    found = world.find("front_camera", 10 * SECOND, 10 * SECOND)
     assert_same(found, Rigid.from_rpy(*HERE).then(MOUNT))
 
 
 def test_what_is_stale_or_missing_is_refused_with_its_age():
-    sensors, tree = poses_with(), TransformTree(0.5)
+    world = World()
     with pytest.raises(TransformError, match="neither /tf nor odometry says where 'base_link'"):
-        sensors.find("front_camera", None, SECOND, tree)
-    sensors.take(Rigid.from_rpy(*HERE), 10 * SECOND)
+        world.find("front_camera", None, SECOND)
+    world.drive(Rigid.from_rpy(*HERE), 10 * SECOND)
     with pytest.raises(TransformError, match=r"by odometry: .* is stale: it is 3.000 s old"):
-        sensors.find("front_camera", 12 * SECOND, 13 * SECOND, tree)
-    sensors.driven.timeout = 5.0
+        world.find("front_camera", 12 * SECOND, 13 * SECOND)
+    world.frames.apply_timeout(5.0)
     assert_same(
-        sensors.find("front_camera", 12 * SECOND, 13 * SECOND, tree),
+        world.find("front_camera", 12 * SECOND, 13 * SECOND),
         Rigid.from_rpy(*HERE).then(MOUNT),
     )
     with pytest.raises(TransformError, match=r"is in frame 'moon'; it must be in 'map', or"):
-        sensors.find("moon", None, SECOND, tree)
+        world.find("moon", None, SECOND)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,6 @@ from msg_adapters.paths import poses_path
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.navigation.sensor_mounts import sensor_poses
 from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.frames import Frames
 from rover_planner.ros.server_inputs import LOOK_PERIOD, ServerInputs
@@ -26,7 +25,7 @@ PRIOR = make_terrain(waves)
 def inputs_with(*edges, clock=time.monotonic, **parameters) -> ServerInputs:
     """Return the inputs of a server that knows transforms (parent, child, where)."""
     values = TraverseServerParameters(**parameters)
-    frames = Frames(values, lambda: 0, sensor_poses(values))
+    frames = Frames(values, lambda: 0)
     for edge in edges:
         frames.take_transform(transform_message(*edge, Time()), is_static=True)
     return ServerInputs(values, frames, clock)

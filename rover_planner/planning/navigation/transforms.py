@@ -77,22 +77,6 @@ class Rigid:
         return np.array([*self.translation, *rpy_from_xyzw((x, y, z, w))])
 
 
-def move_path(path: Any, inner: Rigid | None) -> Any:
-    """Change each pose of a path into that of a frame fixed to it, in place, and return the path.
-
-    Args:
-        path: The path.
-        inner: Pose of the other frame in that of the path's poses; None is the same frame.
-    """
-    if inner is not None:
-        for stamped in path.poses:
-            place, turn = stamped.pose.position, stamped.pose.orientation
-            moved = Rigid.of(place, turn).then(inner)
-            place.x, place.y, place.z = moved.translation.tolist()
-            turn.x, turn.y, turn.z, turn.w = moved.rotation.as_quat().tolist()
-    return path
-
-
 @dataclass
 class _Edge:
     """The transforms of one child frame in the last time, in the order of their stamps."""

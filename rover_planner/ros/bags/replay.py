@@ -16,7 +16,6 @@ from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.judgement import PathJudgement, refusal
 from rover_planner.planning.answering.questions import Register
 from rover_planner.planning.answering.snapshot import GivenPath, Snapshot
-from rover_planner.planning.navigation.sensor_mounts import sensor_poses
 from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.bags.bag_files import IMU, JOINTS, MAP, ODOMETRY, PATH, TF_STATIC, Recorded
 from rover_planner.ros.bags.recorded_drive import Measured, RecordedDrive
@@ -76,7 +75,7 @@ class Replay:
 
     def __post_init__(self) -> None:
         values, self._time = self.parameters, 0
-        frames = Frames(values, lambda: self._time, sensor_poses(values))
+        frames = Frames(values, lambda: self._time)
         self.inputs = ServerInputs(values, frames, lambda: self._time / NANOSECONDS)
         """Takes what the messages say."""
         self._service = self.inputs.service
