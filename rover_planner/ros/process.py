@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import rclpy
+from rclpy.logging import get_logging_directory
 
 from rover_physics.numerics.kernel_cache import kernel_cache_note
 
@@ -50,7 +51,10 @@ def warn_of_disk(logger: Any) -> None:
 
 def log_fault() -> str:
     """Return why ROS could not write a log file, empty if it could."""
-    folder = log_folder()
+    try:
+        folder = get_logging_directory()
+    except RuntimeError as error:  # there is no home
+        return str(error)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder) as file:
@@ -58,15 +62,6 @@ def log_fault() -> str:
     except OSError as error:
         return f"{error.strerror or error}: {folder}"
     return ""
-
-
-def log_folder() -> Path:
-    """Return the folder of ROS's log files: ROS_LOG_DIR, else ROS_HOME/log, else ~/.ros/log."""
-    given = os.environ.get("ROS_LOG_DIR")
-    if given:
-        return Path(given).expanduser()
-    home = os.environ.get("ROS_HOME") or str(Path(os.environ.get("HOME") or "/", ".ros"))
-    return Path(home).expanduser() / "log"
 
 
 def avoid_huge_pages() -> None:

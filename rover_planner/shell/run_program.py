@@ -49,7 +49,8 @@ def run_program(name: str, run: Callable[[], Any]) -> int:
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="backslashreplace")  # names of files may be no text
     try:
-        with _without_warnings():
+        # Filters that are set already come first.
+        with warnings.catch_warnings(action="ignore", append=True):
             code = run()
         if sys.stdout is not None:
             sys.stdout.flush()
@@ -98,13 +99,6 @@ def end_with(name: str, code: int, text: str) -> int:
     with contextlib.suppress(OSError):  # stderr itself may be closed or full
         print(one_line(f"{name}: {text}", MAX_LINE), file=sys.stderr, flush=True)
     return code
-
-
-@contextlib.contextmanager
-def _without_warnings() -> Any:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", append=True)  # filters that are set already come first
-        yield
 
 
 def _drop_output() -> None:
