@@ -16,6 +16,8 @@ from rover_planner.maps.cells import grid_of
 
 Pose = tuple[float, float, float]
 
+_PLAIN_GOALS = 4
+"""Largest number of goals on plain ground; a small map has fewer."""
 _STARTS = 200
 """Largest number of places that are tried as a start."""
 _RAYS = 72
@@ -82,7 +84,7 @@ class _Ground:
         return grid_of(self.terrain).places(np.asarray(columns), np.asarray(rows))
 
 
-def choose_mission(terrain: Terrain, rover: Rover, seed: int = 1, plain_goals: int = 4) -> Mission:
+def choose_mission(terrain: Terrain, rover: Rover, seed: int = 1) -> Mission:
     """Choose a start and goals by the heights of a map; the model is not used.
 
     The start is on gentle known ground with much gentle ground ahead. Goals on plain ground are
@@ -94,7 +96,6 @@ def choose_mission(terrain: Terrain, rover: Rover, seed: int = 1, plain_goals: i
         terrain: The map, with or without unknown cells.
         rover: The rover; its size and wheels define gentle ground and the distance of goals.
         seed: Seed of the choice among equally good places.
-        plain_goals: Largest number of goals on plain ground; a small map has fewer.
 
     Raises:
         PlanningError: The map has no place where all ground under the rover is known.
@@ -102,7 +103,7 @@ def choose_mission(terrain: Terrain, rover: Rover, seed: int = 1, plain_goals: i
     rng = np.random.default_rng(seed)
     ground = _survey(terrain, rover)
     start = _choose_start(ground, rng)
-    found = [("plain", pose) for pose in _choose_plain(ground, start, plain_goals, rng)]
+    found = [("plain", pose) for pose in _choose_plain(ground, start, _PLAIN_GOALS, rng)]
     for intent, score in _score_cells(ground, start):
         best = np.unravel_index(np.argmax(score), score.shape)
         if np.isfinite(score[best]):

@@ -104,20 +104,16 @@ class PathJudge:
             PlanningError: Start, goal or options are invalid.
             RoverError: The model refuses an option or the poses.
         """
-        answer, tried = self._query(start, goal), 0
+        answer, end, tried = self._query(start, goal), goal, 0
         if not answer.traversable and self._fails_at(answer, goal, tolerance):
             for alternative in self._goals_to_stand_on(start, goal, tolerance):
                 tried += 1
                 other = self._query(start, alternative)
                 if other.traversable:
-                    offset = float(np.hypot(*(alternative - goal)[:2]))
-                    return replace(
-                        self._hold(other),
-                        goal=alternative,
-                        goal_offset=offset,
-                        alternatives_tried=tried,
-                    )
-        return replace(self._hold(answer), goal=goal, alternatives_tried=tried)
+                    answer, end = other, alternative
+                    break
+        offset = float(np.hypot(*(end - goal)[:2]))
+        return replace(self._hold(answer), goal=end, goal_offset=offset, alternatives_tried=tried)
 
     def _query(self, start: Pose, goal: Pose) -> PathAnswer:
         return answer_path_query(self.rover, self.terrain, start, goal, self.options)

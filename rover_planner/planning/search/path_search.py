@@ -25,11 +25,10 @@ from rover_planner.planning.search.connections import (
 )
 from rover_planner.planning.search.difficulty import estimate_difficulty, steepest_climb
 from rover_planner.planning.search.edge_memory import EdgeMemory
-from rover_planner.planning.search.edges import UNJUDGED
 from rover_planner.planning.search.ground_estimate import estimate_ground
 from rover_planner.planning.search.judge import PathJudge, cost_of_path
 from rover_planner.planning.search.lattice_search import LatticeSearch, SearchProgress, join_pieces
-from rover_planner.planning.search.nodes import HEADINGS, Nodes
+from rover_planner.planning.search.nodes import Nodes
 from rover_planner.planning.search.primitives import Gear, Piece
 from rover_planner.planning.search.query import (
     LatticeSettings,
@@ -95,9 +94,6 @@ class SearchResult:
     """The closed-in area where no path exists; else None."""
     warning: str
     """Condition that may have hidden a path, such as a coarse lattice; empty without one."""
-    asked: NDArray[np.bool_]
-    """(rows, columns) True for the places where the model was asked whether the rover can stand,
-    in this search or in an earlier one that the memory holds; row 0 at the smallest y."""
 
     def report(self) -> dict[str, Any]:
         """Return the result as plain values for JSON; numbers that are not known are None.
@@ -326,7 +322,6 @@ class _PathFinder:
         terrain = cut_out(query, nodes) if self._is_limited else query.terrain
         ground = estimate_ground(rover, terrain, nodes)
         edges.standing[ground.groundless] = edges.state_of("unknown_ground")
-        self._groundless = ground.groundless
         return LatticeSearch(
             self._judge,
             edges,
@@ -376,7 +371,6 @@ class _PathFinder:
         closed: ClosedArea | None = None,
     ) -> SearchResult:
         progress = self._progress
-        asked = np.zeros(self._nodes.shape, bool) if search is None else self._asked(search)
         known = progress.best is not None and progress.bound > 0.0
         bound = progress.cost / progress.bound if known else math.inf
         return SearchResult(
@@ -394,13 +388,7 @@ class _PathFinder:
             nodes=self._nodes,
             closed=closed,
             warning=self._warn(),
-            asked=asked,
         )
-
-    def _asked(self, search: LatticeSearch) -> NDArray[np.bool_]:
-        """Return the places (rows, columns) where the model was asked about a node."""
-        was_asked = (search.edges.standing != UNJUDGED) & ~self._groundless
-        return np.asarray(was_asked.reshape(*self._nodes.shape, HEADINGS).any(axis=2))
 
 
 def _check_end(name: str, query: SearchQuery, *, may_be_off_map: bool) -> NDArray[np.float64]:
