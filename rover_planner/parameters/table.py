@@ -56,51 +56,43 @@ class ParameterSpec:
             ParameterError: The value has a wrong type, is NaN, empty, out of bounds or not one
                 of the choices.
         """
-        if type(value) is not type(self.default):
-            shown = list(value) if isinstance(value, tuple) else value
+        must = self._find_broken_rule(value)
+        if must:
+            shown = repr(list(value) if isinstance(value, tuple) else value)
+            is_empty = value == "" and isinstance(self.default, str)
             raise ParameterError(
-                f"parameter {self.name} is {shown!r}; it must be of "
-                f"type {self.type_name}, such as {self.ros_default!r}"
-            )
-        if isinstance(value, tuple):
-            self._check_items(value)
-            return
-        if value == "" != self.default:
-            raise ParameterError(
-                f"parameter {self.name} is empty; it must be a text such as {self.default!r}"
-            )
-        if isinstance(value, float) and not math.isfinite(value):
-            raise ParameterError(f"parameter {self.name} is {value}; it must be a finite number")
-        if self.bounds is not None and not self.bounds[0] <= value <= self.bounds[1]:
-            raise ParameterError(
-                f"parameter {self.name} is {value}; it must be in "
-                f"{self.bounds[0]:g} to {self.bounds[1]:g} {self.unit}".rstrip()
-            )
-        if self.choices and value not in self.choices:
-            raise ParameterError(
-                f"parameter {self.name} is {value!r}; it must be one of {', '.join(self.choices)}"
+                f"parameter {self.name} is {'empty' if is_empty else shown}; it must {must}"
             )
 
-    def _check_items(self, values: tuple[Any, ...]) -> None:
-        """Check the items of an array; one of numbers keeps the length of the default."""
+    def _find_broken_rule(self, value: Any) -> str:
+        """Return what a value must be and is not; empty if it is allowed."""
+        if type(value) is not type(self.default):
+            return f"be of type {self.type_name}, such as {self.ros_default!r}"
+        if isinstance(value, tuple):
+            return self._find_broken_rule_of_items(value)
+        if value == "" != self.default:
+            return f"be a text such as {self.default!r}"
+        if isinstance(value, float) and not math.isfinite(value):
+            return "be a finite number"
+        low, high = self.bounds or (-math.inf, math.inf)
+        if self.bounds and not low <= value <= high:
+            return f"be in {low:g} to {high:g} {self.unit}".rstrip()
+        if self.choices and value not in self.choices:
+            return f"be one of {', '.join(self.choices)}"
+        return ""
+
+    def _find_broken_rule_of_items(self, values: tuple[Any, ...]) -> str:
+        """Return the same for the items of an array; one of numbers keeps the default's length."""
         if self.type_name == "string array":
-            if not all(isinstance(text, str) and text for text in values):
-                raise ParameterError(
-                    f"parameter {self.name} is {list(values)!r}; it must hold texts, none of them "
-                    "empty"
-                )
-            return
+            are_texts = all(isinstance(text, str) and text for text in values)
+            return "" if are_texts else "hold texts, none of them empty"
         low, high = self.bounds or (-math.inf, math.inf)
         right = len(values) == len(self.default) and all(
             isinstance(number, float) and math.isfinite(number) and low <= number <= high
             for number in values
         )
-        if not right:
-            allowed = f" in {low:g} to {high:g} {self.unit}".rstrip() if self.bounds else ""
-            raise ParameterError(
-                f"parameter {self.name} is {list(values)!r}; it must hold {len(self.default)} "
-                f"finite numbers{allowed}"
-            )
+        allowed = f" in {low:g} to {high:g} {self.unit}".rstrip() if self.bounds else ""
+        return "" if right else f"hold {len(self.default)} finite numbers{allowed}"
 
 
 def parameter(
