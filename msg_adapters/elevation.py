@@ -44,17 +44,10 @@ COMBINED = {"friction": "min", "elevation_std": "max", CLASS: "most frequent"}
 MAX_POINT_STEP = 1_000_000
 """Largest size of a point [bytes]."""
 
-_FLOATS = {PointField.FLOAT32: "f4", PointField.FLOAT64: "f8"}
-_KINDS = {
-    "INT8": "i1",
-    "UINT8": "u1",
-    "INT16": "i2",
-    "UINT16": "u2",
-    "INT32": "i4",
-    "UINT32": "u4",
-}
-_NUMBERS = _FLOATS | {getattr(PointField, name): kind for name, kind in _KINDS.items()}
-_DATATYPE_NAMES = {getattr(PointField, n): n for n in (*_KINDS, "FLOAT32", "FLOAT64")}
+_NAMES = ("INT8", "UINT8", "INT16", "UINT16", "INT32", "UINT32", "FLOAT32", "FLOAT64")
+_DATATYPE_NAMES = {getattr(PointField, name): name for name in _NAMES}
+_NUMBERS = {datatype: np.dtype(name.lower()).str[1:] for datatype, name in _DATATYPE_NAMES.items()}
+_FLOATS = {datatype: kind for datatype, kind in _NUMBERS.items() if kind.startswith("f")}
 
 
 def is_same_cloud(cloud: PointCloud2, other: PointCloud2) -> bool:

@@ -18,16 +18,9 @@ INSTALL = {
 """Name of each optional module's package, and how to install it."""
 
 PLAIN = {
-    "clarabel": "clarabel",
-    "numba": "numba",
-    "numpy": "numpy",
-    "osqp": "osqp",
-    "pydantic": "pydantic",
-    "rich": "rich",
-    "scipy": "scipy",
-    "typer": "typer",
-    "yaml": "PyYAML",
-}
+    name: name
+    for name in ("clarabel", "numba", "numpy", "osqp", "pydantic", "rich", "scipy", "typer")
+} | {"yaml": "PyYAML"}
 """Modules of a plain installation and their packages, which apt has not all."""
 
 
