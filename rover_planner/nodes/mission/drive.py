@@ -5,7 +5,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,6 @@ from numpy.typing import NDArray
 from rover_planner.planning.angles import wrap
 from rover_planner.planning.marked_places import MARKED_CODE
 from rover_planner.planning.navigation.watched_path import TURN_LENGTH, WatchedPath
-
-if TYPE_CHECKING:
-    from rover_planner.nodes.mission_planner import MissionPlanner
 
 Poses = NDArray[np.float64]
 """(n, 3) x, y [m] and yaw [rad], map frame."""
@@ -36,6 +33,25 @@ SAME_PLACE = 0.1
 
 class DriveFailedError(Exception):
     """The rover did not reach the end of its path; the text names the reason."""
+
+
+class RoverClient(Protocol):
+    """The part of server and rover that a drive needs."""
+
+    def ask(self, start: Sequence[float], goal: Sequence[float]) -> dict[str, Any]:
+        """Return `traversable`, `reason` and the `poses` of a path from start to goal."""
+
+    def send_path(self, poses: Poses) -> None:
+        """Let the rover follow a path."""
+
+    def check(self, poses: Poses) -> tuple[str, str]:
+        """Return code and reason why the server refuses a path now, empty if it passes."""
+
+    def has_ended(self) -> bool | None:
+        """Return whether the follower is at the end of its path; None if it never says so."""
+
+    def wait_for_pose(self, is_wanted: Callable[[Poses], bool], seconds: float) -> Poses:
+        """Return the first measured pose (3,) that is wanted, or the last one in time."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +93,7 @@ class Drive:
 
     def __init__(
         self,
-        client: "MissionPlanner",
+        client: RoverClient,
         goal: Sequence[float],
         settings: DriveSettings,
         report: Callable[[str], object],
