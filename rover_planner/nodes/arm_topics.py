@@ -34,7 +34,7 @@ class ArmTopics:
             (PoseStamped, "~/tool_target", self._take_target),
             (WrenchStamped, "~/tool_wrench", self._take_wrench),
         ):
-            subscribe_to_requests(node, kind, name, take)
+            subscribe_to_requests(node, kind, name, take, node.values.input_reliability)
         serve_later(node, Trigger, "~/check_reach", self._check_reach)
 
     def _take_target(self, message: PoseStamped) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from threading import Event
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from nav_msgs.srv import LoadMap
@@ -30,10 +30,8 @@ from rover_planner.ros.lazy_publisher import LazyPublisher
 from rover_planner.ros.map_intake import CLOUD, GRID_MAP, MapIntake
 from rover_planner.ros.node import RoverNode
 from rover_planner.ros.optional_types import find_type
+from rover_planner.ros.server_inputs import ServerInputs
 from rover_planner.ros.subscriptions import subscribe_to_map
-
-if TYPE_CHECKING:
-    from rover_planner.nodes.traverse_server import TraverseServer
 
 LOG_PERIOD = 10.0
 """Shortest time between two log lines about maps that merge, or come again and again [s]."""
@@ -47,15 +45,28 @@ machine may take 15 ms more to wake the thread until it is 20 ms."""
 class MapTopics(MapIntake):
     """Keeps the map of a TraverseService up to date; maps are prepared in a thread."""
 
-    def __init__(self, server: "TraverseServer"):
-        """Subscribe to the maps and serve ~/load_map."""
-        self._node, self._inputs, self._service = server, server.inputs, server.service
+    def __init__(
+        self,
+        node: RoverNode[TraverseServerParameters],
+        inputs: ServerInputs,
+        report: Callable[[str], None],
+    ):
+        """Subscribe to the maps and serve ~/load_map.
+
+        Args:
+            node: The node.
+            inputs: Takes the maps, in the thread.
+            report: Called in the thread after each map: with the reason if it was refused, else
+                with an empty text.
+        """
+        self._node, self._inputs, self._report = node, inputs, report
+        self._service = inputs.service
         self._is_from_topic = False
         self._logged_at, self._logged_kind = -float("inf"), ("", False)
         self._map_count = 0
-        super().__init__(server.get_logger(), server.values, server.frames)
+        super().__init__(node.get_logger(), node.values, inputs.frames)
         self._subscribe(CLOUD, PointCloud2)
-        serve_later(server, LoadMap, "~/load_map", self._load_map)
+        serve_later(node, LoadMap, "~/load_map", self._load_map)
         grid_map = find_type("grid_map_msgs.msg:GridMap")
         if grid_map is not None:
             self._subscribe(GRID_MAP, grid_map)
@@ -142,7 +153,7 @@ class MapTopics(MapIntake):
             self.prepare(cloud, None)
         else:
             self._service.renew_map(stamp_to_ns(cloud.header.stamp))
-            self._node.hear_of_map("")
+            self._report("")
 
     def prepare(self, message: Any, source: Rigid | None) -> None:
         """Take a PointCloud2 or GridMap into the map."""
@@ -158,7 +169,7 @@ class MapTopics(MapIntake):
 
     def _note(self, source: str, is_new: bool) -> None:
         """Report that a map was taken, prepare it for questions, and log one that is new."""
-        self._node.hear_of_map("")
+        self._report("")
         self._service.prepare()
         if is_new:
             taken, now = self._service.terrain, time.monotonic()
@@ -178,7 +189,7 @@ class MapTopics(MapIntake):
     def refuse(self, error: str) -> None:
         """Log and report why a map is refused."""
         super().refuse(error)
-        self._node.hear_of_map(error)
+        self._report(error)
 
 
 class MapCloud:
@@ -188,20 +199,23 @@ class MapCloud:
         """Create the publisher."""
         self._node, self._service = node, service
         self._publisher = LazyPublisher(node, PointCloud2, "~/map")
-        self._shown_hash = ""
+        self._shown: KnownMap | None = None
         self._pool = ThreadPoolExecutor(1, "map_cloud")
         self._work: Future[None] | None = None
 
     def update(self) -> None:
         """Publish the map if it is new and someone subscribes; call it about once a second."""
         known = self._service.known_map
+        is_new = known is not None and known.fingerprint != getattr(
+            self._shown, "fingerprint", None
+        )
         is_free = self._work is None or self._work.done()
-        if known is None or known.fingerprint == self._shown_hash or not is_free:
+        if known is None or not is_new or not is_free:
             return
         if not self._publisher.has_listeners:
             self._publisher.withdraw()
         else:
-            self._shown_hash = known.fingerprint
+            self._shown = known
             self._work = self._pool.submit(self._publish, known)
 
     def close(self) -> None:

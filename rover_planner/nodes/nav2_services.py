@@ -7,26 +7,35 @@ Both exist where nav2_msgs is installed.
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
 from numpy.typing import NDArray
 from rclpy.duration import Duration
+from rclpy.node import Node
 
 from rover_physics.errors import RoverError
+from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.planning.answering.budget import CANCELLED, STOPPING
 from rover_planner.planning.answering.judgement import PathJudgement
-from rover_planner.planning.answering.questions import ask_about_path, ask_in_vain
+from rover_planner.planning.answering.questions import (
+    Question,
+    ask_about_path,
+    ask_in_vain,
+)
+from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.path_geometry import next_given_poses
 from rover_planner.planning.verdict_report import IdentityReport
 from rover_planner.ros.deferred import Reply, serve_later
 from rover_planner.ros.optional_types import find_type
 from rover_planner.ros.server_inputs import describe_path
 
-if TYPE_CHECKING:
-    from rover_planner.nodes.traverse_server import TraverseServer
+Publish = Callable[[PathJudgement, IdentityReport], Any]
+ReadPath = Callable[[Path], GivenPath]
+ReadQuestion = Callable[[str, PoseStamped, PoseStamped], Question]
+
 
 ERRORS = {
     "": "NONE",
@@ -42,13 +51,30 @@ Their numbers differ between releases of Nav2."""
 class Nav2Services:
     """Answers requests of IsPathValid and goals of ComputePathToPose."""
 
-    def __init__(self, server: "TraverseServer"):
-        """Create service and action of a server, where their types are installed."""
-        self._server = server
+    def __init__(
+        self,
+        node: Node,
+        desk: QuestionDesk,
+        read_path: ReadPath,
+        read_question: ReadQuestion,
+        publish: Publish,
+    ):
+        """Create service and action, where their types are installed.
+
+        Args:
+            node: The node.
+            desk: Answers the questions.
+            read_path: Returns a path of the robot as one of the body; refuses one that is too
+                long.
+            read_question: Returns the question of a service, by start and goal of the robot.
+            publish: Publishes the results of a judgement and returns the plan first.
+        """
+        self._desk, self._publish = desk, publish
+        self._read_path, self._read_question = read_path, read_question
         self._answers: dict[int, tuple[bool, Any]] = {}
         is_valid = find_type("nav2_msgs.srv:IsPathValid")
         if is_valid is not None:
-            serve_later(server, is_valid, "~/is_path_valid", self.check)
+            serve_later(node, is_valid, "~/is_path_valid", self.check)
         action: Any = find_type("nav2_msgs.action:ComputePathToPose")
         self.make_result: Callable[[], Any] | None = None
         """Makes an empty result of the action."""
@@ -57,7 +83,7 @@ class Nav2Services:
 
             self.make_result = action.Result
             ActionServer(
-                server,
+                node,
                 action,
                 "~/compute_path_to_pose",
                 self.finish,
@@ -73,7 +99,7 @@ class Nav2Services:
         path: Path = request.path
         about, stamp = describe_path(path)
         try:
-            given = self._server.read_path(path)
+            given = self._read_path(path)
             question = ask_about_path("is_path_valid", about, given)
         except RoverError as error:
             question = ask_in_vain("is_path_valid", about, str(error))
@@ -87,11 +113,10 @@ class Nav2Services:
                 response.invalid_pose_indices = find_invalid_poses(
                     judged.candidate.verdict.codes, next_given_poses(given.poses, spacing)
                 )
-            about_path = replace(identity, path_hash=about, path_stamp=stamp)
-            self._server.publish(judged, about_path)
+            self._publish(judged, replace(identity, path_hash=about, path_stamp=stamp))
             reply(response)
 
-        self._server.desk.ask(question, send)
+        self._desk.ask(question, send)
 
     def compute(self, handle: Any) -> None:
         """Take an accepted goal; it is executed, which ends it, once its answer is found."""
@@ -101,7 +126,7 @@ class Nav2Services:
 
         def send(judged: PathJudgement, identity: IdentityReport) -> None:
             result = make_result()
-            result.path, _ = self._server.publish(judged, identity)
+            result.path, _ = self._publish(judged, identity)
             seconds = time.monotonic() - begin
             result.planning_time = Duration(seconds=seconds).to_msg()
             result.error_code = getattr(result, _name_error(judged))
@@ -110,8 +135,7 @@ class Nav2Services:
             self._answers[id(handle)] = judged.traversable, result
             handle.execute()
 
-        question = self._server.read_question("compute_path_to_pose", start, goal.goal)
-        self._server.desk.ask(question, send)
+        self._desk.ask(self._read_question("compute_path_to_pose", start, goal.goal), send)
 
     def finish(self, handle: Any) -> Any:
         """End a goal whose answer is found; return its result."""

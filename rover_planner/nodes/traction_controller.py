@@ -11,8 +11,9 @@ from rclpy.duration import Duration
 from std_msgs.msg import Bool
 from std_srvs.srv import SetBool
 
+from msg_adapters.commands import joint_order
 from msg_adapters.results.diagnostics import traction_diagnostics
-from rover_physics.names import WHEEL_COUNT
+from rover_physics.names import WHEEL_COUNT, WHEEL_JOINTS
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.traction.inputs import TractionInputs, TractionMaps
 from rover_planner.nodes.traction.topics import TractionTopics
@@ -75,9 +76,11 @@ class TractionController(RoverNode[TractionControllerParameters]):
         self._clock_watch = ClockWatch(values.clock_timeout)
         self.frames = NodeFrames(self, values)
         """Knows where the frames of messages are on the map."""
-        self._maps = TractionMaps(self)
-        self._inputs = TractionInputs(self, self._maps)
-        self._topics = TractionTopics(self, self._inputs.joint_names)
+        self._maps = TractionMaps(self, lambda: self.service.settings.rover, self.frames)
+        self._inputs = TractionInputs(self, self.service, self._maps, self.frames)
+        names = self._inputs.joint_names
+        order = joint_order(values.joints, names)
+        self._topics = TractionTopics(self, order, names.signs(WHEEL_JOINTS))
         self._create_switches()
         self._watchdog = Watchdog(self._send_watchdog_command)
         self.follow_changes(self._load, self._apply_settings)

@@ -88,28 +88,27 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self.frames = NodeFrames(self, self.values)
         """Transforms poses to the map frame."""
         self.frames.listen()
-        self.inputs = ServerInputs(self.values, self.frames)
-        """Takes what messages say."""
-        self.service = self.inputs.service
+        self._inputs = ServerInputs(self.values, self.frames)
+        self.service = self._inputs.service
         """The service with the last map, path and joint angles."""
-        self._results = ResultTopics(self, self.inputs)
-        self._maps = MapTopics(self)
+        self._results = ResultTopics(self, self._inputs)
+        self._maps = MapTopics(self, self._inputs, self._hear_of_map)
         self.desk = QuestionDesk(self, self.service, self._maps)
         """Takes the questions of all services."""
         self._create_subscriptions()
         serve_later(self, GetPlan, "~/can_traverse", self._can_traverse)
         serve_later(self, Trigger, "~/check_path", self._check_path)
-        Nav2Services(self)
+        Nav2Services(self, self.desk, self.read_path, self.read_question, self.publish)
         self._advice = AdviceTopics(self, self.desk)
         self.create_service(Trigger, "~/cancel", self._cancel)
         self.create_service(Trigger, "~/clear_places", self._clear_marks)
         self.arm = ArmTopics(self, self.desk)
         """The topics and the service of the arm."""
         self._map_cloud = MapCloud(self, self.service)
-        self.watch = PathWatch(self)
+        self.watch = PathWatch(self, self.service, self._find_watched, self._publish_stop)
         """Watches the accepted path."""
         self.urgent_threads = (self.watch.heartbeat_thread,)
-        self._hazards = HazardTopics(self)
+        self._hazards = HazardTopics(self, self.service, self.desk.give_way)
         self._diagnostics = self.create_publisher(DiagnosticArray, "diagnostics", topic_qos())
         self._diagnostics_due = 0.0
         self._beats = create_steady_timer(self, PERIOD, self._beat)
@@ -128,13 +127,14 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         super().destroy_node()
 
     def _create_subscriptions(self) -> None:
-        hear, inputs = self.heard.subscribe, self.inputs
+        hear, inputs = self.heard.subscribe, self._inputs
         hear(JointState, "joint_states", lambda one, _: inputs.take_joints(one), polled_qos())
         hear(Odometry, "odometry", self._take_odometry, newest_qos())
         if self.values.imu_attitude:
             hear(Imu, "imu", lambda one, _: inputs.take_imu(one), newest_qos())
-        subscribe_to_requests(self, Path, "~/path", self._take_path, raw=True)
-        qos = replace_reliability(topic_qos(), self.values.input_reliability)
+        reliability = self.values.input_reliability
+        subscribe_to_requests(self, Path, "~/path", self._take_path, reliability, raw=True)
+        qos = replace_reliability(topic_qos(), reliability)
         hear(String, "~/ground_estimate", self._take_ground, qos)
         self.create_subscription(String, "~/mark_place", self._take_mark, qos)
 
@@ -146,7 +146,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         self.get_logger().info(f"ready for rover {name}, {there}")
 
     def _apply_settings(self, settings: ServiceSettings) -> None:
-        self.inputs.values, self.service.settings = self.values, settings
+        self._inputs.values, self.service.settings = self.values, settings
         self._maps.apply(self.values)
         self.watch.apply()
         self.frames.apply_timeout(self.values.transform_timeout)
@@ -172,14 +172,14 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
             self._beats.timer_period_ns = period
             self._beats.reset()
 
-    def hear_of_map(self, error: str) -> None:
-        """Note why a map was refused, or have the watch look at a new one at once; any thread."""
+    def _hear_of_map(self, error: str) -> None:
+        """Note why a map was refused, or have the watch look at a new one at once."""
         self.desk.health.take_map(error)
         if not error:
             self.watch.look()
 
     def _take_odometry(self, odometry: Any, _arrival: float) -> None:
-        self.inputs.take_odometry(odometry)
+        self._inputs.take_odometry(odometry)
         self._maps.look_under_rover()
 
     def _take_ground(self, message: String, _arrival: float) -> None:
@@ -207,16 +207,14 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         return response
 
     def _take_path(self, message: bytes) -> None:
-        """Keep a path, or why it was refused: later questions must not use an outdated one."""
         about = "", ""
         try:
             self._check_length(count_poses(message))
             path = read_message(message, Path)
             about = describe_path(path)
-            self.service.given_path = self.inputs.read_path(path)
+            self.service.given_path = self._inputs.read_path(path)
         except RoverError as error:
-            refusal = f"the last path was refused: {error}"
-            self.service.given_path = GivenPath(None, refusal, *about)
+            self.service.refuse_path(str(error), *about)
             self.get_logger().error(f"~/path refused: {error}")
 
     def _check_length(self, poses: int) -> None:
@@ -235,7 +233,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
             RoverError: It is too long, a value is wrong, or a frame is not known.
         """
         self._check_length(len(path.poses))
-        return self.inputs.read_path(path)
+        return self._inputs.read_path(path)
 
     def _can_traverse(
         self, request: GetPlan.Request, response: GetPlan.Response, reply: Reply
@@ -263,23 +261,27 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
         """
         about = plan_request_hash(begin, end, tolerance)
         try:
-            read = self.frames.read_pose
-            start = self._find_here() if is_empty(begin) else read(begin, "start")
-            return ask_for_path(service, about, start, read(end, "goal"), tolerance)
+            return ask_for_path(service, about, *self._read_ends(begin, end), tolerance)
         except RoverError as error:
             return ask_in_vain(service, about, str(error))
 
-    def find_watched(self) -> Pose | None:
+    def _read_ends(self, begin: PoseStamped, end: PoseStamped) -> tuple[Pose, Pose]:
+        """Return start and goal (3,) of the body in the map frame; an empty start is here."""
+        read = self.frames.read_pose
+        start = self._find_here() if is_empty(begin) else read(begin, "start")
+        return start, read(end, "goal")
+
+    def _find_watched(self) -> Pose | None:
         """Return the pose (3,) of the body by /tf, else by odometry of just now."""
         try:
-            return self.inputs.find_here(MAX_POSE_AGE)
+            return self._inputs.find_here(MAX_POSE_AGE)
         except RoverError:  # it is stale
             return None
 
     def _find_here(self) -> Pose:
         """Return the pose (3,) of the body by /tf, else by odometry."""
         self.heard.poll()
-        here = self.inputs.find_here()
+        here = self._inputs.find_here()
         if here is None:
             raise MessageError(
                 "start is empty, which means where the rover is, but neither /tf nor odometry of "
@@ -313,7 +315,7 @@ class TraverseServer(RoverNode[TraverseServerParameters]):
             self._set_pace()
         return plan, report
 
-    def publish_stop(self, judgement: PathJudgement, watched: str, snapshot: Snapshot) -> None:
+    def _publish_stop(self, judgement: PathJudgement, watched: str, snapshot: Snapshot) -> None:
         """Publish why the rover is to stop, as the results of a judged path."""
         self.publish(judgement, self.desk.identify("monitor", watched, snapshot))
 

@@ -23,18 +23,25 @@ PERIOD = 5.0
 
 
 def subscribe_to_requests(
-    node: RoverNode[Any], kind: type, name: str, take: Callable[[Any], None], *, raw: bool = False
+    node: Node,
+    kind: type,
+    name: str,
+    take: Callable[[Any], None],
+    reliability: str,
+    *,
+    raw: bool = False,
 ) -> None:
     """Subscribe to a topic of requests, such as paths.
 
     Args:
-        node: The node; its parameter input_reliability counts.
+        node: The node.
         kind: Type of the messages.
         name: Name of the topic.
         take: Called with each message; it must not raise.
+        reliability: One of `RELIABILITIES`.
         raw: Whether `take` gets the bytes of a message.
     """
-    qos = replace_reliability(topic_qos(), node.values.input_reliability)
+    qos = replace_reliability(topic_qos(), reliability)
     _subscribe(node, kind, name, take, qos, HEAR_BEST_EFFORT, raw=raw)
 
 

@@ -10,7 +10,7 @@ from rover_physics import SweepOptions, Terrain, judge_poses, load_rover
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES, classify_judged
 from rover_physics.traversability.pose_classes import RoverOnMap, classify_poses
-from rover_planner.planning.navigation.hazard_map import HazardMap, find_best, find_worst
+from rover_planner.planning.navigation.hazard_map import HazardMap
 from support.rovers import LSR1
 
 OPTIONS = SweepOptions(control_margin=0.3)
@@ -110,15 +110,14 @@ def test_at_a_limit_a_pose_has_the_class_of_the_full_judgement(excess):
 
 def test_no_cell_is_free_where_all_headings_fail():
     view = judged(rough(2)).view()
-    best, worst = find_best(view), find_worst(view)
-    fails = (view == IMPASSABLE).all(axis=0)
+    fails = (view.classes == IMPASSABLE).all(axis=0)
     assert fails.sum() > 20
-    assert (best[fails] == IMPASSABLE).all() and (worst[fails] == IMPASSABLE).all()
-    some = (view == IMPASSABLE).any(axis=0) & ~fails
-    assert some.any() and (worst[some] == IMPASSABLE).all()
-    passes = ((view >= 0) & (view < IMPASSABLE)).any(axis=0)
-    lost = (view == UNKNOWN).any(axis=0) & ~passes
-    assert lost.any() and (best[lost] == UNKNOWN).all()
+    assert (view.best()[fails] == IMPASSABLE).all() and (view.worst()[fails] == IMPASSABLE).all()
+    some = (view.classes == IMPASSABLE).any(axis=0) & ~fails
+    assert some.any() and (view.worst()[some] == IMPASSABLE).all()
+    passes = ((view.classes >= 0) & (view.classes < IMPASSABLE)).any(axis=0)
+    lost = (view.classes == UNKNOWN).any(axis=0) & ~passes
+    assert lost.any() and (view.best()[lost] == UNKNOWN).all()
 
 
 @pytest.mark.parametrize(
@@ -134,12 +133,12 @@ def test_an_updated_map_equals_a_new_one_and_judges_little(rover, cell, height):
         elevation[42, 41] = height
     after = replace(before, elevation=elevation)
     hazards = judged(before, 1, rover)
-    old = hazards.view().copy()
+    old = hazards.view().classes.copy()
     hazards.take(RoverOnMap(rover, after, OPTIONS))
     assert 0 < hazards.stale_count < 0.6 * 60 * 60
     assert hazards.work(600.0) and hazards.stale_count == 0
-    new = judged(after, 1, rover).view()
-    np.testing.assert_array_equal(hazards.view(), new)
+    new = judged(after, 1, rover).view().classes
+    np.testing.assert_array_equal(hazards.view().classes, new)
     assert (new != old).any()  # the change counts
 
 
@@ -158,7 +157,7 @@ def test_a_window_that_rolls_keeps_what_stays_and_equals_a_new_map(rows, columns
     if rows != -55:
         assert hazards.stale_count < 50 * 60
     assert hazards.work(600.0)
-    np.testing.assert_array_equal(hazards.view(), judged(after, 1).view())
+    np.testing.assert_array_equal(hazards.view().classes, judged(after, 1).view().classes)
 
 
 def test_the_same_map_judges_nothing_and_another_rover_option_or_grid_all_anew():
@@ -181,9 +180,9 @@ def test_the_same_map_judges_nothing_and_another_rover_option_or_grid_all_anew()
 def test_what_is_not_judged_yet_is_unknown_and_the_nearest_tiles_come_first():
     terrain = rough(3, (100, 100), 0.05)
     hazards = HazardMap(2)
-    assert hazards.view().size == 0
+    assert hazards.view() is None
     hazards.take(RoverOnMap(LSR1, replace(terrain, elevation=np.zeros((100, 100))), OPTIONS))
-    assert (hazards.view() == UNKNOWN).all()
+    assert (hazards.view().classes == UNKNOWN).all()
     assert not hazards.work(0.0, near=(-2.0 + 4.0, 1.0 + 4.0))
-    judged_cells = hazards.view()[0] != UNKNOWN
+    judged_cells = hazards.view().classes[0] != UNKNOWN
     assert judged_cells[70:90, 70:90].any() and not judged_cells[:60, :60].any()

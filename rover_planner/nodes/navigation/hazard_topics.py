@@ -3,14 +3,14 @@
 
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from nav_msgs.msg import OccupancyGrid
 from nav_msgs.srv import GetMap
-from numpy.typing import NDArray
 from std_msgs.msg import Header
 
 from msg_adapters.results.grids import classes_to_grid
@@ -18,15 +18,14 @@ from rover_physics.errors import RoverError
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.pose_classes import UNKNOWN, RoverOnMap
-from rover_planner.maps.known_map import KnownMap
+from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.budget import STOPPING, QuestionStoppedError
 from rover_planner.planning.answering.service_settings import ServiceSettings
-from rover_planner.planning.navigation.hazard_map import HazardMap, find_best, find_worst
+from rover_planner.planning.answering.traverse_service import TraverseService
+from rover_planner.planning.navigation.hazard_map import HazardMap, HazardView
 from rover_planner.ros.lazy_publisher import LazyPublisher
 from rover_planner.ros.logs import TransitionLog
-
-if TYPE_CHECKING:
-    from rover_planner.nodes.traverse_server import TraverseServer
+from rover_planner.ros.node import RoverNode
 
 PERIOD = 0.5
 """Time between two looks for a new map [s]; comparing two large maps takes a tenth of it."""
@@ -43,14 +42,25 @@ END_TIME = 2.0
 class HazardTopics:
     """Connects a HazardMap to a node; without the parameter `hazard_map` it does nothing."""
 
-    def __init__(self, server: "TraverseServer"):
-        """Create topics, service and thread."""
-        self._node, self._service = server, server.service
-        self._log = TransitionLog(server.get_logger())
+    def __init__(
+        self,
+        node: RoverNode[TraverseServerParameters],
+        service: TraverseService,
+        give_way: Callable[[Callable[[], object], float], float],
+    ):
+        """Create topics, service and thread.
+
+        Args:
+            node: The node.
+            service: Knows map, settings and pose.
+            give_way: As `QuestionDesk.give_way`: questions come first.
+        """
+        self._node, self._service, self._give_way = node, service, give_way
+        self._log = TransitionLog(node.get_logger())
         self._shown: _Shown | None = None
         self._done: tuple[Terrain, ServiceSettings] | None = None
         self._topics: dict[str, LazyPublisher] = {}
-        server.create_service(GetMap, "~/get_hazard_map", self._get)
+        node.create_service(GetMap, "~/get_hazard_map", self._get)
         self._withdrawals = 0
         self._enabled = threading.Event()
         self._ending = threading.Event()
@@ -96,8 +106,7 @@ class HazardTopics:
         shown = self._shown
         if not self._enabled.is_set() or shown is None:
             return {}
-        map_hash = shown.known.fingerprint
-        return {"hazard map: cells to judge": shown.stale, "hazard map: map": map_hash}
+        return {"hazard map: cells to judge": shown.stale, "hazard map: map": shown.map_hash}
 
     def _get(self, _request: GetMap.Request, response: GetMap.Response) -> GetMap.Response:
         """Return the worst classes; a grid without cells if there are none."""
@@ -158,14 +167,17 @@ class HazardTopics:
                 self._done = known.terrain, settings
             if is_done or time.monotonic() - shown_at > SHOW_PERIOD:
                 shown_at = time.monotonic()
-                self._show(hazards, known, withdrawals)
+                self._show(hazards, known.fingerprint, withdrawals)
 
     def _let_questions_go_first(self) -> None:
         """Wait while there are questions, for MAX_PAUSE in each SLICE; called between poses."""
-        self._patience -= self._node.desk.give_way(self._check_end, self._patience)
+        self._patience -= self._give_way(self._check_end, self._patience)
 
-    def _show(self, hazards: HazardMap, known: KnownMap, withdrawals: int) -> None:
-        shown = _Shown(hazards.view(), known, hazards.stale_count, self._make_header())
+    def _show(self, hazards: HazardMap, map_hash: str, withdrawals: int) -> None:
+        view = hazards.view()
+        if view is None:
+            return
+        shown = _Shown(view, map_hash, hazards.stale_count, self._make_header())
         self._node.handover.call(partial(self._publish, shown, withdrawals))
 
     def _make_header(self) -> Header:
@@ -183,12 +195,12 @@ class HazardTopics:
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """The classes as they are published."""
+    """A view of the classes as it is published."""
 
-    classes: NDArray[np.int8]
-    """As `HazardMap.view`."""
-    known: KnownMap
-    """The map they were judged on."""
+    view: HazardView
+    """The classes."""
+    map_hash: str
+    """Fingerprint of the map they were judged on."""
     stale: int
     """Number of poses that were not judged yet; they are unknown."""
     header: Header
@@ -196,13 +208,14 @@ class _Shown:
 
     def without_classes(self, header: Header) -> "_Shown":
         """Return the same cells, none of them judged, at another time."""
-        return replace(self, classes=np.full_like(self.classes, UNKNOWN), header=header)
+        unknown = np.full_like(self.view.classes, UNKNOWN)
+        return replace(self, view=replace(self.view, classes=unknown), header=header)
 
     def grid(self, name: str) -> OccupancyGrid:
         """Return the grid of a topic."""
+        view = self.view
         if name in ("worst", "best"):
-            classes = (find_worst if name == "worst" else find_best)(self.classes)
+            classes = view.worst() if name == "worst" else view.best()
         else:
-            classes = self.classes[int(name.removeprefix("heading_"))]
-        terrain = self.known.terrain
-        return classes_to_grid(classes, terrain.resolution, terrain.origin, self.header)
+            classes = view.classes[int(name.removeprefix("heading_"))]
+        return classes_to_grid(classes, view.resolution, view.origin, self.header)

@@ -4,8 +4,8 @@
 import math
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -17,9 +17,12 @@ from std_srvs.srv import SetBool
 from msg_adapters.results.diagnostics import MONITOR, make_status
 from rover_physics.numerics.interruption import interruptible
 from rover_physics.numerics.kernel_cache import KernelMissingError, loading_only
+from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.budget import STOPPING, Budget, QuestionStoppedError
 from rover_planner.planning.answering.judgement import PathJudgement, refusal
 from rover_planner.planning.answering.server_health import Health
+from rover_planner.planning.answering.snapshot import Snapshot
+from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.monitor import (
     IDLE,
     STOPPED,
@@ -30,10 +33,8 @@ from rover_planner.planning.navigation.monitor import (
     rehearse,
 )
 from rover_planner.planning.navigation.watched_path import WatchedPath
+from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import latched_qos
-
-if TYPE_CHECKING:
-    from rover_planner.nodes.traverse_server import TraverseServer
 
 PERIOD = 0.1
 """Time between two looks while paths are watched, and between two heartbeats [s]."""
@@ -48,6 +49,11 @@ NO_PATH = WatchedPath(np.empty((0, 3)))
 END_TIME = 2.0
 """Longest wait for the thread at the end [s]."""
 
+FindPose = Callable[[], NDArray[np.float64] | None]
+"""Returns the pose (3,) x, y [m] and yaw [rad] of the body of just now, map frame."""
+ReportStop = Callable[[PathJudgement, str, Snapshot], None]
+"""Publishes why the rover is to stop, with the hash of its path and what was known."""
+
 
 class PathWatch:
     """Connects a PathMonitor to a node; looks are taken in a thread, in which maps are judged.
@@ -56,9 +62,23 @@ class PathWatch:
     It ends when the thread of the looks or the executor hangs: both take part in each look.
     """
 
-    def __init__(self, server: "TraverseServer"):
-        """Create topic, service and thread."""
-        self._node, self._service = server, server.service
+    def __init__(
+        self,
+        node: RoverNode[TraverseServerParameters],
+        service: TraverseService,
+        find_pose: FindPose,
+        report_stop: ReportStop,
+    ):
+        """Create topic, service and thread.
+
+        Args:
+            node: The node.
+            service: Knows map, pose and joints.
+            find_pose: Returns where the body is; None if it is not known.
+            report_stop: Called in the executor's thread when the rover is to stop.
+        """
+        self._node, self._service = node, service
+        self._find_pose, self._report_stop = find_pose, report_stop
         self._monitor = PathMonitor()
         self.finding, self._found_idle = self._monitor.finding, False
         """The last finding."""
@@ -66,8 +86,8 @@ class PathWatch:
         """True while accepted paths are watched."""
         self._reported: PathJudgement | None = None
         self._last_path: WatchedPath | None = None
-        self._stop = server.create_publisher(Bool, "~/stop", latched_qos())
-        self._state = server.create_publisher(DiagnosticStatus, "~/watch", latched_qos())
+        self._stop = node.create_publisher(Bool, "~/stop", latched_qos())
+        self._state = node.create_publisher(DiagnosticStatus, "~/watch", latched_qos())
         self._map_age = math.nan
         self._looked, self._idle_until = time.monotonic(), 0.0
         self._stop_is_new = threading.Event()
@@ -77,7 +97,7 @@ class PathWatch:
         self._life = Budget(math.inf)
         self._thread = threading.Thread(target=self._run, name="monitor", daemon=True)
         self._thread.start()
-        server.create_service(SetBool, "~/monitor", self._switch)
+        node.create_service(SetBool, "~/monitor", self._switch)
         self.apply()
         self._heartbeat = threading.Thread(target=self._send_stops, name="heartbeat", daemon=True)
         self._heartbeat.start()
@@ -175,7 +195,7 @@ class PathWatch:
     def _offer_sight(self) -> None:
         """Hand what is known now to the thread; a look that still waits is replaced."""
         now = self._node.get_clock().now().nanoseconds
-        snapshot, pose = self._service.snapshot(now), self._node.find_watched()
+        snapshot, pose = self._service.snapshot(now), self._find_pose()
         self._map_age = snapshot.map_age
         with self._changed:
             self._sight = Sight(snapshot, pose, time.monotonic())
@@ -240,7 +260,7 @@ class PathWatch:
         with interruptible(self._life.check):
             complete = judgement.complete()
         self._node.handover.call(
-            lambda: self._node.publish_stop(complete, finding.path_hash, sight.snapshot)
+            lambda: self._report_stop(complete, finding.path_hash, sight.snapshot)
         )
 
     def _take(self, finding: Finding) -> None:

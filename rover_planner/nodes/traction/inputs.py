@@ -3,7 +3,8 @@
 
 import math
 import time
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 from geometry_msgs.msg import Twist, TwistStamped
 from nav_msgs.msg import Odometry
@@ -18,13 +19,16 @@ from msg_adapters.stamps import NANOSECONDS, stamp_to_ns
 from rover_physics.errors import RoverError
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
+from rover_physics.rover.model import Rover
 from rover_physics.rover.steering_joints import steering_joints
 from rover_physics.traction.map_contacts import MapContactFinder
 from rover_planner.parameters.shared import STOP
 from rover_planner.parameters.traction_controller import TractionControllerParameters
 from rover_planner.planning.navigation.transforms import Rigid
+from rover_planner.ros.frames import NodeFrames
 from rover_planner.ros.logs import TransitionLog
 from rover_planner.ros.map_intake import CLOUD, MapIntake
+from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import newest_qos, sensor_qos, topic_qos
 from rover_planner.ros.subscriptions import PublisherCheck, subscribe_to_map
 from rover_planner.traction.input_monitor import StampError
@@ -33,10 +37,8 @@ from rover_planner.traction.traction_service import (
     IMU,
     JOINT_STATES,
     ODOMETRY,
+    TractionService,
 )
-
-if TYPE_CHECKING:
-    from rover_planner.nodes.traction_controller import TractionController
 
 JOINTS = (*SUSPENSION_JOINTS, *WHEEL_JOINTS)
 ANGLES = (*SUSPENSION_JOINTS, *STEERING_JOINTS)
@@ -49,10 +51,16 @@ TWIST, TWIST_STAMPED = "geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStampe
 class TractionInputs:
     """Takes joint states, attitude, commands and odometry; nothing in them ends the node."""
 
-    def __init__(self, node: "TractionController", maps: MapIntake):
-        """Subscribe to all inputs of a node."""
-        self._node, self._service, self._frames = node, node.service, node.frames
-        parameters, arm = node.values, node.service.settings.rover.manipulator
+    def __init__(
+        self,
+        node: RoverNode[TractionControllerParameters],
+        service: TractionService,
+        maps: MapIntake,
+        frames: NodeFrames,
+    ):
+        """Subscribe to all inputs of a node; `frames` brings odometry to the frame of the map."""
+        self._node, self._service, self._frames, parameters = node, service, frames, node.values
+        arm = service.settings.rover.manipulator
         known = (*JOINTS, *STEERING_JOINTS, *(() if arm is None else arm.joints))
         sign = parameters.steering_sign
         self.joint_names = read_joint_map(parameters.joint_map, known, sign)
@@ -161,11 +169,22 @@ class TractionInputs:
 class TractionMaps(MapIntake):
     """Prepares clouds for the controller in a thread of their own."""
 
-    def __init__(self, node: "TractionController"):
-        """Start the thread."""
-        self._node = node
+    def __init__(
+        self,
+        node: RoverNode[TractionControllerParameters],
+        rover: Callable[[], Rover],
+        frames: NodeFrames,
+    ):
+        """Start the thread.
+
+        Args:
+            node: The node.
+            rover: Returns the rover for which maps are prepared.
+            frames: Knows where the frames of clouds are on the map.
+        """
+        self._rover, self._listen = rover, frames.listen
         self._ready: MapContactFinder | None = None
-        super().__init__(node.get_logger(), node.values, node.frames)
+        super().__init__(node.get_logger(), node.values, frames)
 
     def apply(self, values: TractionControllerParameters) -> None:
         """Prepare the last map again if a parameter of it has changed."""
@@ -175,7 +194,7 @@ class TractionMaps(MapIntake):
     def look_for_frame(self) -> None:
         """Listen to /tf if a map needs it, and take it when its frame is known; call it often."""
         if self.waits_for_frame:
-            self._node.frames.listen()  # only then: /tf of a whole robot costs the loop time
+            self._listen()  # only then: /tf of a whole robot costs the loop time
             self.retry()
 
     def take(self) -> MapContactFinder | None:
@@ -187,4 +206,4 @@ class TractionMaps(MapIntake):
         """Prepare a map from a cloud; called in the thread."""
         values, move = self.values, None if source is None else source.matrix
         terrain = terrain_from_point_cloud(cloud, values.map_resolution, values.cell_height, move)
-        self._ready = MapContactFinder(self._node.service.settings.rover, terrain)
+        self._ready = MapContactFinder(self._rover(), terrain)

@@ -3,15 +3,14 @@
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
+from numpy.typing import NDArray
+from rclpy.node import Node
 from rclpy.publisher import Publisher
 from std_msgs.msg import Bool, Float64MultiArray, String
 
-from msg_adapters.commands import doubles, joint_order, labelled_array
-from msg_adapters.joints import JointNames
-from rover_physics.names import WHEEL_COUNT, WHEEL_JOINTS
+from msg_adapters.commands import doubles, labelled_array
+from rover_physics.names import WHEEL_COUNT
 from rover_physics.numerics.arrays import Floats
-from rover_planner.parameters.traction_controller import TractionControllerParameters
-from rover_planner.ros.node import RoverNode
 from rover_planner.ros.qos import latched_qos, topic_qos
 from rover_planner.traction.traction_service import TractionCommand
 
@@ -22,14 +21,19 @@ STANDING_WHEELS = np.zeros(WHEEL_COUNT)
 class TractionTopics:
     """Publishers of commands, state, brake and forces; any thread may write commands."""
 
-    def __init__(self, node: RoverNode[TractionControllerParameters], names: JointNames):
-        """Create the publishers; `names` are those of the joints in messages."""
+    def __init__(self, node: Node, order: NDArray[np.int64], signs: Floats):
+        """Create the publishers.
+
+        Args:
+            node: The node.
+            order: (6,) index of the wheel of each value of ~/commands.
+            signs: (6,) sign of the torque of each wheel in messages, in wheel order.
+        """
 
         def publish(name: str) -> Publisher:
             return node.create_publisher(Float64MultiArray, name, topic_qos())
 
-        self._order = joint_order(node.values.joints, names)
-        self._signs = names.signs(WHEEL_JOINTS)[self._order]
+        self._order, self._signs = order, signs[order]
         self.commands = publish("~/commands")
         self.velocities = publish("~/velocity_commands")
         self.steering = publish("~/steering_commands")

@@ -5,6 +5,7 @@ import itertools
 import math
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,21 +34,28 @@ MAX_ROLL = 1.0
 """Roll of a body that still stands [rad]; limits of tilt are far below it."""
 
 
-def find_worst(classes: NDArray[np.int8]) -> NDArray[np.int8]:
-    """Return (ny, nx) the worst class of all headings of a `HazardMap`.
+@dataclass(frozen=True, eq=False)
+class HazardView:
+    """The classes at one time."""
 
-    IMPASSABLE is worse than UNKNOWN, all else better.
-    """
-    worst = classes.max(axis=0)
-    unknown = (classes == UNKNOWN).any(axis=0)
-    return np.where(unknown & (worst != IMPASSABLE), UNKNOWN, worst).astype(np.int8)
+    classes: NDArray[np.int8]
+    """(headings, ny, nx) class of each heading and cell; UNKNOWN where it is not judged yet."""
+    resolution: float
+    """Cell size [m]."""
+    origin: tuple[float, float]
+    """x, y of the centre of cell [0, 0] [m], map frame."""
 
+    def worst(self) -> NDArray[np.int8]:
+        """Return (ny, nx) the worst class; IMPASSABLE is worse than UNKNOWN, all else better."""
+        worst = self.classes.max(axis=0)
+        unknown = (self.classes == UNKNOWN).any(axis=0)
+        return np.where(unknown & (worst != IMPASSABLE), UNKNOWN, worst).astype(np.int8)
 
-def find_best(classes: NDArray[np.int8]) -> NDArray[np.int8]:
-    """Return (ny, nx) the best known class; UNKNOWN if one heading is and none is passable."""
-    known = np.where(classes == UNKNOWN, IMPASSABLE, classes).min(axis=0)
-    unknown = (classes == UNKNOWN).any(axis=0)
-    return np.where(unknown & (known == IMPASSABLE), UNKNOWN, known).astype(np.int8)
+    def best(self) -> NDArray[np.int8]:
+        """Return (ny, nx) the best known class; UNKNOWN if one heading is and none is passable."""
+        known = np.where(self.classes == UNKNOWN, IMPASSABLE, self.classes).min(axis=0)
+        unknown = (self.classes == UNKNOWN).any(axis=0)
+        return np.where(unknown & (known == IMPASSABLE), UNKNOWN, known).astype(np.int8)
 
 
 class HazardMap:
@@ -105,12 +113,14 @@ class HazardMap:
                 break
         return not self._stale.any()
 
-    def view(self) -> NDArray[np.int8]:
-        """Return the class (headings, ny, nx) of each heading and cell of the last map.
-
-        It is UNKNOWN where it is not judged yet.
-        """
-        return np.where(self._stale, np.int8(UNKNOWN), self._classes)
+    def view(self) -> HazardView | None:
+        """Return the classes of now; None before the first map."""
+        if self._on_map is None:
+            return None
+        terrain = self._on_map.terrain
+        classes = np.where(self._stale, np.int8(UNKNOWN), self._classes)
+        x, y = terrain.origin
+        return HazardView(classes, float(terrain.resolution), (float(x), float(y)))
 
     def _touch_changes(self, on_map: RoverOnMap, changed: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Return (headings, ny, nx) True where a changed cell is below the rover.
