@@ -81,9 +81,7 @@ def test_a_search_tells_what_was_found_by_a_promised_time_and_that_it_goes_on():
     asked = path.scenario
     growing = grow_advice(Case(asked.rover, asked.terrain, path.poses, asked.options.model))
     none, some = next(growing), next(one for one in growing if one.remedies)
-    first, last = (
-        Advised(path, growing, since, one) for one in (none, replace(some, complete=True))
-    )
+    first, last = (Advised(path, since, one) for one in (none, replace(some, complete=True)))
     told = describe_advice(first, True, since + 0.5 * PROMISED)
     assert told["words"] == "tried: nothing yet" and not told["can_ask"]
     for advised, found in ((first, "nothing"), (last, str(len(last.remedies)))):

@@ -164,7 +164,7 @@ def test_the_ground_has_a_layer_for_the_use_of_each_limit_of_a_pose_and_one_for_
     found = layers.colour_limit(layers.LayerRequest(LSR1, steep, how), grid)
     picture = ground_mesh.draw_picture(grid, found)
     assert np.median(picture[..., 0]) > np.median(picture[..., 2])  # beyond it is vermillion
-    assert found.legend.keys[0] == ("hatched", "beyond the limit")
+    assert found.legend["keys"][0] == ("hatched", "beyond the limit")
 
 
 def test_the_known_ground_is_a_file_that_needs_no_light_and_leaves_no_garbage(monkeypatch):

@@ -30,6 +30,7 @@ from msg_adapters.results.diagnostics import HEALTH
 from msg_adapters.results.predictions import array_values
 from rover_physics.errors import RoverError
 from rover_physics.names import WHEEL_JOINTS
+from rover_planner.errors import PlanningError
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.ros.qos import (
     latched_qos,
@@ -146,17 +147,19 @@ class LiveListener(Node):
         forces = {**predicted, **estimated}
         return replace(data, forces=forces, forces_from=source, ages=self._ages, click=self._click)
 
-    def request_plan(self, goal: np.ndarray) -> str:
+    def request_plan(self, goal: np.ndarray) -> None:
         """Ask the server for a plan from the rover's pose to a goal (2,) [m].
 
-        Returns:
-            Why that is not possible, empty if it is; plan and verdict come on their topics.
+        Plan and verdict come on their topics.
+
+        Raises:
+            PlanningError: There is no odometry, or no server.
         """
         data = self._data
         if data.position is None:
-            return "no odometry yet, so the start is not known"
+            raise PlanningError("no odometry yet, so the start is not known")
         if not self._planner.service_is_ready():
-            return f"no service {SERVER}/can_traverse"
+            raise PlanningError(f"no service {SERVER}/can_traverse")
         yaw = float(np.arctan2(*(np.asarray(goal) - data.position[:2])[::-1]))
         start = (*data.position[:2], data.attitude[2])
         request = GetPlan.Request(
@@ -166,7 +169,6 @@ class LiveListener(Node):
         self._click = click = Question(CLICK, hashed, time.monotonic())
         take = partial(self._on_answer, click)
         self._planner.call_async(request).add_done_callback(partial(self._hear, "plan", take))
-        return ""
 
     def forget_click(self) -> None:
         """Follow the server's newest verdict again."""

@@ -16,13 +16,12 @@ from rover_planner.viewer.live.live_state import (
     LiveData,
     choose_answer,
     describe_learned,
-    list_topics,
     read_state,
 )
 from rover_planner.viewer.pages.base import HERE, Answer, PageBase
 from rover_planner.viewer.pages.sharing import read_link
+from rover_planner.viewer.scene.ground_mesh import paint
 from rover_planner.viewer.scene.scene import START
-from rover_planner.viewer.state.drive import RoverState
 from rover_planner.viewer.state.layers import LayerRequest
 
 BOARD_PERIOD = 0.2
@@ -66,10 +65,10 @@ class LivePage(PageBase):
             "open": lambda words: _refuse_link(words["query"]),
         }
 
-    def describe_ground(self) -> LayerRequest | None:
-        """Return the ground as it is known."""
-        known = bool(self.ground_name)
-        return LayerRequest(self._rover, self.ground, self.colouring) if known else None
+    def paint(self) -> None:
+        """Begin to colour the ground, if it is known."""
+        if self.ground_name:
+            self.painter.ask(paint(LayerRequest(self._rover, self.ground, self.colouring)))
 
     @property
     def points(self) -> Floats:
@@ -81,7 +80,8 @@ class LivePage(PageBase):
         """Ask the server for a plan to a point."""
         if not self.ground_name:
             raise PlanningError("the ground is not known yet")
-        self._refusal = self._listener.request_plan(point)
+        self._refusal = ""
+        self._listener.request_plan(point)
 
     def show_refusal(self, reason: str) -> None:
         """Show why a request was refused."""
@@ -118,14 +118,14 @@ class LivePage(PageBase):
                 self._first = state.position[:2]
                 self.scene.look(START, self.points)
         if now - self._told_at > BOARD_PERIOD:
-            self._told_at = now
-            self._tell_board(state, data)
-
-    def _tell_board(self, state: RoverState | None, data: LiveData) -> None:
-        self.channel.tell("board", describe_board(state))
-        words = f"{data.freshness}; {data.forces_from or 'forces not known'}"
-        self.channel.tell("drive", {"duration": None, "words": words})
-        self.channel.tell("topics", list_topics(data.ages.values()))
+            self._told_at, tell = now, self.channel.tell
+            tell("board", describe_board(state))
+            words = f"{data.freshness}; {data.forces_from or 'forces not known'}"
+            tell("drive", {"duration": None, "words": words})
+            tell("topics", [
+                {"topic": one.topic, "age": one.describe(), "stale": one.is_stale}
+                for one in data.ages.values()
+            ])  # fmt: skip
 
     def _take_terrain(self, data: LiveData, now: float) -> None:
         """Show a new map, at most every GROUND_PERIOD."""

@@ -159,9 +159,10 @@ def write_file(
     for client in server.get_clients().values():
         server.initial_camera.position = client.camera.position
         server.initial_camera.look_at = client.camera.look_at
-    query = write_link(link)
+    query, own = write_link(link), {"rover_planner": rover_physics.__version__}
+    versions = own | {"python": platform.python_version()} | {p: version(p) for p in PACKAGES}
     written = {
-        "versions": _versions(),
+        "versions": ", ".join(f"{name} {text}" for name, text in versions.items()),
         "written": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "link": f"{base}/?{query}" if query else "",
         "rover": write_rover(rover),
@@ -175,9 +176,3 @@ def write_file(
     return page.replace(
         CODE_TAG, f'<script id="told" type="application/json">{told}</script>{code}'
     )
-
-
-def _versions() -> str:
-    own = {"rover_planner": rover_physics.__version__, "python": platform.python_version()}
-    found = own | {name: version(name) for name in PACKAGES}
-    return ", ".join(f"{name} {text}" for name, text in found.items())

@@ -60,11 +60,6 @@ class RoverState:
         return find_axles(self.here, np.array([not w.startswith(on_rocker) for w in WHEELS]))
 
     @property
-    def speed(self) -> float:
-        """Speed along the path [m/s]."""
-        return float(np.hypot(*self.motion[:2]))
-
-    @property
     def friction_use(self) -> Floats:
         """(6,) friction utilisation over its limit."""
         return self._use(self.friction_utilisation, self.rover.limits.friction_utilisation)
@@ -135,7 +130,12 @@ class Trajectory:
         self._rover, self._driven = rover, rows.prediction.select(slice(end))
         self._yaw = np.unwrap(self._driven.poses[:, 2])
         self._numbers = np.clip(numbers_of(self._driven.results), -MAX_VALUE, MAX_VALUE)
-        self._spin = _roll_wheels(rover, self._driven) if end else np.zeros((0, 6))
+        moves = np.linalg.norm(np.diff(self._driven.wheel_centres, axis=0), axis=2)
+        slip = np.clip(self._driven.slip_ratio, 0, MAX_SLIP)[1:]
+        rolled = moves / rover.wheel.radius / (1.0 - slip)
+        rolled *= np.where(self._driven.wheel_speed[1:] < 0.0, -1.0, 1.0)
+        self._spin = np.vstack([np.zeros(6), np.cumsum(np.nan_to_num(rolled), axis=0)])
+        """Angles (length, 6) by which the wheels have turned [rad]."""
 
     @property
     def energy(self) -> float:
@@ -161,14 +161,6 @@ class Trajectory:
             self._driven.select([before]), poses=(shares @ poses)[None], results=results
         )
         return RoverState(self._rover, here, np.asarray(shares @ self._spin[rows]))
-
-
-def _roll_wheels(rover: Rover, driven: PathPrediction) -> Floats:
-    """Return the angles (n, 6) [rad] by which the wheels have turned at n waypoints."""
-    moves = np.linalg.norm(np.diff(driven.wheel_centres, axis=0), axis=2)
-    rolled = moves / rover.wheel.radius / (1.0 - np.clip(driven.slip_ratio, 0, MAX_SLIP))[1:]
-    rolled *= np.where(driven.wheel_speed[1:] < 0.0, -1.0, 1.0)
-    return np.vstack([np.zeros(6), np.cumsum(np.nan_to_num(rolled), axis=0)])
 
 
 @dataclass
@@ -224,12 +216,6 @@ class Playback:
         if self.is_playing:
             self.seek(self.time + self.speed * seconds)
             self.is_playing = self.time < self.duration
-
-    def describe(self) -> str:
-        """Return how it moves, in words."""
-        return (
-            f"playing, {self.speed:g} times as fast as the rover" if self.is_playing else "paused"
-        )
 
     def take(self, drive: Trajectory) -> None:
         """Take another drive, and stay at the place, or at the end of a drive that ends before."""

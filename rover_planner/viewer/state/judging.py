@@ -64,7 +64,11 @@ def judge_steps(
         shown = replace(shown, reference=_judge(values, shown.path.poses))
         yield shown
     if shown.old:
-        shown = yield from _judge_others(shown)
+        paths = list(shown.paths)
+        for k in sorted(shown.old):
+            yield Progress(PATH, k + 1, len(paths))
+            paths[k] = _judge(asked, paths[k].poses)
+        shown = replace(shown, paths=tuple(paths))
         yield shown
     if asked.recorded is not None:
         return
@@ -136,14 +140,6 @@ def _recall(shown: Shown, before: Shown | None, values: Scenario) -> Judged | No
         return None
     known = (before.reference, *before.paths)
     return next((one for one in known if one is not None and one.is_of(poses, values)), None)
-
-
-def _judge_others(shown: Shown) -> Generator[Step, None, Shown]:
-    paths = list(shown.paths)
-    for k in sorted(shown.old):
-        yield Progress(PATH, k + 1, len(paths))
-        paths[k] = _judge(shown.scenario, paths[k].poses)
-    return replace(shown, paths=tuple(paths))
 
 
 def _add_policies(shown: Shown) -> Generator[Step, None, Shown]:

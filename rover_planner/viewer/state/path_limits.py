@@ -96,11 +96,6 @@ class Lane:
         good = write(self.bounds[row], digits, self.unit.name)
         return f"{write(self.values[row], digits)}, {word} {good}"
 
-    def worst_until(self, rows: int) -> int:
-        """Return the row of the first rows that uses most; -1 if nothing is known there."""
-        used = np.where(np.isnan(self.used[:rows]), -np.inf, self.used[:rows])
-        return int(np.argmax(used)) if used.size and used.max() > -np.inf else -1
-
 
 @dataclass(frozen=True, eq=False)
 class PathLimits:
@@ -117,10 +112,6 @@ class PathLimits:
     def end(self) -> float:
         """Distance of the last pose [m]."""
         return float(self.rows.distance[-1])
-
-    def rows_until(self, time: float) -> int:
-        """Return the number of poses up to a time [s], at least 1."""
-        return max(int(np.searchsorted(self.rows.time, time + 1e-6, side="right")), 1)
 
     def lane(self, code: str) -> Lane:
         """Return the lane of a code of a verdict; that of the ground for other codes."""
@@ -240,10 +231,6 @@ class Failure:
     link: str
     """The link that fails: a name of WHEELS, BODY, rocker_left, bogie_right and so on; empty if
     it is none."""
-    distance: float
-    """Distance since the start [m]."""
-    time: float
-    """Time since the start [s]."""
     is_between: bool
     """True if it is between two waypoints."""
     row: int
@@ -253,13 +240,13 @@ class Failure:
 
     def is_reached(self, time: float) -> bool:
         """Return whether it is reached at a time [s]."""
-        return time >= self.time - 1e-6
+        return bool(time >= self.state.time - 1e-6)
 
     @property
     def place(self) -> str:
         """Where and when it is, in words."""
         between = ", between waypoints" if self.is_between else ""
-        return f"after {self.distance:.2f} m, {self.time:.0f} s{between}"
+        return f"after {self.state.distance:.2f} m, {self.state.time:.0f} s{between}"
 
 
 def find_failure(rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathLimits) -> Failure:
@@ -292,8 +279,6 @@ def find_failure(rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathL
         code=verdict.code,
         headline=headline.removeprefix(ON_THE_WAY),
         link=link,
-        distance=float(rows.distance[at]),
-        time=float(rows.time[at]),
         is_between=bool(rows.is_between[at]),
         row=at,
         state=state,
