@@ -81,13 +81,13 @@ def test_playing_stops_at_the_end_and_starts_again_from_the_beginning():
 
 def test_a_drive_that_ends_early_does_not_forget_where_the_rover_was():
     playback = Playback(drive(), place=8.0)
-    playback.take(drive(TIMES[:4]))
+    playback.drive = drive(TIMES[:4])
     assert playback.time == playback.duration == 3.0
-    playback.take(drive(2.0 * TIMES))
+    playback.drive = drive(2.0 * TIMES)
     assert playback.time == 16.0
-    playback.take(drive(TIMES[:4]))
+    playback.drive = drive(TIMES[:4])
     playback.seek(2.0)
-    playback.take(drive())
+    playback.drive = drive()
     assert playback.time == 2.0
 
 

@@ -139,6 +139,15 @@ def test_a_refused_change_alters_nothing_and_says_why():
     assert not session.refusal
 
 
+def test_a_new_start_leaves_the_goal_where_it_is_and_both_have_the_yaw_of_the_line_between():
+    session = session_on(waves)
+    goal, start = session.wanted.goal, (-1.5, -1.0)
+    session.plan_to(goal, np.array(start))
+    now, yaw = session.shown.scenario, np.arctan2(goal[1] - start[1], goal[0] - start[0])
+    assert (now.start[:2], now.goal[:2]) == (start, goal[:2])
+    assert now.start[2] == now.goal[2] == yaw
+
+
 def test_undo_goes_back_change_by_change_and_never_to_another_rover():
     session = session_on(waves)
     for friction in (0.7, 0.6):

@@ -18,7 +18,7 @@ from rover_physics.rover.rover_file import rover_to_dict
 from rover_planner.studies.rover_values import RoverValue, get_value, list_values
 from rover_planner.viewer.state.colours import colour_use, to_css
 from rover_planner.viewer.state.drive import RoverState
-from rover_planner.viewer.state.path_limits import ON_THE_WAY, Lane, PathLimits, write
+from rover_planner.viewer.state.path_limits import ON_THE_WAY, write
 from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
 
 POLICY_TITLES = {EQUAL: "equal torques", SERVO: "speed servos", OPTIMAL: "traction control"}
@@ -66,25 +66,20 @@ def describe_verdict(shown: Shown) -> dict[str, Any]:
     if shown.chance is not None:
         cause = f", most often by {shown.chance.limit}" if shown.chance.limit else ""
         chance = f"chance of failure {100.0 * shown.chance.path:.0f} %{cause}"
-    around = shown.around
+    reason, around = verdict.reason, shown.around
+    if failure is not None and failure.is_between and not reason.startswith(ON_THE_WAY):
+        reason = f"at the next waypoint: {reason}"  # of which a worse place comes before
     closed = "" if around is None or around.path is not None else f"no way: {around.reason}"
     return {
         **describe_answer(verdict.traversable, f"path {shown.index + 1} of {len(shown.paths)}"),
         "headline": "" if failure is None else failure.headline,
         "where": "" if failure is None else failure.place,
         "chance": chance,
-        "details": [*filter(None, (_write_reason(shown.path), closed))],
+        "details": [*filter(None, (reason, closed))],
         "policies": _list_policies(shown),
         "offers": _list_offers(shown),
         "fails": failure is not None,
     }
-
-
-def _write_reason(path: Judged) -> str:
-    """Return the reason of a verdict; where it is a waypoint's after a worse place, say so."""
-    failure, reason = path.failure, path.verdict.reason
-    is_later = failure is not None and failure.is_between and not reason.startswith(ON_THE_WAY)
-    return f"at the next waypoint: {reason}" if is_later else reason
 
 
 def describe_answer(traversable: bool | None, about: str) -> dict[str, Any]:
@@ -129,30 +124,25 @@ def describe_paths(
     every = frozenset(range(len(shown.paths)))
     old = every if is_outdated else shown.old
     waits = "old, is judged" if is_judging else "old, was not judged again"
-    rows = [
-        _describe_row(path, number=k + 1, waits=waits if k in old else "", best=k == shown.best)
-        for k, path in enumerate(shown.paths)
-    ]
+    rows = []
+    for k, path in enumerate(shown.paths):
+        verdict, limits, length = path.verdict, path.limits, f"{path.length:.2f}"
+        uses = [float(np.nanmax(one.used, initial=0.0)) for one in limits.lanes]
+        word = "passes" if verdict.traversable else "refused"
+        rows.append(
+            {
+                "number": k + 1,
+                "passes": verdict.traversable,
+                "word": f"{word}, best" if k == shown.best else word,
+                "waits": waits if k in old else "",
+                "length": length if verdict.traversable else f"{limits.end:.2f} of {length}",
+                "energy": write(path.trajectory.energy, 1),
+                "use": write_use(max(uses)),
+                "limit": limits.lanes[int(np.argmax(uses))].title,
+                "reason": verdict.reason,
+            }
+        )
     return {"rows": rows, "shown": shown.index}
-
-
-def _describe_row(path: Judged, number: int, waits: str, best: bool) -> dict[str, Any]:
-    verdict, length = path.verdict, f"{path.length:.2f}"
-    limits = path.limits
-    uses = [float(np.nanmax(one.used, initial=0.0)) for one in limits.lanes]
-    most = limits.lanes[int(np.argmax(uses))].title
-    word = "passes" if verdict.traversable else "refused"
-    return {
-        "number": number,
-        "passes": verdict.traversable,
-        "word": f"{word}, best" if best else word,
-        "waits": waits,
-        "length": length if verdict.traversable else f"{limits.end:.2f} of {length}",
-        "energy": write(path.trajectory.energy, 1),
-        "use": write_use(max(uses)),
-        "limit": most,
-        "reason": verdict.reason,
-    }
 
 
 def describe_limits(
@@ -174,8 +164,8 @@ def describe_limits(
             old = _pick_points(before.rows.distance, before.lane(lane.code).used[:, None])
         now = _pick_points(rows.distance, lane.used[:, None])
         wheels = None if lane.wheels is None else _pick_points(rows.distance, lane.wheels)
-        told = {"code": lane.code, "title": lane.title, "now": now}
-        lanes.append({**told, "wheels": wheels, "before": old})
+        told = {"code": lane.code, "title": lane.title, "now": now, "before": old}
+        lanes.append({**told, "wheels": wheels})
     loads = rows.prediction.wheel_loads[stands]
     return {
         "end": round(end, 4),
@@ -195,25 +185,21 @@ def describe_uses(
     here = rows - 1
     if failure is not None and failure.is_reached(time):
         rows, here = max(rows, failure.row + 1), failure.row
-    uses = [_describe_use(lane, limits, rows, here) for lane in limits.lanes]
+    uses = []
+    for lane in limits.lanes:
+        known = np.where(np.isnan(lane.used[:rows]), -np.inf, lane.used[:rows])
+        worst = int(np.argmax(known))
+        used = float(lane.used[worst])  # NaN if nothing is known there
+        link = limits.find_link(lane, worst).replace("_", " ") if used > 0.0 else ""
+        value = "" if np.isnan(used) else lane.write_value(worst)
+        now = write_use(float(lane.used[here]))
+        told = {"now": now, "worst": write_use(used), "broken": used > 1.0}
+        uses.append({**told, "value": value, "link": link})
     if chance is not None:
         of = "whole path" if failure is None or failure.code == CHANCE else "up to the failure"
         uses[-1]["value"] = f"{of} {100.0 * chance.path:.0f} %"
         uses[-1]["broken"] = failure is not None and failure.code == CHANCE
     return uses
-
-
-def _describe_use(lane: Lane, limits: PathLimits, rows: int, here: int) -> dict[str, Any]:
-    known = np.where(np.isnan(lane.used[:rows]), -np.inf, lane.used[:rows])
-    worst = int(np.argmax(known))
-    used = float(lane.used[worst])  # NaN if nothing is known there
-    return {
-        "now": write_use(float(lane.used[here])),
-        "worst": write_use(used),
-        "broken": used > 1.0,
-        "value": "" if np.isnan(used) else lane.write_value(worst),
-        "link": limits.find_link(lane, worst).replace("_", " ") if used > 0.0 else "",
-    }
 
 
 def _pick_points(distance: Floats, values: Floats, digits: int = 3) -> dict[str, Any]:

@@ -318,9 +318,10 @@ function plot(curve, write, limit, old) {
   const box = make("svg", { viewBox: "0 0 1000 100", preserveAspectRatio: "none" });
   const end = state.limits.end || 1;
   const line = (x, y, attributes) => {
-    const step = (distance, k) => `${(y[k - 1] ?? null) === null ? "M" : "L"}${(1000 * distance / end).toFixed(1)} ${down(y[k]).toFixed(2)}`;
-    const path = x.map((distance, k) => (y[k] === null ? "" : step(distance, k))).join("") + (x.length === 1 ? "h1000" : "");
-    box.append(make("path", { d: path || "M0 0", fill: "none", "vector-effect": "non-scaling-stroke", "stroke-width": 1.6, ...attributes }));
+    const pen = (k) => ((y[k - 1] ?? null) === null ? "M" : "L");
+    const step = (distance, k) => `${pen(k)}${(1000 * distance / end).toFixed(1)} ${down(y[k]).toFixed(2)}`;
+    const path = x.map((distance, k) => (y[k] === null ? "" : step(distance, k))).join("");
+    box.append(make("path", { d: x.length === 1 ? `${path}h1000` : path || "M0 0", fill: "none", "vector-effect": "non-scaling-stroke", "stroke-width": 1.6, ...attributes }));
   };
   if (old) line(old.x, old.y[0], { stroke: "#888", "stroke-width": 4, opacity: 0.6 });
   curve.y.forEach((y, k) => {

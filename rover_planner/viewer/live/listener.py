@@ -58,14 +58,8 @@ PREDICTED_FIELDS = {
     "tip_over_margin": "tip_over_ratio",
 }
 """Topics of the server with a row for each waypoint, and the quantity each fills."""
-ESTIMATED_FIELDS = {
-    "wheel_loads": "wheel_loads",
-    "friction_utilisation": "friction_utilisation",
-    "contact_angles": "contact_angles",
-}
-"""Topics of the controller and the fields they fill, in place of predictions."""
-
-
+ESTIMATED_FIELDS = ("wheel_loads", "friction_utilisation", "contact_angles")
+"""Topics of the controller, and the quantities they tell in place of predictions."""
 Take = Callable[[Any], None]
 """Takes a message."""
 
@@ -106,9 +100,9 @@ class LiveListener(Node):
         for topic, field in PREDICTED_FIELDS.items():
             take = partial(self._on_prediction, field)
             self._listen(numbers, f"{SERVER}/{topic}", take, results)
-        for topic, field in ESTIMATED_FIELDS.items():
+        for field in ESTIMATED_FIELDS:
             take = partial(self._on_estimate, field)
-            self._listen(numbers, f"{CONTROLLER}/{topic}", take, topic_qos(), is_stream=True)
+            self._listen(numbers, f"{CONTROLLER}/{field}", take, topic_qos(), is_stream=True)
         self._ages[SIGN_OF_LIFE] = TopicAge(SIGN_OF_LIFE, None, True)
         self.create_subscription(DiagnosticArray, "diagnostics", self._on_diagnostics, topic_qos())
 
@@ -137,9 +131,9 @@ class LiveListener(Node):
         if data.plan is not None and data.position is not None and not silent:
             predicted = _read_nearest(self._predicted, data.plan, data.position)
         estimated = {
-            field: self._estimated[field]
-            for topic, field in ESTIMATED_FIELDS.items()
-            if field in self._estimated and not self._ages[f"{CONTROLLER}/{topic}"].is_stale
+            field: values
+            for field, values in self._estimated.items()
+            if not self._ages[f"{CONTROLLER}/{field}"].is_stale
         }
         is_estimated = not estimated.keys().isdisjoint(PREDICTED_FIELDS.values())
         source = "forces predicted by the server" if predicted else ""

@@ -229,7 +229,8 @@ class PageBase(ABC):
 
     def _show_forces(self, words: Words) -> None:
         self.forces = bool(words["shown"])
-        self.scene.show_forces(self.forces)
+        for one in (self.scene.rover, self.scene.ghost):
+            self.scene.canvas.show_frame(one.forces, visible=self.forces)
 
     def _press(self, words: Words, _event: Any) -> None:
         self.hear(words)

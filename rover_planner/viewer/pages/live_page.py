@@ -113,7 +113,10 @@ class LivePage(PageBase):
         state = read_state(self._rover, data)
         self.scene.show(state)
         if state is not None:
-            self._turn_arm(data)
+            arm, joints = self._rover.manipulator, data.joints
+            known = [name for name in arm.joints if name in joints] if arm is not None else []
+            steps = {name: ARM_STEP * round(joints[name] / ARM_STEP) for name in known}
+            self.scene.rover.take(self._rover, steps)
             if self._first is None:
                 self._first = state.position[:2]
                 self.scene.look(START, self.points)
@@ -137,14 +140,6 @@ class LivePage(PageBase):
         if self.scene.canvas.move_to(terrain):
             self._first = None
         self.paint()
-
-    def _turn_arm(self, data: LiveData) -> None:
-        arm = self._rover.manipulator
-        if arm is not None:
-            joints = data.joints
-            known = {name: joints[name] for name in arm.joints if name in joints}
-            steps = {name: ARM_STEP * round(angle / ARM_STEP) for name, angle in known.items()}
-            self.scene.rover.take(self._rover, steps)
 
 
 def _refuse_link(query: str) -> None:

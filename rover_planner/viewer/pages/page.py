@@ -23,7 +23,7 @@ from rover_planner.viewer.scene.overlays import GHOST
 from rover_planner.viewer.scene.scene import FIT
 from rover_planner.viewer.state.drive import SPEEDS, Playback
 from rover_planner.viewer.state.judging import Step
-from rover_planner.viewer.state.layers import Colouring, LayerRequest
+from rover_planner.viewer.state.layers import PREDICTED, Colouring, LayerRequest
 from rover_planner.viewer.state.scenario import Scenario, Shown
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.survey_layers import ShownSurvey
@@ -123,8 +123,10 @@ class Page(PageBase):
 
     def click(self, point: Floats, shift: bool) -> None:
         """Set goal or start, and plan."""
-        sets_start, goal = shift or self._click_sets == "start", self.session.wanted.goal[:2]
-        self.session.plan_to(*((goal, point) if sets_start else (point,)))
+        if shift or self._click_sets == "start":
+            self.session.plan_to(self.session.wanted.goal, point)
+        else:
+            self.session.plan_to(point)
 
     def show_refusal(self, reason: str) -> None:
         """Show why a request was refused."""
@@ -279,7 +281,7 @@ class Page(PageBase):
             self.playback.go_to(0.0)
         is_new = self.has_changed("drive", path)
         if is_new:
-            self.playback.take(path.trajectory)
+            self.playback.drive = path.trajectory
         self._tell_drive()
         if is_new:
             self._ended.wait(PERIOD)
@@ -287,7 +289,7 @@ class Page(PageBase):
         draw("the rover is not drawn", scene.rover.take, asked.rover, asked.arm)
         draw("the cameras are not moved", lambda _: scene.look(FIT, self.points), asked.loaded)
         draw("the paths are not drawn", scene.paths.show, shown.paths, shown.index)
-        depends = self.colouring.is_predicted or self.survey is not None
+        depends = self.colouring.layer in PREDICTED or self.survey is not None
         if self.has_changed("ground", asked) and depends:
             self.paint()
         self.playback.moved = True

@@ -8,7 +8,7 @@ from typing import Any, cast
 import numpy as np
 import trimesh
 
-from rover_physics.names import SIDES, WHEEL_POSITIONS, WHEELS
+from rover_physics.names import SIDES, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import wxyz_about_y, wxyz_from_rpy
 from rover_physics.rover.manipulator import link_points
@@ -90,24 +90,26 @@ class DrawnRover:
         self, rover: Rover, side: str, tyre: trimesh.Trimesh, grousers: trimesh.Trimesh
     ) -> None:
         """Put rocker, bogie and wheels of a side."""
-        suspension, beam = rover.suspension, 0.16 * rover.wheel.radius
-        mirror = LEFT if side == "left" else RIGHT
-        pivots = {
-            f"rocker_{side}": mirror * suspension.rocker_pivot,
-            f"bogie_{side}": mirror * suspension.bogie_pivot,
+        suspension, mirror = rover.suspension, LEFT if side == "left" else RIGHT
+        rocker, bogie = f"rocker_{side}", f"bogie_{side}"
+        carriers = {
+            suspension.rocker_wheel: rocker,
+            **dict.fromkeys(suspension.bogie_wheels, bogie),
         }
-        rocker, bogie = pivots
-        wheels = {name: mirror * suspension.wheels[name] for name in WHEEL_POSITIONS}
-        ends = [pivots[bogie], wheels[suspension.rocker_wheel]]
-        beams = make_beams([end - pivots[rocker] for end in ends], beam)
-        self._put(rocker, BODY, pivots[rocker], beams, colours.METAL)
-        ends = [wheels[name] for name in suspension.bogie_wheels]
-        beams = make_beams([end - pivots[bogie] for end in ends], beam)
-        self._put(bogie, rocker, pivots[bogie] - pivots[rocker], beams, colours.METAL)
-        for position, centre in wheels.items():
-            name, on_bogie = f"{position}_{side}", position in suspension.bogie_wheels
-            on = bogie if on_bogie else rocker
-            self._put(name, on, centre - pivots[on], tyre, colours.METAL)
+        pivots = {rocker: mirror * suspension.rocker_pivot, bogie: mirror * suspension.bogie_pivot}
+        wheels = {name: mirror * suspension.wheels[name] for name in carriers}
+        for link, above, place in (
+            (rocker, BODY, pivots[rocker]),
+            (bogie, rocker, pivots[bogie] - pivots[rocker]),
+        ):
+            ends = [wheels[name] for name, on in carriers.items() if on == link]
+            ends += [pivots[bogie]] if link == rocker else []
+            width = 0.16 * rover.wheel.radius
+            beams = [make_bar(np.zeros(3), end - pivots[link], width) for end in ends]
+            self._put(link, above, place, join_meshes(beams), colours.METAL)
+        for position, on in carriers.items():
+            name = f"{position}_{side}"
+            self._put(name, on, wheels[position] - pivots[on], tyre, colours.METAL)
             self._put(f"{name}_grousers", name, np.zeros(3), grousers, colours.DARK)
 
     def show(self, state: RoverState | None, failing: str = "") -> None:
@@ -174,11 +176,6 @@ def make_bar(start: Floats, end: Floats, radius: float) -> trimesh.Trimesh:
     if np.linalg.norm(end - start) < 1e-6:
         return trimesh.creation.icosphere(1, radius)
     return trimesh.creation.cylinder(radius=radius, segment=[start, end], sections=10)
-
-
-def make_beams(ends: list[Floats], radius: float) -> trimesh.Trimesh:
-    """Return bars of a radius from the origin to ends (3,) [m]."""
-    return join_meshes([make_bar(np.zeros(3), end, radius) for end in ends])
 
 
 def make_body(rover: Rover) -> trimesh.Trimesh:

@@ -42,7 +42,7 @@ def paint(
     if survey is not None and name in survey.names:
         places = layers.spread(ground, layers.count_pixels(ground))
         coloured = survey.colour(name, asked.rover, asked.options, places)
-    elif asked.how.is_predicted:
+    elif name in layers.PREDICTED:
         coloured = layers.colour_limit(asked, ground)
     else:
         coloured = layers.colour_ground(name, ground)

@@ -53,11 +53,6 @@ class Scene:
         self.ghost = DrawnRover(self.canvas, GHOST, OPACITY)
         """The rover where the shown path is refused; no forces are drawn where none are known."""
 
-    def show_forces(self, visible: bool) -> None:
-        """Show or hide the arrows."""
-        for one in (self.rover, self.ghost):
-            self.canvas.show_frame(one.forces, visible=visible)
-
     def mark_failure(self, failure: Failure | None) -> None:
         """Draw a ghost where a path fails, and what is broken, with a line to the wheel or body.
 

@@ -168,9 +168,9 @@ class Playback:
     """The time of a drive that is shown, and how it moves on."""
 
     drive: Trajectory
-    """The drive."""
+    """The drive; with another, the rover stays at its place, or at the end if it ends before."""
     place: float = 0.0
-    """Where the rover is along the path; a drive may end before."""
+    """Where the rover is along the path."""
     speed: float = 10.0
     """Chosen speed, one of SPEEDS."""
     is_playing: bool = False
@@ -216,7 +216,3 @@ class Playback:
         if self.is_playing:
             self.seek(self.time + self.speed * seconds)
             self.is_playing = self.time < self.duration
-
-    def take(self, drive: Trajectory) -> None:
-        """Take another drive, and stay at the place, or at the end of a drive that ends before."""
-        self.drive, self.moved = drive, True

@@ -78,7 +78,8 @@ def judge_steps(
         yield Progress(CHANCE)
         shown = _add_chance(shown)
         yield shown
-    if shown.needs_search:
+    on_map = all(asked.terrain.contains(*end[:2]) for end in (asked.start, asked.goal))
+    if shown.best is None and shown.around is None and on_map:
         yield from _search_around(shown, memory or EdgeMemory())
 
 

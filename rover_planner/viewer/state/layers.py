@@ -3,10 +3,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 from scipy import ndimage
 
 from rover_physics.limits.table import LIMITS
@@ -78,15 +79,10 @@ class Colouring:
 
     layer: str = HEIGHT
     """Name of the layer."""
-    heading: float = 0.0
-    """Heading of the rover for predicted layers [deg]."""
+    heading: Annotated[float, Field(ge=-180.0, le=180.0)] = 0.0
+    """Heading of the rover for predicted layers [deg], as a link may have it."""
     along: bool = False
     """True if they are for the heading of the path instead."""
-
-    @property
-    def is_predicted(self) -> bool:
-        """True if the layer is predicted for the rover."""
-        return self.layer in PREDICTED
 
 
 @dataclass(frozen=True, eq=False)

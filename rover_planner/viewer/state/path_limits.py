@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The limits as people read them, their use along a path, and where the path first fails."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,11 +46,11 @@ class Lane:
     """Code of a verdict, or GROUND."""
     title: str
     """Short name."""
-    values: Floats
-    """The value nearest to the limit; NaN for none."""
     used: Floats
     """Use of the limit: 1 at the limit, above 1 where it is broken, NaN where it does
     not count or is not known."""
+    values: Floats = field(default_factory=lambda: np.empty(0))
+    """The value nearest to the limit, NaN where it has none; empty as `bounds`."""
     bounds: Floats | None = None
     """(m,) largest or smallest good value; None if it is not a single number."""
     unit: Unit = RATIO
@@ -134,7 +134,7 @@ class PathLimits:
         if chance is None:
             return self
         used = chance.at[self.rows.prediction.waypoint]
-        return replace(self, lanes=(*self.lanes, _plain_lane(CHANCE, "chance", used)))
+        return replace(self, lanes=(*self.lanes, Lane(CHANCE, "chance", used)))
 
 
 def find_path_limits(rover: Rover, prediction: PathPrediction, verdict: Verdict) -> PathLimits:
@@ -159,14 +159,9 @@ def find_path_limits(rover: Rover, prediction: PathPrediction, verdict: Verdict)
         of_code.pop("sinkage", None)
     unjudged = np.where(rows.prediction.settled, 0.0, np.inf)
     lanes = [_make_lane(rows, uses, np.array(one)) for one in of_code.values()]
-    found = PathLimits(rows, (_plain_lane(GROUND, "ground", unjudged), *lanes), uses)
+    found = PathLimits(rows, (Lane(GROUND, "ground", unjudged), *lanes), uses)
     _add_refusals(found, verdict)
     return found
-
-
-def _plain_lane(code: str, title: str, used: Floats) -> Lane:
-    """Return the lane of a use (m,) that has neither a value nor a wheel."""
-    return Lane(code, title, np.full(len(used), np.nan), used)
 
 
 def _make_lane(rows: AskedPoses, uses: Uses, of_limit: NDArray[np.int64]) -> Lane:
@@ -179,7 +174,7 @@ def _make_lane(rows: AskedPoses, uses: Uses, of_limit: NDArray[np.int64]) -> Lan
     asked = np.where(np.isnan(uses.use[:, of_limit]), -np.inf, uses.use[:, of_limit])
     decides = of_limit[asked.argmax(axis=1)]
     used = np.where(prediction.settled, uses.use[every, decides], np.nan)
-    lane = replace(_plain_lane(limit.code, limit.title, used), decides=decides)
+    lane = Lane(limit.code, limit.title, used, decides=decides)
     if len(of_limit) > 1 or limit.sense == Sense.RANGE:
         return lane
     unit, kept = limit.shown or limit.unit, np.ones(len(every))
@@ -299,13 +294,9 @@ def _find_link(terrain: Terrain, verdict: Verdict, state: RoverState) -> str:
     """Return the link that fails in a state where no lane names one; empty for none."""
     if verdict.code in BODY_CODES:
         return BODY
-    if verdict.code in ("off_map", "unknown_ground"):
-        return _find_lost_wheel(terrain, state)
-    return next((name for name in WHEELS if name in verdict.reason), "")
-
-
-def _find_lost_wheel(terrain: Terrain, state: RoverState) -> str:
-    """Return the wheel with the most of its footprint beyond known ground; empty for none."""
+    if verdict.code not in ("off_map", "unknown_ground"):
+        return next((name for name in WHEELS if name in verdict.reason), "")
+    # The wheel with the most of its footprint beyond known ground.
     offsets = state.rover.wheel.radius * np.linspace(-1.0, 1.0, 5)
     x = state.wheel_centres[:, 0, None, None] + offsets[:, None]
     y = state.wheel_centres[:, 1, None, None] + offsets

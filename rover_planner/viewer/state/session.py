@@ -18,7 +18,7 @@ from rover_planner.planning.assumptions import Assumptions
 from rover_planner.planning.search.edge_memory import EdgeMemory
 from rover_planner.studies.rover_values import vary
 from rover_planner.viewer.state.judging import Step, judge_steps, show_recorded
-from rover_planner.viewer.state.scenario import Scenario, Shown
+from rover_planner.viewer.state.scenario import Pose, Scenario, Shown
 
 REFUSALS = (RoverError, PlanningError)
 """Errors that say what is wrong with a request."""
@@ -88,13 +88,12 @@ class ViewSession:
             raise PlanningError("the listed paths are old; wait for the new ones")
         self.ask(index=index)
 
-    def plan_to(self, goal: Floats, start: Floats | None = None) -> None:
-        """Plan to a goal (2,) [m] with the yaw of the straight line there, also at a new start."""
-        wanted, (x, y) = self.wanted, goal[:2]
-        x_from, y_from, yaw = wanted.start if start is None else (*start, 0.0)
-        ahead = float(np.arctan2(y - y_from, x - x_from))
-        begin = (float(x_from), float(y_from), yaw if start is None else ahead)
-        self.ask(replace(wanted, start=begin, goal=(float(x), float(y), ahead), recorded=None))
+    def plan_to(self, goal: Pose | Floats, start: Floats | None = None) -> None:
+        """Plan to a goal x, y [m] with the straight line's yaw, perhaps from a start (2,) [m]."""
+        (x, y), before = goal[:2], self.wanted.start if start is None else start
+        yaw = float(np.arctan2(y - before[1], x - before[0]))
+        begin = self.wanted.start if start is None else (float(start[0]), float(start[1]), yaw)
+        self.ask(replace(self.wanted, start=begin, goal=(float(x), float(y), yaw), recorded=None))
 
     def change_rover(self, keys: Sequence[Key], value: float) -> None:
         """Change a number of the rover, the same at all of the keys in the rover file.
