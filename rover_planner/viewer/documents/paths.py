@@ -183,7 +183,7 @@ def describe_uses(
     limits, failure = path.limits.add_chance(chance), path.failure
     rows = max(int(np.searchsorted(limits.rows.time, time + 1e-6, side="right")), 1)
     here = rows - 1
-    if failure is not None and failure.is_reached(time):
+    if failure is not None and time >= failure.state.time - 1e-6:
         rows, here = max(rows, failure.row + 1), failure.row
     uses = []
     for lane in limits.lanes:

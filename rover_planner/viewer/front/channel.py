@@ -85,9 +85,11 @@ class Channel:
         sender.start()
         try:
             for message in connection:
+                words: Any = None
                 with suppress(ValueError, RecursionError):  # what is no JSON is no question
                     words = json.loads(message)
-                    self._hear(words if isinstance(words, dict) else {}, mailbox)
+                if isinstance(words, dict):
+                    self._hear(words, mailbox)
         except ConnectionClosed:
             pass
         finally:

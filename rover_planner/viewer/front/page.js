@@ -212,15 +212,12 @@ function drawChanges({ kept, rover, drive }) {
       button("Undo", { ask: "undo" }), button("Reset", { ask: "reset" }),
       button("Keep as reference", { ask: "keep" }), kept ? button("Compare with loaded", { ask: "drop" }) : "",
       select("preset", (state.chosen?.presets || []).map((name) => [name, name]), state.chosen?.preset, (name) => ({ ask: "preset", name })),
-      make("label", {}, "Load a file ", make("input", { type: "file", accept: ".yaml,.yml", style: "width:9em", onchange: upload })),
+      make("label", {}, "Load a file ", make("input", { type: "file", accept: ".yaml,.yml", style: "width:9em",
+        onchange: async ({ target: { files: [file] } }) => file && ask({ ask: "upload", name: file.name, text: await file.text() }) })),
       button("Save as rover file", { ask: "save rover" })),
     differs);
 }
 
-async function upload(event) {
-  const file = event.target.files[0];
-  if (file) ask({ ask: "upload", name: file.name, text: await file.text() });
-}
 
 function select(label, options, now, question) {
   const known = options.some(([value]) => value === now) ? options : [...options, [now, now]];
@@ -328,13 +325,9 @@ function plot(curve, write, limit, old) {
     const wheel = ["rear", "middle", "front"][k % 3];
     line(curve.x, y, curve.y.length === 6 ? { stroke: COLOURS[wheel], ...(k > 2 ? { "stroke-dasharray": "5 3" } : {}) } : { stroke: "#222" });
   });
-  const ticks = [[0, write(0)], [top, write(top)]];
-  if (limit) {
-    line([0, end], [limit, limit], { stroke: "#c24f00", "stroke-dasharray": "2 3" });
-    ticks.push([limit, write(limit)]);
-  }
+  if (limit) line([0, end], [limit, limit], { stroke: "#c24f00", "stroke-dasharray": "2 3" });
   return make("div", { class: "plot", onclick: goTo }, box,
-    ...ticks.map(([value, words]) => make("span", { class: "tick", style: `top:${down(value)}%` }, words)),
+    ...[0, top, ...(limit ? [limit] : [])].map((value) => make("span", { class: "tick", style: `top:${down(value)}%` }, write(value))),
     make("span", { class: "end" }, `${(state.limits.end || 0).toFixed(2)} m`), make("div", { class: "cursor" }));
 }
 

@@ -139,8 +139,7 @@ class PageBase(ABC):
 
     def wait(self) -> None:
         """Serve until the page is closed or the program is interrupted."""
-        while not self._ended.wait(0.5):
-            pass
+        self._ended.wait()
 
     def hear(self, words: Words, mailbox: Mailbox | None = None) -> None:
         """Take what a visitor asks; a later value of a slider replaces an earlier one."""
@@ -177,11 +176,6 @@ class PageBase(ABC):
     @abstractmethod
     def paint(self) -> None:
         """Begin to colour the ground, if it is known."""
-
-    @property
-    @abstractmethod
-    def points(self) -> Floats:
-        """X and y (n, 2) [m] of what a view of everything shows, the start first."""
 
     @abstractmethod
     def click(self, point: Floats, shift: bool) -> None:
@@ -241,7 +235,7 @@ class PageBase(ABC):
             self.scene.follow(name == FOLLOW)
             self._camera.options = (*VIEWS, STAY if name == FOLLOW else FOLLOW)
         else:
-            self.scene.look(name, self.points, [client])
+            self.scene.look(name, [client])
 
     def _request_click(self, event: Any, shift: bool) -> None:
         def click() -> None:

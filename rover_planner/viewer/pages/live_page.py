@@ -30,8 +30,8 @@ GROUND_PERIOD = 2.0
 """Shortest time between two pictures of the ground [s]."""
 ARM_STEP = 0.01
 """Smallest turn of the arm that is drawn [rad]."""
-AHEAD = np.array([4.0, 0.0])
-"""From the rover to where a new camera looks [m]."""
+AHEAD = np.array([[0.0, 0.0], [4.0, 0.0]])
+"""The rover, and from there to where a new camera looks [m]."""
 
 
 class LivePage(PageBase):
@@ -51,10 +51,11 @@ class LivePage(PageBase):
         """
         self._listener, self._rover, self._refusal = listener, rover, ""
         self._data: LiveData = listener.latest()
-        self._first: Floats | None = None
-        """Where the rover was first seen (2,) [m]."""
+        self._is_seen = False
+        """True if cameras look at where the rover was first seen."""
         self._told_at = self._ground_at = 0.0
         super().__init__(rover, terrain, address, ground_name)
+        self.scene.way = AHEAD
         self.paint()
         self.thread.start()
 
@@ -69,12 +70,6 @@ class LivePage(PageBase):
         """Begin to colour the ground, if it is known."""
         if self.ground_name:
             self.painter.ask(paint(LayerRequest(self._rover, self.ground, self.colouring)))
-
-    @property
-    def points(self) -> Floats:
-        """X and y (2, 2) [m] of where the rover was first seen, and of a place ahead of it."""
-        first = np.zeros(2) if self._first is None else self._first
-        return np.array([first, first + AHEAD])
 
     def click(self, point: Floats, shift: bool) -> None:
         """Ask the server for a plan to a point."""
@@ -117,9 +112,9 @@ class LivePage(PageBase):
             known = [name for name in arm.joints if name in joints] if arm is not None else []
             steps = {name: ARM_STEP * round(joints[name] / ARM_STEP) for name in known}
             self.scene.rover.take(self._rover, steps)
-            if self._first is None:
-                self._first = state.position[:2]
-                self.scene.look(START, self.points)
+            if not self._is_seen:
+                self._is_seen, self.scene.way = True, state.position[:2] + AHEAD
+                self.scene.look(START)
         if now - self._told_at > BOARD_PERIOD:
             self._told_at, tell = now, self.channel.tell
             tell("board", describe_board(state))
@@ -138,7 +133,7 @@ class LivePage(PageBase):
             return
         self.ground, self.ground_name, self._ground_at = terrain, "elevation_cloud", now
         if self.scene.canvas.move_to(terrain):
-            self._first = None
+            self._is_seen = False
         self.paint()
 
 

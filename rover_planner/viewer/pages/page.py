@@ -78,11 +78,6 @@ class Page(PageBase):
         asked = LayerRequest(now.rover, now.terrain, self.colouring, now.options.model, path)
         self.painter.ask(paint(asked, self.survey))
 
-    @property
-    def points(self) -> Floats:
-        """X and y (n, 2) [m] of the path that is looked at."""
-        return self.session.shown.path.poses[:, :2]
-
     # What visitors ask.
 
     def list_answers(self) -> Mapping[str, Answer]:
@@ -287,7 +282,8 @@ class Page(PageBase):
             self._ended.wait(PERIOD)
         draw("the failure is not shown", scene.mark_failure, path.failure)
         draw("the rover is not drawn", scene.rover.take, asked.rover, asked.arm)
-        draw("the cameras are not moved", lambda _: scene.look(FIT, self.points), asked.loaded)
+        scene.way = path.poses[:, :2]
+        draw("the cameras are not moved", lambda _: scene.look(FIT), asked.loaded)
         draw("the paths are not drawn", scene.paths.show, shown.paths, shown.index)
         depends = self.colouring.layer in PREDICTED or self.survey is not None
         if self.has_changed("ground", asked) and depends:

@@ -49,6 +49,9 @@ class Scene:
         self.canvas = Canvas(server.scene)
         """Its nodes; all that is drawn goes through it."""
         self.paths = PathOverlay(self.canvas)
+        self.way: Floats = np.zeros((1, 2))
+        """(n, 2) x and y of the path that cameras look at [m]; its height is 0 where the ground is
+        not known."""
         self.rover = DrawnRover(self.canvas, "/rover")
         self.ghost = DrawnRover(self.canvas, GHOST, OPACITY)
         """The rover where the shown path is refused; no forces are drawn where none are known."""
@@ -91,20 +94,19 @@ class Scene:
                 for client in self._clients():
                     client.camera.position = client.camera.position + by
 
-    def look(self, view: str, points: Floats, clients: Collection[Any] | None = None) -> None:
+    def look(self, view: str, clients: Collection[Any] | None = None) -> None:
         """Let cameras look at a path, or at the rover on it.
 
         Args:
             view: FIT all of the path from behind and beside; TOP the same from above, north at
                 the top; SIDE the rover from the right side of its path; START along the path from
                 behind and beside its start.
-            points: (n, 2) x and y of the path [m]; where the ground is not known, its height is 0.
             clients: The clients of viser of the cameras' visitors (default: all).
         """
         rover, state = self.rover.rover, self.rover.state
         if rover is None:
             return
-        path = self.canvas.lay(points, 0.0, 0.0)
+        path = self.canvas.lay(self.way, 0.0, 0.0)
         ahead = path[-1, :2] - path[0, :2]
         length = float(np.linalg.norm(ahead))
         ahead = ahead / length if length > 0.0 else np.array([1.0, 0.0])

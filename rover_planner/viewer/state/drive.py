@@ -128,6 +128,8 @@ class Trajectory:
         """Places as in `AskedPoses`, distances [m] and times [s] of the poses; without poses those
         of the start."""
         self._rover, self._driven = rover, rows.prediction.select(slice(end))
+        self.energy = float(self._driven.energy[-1]) if end else 0.0
+        """Energy spent up to its end [J]."""
         self._yaw = np.unwrap(self._driven.poses[:, 2])
         self._numbers = np.clip(numbers_of(self._driven.results), -MAX_VALUE, MAX_VALUE)
         moves = np.linalg.norm(np.diff(self._driven.wheel_centres, axis=0), axis=2)
@@ -136,11 +138,6 @@ class Trajectory:
         rolled *= np.where(self._driven.wheel_speed[1:] < 0.0, -1.0, 1.0)
         self._spin = np.vstack([np.zeros(6), np.cumsum(np.nan_to_num(rolled), axis=0)])
         """Angles (length, 6) by which the wheels have turned [rad]."""
-
-    @property
-    def energy(self) -> float:
-        """Energy spent up to its end [J]."""
-        return float(self._driven.energy[-1]) if self.length else 0.0
 
     def time_at(self, distance: float) -> float:
         """Return the time at which the rover is at a distance [m]."""
@@ -205,11 +202,10 @@ class Playback:
 
     def step(self, by: int = 1) -> None:
         """Pause, and go to the next pose, or to the previous one if `by` is -1."""
-        if by > 0:
-            index = int(np.searchsorted(self.drive.times, self.time + 1e-9, side="right"))
-        else:
-            index = int(np.searchsorted(self.drive.times, self.time - 1e-9, side="left")) - 1
-        self.go_to(float(self.drive.times[np.clip(index, 0, len(self.drive.times) - 1)]))
+        times, now = self.drive.times, self.time
+        before = np.count_nonzero(times < now - 1e-9)
+        index = np.count_nonzero(times <= now + 1e-9) if by > 0 else before - 1
+        self.go_to(float(times[np.clip(index, 0, len(times) - 1)]))
 
     def advance(self, seconds: float) -> None:
         """Move on by the visitor's time [s] if it plays."""

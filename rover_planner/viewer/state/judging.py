@@ -23,8 +23,6 @@ from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
 PATH, COMPARE, POLICY, CHANCE = "path", "reference", "policy", "chance of failure"
 SEARCH, BETTER = "searching a way", "way found, searching a better one"
 """Names of steps."""
-
-
 Step = Progress | Shown
 """The beginning of a step, or what is known."""
 

@@ -62,16 +62,6 @@ class Lane:
     wheels: Floats | None = None
     """(m, 6) use by each wheel; None if the limit is not one value for each wheel."""
 
-    def is_explained_at(self, row: int) -> bool:
-        """Return whether the value at a row is beyond the limit.
-
-        The worst case of an uncertain map may break a limit that the value itself keeps.
-        """
-        if self.bounds is None:
-            return False
-        above = self.values[row] - self.bounds[row]
-        return bool(above < 0.0 if self.is_lowest else above > 0.0)
-
     def compare(self, row: int) -> str:
         """Return value and limit at a row, such as "friction 1.32 of 1.00", with enough digits.
 
@@ -233,10 +223,6 @@ class Failure:
     state: RoverState
     """The rover there; a level one of unknown forces above the ground if it does not stand."""
 
-    def is_reached(self, time: float) -> bool:
-        """Return whether it is reached at a time [s]."""
-        return bool(time >= self.state.time - 1e-6)
-
     @property
     def place(self) -> str:
         """Where and when it is, in words."""
@@ -260,10 +246,17 @@ def find_failure(rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathL
         broken = np.flatnonzero(is_there & ~rows.is_between)
     most = lane.used[broken] == lane.used[broken].max()  # what lanes and curves show as the worst
     at = int(min(broken[most], key=lambda row: rows.is_between[row]))
-    here, explains = rows.prediction.select([at]), lane.is_explained_at(at)
+    # The worst case of an uncertain map may break a limit that the value itself keeps.
+    above = 0.0 if lane.bounds is None else lane.values[at] - lane.bounds[at]
+    explains = above < 0.0 if lane.is_lowest else above > 0.0
+    here = rows.prediction.select([at])
     state = RoverState(rover, here, np.zeros(6))
-    if not here.settled[0]:
-        state = level_state(rover, terrain, rows, at)
+    if not here.settled[0]:  # a level rover of unknown forces, above the ground below its origin
+        x, y, yaw = here.poses[0].tolist()
+        standing = rover.wheel.radius - rover.suspension.wheels["middle"][2]
+        height = float(np.nan_to_num(terrain.elevation_at(x, y))) + standing
+        driven = {"distance": rows.distance[at], "time": rows.time[at]}
+        state = place_state(rover, np.array([x, y, height]), np.array([0.0, 0.0, yaw]), **driven)
     link = limits.find_link(lane, at) if explains or verdict.code == "suspension" else ""
     link = link or _find_link(terrain, verdict, state)
     of_ground = TITLES.get(verdict.code, verdict.code.replace("_", " "))
@@ -278,16 +271,6 @@ def find_failure(rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathL
         row=at,
         state=state,
     )
-
-
-def level_state(rover: Rover, terrain: Terrain, rows: AskedPoses, at: int) -> RoverState:
-    """Return a level rover of unknown forces at a row, above the ground below its origin."""
-    x, y, yaw = rows.prediction.poses[at].tolist()
-    height = float(np.nan_to_num(terrain.elevation_at(x, y)))
-    standing = rover.wheel.radius - rover.suspension.wheels["middle"][2]
-    driven = {"distance": rows.distance[at], "time": rows.time[at]}
-    position = np.array([x, y, height + standing])
-    return place_state(rover, position, np.array([0.0, 0.0, yaw]), **driven)
 
 
 def _find_link(terrain: Terrain, verdict: Verdict, state: RoverState) -> str:

@@ -121,7 +121,7 @@ class Judged(Candidate):
         Where a wheel rolls off an edge, the model is asked for several states at one time.
         """
         state, failure = self.trajectory.state_at(time), self.failure
-        if failure is None or not failure.is_reached(time):
+        if failure is None or time < failure.state.time - 1e-6:
             return state
         if state is None:
             return failure.state
