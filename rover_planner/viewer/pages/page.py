@@ -161,20 +161,24 @@ class Page(PageBase):
         if found.path is self.session.shown.path:
             self._advised = found
 
-    def _find_remedy(self, words: str) -> Remedy:
-        for remedy in self._advised.remedies if self._advised is not None else ():
-            if remedy.describe() == words:
-                return remedy
-        raise PlanningError(f"{words!r} is no remedy of the path that is shown")
+    def _find_remedy(self, words: str | None) -> Remedy | None:
+        remedies = [] if self._advised is None else self._advised.remedies
+        return next((one for one in remedies if one.describe() == words), None)
 
     def _show_ghost(self, words: str | None) -> None:
-        """Show where the path of a remedy leads while a person points at it; None ends that."""
-        path = None if words is None else self._find_remedy(words).judged.case.poses
+        """Show where the path of a remedy leads while a person points at it; None ends that.
+
+        A browser may still list the remedies of an earlier path: of those none is shown.
+        """
+        remedy = self._find_remedy(words)
+        path = None if remedy is None else remedy.judged.case.poses
         self.scene.paths.show_line("ghost", path, GHOST)
 
     def _take_remedy(self, words: str) -> None:
         """Judge the path with the levers of a remedy set."""
         remedy = self._find_remedy(words)
+        if remedy is None:
+            raise PlanningError(f"{words!r} is no remedy of the path that is shown")
         self._show_ghost(None)
         self.session.take_change(advice.apply_remedy(self.session.wanted, remedy))
 
