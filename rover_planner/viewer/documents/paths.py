@@ -127,6 +127,7 @@ def describe_paths(
     rows = []
     for k, path in enumerate(shown.paths):
         verdict, limits, length = path.verdict, path.limits, f"{path.length:.2f}"
+        end = limits.rows.distance[-1]
         uses = [float(np.nanmax(one.used, initial=0.0)) for one in limits.lanes]
         word = "passes" if verdict.traversable else "refused"
         rows.append(
@@ -135,7 +136,7 @@ def describe_paths(
                 "passes": verdict.traversable,
                 "word": f"{word}, best" if k == shown.best else word,
                 "waits": waits if k in old else "",
-                "length": length if verdict.traversable else f"{limits.end:.2f} of {length}",
+                "length": length if verdict.traversable else f"{end:.2f} of {length}",
                 "energy": write(path.trajectory.energy, 1),
                 "use": write_use(max(uses)),
                 "limit": limits.lanes[int(np.argmax(uses))].title,
@@ -155,7 +156,7 @@ def describe_limits(
     """
     failure, before = path.failure, None if reference is None else reference.limits
     limits = path.limits.add_chance(chance)
-    end = max(limits.end, 0.0 if before is None else before.end)
+    end = max(float(one.rows.distance[-1]) for one in (limits, before) if one is not None)
     rows, stands = limits.rows, limits.rows.prediction.settled
     lanes = []
     for lane in limits.lanes:

@@ -281,7 +281,14 @@ def listen(context: Context | None = None) -> Iterator[LiveListener]:
     listener, executor = LiveListener(context=own), SingleThreadedExecutor(context=own)
     executor.add_node(listener)
     ended = threading.Event()
-    thread = threading.Thread(target=_spin, args=(executor, ended), daemon=True)
+
+    def spin() -> None:
+        # Not executor.spin(): at times that does not return from executor.shutdown().
+        with contextlib.suppress(ExternalShutdownException):
+            while not ended.is_set():
+                executor.spin_once(timeout_sec=0.2)
+
+    thread = threading.Thread(target=spin, daemon=True)
     thread.start()
     try:
         yield listener
@@ -293,10 +300,3 @@ def listen(context: Context | None = None) -> Iterator[LiveListener]:
         listener.destroy_node()
         if context is None:
             own.try_shutdown()
-
-
-def _spin(executor: SingleThreadedExecutor, ended: threading.Event) -> None:
-    # Not executor.spin(): at times that does not return from executor.shutdown().
-    with contextlib.suppress(ExternalShutdownException):
-        while not ended.is_set():
-            executor.spin_once(timeout_sec=0.2)

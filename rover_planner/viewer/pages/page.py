@@ -323,9 +323,10 @@ class Page(PageBase):
         self.scene.paths.mark_old(every if work["old"] else shown.old if is_slow else frozenset())
         made("subject", paths.describe_subject, shown.scenario, self.ground_name)
         tell("verdict", paths.describe_verdict(shown) | work)
-        is_old, is_judging = bool(work["old"]), self._judging.progress is not None
-        made("paths", paths.describe_paths, shown, is_old, is_judging)
-        is_seeking = self._advice.progress is not None
+        is_judging, is_seeking = (
+            one.progress is not None for one in (self._judging, self._advice)
+        )
+        made("paths", paths.describe_paths, shown, bool(work["old"]), is_judging)
         helps = advice.describe_advice(self._advised, is_seeking, time.monotonic())
         tell("advice", None if shown.verdict.traversable else helps)
         made("current", lambda *_: sharing.write_link(self._link()), shown, self.colouring)

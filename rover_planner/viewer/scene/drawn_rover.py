@@ -92,21 +92,17 @@ class DrawnRover:
         """Put rocker, bogie and wheels of a side."""
         suspension, mirror = rover.suspension, LEFT if side == "left" else RIGHT
         rocker, bogie = f"rocker_{side}", f"bogie_{side}"
-        carriers = {
-            suspension.rocker_wheel: rocker,
-            **dict.fromkeys(suspension.bogie_wheels, bogie),
-        }
+        carriers = {suspension.rocker_wheel: rocker}
+        carriers |= dict.fromkeys(suspension.bogie_wheels, bogie)
         pivots = {rocker: mirror * suspension.rocker_pivot, bogie: mirror * suspension.bogie_pivot}
         wheels = {name: mirror * suspension.wheels[name] for name in carriers}
-        for link, above, place in (
-            (rocker, BODY, pivots[rocker]),
-            (bogie, rocker, pivots[bogie] - pivots[rocker]),
-        ):
+        places = {rocker: pivots[rocker], bogie: pivots[bogie] - pivots[rocker]}
+        for link, above in ((rocker, BODY), (bogie, rocker)):
             ends = [wheels[name] for name, on in carriers.items() if on == link]
             ends += [pivots[bogie]] if link == rocker else []
             width = 0.16 * rover.wheel.radius
             beams = [make_bar(np.zeros(3), end - pivots[link], width) for end in ends]
-            self._put(link, above, place, join_meshes(beams), colours.METAL)
+            self._put(link, above, places[link], join_meshes(beams), colours.METAL)
         for position, on in carriers.items():
             name = f"{position}_{side}"
             self._put(name, on, wheels[position] - pivots[on], tyre, colours.METAL)

@@ -98,11 +98,6 @@ class PathLimits:
     uses: Uses
     """The uses of all limits of the rover at the poses."""
 
-    @property
-    def end(self) -> float:
-        """Distance of the last pose [m]."""
-        return float(self.rows.distance[-1])
-
     def lane(self, code: str) -> Lane:
         """Return the lane of a code of a verdict; that of the ground for other codes."""
         found = {lane.code: lane for lane in self.lanes}
