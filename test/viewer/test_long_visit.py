@@ -53,7 +53,11 @@ def change(visitor: Visitor, values: dict[str, str]) -> None:
 def take_advice(visitor: Visitor) -> None:
     """Wait for what is found by the time that the page promises, and take the first of it."""
     tab, remedies = visitor.tab, visitor.tab.locator("#advice li[tabindex]")
-    stop = tab.locator("#advice").get_by_role("button", name="Stop")
+    question, stop = (
+        tab.locator("#advice").get_by_role("button", name=name)
+        for name in ("What would help?", "Stop")
+    )
+    wait_until(lambda: not question.count(), "the search")
     wait_until(
         lambda: not stop.count() or "the search goes on" in visitor.text("#advice"), "the advice"
     )
