@@ -98,7 +98,7 @@ def _show_failure(page: Page, visitor: Visitor) -> str:
         failure = session.shown.path.failure
         if failure is not None and failure.link in WHEELS:
             visitor.press("Go to the failure")
-            at = min(failure.time, page.playback.duration)
+            at = min(failure.state.time, page.playback.duration)
             wait_until(lambda at=at: abs(page.playback.time - at) < 1e-6, "the failure")
             return failure.headline
     raise AssertionError("no candidate is refused because of a wheel")

@@ -56,7 +56,9 @@ def view(
         bool, flag("--follow", "Follow a live ROS graph instead of planning.")
     ] = False,
     host: Annotated[str, typer.Option(help="Address to serve on.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="Port to serve on; 0: any free port.")] = 8080,
+    port: Annotated[
+        int, typer.Option(help="Port to serve on; 0: any free port.", min=0, max=65535)
+    ] = 8080,
 ) -> None:
     """Show the rover on a terrain in a web page: watch it drive, see why it can or cannot.
 
@@ -75,23 +77,23 @@ def view(
     if survey is not None:
         need("zarr", "a survey")
     from rover_physics.rover.rover_file import load_rover
-    from rover_planner.viewer.pages.base import check_address
+    from rover_planner.viewer.pages.base import check_host
     from rover_planner.viewer.state.scenario import Scenario
     from rover_planner.viewer.state.session import ViewSession
-    from rover_planner.viewer.state.survey_layers import load_map, open_survey
+    from rover_planner.viewer.state.survey_layers import ShownSurvey, load_map
 
     model = load_rover(rover)
-    check_address(host, port)
+    check_host(host)
     surveyed = None
     if survey is not None and terrain is None:
         ground = load_map(survey, max_cells)
-        surveyed = open_survey(survey, model, None)  # on its own map
+        surveyed = ShownSurvey(survey, model, None)  # on its own map
     else:
         ground = _load_or_make(terrain, follow, max_cells)
         if prediction is None:  # predictions were made on the original map
             ground = ground.fill_gaps(max_gap)
         if survey is not None:
-            surveyed = open_survey(survey, model, ground)
+            surveyed = ShownSurvey(survey, model, ground)
     if not follow:
         _check_on_map(ground, start=start, goal=goal)
     _compile()

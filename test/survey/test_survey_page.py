@@ -14,7 +14,7 @@ from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS
 from rover_planner.errors import PlanningError
 from rover_planner.survey.layers import CLASS_COLOURS, CLASS_NUMBERS
 from rover_planner.viewer.state.colours import UNKNOWN
-from rover_planner.viewer.state.survey_layers import CLASS, load_map, open_survey
+from rover_planner.viewer.state.survey_layers import CLASS, ShownSurvey, load_map
 from support.rovers import LSR1
 from support.survey_maps import make_request, survey_here
 
@@ -35,7 +35,7 @@ def surveyed(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def shown(surveyed):
-    return open_survey(surveyed, LSR1, load_map(surveyed, 10_000))
+    return ShownSurvey(surveyed, LSR1, load_map(surveyed, 10_000))
 
 
 def colour(shown, name, x, y):
@@ -84,4 +84,4 @@ def test_a_survey_of_another_rover_or_map_is_refused(surveyed, rover, heights, s
         load_map(surveyed, 100)
     terrain = load_map(surveyed, 10_000) if heights is None else Terrain(heights, 0.1)
     with pytest.raises(PlanningError, match=said):
-        open_survey(surveyed, rover, terrain)
+        ShownSurvey(surveyed, rover, terrain)

@@ -18,7 +18,7 @@ from rover_planner.viewer.documents.advice import (
 )
 from rover_planner.viewer.pages.page import Page
 from support.grounds import rock_left
-from support.viewer.sessions import LSR1, session_on, wait_for_rest
+from support.viewer.sessions import LSR1, ask, session_on, wait_for_rest
 from support.waiting import wait_until
 
 ENDS = (-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)
@@ -76,14 +76,22 @@ def test_advice_is_sought_when_it_is_asked_for_shown_as_a_ghost_and_taken(page):
     assert page.errors == {}
 
 
+def test_a_remedy_of_an_earlier_path_is_no_ghost_when_it_is_pointed_at_and_refused_when_clicked(
+    page,
+):
+    page.hear({"ask": "ghost", "words": "Fly"})
+    ask(page, lambda: None)
+    assert page.session.refusal == "" and "/lines/ghost" not in page.scene.canvas.nodes
+    page.hear({"ask": "remedy", "words": "Fly"})
+    wait_until(lambda: "no remedy of the path" in page.session.refusal, "the reason")
+
+
 def test_a_search_tells_what_was_found_by_a_promised_time_and_that_it_goes_on():
     path, since = session_on(rock_left, *ENDS, OPTIONS).shown.path, 1000.0
     asked = path.scenario
     growing = grow_advice(Case(asked.rover, asked.terrain, path.poses, asked.options.model))
     none, some = next(growing), next(one for one in growing if one.remedies)
-    first, last = (
-        Advised(path, growing, since, one) for one in (none, replace(some, complete=True))
-    )
+    first, last = (Advised(path, since, one) for one in (none, replace(some, complete=True)))
     told = describe_advice(first, True, since + 0.5 * PROMISED)
     assert told["words"] == "tried: nothing yet" and not told["can_ask"]
     for advised, found in ((first, "nothing"), (last, str(len(last.remedies)))):

@@ -168,8 +168,8 @@ def test_changes_add_up_although_the_judgements_between_are_dropped(judge):
     session = judge.session
     session.plan_to(np.array([1.5, 0.5]))
     session.change_rover([("friction",)], 0.5)
-    session.change_options(joint_angles={"arm_yaw": 0.3})
-    session.change_options(soil="dry_sand")
+    session.take_change(session.wanted.change_options(joint_angles={"arm_yaw": 0.3}))
+    session.take_change(session.wanted.change_options(soil="dry_sand"))
     judge.finish()
     asked = session.shown.scenario
     assert asked is session.wanted and session.is_complete
@@ -180,7 +180,7 @@ def test_changes_add_up_although_the_judgements_between_are_dropped(judge):
 
 
 def test_an_error_of_the_judgement_is_raised_and_stops_it(judge):
-    judge.session.change_options(map_sigmas="many")  # type: ignore[arg-type]
+    judge.session.take_change(judge.session.wanted.change_options(map_sigmas="many"))  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="many"):
         judge.finish()
     assert judge.session.is_outdated and judge.session.is_stopped

@@ -10,7 +10,7 @@ import pytest
 from rover_physics.names import EQUAL, OPTIMAL, SERVO, SIDES, WHEELS
 from rover_physics.traversability.judge import judge_path
 from rover_planner.viewer.documents import paths
-from rover_planner.viewer.documents.rover import compare_drives, describe_sliders, read_values
+from rover_planner.viewer.documents.paths import compare_drives, describe_sliders, read_values
 from rover_planner.viewer.state.path_limits import Lane
 from rover_planner.viewer.state.scenario import CANDIDATES, Judged, Shown
 from support.grounds import gap, wall_at, waves
@@ -114,7 +114,7 @@ def test_a_path_that_fails_at_its_first_pose_has_a_lane_and_a_use_for_each_limit
     path = session.shown.path
     assert path.verdict.first_failure == 0
     told = paths.describe_limits(path, None)
-    assert path.failure.distance == told["end"] == 0.0
+    assert path.failure.state.distance == told["end"] == 0.0
     assert all(len(lane["now"]["x"]) == 1 for lane in told["lanes"])
     uses = {
         lane["code"]: one
@@ -130,7 +130,8 @@ def test_the_lanes_of_the_reference_stand_below_those_of_now():
     session.change_rover([("friction",)], 0.3)
     shown = session.shown
     told = paths.describe_limits(shown.path, shown.reference)
-    assert told["compared"] and told["end"] == pytest.approx(shown.reference.limits.end, abs=1e-4)
+    end = shown.reference.limits.rows.distance[-1]
+    assert told["compared"] and told["end"] == pytest.approx(end, abs=1e-4)
     [friction] = (lane for lane in told["lanes"] if lane["code"] == "friction")
     assert max(friction["now"]["y"][0]) > 1.0 > max(friction["before"]["y"][0]) > 0.0
 
@@ -161,7 +162,7 @@ def test_the_chance_of_failure_is_a_lane_of_its_own_with_its_main_cause():
 
 def test_the_chance_of_a_path_that_is_refused_is_that_up_to_its_failure():
     session = session_on(wall_at(0.5), options=CANDIDATES)
-    session.judge_again()
+    session.ask()
     shown = session.shown
     assert len(shown.chance.at) == shown.verdict.first_failure + 1 < len(shown.path.poses)
     told = paths.describe_uses(shown.path, np.inf, shown.chance)[-1]
@@ -212,9 +213,9 @@ def test_a_failure_between_waypoints_has_the_pose_at_which_the_model_was_asked()
     assert failure is not None and failure.is_between
     first = path.verdict.first_failure
     before, after = prediction.distance[first - 1 : first + 1]
-    assert before < failure.distance < after
+    assert before < failure.state.distance < after
     assert 0.0 < prediction.energy[first - 1] < failure.state.energy
-    there = path.trajectory.state_at(failure.time)
+    there = path.trajectory.state_at(failure.state.time)
     np.testing.assert_allclose(there.wheel_loads, failure.state.wheel_loads)
     places = prediction.between.position[prediction.between.waypoint == first]
     assert np.isclose(places, failure.state.position).all(axis=1).any()
@@ -229,10 +230,12 @@ def test_of_several_states_at_the_place_of_a_failure_that_which_fails_is_shown()
     waypoints = np.append(between.waypoint, path.verdict.first_failure)
     again = replace(again, poses=poses, waypoint=waypoints)
     twin = replace(path, prediction=replace(prediction, between=again))
-    assert twin.failure.time == failure.time and twin.failure.headline == failure.headline
-    shown = twin.state_at(failure.time)
+    assert (
+        twin.failure.state.time == failure.state.time and twin.failure.headline == failure.headline
+    )
+    shown = twin.state_at(failure.state.time)
     np.testing.assert_array_equal(shown.wheel_loads, failure.state.wheel_loads)
-    assert twin.state_at(failure.time - 1.0).time < failure.time
+    assert twin.state_at(failure.state.time - 1.0).time < failure.state.time
 
 
 def test_where_the_rover_does_not_settle_a_level_one_stands_and_the_wheel_beyond_is_named():
@@ -267,8 +270,8 @@ def test_a_refusal_on_unknown_ground_is_at_the_time_to_which_the_drive_is_played
     session = session_on(gap, start=(start, 0.0, 0.0), goal=(1.9, 0.0, 0.0))
     path = session.shown.path
     assert path.failure is not None and path.failure.code == "unknown_ground"
-    assert path.failure.time == path.trajectory.times[-1]
-    assert (path.trajectory.length == 0) == (start > 0.0) == (path.failure.time == 0.0)
+    assert path.failure.state.time == path.trajectory.times[-1]
+    assert (path.trajectory.length == 0) == (start > 0.0) == (path.failure.state.time == 0.0)
     told = [
         paths.describe_verdict(session.shown),
         paths.describe_limits(path, None),

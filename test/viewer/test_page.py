@@ -145,7 +145,7 @@ def test_a_refusal_leads_to_its_place_where_all_parts_show_one_number(visitor, p
     path = page.session.shown.path
     visitor.wait_for(path.failure.headline)
     visitor.press("Go to the failure")
-    wait_until(lambda: abs(page.playback.time - path.failure.time) < 0.05, "the failure")
+    wait_until(lambda: abs(page.playback.time - path.failure.state.time) < 0.05, "the failure")
     lane = f'.lane[data-code="{path.failure.code}"][data-broken]'
     wait_until(lambda: visitor.tab.locator(lane).count() == 1, "the broken lane")
     use = float(np.nanmax(path.limits.lane(path.failure.code).used))
@@ -256,7 +256,7 @@ def test_a_link_brings_back_rover_path_and_time(visitor, page):
     visitor.press("Link to what is shown")
     address = visitor.tab.get_attribute("#link", "href")
     assert address.startswith(f"{page.url}/?{KEY}=")
-    ask(page, session.reset)
+    ask(page, lambda: session.take_change(session.wanted.as_loaded()))
     ask(page, lambda: session.plan_to(np.array([0.5, 0.5])))
     wait_for_rest(page)
     visitor.tab.goto(address)

@@ -81,13 +81,13 @@ def test_playing_stops_at_the_end_and_starts_again_from_the_beginning():
 
 def test_a_drive_that_ends_early_does_not_forget_where_the_rover_was():
     playback = Playback(drive(), place=8.0)
-    playback.take(drive(TIMES[:4]))
+    playback.drive = drive(TIMES[:4])
     assert playback.time == playback.duration == 3.0
-    playback.take(drive(2.0 * TIMES))
+    playback.drive = drive(2.0 * TIMES)
     assert playback.time == 16.0
-    playback.take(drive(TIMES[:4]))
+    playback.drive = drive(TIMES[:4])
     playback.seek(2.0)
-    playback.take(drive())
+    playback.drive = drive()
     assert playback.time == 2.0
 
 
@@ -164,7 +164,7 @@ def test_the_ground_has_a_layer_for_the_use_of_each_limit_of_a_pose_and_one_for_
     found = layers.colour_limit(layers.LayerRequest(LSR1, steep, how), grid)
     picture = ground_mesh.draw_picture(grid, found)
     assert np.median(picture[..., 0]) > np.median(picture[..., 2])  # beyond it is vermillion
-    assert found.legend.keys[0] == ("hatched", "beyond the limit")
+    assert found.legend["keys"][0] == ("hatched", "beyond the limit")
 
 
 def test_the_known_ground_is_a_file_that_needs_no_light_and_leaves_no_garbage(monkeypatch):

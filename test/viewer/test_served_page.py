@@ -175,23 +175,29 @@ def test_the_verdict_is_told_before_its_drawings_and_policies_are_judged_after_t
 
 
 def test_the_ghost_of_a_failure_stays_for_the_next_one_and_hides_without(page):
-    session, mark, canvas = session_on(ramp), page.scene.failure, page.scene.canvas
+    session, scene, canvas = session_on(ramp), page.scene, page.scene.canvas
     ghosts = []
     for friction in (0.4, 0.35):
         session.change_rover([("friction",)], friction)
         failure = session.shown.path.failure
-        mark.show(failure)
+        ask(page, lambda failure=failure: scene.mark_failure(failure))
         ghosts.append(canvas.nodes["/failure/body"])
         np.testing.assert_allclose(
             ghosts[-1].position, canvas.to_scene(failure.state.position), rtol=1e-6
         )
-    ghost, (wheel, _) = canvas.nodes["/failure"], mark.ghost.meshes[failure.link]
+    ghost, (wheel, _), (own, _) = (
+        canvas.nodes["/failure"],
+        *(one.meshes[failure.link] for one in (scene.ghost, scene.rover)),
+    )
     assert ghosts[0] is ghosts[1] and ghost.visible
     assert canvas.nodes[wheel].color == REFUSED
-    assert mark.make_room(failure.state) == failure.link and not ghost.visible
-    assert mark.make_room(None) == "" and ghost.visible
-    mark.show(None)
-    assert not ghost.visible and mark.make_room(failure.state) == ""
+    for state, failing in ((failure.state, True), (None, False)):
+        ask(page, lambda state=state: scene.show(state, failure))
+        assert ghost.visible != failing
+        assert state is None or canvas.nodes[own].opacity == 1.0  # as of what fails
+    ask(page, lambda: scene.mark_failure(None))
+    ask(page, lambda: scene.show(failure.state))
+    assert not ghost.visible and canvas.nodes[own].opacity is None
 
 
 @pytest.fixture
@@ -301,7 +307,7 @@ def test_a_failed_request_is_told_until_a_request_succeeds(page):
 def test_a_closed_page_leaves_no_thread_behind():
     before = set(threading.enumerate())
     page = Page(session_on(ramp))
-    page.requests.put(page.session.judge_again)
+    page.requests.put(page.session.ask)
     page.close()
     left = {thread.name for thread in set(threading.enumerate()) - before}
     assert not left & {"page", "judge", "ground"}
@@ -313,11 +319,11 @@ def test_a_closed_page_leaves_no_thread_behind():
 def test_a_camera_sees_all_of_the_path_from_behind_or_above_and_the_rover_from_its_side(page):
     place = {"position": np.zeros(3), "look_at": np.ones(3)}
     camera = SimpleNamespace(fov=1.0, image_width=600, image_height=600, **place)
-    client, path = SimpleNamespace(camera=camera), page.points
+    client, path = SimpleNamespace(camera=camera), page.scene.way
     middle = 0.5 * (path.min(axis=0) + path.max(axis=0))
     away = {}
     for view in ("Fit", "Top", "Side"):
-        page.scene.look(view, page.points, [client])
+        page.scene.look(view, [client])
         away[view] = client.camera.position - client.camera.look_at
         if view != "Side":
             np.testing.assert_allclose(client.camera.look_at[:2], middle, atol=1e-6)

@@ -20,8 +20,11 @@ from rover_planner.command.prediction_files import (
 from rover_planner.command.view import SEED, choose_ends, name_ground
 from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import assume
-from rover_planner.viewer.documents.paths import describe_paths, describe_verdict
-from rover_planner.viewer.documents.rover import describe_changes
+from rover_planner.viewer.documents.paths import (
+    describe_changes,
+    describe_paths,
+    describe_verdict,
+)
 from rover_planner.viewer.state.scenario import CANDIDATES, Scenario
 from rover_planner.viewer.state.session import ViewSession
 from support.grounds import make_terrain, wall_at, waves
@@ -51,9 +54,9 @@ def test_a_slider_never_swaps_the_path_that_is_looked_at_and_another_that_passes
         assert session.shown.index == index and session.shown.path.poses is poses
         assert session.is_complete and session.shown.scenario.rover.friction == friction
     assert not session.shown.verdict.traversable
-    session.change_options(policy="servo")
+    session.take_change(session.wanted.change_options(policy="servo"))
     assert session.shown.path.poses is poses and session.shown.verdict.policy == "servo"
-    session.change_options(policy="equal")
+    session.take_change(session.wanted.change_options(policy="equal"))
     [offer] = describe_verdict(session.shown)["offers"]
     assert offer["words"].startswith(f"path {session.shown.offer + 1} passes")
     session.show_path(offer["ask"]["index"])
@@ -71,10 +74,10 @@ def test_before_and_after_stay_while_something_differs_from_the_loaded_rover():
         assert changes["rover"] == [["friction [-]", "0.8", f"{friction:g}"]]
         word = "passes" if passes else "refused"
         assert changes["drive"][0] == ["verdict", "passes", word]
-    session.change_options(joint_angles={"arm_yaw": 0.5})
+    session.take_change(session.wanted.change_options(joint_angles={"arm_yaw": 0.5}))
     changes = describe_changes(session.shown.path, session.shown.reference, False)
     assert ["arm_yaw [rad]", "3.14159", "0.5"] in changes["rover"]
-    session.reset()
+    session.take_change(session.wanted.as_loaded())
     assert session.shown.reference is None
 
 
@@ -83,7 +86,7 @@ def test_a_kept_reference_takes_the_place_of_the_loaded_rover_also_for_another_p
     session.change_rover(FRICTION, 0.7)
     session.keep_reference(session.wanted)
     assert session.shown.reference is None
-    session.change_options(policy="servo")
+    session.take_change(session.wanted.change_options(policy="servo"))
     session.show_path(2)
     reference = session.shown.reference
     assert reference.verdict.policy == "equal" and reference.scenario.rover.friction == 0.7
@@ -103,7 +106,8 @@ def test_all_paths_are_judged_again_after_a_value_that_is_refused_and_old_ones_s
         rows = describe_paths(session.shown)["rows"]
         assert not any(row["waits"] for row in rows)
         session.change_rover(FRICTION, 0.7)
-        session.change_options(soil="best")  # it is refused when it is judged
+        # It is refused when it is judged.
+        session.take_change(session.wanted.change_options(soil="best"))
         judge.finish()
         assert "best" in session.refusal
         judge.finish()  # the paths that were left
@@ -124,13 +128,24 @@ def test_a_refused_change_alters_nothing_and_says_why():
             session.change_rover(keys, value)
     for change in (
         lambda: session.plan_to(np.array([np.nan, 0.0])),
-        lambda: session.change_options(joint_angles={"arm_yaw": float("nan")}),
+        lambda: session.take_change(
+            session.wanted.change_options(joint_angles={"arm_yaw": float("nan")})
+        ),
     ):
         change()
         assert session.refusal and session.shown.path is shown.path
         assert session.wanted is shown.scenario
     session.plan_to(np.array([0.5, 0.5]))
     assert not session.refusal
+
+
+def test_a_new_start_leaves_the_goal_where_it_is_and_both_have_the_yaw_of_the_line_between():
+    session = session_on(waves)
+    goal, start = session.wanted.goal, (-1.5, -1.0)
+    session.plan_to(goal, np.array(start))
+    now, yaw = session.shown.scenario, np.arctan2(goal[1] - start[1], goal[0] - start[0])
+    assert (now.start[:2], now.goal[:2]) == (start, goal[:2])
+    assert now.start[2] == now.goal[2] == yaw
 
 
 def test_undo_goes_back_change_by_change_and_never_to_another_rover():
@@ -157,7 +172,7 @@ def test_a_path_is_judged_under_all_policies_and_one_that_cannot_judge_says_so()
     ground = make_terrain(ramp)
     ground = replace(ground, elevation_std=np.full(ground.elevation.shape, 1e-3))
     session = session_on(ground)
-    session.judge_again()
+    session.ask()
     _, servo, _ = describe_verdict(session.shown)["policies"]
     assert servo["word"] == "not judged" and "no bounds" in servo["reason"] and not servo["old"]
 

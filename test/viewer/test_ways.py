@@ -62,7 +62,7 @@ def test_the_first_way_is_shown_before_a_better_one_is_searched():
 
 def test_where_there_is_no_way_the_reason_is_told():
     session = walled_session(whole_wall, GOAL)
-    session.judge_again()
+    session.ask()
     shown = session.shown
     assert shown.around.outcome == NO_WAY and len(shown.paths) == 5
     details = describe_verdict(shown)["details"]
@@ -113,6 +113,6 @@ def test_a_search_can_be_cancelled_and_begun_again_and_a_chosen_path_stays_meanw
             work.cancel()
             judge.take()
             assert session.shown is shown and shown.around is None
-        session.judge_again()
+        session.ask()
         judge.finish()
         assert session.shown.around.outcome == FOUND and session.shown.index == other

@@ -1,13 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Advice on the path that is looked at: sought, told beside the reason of a refusal, and taken."""
 
+import time
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from rover_planner.advice.advise import Advice
+from rover_planner.advice.advise import Advice, grow_advice
+from rover_planner.advice.case import case_of
 from rover_planner.advice.remedy import Remedy
 from rover_planner.planning.assumptions import assume
-from rover_planner.viewer.state.background_work import Steps
 from rover_planner.viewer.state.scenario import Judged, Scenario
 
 PROMISED = 20.0
@@ -20,22 +22,27 @@ class Advised:
 
     path: Judged
     """The path."""
-    steps: Steps[Advice]
-    """What seeks the advice."""
     since: float
     """When a visitor asked for advice, on the monotonic clock [s]."""
-    advice: Advice | None = None
-    """What was found so far; None while the first lever is tried."""
+    advice: Advice
+    """What was found so far."""
 
     @property
     def remedies(self) -> list[Remedy]:
         """The remedies in the order of the list."""
-        return [] if self.advice is None else [*self.advice.remedies, *self.advice.others]
+        return [*self.advice.remedies, *self.advice.others]
 
-    @property
-    def is_complete(self) -> bool:
-        """True if all levers were tried."""
-        return self.advice is not None and self.advice.complete
+
+def seek_advice(path: Judged) -> Iterator[Advised]:
+    """Yield the advice on a path as it grows.
+
+    Raises:
+        RoverError: The model refuses the path or an option.
+    """
+    asked, since = path.scenario, time.monotonic()
+    case = case_of(asked.rover, asked.terrain, path.poses, asked.options)
+    for found in grow_advice(case):
+        yield Advised(path, since, found)
 
 
 def apply_remedy(scenario: Scenario, remedy: Remedy) -> Scenario:
@@ -61,33 +68,34 @@ def describe_advice(advised: Advised | None, is_seeking: bool, now: float) -> di
     A change of the ground is no value of the page: such remedies are told, and not taken.
 
     Args:
-        advised: The advice on the path that is looked at; None if it was not asked for.
+        advised: The advice on the path that is looked at; None if nothing is known.
         is_seeking: True if levers are still tried.
         now: The monotonic clock [s].
     """
-    is_complete = advised is not None and advised.is_complete
-    return {
-        "can_ask": not is_seeking and not is_complete,
-        "seeking": is_seeking,
-        "words": "" if advised is None else _write_progress(advised, is_seeking, now),
-        "rows": [] if advised is None else [_describe(remedy) for remedy in advised.remedies],
-    }
+    is_complete = advised is not None and advised.advice.complete
+    rows = [
+        {
+            "taken": all(one.lever.name != "ground" for one in remedy.levers),
+            "words": remedy.describe(),
+            "costs": remedy.describe_costs(),
+        }
+        for remedy in ([] if advised is None else advised.remedies)
+    ]
+    words = _write_progress(advised, is_seeking, now)
+    can_ask = not is_seeking and not is_complete
+    return {"can_ask": can_ask, "seeking": is_seeking, "words": words, "rows": rows}
 
 
-def _write_progress(advised: Advised, is_seeking: bool, now: float) -> str:
+def _write_progress(advised: Advised | None, is_seeking: bool, now: float) -> str:
     """Return how far the search is: what is tried, or what was found at its end."""
+    if advised is None:
+        return "tried: nothing yet" if is_seeking else ""
     advice = advised.advice
+    if not advice.complete and not is_seeking:
+        return "the search was stopped"
     if not is_seeking:
-        if advice is None or not advice.complete:
-            return "the search was stopped"
         return "" if advice.found else advice.describe()
-    tried = " and ".join(advice.tried).replace("_", " ") if advice is not None else ""
-    if now - advised.since < PROMISED:
-        return f"tried: {tried or 'nothing yet'}"
+    tried = f"tried: {' and '.join(advice.tried).replace('_', ' ') or 'nothing yet'}"
     found = len(advised.remedies) or "nothing"
-    return f"{found} found so far; the search goes on, tried: {tried or 'nothing yet'}"
-
-
-def _describe(remedy: Remedy) -> dict[str, Any]:
-    can_take = all(one.lever.name != "ground" for one in remedy.levers)
-    return {"taken": can_take, "words": remedy.describe(), "costs": remedy.describe_costs()}
+    is_late = now - advised.since >= PROMISED
+    return f"{found} found so far; the search goes on, {tried}" if is_late else tried

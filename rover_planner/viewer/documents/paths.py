@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Judged paths: verdicts, uses of the limits beside those of the reference, and the board."""
+"""Judged paths and their rover: verdicts, uses of the limits, board, sliders, and what differs."""
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,9 +13,12 @@ from rover_physics.chance.failure_chance import FailureChance
 from rover_physics.limits.table import CHANCE
 from rover_physics.names import EQUAL, OPTIMAL, SERVO, WHEELS
 from rover_physics.numerics.arrays import Floats
+from rover_physics.rover.model import Rover
+from rover_physics.rover.rover_file import rover_to_dict
+from rover_planner.studies.rover_values import RoverValue, get_value, list_values
 from rover_planner.viewer.state.colours import colour_use, to_css
 from rover_planner.viewer.state.drive import RoverState
-from rover_planner.viewer.state.path_limits import ON_THE_WAY, Lane, PathLimits, write
+from rover_planner.viewer.state.path_limits import ON_THE_WAY, write
 from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
 
 POLICY_TITLES = {EQUAL: "equal torques", SERVO: "speed servos", OPTIMAL: "traction control"}
@@ -34,6 +37,12 @@ WHEEL_ROWS = {
     "slip ratio [%]": ("slip_ratio", 100.0, 0),
 }
 """Rows of the table of wheels: field of the state, factor and digits."""
+JOINTS = "joints"
+"""First key of the angle of a joint, which is no number of the rover file."""
+FULL_TURN = 3.15
+"""Largest angle, both ways, of the slider of an arm's joint without limits [rad]."""
+SAME = 1e-9
+"""Difference up to which two numbers are the same."""
 
 
 def describe_subject(scenario: Scenario, ground: str) -> dict[str, str]:
@@ -53,32 +62,24 @@ def describe_subject(scenario: Scenario, ground: str) -> dict[str, str]:
 
 def describe_verdict(shown: Shown) -> dict[str, Any]:
     """Return the verdict on the path that is looked at."""
-    failure, verdict = shown.path.failure, shown.verdict
-    around = shown.around
+    failure, verdict, chance = shown.path.failure, shown.verdict, ""
+    if shown.chance is not None:
+        cause = f", most often by {shown.chance.limit}" if shown.chance.limit else ""
+        chance = f"chance of failure {100.0 * shown.chance.path:.0f} %{cause}"
+    reason, around = verdict.reason, shown.around
+    if failure is not None and failure.is_between and not reason.startswith(ON_THE_WAY):
+        reason = f"at the next waypoint: {reason}"  # of which a worse place comes before
     closed = "" if around is None or around.path is not None else f"no way: {around.reason}"
     return {
         **describe_answer(verdict.traversable, f"path {shown.index + 1} of {len(shown.paths)}"),
         "headline": "" if failure is None else failure.headline,
         "where": "" if failure is None else failure.place,
-        "chance": "" if shown.chance is None else _write_chance(shown.chance),
-        "details": [*filter(None, (_write_reason(shown.path), closed))],
+        "chance": chance,
+        "details": [*filter(None, (reason, closed))],
         "policies": _list_policies(shown),
         "offers": _list_offers(shown),
         "fails": failure is not None,
     }
-
-
-def _write_reason(path: Judged) -> str:
-    """Return the reason of a verdict; where it is a waypoint's after a worse place, say so."""
-    failure, reason = path.failure, path.verdict.reason
-    is_later = failure is not None and failure.is_between and not reason.startswith(ON_THE_WAY)
-    return f"at the next waypoint: {reason}" if is_later else reason
-
-
-def _write_chance(chance: FailureChance) -> str:
-    """Return the chance that a path fails, and its main cause, in words."""
-    cause = f", most often by {chance.limit}" if chance.limit else ""
-    return f"chance of failure {100.0 * chance.path:.0f} %{cause}"
 
 
 def describe_answer(traversable: bool | None, about: str) -> dict[str, Any]:
@@ -123,30 +124,26 @@ def describe_paths(
     every = frozenset(range(len(shown.paths)))
     old = every if is_outdated else shown.old
     waits = "old, is judged" if is_judging else "old, was not judged again"
-    rows = [
-        _describe_row(path, number=k + 1, waits=waits if k in old else "", best=k == shown.best)
-        for k, path in enumerate(shown.paths)
-    ]
+    rows = []
+    for k, path in enumerate(shown.paths):
+        verdict, limits, length = path.verdict, path.limits, f"{path.length:.2f}"
+        end = limits.rows.distance[-1]
+        uses = [float(np.nanmax(one.used, initial=0.0)) for one in limits.lanes]
+        word = "passes" if verdict.traversable else "refused"
+        rows.append(
+            {
+                "number": k + 1,
+                "passes": verdict.traversable,
+                "word": f"{word}, best" if k == shown.best else word,
+                "waits": waits if k in old else "",
+                "length": length if verdict.traversable else f"{end:.2f} of {length}",
+                "energy": write(path.trajectory.energy, 1),
+                "use": write_use(max(uses)),
+                "limit": limits.lanes[int(np.argmax(uses))].title,
+                "reason": verdict.reason,
+            }
+        )
     return {"rows": rows, "shown": shown.index}
-
-
-def _describe_row(path: Judged, number: int, waits: str, best: bool) -> dict[str, Any]:
-    verdict, length = path.verdict, f"{path.length:.2f}"
-    limits = path.limits
-    uses = [float(np.nanmax(one.used, initial=0.0)) for one in limits.lanes]
-    most = limits.lanes[int(np.argmax(uses))].title
-    word = "passes" if verdict.traversable else "refused"
-    return {
-        "number": number,
-        "passes": verdict.traversable,
-        "word": f"{word}, best" if best else word,
-        "waits": waits,
-        "length": length if verdict.traversable else f"{limits.end:.2f} of {length}",
-        "energy": write(path.trajectory.energy, 1),
-        "use": write_use(max(uses)),
-        "limit": most,
-        "reason": verdict.reason,
-    }
 
 
 def describe_limits(
@@ -159,7 +156,7 @@ def describe_limits(
     """
     failure, before = path.failure, None if reference is None else reference.limits
     limits = path.limits.add_chance(chance)
-    end = max(limits.end, 0.0 if before is None else before.end)
+    end = max(float(one.rows.distance[-1]) for one in (limits, before) if one is not None)
     rows, stands = limits.rows, limits.rows.prediction.settled
     lanes = []
     for lane in limits.lanes:
@@ -168,8 +165,8 @@ def describe_limits(
             old = _pick_points(before.rows.distance, before.lane(lane.code).used[:, None])
         now = _pick_points(rows.distance, lane.used[:, None])
         wheels = None if lane.wheels is None else _pick_points(rows.distance, lane.wheels)
-        told = {"code": lane.code, "title": lane.title, "now": now}
-        lanes.append({**told, "wheels": wheels, "before": old})
+        told = {"code": lane.code, "title": lane.title, "now": now, "before": old}
+        lanes.append({**told, "wheels": wheels})
     loads = rows.prediction.wheel_loads[stands]
     return {
         "end": round(end, 4),
@@ -185,27 +182,25 @@ def describe_uses(
 ) -> list[dict[str, Any]]:
     """Return for each lane its use at a time [s] and the worst so far, with value and wheel."""
     limits, failure = path.limits.add_chance(chance), path.failure
-    rows = limits.rows_until(time)
+    rows = max(int(np.searchsorted(limits.rows.time, time + 1e-6, side="right")), 1)
     here = rows - 1
-    if failure is not None and failure.is_reached(time):
+    if failure is not None and time >= failure.state.time - 1e-6:
         rows, here = max(rows, failure.row + 1), failure.row
-    uses = [_describe_use(lane, limits, lane.worst_until(rows), here) for lane in limits.lanes]
+    uses = []
+    for lane in limits.lanes:
+        known = np.where(np.isnan(lane.used[:rows]), -np.inf, lane.used[:rows])
+        worst = int(np.argmax(known))
+        used = float(lane.used[worst])  # NaN if nothing is known there
+        link = limits.find_link(lane, worst).replace("_", " ") if used > 0.0 else ""
+        value = "" if np.isnan(used) else lane.write_value(worst)
+        now = write_use(float(lane.used[here]))
+        told = {"now": now, "worst": write_use(used), "broken": used > 1.0}
+        uses.append({**told, "value": value, "link": link})
     if chance is not None:
         of = "whole path" if failure is None or failure.code == CHANCE else "up to the failure"
         uses[-1]["value"] = f"{of} {100.0 * chance.path:.0f} %"
         uses[-1]["broken"] = failure is not None and failure.code == CHANCE
     return uses
-
-
-def _describe_use(lane: Lane, limits: PathLimits, worst: int, here: int) -> dict[str, Any]:
-    used = float(lane.used[worst]) if worst >= 0 else np.nan
-    return {
-        "now": write_use(float(lane.used[here])),
-        "worst": write_use(used),
-        "broken": bool(used > 1.0),
-        "value": lane.write_value(worst) if worst >= 0 else "",
-        "link": limits.find_link(lane, worst).replace("_", " ") if used > 0.0 else "",
-    }
 
 
 def _pick_points(distance: Floats, values: Floats, digits: int = 3) -> dict[str, Any]:
@@ -265,7 +260,7 @@ def describe_board(state: RoverState | None, failing: str = "") -> dict[str, Any
     numbers = {
         "time": write(state.time, 1, "s"),
         "distance": write(100.0 * state.distance, 1, "cm"),
-        "speed": write(100.0 * state.speed, 1, "cm/s"),
+        "speed": write(100.0 * float(np.hypot(*state.motion[:2])), 1, "cm/s"),
         "energy": write(state.energy, 2, "J"),
         "tilt": write(math.degrees(state.tilt), 1, "deg"),
         "belly": write(100.0 * state.belly_clearance, 1, "cm"),
@@ -277,6 +272,79 @@ def describe_board(state: RoverState | None, failing: str = "") -> dict[str, Any
         for title, (name, scale, digits) in WHEEL_ROWS.items()
     ]
     return {"wheels": wheels, "numbers": numbers, "table": table}
+
+
+# The rover's numbers, and what differs from the reference.
+
+
+def list_sliders(rover: Rover) -> dict[str, list[RoverValue]]:
+    """Return the changeable numbers of a rover by part; the last are the angles of its arm."""
+    parts, arm = list_values(rover), rover.manipulator
+    if arm is not None:
+        ends = arm.joint_limits or ((-FULL_TURN, FULL_TURN),) * 3
+        parts["Arm"] = [
+            RoverValue(((JOINTS, name),), f"{name} [rad]", low, high, 0.01)
+            for name, (low, high) in zip(arm.joints, ends, strict=True)
+        ]
+    return parts
+
+
+def describe_sliders(scenario: Scenario) -> list[dict[str, Any]]:
+    """Return the sliders of the rover as loaded: label, ends, step and its value, by part."""
+    loaded = read_values(scenario.as_loaded())
+    return [
+        {
+            "title": title,
+            "sliders": [[k.label, k.low, k.high, k.step, loaded[k.label]] for k in values],
+        }
+        for title, values in list_sliders(scenario.loaded).items()
+    ]
+
+
+def read_values(scenario: Scenario) -> dict[str, float]:
+    """Return the numbers of a scenario by the label of their slider."""
+    data = {**rover_to_dict(scenario.rover), JOINTS: scenario.arm}
+    parts = list_sliders(scenario.loaded).values()
+    return {one.label: get_value(data, one.keys[0]) for values in parts for one in values}
+
+
+def describe_changes(path: Judged, reference: Judged | None, is_kept: bool) -> dict[str, Any]:
+    """Return what differs from the reference: numbers of the rover and the arm, and the drive."""
+    if reference is None:
+        return {"kept": is_kept, "rover": [], "drive": []}
+    before, now = read_values(reference.scenario), read_values(path.scenario)
+    rows = [
+        [label, f"{before[label]:g}", f"{value:g}"]
+        for label, value in now.items()
+        if abs(value - before[label]) > SAME
+    ]
+    was, here = (one.scenario.options.model for one in (reference, path))
+    if was.policy != here.policy:
+        rows.append(["torques", POLICY_TITLES[was.policy], POLICY_TITLES[here.policy]])
+    if was.soil != here.soil:
+        rows.append(["soil", was.soil or "none", here.soil or "none"])
+    return {"kept": is_kept, "rover": rows, "drive": compare_drives(reference, path)}
+
+
+def compare_drives(before: Judged, now: Judged) -> list[list[str]]:
+    """Return name, value before and now of the drives along one path, up to their failures."""
+    reads: Mapping[str, Callable[[Judged], str]] = {
+        "verdict": lambda one: "passes" if one.verdict.traversable else "refused",
+        "driven": lambda one: write(float(one.trajectory.distance[-1]), 2, "m"),
+        "time": lambda one: write(float(one.trajectory.times[-1]), 1, "s"),
+        "energy": lambda one: write(one.trajectory.energy, 1, "J"),
+    }
+    rows = [[name, read(before), read(now)] for name, read in reads.items()]
+    for lane in now.limits.lanes:
+        uses = [
+            write_use(float(np.fmax.reduce(one.limits.lane(lane.code).used)))
+            for one in (before, now)
+        ]
+        rows.append([lane.title, *uses])
+    return [row for row in rows if row[0] == "verdict" or row[1] != row[2]]
+
+
+# Numbers.
 
 
 def plain(values: ArrayLike, digits: int = 3) -> Any:

@@ -4,6 +4,7 @@
 import json
 import threading
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from http import HTTPStatus
 from importlib.resources import files
 from typing import Any
@@ -30,8 +31,6 @@ Part = Any
 """A part of what is shown: dicts, lists, texts, numbers, True, False and None."""
 Mailbox = Inbox[Part]
 """Parts on their way to one visitor."""
-Hear = Callable[[dict[str, Any], Mailbox], None]
-"""Takes a visitor's words and where to answer."""
 
 
 class Channel:
@@ -41,8 +40,11 @@ class Channel:
     From a browser: an object with the word `ask` and its values.
     """
 
-    def __init__(self, host: str, port: int, hear: Hear):
-        """Take the port; `hear` is called in a thread of the visitor and must be quick."""
+    def __init__(self, host: str, port: int, hear: Callable[[dict[str, Any], Mailbox], None]):
+        """Take the port; `hear` takes a visitor's words in a thread of theirs: it must be quick.
+
+        It also gets where to answer.
+        """
         self._hear = hear
         self._lock = threading.Lock()
         self.parts: Mapping[str, Part] = {"program": uuid4().hex}
@@ -83,22 +85,17 @@ class Channel:
         sender.start()
         try:
             for message in connection:
-                self._hear(_read(message), mailbox)
+                words: Any = None
+                with suppress(ValueError, RecursionError):  # what is no JSON is no question
+                    words = json.loads(message)
+                if isinstance(words, dict):
+                    self._hear(words, mailbox)
         except ConnectionClosed:
             pass
         finally:
             with self._lock:
                 self._mailboxes.discard(mailbox)
             mailbox.close()
-
-
-def _read(message: str | bytes) -> dict[str, Any]:
-    """Return a visitor's words; none where they are no JSON object."""
-    try:
-        words = json.loads(message)
-    except (ValueError, RecursionError):
-        return {}
-    return words if isinstance(words, dict) else {}
 
 
 def _send(connection: ServerConnection, mailbox: Mailbox) -> None:

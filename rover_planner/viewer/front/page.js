@@ -5,7 +5,6 @@
 const state = {};
 const chosen = { tab: "Drive", lane: "", link: "", program: "", moved: null };
 const at = (id) => document.getElementById(id);
-const SVG = "http://www.w3.org/2000/svg";
 const SHAPES = ["svg", "path"]; // elements of a drawing
 const COLOURS = { rear: "#0072b2", middle: "#d55e00", front: "#00795a" };
 const PRESS = 5000; // [ms] for which a press lasts at most
@@ -18,7 +17,7 @@ const percent = (use) => (use < 99 ? `${Math.round(100 * use)} %` : "fails");
 
 // An element with its attributes and children; what begins with "on" listens.
 function make(tag, attributes = {}, ...children) {
-  const element = document.createElementNS(SHAPES.includes(tag) ? SVG : document.body.namespaceURI, tag);
+  const element = SHAPES.includes(tag) ? document.createElementNS("http://www.w3.org/2000/svg", tag) : document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
     if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
     else if (value !== null && value !== undefined && value !== false) element.setAttribute(name, value === true ? "" : value);
@@ -43,19 +42,14 @@ const FIRST = ["subject", "verdict"]; // what a person waits for; a picture of i
 const waiting = new Set(); // names of the parts that are not drawn yet
 
 function ask(question) {
-  if (socket && socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(question));
+  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(question));
 }
 
 function connect() {
   socket = new WebSocket(`ws://${location.host}/channel`);
   socket.onmessage = (event) => take(JSON.parse(event.data));
-  socket.onopen = () => showLost(false);
-  socket.onclose = () => { showLost(true); setTimeout(connect, 1000); };
-}
-
-function showLost(is) {
-  state.lost = is;
-  drawErrors();
+  socket.onopen = () => take({ lost: false });
+  socket.onclose = () => { take({ lost: true }); setTimeout(connect, 1000); };
 }
 
 function take(parts) {
@@ -77,10 +71,8 @@ function greet(program) {
   const before = chosen.program;
   chosen.program = program;
   if (before && before !== program) {
-    state.restarted = chosen.link ? "The program was started again; what you had changed is taken up."
-      : "The program was started again; it shows what it was started with.";
     if (chosen.link) ask({ ask: "open", query: chosen.link });
-    drawErrors();
+    take({ restarted: chosen.link ? "what you had changed is taken up" : "it shows what it was started with" });
   } else if (!before && location.search) {
     ask({ ask: "open", query: location.search });
     history.replaceState(null, "", location.pathname);
@@ -90,7 +82,8 @@ function greet(program) {
 // ---- What is drawn for each part.
 
 const DRAW = {
-  subject: drawSubject, errors: drawErrors, scene: drawScene, verdict: drawVerdict, advice: drawAdvice,
+  subject: drawSubject, errors: drawErrors, lost: drawErrors, restarted: drawErrors,
+  scene: drawScene, verdict: drawVerdict, advice: drawAdvice,
   paths: drawPaths, sliders: drawSliders, values: drawValues, changes: drawChanges,
   limits: drawLimits, uses: drawUses, board: drawBoard, drive: drawDrive,
   legend: drawLegend, chosen: drawChosen, topics: drawTopics, learned: drawLearned,
@@ -106,7 +99,7 @@ function drawSubject(facts) {
 function drawErrors() {
   const lines = (state.errors || []).map(([what, why]) => `${what}: ${why}`);
   if (state.lost) lines.unshift("No connection to the program: what is shown is old. The page goes on by itself when the program runs again.");
-  if (state.restarted) lines.push(state.restarted);
+  if (state.restarted) lines.push(`The program was started again; ${state.restarted}.`);
   at("errors").replaceChildren(...cells("div", lines));
 }
 
@@ -186,10 +179,7 @@ function drawSliders(parts) {
   at("sliders").replaceChildren(...parts.map((part, k) => make("details", { open: k < 2 },
     make("summary", {}, make("b", {}, part.title)),
     ...part.sliders.map(([label, low, high, step, loaded]) => {
-      const send = (event) => {
-        if (event.target.value === "") return;
-        ask({ ask: "value", label, value: Number(event.target.value) });
-      };
+      const send = ({ target }) => target.value && ask({ ask: "value", label, value: Number(target.value) });
       const move = () => { chosen.moved = label; };
       const settle = () => setTimeout(() => {
         if (chosen.moved === label) chosen.moved = null;
@@ -222,15 +212,12 @@ function drawChanges({ kept, rover, drive }) {
       button("Undo", { ask: "undo" }), button("Reset", { ask: "reset" }),
       button("Keep as reference", { ask: "keep" }), kept ? button("Compare with loaded", { ask: "drop" }) : "",
       select("preset", (state.chosen?.presets || []).map((name) => [name, name]), state.chosen?.preset, (name) => ({ ask: "preset", name })),
-      make("label", {}, "Load a file ", make("input", { type: "file", accept: ".yaml,.yml", style: "width:9em", onchange: upload })),
+      make("label", {}, "Load a file ", make("input", { type: "file", accept: ".yaml,.yml", style: "width:9em",
+        onchange: async ({ target: { files: [file] } }) => file && ask({ ask: "upload", name: file.name, text: await file.text() }) })),
       button("Save as rover file", { ask: "save rover" })),
     differs);
 }
 
-async function upload(event) {
-  const file = event.target.files[0];
-  if (file) ask({ ask: "upload", name: file.name, text: await file.text() });
-}
 
 function select(label, options, now, question) {
   const known = options.some(([value]) => value === now) ? options : [...options, [now, now]];
@@ -300,9 +287,8 @@ function* listRuns({ x, y: [y] }) {
 }
 
 function drawUses() {
-  if (!state.uses) return;
   at("limits").querySelectorAll(".lane").forEach((row, k) => {
-    const use = state.uses[k];
+    const use = state.uses?.[k];
     if (!use) return;
     row.toggleAttribute("data-broken", use.broken);
     row.toggleAttribute("data-chosen", row.dataset.code === chosen.lane);
@@ -329,27 +315,19 @@ function plot(curve, write, limit, old) {
   const box = make("svg", { viewBox: "0 0 1000 100", preserveAspectRatio: "none" });
   const end = state.limits.end || 1;
   const line = (x, y, attributes) => {
-    let path = "", pen = "M";
-    x.forEach((distance, k) => {
-      if (y[k] === null) { pen = "M"; return; }
-      path += `${pen}${(1000 * distance / end).toFixed(1)} ${down(y[k]).toFixed(2)}`;
-      pen = "L";
-    });
-    if (x.length === 1) path += "h1000";
-    box.append(make("path", { d: path || "M0 0", fill: "none", "vector-effect": "non-scaling-stroke", "stroke-width": 1.6, ...attributes }));
+    const pen = (k) => ((y[k - 1] ?? null) === null ? "M" : "L");
+    const step = (distance, k) => `${pen(k)}${(1000 * distance / end).toFixed(1)} ${down(y[k]).toFixed(2)}`;
+    const path = x.map((distance, k) => (y[k] === null ? "" : step(distance, k))).join("");
+    box.append(make("path", { d: x.length === 1 ? `${path}h1000` : path || "M0 0", fill: "none", "vector-effect": "non-scaling-stroke", "stroke-width": 1.6, ...attributes }));
   };
   if (old) line(old.x, old.y[0], { stroke: "#888", "stroke-width": 4, opacity: 0.6 });
   curve.y.forEach((y, k) => {
     const wheel = ["rear", "middle", "front"][k % 3];
     line(curve.x, y, curve.y.length === 6 ? { stroke: COLOURS[wheel], ...(k > 2 ? { "stroke-dasharray": "5 3" } : {}) } : { stroke: "#222" });
   });
-  const ticks = [[0, write(0)], [top, write(top)]];
-  if (limit) {
-    line([0, end], [limit, limit], { stroke: "#c24f00", "stroke-dasharray": "2 3" });
-    ticks.push([limit, write(limit)]);
-  }
+  if (limit) line([0, end], [limit, limit], { stroke: "#c24f00", "stroke-dasharray": "2 3" });
   return make("div", { class: "plot", onclick: goTo }, box,
-    ...ticks.map(([value, words]) => make("span", { class: "tick", style: `top:${down(value)}%` }, words)),
+    ...[0, top, ...(limit ? [limit] : [])].map((value) => make("span", { class: "tick", style: `top:${down(value)}%` }, write(value))),
     make("span", { class: "end" }, `${(state.limits.end || 0).toFixed(2)} m`), make("div", { class: "cursor" }));
 }
 
@@ -389,7 +367,7 @@ function drawDrive(drive) {
   at("plays").textContent = isLive ? drive.words : `${drive.time.toFixed(1)} s, ${drive.words}`;
   if (isLive) return;
   at("time").max = drive.duration;
-  if (!chosen.scrubs) at("time").value = drive.time;
+  if (!at("time").matches(":active")) at("time").value = drive.time;
   at("fails").hidden = drive.fails === null;
   at("fails").style.left = `${100 * (drive.fails || 0) / (drive.duration || 1)}%`;
   at("play").textContent = drive.plays ? "Pause" : "Play";
@@ -405,8 +383,7 @@ function drawLegend({ title, gradient, ends, keys, notes }) {
 }
 
 function drawLearned(lines) {
-  at("learned").replaceChildren(...(lines.length ? [make("h2", {}, "learned of the ground")] : []),
-    ...cells("div", lines));
+  at("learned").replaceChildren(...cells("h2", lines.length ? ["learned of the ground"] : []), ...cells("div", lines));
 }
 
 function drawTopics(topics) {
@@ -474,7 +451,6 @@ document.addEventListener("click", (event) => {
   if (event.detail > 0) pushed?.blur(); // pressed with the pointer
 });
 at("time").addEventListener("input", () => ask({ ask: "seek", time: Number(at("time").value) }));
-for (const [name, is] of [["pointerdown", true], ["pointerup", false]]) at("time").addEventListener(name, () => { chosen.scrubs = is; });
 
 openTab(chosen.tab);
 const told = at("told");

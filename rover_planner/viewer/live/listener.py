@@ -30,6 +30,7 @@ from msg_adapters.results.diagnostics import HEALTH
 from msg_adapters.results.predictions import array_values
 from rover_physics.errors import RoverError
 from rover_physics.names import WHEEL_JOINTS
+from rover_planner.errors import PlanningError
 from rover_planner.planning.learned_ground import parse_learned
 from rover_planner.ros.qos import (
     latched_qos,
@@ -57,14 +58,8 @@ PREDICTED_FIELDS = {
     "tip_over_margin": "tip_over_ratio",
 }
 """Topics of the server with a row for each waypoint, and the quantity each fills."""
-ESTIMATED_FIELDS = {
-    "wheel_loads": "wheel_loads",
-    "friction_utilisation": "friction_utilisation",
-    "contact_angles": "contact_angles",
-}
-"""Topics of the controller and the fields they fill, in place of predictions."""
-
-
+ESTIMATED_FIELDS = ("wheel_loads", "friction_utilisation", "contact_angles")
+"""Topics of the controller, and the quantities they tell in place of predictions."""
 Take = Callable[[Any], None]
 """Takes a message."""
 
@@ -105,9 +100,9 @@ class LiveListener(Node):
         for topic, field in PREDICTED_FIELDS.items():
             take = partial(self._on_prediction, field)
             self._listen(numbers, f"{SERVER}/{topic}", take, results)
-        for topic, field in ESTIMATED_FIELDS.items():
+        for field in ESTIMATED_FIELDS:
             take = partial(self._on_estimate, field)
-            self._listen(numbers, f"{CONTROLLER}/{topic}", take, topic_qos(), is_stream=True)
+            self._listen(numbers, f"{CONTROLLER}/{field}", take, topic_qos(), is_stream=True)
         self._ages[SIGN_OF_LIFE] = TopicAge(SIGN_OF_LIFE, None, True)
         self.create_subscription(DiagnosticArray, "diagnostics", self._on_diagnostics, topic_qos())
 
@@ -136,9 +131,9 @@ class LiveListener(Node):
         if data.plan is not None and data.position is not None and not silent:
             predicted = _read_nearest(self._predicted, data.plan, data.position)
         estimated = {
-            field: self._estimated[field]
-            for topic, field in ESTIMATED_FIELDS.items()
-            if field in self._estimated and not self._ages[f"{CONTROLLER}/{topic}"].is_stale
+            field: values
+            for field, values in self._estimated.items()
+            if not self._ages[f"{CONTROLLER}/{field}"].is_stale
         }
         is_estimated = not estimated.keys().isdisjoint(PREDICTED_FIELDS.values())
         source = "forces predicted by the server" if predicted else ""
@@ -146,17 +141,19 @@ class LiveListener(Node):
         forces = {**predicted, **estimated}
         return replace(data, forces=forces, forces_from=source, ages=self._ages, click=self._click)
 
-    def request_plan(self, goal: np.ndarray) -> str:
+    def request_plan(self, goal: np.ndarray) -> None:
         """Ask the server for a plan from the rover's pose to a goal (2,) [m].
 
-        Returns:
-            Why that is not possible, empty if it is; plan and verdict come on their topics.
+        Plan and verdict come on their topics.
+
+        Raises:
+            PlanningError: There is no odometry, or no server.
         """
         data = self._data
         if data.position is None:
-            return "no odometry yet, so the start is not known"
+            raise PlanningError("no odometry yet, so the start is not known")
         if not self._planner.service_is_ready():
-            return f"no service {SERVER}/can_traverse"
+            raise PlanningError(f"no service {SERVER}/can_traverse")
         yaw = float(np.arctan2(*(np.asarray(goal) - data.position[:2])[::-1]))
         start = (*data.position[:2], data.attitude[2])
         request = GetPlan.Request(
@@ -166,7 +163,6 @@ class LiveListener(Node):
         self._click = click = Question(CLICK, hashed, time.monotonic())
         take = partial(self._on_answer, click)
         self._planner.call_async(request).add_done_callback(partial(self._hear, "plan", take))
-        return ""
 
     def forget_click(self) -> None:
         """Follow the server's newest verdict again."""
@@ -285,7 +281,14 @@ def listen(context: Context | None = None) -> Iterator[LiveListener]:
     listener, executor = LiveListener(context=own), SingleThreadedExecutor(context=own)
     executor.add_node(listener)
     ended = threading.Event()
-    thread = threading.Thread(target=_spin, args=(executor, ended), daemon=True)
+
+    def spin() -> None:
+        # Not executor.spin(): at times that does not return from executor.shutdown().
+        with contextlib.suppress(ExternalShutdownException):
+            while not ended.is_set():
+                executor.spin_once(timeout_sec=0.2)
+
+    thread = threading.Thread(target=spin, daemon=True)
     thread.start()
     try:
         yield listener
@@ -297,10 +300,3 @@ def listen(context: Context | None = None) -> Iterator[LiveListener]:
         listener.destroy_node()
         if context is None:
             own.try_shutdown()
-
-
-def _spin(executor: SingleThreadedExecutor, ended: threading.Event) -> None:
-    # Not executor.spin(): at times that does not return from executor.shutdown().
-    with contextlib.suppress(ExternalShutdownException):
-        while not ended.is_set():
-            executor.spin_once(timeout_sec=0.2)

@@ -2,7 +2,7 @@
 """A live rover: the latest values of its topics, their ages, and what is told of them."""
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -72,10 +72,6 @@ class Question:
     """Reason of a refusal."""
     plan: Floats | None = None
     """(n, 3) poses of the plan; None without one."""
-
-    def describe(self, now: float) -> str:
-        """Return whose it is and how old its answer is, in words."""
-        return f"{self.name}, {write_age(now - self.since)}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,6 +188,7 @@ def choose_answer(
     newest, click, server, offers = data.newest, data.click, data.ages[SIGN_OF_LIFE], []
     shown = newest if click is None else click
     passes = None if shown is None else shown.traversable
+    about = "" if shown is None else f"{shown.name}, {write_age(now - shown.since)}"
     if shown is None:
         headline = "click the ground to ask for a plan"
     elif passes is not None:
@@ -206,7 +203,7 @@ def choose_answer(
         offers = [{"words": words, "ask": {"ask": "newest"}}]
     is_old = passes is not None and server.is_stale
     document = {
-        **describe_answer(passes, "" if shown is None else shown.describe(now)),
+        **describe_answer(passes, about),
         "headline": headline,
         "old": f"the server is silent for {server.describe()}" if is_old else "",
         "refusal": refusal,
@@ -229,8 +226,3 @@ def describe_learned(learned: LearnedTrail | None) -> list[str]:
     if not ground.is_bounded:
         words = f"friction at least {ground.low:.2f}: no wheel has slipped yet"
     return [words, "where: the trail in the scene, from blue (0) to yellow (1)"]
-
-
-def list_topics(ages: Iterable[TopicAge]) -> list[dict[str, Any]]:
-    """Return the topics of a live rover with their ages."""
-    return [{"topic": one.topic, "age": one.describe(), "stale": one.is_stale} for one in ages]

@@ -13,16 +13,15 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.files.validation import describe
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.errors import PlanningError
 from rover_planner.viewer.front.channel import Channel, Mailbox, Part
-from rover_planner.viewer.scene.ground_mesh import intersect_ground, paint
+from rover_planner.viewer.scene.ground_mesh import intersect_ground
 from rover_planner.viewer.scene.scene import START, VIEWS, Scene
 from rover_planner.viewer.state.background_work import BackgroundWork, Inbox, Result, Steps, Take
-from rover_planner.viewer.state.layers import PREDICTED, Colouring, LayerRequest, list_layers
+from rover_planner.viewer.state.layers import PREDICTED, Colouring, list_layers
 from rover_planner.viewer.state.session import REFUSALS
 from rover_planner.viewer.state.survey_layers import ShownSurvey
 
@@ -46,6 +45,8 @@ HOTKEYS: dict[Any, tuple[str, Words]] = {
 """What keys ask, by the name of the key in small letters."""
 CONTINUOUS = ("value", "seek", "place")
 """Words that come dozens of times a second while a slider is dragged."""
+TELLING = "what is shown is old"
+"""What is told where what is shown cannot be told."""
 MAX_PORT = 65535
 HERE = ("127.0.0.1", 0)
 """A free port of this machine alone."""
@@ -103,7 +104,6 @@ class PageBase(ABC):
         self.painter = self.begin_work(self._draw_ground, "ground")
         keys = {key: words for key, (_, words) in HOTKEYS.items()}
         self.channel.tell("scene", {"port": self.server.get_port(), "keys": keys})
-        self._last = time.monotonic()
         self.thread = threading.Thread(target=self._run, name="page", daemon=True)
         """Changes the page."""
 
@@ -139,8 +139,7 @@ class PageBase(ABC):
 
     def wait(self) -> None:
         """Serve until the page is closed or the program is interrupted."""
-        while not self._ended.wait(0.5):
-            pass
+        self._ended.wait()
 
     def hear(self, words: Words, mailbox: Mailbox | None = None) -> None:
         """Take what a visitor asks; a later value of a slider replaces an earlier one."""
@@ -175,13 +174,8 @@ class PageBase(ABC):
         """Return what the page does by the word `ask`; refusals are raised as errors."""
 
     @abstractmethod
-    def describe_ground(self) -> LayerRequest | None:
-        """Return what is painted as the ground; None while it is not known."""
-
-    @property
-    @abstractmethod
-    def points(self) -> Floats:
-        """X and y (n, 2) [m] of what a view of everything shows, the start first."""
+    def paint(self) -> None:
+        """Begin to colour the ground, if it is known."""
 
     @abstractmethod
     def click(self, point: Floats, shift: bool) -> None:
@@ -210,19 +204,14 @@ class PageBase(ABC):
         offers = {"layers": self.layers, "predicted": list(PREDICTED)}
         return {**asdict(self.colouring), "forces": self.forces, **offers}
 
-    def paint(self) -> None:
-        """Begin to colour the ground."""
-        request = self.describe_ground()
-        if request is not None:
-            self.painter.ask(paint(request, self.survey))
-
     def _draw_ground(self, _steps: Any, painted: Any) -> None:
         def draw() -> None:
             if isinstance(painted, BaseException):
                 raise painted
             file, legend = painted
-            self.scene.draw_ground(file)
-            self.channel.tell("legend", asdict(legend))
+            add = self.server.scene.add_glb
+            add("/ground", file, cast_shadow=False, receive_shadow=False)
+            self.channel.tell("legend", legend)
 
         self.run("the ground is not drawn", draw)
 
@@ -234,7 +223,8 @@ class PageBase(ABC):
 
     def _show_forces(self, words: Words) -> None:
         self.forces = bool(words["shown"])
-        self.scene.show_forces(self.forces)
+        for one in (self.scene.rover, self.scene.ghost):
+            self.scene.canvas.show_frame(one.forces, visible=self.forces)
 
     def _press(self, words: Words, _event: Any) -> None:
         self.hear(words)
@@ -245,11 +235,11 @@ class PageBase(ABC):
             self.scene.follow(name == FOLLOW)
             self._camera.options = (*VIEWS, STAY if name == FOLLOW else FOLLOW)
         else:
-            self.scene.look(name, self.points, [client])
+            self.scene.look(name, [client])
 
     def _request_click(self, event: Any, shift: bool) -> None:
         def click() -> None:
-            origin = self.scene.canvas.to_map(event.ray_origin)
+            origin = self.scene.canvas.origin + event.ray_origin
             direction = np.array(event.ray_direction)
             index = self.scene.paths.find_number(origin, direction)
             if index is not None:
@@ -263,22 +253,19 @@ class PageBase(ABC):
         self.requests.put(click, "click")
 
     def _run(self) -> None:
-        self.tell_all()
-        self.channel.open()
-        while not self._ended.is_set():
-            self._run_period()
-
-    def _run_period(self) -> None:
         """Fulfil the requests, tell what they have changed, and draw the next picture if due."""
-        due = self._last + PERIOD
-        self.requests.wait(due - time.monotonic())
-        for action in self.requests.take().values():
-            self.run("the last request failed", action, self.show_refusal)
-        self.tell_all()
-        now = time.monotonic()
-        passed, self._last = now - self._last, now
-        with self.server.atomic():  # one message to wake the server for all that is sent
-            self.run("drawing stopped", partial(self.advance, passed))
+        self.run(TELLING, self.tell)
+        self.channel.open()
+        last = time.monotonic()
+        while not self._ended.is_set():
+            self.requests.wait(last + PERIOD - time.monotonic())
+            for action in self.requests.take().values():
+                self.run("the last request failed", action, self.show_refusal)
+            self.run(TELLING, self.tell)
+            now = time.monotonic()
+            passed, last = now - last, now
+            with self.server.atomic():  # one message to wake the server for all that is sent
+                self.run("drawing stopped", partial(self.advance, passed))
 
     def run(
         self, failure: str, work: Action, refuse: Callable[[str], object] | None = None
@@ -306,10 +293,6 @@ class PageBase(ABC):
             self.errors |= {failure: message} if message else {}
             self.channel.tell("errors", [[what, why] for what, why in self.errors.items()])
 
-    def tell_all(self) -> None:
-        """Tell what is shown, or that it is old."""
-        self.run("what is shown is old", self.tell)
-
     def has_changed(self, name: str, *made_of: Any) -> bool:
         """Return whether something is made of other objects than when this was asked last."""
         before, self._made_of[name] = self._made_of.get(name, ()), made_of
@@ -333,18 +316,12 @@ class PageBase(ABC):
                 self.run(failure, partial(draw, *made_of))
 
 
-def check_address(host: str, port: int) -> None:
-    """Check that this machine can serve on an address; the port itself may be taken.
-
-    Args:
-        host: Name or address.
-        port: Port; 0 for any free one.
+def check_host(host: str) -> None:
+    """Check that this machine can serve on a host, a name or an address.
 
     Raises:
-        PlanningError: The port is out of range, or the host is no address of this machine.
+        PlanningError: It is no address of this machine.
     """
-    if not 0 <= port <= MAX_PORT:
-        raise PlanningError(f"port is {describe(port)}; it must be 0 to {MAX_PORT}")
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
         socket.create_server((host, 0), family=family).close()

@@ -16,13 +16,12 @@ from rover_planner.viewer.live.live_state import (
     LiveData,
     choose_answer,
     describe_learned,
-    list_topics,
     read_state,
 )
 from rover_planner.viewer.pages.base import HERE, Answer, PageBase
 from rover_planner.viewer.pages.sharing import read_link
+from rover_planner.viewer.scene.ground_mesh import paint
 from rover_planner.viewer.scene.scene import START
-from rover_planner.viewer.state.drive import RoverState
 from rover_planner.viewer.state.layers import LayerRequest
 
 BOARD_PERIOD = 0.2
@@ -31,8 +30,8 @@ GROUND_PERIOD = 2.0
 """Shortest time between two pictures of the ground [s]."""
 ARM_STEP = 0.01
 """Smallest turn of the arm that is drawn [rad]."""
-AHEAD = np.array([4.0, 0.0])
-"""From the rover to where a new camera looks [m]."""
+AHEAD = np.array([[0.0, 0.0], [4.0, 0.0]])
+"""The rover, and from there to where a new camera looks [m]."""
 
 
 class LivePage(PageBase):
@@ -52,10 +51,11 @@ class LivePage(PageBase):
         """
         self._listener, self._rover, self._refusal = listener, rover, ""
         self._data: LiveData = listener.latest()
-        self._first: Floats | None = None
-        """Where the rover was first seen (2,) [m]."""
+        self._is_seen = False
+        """True if cameras look at where the rover was first seen."""
         self._told_at = self._ground_at = 0.0
         super().__init__(rover, terrain, address, ground_name)
+        self.scene.way = AHEAD
         self.paint()
         self.thread.start()
 
@@ -66,22 +66,17 @@ class LivePage(PageBase):
             "open": lambda words: _refuse_link(words["query"]),
         }
 
-    def describe_ground(self) -> LayerRequest | None:
-        """Return the ground as it is known."""
-        known = bool(self.ground_name)
-        return LayerRequest(self._rover, self.ground, self.colouring) if known else None
-
-    @property
-    def points(self) -> Floats:
-        """X and y (2, 2) [m] of where the rover was first seen, and of a place ahead of it."""
-        first = np.zeros(2) if self._first is None else self._first
-        return np.array([first, first + AHEAD])
+    def paint(self) -> None:
+        """Begin to colour the ground, if it is known."""
+        if self.ground_name:
+            self.painter.ask(paint(LayerRequest(self._rover, self.ground, self.colouring)))
 
     def click(self, point: Floats, shift: bool) -> None:
         """Ask the server for a plan to a point."""
         if not self.ground_name:
             raise PlanningError("the ground is not known yet")
-        self._refusal = self._listener.request_plan(point)
+        self._refusal = ""
+        self._listener.request_plan(point)
 
     def show_refusal(self, reason: str) -> None:
         """Show why a request was refused."""
@@ -113,19 +108,22 @@ class LivePage(PageBase):
         state = read_state(self._rover, data)
         self.scene.show(state)
         if state is not None:
-            self._turn_arm(data)
-            if self._first is None:
-                self._first = state.position[:2]
-                self.scene.look(START, self.points)
+            arm, joints = self._rover.manipulator, data.joints
+            known = [name for name in arm.joints if name in joints] if arm is not None else []
+            steps = {name: ARM_STEP * round(joints[name] / ARM_STEP) for name in known}
+            self.scene.rover.take(self._rover, steps)
+            if not self._is_seen:
+                self._is_seen, self.scene.way = True, state.position[:2] + AHEAD
+                self.scene.look(START)
         if now - self._told_at > BOARD_PERIOD:
-            self._told_at = now
-            self._tell_board(state, data)
-
-    def _tell_board(self, state: RoverState | None, data: LiveData) -> None:
-        self.channel.tell("board", describe_board(state))
-        words = f"{data.freshness}; {data.forces_from or 'forces not known'}"
-        self.channel.tell("drive", {"duration": None, "words": words})
-        self.channel.tell("topics", list_topics(data.ages.values()))
+            self._told_at, tell = now, self.channel.tell
+            tell("board", describe_board(state))
+            words = f"{data.freshness}; {data.forces_from or 'forces not known'}"
+            tell("drive", {"duration": None, "words": words})
+            tell("topics", [
+                {"topic": one.topic, "age": one.describe(), "stale": one.is_stale}
+                for one in data.ages.values()
+            ])  # fmt: skip
 
     def _take_terrain(self, data: LiveData, now: float) -> None:
         """Show a new map, at most every GROUND_PERIOD."""
@@ -135,16 +133,8 @@ class LivePage(PageBase):
             return
         self.ground, self.ground_name, self._ground_at = terrain, "elevation_cloud", now
         if self.scene.canvas.move_to(terrain):
-            self._first = None
+            self._is_seen = False
         self.paint()
-
-    def _turn_arm(self, data: LiveData) -> None:
-        arm = self._rover.manipulator
-        if arm is not None:
-            joints = data.joints
-            known = {name: joints[name] for name in arm.joints if name in joints}
-            steps = {name: ARM_STEP * round(angle / ARM_STEP) for name, angle in known.items()}
-            self.scene.rover.take(self._rover, steps)
 
 
 def _refuse_link(query: str) -> None:

@@ -3,28 +3,27 @@
 
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from functools import cached_property, partial
 from typing import Any
 
 from rover_physics.numerics.arrays import Floats
+from rover_physics.rover.model import Rover
 from rover_physics.rover.rover_file import load_rover, preset_names, rover_to_dict
 from rover_physics.terrain.grid import fingerprint
 from rover_physics.terrain.soil_file import load_soils
-from rover_planner.advice.advise import Advice, grow_advice
-from rover_planner.advice.case import case_of
 from rover_planner.advice.remedy import Remedy
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import read_rover, write_rover
-from rover_planner.viewer.documents import advice, paths, rover
+from rover_planner.viewer.documents import advice, paths
 from rover_planner.viewer.pages import sharing
-from rover_planner.viewer.pages.base import HERE, PERIOD, Answer, PageBase
+from rover_planner.viewer.pages.base import HERE, PERIOD, TELLING, Answer, PageBase
+from rover_planner.viewer.scene.ground_mesh import paint
 from rover_planner.viewer.scene.overlays import GHOST
 from rover_planner.viewer.scene.scene import FIT
-from rover_planner.viewer.state.background_work import Steps
 from rover_planner.viewer.state.drive import SPEEDS, Playback
 from rover_planner.viewer.state.judging import Step
-from rover_planner.viewer.state.layers import Colouring, LayerRequest
+from rover_planner.viewer.state.layers import PREDICTED, Colouring, LayerRequest
 from rover_planner.viewer.state.scenario import Scenario, Shown
 from rover_planner.viewer.state.session import ViewSession
 from rover_planner.viewer.state.survey_layers import ShownSurvey
@@ -60,7 +59,7 @@ class Page(PageBase):
         self._judging = self.begin_work(self._take_judged, "judge")
         session.judge = self._judging.ask
         self._advised: advice.Advised | None = None
-        """The path that is looked at and the advice on it; None if it was not asked for."""
+        """The path that is looked at and the advice on it; None if nothing is known."""
         self._offers = {
             "presets": list(preset_names()),
             "soils": list(load_soils()),
@@ -70,36 +69,35 @@ class Page(PageBase):
         self.has_changed("the cameras are not moved", session.wanted.loaded)  # START is theirs
         self._show()
         self.paint()
-        session.judge_again()  # with the search that was not made
+        session.ask()  # with the search that was not made
         self.thread.start()
 
-    def describe_ground(self) -> LayerRequest:
-        """Return the ground with what is shown on it."""
+    def paint(self) -> None:
+        """Begin to colour the ground with what is shown on it."""
         path, now = self.session.shown.path.poses, self.session.shown.scenario
-        options = now.options.model
-        return LayerRequest(now.rover, now.terrain, self.colouring, options, path)
-
-    @property
-    def points(self) -> Floats:
-        """X and y (n, 2) [m] of the path that is looked at."""
-        return self.session.shown.path.poses[:, :2]
+        asked = LayerRequest(now.rover, now.terrain, self.colouring, now.options.model, path)
+        self.painter.ask(paint(asked, self.survey))
 
     # What visitors ask.
 
     def list_answers(self) -> Mapping[str, Answer]:
         """Return what the page does by the word `ask`."""
         session, playback = self.session, self.playback
+
+        def change(**options: Any) -> None:
+            session.take_change(session.wanted.change_options(**options))
+
         return {
             "show": lambda words: session.show_path(int(words["index"])),
             "value": lambda words: self._change_value(words["label"], float(words["value"])),
-            "policy": lambda words: session.change_options(policy=words["name"]),
-            "soil": lambda words: session.change_options(soil=words["name"] or None),
+            "policy": lambda words: change(policy=words["name"]),
+            "soil": lambda words: change(soil=words["name"] or None),
             "undo": lambda _words: session.undo(),
-            "reset": lambda _words: session.reset(),
+            "reset": lambda _words: session.take_change(session.wanted.as_loaded()),
             "keep": lambda _words: session.keep_reference(session.shown.scenario),
             "drop": lambda _words: session.keep_reference(None),
             "cancel": lambda _words: self._cancel(),
-            "judge": lambda _words: session.judge_again(),
+            "judge": lambda _words: session.ask(),
             "preset": lambda words: session.take_rover(load_rover(words["name"])),
             "upload": lambda words: session.take_rover(read_rover(words["text"], words["name"])),
             "open": lambda words: self._open(sharing.read_link(words["query"])),
@@ -110,10 +108,10 @@ class Page(PageBase):
             "place": lambda words: playback.go_to(playback.drive.time_at(words["distance"])),
             "speed": lambda words: setattr(playback, "speed", float(words["times"])),
             "failure": lambda _words: self._go_to_failure(),
-            "advise": lambda _words: self._advise(),
+            "advise": lambda _words: self._advice.ask(advice.seek_advice(session.shown.path)),
             "ghost": lambda words: self._show_ghost(words["words"]),
             "remedy": lambda words: self._take_remedy(words["words"]),
-            "save rover": lambda _words: self._save_rover(),
+            "save rover": lambda _words: _write_rover(session.wanted.rover),
             "save page": lambda words: self._save_page(str(words.get("base", ""))),
             "link": lambda _words: self._tell_link(),
         }
@@ -121,7 +119,7 @@ class Page(PageBase):
     def click(self, point: Floats, shift: bool) -> None:
         """Set goal or start, and plan."""
         if shift or self._click_sets == "start":
-            self.session.plan_from(point)
+            self.session.plan_to(self.session.wanted.goal, point)
         else:
             self.session.plan_to(point)
 
@@ -131,15 +129,16 @@ class Page(PageBase):
 
     def _change_value(self, label: str, number: float) -> None:
         """Change a number of the rover, or turn a joint, by the label of its slider."""
-        parts = rover.list_sliders(self.session.wanted.loaded).values()
+        parts = paths.list_sliders(self.session.wanted.loaded).values()
         found = [one for values in parts for one in values if one.label == label]
         if not found:
             raise PlanningError(f"the rover has no number {label!r}")
         (one,), session = found, self.session
         number = min(max(number, one.low), one.high)
         kind, name, *_ = (*one.keys[0], "")
-        if kind == rover.JOINTS:
-            session.change_options(joint_angles={**session.wanted.arm, str(name): number})
+        if kind == paths.JOINTS:
+            angles = {**session.wanted.arm, str(name): number}
+            session.take_change(session.wanted.change_options(joint_angles=angles))
         else:
             session.change_rover(one.keys, number)
 
@@ -151,39 +150,35 @@ class Page(PageBase):
     def _go_to_failure(self) -> None:
         failure = self.session.shown.path.failure
         if failure is not None:
-            self.playback.go_to(failure.time)
+            self.playback.go_to(failure.state.time)
             self.scene.look_at_failure(failure)
 
     # Advice.
 
-    def _advise(self) -> None:
-        """Seek advice on the path that is looked at."""
-        path = self.session.shown.path
-        asked = path.scenario
-        steps = grow_advice(case_of(asked.rover, asked.terrain, path.poses, asked.options))
-        self._advised = advice.Advised(path, steps, time.monotonic())
-        self._advice.ask(self._advised.steps)
-
-    def _take_advice(self, steps: Steps[Advice], found: Advice | BaseException) -> None:
+    def _take_advice(self, _steps: Any, found: advice.Advised | BaseException) -> None:
         if isinstance(found, BaseException):
             raise PlanningError(f"no advice: {found}")
-        if self._advised is not None and steps is self._advised.steps:
-            self._advised = replace(self._advised, advice=found)
+        if found.path is self.session.shown.path:
+            self._advised = found
 
-    def _find_remedy(self, words: str) -> Remedy:
-        for remedy in self._advised.remedies if self._advised is not None else ():
-            if remedy.describe() == words:
-                return remedy
-        raise PlanningError(f"{words!r} is no remedy of the path that is shown")
+    def _find_remedy(self, words: str | None) -> Remedy | None:
+        remedies = [] if self._advised is None else self._advised.remedies
+        return next((one for one in remedies if one.describe() == words), None)
 
     def _show_ghost(self, words: str | None) -> None:
-        """Show where the path of a remedy leads while a person points at it; None ends that."""
-        path = None if words is None else self._find_remedy(words).judged.case.poses
+        """Show where the path of a remedy leads while a person points at it; None ends that.
+
+        A browser may still list the remedies of an earlier path: of those none is shown.
+        """
+        remedy = self._find_remedy(words)
+        path = None if remedy is None else remedy.judged.case.poses
         self.scene.paths.show_line("ghost", path, GHOST)
 
     def _take_remedy(self, words: str) -> None:
         """Judge the path with the levers of a remedy set."""
         remedy = self._find_remedy(words)
+        if remedy is None:
+            raise PlanningError(f"{words!r} is no remedy of the path that is shown")
         self._show_ghost(None)
         self.session.take_change(advice.apply_remedy(self.session.wanted, remedy))
 
@@ -221,20 +216,16 @@ class Page(PageBase):
             )
         return {"link": query}
 
-    def _save_rover(self) -> dict[str, Any]:
-        model = self.session.wanted.rover
-        return _file(f"{model.name.removesuffix('.yaml')}.yaml", write_rover(model))
-
     def _save_page(self, base: str) -> dict[str, Any]:
         """Return the page as a file; the rover goes to where the path is refused if it is."""
         path = self.session.shown.path
         if path.failure is not None:
-            self.playback.go_to(path.failure.time)
+            self.playback.go_to(path.failure.state.time)
         self.advance(0.0)
         self.tell()
         model = path.scenario.rover
         text = sharing.write_file(self.server, self.channel.parts, self._link(), model, base)
-        return _file(f"{model.name}.html", text)
+        return {"file": {"name": f"{model.name}.html", "text": text}}
 
     def _open(self, link: sharing.PageLink | None) -> None:
         """Judge what a link holds, and show it."""
@@ -280,24 +271,25 @@ class Page(PageBase):
         """
         shown, scene, draw = self.session.shown, self.scene, self.draw_made
         asked, path = shown.scenario, shown.path
-        if self._advised is not None and self._advised.path is not path:
+        if self.has_changed("advice", path):
             self._advice.cancel()  # nobody looks at its path any more
             self._advised = None
             self._show_ghost(None)
-        self.tell_all()
+        self.run(TELLING, self.tell)
         if self.has_changed("ends", asked.start, asked.goal):
             self.playback.go_to(0.0)
         is_new = self.has_changed("drive", path)
         if is_new:
-            self.playback.take(path.trajectory)
+            self.playback.drive = path.trajectory
         self._tell_drive()
         if is_new:
             self._ended.wait(PERIOD)
-        draw("the failure is not shown", scene.failure.show, path.failure)
+        draw("the failure is not shown", scene.mark_failure, path.failure)
         draw("the rover is not drawn", scene.rover.take, asked.rover, asked.arm)
-        draw("the cameras are not moved", lambda _: scene.look(FIT, self.points), asked.loaded)
+        scene.way = path.poses[:, :2]
+        draw("the cameras are not moved", lambda _: scene.look(FIT), asked.loaded)
         draw("the paths are not drawn", scene.paths.show, shown.paths, shown.index)
-        depends = self.colouring.is_predicted or self.survey is not None
+        depends = self.colouring.layer in PREDICTED or self.survey is not None
         if self.has_changed("ground", asked) and depends:
             self.paint()
         self.playback.moved = True
@@ -331,15 +323,16 @@ class Page(PageBase):
         self.scene.paths.mark_old(every if work["old"] else shown.old if is_slow else frozenset())
         made("subject", paths.describe_subject, shown.scenario, self.ground_name)
         tell("verdict", paths.describe_verdict(shown) | work)
-        is_old, is_judging = bool(work["old"]), self._judging.progress is not None
-        made("paths", paths.describe_paths, shown, is_old, is_judging)
-        is_seeking = self._advice.progress is not None
+        is_judging, is_seeking = (
+            one.progress is not None for one in (self._judging, self._advice)
+        )
+        made("paths", paths.describe_paths, shown, bool(work["old"]), is_judging)
         helps = advice.describe_advice(self._advised, is_seeking, time.monotonic())
         tell("advice", None if shown.verdict.traversable else helps)
         made("current", lambda *_: sharing.write_link(self._link()), shown, self.colouring)
-        made("sliders", lambda _: rover.describe_sliders(wanted), wanted.loaded)
-        made("values", rover.read_values, wanted)
-        made("changes", rover.describe_changes, path, reference, session.kept is not None)
+        made("sliders", lambda _: paths.describe_sliders(wanted), wanted.loaded)
+        made("values", paths.read_values, wanted)
+        made("changes", paths.describe_changes, path, reference, session.kept is not None)
         made("limits", paths.describe_limits, path, reference, shown.chance)
         model = wanted.options.model
         tell("chosen", {
@@ -353,7 +346,8 @@ class Page(PageBase):
         playback.advance(seconds)
         if not playback.moved:
             return
-        self.scene.show(self.session.shown.path.state_at(playback.time))
+        path = self.session.shown.path
+        self.scene.show(path.state_at(playback.time), path.failure)
         now = time.monotonic()
         playback.moved = now - self._told_at < BOARD_PERIOD and playback.is_playing
         if not playback.moved:
@@ -363,11 +357,12 @@ class Page(PageBase):
     def _tell_drive(self) -> None:
         path, playback = self.session.shown.path, self.playback
         state, failure = path.state_at(playback.time), path.failure
+        plays = f"playing, {playback.speed:g} times as fast as the rover"
         self.channel.tell("drive", {
             "time": round(playback.time, 2), "duration": round(playback.duration, 2),
             "distance": 0.0 if state is None else round(state.distance, 4),
-            "plays": playback.is_playing, "words": playback.describe(),
-            "fails": None if failure is None else round(failure.time, 2),
+            "plays": playback.is_playing, "words": plays if playback.is_playing else "paused",
+            "fails": None if failure is None else round(float(failure.state.time), 2),
         })  # fmt: skip
         link = "" if failure is None else failure.link
         board = paths.describe_board(state, link)
@@ -376,5 +371,6 @@ class Page(PageBase):
         self.channel.tell("uses", uses)
 
 
-def _file(name: str, text: str) -> dict[str, Any]:
-    return {"file": {"name": name, "text": text}}
+def _write_rover(model: Rover) -> dict[str, Any]:
+    name = f"{model.name.removesuffix('.yaml')}.yaml"
+    return {"file": {"name": name, "text": write_rover(model)}}

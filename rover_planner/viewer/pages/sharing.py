@@ -23,6 +23,7 @@ from rover_physics.terrain.soil_file import soil_named
 from rover_planner.errors import PlanningError
 from rover_planner.studies.rover_values import write_rover
 from rover_planner.viewer.front.channel import read_file
+from rover_planner.viewer.state.layers import Colouring
 from rover_planner.viewer.state.scenario import Pose, Scenario
 
 KEY = "view"
@@ -38,9 +39,9 @@ CODE_TAG = '<script type="module" src="page.js"></script>'
 """Lines of page.html for which a file that is sent has the contents."""
 
 
-@dataclass(frozen=True)
-class PageLink:
-    """Content of a link to the page."""
+@dataclass(frozen=True, kw_only=True)
+class PageLink(Colouring):
+    """Content of a link to the page: what colours the ground, and what follows."""
 
     __pydantic_config__ = ConfigDict(allow_inf_nan=False, extra="forbid")
 
@@ -62,14 +63,8 @@ class PageLink:
     """Number of the path that is looked at, from 1."""
     time: float
     """Time of the drive [s]."""
-    layer: str
-    """Name of the layer that colours the ground."""
-    heading: Annotated[float, Field(ge=-180.0, le=180.0)]
-    """Heading of the rover for predicted layers [deg]."""
     joints: Mapping[str, float] = field(default_factory=dict)
     """Angles of the arm's joints by name [rad]."""
-    along: bool = False
-    """True if predicted layers are for the heading of the path, not for `heading`."""
 
 
 LINK = TypeAdapter(PageLink)
@@ -159,9 +154,10 @@ def write_file(
     for client in server.get_clients().values():
         server.initial_camera.position = client.camera.position
         server.initial_camera.look_at = client.camera.look_at
-    query = write_link(link)
+    query, own = write_link(link), {"rover_planner": rover_physics.__version__}
+    versions = own | {"python": platform.python_version()} | {p: version(p) for p in PACKAGES}
     written = {
-        "versions": _versions(),
+        "versions": ", ".join(f"{name} {text}" for name, text in versions.items()),
         "written": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         "link": f"{base}/?{query}" if query else "",
         "rover": write_rover(rover),
@@ -175,9 +171,3 @@ def write_file(
     return page.replace(
         CODE_TAG, f'<script id="told" type="application/json">{told}</script>{code}'
     )
-
-
-def _versions() -> str:
-    own = {"rover_planner": rover_physics.__version__, "python": platform.python_version()}
-    found = own | {name: version(name) for name in PACKAGES}
-    return ", ".join(f"{name} {text}" for name, text in found.items())

@@ -42,7 +42,7 @@ class Canvas:
     """Nodes that stay while they are shown: a new node takes the page longer than new values.
 
     The scene is the map frame moved to an origin near the ground: whatever has a place goes
-    through `to_scene`, and rays of visitors come back through `to_map`.
+    through `to_scene`.
     """
 
     terrain: Terrain
@@ -62,10 +62,6 @@ class Canvas:
     def to_scene(self, points: ArrayLike) -> Floats:
         """Return points (..., 3) of the map frame in the scene [m]."""
         return np.asarray(points, dtype=float) - self.origin
-
-    def to_map(self, points: ArrayLike) -> Floats:
-        """Return points (..., 3) of the scene in the map frame [m]."""
-        return np.asarray(points, dtype=float) + self.origin
 
     def move_to(self, terrain: Terrain) -> bool:
         """Take another ground, and the origin near it; return whether that moved.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A rover in the scene with the forces on its wheels: the one that is played, and its ghost."""
+"""A rover in the scene with the forces on its wheels."""
 
 import itertools
 from collections.abc import Mapping
@@ -8,27 +8,20 @@ from typing import Any, cast
 import numpy as np
 import trimesh
 
-from rover_physics.names import SIDES, WHEEL_POSITIONS, WHEELS
+from rover_physics.names import SIDES, WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import wxyz_about_y, wxyz_from_rpy
 from rover_physics.rover.manipulator import link_points
 from rover_physics.rover.model import Manipulator, Rover
-from rover_planner.viewer.scene.canvas import Canvas, Strand
+from rover_planner.viewer.scene.canvas import Canvas
 from rover_planner.viewer.state import colours
 from rover_planner.viewer.state.drive import RoverState
-from rover_planner.viewer.state.path_limits import BODY, Failure
+from rover_planner.viewer.state.path_limits import BODY
 
 WEIGHT_LENGTH = 4.0
 """Length of the arrow of a sixth of the rover's weight [wheel radii]."""
 GROUSERS = 16
 """Grousers of a wheel as it is drawn."""
-NAME, REASON = "/failure", "/reason"
-OPACITY = 0.55
-"""Opacity of the ghost."""
-NEAR = 0.5
-"""Distance of the played rover at which the ghost makes room for it [wheelbases]."""
-LABEL_HEIGHT = 4.5
-"""Height of the label above the body [wheel radii]."""
 LEFT, RIGHT = np.array([1.0, 1.0, 1.0]), np.array([1.0, -1.0, 1.0])
 """Factors on a point of the left side [m] as it is on a side."""
 
@@ -42,7 +35,8 @@ class DrawnRover:
     def __init__(self, canvas: Canvas, name: str, opacity: float | None = None):
         """Draw nothing yet; nodes will be below a node `name`, opaque without an opacity."""
         self._canvas, self._name, self._opacity = canvas, name, opacity
-        self._forces = f"{name}/forces"
+        self.forces = f"{name}/forces"
+        """The node of its arrows."""
         self.rover: Rover | None = None
         """The rover; None before the first."""
         self.state: RoverState | None = None
@@ -63,25 +57,21 @@ class DrawnRover:
         looks = wheel.radius, wheel.width, rover.suspension, rover.belly, arm, rover.weight
         is_new = looks != self._looks
         if is_new:
-            self._looks, self.rover = (), None  # an error must not leave half a rover
-            self._draw(rover)
+            self._looks, self.rover, self.meshes = (), None, {}  # no half a rover after an error
+            self._canvas.show_frame(self._name, visible=self.state is not None)
+            self._canvas.show_frame(self.forces)
+            self._put(BODY, "", np.zeros(3), make_body(rover), colours.BODY)
+            tyre, grousers = make_wheel(rover)
+            for side in SIDES:
+                self._put_side(rover, side, tyre, grousers)
+            kept = [node for node, _ in self.meshes.values()]
+            self._canvas.remove(f"{self._name}/{BODY}", kept)
         if arm is not None and (is_new or arm_angles != self._arm):
             mesh = make_arm(arm, arm_angles, wheel.radius)
             self._put("arm", BODY, np.zeros(3), mesh, colours.DARK)
         self._looks, self._arm, self.rover = looks, dict(arm_angles), rover
         if is_new:
             self.show(self.state)
-
-    def _draw(self, rover: Rover) -> None:
-        """Put all links of a rover, and take away those that it lacks."""
-        self.meshes = {}
-        self._canvas.show_frame(self._name, visible=self.state is not None)
-        self._canvas.show_frame(self._forces)
-        self._put(BODY, "", np.zeros(3), make_body(rover), colours.BODY)
-        tyre, grousers = make_wheel(rover)
-        for side in SIDES:
-            self._put_side(rover, side, tyre, grousers)
-        self._canvas.remove(f"{self._name}/{BODY}", [node for node, _ in self.meshes.values()])
 
     def _put(
         self, link: str, above: str, place: Floats, mesh: trimesh.Trimesh, colour: colours.Colour
@@ -100,24 +90,22 @@ class DrawnRover:
         self, rover: Rover, side: str, tyre: trimesh.Trimesh, grousers: trimesh.Trimesh
     ) -> None:
         """Put rocker, bogie and wheels of a side."""
-        suspension, beam = rover.suspension, 0.16 * rover.wheel.radius
-        mirror = LEFT if side == "left" else RIGHT
-        pivots = {
-            f"rocker_{side}": mirror * suspension.rocker_pivot,
-            f"bogie_{side}": mirror * suspension.bogie_pivot,
-        }
-        rocker, bogie = pivots
-        wheels = {name: mirror * suspension.wheels[name] for name in WHEEL_POSITIONS}
-        ends = [pivots[bogie], wheels[suspension.rocker_wheel]]
-        beams = make_beams([end - pivots[rocker] for end in ends], beam)
-        self._put(rocker, BODY, pivots[rocker], beams, colours.METAL)
-        ends = [wheels[name] for name in suspension.bogie_wheels]
-        beams = make_beams([end - pivots[bogie] for end in ends], beam)
-        self._put(bogie, rocker, pivots[bogie] - pivots[rocker], beams, colours.METAL)
-        for position, centre in wheels.items():
-            name, on_bogie = f"{position}_{side}", position in suspension.bogie_wheels
-            on = bogie if on_bogie else rocker
-            self._put(name, on, centre - pivots[on], tyre, colours.METAL)
+        suspension, mirror = rover.suspension, LEFT if side == "left" else RIGHT
+        rocker, bogie = f"rocker_{side}", f"bogie_{side}"
+        carriers = {suspension.rocker_wheel: rocker}
+        carriers |= dict.fromkeys(suspension.bogie_wheels, bogie)
+        pivots = {rocker: mirror * suspension.rocker_pivot, bogie: mirror * suspension.bogie_pivot}
+        wheels = {name: mirror * suspension.wheels[name] for name in carriers}
+        places = {rocker: pivots[rocker], bogie: pivots[bogie] - pivots[rocker]}
+        for link, above in ((rocker, BODY), (bogie, rocker)):
+            ends = [wheels[name] for name, on in carriers.items() if on == link]
+            ends += [pivots[bogie]] if link == rocker else []
+            width = 0.16 * rover.wheel.radius
+            beams = [make_bar(np.zeros(3), end - pivots[link], width) for end in ends]
+            self._put(link, above, places[link], join_meshes(beams), colours.METAL)
+        for position, on in carriers.items():
+            name = f"{position}_{side}"
+            self._put(name, on, wheels[position] - pivots[on], tyre, colours.METAL)
             self._put(f"{name}_grousers", name, np.zeros(3), grousers, colours.DARK)
 
     def show(self, state: RoverState | None, failing: str = "") -> None:
@@ -168,58 +156,10 @@ class DrawnRover:
         }
         for name, (tips, colour) in arrows.items():
             self._canvas.show(
-                self._canvas.scene.add_arrows, f"{self._forces}/{name}",
+                self._canvas.scene.add_arrows, f"{self.forces}/{name}",
                 points=np.stack([points, tips], axis=1), colors=np.array(colour, np.uint8),
                 shaft_radius=0.07 * radius, head_radius=0.16 * radius, head_length=0.35 * radius,
             )  # fmt: skip
-
-    def show_forces(self, visible: bool) -> None:
-        """Show or hide the arrows."""
-        self._canvas.show_frame(self._forces, visible=visible)
-
-
-class FailureMark:
-    """A ghost of the whole rover where the shown path is refused, until another one is shown."""
-
-    def __init__(self, canvas: Canvas):
-        """Draw nothing yet."""
-        self._canvas = canvas
-        self.ghost = DrawnRover(canvas, NAME, OPACITY)
-        """The ghost; no forces are drawn where they are not known."""
-        self._failure: Failure | None = None
-
-    def show(self, failure: Failure | None) -> None:
-        """Draw a failure instead of what was drawn before; None draws nothing."""
-        self._failure = failure
-        if failure is None:
-            self._canvas.remove(REASON)
-            self.ghost.show(None)
-            return
-        self.ghost.take(failure.state.rover, {})
-        self.ghost.show(failure.state, failure.link)
-        self._draw_label(failure)
-
-    def make_room(self, state: RoverState | None) -> str:
-        """Hide the ghost while the played rover stands there; return the link of it that fails."""
-        failure, away = self._failure, np.inf
-        if failure is None:
-            return ""
-        if state is not None:
-            away = float(np.linalg.norm(state.position - failure.state.position))
-        is_away = away > NEAR * failure.state.rover.wheelbase
-        self._canvas.show_frame(NAME, visible=is_away)
-        return "" if is_away else failure.link
-
-    def _draw_label(self, failure: Failure) -> None:
-        """Draw what is broken, with a line from a place above the rover to the wheel or body."""
-        words, state = failure.headline.replace(", ", "\n", 1), failure.state
-        place = state.position
-        if failure.link in WHEELS:
-            place = state.wheel_centres[WHEELS.index(failure.link)]
-        top = state.position + np.array([0.0, 0.0, LABEL_HEIGHT * state.rover.wheel.radius])
-        leader = Strand(np.array([top, place]), colours.CASING)
-        self._canvas.show_lines(f"{REASON}/leader", [leader], 2.0)
-        self._canvas.show_label(f"{REASON}/words", f"{words}\n{failure.place}", top)
 
 
 def join_meshes(parts: list[trimesh.Trimesh]) -> trimesh.Trimesh:
@@ -232,11 +172,6 @@ def make_bar(start: Floats, end: Floats, radius: float) -> trimesh.Trimesh:
     if np.linalg.norm(end - start) < 1e-6:
         return trimesh.creation.icosphere(1, radius)
     return trimesh.creation.cylinder(radius=radius, segment=[start, end], sections=10)
-
-
-def make_beams(ends: list[Floats], radius: float) -> trimesh.Trimesh:
-    """Return bars of a radius from the origin to ends (3,) [m]."""
-    return join_meshes([make_bar(np.zeros(3), end, radius) for end in ends])
 
 
 def make_body(rover: Rover) -> trimesh.Trimesh:

@@ -2,7 +2,7 @@
 """The terrain as a mesh with a picture on it, and where a ray meets the ground."""
 
 import gc
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -32,7 +32,7 @@ the screen takes most of the time of a picture."""
 
 def paint(
     asked: layers.LayerRequest, survey: ShownSurvey | None = None
-) -> Iterator[Progress | tuple[bytes, layers.Legend]]:
+) -> Iterator[Progress | tuple[bytes, Mapping[str, Any]]]:
     """Yield what is begun, and the painted ground as a file for the scene, with its legend.
 
     A layer that is predicted for the rover takes seconds.
@@ -42,7 +42,7 @@ def paint(
     if survey is not None and name in survey.names:
         places = layers.spread(ground, layers.count_pixels(ground))
         coloured = survey.colour(name, asked.rover, asked.options, places)
-    elif asked.how.is_predicted:
+    elif name in layers.PREDICTED:
         coloured = layers.colour_limit(asked, ground)
     else:
         coloured = layers.colour_ground(name, ground)
@@ -73,32 +73,27 @@ def draw_picture(ground: Terrain, coloured: layers.ColouredGround) -> NDArray[np
     return picture
 
 
-def build_ground_mesh(
-    ground: Terrain, picture: NDArray[np.uint8], origin: Floats
-) -> trimesh.Trimesh:
-    """Return the known cells of a ground about an origin (3,) [m] with a picture on them."""
+def write_ground(ground: Terrain, coloured: layers.ColouredGround, origin: Floats) -> bytes:
+    """Return the known cells of a ground about an origin (3,) [m] as a binary glTF file.
+
+    It has the picture on it, without lights. It takes a third of a second: most of it to compress
+    the picture.
+    """
     from PIL import Image
 
     heights, (ny, nx) = ground.elevation, ground.elevation.shape
     x, y = np.meshgrid(*layers.spread(ground, (ny, nx)))
     vertices = np.column_stack([x.ravel(), y.ravel(), np.nan_to_num(heights).ravel()]) - origin
     u, v = np.meshgrid((np.arange(nx) + 0.5) / nx, (np.arange(ny) + 0.5) / ny)
+    picture = Image.fromarray(draw_picture(ground, coloured))
     visual = trimesh.visual.TextureVisuals(
         np.column_stack([u.ravel(), 1.0 - v.ravel()]),
-        trimesh.visual.material.PBRMaterial(baseColorTexture=Image.fromarray(picture)),
+        trimesh.visual.material.PBRMaterial(baseColorTexture=picture),
     )
     faces = _join_cells(np.isfinite(heights))
-    return trimesh.Trimesh(vertices, faces, visual=visual, process=False)
-
-
-def write_ground(ground: Terrain, coloured: layers.ColouredGround, origin: Floats) -> bytes:
-    """Return a coloured ground about an origin (3,) [m] as a binary glTF file, without lights.
-
-    It takes a third of a second: most of it to compress the picture.
-    """
-    mesh = build_ground_mesh(ground, draw_picture(ground, coloured), origin)
+    mesh = trimesh.Trimesh(vertices, faces, visual=visual, process=False)
     file: Any = mesh.export(file_type="glb", tree_postprocessor=_leave_unlit)
-    del mesh
+    del mesh, visual, picture
     gc.collect()  # meshes of trimesh hold themselves: a page would keep dozens of old grounds
     return bytes(file)
 

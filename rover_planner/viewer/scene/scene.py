@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from rover_physics.names import WHEELS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.steering_joints import swing_radius
-from rover_planner.viewer.scene.canvas import Canvas
-from rover_planner.viewer.scene.drawn_rover import DrawnRover, FailureMark
+from rover_planner.viewer.scene.canvas import Canvas, Strand
+from rover_planner.viewer.scene.drawn_rover import DrawnRover
 from rover_planner.viewer.scene.overlays import PathOverlay
+from rover_planner.viewer.state.colours import CASING
 from rover_planner.viewer.state.drive import RoverState
 from rover_planner.viewer.state.path_limits import Failure
 
@@ -23,6 +25,13 @@ MARGIN = 1.15
 """Factor on the distance from which something just fits into the picture."""
 MIN_AWAY = 12.0
 """Smallest distance of a camera from what it looks at [wheel radii]."""
+GHOST, REASON = "/failure", "/reason"
+OPACITY = 0.55
+"""Opacity of the ghost."""
+NEAR = 0.5
+"""Distance of the played rover at which the ghost makes room for it [wheelbases]."""
+LABEL_HEIGHT = 4.5
+"""Height of the label above the body [wheel radii]."""
 
 
 class Scene:
@@ -40,42 +49,64 @@ class Scene:
         self.canvas = Canvas(server.scene)
         """Its nodes; all that is drawn goes through it."""
         self.paths = PathOverlay(self.canvas)
+        self.way: Floats = np.zeros((1, 2))
+        """(n, 2) x and y of the path that cameras look at [m]; its height is 0 where the ground is
+        not known."""
         self.rover = DrawnRover(self.canvas, "/rover")
-        self.failure = FailureMark(self.canvas)
+        self.ghost = DrawnRover(self.canvas, GHOST, OPACITY)
+        """The rover where the shown path is refused; no forces are drawn where none are known."""
 
-    def draw_ground(self, glb: bytes) -> None:
-        """Show another ground, as `write_ground` returns it, or the same in other colours."""
-        self._server.scene.add_glb("/ground", glb, cast_shadow=False, receive_shadow=False)
+    def mark_failure(self, failure: Failure | None) -> None:
+        """Draw a ghost where a path fails, and what is broken, with a line to the wheel or body.
 
-    def show_forces(self, visible: bool) -> None:
-        """Show or hide the arrows."""
-        for one in (self.rover, self.failure.ghost):
-            one.show_forces(visible)
+        None draws nothing.
+        """
+        if failure is None:
+            self.canvas.remove(REASON)
+            self.ghost.show(None)
+            return
+        state, link = failure.state, failure.link
+        self.ghost.take(state.rover, {})
+        self.ghost.show(state, link)
+        top = state.position + np.array([0.0, 0.0, LABEL_HEIGHT * state.rover.wheel.radius])
+        place = state.wheel_centres[WHEELS.index(link)] if link in WHEELS else state.position
+        self.canvas.show_lines(f"{REASON}/leader", [Strand(np.array([top, place]), CASING)], 2.0)
+        words = failure.headline.replace(", ", "\n", 1)
+        self.canvas.show_label(f"{REASON}/words", f"{words}\n{failure.place}", top)
 
-    def show(self, state: RoverState | None) -> None:
-        """Show rover and forces in a state; hide them for None."""
-        before = self.rover.state
+    def show(self, state: RoverState | None, failure: Failure | None = None) -> None:
+        """Show rover and forces in a state; hide them for None.
+
+        While the rover stands where its path fails, it shows what fails in place of the ghost.
+        """
+        before, failing = self.rover.state, ""
         with self._server.atomic():
-            self.rover.show(state, self.failure.make_room(state))
+            if failure is not None:
+                there, away = failure.state, np.inf
+                if state is not None:
+                    away = float(np.linalg.norm(state.position - there.position))
+                is_away = away > NEAR * there.rover.wheelbase
+                self.canvas.show_frame(GHOST, visible=is_away)
+                failing = "" if is_away else failure.link
+            self.rover.show(state, failing)
             if self._follows and before is not None and state is not None:
                 by = state.position - before.position
                 for client in self._clients():
                     client.camera.position = client.camera.position + by
 
-    def look(self, view: str, points: Floats, clients: Collection[Any] | None = None) -> None:
+    def look(self, view: str, clients: Collection[Any] | None = None) -> None:
         """Let cameras look at a path, or at the rover on it.
 
         Args:
             view: FIT all of the path from behind and beside; TOP the same from above, north at
                 the top; SIDE the rover from the right side of its path; START along the path from
                 behind and beside its start.
-            points: (n, 2) x and y of the path [m]; where the ground is not known, its height is 0.
             clients: The clients of viser of the cameras' visitors (default: all).
         """
         rover, state = self.rover.rover, self.rover.state
         if rover is None:
             return
-        path = self.canvas.lay(points, 0.0, 0.0)
+        path = self.canvas.lay(self.way, 0.0, 0.0)
         ahead = path[-1, :2] - path[0, :2]
         length = float(np.linalg.norm(ahead))
         ahead = ahead / length if length > 0.0 else np.array([1.0, 0.0])
@@ -94,7 +125,11 @@ class Scene:
                 radius = float(np.linalg.norm(path - at, axis=1).max()) + swing_radius(rover)
                 flat = 0.45 * beside - 0.65 * ahead
                 towards = np.array([*flat, SLANT] if view == FIT else [0.0, -1e-3, 1.0])
-                away = _distance_of(client, max(radius + rover.wheel.radius, least))
+                # From there, a ball of the radius just fits into the visitor's picture.
+                camera, ball = client.camera, max(radius + rover.wheel.radius, least)
+                width, height, fov = camera.image_width, camera.image_height, camera.fov
+                narrow = min(width / height, 1.0) if height else 1.0
+                away = MARGIN * ball / np.sin(0.5 * (fov if fov > 0.1 else 1.0)) / narrow
                 self._place(client, at, at + away * towards / np.linalg.norm(towards))
 
     def follow(self, follows: bool) -> None:
@@ -121,11 +156,3 @@ class Scene:
     def _place(self, client: Any, look_at: Floats, position: Floats) -> None:
         client.camera.position = self.canvas.to_scene(position)
         client.camera.look_at = self.canvas.to_scene(look_at)
-
-
-def _distance_of(client: Any, radius: float) -> float:
-    """Return the distance [m] from which a ball of a radius fits into a visitor's picture."""
-    camera = client.camera
-    fov, width, height = camera.fov, camera.image_width, camera.image_height
-    narrow = min(width / height, 1.0) if height else 1.0
-    return float(MARGIN * radius / np.sin(0.5 * (fov if fov > 0.1 else 1.0)) / narrow)

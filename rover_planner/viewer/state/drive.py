@@ -60,11 +60,6 @@ class RoverState:
         return find_axles(self.here, np.array([not w.startswith(on_rocker) for w in WHEELS]))
 
     @property
-    def speed(self) -> float:
-        """Speed along the path [m/s]."""
-        return float(np.hypot(*self.motion[:2]))
-
-    @property
     def friction_use(self) -> Floats:
         """(6,) friction utilisation over its limit."""
         return self._use(self.friction_utilisation, self.rover.limits.friction_utilisation)
@@ -133,14 +128,16 @@ class Trajectory:
         """Places as in `AskedPoses`, distances [m] and times [s] of the poses; without poses those
         of the start."""
         self._rover, self._driven = rover, rows.prediction.select(slice(end))
+        self.energy = float(self._driven.energy[-1]) if end else 0.0
+        """Energy spent up to its end [J]."""
         self._yaw = np.unwrap(self._driven.poses[:, 2])
         self._numbers = np.clip(numbers_of(self._driven.results), -MAX_VALUE, MAX_VALUE)
-        self._spin = _roll_wheels(rover, self._driven) if end else np.zeros((0, 6))
-
-    @property
-    def energy(self) -> float:
-        """Energy spent up to its end [J]."""
-        return float(self._driven.energy[-1]) if self.length else 0.0
+        moves = np.linalg.norm(np.diff(self._driven.wheel_centres, axis=0), axis=2)
+        slip = np.clip(self._driven.slip_ratio, 0, MAX_SLIP)[1:]
+        rolled = moves / rover.wheel.radius / (1.0 - slip)
+        rolled *= np.where(self._driven.wheel_speed[1:] < 0.0, -1.0, 1.0)
+        self._spin = np.vstack([np.zeros(6), np.cumsum(np.nan_to_num(rolled), axis=0)])
+        """Angles (length, 6) by which the wheels have turned [rad]."""
 
     def time_at(self, distance: float) -> float:
         """Return the time at which the rover is at a distance [m]."""
@@ -163,22 +160,14 @@ class Trajectory:
         return RoverState(self._rover, here, np.asarray(shares @ self._spin[rows]))
 
 
-def _roll_wheels(rover: Rover, driven: PathPrediction) -> Floats:
-    """Return the angles (n, 6) [rad] by which the wheels have turned at n waypoints."""
-    moves = np.linalg.norm(np.diff(driven.wheel_centres, axis=0), axis=2)
-    rolled = moves / rover.wheel.radius / (1.0 - np.clip(driven.slip_ratio, 0, MAX_SLIP))[1:]
-    rolled *= np.where(driven.wheel_speed[1:] < 0.0, -1.0, 1.0)
-    return np.vstack([np.zeros(6), np.cumsum(np.nan_to_num(rolled), axis=0)])
-
-
 @dataclass
 class Playback:
     """The time of a drive that is shown, and how it moves on."""
 
     drive: Trajectory
-    """The drive."""
+    """The drive; with another, the rover stays at its place, or at the end if it ends before."""
     place: float = 0.0
-    """Where the rover is along the path; a drive may end before."""
+    """Where the rover is along the path."""
     speed: float = 10.0
     """Chosen speed, one of SPEEDS."""
     is_playing: bool = False
@@ -213,24 +202,13 @@ class Playback:
 
     def step(self, by: int = 1) -> None:
         """Pause, and go to the next pose, or to the previous one if `by` is -1."""
-        if by > 0:
-            index = int(np.searchsorted(self.drive.times, self.time + 1e-9, side="right"))
-        else:
-            index = int(np.searchsorted(self.drive.times, self.time - 1e-9, side="left")) - 1
-        self.go_to(float(self.drive.times[np.clip(index, 0, len(self.drive.times) - 1)]))
+        times, now = self.drive.times, self.time
+        before = np.count_nonzero(times < now - 1e-9)
+        index = np.count_nonzero(times <= now + 1e-9) if by > 0 else before - 1
+        self.go_to(float(times[np.clip(index, 0, len(times) - 1)]))
 
     def advance(self, seconds: float) -> None:
         """Move on by the visitor's time [s] if it plays."""
         if self.is_playing:
             self.seek(self.time + self.speed * seconds)
             self.is_playing = self.time < self.duration
-
-    def describe(self) -> str:
-        """Return how it moves, in words."""
-        return (
-            f"playing, {self.speed:g} times as fast as the rover" if self.is_playing else "paused"
-        )
-
-    def take(self, drive: Trajectory) -> None:
-        """Take another drive, and stay at the place, or at the end of a drive that ends before."""
-        self.drive, self.moved = drive, True

@@ -23,8 +23,6 @@ from rover_planner.viewer.state.scenario import Judged, Scenario, Shown
 PATH, COMPARE, POLICY, CHANCE = "path", "reference", "policy", "chance of failure"
 SEARCH, BETTER = "searching a way", "way found, searching a better one"
 """Names of steps."""
-
-
 Step = Progress | Shown
 """The beginning of a step, or what is known."""
 
@@ -64,7 +62,11 @@ def judge_steps(
         shown = replace(shown, reference=_judge(values, shown.path.poses))
         yield shown
     if shown.old:
-        shown = yield from _judge_others(shown)
+        paths = list(shown.paths)
+        for k in sorted(shown.old):
+            yield Progress(PATH, k + 1, len(paths))
+            paths[k] = _judge(asked, paths[k].poses)
+        shown = replace(shown, paths=tuple(paths))
         yield shown
     if asked.recorded is not None:
         return
@@ -74,7 +76,8 @@ def judge_steps(
         yield Progress(CHANCE)
         shown = _add_chance(shown)
         yield shown
-    if shown.needs_search:
+    on_map = all(asked.terrain.contains(*end[:2]) for end in (asked.start, asked.goal))
+    if shown.best is None and shown.around is None and on_map:
         yield from _search_around(shown, memory or EdgeMemory())
 
 
@@ -136,14 +139,6 @@ def _recall(shown: Shown, before: Shown | None, values: Scenario) -> Judged | No
         return None
     known = (before.reference, *before.paths)
     return next((one for one in known if one is not None and one.is_of(poses, values)), None)
-
-
-def _judge_others(shown: Shown) -> Generator[Step, None, Shown]:
-    paths = list(shown.paths)
-    for k in sorted(shown.old):
-        yield Progress(PATH, k + 1, len(paths))
-        paths[k] = _judge(shown.scenario, paths[k].poses)
-    return replace(shown, paths=tuple(paths))
 
 
 def _add_policies(shown: Shown) -> Generator[Step, None, Shown]:

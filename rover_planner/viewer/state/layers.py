@@ -3,10 +3,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 from scipy import ndimage
 
 from rover_physics.limits.table import LIMITS
@@ -78,15 +79,10 @@ class Colouring:
 
     layer: str = HEIGHT
     """Name of the layer."""
-    heading: float = 0.0
-    """Heading of the rover for predicted layers [deg]."""
+    heading: Annotated[float, Field(ge=-180.0, le=180.0)] = 0.0
+    """Heading of the rover for predicted layers [deg], as a link may have it."""
     along: bool = False
     """True if they are for the heading of the path instead."""
-
-    @property
-    def is_predicted(self) -> bool:
-        """True if the layer is predicted for the rover."""
-        return self.layer in PREDICTED
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,30 +101,15 @@ class LayerRequest:
     """(n, 3) poses whose yaw the rover has if predicted layers are for the path."""
 
 
-@dataclass(frozen=True)
-class Legend:
-    """What the colours of a layer mean."""
-
-    title: str
-    """The layer."""
-    keys: tuple[tuple[str, str], ...]
-    """Colours as CSS writes them, or "hatched", with what they mean."""
-    gradient: tuple[str, ...] = ()
-    """Colours from the smallest to the largest value; none for classes."""
-    ends: tuple[str, ...] = ()
-    """Both values with their unit."""
-    notes: tuple[str, ...] = ()
-    """More about it."""
-
-
 @dataclass(frozen=True, eq=False)
 class ColouredGround:
     """The colours of a layer, and what they mean."""
 
     colours: NDArray[np.uint8]
     """(ny, nx, 3), grey where nothing is known."""
-    legend: Legend
-    """Their meaning."""
+    legend: Mapping[str, Any]
+    """Their meaning: its `title`, `keys` (colours as CSS writes them, or "hatched", with what
+    they mean), the colours of a `gradient` with the values at both `ends`, and `notes`."""
     beyond: NDArray[np.bool_] | None = None
     """(ny, nx) True where a limit is broken; None without one."""
 
@@ -175,11 +156,11 @@ def colour_limit(request: LayerRequest, ground: Terrain) -> ColouredGround:
     )
 
 
-def _grade(title: str, ends: tuple[str, ...], *keys: tuple[str, str]) -> Legend:
+def _grade(title: str, ends: tuple[str, ...], *keys: tuple[str, str]) -> dict[str, Any]:
     """Return the legend of values from one end to the other."""
-    gradient = tuple(to_css((r, g, b)) for r, g, b in map_colours(STOPS, 0.0, 1.0).tolist())
-    unknown = to_css(UNKNOWN), "unknown, or the rover cannot stand"
-    return Legend(title, (*keys, unknown), gradient, ends)
+    gradient = [to_css((r, g, b)) for r, g, b in map_colours(STOPS, 0.0, 1.0).tolist()]
+    keys = *keys, (to_css(UNKNOWN), "unknown, or the rover cannot stand")
+    return {"title": title, "keys": keys, "gradient": gradient, "ends": ends, "notes": []}
 
 
 def predict_use(request: LayerRequest, at: Sequence[Floats]) -> Floats:
@@ -195,20 +176,15 @@ def predict_use(request: LayerRequest, at: Sequence[Floats]) -> Floats:
     Raises:
         RoverError: The model refuses an option.
     """
+    from scipy.spatial import cKDTree
+
     (x, y), how, path = np.meshgrid(*at), request.how, request.path
     yaw, code = np.full_like(x, np.radians(how.heading)), PREDICTED[how.layer]
-    if how.along and path is not None:
-        yaw = _follow(path, x, y)
+    if how.along and path is not None:  # as at the nearest waypoint
+        _, nearest = cKDTree(path[:, :2]).query(np.stack([x, y], axis=-1))
+        yaw = path[nearest, 2]
     poses = np.stack([x, y, yaw], axis=-1)
     scores = score_poses(request.rover, request.terrain, poses, request.options)
     of_limit = [code in ("", row.code) for row in scores.limits.rows]
     used = np.fmax.reduce(scores.uses[..., of_limit], axis=-1, initial=np.nan)
     return np.where(scores.status == PoseStatus.SETTLED, used, np.nan)
-
-
-def _follow(path: Floats, x: Floats, y: Floats) -> Floats:
-    """Return the yaw (ny, nx) of a path (n, 3) at its waypoints nearest to places."""
-    from scipy.spatial import cKDTree
-
-    _, nearest = cKDTree(path[:, :2]).query(np.stack([x, y], axis=-1))
-    return np.asarray(path[nearest, 2])

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The limits as people read them, their use along a path, and where the path first fails."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,11 +46,11 @@ class Lane:
     """Code of a verdict, or GROUND."""
     title: str
     """Short name."""
-    values: Floats
-    """The value nearest to the limit; NaN for none."""
     used: Floats
     """Use of the limit: 1 at the limit, above 1 where it is broken, NaN where it does
     not count or is not known."""
+    values: Floats = field(default_factory=lambda: np.empty(0))
+    """The value nearest to the limit, NaN where it has none; empty as `bounds`."""
     bounds: Floats | None = None
     """(m,) largest or smallest good value; None if it is not a single number."""
     unit: Unit = RATIO
@@ -61,16 +61,6 @@ class Lane:
     """(m,) which of the rover's limits it is that is used most; None for what is no limit."""
     wheels: Floats | None = None
     """(m, 6) use by each wheel; None if the limit is not one value for each wheel."""
-
-    def is_explained_at(self, row: int) -> bool:
-        """Return whether the value at a row is beyond the limit.
-
-        The worst case of an uncertain map may break a limit that the value itself keeps.
-        """
-        if self.bounds is None:
-            return False
-        above = self.values[row] - self.bounds[row]
-        return bool(above < 0.0 if self.is_lowest else above > 0.0)
 
     def compare(self, row: int) -> str:
         """Return value and limit at a row, such as "friction 1.32 of 1.00", with enough digits.
@@ -96,11 +86,6 @@ class Lane:
         good = write(self.bounds[row], digits, self.unit.name)
         return f"{write(self.values[row], digits)}, {word} {good}"
 
-    def worst_until(self, rows: int) -> int:
-        """Return the row of the first rows that uses most; -1 if nothing is known there."""
-        used = np.where(np.isnan(self.used[:rows]), -np.inf, self.used[:rows])
-        return int(np.argmax(used)) if used.size and used.max() > -np.inf else -1
-
 
 @dataclass(frozen=True, eq=False)
 class PathLimits:
@@ -112,15 +97,6 @@ class PathLimits:
     """The limits, in the order in which they become reasons."""
     uses: Uses
     """The uses of all limits of the rover at the poses."""
-
-    @property
-    def end(self) -> float:
-        """Distance of the last pose [m]."""
-        return float(self.rows.distance[-1])
-
-    def rows_until(self, time: float) -> int:
-        """Return the number of poses up to a time [s], at least 1."""
-        return max(int(np.searchsorted(self.rows.time, time + 1e-6, side="right")), 1)
 
     def lane(self, code: str) -> Lane:
         """Return the lane of a code of a verdict; that of the ground for other codes."""
@@ -143,7 +119,7 @@ class PathLimits:
         if chance is None:
             return self
         used = chance.at[self.rows.prediction.waypoint]
-        return replace(self, lanes=(*self.lanes, _plain_lane(CHANCE, "chance", used)))
+        return replace(self, lanes=(*self.lanes, Lane(CHANCE, "chance", used)))
 
 
 def find_path_limits(rover: Rover, prediction: PathPrediction, verdict: Verdict) -> PathLimits:
@@ -168,14 +144,9 @@ def find_path_limits(rover: Rover, prediction: PathPrediction, verdict: Verdict)
         of_code.pop("sinkage", None)
     unjudged = np.where(rows.prediction.settled, 0.0, np.inf)
     lanes = [_make_lane(rows, uses, np.array(one)) for one in of_code.values()]
-    found = PathLimits(rows, (_plain_lane(GROUND, "ground", unjudged), *lanes), uses)
+    found = PathLimits(rows, (Lane(GROUND, "ground", unjudged), *lanes), uses)
     _add_refusals(found, verdict)
     return found
-
-
-def _plain_lane(code: str, title: str, used: Floats) -> Lane:
-    """Return the lane of a use (m,) that has neither a value nor a wheel."""
-    return Lane(code, title, np.full(len(used), np.nan), used)
 
 
 def _make_lane(rows: AskedPoses, uses: Uses, of_limit: NDArray[np.int64]) -> Lane:
@@ -188,7 +159,7 @@ def _make_lane(rows: AskedPoses, uses: Uses, of_limit: NDArray[np.int64]) -> Lan
     asked = np.where(np.isnan(uses.use[:, of_limit]), -np.inf, uses.use[:, of_limit])
     decides = of_limit[asked.argmax(axis=1)]
     used = np.where(prediction.settled, uses.use[every, decides], np.nan)
-    lane = replace(_plain_lane(limit.code, limit.title, used), decides=decides)
+    lane = Lane(limit.code, limit.title, used, decides=decides)
     if len(of_limit) > 1 or limit.sense == Sense.RANGE:
         return lane
     unit, kept = limit.shown or limit.unit, np.ones(len(every))
@@ -240,10 +211,6 @@ class Failure:
     link: str
     """The link that fails: a name of WHEELS, BODY, rocker_left, bogie_right and so on; empty if
     it is none."""
-    distance: float
-    """Distance since the start [m]."""
-    time: float
-    """Time since the start [s]."""
     is_between: bool
     """True if it is between two waypoints."""
     row: int
@@ -251,15 +218,11 @@ class Failure:
     state: RoverState
     """The rover there; a level one of unknown forces above the ground if it does not stand."""
 
-    def is_reached(self, time: float) -> bool:
-        """Return whether it is reached at a time [s]."""
-        return time >= self.time - 1e-6
-
     @property
     def place(self) -> str:
         """Where and when it is, in words."""
         between = ", between waypoints" if self.is_between else ""
-        return f"after {self.distance:.2f} m, {self.time:.0f} s{between}"
+        return f"after {self.state.distance:.2f} m, {self.state.time:.0f} s{between}"
 
 
 def find_failure(rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathLimits) -> Failure:
@@ -278,10 +241,17 @@ def find_failure(rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathL
         broken = np.flatnonzero(is_there & ~rows.is_between)
     most = lane.used[broken] == lane.used[broken].max()  # what lanes and curves show as the worst
     at = int(min(broken[most], key=lambda row: rows.is_between[row]))
-    here, explains = rows.prediction.select([at]), lane.is_explained_at(at)
+    # The worst case of an uncertain map may break a limit that the value itself keeps.
+    above = 0.0 if lane.bounds is None else lane.values[at] - lane.bounds[at]
+    explains = above < 0.0 if lane.is_lowest else above > 0.0
+    here = rows.prediction.select([at])
     state = RoverState(rover, here, np.zeros(6))
-    if not here.settled[0]:
-        state = level_state(rover, terrain, rows, at)
+    if not here.settled[0]:  # a level rover of unknown forces, above the ground below its origin
+        x, y, yaw = here.poses[0].tolist()
+        standing = rover.wheel.radius - rover.suspension.wheels["middle"][2]
+        height = float(np.nan_to_num(terrain.elevation_at(x, y))) + standing
+        driven = {"distance": rows.distance[at], "time": rows.time[at]}
+        state = place_state(rover, np.array([x, y, height]), np.array([0.0, 0.0, yaw]), **driven)
     link = limits.find_link(lane, at) if explains or verdict.code == "suspension" else ""
     link = link or _find_link(terrain, verdict, state)
     of_ground = TITLES.get(verdict.code, verdict.code.replace("_", " "))
@@ -292,35 +262,19 @@ def find_failure(rover: Rover, terrain: Terrain, verdict: Verdict, limits: PathL
         code=verdict.code,
         headline=headline.removeprefix(ON_THE_WAY),
         link=link,
-        distance=float(rows.distance[at]),
-        time=float(rows.time[at]),
         is_between=bool(rows.is_between[at]),
         row=at,
         state=state,
     )
 
 
-def level_state(rover: Rover, terrain: Terrain, rows: AskedPoses, at: int) -> RoverState:
-    """Return a level rover of unknown forces at a row, above the ground below its origin."""
-    x, y, yaw = rows.prediction.poses[at].tolist()
-    height = float(np.nan_to_num(terrain.elevation_at(x, y)))
-    standing = rover.wheel.radius - rover.suspension.wheels["middle"][2]
-    driven = {"distance": rows.distance[at], "time": rows.time[at]}
-    position = np.array([x, y, height + standing])
-    return place_state(rover, position, np.array([0.0, 0.0, yaw]), **driven)
-
-
 def _find_link(terrain: Terrain, verdict: Verdict, state: RoverState) -> str:
     """Return the link that fails in a state where no lane names one; empty for none."""
     if verdict.code in BODY_CODES:
         return BODY
-    if verdict.code in ("off_map", "unknown_ground"):
-        return _find_lost_wheel(terrain, state)
-    return next((name for name in WHEELS if name in verdict.reason), "")
-
-
-def _find_lost_wheel(terrain: Terrain, state: RoverState) -> str:
-    """Return the wheel with the most of its footprint beyond known ground; empty for none."""
+    if verdict.code not in ("off_map", "unknown_ground"):
+        return next((name for name in WHEELS if name in verdict.reason), "")
+    # The wheel with the most of its footprint beyond known ground.
     offsets = state.rover.wheel.radius * np.linspace(-1.0, 1.0, 5)
     x = state.wheel_centres[:, 0, None, None] + offsets[:, None]
     y = state.wheel_centres[:, 1, None, None] + offsets

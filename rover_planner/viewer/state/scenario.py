@@ -121,7 +121,7 @@ class Judged(Candidate):
         Where a wheel rolls off an edge, the model is asked for several states at one time.
         """
         state, failure = self.trajectory.state_at(time), self.failure
-        if failure is None or not failure.is_reached(time):
+        if failure is None or time < failure.state.time - 1e-6:
             return state
         if state is None:
             return failure.state
@@ -191,12 +191,3 @@ class Shown:
     def offer(self) -> int | None:
         """Index of a path that passes while the one that is looked at does not."""
         return None if self.verdict.traversable else self.best
-
-    @property
-    def needs_search(self) -> bool:
-        """True if all candidates are refused, and no search around obstacles was made yet."""
-        asked = self.scenario
-        is_refused = not self.old and self.best is None and self.around is None
-        ends = (asked.start, asked.goal)
-        on_map = all(asked.terrain.contains(*end[:2]) for end in ends)
-        return asked.recorded is None and is_refused and on_map

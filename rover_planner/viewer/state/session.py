@@ -86,25 +86,14 @@ class ViewSession:
             raise PlanningError(f"no path {index + 1}; there are paths 1 to {count}")
         if not self.wanted.has_paths_of(self.shown.scenario):
             raise PlanningError("the listed paths are old; wait for the new ones")
-        self._ask(self.wanted, index)
+        self.ask(index=index)
 
-    def plan_to(self, goal: Floats) -> None:
-        """Plan to a goal (2,) [m] with the yaw of the straight line there."""
-        self._ask(replace(self.wanted, goal=_facing(self.wanted.start, goal), recorded=None))
-
-    def plan_from(self, start: Floats) -> None:
-        """Plan from a start (2,) [m] with the yaw of the straight line to the goal."""
-        x, y, yaw = _facing(start, self.wanted.goal)
-        pose = (float(start[0]), float(start[1]), yaw)
-        self._ask(replace(self.wanted, start=pose, goal=(x, y, yaw), recorded=None))
-
-    def change_options(self, **changes: object) -> None:
-        """Change options of the model.
-
-        Raises:
-            RoverError: A value is out of range.
-        """
-        self.take_change(self.wanted.change_options(**changes))
+    def plan_to(self, goal: Pose | Floats, start: Floats | None = None) -> None:
+        """Plan to a goal x, y [m] with the straight line's yaw, perhaps from a start (2,) [m]."""
+        (x, y), before = goal[:2], self.wanted.start if start is None else start
+        yaw = float(np.arctan2(y - before[1], x - before[0]))
+        begin = self.wanted.start if start is None else (float(start[0]), float(start[1]), yaw)
+        self.ask(replace(self.wanted, start=begin, goal=(float(x), float(y), yaw), recorded=None))
 
     def change_rover(self, keys: Sequence[Key], value: float) -> None:
         """Change a number of the rover, the same at all of the keys in the rover file.
@@ -115,10 +104,6 @@ class ViewSession:
         rover = vary(self.wanted.rover, dict.fromkeys(keys, value))
         self.take_change(replace(self.wanted, rover=rover))
 
-    def reset(self) -> None:
-        """Take the numbers of the rover as it was loaded, with its arm stowed."""
-        self.take_change(self.wanted.as_loaded())
-
     def undo(self) -> None:
         """Take the numbers of the rover before the last change.
 
@@ -127,12 +112,12 @@ class ViewSession:
         """
         if not self._undo:
             raise PlanningError("there is no change of this rover to undo")
-        self._ask(self.wanted.take_values(self._undo.pop()))
+        self.ask(self.wanted.take_values(self._undo.pop()))
 
     def keep_reference(self, values: Scenario | None) -> None:
         """Compare with some values from now on; None: with the rover as it was loaded."""
         self.kept = values
-        self._ask(self.wanted)
+        self.ask()
 
     def take_rover(self, rover: Rover) -> None:
         """Take another rover as it was loaded, and plan again."""
@@ -142,20 +127,17 @@ class ViewSession:
         """Plan for a whole scenario on the same ground."""
         if scenario.loaded is not self.wanted.loaded:
             self.kept, self._undo = None, []
-        self._ask(scenario)
+        self.ask(scenario)
 
     def take_change(self, scenario: Scenario) -> None:
         """Take other values, and perhaps a path of its own; one step to undo."""
         if self.is_complete:
             self._undo = [*self._undo[-MAX_STEPS:], self.wanted]
-        self._ask(scenario)
+        self.ask(scenario)
 
-    def judge_again(self) -> None:
-        """Judge what is wanted, after it was stopped."""
-        self._ask(self.wanted)
-
-    def _ask(self, wanted: Scenario, index: int | None = None) -> None:
-        """Judge a scenario, and look at a path by its index (default: the same as before)."""
+    def ask(self, wanted: Scenario | None = None, index: int | None = None) -> None:
+        """Judge a scenario, and look at a path by its index; each is by default as before."""
+        wanted = wanted or self.wanted
         same = wanted.has_paths_of(self.shown.scenario)
         if index is not None:
             self._index = index
@@ -182,7 +164,7 @@ class ViewSession:
                 self.shown, self._index = found, found.index
         elif is_newest and isinstance(found, REFUSALS):
             self._index = self.shown.index
-            self._ask(self.shown.scenario)  # also what was left of it
+            self.ask(self.shown.scenario)  # also what was left of it
             self.refusal = str(found)
         elif is_newest:
             self.is_stopped = True
@@ -208,9 +190,3 @@ class ViewSession:
         start, goal = tuple(poses[0].tolist()), tuple(poses[-1].tolist())
         self.wanted = self.kept = replace(wanted, start=start, goal=goal, recorded=poses)
         self.shown, self._index = show_recorded(self.wanted, prediction, reasons), 0
-
-
-def _facing(start: Pose | Floats, goal: Pose | Floats) -> Pose:
-    """Return the pose at a goal x, y [m] with the yaw of the straight line from start to goal."""
-    yaw = np.arctan2(goal[1] - start[1], goal[0] - start[0])
-    return float(goal[0]), float(goal[1]), float(yaw)

@@ -27,7 +27,7 @@ from rover_planner.survey.layers import (
 )
 from rover_planner.survey.store import SurveyStore
 from rover_planner.viewer.state.colours import UNKNOWN, to_css
-from rover_planner.viewer.state.layers import ColouredGround, Legend
+from rover_planner.viewer.state.layers import ColouredGround
 
 MAX_READ = 1200
 """Most cells along a side that are read of a layer; of more, every second, third, ..."""
@@ -43,10 +43,31 @@ class ShownSurvey:
     names = (CLASS, LIMIT)
     """Names of the layers to choose from."""
 
-    def __init__(self, store: SurveyStore):
-        """Show a survey; `open_survey` also compares it with rover and map."""
-        self._store = store
-        self._every = count_skipped(store, MAX_READ)
+    def __init__(self, path: Path, rover: Rover, terrain: Terrain | None):
+        """Open a survey to show it with a rover on a map.
+
+        Args:
+            path: Folder of the store.
+            rover: The rover that is shown.
+            terrain: The map that is shown; None if it is the survey's own.
+
+        Raises:
+            PlanningError: It is no survey, or one of another rover or map.
+        """
+        self._store = SurveyStore(path)
+        self._every = count_skipped(self._store, MAX_READ)
+        recorded = self._store.notes.description
+        if recorded["rover"] != to_plain(asdict(rover)):
+            other = recorded["rover"]["name"]
+            what = "another " + rover.name if other == rover.name else f"{other}, not {rover.name}"
+            raise PlanningError(
+                f"{show_file(path)} is a survey of {what}; name the rover that was surveyed"
+            )
+        if terrain is not None and recorded["map"] != fingerprint(terrain):
+            raise PlanningError(
+                f"{show_file(path)} is a survey of another map, or of one with other gaps; give "
+                "the map and the --max-gap that were surveyed (default 0), or leave TERRAIN out"
+            )
 
     def colour(
         self, name: str, rover: Rover, options: SweepOptions, places: tuple[Floats, Floats]
@@ -71,10 +92,14 @@ class ShownSurvey:
         numbers = np.minimum(numbers, len(labels))
         named = [*enumerate(labels), (len(labels), UNKNOWN_LABEL)]
         keys = [(to_hex(colours(k)), label) for k, label in named if (numbers == k).any()]
-        differences = self.find_differences(rover, options)
-        changed = [f"not as on the page: {'; '.join(differences)}"] if differences else []
-        legend = Legend(name, tuple(keys), notes=(self._describe(name), *changed))
         notes, (x, y), (ny, nx) = self._store.notes, places, numbers.shape
+        asked = notes.description["options"]
+        margin = f", control margin {asked['control_margin']:g}" if name == CLASS else ""
+        about = f"{notes.headings} headings, a cell every {notes.cell:g} m{margin}"
+        told = [f"{notes.description['rover']['name']}, {about}"]
+        if differences := self.find_differences(rover, options):
+            told.append(f"not as on the page: {'; '.join(differences)}")
+        legend = {"title": name, "keys": keys, "gradient": [], "ends": [], "notes": told}
         cell, (left, low) = notes.cell * self._every, notes.frame.origin
         columns = np.rint((x - left) / cell).astype(int).clip(0, nx - 1)
         rows = np.rint((y - low) / cell).astype(int).clip(0, ny - 1)
@@ -99,40 +124,6 @@ class ShownSurvey:
                     f"{name} {_write_value(value)} in the survey, {_write_value(other)} here"
                 )
         return tuple(found)
-
-    def _describe(self, name: str) -> str:
-        """Return in words what a layer is about."""
-        notes = self._store.notes
-        rover, options = notes.description["rover"]["name"], notes.description["options"]
-        margin = f", control margin {options['control_margin']:g}" if name == CLASS else ""
-        return f"{rover}, {notes.headings} headings, a cell every {notes.cell:g} m{margin}"
-
-
-def open_survey(path: Path, rover: Rover, terrain: Terrain | None) -> ShownSurvey:
-    """Open a survey to show it with a rover on a map.
-
-    Args:
-        path: Folder of the store.
-        rover: The rover that is shown.
-        terrain: The map that is shown; None if it is the survey's own.
-
-    Raises:
-        PlanningError: It is no survey, or one of another rover or map.
-    """
-    store = SurveyStore(path)
-    recorded = store.notes.description
-    if recorded["rover"] != to_plain(asdict(rover)):
-        other = recorded["rover"]["name"]
-        what = "another " + rover.name if other == rover.name else f"{other}, not {rover.name}"
-        raise PlanningError(
-            f"{show_file(path)} is a survey of {what}; name the rover that was surveyed"
-        )
-    if terrain is not None and recorded["map"] != fingerprint(terrain):
-        raise PlanningError(
-            f"{show_file(path)} is a survey of another map, or of one with other gaps; give the "
-            "map and the --max-gap that were surveyed (default 0), or leave TERRAIN out"
-        )
-    return ShownSurvey(store)
 
 
 def load_map(path: Path, max_cells: int) -> Terrain:

@@ -24,7 +24,17 @@ pytestmark = pytest.mark.slow
 
 LSR1 = load_rover("lsr1")
 QUERY = write_link(
-    PageLink({}, {}, "0", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), "equal", "", 1, 0.0, "height", 0.0)
+    PageLink(
+        loaded={},
+        rover={},
+        ground="0",
+        start=(0.0, 0.0, 0.0),
+        goal=(1.0, 0.0, 0.0),
+        policy="equal",
+        soil="",
+        path=1,
+        time=0.0,
+    )
 )
 PLAN = "/lines/plan"
 LEVEL = Terrain(np.zeros((160, 160)), 0.05, (-4.0, -4.0))
