@@ -3,8 +3,19 @@
 
 from collections.abc import Iterator
 
-from rover_planner.nodes.programs import PROGRAMS
-from rover_planner.parameters.table import ParameterSpec
+from rover_planner.parameters.ground_learner import GroundLearnerParameters
+from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
+from rover_planner.parameters.table import ParameterSpec, ParameterTable, specs_of
+from rover_planner.parameters.traction_controller import TractionControllerParameters
+from rover_planner.parameters.traverse_server import TraverseServerParameters
+
+TABLES: dict[str, type[ParameterTable]] = {
+    "/traverse_server": TraverseServerParameters,
+    "/traction_controller": TractionControllerParameters,
+    "/rover_simulator": RoverSimulatorParameters,
+    "/ground_learner": GroundLearnerParameters,
+}
+"""Tables of the nodes, by name and in the order of the document."""
 
 
 def parameters_document() -> str:
@@ -26,9 +37,8 @@ def parameters_document() -> str:
 def _sections() -> Iterator[str]:
     """Yield the lines of a Markdown table per node; it only names rows of an earlier table."""
     homes: dict[str, str] = {}
-    tables = {f"/{name}": one.parameters for name, one in PROGRAMS.items() if one.parameters}
-    for node, specs in tables.items():
-        rows = {spec.name: _row(spec) for spec in specs}
+    for node, table in TABLES.items():
+        rows = {spec.name: _row(spec) for spec in specs_of(table)}
         yield from (f"## {node}", "")
         yield from ("| name | default; other choices | meaning |", "|---|---|---|")
         yield from (row for row in rows.values() if row not in homes)
