@@ -235,12 +235,12 @@ def _sum_up(
         "first_limit": np.where(passes.all(axis=1), np.uint8(NO_LIMIT), first),
         "passable_headings": pack_bits(passes),
     }
-    for quantity in QUANTITIES:
-        values = numbers[quantity.row].reshape(-1, headings)
+    for name, (row, high_is_bad) in QUANTITIES.items():
+        values = numbers[row].reshape(-1, headings)
         ends: tuple[Callable[..., Any], Callable[..., Any]] = np.fmax.reduce, np.fmin.reduce
-        worst, best = ends if quantity.high_is_bad else ends[::-1]
-        layers[f"worst_{quantity.name}"] = worst(values, axis=1)
-        layers[f"best_{quantity.name}"] = best(values, axis=1)
+        worst, best = ends if high_is_bad else ends[::-1]
+        layers[f"worst_{name}"] = worst(values, axis=1)
+        layers[f"best_{name}"] = best(values, axis=1)
     return layers
 
 
