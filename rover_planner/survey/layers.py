@@ -69,30 +69,25 @@ def bits_type(headings: int) -> np.dtype:
     return np.dtype(f"u{bits // 8}")
 
 
-def types_of_layers(headings: int, turns: bool, chance: bool) -> dict[str, np.dtype]:
-    """Return the layers of a survey and their types.
+def list_layers(headings: int, turns: bool, chance: bool) -> dict[str, np.number]:
+    """Return the layers of a survey, each with its value in cells that are not surveyed.
+
+    The value has the type of the layer.
 
     Args:
         headings: Number of headings.
         turns: Whether turns on the spot are judged.
         chance: Whether chances of failure are found.
     """
-    types: dict[str, np.dtype] = {name: np.dtype("u1") for name in ("worst_class", "best_class")}
-    types["first_limit"] = np.dtype("u1")
-    types["passable_headings"] = bits_type(headings)
-    if turns:
-        types["turnable_headings"] = bits_type(headings)
+    layers: dict[str, np.number] = {}
+    for name in ("worst_class", "best_class", "first_limit"):
+        layers[name] = np.uint8(NOT_SURVEYED)
+    for name in ("passable_headings", *(("turnable_headings",) if turns else ())):
+        layers[name] = bits_type(headings).type(0)
     for name in (*QUANTITIES, *(("failure_chance",) if chance else ())):
         for which in ("worst", "best"):
-            types[f"{which}_{name}"] = np.dtype("f4")
-    return types
-
-
-def fill_of(name: str) -> float | int:
-    """Return the value of a layer in cells that are not surveyed."""
-    if name in ("worst_class", "best_class", "first_limit"):
-        return NOT_SURVEYED
-    return 0 if name.endswith("_headings") else float("nan")
+            layers[f"{which}_{name}"] = np.float32(np.nan)
+    return layers
 
 
 def pack_bits(passes: NDArray[np.bool_]) -> NDArray:

@@ -24,10 +24,9 @@ from rover_planner.survey.layers import (
     CLASS_NUMBERS,
     NO_LIMIT,
     QUANTITIES,
-    fill_of,
+    list_layers,
     number_limits,
     pack_bits,
-    types_of_layers,
 )
 from rover_planner.survey.request import SurveyRequest
 
@@ -78,8 +77,8 @@ def warm_up_survey(request: SurveyRequest) -> None:
 
 def refuse_all(request: SurveyRequest, cells: int) -> dict[str, np.ndarray]:
     """Return the layers (cells,) of a tile of unknown ground."""
-    types = types_of_layers(request.headings, request.turns, request.chance)
-    layers = {name: np.full(cells, fill_of(name), kind) for name, kind in types.items()}
+    empty = list_layers(request.headings, request.turns, request.chance)
+    layers = {name: np.full(cells, value) for name, value in empty.items()}
     layers["worst_class"][:] = layers["best_class"][:] = CLASS_NUMBERS[IMPASSABLE]
     layers["first_limit"][:] = number_limits()["unknown_ground"]
     return layers
