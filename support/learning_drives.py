@@ -10,8 +10,8 @@ from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.quaternions import matrix_from_xyzw
 from rover_planner.learning import drive_log as log
-from rover_planner.simulator.plant import Plant
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
+from rover_planner.simulator.simulation import Plant
 from support.rough_grounds import plane
 
 RATE = 50.0

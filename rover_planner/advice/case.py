@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from rover_physics.bounds.path import SIGMAS
-from rover_physics.chance.failure_chance import SUMS
 from rover_physics.limits.table import CHANCE, Sense
 from rover_physics.names import SERVO, WHEEL_POSITIONS
 from rover_physics.numerics.arrays import Floats
@@ -31,8 +30,6 @@ from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 
 MOST_FRICTION = 1.5
 """Largest friction that is asked for."""
-BEFORE = 1.5
-"""Length of path that decides about drift and lifts of servos [wheelbases]: sums over one."""
 EDGE = 2.0
 """Length of path around a failure that decides whether a wheel falls there [wheel radii]."""
 SEARCH = LatticeSettings(budget=1.0, ends_at_first=True)
@@ -144,13 +141,6 @@ class JudgedCase:
         return self._limits.rows[int(self._uses[place].argmax())].code.replace("_", " ")
 
     @property
-    def fails_by_sum(self) -> bool:
-        """True if no limit is broken that a waypoint breaks without the path before it."""
-        broken = self._uses[self.verdict.first_failure] > 1.0
-        rows = zip(self._limits.rows, broken, strict=True)
-        return all(row.reads in SUMS for row, is_broken in rows if is_broken)
-
-    @property
     def _limits(self) -> RoverLimits:
         return limits_of(self.case.rover, self.prediction.policy)
 
@@ -241,10 +231,8 @@ class JudgedCase:
             return None  # an end is not on the map
         return None if found.path is None else found.path.poses
 
-    def rows_around(self, place: int, fails_by_sum: bool) -> slice:
-        """Return the rows of the path that show whether a waypoint fails, perhaps by a sum."""
-        rover, distance = self.case.rover, self.distance
-        before = BEFORE * rover.wheelbase if fails_by_sum else EDGE * rover.wheel.radius
-        near = distance[place] - before, distance[place] + EDGE * rover.wheel.radius
-        first, last = np.searchsorted(distance, near)
+    def rows_around(self, place: int) -> slice:
+        """Return the rows of the path that show whether a waypoint fails by itself."""
+        near = EDGE * self.case.rover.wheel.radius * np.array([-1.0, 1.0])
+        first, last = np.searchsorted(self.distance, self.distance[place] + near)
         return slice(max(0, min(int(first), place - 1)), int(last) + 1)

@@ -15,7 +15,6 @@ import numpy as np
 
 from rover_physics.errors import RoverError
 from rover_physics.limits.table import CHANCE, TRAPPED
-from rover_physics.names import SERVO
 from rover_planner.advice.case import Case, JudgedCase
 from rover_planner.advice.levers import LEVERS, Choice, Lever, Span
 from rover_planner.advice.remedy import Remedy, SetLever
@@ -37,8 +36,6 @@ class FailedPlace:
     """Index of the waypoint."""
     by_chance: bool
     """True if it kept the limits, but not in enough samples."""
-    by_sum: bool
-    """True if it may be the path before it that decides."""
 
 
 @dataclass(frozen=True)
@@ -166,8 +163,7 @@ class _Seeker:
     def _fails_where_known(self, case: Case) -> bool:
         """Return whether a case fails where others have failed."""
         for known in self._failed:
-            by_sum = known.by_sum and case.options.policy == SERVO
-            rows = self._refusal.rows_around(known.place, by_sum)
+            rows = self._refusal.rows_around(known.place)
             if case.fails_at(known.place, rows, known.by_chance):
                 self._remember(known)
                 return True
@@ -177,8 +173,7 @@ class _Seeker:
         """Remember where a case failed."""
         verdict = judged.verdict
         if verdict.code != TRAPPED:
-            by_chance = verdict.code == CHANCE
-            self._remember(FailedPlace(verdict.first_failure, by_chance, judged.fails_by_sum))
+            self._remember(FailedPlace(verdict.first_failure, verdict.code == CHANCE))
 
     def _remember(self, known: FailedPlace) -> None:
         others = [one for one in self._failed if one != known]

@@ -89,16 +89,19 @@ def read_curvature(path: Path, count: int) -> NDArray[np.float64] | None:
         return curvature
 
 
-def read_prediction(path: Path) -> tuple[PathPrediction, tuple[str, ...]]:
+def read_prediction(
+    path: Path,
+) -> tuple[PathPrediction, tuple[str, ...], Assumptions | None]:
     """Read a file of `write_prediction`, without crossings between waypoints and bounds.
 
     Returns:
-        The prediction of n waypoints, and for each the reason why it is not passable, "" if it
-        is passable.
+        The prediction of n waypoints; for each the reason why it is not passable, "" if it is
+        passable; and what the prediction was made for, None if the file does not tell.
 
     Raises:
         PlanningError: The file is missing or is not a file of predictions.
     """
+    assumptions = None
     with errors_of(path, PlanningError), open_npz(path) as archive:
         reasons = archive.read("reason", most=MAX_REASONS, kinds=TEXTS, shape=(None,)).tolist()
         if not 1 <= len(reasons) <= MAX_POSES:
@@ -108,26 +111,16 @@ def read_prediction(path: Path) -> tuple[PathPrediction, tuple[str, ...]]:
             kinds, dtype = TYPES.get(name, (NUMBERS, np.float64))
             size, most = (len(reasons), *shape), len(reasons) * math.prod(shape)
             arrays[name] = archive.read(name, most=most, kinds=kinds, shape=size, dtype=dtype)
+        if ASSUMPTIONS in archive.names:
+            text = str(archive.read(ASSUMPTIONS, most=MAX_ASSUMPTIONS, kinds=TEXTS, shape=()))
+            try:
+                assumptions = read_assumptions(text)
+            except PlanningError as error:
+                raise PlanningError(f"{show_file(path)}: {error}") from None
     _check_numbers(path, arrays)
     poses, status = arrays.pop("poses"), arrays.pop("status")
     del arrays["settled"]
-    return prediction_of(poses, status, arrays, "recorded"), tuple(reasons)
-
-
-def read_recorded_assumptions(path: Path) -> Assumptions | None:
-    """Read what the prediction in a file was made for; None if the file does not tell.
-
-    Raises:
-        PlanningError: The file is missing, or the assumptions are invalid.
-    """
-    with errors_of(path, PlanningError), open_npz(path) as archive:
-        if ASSUMPTIONS not in archive.names:
-            return None
-        text = str(archive.read(ASSUMPTIONS, most=MAX_ASSUMPTIONS, kinds=TEXTS, shape=()))
-    try:
-        return read_assumptions(text)
-    except PlanningError as error:
-        raise PlanningError(f"{show_file(path)}: {error}") from None
+    return prediction_of(poses, status, arrays, "recorded"), tuple(reasons), assumptions
 
 
 def _check_numbers(path: Path, arrays: dict[str, Any]) -> None:

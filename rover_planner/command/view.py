@@ -101,8 +101,11 @@ def view(
     name = name_ground(terrain, survey)
     with contextlib.ExitStack() as closing:
         if follow:
-            given = name if terrain is not None else ""
-            page: PageBase = _follow(closing, model, ground, (host, port), given)
+            from rover_planner.viewer.live.listener import listen
+            from rover_planner.viewer.pages.live_page import LivePage
+
+            listener, given = closing.enter_context(listen()), name if terrain is not None else ""
+            page: PageBase = LivePage(model, ground, listener, (host, port), given)
         else:
             wanted = Scenario(model, model, ground, start or low, goal or high)
             session = ViewSession(wanted)
@@ -171,33 +174,18 @@ def _show(
     name: str,
 ) -> "PageBase":
     """Serve a page that plans, or replays a recorded prediction."""
-    from rover_planner.command.prediction_files import read_prediction, read_recorded_assumptions
+    from rover_planner.command.prediction_files import read_prediction
     from rover_planner.viewer.pages.page import Page
 
     if prediction is not None:
-        assumptions = read_recorded_assumptions(prediction)
+        recorded, reasons, assumptions = read_prediction(prediction)
         if assumptions is not None and assumptions.rover != session.wanted.rover.name:
             raise PlanningError(
                 f"{prediction} is about rover {assumptions.rover}; the page shows "
                 f"{session.wanted.rover.name}"
             )
-        session.replay(*read_prediction(prediction), assumptions)
+        session.replay(recorded, reasons, assumptions)
     return Page(session, address, survey, name)
-
-
-def _follow(
-    closing: contextlib.ExitStack,
-    rover: "Rover",
-    ground: "Terrain",
-    address: tuple[str, int],
-    ground_name: str,
-) -> "PageBase":
-    """Serve a page that follows a live graph."""
-    from rover_planner.viewer.live.listener import listen
-    from rover_planner.viewer.pages.live_page import LivePage
-
-    listener = closing.enter_context(listen())
-    return LivePage(rover, ground, listener, address, ground_name)
 
 
 def _load_or_make(name: str | None, follow: bool, max_cells: int) -> "Terrain":

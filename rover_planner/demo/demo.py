@@ -290,22 +290,21 @@ def _draw(
 ) -> int:  # fmt: skip
     """Draw the picture; return how many verdicts agree with those computed here."""
     with steps.step("draw the picture") as status:
-        from rover_planner.figures.plots import LabelledAnswer, draw_answers
+        from rover_planner.figures.plots import draw_answers
         from rover_planner.planning.path_query import answer_path_query
 
-        labelled = []
+        answered = []
         for goal in mission.goals:
             status.update(f"sweep the candidate paths to goal {goal.name} for the picture")
             answer = answer_path_query(rover, ground, mission.start, goal.pose)
-            labelled.append(LabelledAnswer(goal.name, goal.intent, answer))
+            answered.append((goal, answer))
         status.update("draw the picture")
-        passable = sum(one.answer.traversable for one in labelled)
-        title = f"{rover.name}: {passable} of {len(labelled)} goals can be reached"
-        draw_answers(picture, rover, ground, labelled, title)
+        passable = sum(answer.traversable for _, answer in answered)
+        title = f"{rover.name}: {passable} of {len(answered)} goals can be reached"
+        draw_answers(picture, rover, ground, answered, title)
     return sum(
-        one.answer.traversable == answer["traversable"]
-        and one.answer.chosen.verdict.code == answer["code"]
-        for one, answer in zip(labelled, answers, strict=True)
+        own.traversable == answer["traversable"] and own.chosen.verdict.code == answer["code"]
+        for (_, own), answer in zip(answered, answers, strict=True)
     )
 
 

@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
 
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
@@ -106,9 +105,11 @@ def draw_figure4(path: Path, rover: Rover) -> None:
         for row in range(3):
             for column in range(3):
                 axes = panels[row, column]
-                axes.axhline(centre[column], color="#999999", linewidth=0.8)
                 for case in (ALONE, HELD):
                     _draw_line(axes, torques, loads[row, case][:, column], case)
+                axes.axhline(
+                    centre[column], color="#999999", linewidth=0.8, zorder=1.9, label="no torque"
+                )
                 axes.set_ylim(centre[column] - largest, centre[column] + _HEADROOM * largest)
                 axes.set_xlabel(f"{AXLES[row]} wheel torque [mN·m]")
                 axes.set_ylabel(f"{AXLES[column]} load [N]")
@@ -120,7 +121,8 @@ def draw_figure4(path: Path, rover: Rover) -> None:
             fontsize=13,
             fontweight="bold",
         )
-        figure.legend(handles=_legend(), loc="outside lower center", ncols=3)
+        handles, labels = panels[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=3)
 
 
 def _draw_line(axes: Axes, torques: np.ndarray, loads: np.ndarray, case: str) -> None:
@@ -136,11 +138,3 @@ def _draw_line(axes: Axes, torques: np.ndarray, loads: np.ndarray, case: str) ->
         color=_COLOURS[case], fontsize=8.5,
         bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
     )  # fmt: skip
-
-
-def _legend() -> list[Line2D]:
-    lines = [
-        Line2D([], [], color=_COLOURS[case], linestyle=_DASHES[case], linewidth=1.8, label=case)
-        for case in (ALONE, HELD)
-    ]
-    return [*lines, Line2D([], [], color="#999999", linewidth=0.8, label="no torque")]

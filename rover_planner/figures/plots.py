@@ -2,7 +2,6 @@
 """Draws answers: candidate paths on the hill-shaded terrain, and wheel values along them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +27,7 @@ from rover_planner.figures.pictures import (
     find_extent,
 )
 from rover_planner.maps.hill_shade import LEVEL_SHADE, hill_shade
+from rover_planner.planning.goals import Goal
 from rover_planner.planning.path_geometry import distance_along
 from rover_planner.planning.path_query import Candidate, PathAnswer
 
@@ -40,20 +40,12 @@ _COLUMNS = 8
 _EDGE = "#E4E1DC"
 
 
-@dataclass(frozen=True)
-class LabelledAnswer:
-    """An answer with the name of its goal."""
-
-    name: str
-    """Short name, drawn at the goal."""
-    intent: str
-    """Kind of goal, for titles."""
-    answer: PathAnswer
-    """The candidates with their verdicts."""
+Answered = tuple[Goal, PathAnswer]
+"""A goal, and the candidates to it with their verdicts."""
 
 
 def draw_answers(
-    path: Path, rover: Rover, terrain: Terrain, answers: Sequence[LabelledAnswer], title: str = ""
+    path: Path, rover: Rover, terrain: Terrain, answers: Sequence[Answered], title: str
 ) -> None:
     """Draw the answers to queries on one terrain.
 
@@ -77,13 +69,12 @@ def draw_answers(
     with drawing(path, (max(12.5, 2.6 * len(shown)), 15.5)) as figure:
         grid = figure.add_gridspec(2, 1, height_ratios=(1.0, 1.05))
         above, below = (figure.add_subfigure(grid[row]) for row in (0, 1))
-        if title:
-            figure.suptitle(title, fontsize=14, fontweight="bold")
+        figure.suptitle(title, fontsize=14, fontweight="bold")
         _draw_map(above.subplots(), terrain, answers)
         _draw_panels(below, rover, shown)
 
 
-def _draw_map(axes: Axes, terrain: Terrain, answers: Sequence[LabelledAnswer]) -> None:
+def _draw_map(axes: Axes, terrain: Terrain, answers: Sequence[Answered]) -> None:
     """Draw the terrain with the candidate paths of all answers."""
     extent = find_extent(terrain.origin, terrain.elevation.shape, terrain.resolution)
     view = _view(terrain, answers)
@@ -95,11 +86,11 @@ def _draw_map(axes: Axes, terrain: Terrain, answers: Sequence[LabelledAnswer]) -
     axes.imshow(_shade_layer(terrain), interpolation="bilinear", zorder=1, **placed)
     bar = axes.inset_axes((1.015, 0.12, 0.015, 0.76))
     axes.figure.colorbar(image, cax=bar, label="elevation [m]")
-    for labelled in answers:
-        _draw_candidates(axes, labelled.answer)
-    for labelled in answers:
-        _draw_goal(axes, labelled)
-    start = answers[0].answer.chosen.poses[0]
+    for _, answer in answers:
+        _draw_candidates(axes, answer)
+    for goal, answer in answers:
+        _draw_goal(axes, goal.name, answer)
+    start = answers[0][1].chosen.poses[0]
     axes.plot(*start[:2], **_start_style(start[2], 17), zorder=9)
     axes.set(xlim=view[:2], ylim=view[2:], xlabel="x [m]", ylabel="y [m]")
     axes.set_aspect("equal")
@@ -177,19 +168,19 @@ def _draw_candidates(axes: Axes, answer: PathAnswer) -> None:
         axes.plot(*answer.chosen.poses[:, :2].T, **thick, **_around(INK, 4.6))
 
 
-def _draw_goal(axes: Axes, labelled: LabelledAnswer) -> None:
+def _draw_goal(axes: Axes, name: str, answer: PathAnswer) -> None:
     """Mark a goal with its name in the colour of the verdict."""
-    x, y = labelled.answer.chosen.poses[-1, :2]
-    colour = PASSABLE if labelled.answer.traversable else REFUSED
+    x, y = answer.chosen.poses[-1, :2]
+    colour = PASSABLE if answer.traversable else REFUSED
     axes.plot(x, y, "o", ms=17, color=colour, markeredgecolor="white", mew=1.5, zorder=8)
     middle: dict[str, Any] = {"ha": "center", "va": "center_baseline"}
-    axes.text(x, y, labelled.name, color="white", fontweight="bold", zorder=10, clip_on=True,
+    axes.text(x, y, name, color="white", fontweight="bold", zorder=10, clip_on=True,
               **middle)  # fmt: skip
 
 
-def _view(terrain: Terrain, answers: Sequence[LabelledAnswer]) -> tuple[float, ...]:
+def _view(terrain: Terrain, answers: Sequence[Answered]) -> tuple[float, ...]:
     """Return xmin, xmax, ymin, ymax [m] of the visible area: all paths and a margin."""
-    places = np.concatenate([c.poses[:, :2] for a in answers for c in a.answer.candidates])
+    places = np.concatenate([c.poses[:, :2] for _, answer in answers for c in answer.candidates])
     lower, upper = places.min(axis=0), places.max(axis=0)
     margin = 0.08 * float(max(upper - lower)) + 0.5
     lower, upper = lower - margin, upper + margin
@@ -220,7 +211,7 @@ def _elevation_range(
     return float(low), float(max(high, low + 0.05))
 
 
-def _draw_panels(figure, rover: Rover, shown: Sequence[LabelledAnswer]) -> None:
+def _draw_panels(figure, rover: Rover, shown: Sequence[Answered]) -> None:
     """Draw a column of panels for each answer shown."""
     limits = rover.limits
     rows = (
@@ -230,9 +221,9 @@ def _draw_panels(figure, rover: Rover, shown: Sequence[LabelledAnswer]) -> None:
         ("tip-over margin\n(ratio to flat) [-]", "tip_over_ratio", limits.tip_over_ratio),
     )
     panels = figure.subplots(len(rows), len(shown), sharex="col", sharey="row", squeeze=False)
-    for column, labelled in enumerate(shown):
-        candidate = labelled.answer.chosen
-        panels[0, column].set_title(_panel_title(labelled), loc="left")
+    for column, (goal, answer) in enumerate(shown):
+        candidate = answer.chosen
+        panels[0, column].set_title(_panel_title(goal, answer), loc="left")
         for row, (label, name, limit) in enumerate(rows):
             axes = panels[row, column]
             _draw_quantity(axes, candidate, name)
@@ -244,7 +235,7 @@ def _draw_panels(figure, rover: Rover, shown: Sequence[LabelledAnswer]) -> None:
                 axes.set_ylabel(label)
         panels[-1, column].set_xlabel("distance along the path [m]")
     for row, (_, name, limit) in enumerate(rows):
-        highest = max(_highest(one.answer.chosen, name) for one in shown)
+        highest = max(_highest(answer.chosen, name) for _, answer in shown)
         if limit is not None:
             highest = max(limit, min(highest, 2 * max(limit, 1.0)))
         panels[row, 0].set_ylim(0, 1.08 * max(highest, 1e-3))
@@ -258,13 +249,13 @@ def _highest(candidate: Candidate, name: str) -> float:
     return float(np.max(values, where=np.isfinite(values), initial=0.0))
 
 
-def _panel_title(labelled: LabelledAnswer) -> str:
+def _panel_title(goal: Goal, answer: PathAnswer) -> str:
     """Return the heading of a column."""
-    chosen = labelled.answer.chosen
-    if labelled.answer.traversable:
-        return f"{labelled.name} ({labelled.intent}):\nchosen path, {chosen.length:.1f} m"
+    chosen = answer.chosen
+    if answer.traversable:
+        return f"{goal.name} ({goal.intent}):\nchosen path, {chosen.length:.1f} m"
     reason = chosen.verdict.code.replace("_", " ")
-    return f"{labelled.name} ({labelled.intent}):\nrefused, {reason}"
+    return f"{goal.name} ({goal.intent}):\nrefused, {reason}"
 
 
 def _draw_quantity(axes: Axes, candidate: Candidate, name: str) -> None:

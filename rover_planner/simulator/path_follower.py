@@ -7,6 +7,8 @@ from itertools import pairwise
 import numpy as np
 
 from rover_physics.numerics.arrays import Floats
+from rover_planner.planning.angles import wrap
+from rover_planner.planning.path_geometry import distance_along
 
 ARRIVED = 0.02
 """Distance along the path from its end at which it is finished, in look-ahead distances."""
@@ -97,20 +99,18 @@ class _Leg:
     """A stretch of a path, or a turn on the spot, with the distance that is done."""
 
     def __init__(self, poses: Floats):
-        self.is_turn = len(poses) > 1 and bool((_steps(poses) <= SAME_PLACE).all())
+        self._along = distance_along(poses)
+        self.is_turn = len(poses) > 1 and bool((np.diff(self._along) <= SAME_PLACE).all())
         self.gear = -1.0 if _gears(poses).min(initial=0.0) < 0.0 else 1.0
         self._places = poses[:, :2]
         self._yaw = np.unwrap(poses[:, 2])
-        self._along = np.concatenate([[0.0], np.cumsum(_steps(poses))])
         self.length = 0.0 if self.is_turn else float(self._along[-1])
         self.done = 0.0
-        self._seen: float | None = None
+        self._seen = float(self._yaw[0])
 
     def left_to_turn(self, pose: Floats) -> float:
         """Return the turn [rad] that is left, positive to the left; of large turns, too."""
-        if self._seen is None:
-            self._seen = self._yaw[0] + _wrap(float(pose[2]) - self._yaw[0])
-        self._seen += _wrap(float(pose[2]) - self._seen)
+        self._seen += math.remainder(float(pose[2]) - self._seen, 2.0 * math.pi)
         return float(self._yaw[-1] - self._seen)
 
     def project(self, pose: Floats, look_ahead: float) -> None:
@@ -140,18 +140,8 @@ def _find_legs(poses: Floats) -> list[_Leg]:
 def _gears(poses: Floats) -> Floats:
     """Return 1 for steps (n - 1,) forwards, -1 for those backwards, 0 for turns on the spot."""
     steps = np.diff(poses, axis=0)
-    turns = np.array([_wrap(turn) for turn in steps[:, 2]])
+    turns = wrap(steps[:, 2])
     yaw = poses[:-1, 2] + 0.5 * turns
     ahead = steps[:, 0] * np.cos(yaw) + steps[:, 1] * np.sin(yaw)
-    on_the_spot = (_steps(poses) <= SAME_PLACE) & (np.abs(turns) > MIN_TURN)
+    on_the_spot = (np.hypot(steps[:, 0], steps[:, 1]) <= SAME_PLACE) & (np.abs(turns) > MIN_TURN)
     return np.where(on_the_spot, 0.0, np.where(ahead < 0.0, -1.0, 1.0))
-
-
-def _steps(poses: Floats) -> Floats:
-    """Return the lengths (n - 1,) of the steps between poses [m]."""
-    return np.asarray(np.hypot(*np.diff(poses[:, :2], axis=0).T))
-
-
-def _wrap(angle: float) -> float:
-    """Return an angle [rad] in -pi to pi."""
-    return math.remainder(angle, 2.0 * math.pi)

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The interface of a simulated rover, common to all physics engines."""
+"""What is measured of a simulated rover, whatever simulates it."""
 
 from dataclasses import dataclass
-from typing import Protocol
 
 from rover_physics.numerics.arrays import Floats
 
@@ -27,29 +26,3 @@ class PlantState:
     """(6,) torques of the motors [N m], wheel order."""
     stopped: str
     """Reason why the rover does not move as commanded; empty if it moves."""
-
-
-class Plant(Protocol):
-    """A simulated rover that is driven by speeds or torques for given durations."""
-
-    def drive(self, speed: float, yaw_rate: float, duration: float) -> None:
-        """Drive at a speed [m/s] and yaw rate [rad/s] for a duration [s], with wheel servos.
-
-        Wheels that steer turn at their largest rate, and the rover drives slower or stands until
-        they point along the motion.
-        """
-
-    def pull(self, torques: Floats, command: tuple[float, float], duration: float) -> None:
-        """Apply torques (6,) [N m] for a duration [s].
-
-        `command`, speed [m/s] and yaw rate [rad/s], sets the steering.
-        """
-
-    def brake(self, duration: float) -> None:
-        """Lock the wheels for a duration [s]; they hold as far as their friction reaches."""
-
-    def state(self) -> PlantState:
-        """Return the current measurements."""
-
-    def pose(self) -> Floats:
-        """Return x, y [m] and yaw [rad] (3,) of the body origin."""

@@ -102,7 +102,11 @@ class QuasiStaticPlant:
         return self._pose.copy()
 
     def drive(self, speed: float, yaw_rate: float, duration: float) -> None:
-        """Drive at a speed [m/s] and yaw rate [rad/s] for a duration [s], if this is possible."""
+        """Drive at a speed [m/s] and yaw rate [rad/s] for a duration [s], if this is possible.
+
+        Wheels that steer turn at their largest rate, and the rover drives slower or stands until
+        they point along the motion.
+        """
         if self._repeats("drive", speed, yaw_rate):
             return
         self._torques = self._here.torque[0].copy()

@@ -3,6 +3,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -15,12 +16,17 @@ from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.parameters.rover_simulator import MUJOCO, RoverSimulatorParameters
 from rover_planner.simulator.path_follower import PathFollower
-from rover_planner.simulator.plant import Plant, PlantState
+from rover_planner.simulator.plant import PlantState
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.simulator.range_sensor import RangeSensor
 from rover_planner.simulator.second_try import MAX_TRIES, STUCK_TIME, SecondTry
 from rover_planner.worlds.mars_terrain import make_mars_terrain
 
+if TYPE_CHECKING:
+    from rover_planner.simulator.mujoco_plant import MujocoPlant
+
+Plant: TypeAlias = "QuasiStaticPlant | MujocoPlant"
+"""A simulated rover; all have the same methods."""
 MADE_SIZE, MADE_RESOLUTION = 24.0, 0.05
 """Width and cell size of the generated terrain [m], the default terrain."""
 WIDEST_GAP = 1e6

@@ -88,7 +88,7 @@ def compute_chunk(
     window = layout.window_of(cells)
     grids, soils = source.read(window), source.soil_names
     shape = tuple(span.stop - span.start for span in cells)
-    layers = {name: np.empty(shape, kind) for name, kind in store.notes.types.items()}
+    layers = {name: np.full(shape, value) for name, value in store.notes.layers.items()}
     for tile in layout.tiles_of(chunk):
         part = layout.window_of(tile)
         below = _relative(part, window)
@@ -119,7 +119,7 @@ def estimate_memory(notes: StoreNotes) -> int:
         min((side - 1) * layout.step + 1 + 2 * layout.halo + BLOCK, size)
         for side, size in zip((rows, columns), layout.map_shape, strict=True)
     ]
-    kept = 2 * rows * columns * sum(kind.itemsize for kind in notes.types.values())
+    kept = 2 * rows * columns * sum(value.itemsize for value in notes.layers.values())
     poses = 4 * max(BATCH, notes.headings) * RESULT.itemsize
     return BYTES_OF_PROCESS + BYTES_OF_CELL * sides[0] * sides[1] + kept + poses
 

@@ -27,32 +27,27 @@ def write_cog(path: Path, layer: Any, frame: MapFrame, step: int) -> None:
         PlanningError: The file cannot be written.
     """
     rasterio = import_rasterio()
-    from rasterio.shutil import copy
-
     rows, columns = layer.shape
     size = step * frame.resolution
     left, low = (start - 0.5 * size for start in frame.origin)
     profile = {
-        "driver": "GTiff",
+        "driver": "COG",
         "width": columns,
         "height": rows,
         "count": 1,
         "dtype": layer.dtype.name,
         "transform": rasterio.Affine(size, 0.0, left, 0.0, -size, low + rows * size),
         "nodata": math.nan if layer.dtype.kind == "f" else None,
-        "tiled": True,
         "compress": "deflate",
-        "BIGTIFF": "IF_SAFER",
+        "overview_resampling": "nearest",
     } | ({"crs": frame.crs} if frame.crs else {})
     # In memory, as GDAL does not tell of all that it could not write to a disk.
-    with rasterio.MemoryFile() as plain, rasterio.MemoryFile() as whole:
-        with plain.open(**profile) as file:
+    with rasterio.MemoryFile() as whole:
+        with whole.open(**profile) as file:
             for first in range(0, rows, BAND):
                 end = min(first + BAND, rows)
                 window = rasterio.windows.Window(0, rows - end, columns, end - first)
                 file.write(layer[first:end][::-1], 1, window=window)
-        copy(plain.name, whole.name, driver="COG", compress="deflate",
-             overview_resampling="nearest")  # fmt: skip
         _replace(path, whole.getbuffer())
 
 

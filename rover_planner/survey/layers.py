@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The layers of a survey: names, types, meanings and colours."""
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,30 +24,16 @@ CLASS_COLOURS = ("#009E73", "#56B4E9", "#E69F00", "#D55E00", "#F0E442")
 UNKNOWN_LABEL = "unknown ground, edge, or not surveyed"
 """Name of what has no class."""
 
-Layers = Mapping[str, NDArray]
-"""Layers by name, all of one shape."""
 
-
-class SurveyedQuantity(NamedTuple):
-    """A number of a pose whose worst and best value over the headings are kept."""
-
-    name: str
-    """Name without `worst_` or `best_`."""
-    high_is_bad: bool
-    """True if the worst value is the largest."""
-    unit: str
-    """Unit, empty for a ratio."""
-    row: int
-    """Row of the number in a score of `map_sweep`."""
-
-
-QUANTITIES = (
-    SurveyedQuantity("friction_utilisation", True, "", 0),
-    SurveyedQuantity("torque_saturation", True, "", 1),
-    SurveyedQuantity("tip_over_ratio", False, "", 3),
-    SurveyedQuantity("tilt", True, "rad", 4),
-    SurveyedQuantity("belly_clearance", False, "m", 5),
-)
+QUANTITIES = {
+    "friction_utilisation": (0, True),
+    "torque_saturation": (1, True),
+    "tip_over_ratio": (3, False),
+    "tilt": (4, True),
+    "belly_clearance": (5, False),
+}
+"""Numbers of a pose whose worst and best value over the headings are kept: the row in a score of
+`map_sweep`, and whether the worst value is the largest."""
 
 
 def number_limits() -> dict[str, int]:
@@ -84,30 +69,25 @@ def bits_type(headings: int) -> np.dtype:
     return np.dtype(f"u{bits // 8}")
 
 
-def types_of_layers(headings: int, turns: bool, chance: bool) -> dict[str, np.dtype]:
-    """Return the layers of a survey and their types.
+def list_layers(headings: int, turns: bool, chance: bool) -> dict[str, np.number]:
+    """Return the layers of a survey, each with its value in cells that are not surveyed.
+
+    The value has the type of the layer.
 
     Args:
         headings: Number of headings.
         turns: Whether turns on the spot are judged.
         chance: Whether chances of failure are found.
     """
-    types: dict[str, np.dtype] = {name: np.dtype("u1") for name in ("worst_class", "best_class")}
-    types["first_limit"] = np.dtype("u1")
-    types["passable_headings"] = bits_type(headings)
-    if turns:
-        types["turnable_headings"] = bits_type(headings)
-    for name in (*(one.name for one in QUANTITIES), *(("failure_chance",) if chance else ())):
+    layers: dict[str, np.number] = {}
+    for name in ("worst_class", "best_class", "first_limit"):
+        layers[name] = np.uint8(NOT_SURVEYED)
+    for name in ("passable_headings", *(("turnable_headings",) if turns else ())):
+        layers[name] = bits_type(headings).type(0)
+    for name in (*QUANTITIES, *(("failure_chance",) if chance else ())):
         for which in ("worst", "best"):
-            types[f"{which}_{name}"] = np.dtype("f4")
-    return types
-
-
-def fill_of(name: str) -> float | int:
-    """Return the value of a layer in cells that are not surveyed."""
-    if name in ("worst_class", "best_class", "first_limit"):
-        return NOT_SURVEYED
-    return 0 if name.endswith("_headings") else float("nan")
+            layers[f"{which}_{name}"] = np.float32(np.nan)
+    return layers
 
 
 def pack_bits(passes: NDArray[np.bool_]) -> NDArray:

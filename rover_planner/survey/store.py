@@ -21,9 +21,8 @@ from rover_planner.survey.geotiff import GeoTiffMap
 from rover_planner.survey.layers import (
     CLASS_NUMBERS,
     NOT_SURVEYED,
-    fill_of,
+    list_layers,
     number_limits,
-    types_of_layers,
 )
 from rover_planner.survey.layout import Index, SurveyLayout
 from rover_planner.survey.map_source import MapFrame, StoredMap, keep_map
@@ -63,10 +62,10 @@ class StoreNotes:
         return int(self.description["headings"])
 
     @property
-    def types(self) -> dict[str, np.dtype]:
-        """Types of the layers by name."""
+    def layers(self) -> dict[str, np.number]:
+        """Value of each layer in cells that are not surveyed, of the type of the layer."""
         asked = self.description
-        return types_of_layers(asked["headings"], asked["turns"], asked["chance"])
+        return list_layers(asked["headings"], asked["turns"], asked["chance"])
 
     @property
     def cell(self) -> float:
@@ -110,24 +109,12 @@ class KeptLayer:
     """A Zarr array (rows, columns), which says in one line if it cannot be read."""
 
     def __init__(self, array: Any, path: Path):
-        """Keep an array.
-
-        Args:
-            array: The Zarr array.
-            path: The store, for what is said of it.
-        """
-        self._array = array
-        self._path = path
-
-    @property
-    def shape(self) -> tuple[int, ...]:
+        """Keep the array of a store, whose path is for what is said of it."""
+        self._array, self._path = array, path
+        self.shape: tuple[int, ...] = array.shape
         """Rows and columns."""
-        return tuple(self._array.shape)
-
-    @property
-    def dtype(self) -> np.dtype:
+        self.dtype: np.dtype = array.dtype
         """Type of the values."""
-        return np.dtype(self._array.dtype)
 
     def file_of(self, chunk: Index) -> Path:
         """Return the file of a chunk."""
@@ -259,7 +246,7 @@ class SurveyStore:
 
     def layer_names(self) -> list[str]:
         """Return the names of the layers."""
-        return list(self.notes.types)
+        return list(self.notes.layers)
 
     def layer(self, name: str) -> KeptLayer:
         """Return a layer (rows, columns)."""
@@ -310,13 +297,13 @@ def create_store(path: Path, notes: StoreNotes, terrain: Terrain | None) -> None
     try:
         group: Any = zarr.open_group(aside, mode="w")
         side = min(layout.chunk, max(layout.shape))
-        for name, kind in notes.types.items():
+        for name, value in notes.layers.items():
             group.create_array(
                 name,
                 shape=layout.shape,
                 chunks=(side, side),
-                dtype=kind,
-                fill_value=fill_of(name),
+                dtype=value.dtype,
+                fill_value=value.item(),
             )
         group.create_array(
             SECONDS, shape=layout.chunks, chunks=(1, 1), dtype="f4", fill_value=float("nan")

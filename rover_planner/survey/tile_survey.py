@@ -24,10 +24,9 @@ from rover_planner.survey.layers import (
     CLASS_NUMBERS,
     NO_LIMIT,
     QUANTITIES,
-    fill_of,
+    list_layers,
     number_limits,
     pack_bits,
-    types_of_layers,
 )
 from rover_planner.survey.request import SurveyRequest
 
@@ -78,8 +77,8 @@ def warm_up_survey(request: SurveyRequest) -> None:
 
 def refuse_all(request: SurveyRequest, cells: int) -> dict[str, np.ndarray]:
     """Return the layers (cells,) of a tile of unknown ground."""
-    types = types_of_layers(request.headings, request.turns, request.chance)
-    layers = {name: np.full(cells, fill_of(name), kind) for name, kind in types.items()}
+    empty = list_layers(request.headings, request.turns, request.chance)
+    layers = {name: np.full(cells, value) for name, value in empty.items()}
     layers["worst_class"][:] = layers["best_class"][:] = CLASS_NUMBERS[IMPASSABLE]
     layers["first_limit"][:] = number_limits()["unknown_ground"]
     return layers
@@ -235,12 +234,12 @@ def _sum_up(
         "first_limit": np.where(passes.all(axis=1), np.uint8(NO_LIMIT), first),
         "passable_headings": pack_bits(passes),
     }
-    for quantity in QUANTITIES:
-        values = numbers[quantity.row].reshape(-1, headings)
+    for name, (row, high_is_bad) in QUANTITIES.items():
+        values = numbers[row].reshape(-1, headings)
         ends: tuple[Callable[..., Any], Callable[..., Any]] = np.fmax.reduce, np.fmin.reduce
-        worst, best = ends if quantity.high_is_bad else ends[::-1]
-        layers[f"worst_{quantity.name}"] = worst(values, axis=1)
-        layers[f"best_{quantity.name}"] = best(values, axis=1)
+        worst, best = ends if high_is_bad else ends[::-1]
+        layers[f"worst_{name}"] = worst(values, axis=1)
+        layers[f"best_{name}"] = best(values, axis=1)
     return layers
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
+from rover_physics.rover.steered_drive import SteeredDrive
 from rover_physics.rover.steering_joints import steering_joints
 
 MAX_WHEEL_RATE_RATIO = 20.0
@@ -40,10 +41,7 @@ class MeasurementLimits:
             limit = rover.steering.limit
             self._angles |= dict.fromkeys(steering_joints(rover), (-limit, limit))
         self._max_speed = wheel.max_speed * wheel.radius
-        places = np.array([place[:2] for place in suspension.wheels.values()])
-        axles = () if rover.steering is None else rover.steering.wheels
-        self._sides = np.abs(places[:, 1])
-        self._arms = np.where([name in axles for name in suspension.wheels], places[:, 0], 0.0)
+        self._drive = SteeredDrive(rover)
 
     def find_wrong_joint(
         self, positions: Mapping[str, float], velocities: Mapping[str, float]
@@ -78,7 +76,6 @@ class MeasurementLimits:
         """
         if speed == yaw_rate == 0.0:
             return 0.0, 0.0
-        ahead = abs(speed) + abs(yaw_rate) * self._sides
-        fastest = float(np.hypot(ahead, yaw_rate * self._arms).max())
+        fastest = float(np.abs(self._drive.aim(speed, yaw_rate).speeds).max())
         share = self._max_speed / max(fastest, self._max_speed)
         return share * speed, share * yaw_rate

@@ -183,7 +183,7 @@ def test_a_piece_fails_only_where_the_path_does():
     case = replace(refused_by(rock_left, policy="servo"), poses=bend_path(STRAIGHT, 0.1))
     refused = case.judge()
     for place in range(refused.place + 1):
-        rows = refused.rows_around(place, fails_by_sum=False)
+        rows = refused.rows_around(place)
         assert case.fails_at(place, rows, by_chance=False) == (place == refused.place), place
 
 

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 
 from rover_physics import Terrain
 from rover_planner.figures.path_picture import _draw_uses, draw_path
-from rover_planner.figures.plots import LabelledAnswer, draw_answers
+from rover_planner.figures.plots import draw_answers
+from rover_planner.planning.goals import Goal
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query, check_path
 from rover_planner.planning.search.path_search import find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
@@ -28,9 +29,8 @@ def holed():
 
 
 def ask(terrain, name, goal):
-    return LabelledAnswer(
-        name, "plain", answer_path_query(LSR1, terrain, (-4, 0, 0), goal, COARSE)
-    )
+    answer = answer_path_query(LSR1, terrain, (-4, 0, 0), goal, COARSE)
+    return Goal(name, "plain", goal), answer
 
 
 def test_a_picture_shows_accepted_and_refused_answers_each_with_its_curves(tmp_path, holed):
@@ -39,7 +39,7 @@ def test_a_picture_shows_accepted_and_refused_answers_each_with_its_curves(tmp_p
         ask(holed, "B", (4, 3, 0.5)),
         ask(holed, "C", (9, 0, 0)),
     ]
-    assert [one.answer.traversable for one in answers] == [True, False, False]
+    assert [answer.traversable for _, answer in answers] == [True, False, False]
     path = tmp_path / "picture.svg"
     draw_answers(path, LSR1, holed, answers, "title")
     text = path.read_text()
@@ -76,8 +76,9 @@ def draw(tmp_path, holed, monkeypatch):
     drawn = []
     monkeypatch.setattr(Figure, "savefig", lambda self, *_, **__: drawn.append(self))
 
-    def draw_one(labelled):
-        draw_answers(tmp_path / "picture.png", LSR1, holed, [labelled])
+    def draw_one(name, answer):
+        asked = Goal(name, "plain", answer.chosen.poses[-1])
+        draw_answers(tmp_path / "picture.png", LSR1, holed, [(asked, answer)], "title")
         on_map = next(axes for axes in drawn[-1].axes if axes.get_xlabel() == "x [m]")
         return on_map, [axes for axes in drawn[-1].axes if axes is not on_map]
 
@@ -93,11 +94,11 @@ def test_forces_that_no_verdict_asks_for_are_shaded(draw):
     prediction = answer.chosen.prediction
     falls = prediction.falling.any(axis=1)
     assert 0 < falls.sum() < len(falls)
-    _, others = draw(LabelledAnswer("A", "down", answer))
+    _, others = draw("A", answer)
     shaded = {axes.get_ylabel().split("\n")[0]: len(axes.patches) for axes in others}
     for name in ("wheel load [N]", "friction", "torque"):
         assert shaded[name] >= falls.sum()
     assert shaded["tip-over margin"] == 0
     before = answer_path_query(LSR1, ledge, (-3.5, 0, 0), (-3.2, 0, 0), options)
     assert before.traversable
-    assert not any(axes.patches for axes in draw(LabelledAnswer("B", "level", before))[1])
+    assert not any(axes.patches for axes in draw("B", before)[1])

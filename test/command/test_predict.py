@@ -9,7 +9,7 @@ import pytest
 from rover_physics import load_terrain, save_terrain
 from rover_physics.names import WHEELS
 from rover_planner.cli import main
-from rover_planner.command.prediction_files import read_prediction, read_recorded_assumptions
+from rover_planner.command.prediction_files import read_prediction
 from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import read_assumptions
 from support.command_line import N, assert_refused, predict_arguments, write_ground_and_path
@@ -238,7 +238,6 @@ def test_a_file_of_other_shapes_or_types_is_refused(files, changes, names):
     with np.load(files / "out.npz") as out:
         np.savez(files / "bad.npz", **(dict(out) | changes))
     with pytest.raises(PlanningError, match=names):
-        read_recorded_assumptions(files / "bad.npz")
         read_prediction(files / "bad.npz")
 
 

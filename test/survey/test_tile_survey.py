@@ -13,9 +13,9 @@ from rover_physics.traversability.pose_classes import RoverOnMap, classify_poses
 from rover_planner.survey.layers import (
     CLASS_NUMBERS,
     NO_LIMIT,
+    list_layers,
     number_limits,
     pack_bits,
-    types_of_layers,
     unpack_bits,
 )
 from rover_planner.survey.layout import choose_chunk, find_halo
@@ -174,7 +174,8 @@ def test_ground_that_is_all_unknown_is_impassable():
     assert (layers["best_class"] == CLASS_NUMBERS["impassable"]).all()
     assert (layers["first_limit"] == number_limits()["unknown_ground"]).all()
     assert not layers["passable_headings"].any() and np.isnan(layers["worst_tilt"]).all()
-    assert {name: layer.dtype for name, layer in layers.items()} == types_of_layers(4, True, False)
+    listed = list_layers(4, True, False)
+    assert {k: v.dtype for k, v in layers.items()} == {k: v.dtype for k, v in listed.items()}
 
 
 @pytest.mark.parametrize("headings", [1, 9, 64])

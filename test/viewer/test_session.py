@@ -12,11 +12,7 @@ from rover_physics.prediction.sweep_options import SweepOptions
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, load_terrain
 from rover_physics.traversability.judge import judge_path
-from rover_planner.command.prediction_files import (
-    read_prediction,
-    read_recorded_assumptions,
-    write_prediction,
-)
+from rover_planner.command.prediction_files import read_prediction, write_prediction
 from rover_planner.command.view import SEED, choose_ends, name_ground
 from rover_planner.errors import PlanningError
 from rover_planner.planning.assumptions import assume
@@ -181,8 +177,8 @@ def test_a_recorded_prediction_is_shown_as_it_was_recorded_until_the_rover_is_ch
     terrain, file = make_terrain(wall_at(0.5)), tmp_path / "out.npz"
     prediction, verdict = judge_path(LSR1, terrain, straight())
     write_prediction(file, prediction, verdict)
-    again, reasons = read_prediction(file)
-    assert read_recorded_assumptions(file) is None
+    again, reasons, assumptions = read_prediction(file)
+    assert assumptions is None
     session = session_on(terrain, goal=(-1.5, 0.0, 0.0))
     session.replay(again, reasons)
     shown = session.shown
@@ -216,10 +212,10 @@ def test_a_replay_keeps_the_soil_the_policy_and_the_arm_it_was_predicted_with(tm
     file = tmp_path / "out.npz"
     assumed = assume(LSR1, options, 2.0)
     write_prediction(file, prediction, verdict, assumptions=assumed)
-    assert read_recorded_assumptions(file) == assumed
+    assert read_prediction(file)[2] == assumed
 
     session = session_on(ground, (-1.0, 0.0, 0.0), options=CANDIDATES)
-    session.replay(*read_prediction(file), read_recorded_assumptions(file))
+    session.replay(*read_prediction(file))
     assert (session.wanted.rover.friction, session.wanted.rover.manipulator.payload) == (0.7, 0.5)
     assert session.wanted.options.model.arm_angles == angles
     session.change_rover([("wheel", "width")], 0.07)
