@@ -34,7 +34,7 @@ from rover_physics.terrain.grid import save_terrain
 from rover_planner.learning import drive_log as log
 from rover_planner.learning.friction_filter import FrictionEstimate
 from rover_planner.learning.ground_learner import GroundEstimate, GroundLearner
-from rover_planner.learning.wheel_odometry import GYRO_BIAS, GYRO_NOISE, WheelMotion, WheelOdometry
+from rover_planner.learning.wheel_odometry import GYRO_BIAS, GYRO_NOISE, WheelOdometry
 from rover_planner.simulator.mujoco_rover import MujocoRover
 from support.learning_drives import scatter, write_csv
 
@@ -260,24 +260,12 @@ def has_truth(estimate: FrictionEstimate, truth: float) -> bool:
     return estimate.low <= truth <= (estimate.high or np.inf)
 
 
-def measure_motion(rows: np.ndarray, truth: np.ndarray, seed: int) -> list[WheelMotion]:
-    """Return what wheels and IMU measured in a drive, of rows with noise and without."""
-    rng, times = np.random.default_rng(seed), rows[:, log.TIME]
-    noise = GYRO_NOISE / np.sqrt(np.median(np.diff(times))) * rng.standard_normal(len(rows))
-    yaw_rates = np.gradient(truth[:, log.YAW], times) + noise + GYRO_BIAS * rng.standard_normal()
-    return [
-        WheelMotion(
-            row[log.TIME],
-            row[log.RATES],
-            steering,
-            *row[[log.ROLL, log.PITCH]],
-            rate,
-            row[log.TORQUES],
-        )
-        for row, steering, rate in zip(
-            rows, np.nan_to_num(rows[:, log.STEERING]), yaw_rates, strict=True
-        )
-    ]
+def measure_yaw_rates(truth: np.ndarray, seed: int) -> np.ndarray:
+    """Return the yaw rates [rad/s] that an IMU measured in a drive, of rows without noise."""
+    rng, times = np.random.default_rng(seed), truth[:, log.TIME]
+    noise = GYRO_NOISE / np.sqrt(np.median(np.diff(times))) * rng.standard_normal(len(truth))
+    bias = GYRO_BIAS * rng.standard_normal()
+    return np.asarray(np.gradient(truth[:, log.YAW], times) + noise + bias)
 
 
 def print_odometry(learned: list[Learned], keep: Path) -> None:
@@ -292,16 +280,16 @@ def print_odometry(learned: list[Learned], keep: Path) -> None:
         if not recorded.passed:
             continue
         truth, rows = recorded.rows[:: drive.step], drive.add_noise(recorded.rows)
-        motions = measure_motion(rows, truth, drive.seed)
+        yaw_rates = measure_yaw_rates(truth, drive.seed)
         told, known, pupil = (WheelOdometry(rover) for _ in range(3))
         for odometry in (told, known, pupil):
             odometry.forward, odometry.side = teacher.forward, teacher.side
         friction = one.estimate.friction
         known.friction, known.friction_deviation = friction.mean, friction.std
         yaws = []
-        for motion in motions:
-            told.take(motion)
-            known.take(motion)
+        for row, yaw_rate in zip(rows, yaw_rates, strict=True):
+            told.take(row, yaw_rate)
+            known.take(row, yaw_rate)
             yaws.append(told.pose[2])
         between = 0.5 * np.add(yaws[:-1], yaws[1:])
         ways = rover.wheel.radius * rows[1:, log.RATES].mean(axis=1) * PERIOD * drive.step
@@ -314,8 +302,8 @@ def print_odometry(learned: list[Learned], keep: Path) -> None:
             if one is not learned[0]:
                 sizes = np.hypot(*miss), np.hypot(*(plain - end))
                 found[drive.kind, name].append((*sizes, nees))
-        for motion, row in zip(motions, rows, strict=True):
-            pupil.take(motion)
+        for row, yaw_rate in zip(rows, yaw_rates, strict=True):
+            pupil.take(row, yaw_rate)
             pupil.learn(row[[log.X, log.Y, log.YAW]])
     table = []
     for kind, values in sorted(found.items()):

@@ -82,8 +82,6 @@ JUMP = 0.05
 """Step of the position beyond what the wheels can drive that is no motion [m]."""
 CHANGE_CERTAIN = 2.0
 """Standard deviations that are no change of a suspension angle."""
-SPIKE = 1.3
-"""Torque over the largest one of a motor from which it is an error."""
 
 Flags = NDArray[np.bool_]
 _RATES, _TORQUES = RATES.start, TORQUES.start
@@ -207,7 +205,7 @@ class GroundLearner:
 
     def take(self, row: Floats) -> bool:
         """Take a row of measurements; return whether the estimate is new."""
-        row = self._clean(row)
+        row = self._health.clean(row)
         time, last = float(row[TIME]), self._time
         if not math.isfinite(time):
             return False
@@ -225,14 +223,6 @@ class GroundLearner:
             self._block, self._block_end = np.zeros(1, _SUMS), time + BLOCK
         _add(row, elapsed, self._rates, self._turned, self._block)
         return new
-
-    def _clean(self, row: Floats) -> Floats:
-        """Return a row without torques that no motor has."""
-        spikes = np.abs(row[TORQUES]) > SPIKE * self._rover.wheel.max_torque
-        if spikes.any():
-            row = row.copy()
-            row[TORQUES][spikes] = np.nan
-        return row
 
     def _jumps(self, row: Floats) -> bool:
         """Return whether the position, where it was measured, is beyond what the wheels drive."""

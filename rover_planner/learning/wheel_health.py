@@ -19,6 +19,8 @@ DOUBTFUL_TIME = 0.25
 """Time after which it may be frozen [s]."""
 OTHERS = 3
 """Number of other wheels whose values must change meanwhile."""
+SPIKE = 1.3
+"""Torque over the largest one of a motor from which it is an error."""
 SIGN_TIME = 2.0
 """Time constant of the search for wrong signs [s]."""
 SIGN_SHARE = 0.25
@@ -44,16 +46,33 @@ class WheelHealth:
         """Start with good sensors of a rover of a weight [N] and a largest wheel torque [N m]."""
         self._weight, self._most = weight, max_torque
         self._watches = np.zeros(1, _WATCH)
+        self._still = self._watches["still"][0]
         self._time = np.nan
         self._excess = 0.0
         self._turned = np.zeros(WHEEL_COUNT)
         self._backward = np.zeros(WHEEL_COUNT)
+
+    def clean(self, row: Floats) -> Floats:
+        """Return a row of measurements without torques that no motor has."""
+        spikes = np.abs(row[TORQUES]) > SPIKE * self._most
+        if spikes.any():
+            row = row.copy()
+            row[TORQUES][spikes] = np.nan
+        return row
 
     def take(self, row: Floats) -> None:
         """Take a row of measurements."""
         elapsed = row[TIME] - self._time if row[TIME] > self._time else 0.0
         _take(row, elapsed, 0.99 * self._most, self._watches)
         self._time = row[TIME]
+
+    def drop_frozen(self, row: Floats) -> Floats:
+        """Return the row that was taken last without torques and rates that are frozen."""
+        frozen = self._still > FROZEN_TIME
+        if frozen.any():
+            row = row.copy()
+            row[TORQUES][frozen[0]], row[RATES][frozen[1]] = np.nan, np.nan
+        return row
 
     def take_window(self, window: SlipWindow, elapsed: float, grips: bool) -> None:
         """Take a window to look at signs.
@@ -79,14 +98,14 @@ class WheelHealth:
     @property
     def doubtful(self) -> NDArray[np.bool_]:
         """(6,) whether a rate stands still while others change; it may be frozen."""
-        return np.asarray(self._watches["still"][0, 1] > DOUBTFUL_TIME)
+        return np.asarray(self._still[1] > DOUBTFUL_TIME)
 
     @property
     def faults(self) -> dict[str, str]:
         """Faults, with the wheels that have them."""
         found: dict[str, str] = {}
         watch = self._watches[0]
-        frozen, missing = watch["still"] > FROZEN_TIME, np.isnan(watch["last"])
+        frozen, missing = self._still > FROZEN_TIME, np.isnan(watch["last"])
         signs = np.zeros(WHEEL_COUNT, dtype=bool)
         if self._excess > LEAST_EXCESS * self._weight:
             best = int(np.argmin(self._turned))

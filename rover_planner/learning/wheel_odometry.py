@@ -10,13 +10,14 @@ turn on. Their torques tell how much they push, and the ground's friction how mu
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from rover_physics.numerics.arrays import Floats
 from rover_physics.rover.model import Rover
+from rover_planner.learning.drive_log import PITCH, RATES, ROLL, STEERING, TIME, TORQUES
 from rover_planner.learning.friction_filter import PRIOR_SPREAD
+from rover_planner.learning.wheel_health import WheelHealth
 from rover_planner.learning.wheel_slip import LONGEST_GAP
 from rover_planner.planning.angles import wrap
 
@@ -63,25 +64,6 @@ class Regression:
         """Means (n,) of the parameters."""
 
 
-@dataclass(frozen=True)
-class WheelMotion:
-    """Measurements of wheels and IMU at one time."""
-
-    time: float
-    """Time [s]."""
-    rates: Floats
-    """(6,) wheel rates [rad/s]; NaN where none was measured."""
-    steering: Floats
-    """(6,) steering angles [rad]."""
-    roll: float
-    pitch: float
-    """Attitude [rad]."""
-    yaw_rate: float
-    """Rate of the yaw [rad/s]."""
-    torques: Floats
-    """(6,) wheel torques [N m]; NaN where none was measured."""
-
-
 class WheelOdometry:
     """The odometry of one rover, from where it starts."""
 
@@ -93,37 +75,48 @@ class WheelOdometry:
         self._radius, self._piece = rover.wheel.radius, 0.5 * rover.wheelbase
         self.forward, self.side = Regression(FORWARD_PRIOR), Regression(SIDE_PRIOR)
         """Shares of the distance lost ahead and gone aside; may be those of another drive."""
-        self._per_torque = 1.0 / (rover.wheel.radius * rover.weight)
+        self._per_torque = len(self._x) / (rover.wheel.radius * rover.weight)
+        self._health = WheelHealth(rover.weight, rover.wheel.max_torque)
         self.friction, self.friction_deviation = rover.friction, PRIOR_SPREAD * rover.friction
         """Friction of the ground, as far as it is known, and its standard deviation."""
         self._traction = 0.0
-        """What all wheels pull, over the weight."""
+        """What all wheels pull, over the weight; without torques that is the slope."""
         self.pose = np.zeros(3)
         """x, y [m] and yaw [rad] from where it started."""
         self.speed = 0.0
         """Speed ahead [m/s]."""
         self.speed_deviation = 0.0
         """Standard deviation of it [m/s]."""
-        self._last: WheelMotion | None = None
+        self.time, self.yaw_rate = math.nan, math.nan
+        """Time [s] and yaw rate [rad/s] of the last row; NaN before the first."""
         self._sums, self._slide = np.zeros(13), np.zeros(2)
         self._forward_ways, self._noise = self._sums[:8].reshape(2, 2, 2)
         self._side_way, self._piece_ways = self._sums[8:10], self._sums[10:]
         self._way = self._elapsed = 0.0
         self._begin: Floats | None = None
 
-    def take(self, motion: WheelMotion) -> None:
-        """Go on by a measurement."""
-        last, self._last = self._last, motion
-        elapsed = 0.0 if last is None else motion.time - last.time
-        if last is None or not 0.0 < elapsed < LONGEST_GAP:
-            return
-        ahead = self._find_speeds(motion)
+    def take(self, row: Floats, yaw_rate: float) -> None:
+        """Go on by a row of measurements and the yaw rate [rad/s] at its time.
+
+        A torque or rate that is frozen, and a torque that no motor has, count as not measured.
+        """
+        row = self._health.clean(row)
+        self._health.take(row)
+        row = self._health.drop_frozen(row)
+        ahead = self._find_speeds(row, yaw_rate)
         if not len(ahead):
             return
+        elapsed, self.time = float(row[TIME]) - self.time, float(row[TIME])
+        turned, self.yaw_rate = 0.5 * elapsed * (yaw_rate + self.yaw_rate), yaw_rate
+        if not 0.0 < elapsed < LONGEST_GAP:
+            return
         # Plain numbers and few sums: arrays of two elements take several times as long.
-        slope, aside = -math.tan(motion.pitch), math.tan(motion.roll)
-        raw = float(ahead.sum()) / len(ahead) * math.cos(motion.pitch)
-        self._take_traction(float(motion.torques.sum()) * self._per_torque, slope, elapsed)
+        pitch = float(row[PITCH])
+        slope, aside = -math.tan(pitch), math.tan(row[ROLL])
+        raw = float(ahead.sum()) / len(ahead) * math.cos(pitch)
+        torques = row[TORQUES][np.isfinite(row[TORQUES])]
+        pull = float(torques.sum()) / len(torques) * self._per_torque if len(torques) else slope
+        self._traction += min(elapsed / TRACTION_TIME, 1.0) * (pull - self._traction)
         push = self._traction if raw > 0.0 else -self._traction
         slid, slide = self._find_slide(push, aside)
         rolled = (1.0 - slid) * raw
@@ -134,7 +127,7 @@ class WheelOdometry:
         along = float(self.forward.variance)
         across = float(self.side.variance) * (aside**2 + 1.0)
         self.speed_deviation = math.hypot(rolled * math.sqrt(along), raw * slide)
-        self.pose[2] += 0.5 * elapsed * (motion.yaw_rate + last.yaw_rate)
+        self.pose[2] += turned
         c, s = math.cos(self.pose[2]), math.sin(self.pose[2])
         self.pose[0] += step * ((1.0 - lost) * c + drift * s)
         self.pose[1] += step * ((1.0 - lost) * s - drift * c)
@@ -152,11 +145,6 @@ class WheelOdometry:
         self._elapsed += elapsed
         self._way += abs(step)
 
-    def _take_traction(self, measured: float, slope: float, elapsed: float) -> None:
-        """Go on to what all wheels pull, over the weight: without torques that is the slope."""
-        pull = slope if math.isnan(measured) else measured
-        self._traction += min(elapsed / TRACTION_TIME, 1.0) * (pull - self._traction)
-
     def _find_slide(self, push: float, aside: float) -> tuple[float, float]:
         """Return the share of the way that sliding wheels lose, and its standard deviation.
 
@@ -172,11 +160,14 @@ class WheelOdometry:
         possible = _chance_to_slide(math.hypot(push, aside) / friction, spread)
         return likely, math.sqrt((possible - likely) ** 2 + possible * (1.0 - possible))
 
-    def _find_speeds(self, motion: WheelMotion) -> Floats:
-        """Return the speeds of the body [m/s] that the wheels tell, those that were measured."""
-        c, s = np.cos(motion.steering), np.sin(motion.steering)
-        turning = motion.yaw_rate
-        ahead = (self._radius * motion.rates - turning * self._x * s) / c + turning * self._y
+    def _find_speeds(self, row: Floats, turning: float) -> Floats:
+        """Return the speeds of the body [m/s] that the wheels tell, those that were measured.
+
+        `turning` is the yaw rate [rad/s]. Wheels whose steering is not measured point ahead.
+        """
+        steering = np.where(np.isnan(row[STEERING]), 0.0, row[STEERING])
+        c, s = np.cos(steering), np.sin(steering)
+        ahead = (self._radius * row[RATES] - turning * self._x * s) / c + turning * self._y
         return np.asarray(ahead[np.isfinite(ahead)])
 
     def learn(self, pose: Floats) -> None:

@@ -2,6 +2,7 @@
 """The node /ground_learner: learns the ground from a rover's sensors while it drives."""
 
 import json
+import math
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -27,7 +28,7 @@ from rover_planner.learning.ground_learner import GroundLearner
 from rover_planner.learning.learned_file import describe
 from rover_planner.learning.soil_fit import SoilFit
 from rover_planner.learning.stuck_watch import find_place_ahead
-from rover_planner.learning.wheel_odometry import WheelMotion, WheelOdometry
+from rover_planner.learning.wheel_odometry import WheelOdometry
 from rover_planner.nodes.running import run_node
 from rover_planner.nodes.warm_up import LEARNING
 from rover_planner.parameters.ground_learner import GroundLearnerParameters
@@ -73,7 +74,7 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
         self._stops = self.create_publisher(Bool, EMERGENCY_STOP, latched_qos())
         self._marks = self.create_publisher(String, MARK_PLACE, latched_qos())
         self._wheels = WheelOdometry(self._rover)
-        self._motion: WheelMotion | None = None  # what the wheels' odometry went on by last
+        self._wheels_told = -math.inf  # time of the last odometry of the wheels that was sent
         self._wheel_odometry = self.create_publisher(Odometry, "~/odometry", sensor_qos())
         hear, rows = self.heard.subscribe, self._rows
         hear(TwistStamped, "cmd_vel", self._take_command, newest_qos())
@@ -109,26 +110,25 @@ class GroundLearnerNode(RoverNode[GroundLearnerParameters]):
             is_fresh = self.seconds - self._command_time < COMMAND_AGE
             learner.commanded = self._commanded if is_fresh else None
         self.heard.poll()
-        motion, self._motion = self._motion, None
-        if motion is None:
+        if not wheels.time > self._wheels_told:
             return
+        self._wheels_told = wheels.time
         message = planar_odometry(
             wheels.pose,
             wheels.covariance,
             (wheels.speed, wheels.speed_deviation),
-            motion.yaw_rate,
+            wheels.yaw_rate,
             self.values.odometry_frame,
-            ns_to_stamp(round(motion.time * NANOSECONDS)),
+            ns_to_stamp(round(wheels.time * NANOSECONDS)),
         )
         self._wheel_odometry.publish(message)
 
     def _take_imu(self, imu: Any, _arrival: float) -> None:
         """Take attitude and yaw rate, and go on by what the wheels turned."""
         self._rows.take_imu(imu)
-        motion = self._rows.motion(self._time_of(imu) / NANOSECONDS)
-        if motion is not None:
-            self._motion = motion
-            self._wheels.take(motion)
+        yaw_rate = self._rows.yaw_rate
+        if not math.isnan(yaw_rate):
+            self._wheels.take(self._rows.at(self._time_of(imu) / NANOSECONDS), yaw_rate)
 
     def _time_of(self, message: Any) -> int:
         """Return the stamp of a message, or the present time if it has none [ns]."""

@@ -25,7 +25,6 @@ from rover_planner.learning.drive_log import (
     X,
     Y,
 )
-from rover_planner.learning.wheel_odometry import WheelMotion
 
 _POSITIONS = dict(zip(SUSPENSION_JOINTS, range(WIDTH)[SUSPENSION], strict=True)) | dict(
     zip(STEERING_JOINTS, range(WIDTH)[STEERING], strict=True)
@@ -41,7 +40,8 @@ class RowCollector:
     def __init__(self, names: JointNames = OWN_NAMES) -> None:
         """Start without measurements; `names` are those of the joints in messages."""
         self._row, self._names, self._has_imu = np.full(WIDTH, np.nan), names, False
-        self._yaw_rate = math.nan
+        self.yaw_rate = math.nan
+        """Yaw rate by the IMU [rad/s]; NaN before it was measured."""
 
     def take_joints(self, message: Any) -> None:
         """Take joint states by name; a value that is missing or not finite was not measured.
@@ -79,16 +79,13 @@ class RowCollector:
         if attitude.rates is not None:
             _, q, r = attitude.rates.tolist()
             turn = q * math.sin(attitude.roll) + r * math.cos(attitude.roll)
-            self._yaw_rate = turn / math.cos(attitude.pitch)
+            self.yaw_rate = turn / math.cos(attitude.pitch)
 
-    def motion(self, time: float) -> WheelMotion | None:
-        """Return what wheels and IMU measure at a time [s]; None until both were heard."""
-        row = self._row
-        rates, steering, torques = (row[part].copy() for part in (RATES, STEERING, TORQUES))
-        if math.isnan(self._yaw_rate) or np.isnan(rates).all():
-            return None
-        steering[np.isnan(steering)] = 0.0
-        return WheelMotion(time, rates, steering, row[ROLL], row[PITCH], self._yaw_rate, torques)
+    def at(self, time: float) -> Floats:
+        """Return the row of a time [s], with the pose of the last odometry, NaN before it."""
+        row = self._row.copy()
+        row[TIME] = time
+        return row
 
     def take_odometry(self, message: Any, time: float, frame: str = "") -> Floats:
         """Take a pose; return the row of its time [s].

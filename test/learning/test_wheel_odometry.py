@@ -4,13 +4,24 @@
 import numpy as np
 import pytest
 
-from rover_planner.learning.wheel_odometry import WheelMotion, WheelOdometry
+from rover_planner.learning.drive_log import PITCH, RATES, ROLL, TIME, TORQUES, WIDTH
+from rover_planner.learning.wheel_odometry import WheelOdometry
 from support.rovers import LSR1 as ROVER
 
 SPEED, RATE = 0.06, 10.0
-UNKNOWN = np.full(6, np.nan)
+TURNING = SPEED / ROVER.wheel.radius
+LARGEST = 0.5 * ROVER.weight * ROVER.wheel.radius / 6.0
+"""Rate of the wheels [rad/s], and torque at which friction of 0.5 is used up [N m]."""
 CREEP, DRIFT, SCATTER = 0.12, 0.18, 0.02
 """Share of the way that is lost per slope, gone aside per side slope, and its scatter."""
+
+
+def measure(time, pitch=0.0, roll=0.0, torques=np.nan):
+    """Return a row of measurements of wheels that turn evenly."""
+    row = np.full(WIDTH, np.nan)
+    row[[TIME, PITCH, ROLL]] = time, pitch, roll
+    row[RATES], row[TORQUES] = TURNING, torques
+    return row
 
 
 def drive(odometry, seed, pitch, roll, seconds=60.0, teach=False):
@@ -21,8 +32,7 @@ def drive(odometry, seed, pitch, roll, seconds=60.0, teach=False):
         if k % 50 == 0:  # what is uneven lasts for a while
             piece = SCATTER * rng.standard_normal()
         yaw_rate = 0.02 * np.sin(0.01 * k)
-        rates = np.full(6, SPEED / ROVER.wheel.radius)
-        odometry.take(WheelMotion(k / RATE, rates, np.zeros(6), roll, pitch, yaw_rate, UNKNOWN))
+        odometry.take(measure(k / RATE, pitch, roll), yaw_rate)
         if k:
             step = SPEED * np.cos(pitch) / RATE
             true[2] += yaw_rate / RATE
@@ -92,10 +102,21 @@ def test_on_ground_of_unknown_friction_the_way_up_a_slope_is_less_sure(taught):
 def test_a_rover_that_pushes_against_an_obstacle_with_all_friction_stands(deviation, furthest):
     odometry = WheelOdometry(ROVER)
     odometry.friction, odometry.friction_deviation = 0.5, deviation
-    rates = np.full(6, SPEED / ROVER.wheel.radius)
-    torques = np.full(6, 0.98 * 0.5 * ROVER.weight * ROVER.wheel.radius / 6.0)
     for k in range(200):
-        odometry.take(WheelMotion(k / RATE, rates, np.zeros(6), 0.0, 0.0, 0.0, torques))
+        odometry.take(measure(k / RATE, torques=0.98 * LARGEST), 0.0)
     assert odometry.pose[0] < furthest
     assert odometry.pose[0] ** 2 < 5.99 * odometry.covariance[0, 0]
     assert odometry.speed < SPEED
+
+
+@pytest.mark.parametrize("value", [0.9 * ROVER.wheel.max_torque, 1e3, -1e3, np.nan])
+def test_a_torque_that_cannot_be_believed_does_not_count(value):
+    rng, way = np.random.default_rng(1), 200 / RATE * SPEED
+    odometry = WheelOdometry(ROVER)
+    odometry.friction, odometry.friction_deviation = 0.5, 0.03
+    for k in range(201):
+        torques = 0.4 * LARGEST * (1.0 + 0.05 * rng.standard_normal(6))
+        torques[2] = value
+        odometry.take(measure(k / RATE, torques=torques), 0.0)
+    assert odometry.pose[0] == pytest.approx(way, rel=0.05)
+    assert odometry.covariance[0, 0] < (0.1 * way) ** 2

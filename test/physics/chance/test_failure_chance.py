@@ -11,7 +11,7 @@ import pytest
 from benchmarks.chance import HELD_OUT, find_chance, read_driven_paths
 from rover_physics import SweepOptions, Terrain, judge_path, judge_poses, load_rover
 from rover_physics.chance.failure_chance import SAMPLES
-from rover_physics.chance.samples import DEVIATES
+from rover_physics.chance.samples import DEVIATES, draw_samples
 from rover_physics.errors import ModelError, RoverFileError
 from rover_physics.limits.table import CHANCE
 from rover_physics.rover.rover_file import rover_from_dict, rover_to_dict
@@ -55,6 +55,21 @@ def test_the_chance_is_that_of_a_friction_below_what_the_slope_needs(slope):
     expected = NormalDist(1.0, 0.1).cdf(found.max_friction_utilisation)
     assert 0.005 < expected < 0.995
     assert found.failure_chance == pytest.approx(expected, abs=ONE)
+
+
+def test_samples_over_the_error_of_the_model_are_spread_as_told():
+    told, samples = Uncertainty(), draw_samples(Uncertainty(), SAMPLES)
+    frictions, torques = [one.friction.mean() for one in samples], [one.torque for one in samples]
+    of_friction = np.hypot(told.friction, told.friction_per_wheel / np.sqrt(6.0))
+    over = np.hypot(told.model, told.wheel_radius)
+    for ratios, own, other in (
+        (frictions, of_friction, told.model),
+        (torques, told.max_torque, over),
+    ):
+        below = [NormalDist(1.0 - x, np.hypot(own, x * other)).cdf(0.0) for x in sorted(ratios)]
+        steps = np.arange(SAMPLES + 1) / SAMPLES
+        assert np.abs(below - steps[:-1]).max() < 0.1
+        assert np.abs(below - steps[1:]).max() < 0.1
 
 
 def test_a_path_that_passes_in_the_best_sample_alone_does_not_fail_for_sure():
