@@ -182,6 +182,7 @@ def test_a_peak_between_points_of_a_curve_is_kept():
         (1.234, "friction 1.23 of 1.00"),
         (1.0004, "friction 1.0004 of 1.0000"),
         (1.00004, "friction just above 1.00"),
+        (np.inf, "friction far above 1.00"),
         (0.99999, "friction just below 1.00"),
     ],
 )

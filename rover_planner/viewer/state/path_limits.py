@@ -24,6 +24,8 @@ GROUND = "ground"
 """Code of what is no limit of a number: unknown ground, no equilibrium, entrapment, steering."""
 MORE_DIGITS = 2
 """Most digits beyond those of the unit that tell a value from its limit; else words do."""
+HUGE = 1e5
+"""Value from which a number is told in words."""
 BODY = "body"
 """Name of the body among the links."""
 BODY_CODES = ("tilt", "tip_over", "belly")
@@ -65,11 +67,14 @@ class Lane:
     def compare(self, row: int) -> str:
         """Return value and limit at a row, such as "friction 1.32 of 1.00", with enough digits.
 
-        Where MORE_DIGITS do not tell them apart, words do: "friction just above 1.00".
+        Where MORE_DIGITS do not tell them apart, words do: "friction just above 1.00". So they do
+        where there is no number, as without load: "friction far above 1.00".
         """
         if self.bounds is None:
             return self.title
         unit, value, bound = f" {self.unit.name}".rstrip(), self.values[row], self.bounds[row]
+        if abs(value) >= HUGE:  # a wheel that lifts off
+            return f"{self.title} far above {write(bound, self.unit.digits)}{unit}"
         for digits in range(self.unit.digits, self.unit.digits + MORE_DIGITS + 1):
             shown, limit = write(value, digits), write(bound, digits)
             if shown != limit:
@@ -197,7 +202,7 @@ def write(value: float, digits: int, unit: str = "") -> str:
     """Return a number as text with its unit, ? for NaN."""
     if np.isnan(value):
         return "?"
-    return f"{value:.{digits}f} {unit}".rstrip() if abs(value) < 1e5 else "infinite"
+    return f"{value:.{digits}f} {unit}".rstrip() if abs(value) < HUGE else "infinite"
 
 
 @dataclass(frozen=True, eq=False)
