@@ -4,7 +4,7 @@
 Poses that use less than FAR of every limit keep them in all samples. So do those that use less
 than NEAR with the least friction and torque of all samples, and all else off to either side. The
 others are evaluated anew in each sample, with the contacts that they have there. Drops and poses
-between waypoints are those of the prediction.
+between waypoints are those of the prediction. On even ground a share of the model's error counts.
 """
 
 from dataclasses import dataclass, replace
@@ -28,7 +28,7 @@ from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import Crossings, join_crossings, none_held
 from rover_physics.prediction.servo_path import write_servo_path
 from rover_physics.prediction.sweep import SweptPath
-from rover_physics.results.record import place_results
+from rover_physics.results.record import place_results, unwritten_results
 from rover_physics.results.uses import find_uses
 from rover_physics.status import PoseStatus, Stall
 from rover_physics.terrain.grid import Terrain
@@ -40,6 +40,9 @@ FAR = 0.5
 torque of a sample may be less than half."""
 NEAR = 0.95
 """Use with the least friction and torque of all samples below which no sample breaks a limit."""
+EVEN, EVEN_SHARE = 0.1, 0.3
+"""Difference of contact angles [rad] up to which ground is even, and the share of the model's error
+that counts there: on a plane, forces follow from statics alone."""
 SUMS = ("turn_off", "slide_off", "lift_height")
 """Quantities of limits that are sums along the path."""
 OF_PATH = ("falling", "wheel_drop", "drift", "lift_height")
@@ -207,7 +210,15 @@ def _evaluate_near(
     between = chosen_rows >= len(swept.prediction.poses)
     poses = np.where(between[:, None], rows.poses, sample.move(rows.poses))
     motions = np.ascontiguousarray(rows.results["motion"])
-    results = sample.change(model).evaluate(np.ascontiguousarray(poses), rows.held, motions)
+    results = unwritten_results(len(poses))
+    angles = rows.results["contact_angle"]
+    is_even = angles.max(axis=1) - angles.min(axis=1) < EVEN
+    for share, own in ((EVEN_SHARE, is_even), (1.0, ~is_even)):
+        here = np.flatnonzero(own)
+        if len(here):
+            changed = sample.add_error(share).change(model)
+            found = changed.evaluate(poses[here], rows.held[here], motions[here])
+            place_results(found, results, here)
     for name in OF_PATH:
         results[name] = rows.results[name]
     results["torque_saturation"] /= sample.torques

@@ -38,9 +38,9 @@ class Sample:
     """One drawing of all that is uncertain; factors are over what is told."""
 
     friction: Floats
-    """(6,) factors of the friction under the wheels, less the model's error."""
+    """(6,) factors of the friction under the wheels."""
     torque: float
-    """Factor of the torque limit of all wheels, less the model's error."""
+    """Factor of the torque limit of all wheels."""
     torques: Floats
     """(6,) factors of the torque limits of the wheels beside that."""
     mass: float
@@ -49,9 +49,17 @@ class Sample:
     """(3,) shift of the body's centre of mass [m], body frame."""
     shift: Floats
     """(3,) shift of all poses: along and across their heading [m], and turn [rad]."""
+    error: float = 0.0
+    """The model's error: the forces that are needed over those that it finds, less 1."""
 
     def __post_init__(self) -> None:
         freeze_fields(self)
+
+    def add_error(self, share: float) -> "Sample":
+        """Return the sample with a share of the model's error as less friction and torque."""
+        needed = 1.0 + share * self.error
+        friction, torque = self.friction / needed, self.torque / needed
+        return replace(self, friction=friction, torque=torque, error=0.0)
 
     def change(self, model: PackedModel) -> PackedModel:
         """Return the model with friction, torque limit and masses of this sample."""
@@ -98,12 +106,14 @@ def draw_samples(uncertainty: Uncertainty, count: int) -> tuple[Sample, ...]:
 
 def sort_by_strength(samples: tuple[Sample, ...]) -> tuple[Sample, ...]:
     """Return samples sorted by the scarcer of friction and torque, the one with the most first."""
-    scarcer = [min(one.friction.min(), one.torque * one.torques.min()) for one in samples]
+    whole = [one.add_error(1.0) for one in samples]
+    scarcer = [min(one.friction.min(), one.torque * one.torques.min()) for one in whole]
     return tuple(samples[k] for k in np.argsort(scarcer, kind="stable")[::-1])
 
 
 def worst_of(samples: tuple[Sample, ...]) -> tuple[Sample, Sample]:
     """Return the least friction and torque limit of samples, with all else off to either side."""
+    samples = tuple(one.add_error(1.0) for one in samples)
     friction = np.full(6, min(float(one.friction.min()) for one in samples))
     torque = min(one.torque * float(one.torques.min()) for one in samples)
     mass = max(one.mass for one in samples)
@@ -118,14 +128,14 @@ def worst_of(samples: tuple[Sample, ...]) -> tuple[Sample, Sample]:
 def _sample(deviations: dict[str, Floats]) -> Sample:
     """Return a sample from deviations by name."""
     held = {name: value.item() for name, value in deviations.items() if len(value) == 1}
-    needed = 1.0 + held["model"]
     return Sample(
-        friction=(1.0 + held["friction"]) * (1.0 + deviations["friction_per_wheel"]) / needed,
-        torque=(1.0 + held["max_torque"]) / (1.0 + held["wheel_radius"]) / needed,
+        friction=(1.0 + held["friction"]) * (1.0 + deviations["friction_per_wheel"]),
+        torque=(1.0 + held["max_torque"]) / (1.0 + held["wheel_radius"]),
         torques=1.0 + deviations["max_torque_per_wheel"],
         mass=held["mass"],
         com=deviations["com"],
         shift=np.append(deviations["position"], deviations["heading"]),
+        error=held["model"],
     )
 
 

@@ -147,7 +147,8 @@ def test_the_chance_of_failure_is_a_lane_of_its_own_with_its_main_cause():
     told = paths.describe_limits(shown.path, None, shown.chance)["lanes"]
     assert [lane["code"] for lane in told].index("chance") == len(shown.path.limits.lanes)
     curve = told[-1]["now"]["y"][0]
-    assert max(curve) == pytest.approx(max(verdict.failure_chance_at), abs=1e-3)
+    end = 1 + int(shown.path.limits.rows.prediction.waypoint[-1])
+    assert max(curve) == pytest.approx(max(verdict.failure_chance_at[:end]), abs=1e-3)
     use = paths.describe_uses(shown.path, np.inf, shown.chance)[-1]
     assert use["broken"]
     percent = f"{100.0 * verdict.failure_chance:.0f} %"

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.chance import HELD_OUT, find_chance, read_driven_paths
 from rover_physics import SweepOptions, Terrain, judge_path, judge_poses, load_rover
-from rover_physics.chance.failure_chance import SAMPLES
+from rover_physics.chance.failure_chance import EVEN_SHARE, SAMPLES
 from rover_physics.chance.samples import DEVIATES, draw_samples
 from rover_physics.errors import ModelError, RoverFileError
 from rover_physics.limits.table import CHANCE
@@ -42,10 +42,10 @@ def chance_on(ground: Terrain, rover, options=SLIPPERY, n: int = 5):
     return judge_path(rover, ground, straight(n), options, accepted_chance=1.0)[1]
 
 
-def chance_near_torque(ground: Terrain, rover) -> float:
-    """Return the chance on ground that grips, with motors of which 0.9 is used."""
+def chance_near_torque(ground: Terrain, rover, use: float = 0.9) -> float:
+    """Return the chance on ground that grips, with motors of which a share is used."""
     used = chance_on(ground, rover).max_torque_saturation * rover.wheel.max_torque
-    options = SweepOptions(friction=1.5, max_torque=used / 0.9)
+    options = SweepOptions(friction=1.5, max_torque=used / use)
     return chance_on(ground, rover, options).failure_chance
 
 
@@ -58,7 +58,8 @@ def test_the_chance_is_that_of_a_friction_below_what_the_slope_needs(slope):
 
 
 def test_samples_over_the_error_of_the_model_are_spread_as_told():
-    told, samples = Uncertainty(), draw_samples(Uncertainty(), SAMPLES)
+    told = Uncertainty()
+    samples = [one.add_error(1.0) for one in draw_samples(told, SAMPLES)]
     frictions, torques = [one.friction.mean() for one in samples], [one.torque for one in samples]
     of_friction = np.hypot(told.friction, told.friction_per_wheel / np.sqrt(6.0))
     over = np.hypot(told.model, told.wheel_radius)
@@ -106,10 +107,22 @@ def test_optimal_torques_give_way_to_a_wheel_that_has_less():
     assert found.max_torque_saturation > 0.99 and found.failure_chance == 0.0
 
 
-@pytest.mark.parametrize("name", ["max_torque", "model"])
-def test_the_torque_limit_counts_like_friction(name):
-    found = chance_near_torque(plane(0.2, 0.0), rover_with(**{name: 0.1}))
+def test_the_torque_limit_counts_like_friction():
+    found = chance_near_torque(plane(0.2, 0.0), rover_with(max_torque=0.1))
     assert found == pytest.approx(NormalDist(1.0, 0.1).cdf(0.9), abs=ONE)
+
+
+def rising(x, y):
+    """Return the height of a slope that gets steeper: contact angles differ by 0.2 rad."""
+    return 0.12 * x**2 + 0.25 * x
+
+
+@pytest.mark.parametrize(
+    ("ground", "share"), [(plane(0.2, 0.0), EVEN_SHARE), (make_terrain(rising, half=3.0), 1.0)]
+)
+def test_of_the_error_of_the_model_a_share_counts_where_the_ground_is_even(ground, share):
+    found = chance_near_torque(ground, rover_with(model=0.1), use=0.97)
+    assert found == pytest.approx(NormalDist(1.0, 0.1 * share).cdf(0.97), abs=ONE)
 
 
 def test_a_peak_between_waypoints_counts_though_the_position_is_uncertain():
