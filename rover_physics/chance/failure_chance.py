@@ -41,8 +41,8 @@ torque of a sample may be less than half."""
 NEAR = 0.95
 """Use with the least friction and torque of all samples below which no sample breaks a limit."""
 EVEN, EVEN_SHARE = 0.1, 0.3
-"""Difference of contact angles [rad] up to which ground is even, and the share of the model's error
-that counts there: on a plane, forces follow from statics alone."""
+"""Difference of contact angles [rad] below which the ground is even, and the share of the model's
+error that counts there: on a plane, forces follow from statics alone."""
 SUMS = ("turn_off", "slide_off", "lift_height")
 """Quantities of limits that are sums along the path."""
 OF_PATH = ("falling", "wheel_drop", "drift", "lift_height")
