@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
-from threading import Event
 from typing import Any
 
 import numpy as np
@@ -79,7 +78,7 @@ class MapTopics(MapIntake):
         subscribe_to_map(self._node, kind, topic, offer)
 
     def wait(
-        self, ticket: Event, check: Callable[[], object], longest: float = float("inf")
+        self, ticket: int, check: Callable[[], object], longest: float = float("inf")
     ) -> None:
         """Wait until the maps before a ticket are taken; `check` may raise meanwhile.
 

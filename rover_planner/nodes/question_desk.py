@@ -8,7 +8,6 @@ service, which makes messages of it.
 
 import contextlib
 import math
-import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -55,8 +54,8 @@ class Inquiry(Asked):
     """Map, settings, path and measurements; its map is that of the time of judging."""
     arrival: float
     """Time of its arrival [s], steady clock."""
-    ticket: threading.Event
-    """Is set once the maps are prepared that had come until then."""
+    ticket: int
+    """The maps that had come until then."""
 
 
 class QuestionDesk:

@@ -6,9 +6,9 @@ import math
 import threading
 import time
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable
 from functools import partial
-from queue import SimpleQueue
 from typing import Any
 
 from rclpy.impl.rcutils_logger import RcutilsLogger
@@ -56,10 +56,12 @@ class MapIntake(ABC):
         """Topic of the map in work."""
         self._logger, self._frames, self._refusals = logger, frames, RepeatLog()
         self._unplaced: tuple[str, int | None] | None = None
+        self._changed = threading.Condition()
         self._last: tuple[bytes, type] | None = None
         self._used: Any = None
-        self._newest: dict[type, object] = {}
-        self._jobs: SimpleQueue[Callable[[], Any]] = SimpleQueue()
+        self._newest: dict[type, int] = {}
+        self._jobs: deque[Callable[[], Any]] = deque()
+        self._given, self._done = 0, 0
         self._ending = False
         self._thread = threading.Thread(target=self._run, name="maps", daemon=True)
         self._thread.start()
@@ -134,17 +136,16 @@ class MapIntake(ABC):
 
     def do(self, job: Callable[[], Any]) -> None:
         """Call a function in the thread after all that was given before."""
-        self._jobs.put(job)
+        with self._changed:
+            self._given += 1
+            self._jobs.append(job)
+            self._changed.notify_all()
 
-    def ticket(self) -> threading.Event:
-        """Return what is set once all that was given until now is done."""
-        ticket = threading.Event()
-        self.do(ticket.set)
-        return ticket
+    def ticket(self) -> int:
+        """Return a number for `wait`: all that was given until now."""
+        return self._given
 
-    def wait(
-        self, ticket: threading.Event, check: Callable[[], object], longest: float = math.inf
-    ) -> None:
+    def wait(self, ticket: int, check: Callable[[], object], longest: float = math.inf) -> None:
         """Wait until all that was given before a ticket is done; `check` may raise meanwhile.
 
         Args:
@@ -153,32 +154,43 @@ class MapIntake(ABC):
             longest: Time after which the wait ends whatever is done [s].
         """
         end = time.monotonic() + longest
-        while not self._ending and (left := end - time.monotonic()) > 0.0:
-            if ticket.wait(min(WAIT, left)):
-                return
-            check()
+        with self._changed:
+            while self._done < ticket and not self._ending:
+                left = end - time.monotonic()
+                if left <= 0.0:
+                    return
+                self._changed.wait(min(WAIT, left))
+                check()
 
     def close(self) -> None:
         """End the thread after the map in work is prepared."""
-        self._ending = True
-        self.do(lambda: None)  # wakes it
+        with self._changed:
+            self._ending = True
+            self._changed.notify_all()
         self._thread.join(END_TIME)
 
     def _do_latest(self, message: bytes, kind: type) -> None:
-        self._newest[kind] = given = object()
-        self.do(partial(self._prepare_map, message, kind, given))
+        self._newest[kind] = self._given + 1
+        self.do(partial(self._prepare_map, message, kind, self._newest[kind]))
 
     def _run(self) -> None:
-        while not self._ending:
-            job = self._jobs.get()
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._jobs or self._ending)
+                if self._ending:
+                    return
+                job = self._jobs.popleft()
             try:
                 job()
             except Exception as error:
                 # An internal error must not end the thread: the next map may work.
                 self.refuse(f"internal error: {type(error).__name__}: {error}")
+            with self._changed:
+                self._done += 1
+                self._changed.notify_all()
 
-    def _prepare_map(self, message: bytes, kind: type, given: object) -> None:
-        if given is not self._newest[kind]:
+    def _prepare_map(self, message: bytes, kind: type, number: int) -> None:
+        if number < self._newest[kind]:
             return
         self.topic = CLOUD if kind is PointCloud2 else GRID_MAP
         self._unplaced = None
