@@ -303,7 +303,8 @@ def test_letters_are_large_enough_and_have_contrast_and_a_phone_shows_all_of_its
     visitor.tab.set_viewport_size(LAPTOP)
 
 
-def test_a_visitor_of_a_page_that_ends_is_told(visitor, page):
+def test_a_visitor_of_a_page_that_ends_is_told_and_all_that_is_old_is_grey(visitor, page):
     assert "No connection" not in visitor.text("#errors")
     page.close()  # this is the last test of the page
     visitor.wait_for("No connection to the program")
+    assert "grayscale" in visitor.tab.locator("main").evaluate("it => getComputedStyle(it).filter")

@@ -98,6 +98,7 @@ function drawSubject(facts) {
 
 function drawErrors() {
   const lines = (state.errors || []).map(([what, why]) => `${what}: ${why}`);
+  document.querySelector("main").toggleAttribute("data-old", Boolean(state.lost));
   if (state.lost) lines.unshift("No connection to the program: what is shown is old. The page goes on by itself when the program runs again.");
   if (state.restarted) lines.push(`The program was started again; ${state.restarted}.`);
   at("errors").replaceChildren(...cells("div", lines));
@@ -217,7 +218,6 @@ function drawChanges({ kept, rover, drive }) {
       button("Save as rover file", { ask: "save rover" })),
     differs);
 }
-
 
 function select(label, options, now, question) {
   const known = options.some(([value]) => value === now) ? options : [...options, [now, now]];
