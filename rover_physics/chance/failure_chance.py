@@ -3,21 +3,22 @@
 
 Poses that use less than FAR of every limit keep them in all samples. So do those that use less
 than NEAR with the least friction and torque of all samples, and all else off to either side. The
-others are evaluated anew in each sample, with the contacts that they have there. Drops and poses
-between waypoints are those of the prediction. On even ground a share of the model's error counts.
+others are evaluated anew in each sample, with the contacts that they have at its place: samples
+that share a place settle once. Drops and poses between waypoints are those of the prediction. On
+even ground a share of the model's error counts.
 """
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.chance.samples import (
-    Sample,
+    PlacedSamples,
     change_heights,
     cut_around,
     draw_samples,
-    sort_by_strength,
     worst_of,
 )
 from rover_physics.errors import ModelError
@@ -28,13 +29,13 @@ from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import Crossings, join_crossings, none_held
 from rover_physics.prediction.servo_path import write_servo_path
 from rover_physics.prediction.sweep import SweptPath
-from rover_physics.results.record import place_results, unwritten_results
+from rover_physics.results.record import place_results, select_results, unwritten_results
 from rover_physics.results.uses import find_uses
 from rover_physics.status import PoseStatus, Stall
 from rover_physics.terrain.grid import Terrain
 
-SAMPLES = 32
-"""Number of samples."""
+SAMPLES, PLACES = 32, 8
+"""Number of samples, and of the places at which the rover is in them."""
 FAR = 0.5
 """Use of a limit below which no sample breaks it: it would have to double. Less where friction or
 torque of a sample may be less than half."""
@@ -90,58 +91,69 @@ def find_failure_chance(
         enough: Chance above which it need not be known: the samples end there, and those that are
             left count as if they passed.
     """
-    n = len(swept.prediction.poses)
-    rows, records = _all_rows(swept), model.records[-1:].copy()
+    records = model.records[-1:].copy()
     records["settings"]["control_margin"] = 0.0
-    model = replace(model, records=records)
-    settled = rows.results["status"] == PoseStatus.SETTLED
-    samples = draw_samples(model.rover.uncertainty, SAMPLES)
+    model, rows, n = replace(model, records=records), _all_rows(swept), len(swept.prediction.poses)
+    groups = draw_samples(model.rover.uncertainty, SAMPLES, PLACES)
     if model.options.policy == OPTIMAL:
-        samples = tuple(one.weaken() for one in samples)
-    samples = sort_by_strength(samples)
-    if enough < 0.5:
-        samples = samples[::-1]  # those with the least friction and torque refuse first
-    worst_two = worst_of(samples)
-    far = min(FAR, NEAR * min(worst_two[0].friction[0], worst_two[0].torque))
-    near = settled & _find_near(model, swept, rows.results, on_path, far)
-    is_exact = model.terrain.elevation_std is None
-    if near.any() and is_exact:
-        closer = _find_near(model, swept, rows.results, on_path, NEAR)
-        summed = _needs_path(model, rows.results)
-        for sample in worst_two:
-            worst = _evaluate_near(model, swept, sample, (rows, near), on_path)
-            closer |= _find_near(model, swept, worst, on_path, NEAR)
-            summed |= _needs_path(model, worst)
-        near &= closer
-        on_path &= summed
-    failed = np.zeros((SAMPLES if near.any() else 1, n), bool)
+        groups = tuple(one.weaken() for one in groups)
+    on_path &= model.wheels.on_servos
+    asked, on_path = _find_asked(model, swept, rows, groups, on_path)
+    settled = rows.results["status"] == PoseStatus.SETTLED
+    failed = np.zeros((SAMPLES if len(asked) else 1, n), bool)
     failed[:, rows.waypoint[~settled]] = True
-    counts, is_whole = np.zeros((n, len(model.limits)), np.int64), True
-    part = model.terrain if is_exact else _cut_around(model, rows.poses)
-    for k, sample in enumerate(samples if near.any() else ()):
+    counts, done = np.zeros((n, len(model.limits)), np.int64), 0
+    part = None if model.terrain.elevation_std is None else _cut_around(model, rows.poses)
+    looked_at = np.flatnonzero(settled) if on_path else asked
+    for group in groups if len(asked) else ():
         check_interruption()
-        drawn = model if is_exact else change_heights(model, part, k)
-        results = _evaluate_near(drawn, swept, sample, (rows, near), on_path)
-        asked = np.flatnonzero(near | _differ(results, rows.results))
-        broken = find_uses(model.limits, results[asked]).use > 1.0
-        fails = broken.any(axis=1)
-        waypoints = rows.waypoint[asked[fails]]
-        failed[k, waypoints] = True
-        np.add.at(counts, waypoints, broken[fails])
+        drawn = model if part is None else change_heights(model, part, group.number)
+        found = _evaluate(drawn, rows, asked, n, group)
+        for results in found:
+            if on_path:
+                every = _complete(drawn, swept, rows.results, (asked, results), on_path)
+                results = select_results(every, looked_at)
+            broken = find_uses(model.limits, results).use > 1.0
+            fails = broken.any(axis=1)
+            waypoints = rows.waypoint[looked_at[fails]]
+            failed[done, waypoints] = True
+            np.add.at(counts, waypoints, broken[fails])
+            done += 1
         if failed.any(axis=1).sum() > enough * SAMPLES:
-            is_whole = k == SAMPLES - 1
             break
     at = failed.mean(axis=0)
     place = int(at.argmax())
     most = int(counts[place].argmax())
     limit = model.limits.rows[most].title if counts[place, most] else ""
-    return FailureChance(float(failed.any(axis=1).mean()), at, limit, is_whole)
+    return FailureChance(float(failed.any(axis=1).mean()), at, limit, done in (0, SAMPLES))
 
 
-def _differ(results: np.ndarray, others: np.ndarray) -> NDArray[np.bool_]:
-    """Return for each row (n,) whether two RESULTs of it differ."""
-    whole = f"V{results.itemsize}"
-    return np.asarray(results.view(whole) != others.view(whole))
+def _find_asked(
+    model: PackedModel,
+    swept: SweptPath,
+    rows: Crossings,
+    groups: tuple[PlacedSamples, ...],
+    on_path: bool,
+) -> tuple[NDArray[np.int64], bool]:
+    """Return the indices of the rows that a sample may break, and whether the path decides there.
+
+    Where heights are uncertain, all that use more than FAR are asked.
+    """
+    worst_two = worst_of(groups)
+    weakest = worst_two[0].samples[0]
+    far = min(FAR, NEAR * min(weakest.friction[0], weakest.torque))
+    near = _find_near(model, swept, rows.results, on_path, far)
+    near &= rows.results["status"] == PoseStatus.SETTLED
+    if not near.any() or model.terrain.elevation_std is not None:
+        return np.flatnonzero(near), on_path
+    closer = _find_near(model, swept, rows.results, on_path, NEAR)
+    by_path, asked = _needs_path(model, rows.results), np.flatnonzero(near)
+    for group in worst_two:
+        found = _evaluate(model, rows, asked, len(swept.prediction.poses), group)[0]
+        worst = _complete(model, swept, rows.results, (asked, found), on_path)
+        closer |= _find_near(model, swept, worst, on_path, NEAR)
+        by_path |= _needs_path(model, worst)
+    return np.flatnonzero(near & closer), on_path and by_path
 
 
 def _cut_around(model: PackedModel, poses: Floats) -> Terrain:
@@ -171,7 +183,7 @@ def _find_near(
     """
     uses = find_uses(model.limits, results).use
     near = np.fmax.reduce(uses, axis=1, initial=0.0) > least
-    if not (on_path and model.wheels.on_servos):
+    if not on_path:
         return near
     sums = [row.reads in SUMS for row in model.limits.rows]
     n, distance = len(swept.prediction.poses), swept.prediction.distance
@@ -192,41 +204,53 @@ def _needs_path(model: PackedModel, results: np.ndarray) -> bool:
     return bool(near.any() or results["deficit"].any() or wedged.any())
 
 
-def _evaluate_near(
+def _evaluate(
     model: PackedModel,
-    swept: SweptPath,
-    sample: Sample,
-    chosen: tuple[Crossings, NDArray[np.bool_]],
-    on_path: bool,
-) -> np.ndarray:
-    """Return the RESULTs of all rows: those where the mask is True evaluated in a sample.
+    rows: Crossings,
+    asked: NDArray[np.int64],
+    waypoints: int,
+    group: PlacedSamples,
+) -> Any:
+    """Return the RESULTs (m, k) of asked rows in the m samples of a group.
 
     Poses between waypoints stay where they are: a peak of millimetres, as where a wheel leaves an
     edge, is met wherever the path is, and not a few millimetres beside it.
     """
-    all_rows, near = chosen
-    chosen_rows = np.flatnonzero(near)
-    rows, all_results = all_rows.select(chosen_rows), all_rows.results.copy()
-    between = chosen_rows >= len(swept.prediction.poses)
-    poses = np.where(between[:, None], rows.poses, sample.move(rows.poses))
+    rows = rows.select(asked)
+    poses = np.where((asked < waypoints)[:, None], group.move(rows.poses), rows.poses)
     motions = np.ascontiguousarray(rows.results["motion"])
-    results = unwritten_results(len(poses))
+    results = unwritten_results(len(group.samples) * len(poses)).reshape(-1, len(poses))
     angles = rows.results["contact_angle"]
     is_even = angles.max(axis=1) - angles.min(axis=1) < EVEN
     for share, own in ((EVEN_SHARE, is_even), (1.0, ~is_even)):
         here = np.flatnonzero(own)
         if len(here):
-            changed = sample.add_error(share).change(model)
-            found = changed.evaluate(poses[here], rows.held[here], motions[here])
-            place_results(found, results, here)
+            variants = model.records[None].repeat(len(group.samples), axis=0)
+            for sample, records in zip(group.samples, variants, strict=True):
+                sample.add_error(share).change(records)
+            found = model.evaluate_variants(variants, poses[here], motions[here], rows.held[here])
+            for to, one in zip(results, found.T, strict=True):
+                place_results(np.ascontiguousarray(one), to, here)
     for name in OF_PATH:
         results[name] = rows.results[name]
-    results["torque_saturation"] /= sample.torques
+    results["torque_saturation"] /= np.array([[one.torques] for one in group.samples])
     if model.wheels.on_servos:
-        results["torque_share"] = results["torque_saturation"].mean(axis=1)
-    place_results(results, all_results, near)
-    if on_path and model.wheels.on_servos:
-        n = len(swept.prediction.poses)
-        crossings = swept.crossings._replace(results=all_results[n:])
-        write_servo_path(model, swept.prediction.poses, all_results[:n], crossings)
-    return np.asarray(all_results)
+        results["torque_share"] = results["torque_saturation"].mean(axis=2)
+    return results
+
+
+def _complete(
+    model: PackedModel,
+    swept: SweptPath,
+    results: Any,
+    found: tuple[NDArray[np.int64], Any],
+    on_path: bool,
+) -> Any:
+    """Return the RESULTs of all rows with those found at some, and what the path decides then."""
+    results, n = results.copy(), len(swept.prediction.poses)
+    rows, others = found
+    place_results(others, results, rows)
+    if on_path:
+        crossings = swept.crossings._replace(results=results[n:])
+        write_servo_path(model, swept.prediction.poses, results[:n], crossings)
+    return results

@@ -27,6 +27,8 @@ DEVIATES = {
     "heading": 1,
 }
 """Fields of `Uncertainty`, and how many independent deviates each has."""
+OF_PLACE = ("position", "heading")
+"""Fields that say where the rover is."""
 SEED, HEIGHT_SEED = 48617, 6
 """Seeds of the samples and of the heights: every path gets the same, so that what is common stays
 common. Of 60,000 seeds it is the one with which friction and torque limit over the model's error
@@ -35,7 +37,7 @@ are nearest to their distributions: a chance is off by 0.09 at most, with others
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """One drawing of all that is uncertain; factors are over what is told."""
+    """One drawing of forces, torques and masses; factors are over what is told."""
 
     friction: Floats
     """(6,) factors of the friction under the wheels."""
@@ -47,8 +49,6 @@ class Sample:
     """Mass [kg] that the body has more."""
     com: Floats
     """(3,) shift of the body's centre of mass [m], body frame."""
-    shift: Floats
-    """(3,) shift of all poses: along and across their heading [m], and turn [rad]."""
     error: float = 0.0
     """The model's error: the forces that are needed over those that it finds, less 1."""
 
@@ -61,9 +61,8 @@ class Sample:
         friction, torque = self.friction / needed, self.torque / needed
         return replace(self, friction=friction, torque=torque, error=0.0)
 
-    def change(self, model: PackedModel) -> PackedModel:
-        """Return the model with friction, torque limit and masses of this sample."""
-        records = model.records.copy()
+    def change(self, records: np.ndarray) -> None:
+        """Give a model's records friction, torque limit and masses of this sample."""
         settings, linkage = records["settings"], records["linkage"]
         settings["friction_factor"] *= self.friction
         settings["max_torque"] *= self.torque
@@ -71,7 +70,6 @@ class Sample:
         linkage["body_mass"] += self.mass
         linkage["mass"] += self.mass
         linkage["body_com"] += self.com
-        return replace(model, records=records)
 
     def weaken(self) -> "Sample":
         """Return the sample with all wheels as weak as the weakest one.
@@ -80,6 +78,31 @@ class Sample:
         """
         torque = self.torque * float(self.torques.min())
         return replace(self, torque=torque, torques=np.ones(6))
+
+    @property
+    def strength(self) -> float:
+        """The scarcer of friction and torque over what is told."""
+        whole = self.add_error(1.0)
+        return min(float(whole.friction.min()), whole.torque * float(whole.torques.min()))
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedSamples:
+    """Samples of a rover that is at one place beside its path, on one drawing of the heights."""
+
+    samples: tuple[Sample, ...]
+    """The samples, for which the rover settles once."""
+    shift: Floats
+    """(3,) shift of all poses: along and across their heading [m], and turn [rad]."""
+    number: int
+    """Number of the drawing of the heights."""
+
+    def __post_init__(self) -> None:
+        freeze_fields(self)
+
+    def weaken(self) -> "PlacedSamples":
+        """Return the samples as `Sample.weaken` does."""
+        return replace(self, samples=tuple(one.weaken() for one in self.samples))
 
     def move(self, poses: Floats) -> Floats:
         """Return poses (n, 3) with the shift."""
@@ -90,36 +113,45 @@ class Sample:
 
 
 @lru_cache(maxsize=8)
-def draw_samples(uncertainty: Uncertainty, count: int) -> tuple[Sample, ...]:
-    """Return the samples: each deviate has one value in each of `count` equally likely ranges."""
-    rng, quantile = np.random.default_rng(SEED), NormalDist().inv_cdf
-    levels = np.array([quantile((k + 0.5) / count) for k in range(count)])
+def draw_samples(uncertainty: Uncertainty, count: int, places: int) -> tuple[PlacedSamples, ...]:
+    """Return the samples, those with the weakest first.
+
+    Each deviate has one value in each of `count` equally likely ranges, those of the place in each
+    of `places`.
+    """
+    rng = np.random.default_rng(SEED)
     drawn = {
         name: getattr(uncertainty, name)
-        * np.column_stack([levels[rng.permutation(count)] for _ in range(deviates)])
+        * _draw_levels(rng, places if name in OF_PLACE else count, deviates)
         for name, deviates in DEVIATES.items()
     }
-    return tuple(
-        _sample({name: values[k] for name, values in drawn.items()}) for k in range(count)
-    )
+    samples = [
+        _sample({name: values[k] for name, values in drawn.items() if name not in OF_PLACE})
+        for k in range(count)
+    ]
+    shifts = np.column_stack([drawn[name] for name in OF_PLACE])
+    placed = [PlacedSamples(tuple(samples[k::places]), shift, k) for k, shift in enumerate(shifts)]
+    return tuple(sorted(placed, key=lambda one: min(each.strength for each in one.samples)))
 
 
-def sort_by_strength(samples: tuple[Sample, ...]) -> tuple[Sample, ...]:
-    """Return samples sorted by the scarcer of friction and torque, the one with the most first."""
-    whole = [one.add_error(1.0) for one in samples]
-    scarcer = [min(one.friction.min(), one.torque * one.torques.min()) for one in whole]
-    return tuple(samples[k] for k in np.argsort(scarcer, kind="stable")[::-1])
+def _draw_levels(rng: np.random.Generator, count: int, deviates: int) -> Floats:
+    """Return standard normal deviates (count, deviates), one in each of `count` ranges."""
+    levels = np.array([NormalDist().inv_cdf((k + 0.5) / count) for k in range(count)])
+    return np.column_stack([levels[rng.permutation(count)] for _ in range(deviates)])
 
 
-def worst_of(samples: tuple[Sample, ...]) -> tuple[Sample, Sample]:
+@lru_cache(maxsize=8)
+def worst_of(groups: tuple[PlacedSamples, ...]) -> tuple[PlacedSamples, PlacedSamples]:
     """Return the least friction and torque limit of samples, with all else off to either side."""
-    samples = tuple(one.add_error(1.0) for one in samples)
+    samples = [one.add_error(1.0) for group in groups for one in group.samples]
     friction = np.full(6, min(float(one.friction.min()) for one in samples))
     torque = min(one.torque * float(one.torques.min()) for one in samples)
-    mass = max(one.mass for one in samples)
-    com, shift = (np.max([getattr(one, name) for one in samples], 0) for name in ("com", "shift"))
+    mass, com = max(one.mass for one in samples), np.max([one.com for one in samples], 0)
+    shift = np.max([group.shift for group in groups], 0)
     one, other = (
-        Sample(friction, torque, np.ones(6), side * mass, side * com, side * shift)
+        PlacedSamples(
+            (Sample(friction, torque, np.ones(6), side * mass, side * com),), side * shift, 0
+        )
         for side in (1.0, -1.0)
     )
     return one, other
@@ -134,7 +166,6 @@ def _sample(deviations: dict[str, Floats]) -> Sample:
         torques=1.0 + deviations["max_torque_per_wheel"],
         mass=held["mass"],
         com=deviations["com"],
-        shift=np.append(deviations["position"], deviations["heading"]),
         error=held["model"],
     )
 

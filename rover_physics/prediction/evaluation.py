@@ -108,20 +108,27 @@ def evaluate_poses(models, limits, places, works, written, part):
     """Evaluate the poses of some chunks into results, one chunk per work space.
 
     Args:
-        models: (1,) or (3,) MODEL.
+        models: (m, 1) or (m, 3) MODEL, the rows of which differ in friction, torques and masses
+            alone: the rover settles in all of them as in the first.
         limits: (k,) LIMIT.
         places: `poses`, `motions` and `held` of `PackedModel.evaluate`.
         works: (chunks,) WORK.
-        written: (n,) RESULT and the same as numbers (n, RESULT_COLUMNS), written.
+        written: RESULTs (n m,), those of a pose side by side, and the same as numbers
+            (n m, RESULT_COLUMNS), written.
         part: The first chunk and the one after the last.
     """
-    (poses, motions, held), (results, numbers), chunks = places, written, works.size
-    n = poses.shape[0]
+    (poses, motions, held), chunks = places, works.size
+    n, variants = poses.shape[0], models.shape[0]
     for chunk in range(part[0], part[1]):
+        work = works[chunk]
         for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
-            set_pose(models[0], poses, motions, i, works[chunk])
-            hold_wheels(held, i, works[chunk].contacts)
-            evaluate_row(models, limits, works[chunk], (results, numbers), i)
+            set_pose(models[0, 0], poses, motions, i, work)
+            hold_wheels(held, i, work.contacts)
+            status = stand(models[0, 0], work)
+            for k in range(variants):
+                if k > 0 and status == PoseStatus.SETTLED:
+                    place_masses(models[k, 0].linkage, work.q, work.placement)
+                _evaluate_row(models[k], limits, work, status, written, i * variants + k)
 
 
 @kernel
@@ -146,8 +153,8 @@ def set_pose(model, poses, motions, i, work):
 
 
 @kernel
-def evaluate_row(models, limits, work, written, i):
-    """Evaluate the pose and motion of `set_pose` into row i of results.
+def _evaluate_row(models, limits, work, status, written, i):
+    """Evaluate a rover for which `stand` has returned a status into row i of results.
 
     If the rover does not settle or its forces do not balance, only motion, steering and status are
     written. If a number is none, the status says so: NaN would keep every limit.
@@ -160,12 +167,12 @@ def evaluate_row(models, limits, work, written, i):
         models: (1,) MODEL, or these three.
         limits: (k,) LIMIT.
         work: WORK.
-        written: (n,) RESULT and the same as numbers (n, RESULT_COLUMNS), written.
+        status: A PoseStatus.
+        written: RESULTs and the same as numbers, written.
         i: The row.
     """
     results, numbers = written
     _write_motion(models[0].linkage, work, results[i])
-    status = stand(models[0], work)
     for k in range(models.size):
         evaluate_stance(models[k], work, status, results[i])
         if k + 1 == models.size or status != PoseStatus.SETTLED:

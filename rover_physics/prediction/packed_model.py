@@ -60,7 +60,7 @@ class PackedModel:
     options: SweepOptions
     """Torque policy, friction, soil, arm and direction."""
     records: np.ndarray
-    """(1,) MODEL; with a control margin (3,), see `evaluate_row`."""
+    """(1,) MODEL; with a control margin (3,), see `evaluate_poses`."""
     limits: RoverLimits
     """The limits that are asked of it."""
     ground: Ground
@@ -136,20 +136,39 @@ class PackedModel:
             return self.known.complete(poses, motions, self._evaluate)
         return self._evaluate(poses, motions, held)
 
+    def evaluate_variants(
+        self,
+        variants: np.ndarray,
+        poses: np.ndarray,
+        motions: np.ndarray,
+        held: np.ndarray = NONE_HELD,
+    ) -> Any:
+        """Evaluate variants of the model at poses and return RESULTs (n, m).
+
+        Args:
+            variants: (m, 1) or (m, 3) MODEL: records as of this model, which differ from them in
+                friction, torques and masses alone.
+            poses: As for `evaluate`, (n, 3).
+            motions: As for `evaluate`.
+            held: As for `evaluate`.
+        """
+        count = len(variants)
+        results = unwritten_results(len(poses) * count)
+        with limit_threads(self.relative_cost(len(results))) as threads:
+            works = new_works(threads, len(poses))
+            for part in slices(len(poses)):
+                rows = results[part.start * count : part.stop * count]
+                clear_results(rows)
+                places = poses[part], motions[part], held[part]
+                sweep = variants, self.limits.records, places, works, (rows, numbers_of(rows))
+                run_chunks(evaluate_poses, sweep, len(works), threads)
+                forget_uncomputable(rows)
+        return results.reshape(-1, count)
+
     def _evaluate(
         self, poses: np.ndarray, motions: np.ndarray, held: np.ndarray = NONE_HELD
     ) -> Any:
-        results = unwritten_results(len(poses))
-        with limit_threads(self.relative_cost(len(poses))) as threads:
-            works = new_works(threads, len(poses))
-            for part in slices(len(poses)):
-                clear_results(results[part])
-                places = poses[part], motions[part], held[part]
-                written = results[part], numbers_of(results[part])
-                sweep = self.records, self.limits.records, places, works, written
-                run_chunks(evaluate_poses, sweep, len(works), threads)
-                forget_uncomputable(results[part])
-        return results
+        return self.evaluate_variants(self.records[None], poses, motions, held)[:, 0]
 
     def relative_cost(self, poses: int) -> int:
         """Return the time of a sweep over poses, relative to one pose with equal torques."""

@@ -102,7 +102,7 @@ def _carry_by_momentum(course: _Course, gravity: float) -> None:
     no momentum. `gravity` is in [m/s^2].
     """
     deficits = course.values("deficit")
-    if not (deficits != 0.0).any():
+    if not deficits.any():
         return
     share, motion = course.values("speed_share"), course.values("motion")
     ahead = course.values("contact_angle") * np.sign(course.values("wheel_speed"))
@@ -110,10 +110,9 @@ def _carry_by_momentum(course: _Course, gravity: float) -> None:
     distances = np.append(0.0, course.distances)
     stands = (distances == 0.0) | (ahead.max(axis=1) > FACE)
     head = 0.0
-    for k in range(len(deficits)):
-        if deficits[k] == 0.0:
-            head = 0.0 if stands[k] else share[k] ** 2 * nominal[k]
-            continue
+    for k in np.flatnonzero(deficits).tolist():
+        if k > 0 and deficits[k - 1] == 0.0:
+            head = 0.0 if stands[k - 1] else share[k - 1] ** 2 * nominal[k - 1]
         if deficits[k] < 0.0:
             head = max(head, nominal[k])
         before = deficits[k - 1] if (deficits[k - 1] < 0.0) == (deficits[k] < 0.0) else 0.0

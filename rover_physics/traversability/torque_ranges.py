@@ -106,7 +106,7 @@ def evaluate_in_turn(
     for i in range(len(poses)):
         places = poses[i : i + 1], motions[i : i + 1], NONE_HELD
         # The kernel of sweeps, for one pose: a kernel of its own would compile the model again.
-        evaluate_poses(model.records, model.limits.records, places, works, written, (0, 1))
+        evaluate_poses(model.records[None], model.limits.records, places, works, written, (0, 1))
         yield results, works[0]
 
 

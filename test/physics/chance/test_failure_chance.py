@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.chance import HELD_OUT, find_chance, read_driven_paths
 from rover_physics import SweepOptions, Terrain, judge_path, judge_poses, load_rover
-from rover_physics.chance.failure_chance import EVEN_SHARE, SAMPLES
+from rover_physics.chance.failure_chance import EVEN_SHARE, PLACES, SAMPLES
 from rover_physics.chance.samples import DEVIATES, draw_samples
 from rover_physics.errors import ModelError, RoverFileError
 from rover_physics.limits.table import CHANCE
@@ -59,7 +59,8 @@ def test_the_chance_is_that_of_a_friction_below_what_the_slope_needs(slope):
 
 def test_samples_over_the_error_of_the_model_are_spread_as_told():
     told = Uncertainty()
-    samples = [one.add_error(1.0) for one in draw_samples(told, SAMPLES)]
+    groups = draw_samples(told, SAMPLES, PLACES)
+    samples = [one.add_error(1.0) for group in groups for one in group.samples]
     frictions, torques = [one.friction.mean() for one in samples], [one.torque for one in samples]
     of_friction = np.hypot(told.friction, told.friction_per_wheel / np.sqrt(6.0))
     over = np.hypot(told.model, told.wheel_radius)
