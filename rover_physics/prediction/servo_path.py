@@ -76,12 +76,11 @@ class _Course:
         parts = [self.results[name], self.crossings.results[name]]
         return np.asarray(np.concatenate(parts)[self.order])
 
-    def result(self, k: int) -> Any:
-        """Return the RESULT of the k-th pose, an array (1,) to write to."""
-        row, n = self.order[k], len(self.results)
-        if row < n:
-            return self.results[row : row + 1]
-        return self.crossings.results[row - n : row - n + 1]
+    def write(self, name: str, values: Floats) -> None:
+        """Write a field of RESULT at all poses."""
+        n, unsorted = len(self.results), np.empty_like(values)
+        unsorted[self.order] = values
+        self.results[name], self.crossings.results[name] = unsorted[:n], unsorted[n:]
 
 
 def _stop_in_slots(course: _Course) -> None:
@@ -89,9 +88,12 @@ def _stop_in_slots(course: _Course) -> None:
     angles = course.values("contact_angle") * np.sign(course.values("wheel_speed"))
     # The contact jumps from the face behind to the face in front.
     wedged = ((angles[1:] - angles[:-1] >= WEDGED) & (angles[:-1] < 0.0)).any(axis=1)
-    for k in (1 + np.flatnonzero(wedged)).tolist():
-        one = course.result(k)
-        one["speed_share"], one["stalls"] = 0.0, Stall.WEDGED
+    if wedged.any():
+        rows = 1 + np.flatnonzero(wedged)
+        for name, value in (("speed_share", 0.0), ("stalls", Stall.WEDGED)):
+            values = course.values(name)
+            values[rows] = value
+            course.write(name, values)
 
 
 def _carry_by_momentum(course: _Course, gravity: float) -> None:
@@ -109,7 +111,7 @@ def _carry_by_momentum(course: _Course, gravity: float) -> None:
     nominal = (motion[:, 0] ** 2 + motion[:, 1] ** 2) / (2.0 * gravity)
     distances = np.append(0.0, course.distances)
     stands = (distances == 0.0) | (ahead.max(axis=1) > FACE)
-    head = 0.0
+    head, carried = 0.0, np.zeros(len(deficits))
     for k in np.flatnonzero(deficits).tolist():
         if k > 0 and deficits[k - 1] == 0.0:
             head = 0.0 if stands[k - 1] else share[k - 1] ** 2 * nominal[k - 1]
@@ -119,10 +121,13 @@ def _carry_by_momentum(course: _Course, gravity: float) -> None:
         head -= 0.5 * (before + deficits[k]) * distances[k] if distances[k] else 0.0
         head = 0.0 if stands[k] and deficits[k] > 0.0 else max(head, 0.0)
         if MIN_SPEED_SHARE**2 * nominal[k] < head <= RUNAWAY:
-            one = course.result(k)
-            one["speed_share"] = np.sqrt(head / nominal[k])
-            for name in ("friction_share", "torque_share"):
-                one[name] = np.minimum(one[name], 1.0)
+            carried[k] = head
+    rolls = carried > 0.0
+    share[rolls] = np.sqrt(carried[rolls] / nominal[rolls])
+    course.write("speed_share", share)
+    for name in ("friction_share", "torque_share"):
+        values = course.values(name)
+        course.write(name, np.where(rolls, np.minimum(values, 1.0), values))
 
 
 def _find_lift_heights(course: _Course) -> tuple[Floats, Floats]:
