@@ -106,12 +106,6 @@ read_int: Any = intrinsic(_reader(types.int32, types.int64))
 """Return element `index` of the int32 array at `address`."""
 
 
-@lru_cache(maxsize=4)
-def pack_ground(terrain: Terrain) -> Ground:
-    """Return a terrain as a Ground, without soils; the last 4 are cached."""
-    return new_ground(terrain)
-
-
 def new_ground(terrain: Terrain) -> Ground:
     """Return a terrain as a Ground, without soils."""
     elevation, friction, soil = terrain.elevation, terrain.friction, terrain.soil
@@ -141,6 +135,10 @@ def new_ground(terrain: Terrain) -> Ground:
         inverse_resolution=1.0 / float(terrain.resolution),
     )
     return Ground(array_of(record), arrays)
+
+
+pack_ground = lru_cache(maxsize=4)(new_ground)
+"""The same; the last 4 are cached."""
 
 
 def with_soils(ground: Ground, soils: np.ndarray) -> Ground:
