@@ -7,6 +7,7 @@ map, without the verdict.
 
 import warnings
 from collections.abc import Callable
+from functools import wraps
 from typing import Any
 
 from rover_physics.traversability.judge import judge_path, judge_paths, judge_poses
@@ -15,6 +16,7 @@ from rover_physics.traversability.judge import judge_path, judge_paths, judge_po
 def _old_name(name: str, judge: Callable[..., Any], pick: Callable[[Any], Any]) -> Any:
     """Return the function of an old name; `pick` takes predictions from what `judge` returns."""
 
+    @wraps(judge)
     def sweep(*arguments: Any, **named: Any) -> Any:
         now = f"{judge.__name__} returns the prediction and the verdict"
         text = f"{name} goes with the next version; {now}"

@@ -150,15 +150,10 @@ def with_soils(ground: Ground, soils: np.ndarray) -> Ground:
 
 def _reduce_blocks(cells: np.ndarray, reduce: np.ufunc) -> np.ndarray:
     """Reduce each block of cells to one value; missing cells at the far edges repeat the last."""
+    cells = np.pad(cells, [(0, -size % BLOCK) for size in cells.shape], mode="edge")
     ny, nx = cells.shape
-    missing = (0, -ny % BLOCK), (0, -nx % BLOCK)
-    if missing != ((0, 0), (0, 0)):
-        cells = np.pad(cells, missing, mode="edge")
-    for _ in range(BLOCK_BITS):
-        cells = reduce(cells[0::2], cells[1::2])
-    for _ in range(BLOCK_BITS):
-        cells = reduce(cells[:, 0::2], cells[:, 1::2])
-    return cells
+    blocks = cells.reshape(ny // BLOCK, BLOCK, nx // BLOCK, BLOCK)
+    return np.asarray(reduce.reduce(blocks, axis=(1, 3)))
 
 
 @kernel
