@@ -9,21 +9,29 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rover_physics.deprecated import sweep_path, sweep_paths, sweep_poses
-    from rover_physics.errors import RoverError
-    from rover_physics.prediction.map_sweep import PoseScores, score_poses, sweep_map
-    from rover_physics.prediction.sweep_options import SweepOptions
-    from rover_physics.results.path_prediction import PathPrediction
-    from rover_physics.rover.model import Rover
-    from rover_physics.rover.rover_file import load_rover
-    from rover_physics.status import PoseStatus
-    from rover_physics.terrain.grid import Terrain, load_terrain, save_terrain
-    from rover_physics.traversability.classification import classify_path
-    from rover_physics.traversability.judge import judge_path, judge_paths, judge_poses
-    from rover_physics.traversability.pieces import judge_pieces
-    from rover_physics.traversability.reach import judge_reach
-    from rover_physics.traversability.torque_ranges import find_torque_ranges
-    from rover_physics.traversability.verdict import Verdict
+    from rover_physics.deprecated import sweep_path as sweep_path
+    from rover_physics.deprecated import sweep_paths as sweep_paths
+    from rover_physics.deprecated import sweep_poses as sweep_poses
+    from rover_physics.errors import RoverError as RoverError
+    from rover_physics.prediction.map_sweep import PoseScores as PoseScores
+    from rover_physics.prediction.map_sweep import score_poses as score_poses
+    from rover_physics.prediction.map_sweep import sweep_map as sweep_map
+    from rover_physics.prediction.sweep_options import SweepOptions as SweepOptions
+    from rover_physics.results.path_prediction import PathPrediction as PathPrediction
+    from rover_physics.rover.model import Rover as Rover
+    from rover_physics.rover.rover_file import load_rover as load_rover
+    from rover_physics.status import PoseStatus as PoseStatus
+    from rover_physics.terrain.grid import Terrain as Terrain
+    from rover_physics.terrain.grid import load_terrain as load_terrain
+    from rover_physics.terrain.grid import save_terrain as save_terrain
+    from rover_physics.traversability.classification import classify_path as classify_path
+    from rover_physics.traversability.judge import judge_path as judge_path
+    from rover_physics.traversability.judge import judge_paths as judge_paths
+    from rover_physics.traversability.judge import judge_poses as judge_poses
+    from rover_physics.traversability.pieces import judge_pieces as judge_pieces
+    from rover_physics.traversability.reach import judge_reach as judge_reach
+    from rover_physics.traversability.torque_ranges import find_torque_ranges as find_torque_ranges
+    from rover_physics.traversability.verdict import Verdict as Verdict
 
 __version__ = "0.1.0"
 
@@ -54,32 +62,7 @@ _HOMES = {
 }
 """Names of the API, and the module below this package that holds each."""
 
-__all__ = [
-    "PathPrediction",
-    "PoseScores",
-    "PoseStatus",
-    "Rover",
-    "RoverError",
-    "SweepOptions",
-    "Terrain",
-    "Verdict",
-    "__version__",
-    "classify_path",
-    "find_torque_ranges",
-    "judge_path",
-    "judge_paths",
-    "judge_pieces",
-    "judge_poses",
-    "judge_reach",
-    "load_rover",
-    "load_terrain",
-    "save_terrain",
-    "score_poses",
-    "sweep_map",
-    "sweep_path",
-    "sweep_paths",
-    "sweep_poses",
-]
+__all__ = ["__version__", *_HOMES]
 
 
 def __getattr__(name: str) -> Any:

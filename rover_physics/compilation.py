@@ -33,11 +33,6 @@ Report = Callable[[str], object]
 """Function that takes the name of a step that is compiled, when it begins."""
 
 
-def name_of(step: Step) -> str:
-    """Return the name of a step for people."""
-    return step.__name__.replace("_", " ")
-
-
 def load(step: Step) -> bool:
     """Load the kernels of a step; return False if one of them is not on disk."""
     try:
@@ -112,7 +107,7 @@ class Compilation:
             self._process = start_process(steps, self._niceness)
         assert self._process.stdout is not None
         for line in self._process.stdout:
-            report(name_of(steps[int(line)]))
+            report(steps[int(line)].__name__.replace("_", " "))
         self._process.wait()
 
 

@@ -1,56 +1,31 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Names of version 0.1 that work for one more version, with a warning."""
+"""Names of version 0.1 that work for one more version, with a warning.
+
+Each takes the arguments of the function that replaces it, and returns its prediction on an exact
+map, without the verdict.
+"""
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable
+from functools import wraps
+from typing import Any
 
-from numpy.typing import ArrayLike
-
-from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
-from rover_physics.results.path_prediction import PathPrediction
-from rover_physics.rover.model import Rover
-from rover_physics.terrain.grid import Terrain
-from rover_physics.traversability.judge import judge_paths, judge_poses
+from rover_physics.traversability.judge import judge_path, judge_paths, judge_poses
 
 
-def sweep_path(
-    rover: Rover, terrain: Terrain, poses: ArrayLike, options: SweepOptions = DEFAULT_OPTIONS
-) -> PathPrediction:
-    """Return the prediction of `judge_path` on an exact map."""
-    _warn("sweep_path", "judge_path")
-    return _sweep(rover, terrain, [poses], options)[0]
+def _old_name(name: str, judge: Callable[..., Any], pick: Callable[[Any], Any]) -> Any:
+    """Return the function of an old name; `pick` takes predictions from what `judge` returns."""
+
+    @wraps(judge)
+    def sweep(*arguments: Any, **named: Any) -> Any:
+        now = f"{judge.__name__} returns the prediction and the verdict"
+        text = f"{name} goes with the next version; {now}"
+        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        return pick(judge(*arguments, sigmas=0, **named))
+
+    return sweep
 
 
-def sweep_paths(
-    rover: Rover,
-    terrain: Terrain,
-    paths: Sequence[ArrayLike],
-    options: SweepOptions = DEFAULT_OPTIONS,
-) -> list[PathPrediction]:
-    """Return the predictions of `judge_paths` on an exact map."""
-    _warn("sweep_paths", "judge_paths")
-    return _sweep(rover, terrain, paths, options)
-
-
-def sweep_poses(
-    rover: Rover,
-    terrain: Terrain,
-    poses: ArrayLike,
-    curvature: ArrayLike,
-    options: SweepOptions = DEFAULT_OPTIONS,
-) -> PathPrediction:
-    """Return the prediction of `judge_poses` on an exact map."""
-    _warn("sweep_poses", "judge_poses")
-    return judge_poses(rover, terrain, poses, curvature, options, sigmas=0)[0]
-
-
-def _sweep(
-    rover: Rover, terrain: Terrain, paths: Sequence[ArrayLike], options: SweepOptions
-) -> list[PathPrediction]:
-    judged = judge_paths(rover, terrain, paths, options, sigmas=0, check_entrapment=False)
-    return [prediction for prediction, _ in judged]
-
-
-def _warn(old: str, new: str) -> None:
-    text = f"{old} goes with the next version; {new} returns the prediction and the verdict"
-    warnings.warn(text, DeprecationWarning, stacklevel=3)
+sweep_path = _old_name("sweep_path", judge_path, lambda judged: judged[0])
+sweep_paths = _old_name("sweep_paths", judge_paths, lambda judged: [one[0] for one in judged])
+sweep_poses = _old_name("sweep_poses", judge_poses, lambda judged: judged[0])

@@ -12,10 +12,11 @@ import numpy as np
 
 from rover_physics.contact.circle_search import search_circle
 from rover_physics.contact.contact_record import MAX_ANGLES, MAX_CIRCLES
+from rover_physics.contact.rim_scan import find_gap
 from rover_physics.contact.wheel import COMPLIANCE
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import record_type
-from rover_physics.terrain.ground import elevation_of, height_at_cell, is_cell_on_map, to_cells
+from rover_physics.terrain.ground import elevation_of, to_cells
 
 RUNGS = 4
 """Number of places between a point and the nearest point with which the point is compared."""
@@ -98,13 +99,14 @@ def _look_around(model, rover, wheel, angle, rim):
     samples = model.samples
     s, c = np.sin(angle), np.cos(angle)
     for m in range(samples.circles):
-        gap, _ = _gap_at(model, rover, (wheel, m), (s, c))
+        circle = wheel, samples.laterals[m]
+        gap, _ = find_gap(model, rover, circle, (s, c))
         rim.nearest[m], rim.nearest_angle[m] = np.inf, angle
         if gap == gap:
             rim.nearest[m] = gap
         for k in range(samples.rows):
-            gap, _ = _gap_at(model, rover, (wheel, m), (samples.sines[k], samples.cosines[k]))
-            rim.gap[m, k] = gap
+            turn = samples.sines[k], samples.cosines[k]
+            rim.gap[m, k] = find_gap(model, rover, circle, turn)[0]
         _find_lowest(model, rover, wheel, m, rim)
 
 
@@ -122,32 +124,12 @@ def _find_lowest(model, rover, wheel, m, rim):
         after = rim.gap[m, min(k + 1, samples.rows - 1)]
         if gap != gap or gap > before or gap > after:
             continue
-        circle = wheel, samples.laterals[m]
-        gap, turn, _ = search_circle(model, rover, circle, (samples.sines[k], samples.cosines[k]))
+        circle, turn = (wheel, samples.laterals[m]), (samples.sines[k], samples.cosines[k])
+        gap, turn, _ = search_circle(model, rover, circle, turn, np.inf)
         angle = np.arctan2(turn[0], turn[1])
         rim.lowest[m, k] = angle
         if gap < rim.nearest[m]:
             rim.nearest[m], rim.nearest_angle[m] = gap, angle
-
-
-@kernel
-def _gap_at(model, rover, circle, turn):
-    """Return the gap [m] at one point of the rim, NaN if unknown, and its place (x, y) [cells].
-
-    `circle` is (wheel, index of its circle), `turn` (sine, cosine) of the contact angle.
-    """
-    ground, samples, placement = model.ground, model.samples, rover.placement
-    (wheel, m), (s, c) = circle, turn
-    axis, centres = placement.axis[wheel], placement.centres
-    forward, up = placement.forward[wheel], placement.up[wheel]
-    across, radius = samples.laterals[m], samples.radius
-    x = centres[wheel, 0] + across * axis[0] + radius * (s * forward[0] - c * up[0])
-    y = centres[wheel, 1] + across * axis[1] + radius * (s * forward[1] - c * up[1])
-    z = centres[wheel, 2] + across * axis[2] - radius * c * up[2]
-    gx, gy = to_cells(ground, x, y)
-    if not is_cell_on_map(ground, gx, gy):
-        return np.nan, (gx, gy)
-    return z - height_at_cell(ground, gx, gy), (gx, gy)
 
 
 @kernel
@@ -207,8 +189,9 @@ def _error_to_circle(uncertain, work, wheel, m, best):
     """Return a bound on the error [m] between the gaps of the nearest points of two circles."""
     model, rover, rim = uncertain.nominal, work.rover, work.contact_bounds.rim
     here, there = rim.nearest_angle[m], rim.nearest_angle[best]
-    _, a = _gap_at(model, rover, (wheel, m), (np.sin(here), np.cos(here)))
-    _, b = _gap_at(model, rover, (wheel, best), (np.sin(there), np.cos(there)))
+    one, other = (wheel, model.samples.laterals[m]), (wheel, model.samples.laterals[best])
+    _, a = find_gap(model, rover, one, (np.sin(here), np.cos(here)))
+    _, b = find_gap(model, rover, other, (np.sin(there), np.cos(there)))
     return np.hypot(_error_between(uncertain.error, a, b), _shift_between(rim, here, there))
 
 
@@ -223,7 +206,7 @@ def _shift_between(rim, angle, other):
 @kernel
 def _widen_angles(uncertain, work, wheel, m):
     """Widen the angles of a wheel to those at which circle m may touch."""
-    contact_bounds = work.contact_bounds
+    contact_bounds, circle = work.contact_bounds, (wheel, uncertain.nominal.samples.laterals[m])
     nearest = contact_bounds.rim.nearest_angle[m]
     contact_bounds.angle_low[wheel] = min(contact_bounds.angle_low[wheel], nearest)
     contact_bounds.angle_high[wheel] = max(contact_bounds.angle_high[wheel], nearest)
@@ -233,7 +216,7 @@ def _widen_angles(uncertain, work, wheel, m):
             continue
         for _ in range(HALVINGS):
             middle = 0.5 * (inside + outside)
-            if _may_touch(uncertain, work, (wheel, m), middle, nearest):
+            if _may_touch(uncertain, work, circle, middle, nearest):
                 inside = middle
             else:
                 outside = middle
@@ -249,7 +232,7 @@ def _find_farthest(uncertain, work, wheel, m, side):
     counts with the local minimum near it.
     """
     samples, rim = uncertain.nominal.samples, work.contact_bounds.rim
-    nearest = rim.nearest_angle[m]
+    nearest, circle = rim.nearest_angle[m], (wheel, samples.laterals[m])
     away = -1.0 if side == 0 else 1.0
     spacing = np.pi / (samples.rows - 1)
     outside = nearest
@@ -263,9 +246,9 @@ def _find_farthest(uncertain, work, wheel, m, side):
         doubt = np.hypot(SQRT2 * rim.largest_error, _shift_between(rim, angle, nearest))
         if lowest != lowest and rim.gap[m, k] - rim.nearest[m] > doubt:
             continue
-        if lowest == lowest and _may_touch(uncertain, work, (wheel, m), lowest, nearest):
+        if lowest == lowest and _may_touch(uncertain, work, circle, lowest, nearest):
             return lowest, _clip_angle(max(away * angle, away * lowest + spacing) * away)
-        if _may_touch(uncertain, work, (wheel, m), angle, nearest):
+        if _may_touch(uncertain, work, circle, angle, nearest):
             return angle, _clip_angle(angle + away * spacing)
     return nearest, outside
 
@@ -279,15 +262,15 @@ def _clip_angle(angle):
 def _may_touch(uncertain, work, circle, angle, nearest):
     """Return whether a circle may touch at `angle` [rad] rather than between it and `nearest`.
 
-    `circle` is (wheel, index of its circle).
+    `circle` is (wheel, distance of its circle from its middle plane [m]).
     """
     model, rover, rim = uncertain.nominal, work.rover, work.contact_bounds.rim
-    gap, a = _gap_at(model, rover, circle, (np.sin(angle), np.cos(angle)))
+    gap, a = find_gap(model, rover, circle, (np.sin(angle), np.cos(angle)))
     if gap != gap:
         return False
     for rung in range(RUNGS):
         other = angle + (nearest - angle) * ((rung + 1.0) / RUNGS) ** 2
-        lower, b = _gap_at(model, rover, circle, (np.sin(other), np.cos(other)))
+        lower, b = find_gap(model, rover, circle, (np.sin(other), np.cos(other)))
         if not gap - lower > 0.0:
             continue
         doubt = np.hypot(_error_between(uncertain.error, a, b), _shift_between(rim, angle, other))

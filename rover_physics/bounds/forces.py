@@ -14,7 +14,7 @@ of the Engineering Mechanics Division 100(1), 1974.
 
 import numpy as np
 
-from rover_physics.contact.contact_record import write_point
+from rover_physics.contact.contact_record import point_of_rim, write_point
 from rover_physics.forces.equilibrium import FREE_FORCES, balance_forces
 from rover_physics.forces.shares import has_turned_wheels
 from rover_physics.forces.soil import SoilWheel, solve_wheel
@@ -145,8 +145,6 @@ def _find_grounds(model, placement, contact_bounds, box):
 @kernel
 def _find_footprint(samples, placement, wheel, contact_bounds):
     """Return smallest and largest x and y [m] of the points of a wheel that may touch."""
-    axis, centres = placement.axis[wheel], placement.centres
-    forward, up = placement.forward[wheel], placement.up[wheel]
     left = near = np.inf
     right = far = -np.inf
     for corner in range(4):
@@ -155,9 +153,8 @@ def _find_footprint(samples, placement, wheel, contact_bounds):
             angle = contact_bounds.angle_high[wheel]
         if corner % 2 == 1:
             across = contact_bounds.lateral_high[wheel]
-        s, c = samples.radius * np.sin(angle), samples.radius * np.cos(angle)
-        x = centres[wheel, 0] + across * axis[0] + s * forward[0] - c * up[0]
-        y = centres[wheel, 1] + across * axis[1] + s * forward[1] - c * up[1]
+        turn = np.sin(angle), np.cos(angle)
+        x, y, _ = point_of_rim(samples.radius, placement, (wheel, across), turn)
         left, right, near, far = min(left, x), max(right, x), min(near, y), max(far, y)
     return left, right, near, far
 

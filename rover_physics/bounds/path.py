@@ -34,9 +34,8 @@ from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import record_type
 from rover_physics.numerics.threads import limit_threads, run_chunks
 from rover_physics.prediction.evaluation import CHUNK, MAX_CHUNKS, MODEL, WORK, set_pose
-from rover_physics.prediction.packed_model import PackedModel, forget_models, pack_model
+from rover_physics.prediction.packed_model import PackedModel, forget_models
 from rover_physics.prediction.sweep import check_poses
-from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.path_prediction import (
     BOUNDED_VALUES,
     BOUNDS,
@@ -44,7 +43,6 @@ from rover_physics.results.path_prediction import (
     PathPrediction,
 )
 from rover_physics.rover.linkage import place
-from rover_physics.rover.model import Rover
 from rover_physics.status import BoundStatus, PoseStatus, TorquePolicy
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import GROUND, Ground, copy_soil, new_ground
@@ -87,19 +85,13 @@ def check_sigmas(sigmas: float | None) -> float:
 
 
 def bound_path(
-    rover: Rover,
-    terrain: Terrain,
-    prediction: PathPrediction,
-    options: SweepOptions = DEFAULT_OPTIONS,
-    sigmas: float | None = SIGMAS,
+    model: PackedModel, prediction: PathPrediction, sigmas: float | None
 ) -> PathBounds | None:
     """Bound a prediction along a path over a map with uncertain heights.
 
     Args:
-        rover: The rover.
-        terrain: The ground, with its layer `elevation_std`.
-        prediction: The result of `judge_path` on the same terrain.
-        options: The options of that `judge_path`.
+        model: The model on its terrain, with a layer `elevation_std`.
+        prediction: What the model predicts.
         sigmas: Number of standard deviations by which each height may be wrong; 0 or None for no
             bounds.
 
@@ -108,14 +100,13 @@ def bound_path(
         layer or there are no standard deviations.
 
     Raises:
-        ModelError: `sigmas` is negative or not a number, an option that this rover cannot have, a
-            terrain with too many soils, or policy "servo".
-        SoilError: As `judge_path`.
+        ModelError: `sigmas` is negative or not a number, a terrain with too many soils, or policy
+            "servo".
     """
-    allowed = check_sigmas(sigmas)
+    allowed, terrain = check_sigmas(sigmas), model.terrain
     if terrain.elevation_std is None or allowed == 0.0:
         return None
-    if options.policy == SERVO:
+    if model.options.policy == SERVO:
         raise ModelError(
             f"policy {SERVO!r} has no bounds on a map with uncertain heights; judge with 0 "
             f"sigmas, or use {EQUAL!r} or {OPTIMAL!r}"
@@ -125,8 +116,8 @@ def bound_path(
             f"the terrain has {len(terrain.soil_names)} soils; bounds are found on maps with at "
             f"most {MAX_SOILS - 1}"
         )
-    model, results = pack_model(rover, terrain, options), prediction.results
-    found = find_bounds(model, _pack_grounds(terrain, allowed), prediction.poses, results)
+    grounds = _pack_grounds(terrain, allowed)
+    found = find_bounds(model, grounds, prediction.poses, prediction.results)
     for name in BOUNDED_VALUES:
         value, (low, high) = getattr(prediction, name), np.moveaxis(found[name], -1, 0)
         low[:], high[:] = np.minimum(low, value), np.maximum(high, value)

@@ -79,7 +79,8 @@ def _take_rim(model, work, wheel):
     contacts.across[wheel] = search.rim * model.samples.half_width
     sine = search.rim_s / search.radius
     turn = sine, np.sqrt(1.0 - sine * sine)
-    take_circle(contacts, wheel, search_circle(model, work, (wheel, contacts.across[wheel]), turn))
+    circle = wheel, contacts.across[wheel]
+    take_circle(contacts, wheel, search_circle(model, work, circle, turn, np.inf))
 
 
 @kernel

@@ -15,13 +15,7 @@ TURN_TOLERANCE = 3e-3
 
 
 @kernel
-def search_circle(model, work, circle, turn):
-    """Return the smallest gap of a circle near an angle, as `search_circle_below` does."""
-    return search_circle_below(model, work, circle, turn, np.inf)
-
-
-@kernel
-def search_circle_below(model, work, circle, turn, largest):
+def search_circle(model, work, circle, turn, largest):
     """Return the smallest gap of a circle near an angle, and its place.
 
     On a plane, the circle touches in the direction of the plane's normal. The first two trials
@@ -34,7 +28,8 @@ def search_circle_below(model, work, circle, turn, largest):
         work: A record with `placement`.
         circle: Index of the wheel, and distance of the circle from its middle plane [m].
         turn: (sine, cosine) of the first angle.
-        largest: Gap [m] at that angle from which on nothing more is searched.
+        largest: Gap [m] at that angle from which on nothing more is searched; infinite to search
+            in any case.
 
     Returns:
         Gap [m], infinite over unknown ground; (sine, cosine) of the contact angle; slope of the

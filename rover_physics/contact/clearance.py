@@ -157,11 +157,8 @@ def _blocks_below(ground, R, origin, belly):
     """Return first and last row, first and last column of the blocks below the underside."""
     low_x = low_y = np.inf
     high_x = high_y = -np.inf
-    for corner in range(4):
-        along = belly[1 + corner % 2]
-        across = belly[3 + corner // 2]
-        x = origin[0] + R[0, 0] * along + R[0, 1] * across + R[0, 2] * belly[0]
-        y = origin[1] + R[1, 0] * along + R[1, 1] * across + R[1, 2] * belly[0]
+    for k in (0, 2, 6, 8):
+        x, y, _ = point_of_underside(R, origin, belly, k)
         low_x, high_x = min(low_x, x), max(high_x, x)
         low_y, high_y = min(low_y, y), max(high_y, y)
     scale = ground.inverse_resolution

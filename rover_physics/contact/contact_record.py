@@ -129,6 +129,22 @@ def hold_wheels(held, i, contacts):
 
 
 @kernel
+def point_of_rim(radius, placement, circle, turn):
+    """Return a point x, y, z [m] of a wheel's cylinder, map frame.
+
+    `circle` is (wheel, distance from its middle plane [m], positive to the left), `turn` (sine,
+    cosine) of the contact angle.
+    """
+    (wheel, across), (s, c), centres = circle, turn, placement.centres
+    axis, forward, up = placement.axis[wheel], placement.forward[wheel], placement.up[wheel]
+    return (
+        centres[wheel, 0] + across * axis[0] + radius * (s * forward[0] - c * up[0]),
+        centres[wheel, 1] + across * axis[1] + radius * (s * forward[1] - c * up[1]),
+        centres[wheel, 2] + across * axis[2] - radius * c * up[2],
+    )
+
+
+@kernel
 def write_point(radius, work, wheel, turn, across):
     """Write a point of a wheel's cylinder [m], map frame, and its contact angle into the contacts.
 

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from rover_physics.contact.contact_record import RIMS, SearchScope
+from rover_physics.contact.contact_record import RIMS, SearchScope, point_of_rim
 from rover_physics.numerics.kernels import kernel
 from rover_physics.status import ContactStatus
 from rover_physics.terrain.ground import (
@@ -127,31 +127,36 @@ def scan_carefully(model, work, wheel, scope):
 
     COARSE visits every other sample of the middle circle. Returns what `scan_rims` returns.
     """
-    ground, samples, placement = model.ground, model.samples, work.placement
+    samples = model.samples
     first, last, stride = 0, RIMS - 1, 1
     if scope == SearchScope.COARSE:
         first, last, stride = 1, 1, 2
-    axis, centres = placement.axis[wheel], placement.centres
-    forward, up = placement.forward[wheel], placement.up[wheel]
-    radius, middle = samples.radius, samples.rows // 2
+    middle = samples.rows // 2
     status, best, best_rim, best_row = ContactStatus.IN_CONTACT, np.inf, first, middle
     for visit in range((samples.rows - 1) // stride + 1):
         k = middle + stride * ((visit + 1) // 2) * (1 - 2 * (visit % 2))
-        s, c = samples.sines[k], samples.cosines[k]
+        turn = samples.sines[k], samples.cosines[k]
         for rim in range(first, last + 1):
-            across = (rim - 1) * samples.half_width
-            x = centres[wheel, 0] + across * axis[0] + radius * (s * forward[0] - c * up[0])
-            y = centres[wheel, 1] + across * axis[1] + radius * (s * forward[1] - c * up[1])
-            gx, gy = to_cells(ground, x, y)
-            if not is_cell_on_map(ground, gx, gy):
-                status = ContactStatus.OFF_MAP
-                continue
-            gap = centres[wheel, 2] + across * axis[2] - radius * c * up[2]
-            gap -= height_at_cell(ground, gx, gy)
-            if gap != gap:
-                if status == ContactStatus.IN_CONTACT:
-                    status = ContactStatus.UNKNOWN_GROUND
-                continue
+            circle = wheel, (rim - 1) * samples.half_width
+            gap, (gx, gy) = find_gap(model, work, circle, turn)
             if gap < best:
                 best, best_rim, best_row = gap, rim, k
+            elif gap != gap and not is_cell_on_map(model.ground, gx, gy):
+                status = ContactStatus.OFF_MAP
+            elif gap != gap and status == ContactStatus.IN_CONTACT:
+                status = ContactStatus.UNKNOWN_GROUND
     return status, (best, best_rim, best_row)
+
+
+@kernel
+def find_gap(model, work, circle, turn):
+    """Return the gap [m] at one point of the rim, NaN if unknown, and its place (x, y) [cells].
+
+    `circle` is (wheel, distance from its middle plane [m]), `turn` (sine, cosine) of the contact
+    angle.
+    """
+    x, y, z = point_of_rim(model.samples.radius, work.placement, circle, turn)
+    gx, gy = to_cells(model.ground, x, y)
+    if not is_cell_on_map(model.ground, gx, gy):
+        return np.nan, (gx, gy)
+    return z - height_at_cell(model.ground, gx, gy), (gx, gy)

@@ -20,7 +20,7 @@ import numpy as np
 from rover_physics.contact.contact_record import SearchScope
 from rover_physics.contact.wheel import blend_contact, find_contact
 from rover_physics.numerics.kernels import kernel
-from rover_physics.numerics.linear_algebra import solve_in_place
+from rover_physics.numerics.linear_algebra import difference, solve_in_place
 from rover_physics.rover.linkage import place, rocker_sign
 from rover_physics.status import ContactStatus, PoseStatus
 
@@ -359,21 +359,15 @@ def write_gap_rates(linkage, placement, contacts, ground_is, J):
         side = i // 3
         if ground_is == GroundSlope.SLOPED:
             slope = normal[i, 0], normal[i, 1]
-        arm = _arm_from(origin, point[i])
+        arm = difference(point[i], origin)
         J[i, 0] = 1.0
         J[i, 1] = _gap_rate(body_x, arm, slope)
         J[i, 2] = _gap_rate(level_y, arm, slope)
-        arm = _arm_from(placement.rocker_pivots[side], point[i])
+        arm = difference(point[i], placement.rocker_pivots[side])
         J[i, 3] = rocker_sign(side) * _gap_rate(body_y, arm, slope)
         if linkage.on_bogie[i]:
-            arm = _arm_from(placement.bogie_pivots[side], point[i])
+            arm = difference(point[i], placement.bogie_pivots[side])
             J[i, 4 + side] = _gap_rate(body_y, arm, slope)
-
-
-@kernel
-def _arm_from(pivot, point):
-    """Return the vector (x, y, z) [m] from a pivot (3,) to a point (3,)."""
-    return point[0] - pivot[0], point[1] - pivot[1], point[2] - pivot[2]
 
 
 @kernel

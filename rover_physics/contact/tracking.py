@@ -23,7 +23,8 @@ def follow_contact(model, work, wheel):
     if contacts.inside[wheel]:
         return _write_peak(model, work, wheel, contacts.peak[wheel])
     turn = contacts.sine[wheel], contacts.cosine[wheel]
-    gap, turn, slope = search_circle(model, work, (wheel, contacts.across[wheel]), turn)
+    circle = wheel, contacts.across[wheel]
+    gap, turn, slope = search_circle(model, work, circle, turn, np.inf)
     take_circle(contacts, wheel, (gap if gap < np.inf else np.nan, turn, slope))
     return True
 
@@ -96,7 +97,7 @@ def look_at_kept(model, work, wheel):
             continue
         across = contacts.kept_across[wheel, row]
         turn = contacts.kept_turn[wheel, row, 0], contacts.kept_turn[wheel, row, 1]
-        gap, turn, slope = search_circle(model, work, (wheel, across), turn)
+        gap, turn, slope = search_circle(model, work, (wheel, across), turn, np.inf)
         if gap < np.inf:
             contacts.kept_turn[wheel, row, 0], contacts.kept_turn[wheel, row, 1] = turn
         if gap < contacts.gap[wheel]:

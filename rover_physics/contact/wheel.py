@@ -11,7 +11,7 @@ wheel has a positive angle.
 import numpy as np
 
 from rover_physics.contact.cell_search import look_everywhere
-from rover_physics.contact.circle_search import search_circle_below
+from rover_physics.contact.circle_search import search_circle
 from rover_physics.contact.contact_record import SearchScope, write_point
 from rover_physics.contact.rim_scan import find_tops, scan_carefully, scan_rims
 from rover_physics.contact.tracking import follow_contact, keep_contact, look_at_kept
@@ -181,7 +181,7 @@ def blend_contact(model, work, wheel):
     largest = 0.0
     for m in range(samples.circles):
         across = samples.laterals[m]
-        gap, (s, c), _ = search_circle_below(model, work, (wheel, across), turn, largest_gap)
+        gap, (s, c), _ = search_circle(model, work, (wheel, across), turn, largest_gap)
         weight = min(1.0 - (gap - contacts.gap[wheel]) / allowance, 1.0)
         if weight > 0.0:
             largest = max(largest, weight)

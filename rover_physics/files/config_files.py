@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Location of the package's own configuration files, in a source checkout or an installed tree."""
 
-from collections.abc import Iterator
+import os
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from rover_physics.errors import RoverError
+from rover_physics.errors import RoverError, RoverFileError
+from rover_physics.files.validation import show_file
 
 PACKAGE_NAME = "rover_planner"
 
@@ -34,6 +36,22 @@ def find_config(relative: str) -> Path:
         f"no configuration file {relative!r}; searched {', '.join(searched) or 'nowhere'}; "
         f"is {PACKAGE_NAME} installed with its config/ folder?"
     )
+
+
+def find_file(what: str, name_or_path: str | Path, presets: Mapping[str, Path]) -> Path:
+    """Return the file of a preset by its name, or the path that is given.
+
+    Raises:
+        RoverFileError: Neither a preset nor a file; the text lists the presets of `what`.
+    """
+    if not isinstance(name_or_path, Path) and name_or_path in presets:
+        return presets[name_or_path]
+    if not os.path.exists(name_or_path):
+        raise RoverFileError(
+            f"no {what} {show_file(name_or_path)!r}: there is no such file, and the presets are "
+            f"{', '.join(presets)}"
+        )
+    return Path(name_or_path)
 
 
 def _config_folders() -> Iterator[Path]:

@@ -22,8 +22,6 @@ VALUE_BYTES, HEADER_BYTES = 8, 10_000
 METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 """Compression methods of numpy.savez and numpy.savez_compressed; zipfile unpacks others without a
 limit of memory."""
-FORCE_ZIP64 = 1 << 30
-"""Size of an array [bytes] from which its entry is written as one that may exceed 2 GiB."""
 MAX_CODE_POINT = 0x10FFFF
 NUMBERS, FLAGS, TEXTS, ANY = "fiu", "b", "U", "fiubU"
 KINDS = {NUMBERS: "numbers", FLAGS: "bools", TEXTS: "texts", ANY: "plain numbers or texts"}
@@ -173,7 +171,7 @@ def write_npz(path: str | Path, arrays: Mapping[str, Any], *, compressed: bool =
             array = np.asanyarray(value)
             entry = zipfile.ZipInfo(f"{name}.npy")
             entry.compress_type = zipfile.ZIP_DEFLATED if compressed else method_for(array.dtype)
-            with archive.open(entry, "w", force_zip64=array.nbytes > FORCE_ZIP64) as stream:
+            with archive.open(entry, "w", force_zip64=True) as stream:  # as numpy.savez does
                 npy_format.write_array(stream, array, allow_pickle=False)
 
 

@@ -67,7 +67,11 @@ def read_yaml(path: Path) -> object:
             `parse_yaml`.
     """
     with errors_of(path):
-        return parse_yaml(_read_text(path))
+        try:
+            text = read_regular_file(path, MAX_BYTES).decode("utf-8")
+        except UnicodeDecodeError as error:
+            raise RoverFileError(f"not a text file in UTF-8 ({error.reason})") from error
+        return parse_yaml(text)
 
 
 def parse_yaml(text: str) -> object:
@@ -107,10 +111,3 @@ def _count_nodes(node: yaml.Node, counted: dict[int, float]) -> float:
             children = [child for pair in children for child in pair]
         counted[id(node)] = 1.0 + sum(_count_nodes(child, counted) for child in children)
     return counted[id(node)]
-
-
-def _read_text(path: Path) -> str:
-    try:
-        return read_regular_file(path, MAX_BYTES).decode("utf-8")
-    except UnicodeDecodeError as error:
-        raise RoverFileError(f"not a text file in UTF-8 ({error.reason})") from error

@@ -15,6 +15,7 @@ import numpy as np
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.linear_algebra import cross, difference, dot, solve_in_place
 from rover_physics.numerics.records import record_type
+from rover_physics.rover.linkage import rocker_sign
 from rover_physics.terrain.ground import SOIL_NUMBERS
 
 MOTIONS = 3
@@ -161,7 +162,6 @@ def _write_wheel(linkage, placement, contact, wheel, X):
     point, frame = contact
     origin, length, R = placement.origin, linkage.length, placement.R
     side = wheel // 3
-    sign = 1.0 if side == 0 else -1.0
     ax, ay, az = R[0, 1], R[1, 1], R[2, 1]
     arm = difference(point, origin)
     for kind in range(3):
@@ -179,7 +179,7 @@ def _write_wheel(linkage, placement, contact, wheel, X):
             about_rocker = _moment(placement, placement.rocker_pivots[side], point, force) / length
             about_bogie = _moment(placement, placement.bogie_pivots[side], point, force) / length
         X[3, column], X[4, column], X[5, column] = mx, my, mz
-        X[8, column] = sign * about_rocker
+        X[8, column] = rocker_sign(side) * about_rocker
         if linkage.on_bogie[wheel]:
             X[6 + side, column] = about_bogie
 

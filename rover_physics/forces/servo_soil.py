@@ -74,8 +74,7 @@ def roll_on_soil(servo, wheel, velocity):
         _shear_point(curve, rim, rim - along + spin, across),
     )
     signed = resistance[0] * facing, resistance[0] * turning, resistance[1] * facing
-    _write_forces(servo, wheel, strength, signed, ends)
-    _write_rates(servo, wheel, (strength, held), signed, ends)
+    _write_forces(servo, wheel, (strength, held), signed, ends)
     if held == 0.0:
         limit = np.copysign(servo.max_traction, servo.force[wheel, T] + signed[0])
         servo.force[wheel, T] = limit - signed[0]
@@ -272,18 +271,11 @@ def _mobilise(x):
 
 
 @kernel
-def _write_forces(servo, wheel, strength, signed, ends):
-    """Write the forces; a share of the soil's net force is what a wheel may use."""
-    one, two = ends
-    force = servo.force[wheel]
-    force[T] = strength[0] * (one[0] + two[0]) - servo.friction_share * signed[0]
-    force[S] = strength[0] * (one[1] + two[1])
-    force[D] = strength[0] * (one[0] - two[0])
+def _write_forces(servo, wheel, state, signed, ends):
+    """Write the forces, and their derivatives.
 
-
-@kernel
-def _write_rates(servo, wheel, state, signed, ends):
-    """Write the derivatives of the forces, by the implicit function theorem for the rim's speed.
+    A share of the soil's net force is what a wheel may use. The derivatives follow from the
+    implicit function theorem for the rim's speed.
 
     Args:
         servo: SERVO.
@@ -294,7 +286,10 @@ def _write_rates(servo, wheel, state, signed, ends):
     """
     (half, half_rate, _, length_rate), held = state
     one, two = ends
-    rate, share = servo.force_rate[wheel], servo.friction_share
+    force, rate, share = servo.force[wheel], servo.force_rate[wheel], servo.friction_share
+    force[T] = half * (one[0] + two[0]) - share * signed[0]
+    force[S] = half * (one[1] + two[1])
+    force[D] = half * (one[0] - two[0])
     droop = servo.droop / servo.full_traction
     back = 1.0 - share
     by_rim = half * (one[2] + one[4] + two[2] + two[4])

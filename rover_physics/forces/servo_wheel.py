@@ -53,11 +53,10 @@ def roll_wheel(servo, wheel, grip, velocity):
         held, gain = 0.0, half
         limit = np.copysign(servo.max_traction, pull)
         slip = _slip_of_pull(limit / half, wide, spin)
-    _write_forces(servo, wheel, half, (slip, wide, across, spin))
+    servo.slip[wheel] = slip
+    _write_forces(servo, wheel, (half, gain, held), (slip, wide, across, spin))
     if held == 0.0:
         force[T] = -np.copysign(servo.max_traction, pull)
-    servo.slip[wheel] = slip
-    _write_rates(servo, wheel, (half, gain, held), (slip, wide, across, spin))
 
 
 @kernel
@@ -123,30 +122,20 @@ def _find_root(equation, bracket, wide, spin):
 
 
 @kernel
-def _write_forces(servo, wheel, half, state):
-    slip, wide, across, spin = state
-    force = servo.force[wheel]
-    a, b = slip + spin, slip - spin
-    ha, hb = np.sqrt(a * a + wide * wide), np.sqrt(b * b + wide * wide)
-    force[T] = -half * (a / ha + b / hb)
-    force[S] = -half * across * (1.0 / ha + 1.0 / hb)
-    force[D] = -half * (a / ha - b / hb)
-
-
-@kernel
-def _write_rates(servo, wheel, servo_line, state):
-    """Write the derivatives of the forces, by the implicit function theorem for the slip.
+def _write_forces(servo, wheel, servo_line, state):
+    """Write the forces, and their derivatives by the implicit function theorem for the slip.
 
     `servo_line` is (half of mu N, gain, 1 while the servo is not saturated, else 0); the slip s is
     the root of held (s - drawn) + gain (f(s + spin) + f(s - spin)) = const.
     """
     half, gain, held = servo_line
     slip, wide, across, spin = state
-    rate = servo.force_rate[wheel]
+    force, rate = servo.force[wheel], servo.force_rate[wheel]
     a, b = slip + spin, slip - spin
     ha, hb = np.sqrt(a * a + wide * wide), np.sqrt(b * b + wide * wide)
     ia, ib = 1.0 / (ha * ha * ha), 1.0 / (hb * hb * hb)
-    fa, fb = a / ha, b / hb
+    fa, fb, u = a / ha, b / hb, 1.0 / ha + 1.0 / hb
+    force[T], force[S], force[D] = -half * (fa + fb), -half * across * u, -half * (fa - fb)
     pa, pb = wide * wide * ia, wide * wide * ib  # df/ds
     qa, qb = -a * wide * ia, -b * wide * ib  # df/dwide
     G_s = held + gain * (pa + pb)
@@ -166,7 +155,6 @@ def _write_rates(servo, wheel, servo_line, state):
     u_s = -across * (a * ia + b * ib)  # derivatives of across (1 / ha + 1 / hb)
     u_spin = -across * (a * ia - b * ib)
     u_wide = -across * wide * (ia + ib)
-    u = 1.0 / ha + 1.0 / hb
     rate[S, ALONG] = -half * u_s * s_along
     rate[S, SPIN] = -half * (u_s * s_spin + u_spin)
     rate[S, ACROSS] = -half * (u + (u_s * s_wide + u_wide) * w_across)

@@ -27,33 +27,23 @@ def find_support(linkage, placement, contacts, corners):
 
     The order is counter-clockwise seen from above, from the rear right.
     """
+    R, point, pivot = placement.R, contacts.point, placement.bogie_pivots
     for side in range(2):
-        _write_side(linkage, placement, contacts, side, corners)
-
-
-@kernel
-def _write_side(linkage, placement, contacts, side, corners):
-    first = 3 * side
-    point, pivot = contacts.point, placement.bogie_pivots
-    rocker_is_rear = not linkage.on_bogie[first]
-    on_rocker = first if rocker_is_rear else first + 2
-    behind = first + 1 if rocker_is_rear else first
-    ahead = behind + 1
-    R = placement.R
-    along_x, along_y = R[0, 0], R[1, 0]
-    arm_behind = along_x * (point[behind, 0] - pivot[side, 0])
-    arm_behind += along_y * (point[behind, 1] - pivot[side, 1])
-    arm_ahead = along_x * (point[ahead, 0] - pivot[side, 0])
-    arm_ahead += along_y * (point[ahead, 1] - pivot[side, 1])
-    share = -arm_behind / (arm_ahead - arm_behind)
-    share = min(max(share, 0.0), 1.0)
-    rear = 0 if side == 0 else 3
-    front = 1 if side == 0 else 2
-    rocker_corner = rear if rocker_is_rear else front
-    bogie_corner = front if rocker_is_rear else rear
-    for i in range(3):
-        corners[rocker_corner, i] = point[on_rocker, i]
-        corners[bogie_corner, i] = point[behind, i] + share * (point[ahead, i] - point[behind, i])
+        rear, rear_corner, front_corner = 3 * side, 3 * side, 1 + side
+        on_rocker, behind, rocker_corner, bogie_corner = rear + 2, rear, front_corner, rear_corner
+        if not linkage.on_bogie[rear]:
+            on_rocker, behind = rear, rear + 1
+            rocker_corner, bogie_corner = rear_corner, front_corner
+        ahead = behind + 1
+        arm_behind = R[0, 0] * (point[behind, 0] - pivot[side, 0])
+        arm_behind += R[1, 0] * (point[behind, 1] - pivot[side, 1])
+        arm_ahead = R[0, 0] * (point[ahead, 0] - pivot[side, 0])
+        arm_ahead += R[1, 0] * (point[ahead, 1] - pivot[side, 1])
+        share = min(max(-arm_behind / (arm_ahead - arm_behind), 0.0), 1.0)
+        for i in range(3):
+            step = point[ahead, i] - point[behind, i]
+            corners[rocker_corner, i] = point[on_rocker, i]
+            corners[bogie_corner, i] = point[behind, i] + share * step
 
 
 @kernel

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
-from rover_physics.names import CONTROL_POLICIES, SERVO, TORQUE_POLICIES
+from rover_physics.names import CONTROL_POLICIES, SERVO, SIDES, TORQUE_POLICIES
 from rover_physics.status import Stall
 
 MODERATE_SINKAGE = 1.0 / 6.0
@@ -141,18 +141,17 @@ class Limit:
 FORCES: dict[str, Any] = {"needs_forces": True, "exempt_on_edge": True}
 ON_TORQUES: dict[str, Any] = {"policies": CONTROL_POLICIES, **FORCES}
 ON_SERVOS: dict[str, Any] = {"policies": (SERVO,), **FORCES}
-SIDE_NAMES = ("right", "left")
 
 LIMITS: tuple[Limit, ...] = (
     Limit(
         "suspension", "rocker_angle", "{element} rocker angle {compared}", "joints",
         lambda rover: rover.suspension.rocker_limits, Sense.RANGE,
-        unit=RADIANS, elements=SIDE_NAMES,
+        unit=RADIANS, elements=SIDES,
     ),
     Limit(
         "suspension", "bogie_angle", "{element} bogie angle {compared}", "joints",
         lambda rover: rover.suspension.bogie_limits, Sense.RANGE,
-        unit=RADIANS, elements=SIDE_NAMES,
+        unit=RADIANS, elements=SIDES,
     ),
     Limit(
         "tilt", "tilt", "tilt {compared}", "tilt",

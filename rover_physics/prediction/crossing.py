@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import (
     HEIGHT_JUMP,
@@ -22,6 +21,7 @@ from rover_physics.prediction.path_kernels import (
     join_crossings,
     none_held,
     sort_pieces,
+    steps_between,
 )
 from rover_physics.results.record import place_results, select_results
 from rover_physics.status import PoseStatus
@@ -102,7 +102,7 @@ def _divide_turns(
     first, pieces = np.repeat(turns, turns[:, 1] + 1, axis=0).T
     within = np.concatenate([np.arange(count + 1) for count in turns[:, 1]])
     inside, share = (within > 0) & (within < pieces), within / pieces
-    steps = _steps(poses[first], poses[first + 1])
+    steps = steps_between(poses[first], poses[first + 1])
     at = poses[first] + share[:, None] * steps
     found = select_results(results, np.where(within > 0, first + 1, first))
     turned = model.evaluate(at[inside], motions=found["motion"][inside])
@@ -135,19 +135,12 @@ def find_turns(
     Returns:
         (k, 2) first waypoints of these steps and numbers of pieces TURN_SPACING apart.
     """
-    wheels, steps = model.wheels, _steps(poses[:-1], poses[1:])
+    wheels, steps = model.wheels, steps_between(poses[:-1], poses[1:])
     swing = wheels.swing_radius * np.abs(steps[:, 2])
     far = swing > np.maximum(wheels.radius, np.hypot(steps[:, 0], steps[:, 1]))
     rows = np.flatnonzero(joined & far & (results["motion"][1:, 2] != 0.0))
     pieces = np.ceil(swing[rows] / (TURN_SPACING * wheels.radius)).astype(np.int64)
     return np.column_stack([rows, pieces])
-
-
-def _steps(here: np.ndarray, there: np.ndarray) -> Floats:
-    """Return the steps (n, 3) from poses to others: x, y [m] and the shorter turn [rad]."""
-    steps = np.asarray(there - here)
-    steps[:, 2] = (steps[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
-    return steps
 
 
 def _divide(model: PackedModel, known: Crossings, ends: np.ndarray) -> Crossings:
@@ -159,7 +152,7 @@ def _divide(model: PackedModel, known: Crossings, ends: np.ndarray) -> Crossings
     (before, after), within = ends.T, PIECES - 1
     share, first = np.arange(1, PIECES) / PIECES, known.place[before]
     place = first[:, None] + share * (known.place[after] - first)[:, None]
-    steps = _steps(known.poses[before], known.poses[after])
+    steps = steps_between(known.poses[before], known.poses[after])
     poses = known.poses[before][:, None] + share[:, None] * steps[:, None]
     at, motions = poses.reshape(-1, 3), np.repeat(known.results["motion"][after], within, axis=0)
     waypoint = np.repeat(known.waypoint[before], within)

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rover_physics.numerics.arrays import view_read_only
+from rover_physics.numerics.arrays import Floats, view_read_only
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.results.record import join_results, new_results, select_results
 from rover_physics.status import PoseStatus
@@ -223,6 +223,20 @@ def turn_between(here, there):
     if there[2] == here[2]:
         return 0.0
     return (there[2] - here[2] + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def steps_between(here: np.ndarray, there: np.ndarray) -> Floats:
+    """Return the steps (n, 3) from poses to others: x, y [m] and the shorter turn [rad]."""
+    steps = np.asarray(there - here)
+    steps[:, 2] = (steps[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
+    return steps
+
+
+def distances_between(wheels: Wheels, poses: np.ndarray) -> Floats:
+    """Return the distances (n - 1,) between poses [m], as `distance_between` does."""
+    steps = steps_between(poses[:-1], poses[1:])
+    swing = wheels.swing_radius * np.abs(steps[:, 2])
+    return np.maximum(np.hypot(steps[:, 0], steps[:, 1]), swing)
 
 
 @exact_kernel

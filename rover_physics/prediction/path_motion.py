@@ -54,8 +54,10 @@ class StepKind(IntEnum):
     """No motion of the wheels leads from one to the other."""
 
 
-def path_motions(model: PackedModel, poses: np.ndarray) -> np.ndarray:
-    """Return the nominal motions (n, 3) along a path: vx, vy [m/s], yaw rate [rad/s].
+def motions_of(
+    model: PackedModel, poses: np.ndarray, curvature: ArrayLike | None = None
+) -> np.ndarray:
+    """Return the nominal motions (n, 3) at poses: vx, vy [m/s], yaw rate [rad/s].
 
     The body origin drives at the nominal speed, slower where a wheel would exceed its largest
     speed. In a turn on the spot the outermost wheel has the nominal speed. A straight path has
@@ -63,31 +65,18 @@ def path_motions(model: PackedModel, poses: np.ndarray) -> np.ndarray:
 
     Args:
         model: The model.
-        poses: (n, 3) x, y [m] and yaw [rad] of the waypoints of one path, map frame.
-    """
-    motions = np.empty((len(poses), 3))
-    write_path_motions(model.records, poses, motions)
-    return motions
-
-
-def motions_of(
-    model: PackedModel, poses: np.ndarray, curvature: ArrayLike | None = None
-) -> np.ndarray:
-    """Return the nominal motions (n, 3) at poses, as `path_motions` does.
-
-    Args:
-        model: The model.
         poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
         curvature: (n,) curvature of the body origin's path at each pose [1/m], positive to the
-            left, infinite on the spot; None if the poses are a path.
+            left, infinite on the spot; None if the poses are the waypoints of one path.
 
     Raises:
         PoseError: Curvatures of wrong shape, or not numbers.
     """
+    motions = np.empty((len(poses), 3))
     if curvature is None:
-        return path_motions(model, poses)
-    bends, motions = check_curvature(curvature, len(poses)), np.empty((len(poses), 3))
-    write_curvature_motions(model.records, bends, motions)
+        write_path_motions(model.records, poses, motions)
+    else:
+        write_curvature_motions(model.records, check_curvature(curvature, len(poses)), motions)
     return motions
 
 
@@ -113,7 +102,7 @@ def check_curvature(curvature: ArrayLike, count: int) -> np.ndarray:
 
 @kernel
 def write_curvature_motions(models, curvature, motions):
-    """Write the motions of `motions_of`."""
+    """Write the motions of `motions_of` for curvatures (n,)."""
     linkage, settings = models[0].linkage, models[0].settings
     for i in range(curvature.size):
         bend, motion = curvature[i], motions[i]
@@ -127,7 +116,7 @@ def write_curvature_motions(models, curvature, motions):
 
 @kernel
 def write_path_motions(models, poses, motions):
-    """Write the motions of `path_motions`."""
+    """Write the motions of `motions_of` along a path."""
     linkage, settings = models[0].linkage, models[0].settings
     n, driven, open_steps, end, is_ahead = poses.shape[0], 0, 0, 0, False
     for i in range(1, n):
@@ -247,7 +236,7 @@ def _swings_out(linkage, motion, turn):
 
 @kernel
 def _take_nominal_speed(linkage, settings, motion):
-    """Scale a motion of any speed to the nominal one, see `path_motions`."""
+    """Scale a motion of any speed to the nominal one, see `motions_of`."""
     speed = np.hypot(motion[0], motion[1])
     if motion[1] == 0.0 and motion[2] == 0.0:
         motion[0] = settings.speed if motion[0] > 0.0 else -settings.speed

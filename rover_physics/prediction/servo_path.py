@@ -22,7 +22,7 @@ import numpy as np
 from rover_physics.limits.table import MIN_SPEED_SHARE, RUNAWAY
 from rover_physics.numerics.arrays import Floats
 from rover_physics.prediction.packed_model import PackedModel
-from rover_physics.prediction.path_kernels import FACE, Crossings, Wheels
+from rover_physics.prediction.path_kernels import FACE, Crossings, Wheels, distances_between
 from rover_physics.results.record import select_results
 from rover_physics.status import PoseStatus, Stall
 
@@ -218,10 +218,3 @@ def _find_drift(course: _Course, window: float) -> Floats:
     owner = np.append(np.arange(n), turns.waypoint)[course.order]
     found = np.column_stack([np.abs(built_up[:, 2]), np.hypot(built_up[:, 0], built_up[:, 1])])
     return np.asarray(np.maximum.reduceat(found, np.searchsorted(owner, np.arange(n))))
-
-
-def distances_between(wheels: Wheels, poses: np.ndarray) -> Floats:
-    """Return the distances (n - 1,) between poses [m]: of the body or, if it turns, of a wheel."""
-    steps = np.diff(poses, axis=0)
-    swing = wheels.swing_radius * np.abs((steps[:, 2] + np.pi) % (2.0 * np.pi) - np.pi)
-    return np.maximum(np.hypot(steps[:, 0], steps[:, 1]), swing)

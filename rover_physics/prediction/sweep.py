@@ -29,14 +29,14 @@ from rover_physics.prediction.path_kernels import (
     Crossings,
     add_up,
     angle_ahead,
+    distances_between,
     find_remaining_jumps,
     join_crossings,
     none_held,
 )
-from rover_physics.prediction.path_motion import path_motions
+from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.servo_path import (
     climb_costs,
-    distances_between,
     drift_window,
     write_servo_path,
 )
@@ -131,7 +131,7 @@ def predict_in_parts(model: PackedModel, path: np.ndarray) -> Iterator[PathPart]
     begins before its end, at a waypoint where no wheel rolls off an edge, on servos by the way
     within which drift counts.
     """
-    motions = path_motions(model, path)
+    motions = motions_of(model, path)
     start, done, size, sums = 0, 0, PART, NO_SUMS
     while done < len(path):
         check_interruption()
@@ -239,7 +239,7 @@ class _StartedPath:
 
     def __init__(self, model: PackedModel, poses: np.ndarray, stops: bool):
         self._model, self.poses, self._stops = model, poses, stops
-        self.motions = path_motions(model, poses)
+        self.motions = motions_of(model, poses)
         self.results = unwritten_results(len(poses))
         """(n,) RESULT of each waypoint; the first `evaluated` are written."""
         self.evaluated = 0

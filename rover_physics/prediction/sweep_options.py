@@ -6,16 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from rover_physics.errors import ModelError
-from rover_physics.names import EQUAL, OPTIMAL, SERVO
+from rover_physics.names import EQUAL, OPTIMAL, TORQUE_POLICIES
 from rover_physics.numerics import plausible as known
 from rover_physics.rover.manipulator import as_vector
 from rover_physics.status import TorquePolicy
 
-POLICIES = {
-    EQUAL: TorquePolicy.EQUAL,
-    SERVO: TorquePolicy.SERVO,
-    OPTIMAL: TorquePolicy.OPTIMAL,
-}
+POLICIES = {name: TorquePolicy[name.upper()] for name in TORQUE_POLICIES}
 """Torque policies by name."""
 
 JointAngles = tuple[tuple[str, float], ...]

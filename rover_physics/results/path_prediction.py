@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rover_physics.numerics.arrays import Floats, freeze_fields
+from rover_physics.numerics.arrays import Floats, freeze_fields, seal_array, view_read_only
 from rover_physics.numerics.records import record_type
 from rover_physics.results.record import (
     QUANTITIES,
@@ -20,9 +20,7 @@ from rover_physics.results.record import (
 )
 from rover_physics.status import BoundStatus, PoseStatus
 
-_SHAPES = {one.name: one.shape for one in QUANTITIES} | {
-    name: shape for name, (_, _, shape) in VIEWS.items()
-}
+_NAMES = (*(one.name for one in QUANTITIES), *VIEWS)
 
 BOUNDS = record_type(
     ("status", np.int8),  # a BoundStatus
@@ -66,10 +64,6 @@ class PathBounds:
             return self.values[name]
         raise AttributeError(f"a PathBounds has no {name!r}; it has {', '.join(BOUNDED_VALUES)}")
 
-    def cut(self, waypoints: int) -> "PathBounds":
-        """Return the bounds on the first waypoints."""
-        return replace(self, values=self.values[:waypoints])
-
     @property
     def bounded(self) -> NDArray[np.bool_]:
         """(n,) True for the waypoints that have bounds."""
@@ -107,18 +101,16 @@ class PathPrediction:
 
     def __post_init__(self) -> None:
         for name in ("poses", "results", "waypoint"):
-            array = getattr(self, name).view()
-            array.flags.writeable = False
-            object.__setattr__(self, name, array)
+            object.__setattr__(self, name, view_read_only(getattr(self, name)))
 
     def __getattr__(self, name: str) -> Any:
         if name in VIEWS:
             first, count = find_column(name)
             columns = slice(first, first + count) if VIEWS[name][2] else first
             return numbers_of(self.results)[:, columns]
-        if name in _SHAPES:
+        if name in _NAMES:
             return self.results[name]
-        raise AttributeError(f"a PathPrediction has no {name!r}; it has {', '.join(_SHAPES)}")
+        raise AttributeError(f"a PathPrediction has no {name!r}; it has {', '.join(_NAMES)}")
 
     @property
     def status(self) -> NDArray[np.int8]:
@@ -128,19 +120,19 @@ class PathPrediction:
     @cached_property
     def settled(self) -> NDArray[np.bool_]:
         """(n,) True where all wheels touch the ground and the forces balance."""
-        return _seal(self.status == PoseStatus.SETTLED)
+        return seal_array(self.status == PoseStatus.SETTLED)
 
     @cached_property
     def position(self) -> Floats:
         """(n, 3) body origin [m], map frame."""
         position = np.column_stack([self.poses[:, :2], self.results["q"][:, 0]])
         position[~self.settled] = np.nan
-        return _seal(position)
+        return seal_array(position)
 
     @cached_property
     def falling(self) -> NDArray[np.bool_]:
         """(n, 6) True for wheels that roll off an edge here; they need no equilibrium."""
-        return _seal(self.results["falling"] > 0.0)
+        return seal_array(self.results["falling"] > 0.0)
 
     @cached_property
     def wheel_speed(self) -> Floats:
@@ -148,7 +140,7 @@ class PathPrediction:
 
         NaN where the rover did not settle.
         """
-        return _seal(np.where(self.settled[:, None], self.results["wheel_speed"], np.nan))
+        return seal_array(np.where(self.settled[:, None], self.results["wheel_speed"], np.nan))
 
     @cached_property
     def steering_angle(self) -> Floats:
@@ -157,14 +149,15 @@ class PathPrediction:
         Where the status is STEERING: the angles that the motion asks for.
         """
         asked = self.settled | (self.status == PoseStatus.STEERING)
-        return _seal(np.where(asked[:, None], self.results["steering_angle"], np.nan))
+        return seal_array(np.where(asked[:, None], self.results["steering_angle"], np.nan))
 
     def cut(self, waypoints: int) -> "PathPrediction":
         """Return the prediction of the first waypoints and of the poses between them."""
         between, bounds = self.between, self.bounds
         if between is not None:
             between = between.select(between.waypoint < waypoints)
-        bounds = None if bounds is None else bounds.cut(waypoints)
+        if bounds is not None:
+            bounds = replace(bounds, values=bounds.values[:waypoints])
         return replace(self.select(slice(waypoints)), between=between, bounds=bounds)
 
     def select(self, rows: Any) -> "PathPrediction":
@@ -208,10 +201,9 @@ def prediction_of(
         policy: Torque policy, or what made the values.
     """
     results = new_results(len(poses))
-    for name in ("kept_share", "friction_share", "torque_share"):
-        results[name] = 1.0 if name == "kept_share" else 0.0
-    height, known = np.asarray(values["position"])[:, 2], dict(values)
-    known.pop("position")
+    results["kept_share"], results["friction_share"], results["torque_share"] = 1.0, 0.0, 0.0
+    known = dict(values)
+    height = np.asarray(known.pop("position"))[:, 2]
     write_values(results, known)
     results["status"] = status
     results["q"][:, 0], results["q"][:, 3] = height, results["rocker_angle"][:, 0]
@@ -228,8 +220,3 @@ def _sizes(angles: Floats) -> Floats:
     sizes = np.sort(np.abs(angles), axis=1)
     sizes[angles[:, 0] * angles[:, 1] < 0.0, 0] = 0.0
     return sizes
-
-
-def _seal(array: Any) -> Any:
-    array.flags.writeable = False
-    return array

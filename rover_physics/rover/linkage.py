@@ -5,9 +5,12 @@ from typing import Any
 
 import numpy as np
 
+from rover_physics.names import WHEEL_POSITIONS
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import new_record, record_type
+from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
+from rover_physics.rover.steering_joints import steered_wheels, swing_radius
 
 LINKAGE = record_type(
     ("radius", float),  # wheel radius [m]
@@ -41,44 +44,48 @@ NO_TOOL = np.zeros((3, 3))
 
 
 def pack_linkage(
-    rover: Rover, body_mass: float, body_com: np.ndarray, tool: np.ndarray = NO_TOOL
+    rover: Rover,
+    body_mass: float | None = None,
+    body_com: np.ndarray | None = None,
+    tool: np.ndarray = NO_TOOL,
 ) -> Any:
     """Return the constants of a rover as a LINKAGE.
 
     Args:
         rover: The rover.
-        body_mass: Mass of the body with its arm and payload [kg].
-        body_com: (3,) centre of mass of body, arm and payload [m], body frame.
+        body_mass: Mass of the body with its arm and payload [kg] (default: that of the rover file,
+            arm stowed).
+        body_com: (3,) centre of mass of body, arm and payload [m], body frame (default: the same).
         tool: (3, 3) tip of the arm [m], force [N] and moment [N m] on the tool, body frame.
     """
     suspension, masses, belly = rover.suspension, rover.masses, rover.belly
-    names = ("rear", "middle", "front")
-    left = [suspension.wheels[name] for name in names]
-    on_bogie = [name != suspension.rocker_wheel for name in names]
-    steering = rover.steering
-    steers = [steering is not None and name in steering.wheels for name in names]
+    wheel, steering = rover.wheel, rover.steering
+    if body_mass is None or body_com is None:
+        body_mass, body_com = body_mass_and_com(rover)
+    left = [suspension.wheels[name] for name in WHEEL_POSITIONS]
+    on_bogie = [name != suspension.rocker_wheel for name in WHEEL_POSITIONS]
     return new_record(
         LINKAGE,
-        radius=float(rover.wheel.radius),
-        width=float(rover.wheel.width),
+        radius=wheel.radius,
+        width=wheel.width,
         wheels=np.array([_mirror(p) for p in left] + left, dtype=float),
         on_bogie=np.array(on_bogie * 2),
-        steers=np.array(steers * 2),
+        steers=np.isin(np.arange(6), steered_wheels(rover)),
         steering_limit=0.0 if steering is None else float(steering.limit),
         steering_rate=np.inf if steering is None else float(steering.rate),
-        swing_radius=max(float(np.hypot(x, y)) for x, y, _ in left),
+        swing_radius=swing_radius(rover),
         rocker_pivots=_both_sides(suspension.rocker_pivot),
         bogie_pivots=_both_sides(suspension.bogie_pivot),
-        gravity=float(rover.gravity),
-        wheel_mass=float(rover.wheel.mass),
-        body_mass=float(body_mass),
+        gravity=rover.gravity,
+        wheel_mass=wheel.mass,
+        body_mass=body_mass,
         body_com=np.asarray(body_com, dtype=float),
-        rocker_mass=float(masses.rocker.mass),
+        rocker_mass=masses.rocker.mass,
         rocker_coms=_both_sides(masses.rocker.com),
-        bogie_mass=float(masses.bogie.mass),
+        bogie_mass=masses.bogie.mass,
         bogie_coms=_both_sides(masses.bogie.com),
-        mass=body_mass + 2 * (masses.rocker.mass + masses.bogie.mass) + 6 * rover.wheel.mass,
-        length=float(suspension.wheels["front"][0] - suspension.wheels["rear"][0]),
+        mass=body_mass + 2 * (masses.rocker.mass + masses.bogie.mass) + 6 * wheel.mass,
+        length=rover.wheelbase,
         belly=np.array([belly.z, *belly.x, *belly.y], dtype=float),
         has_tool_load=bool(np.any(tool[1:])),
         tool=np.ascontiguousarray(tool, dtype=float),

@@ -2,17 +2,15 @@
 """Rover files: presets, and YAML files with the same keys."""
 
 import math
-import os
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import yaml
 
-from rover_physics.errors import RoverFileError
-from rover_physics.files.config_files import find_config
+from rover_physics.files.config_files import find_config, find_file
 from rover_physics.files.user_file import write_file
-from rover_physics.files.validation import errors_of, read_as, refuse, show_file
+from rover_physics.files.validation import errors_of, read_as, refuse
 from rover_physics.files.yaml_file import read_yaml
 from rover_physics.limits.table import optional_keys
 from rover_physics.rover.checks import check_rover
@@ -33,17 +31,8 @@ def load_rover(name_or_path: str | Path) -> Rover:
     Raises:
         RoverFileError: Neither a preset nor a file, or an invalid file; the text names the key.
     """
-    name = str(name_or_path)
-    presets = preset_names()
-    if name in presets and not isinstance(name_or_path, Path):
-        path = find_config(f"rovers/{name}.yaml")
-    else:
-        path = Path(name_or_path)
-        if not os.path.exists(path):
-            raise RoverFileError(
-                f"no rover {show_file(name)!r}: there is no such file, and the presets are "
-                f"{', '.join(presets)}"
-            )
+    presets = {name: find_config(f"rovers/{name}.yaml") for name in preset_names()}
+    path = find_file("rover", name_or_path, presets)
     return rover_from_dict(read_yaml(path), str(path))
 
 

@@ -21,7 +21,6 @@ from rover_physics.numerics.arrays import Floats
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import array_of
 from rover_physics.rover.linkage import pack_linkage
-from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
 
 ROUNDED_LIMIT = 1e-3
@@ -49,7 +48,7 @@ class SteeredDrive:
 
     def __init__(self, rover: Rover):
         """Prepare for a rover; one without steering has all angles at 0 and skids in curves."""
-        self._linkages: Any = array_of(pack_linkage(rover, *body_mass_and_com(rover)))
+        self._linkages: Any = array_of(pack_linkage(rover))
         self.steers = np.array(self._linkages["steers"][0], dtype=bool)
         """(6,) True for wheels that steer."""
         self._limit = float(self._linkages["steering_limit"][0])

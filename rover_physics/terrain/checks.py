@@ -30,8 +30,7 @@ def as_elevation(values: ArrayLike) -> NDArray[np.float64]:
 
 def as_friction(values: ArrayLike, elevation: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return friction coefficients (ny, nx), each above 0 or NaN."""
-    friction = _as_grid("friction", values, known.MAX_FRICTION)
-    _check_shape("friction", friction, elevation)
+    friction = _as_grid("friction", values, known.MAX_FRICTION, elevation)
     must = f"above 0, at least {known.MIN_FRICTION:g}, or NaN for the default"
     _refuse_first(friction, friction < known.MIN_FRICTION, "friction", must)
     return friction
@@ -39,8 +38,7 @@ def as_friction(values: ArrayLike, elevation: NDArray[np.float64]) -> NDArray[np
 
 def as_ground_class(values: ArrayLike, elevation: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return classes of ground (ny, nx), whole numbers from 0, NaN where there is none."""
-    classes = _as_grid("ground_class", values, MAX_CLASS)
-    _check_shape("ground_class", classes, elevation)
+    classes = _as_grid("ground_class", values, MAX_CLASS, elevation)
     wrong = (classes < 0.0) | (classes > np.floor(classes))
     must = f"a whole number from 0 to {MAX_CLASS}, or NaN for none"
     _refuse_first(classes, wrong, "ground_class", must)
@@ -80,12 +78,19 @@ def as_soil_names(values: Any) -> tuple[str, ...]:
 
 def as_elevation_std(values: ArrayLike, elevation: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return standard deviations (ny, nx) [m], at least 0 and known where the height is known."""
-    std = _as_grid("elevation_std", values, known.MAX_COORDINATE)
-    _check_shape("elevation_std", std, elevation)
+    std = _as_grid("elevation_std", values, known.MAX_COORDINATE, elevation)
     _refuse_first(std, std < 0.0, "elevation_std", "at least 0")
     missing = np.isnan(std) & np.isfinite(elevation)
     _refuse_first(std, missing, "elevation_std", "a number in m where the height is known")
     return std
+
+
+LAYER_CHECKS = {
+    "friction": as_friction,
+    "elevation_std": as_elevation_std,
+    "ground_class": as_ground_class,
+}
+"""Checks of the optional layers of numbers, given the checked elevation."""
 
 
 def as_resolution(value: Any) -> float:
@@ -117,8 +122,13 @@ def as_origin(value: Any) -> tuple[float, float]:
     )
 
 
-def _as_grid(name: str, values: ArrayLike, largest: float) -> NDArray[np.float64]:
-    """Return a grid as C-contiguous float64 after checking type, shape and largest value."""
+def _as_grid(
+    name: str, values: ArrayLike, largest: float, elevation: NDArray[np.float64] | None = None
+) -> NDArray[np.float64]:
+    """Return a grid as C-contiguous float64 after checking type, shape and largest value.
+
+    A layer must have the shape of the `elevation`.
+    """
     grid = np.asarray(values)
     if grid.dtype.kind not in "fiu":
         raise TerrainError(f"{name} has type {grid.dtype}; it must be an array of numbers")
@@ -129,6 +139,8 @@ def _as_grid(name: str, values: ArrayLike, largest: float) -> NDArray[np.float64
     grid = np.ascontiguousarray(grid, dtype=np.float64)
     must = f"finite and within {largest:g}, or NaN where unknown"
     _refuse_first(grid, (grid > largest) | (grid < -largest), name, must)
+    if elevation is not None:
+        _check_shape(name, grid, elevation)
     return grid
 
 

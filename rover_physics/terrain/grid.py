@@ -16,20 +16,14 @@ from rover_physics.files.user_file import open_regular_file
 from rover_physics.files.validation import errors_of, show_file
 from rover_physics.numerics.arrays import freeze_array, seal_array
 from rover_physics.terrain.checks import (
+    LAYER_CHECKS,
     as_elevation,
-    as_elevation_std,
-    as_friction,
-    as_ground_class,
     as_origin,
     as_resolution,
     as_soil,
     as_soil_names,
 )
-from rover_physics.terrain.terrain_file import (
-    MAX_CELLS,
-    find_terrain_file,
-    read_entries,
-)
+from rover_physics.terrain.terrain_file import MAX_CELLS, find_terrain_file, read_entries
 
 LAYERS = ("elevation", "friction", "elevation_std", "soil", "ground_class")
 """Grids of a terrain, in the order in which they count for a fingerprint."""
@@ -80,18 +74,15 @@ class Terrain:
             "origin": as_origin(self.origin),
             "soil_names": soil_names,
         }
-        if self.friction is not None:
-            checked["friction"] = as_friction(self.friction, elevation)
         if self.soil is not None:
             checked["soil"] = as_soil(self.soil, soil_names, elevation)
         elif soil_names:
             raise TerrainError(
                 f"soil_names are {', '.join(soil_names)} without a soil layer that points to them"
             )
-        if self.elevation_std is not None:
-            checked["elevation_std"] = as_elevation_std(self.elevation_std, elevation)
-        if self.ground_class is not None:
-            checked["ground_class"] = as_ground_class(self.ground_class, elevation)
+        for name, check in LAYER_CHECKS.items():
+            if getattr(self, name) is not None:
+                checked[name] = check(getattr(self, name), elevation)
         for name, value in checked.items():
             frozen = freeze_array(value) if isinstance(value, np.ndarray) else value
             object.__setattr__(self, name, frozen)

@@ -106,12 +106,6 @@ read_int: Any = intrinsic(_reader(types.int32, types.int64))
 """Return element `index` of the int32 array at `address`."""
 
 
-@lru_cache(maxsize=4)
-def pack_ground(terrain: Terrain) -> Ground:
-    """Return a terrain as a Ground, without soils; the last 4 are cached."""
-    return new_ground(terrain)
-
-
 def new_ground(terrain: Terrain) -> Ground:
     """Return a terrain as a Ground, without soils."""
     elevation, friction, soil = terrain.elevation, terrain.friction, terrain.soil
@@ -143,6 +137,10 @@ def new_ground(terrain: Terrain) -> Ground:
     return Ground(array_of(record), arrays)
 
 
+pack_ground = lru_cache(maxsize=4)(new_ground)
+"""The same; the last 4 are cached."""
+
+
 def with_soils(ground: Ground, soils: np.ndarray) -> Ground:
     """Return `ground` with another table of soils (1 + k, SOIL_NUMBERS)."""
     records = ground.records.copy()
@@ -152,15 +150,10 @@ def with_soils(ground: Ground, soils: np.ndarray) -> Ground:
 
 def _reduce_blocks(cells: np.ndarray, reduce: np.ufunc) -> np.ndarray:
     """Reduce each block of cells to one value; missing cells at the far edges repeat the last."""
+    cells = np.pad(cells, [(0, -size % BLOCK) for size in cells.shape], mode="edge")
     ny, nx = cells.shape
-    missing = (0, -ny % BLOCK), (0, -nx % BLOCK)
-    if missing != ((0, 0), (0, 0)):
-        cells = np.pad(cells, missing, mode="edge")
-    for _ in range(BLOCK_BITS):
-        cells = reduce(cells[0::2], cells[1::2])
-    for _ in range(BLOCK_BITS):
-        cells = reduce(cells[:, 0::2], cells[:, 1::2])
-    return cells
+    blocks = cells.reshape(ny // BLOCK, BLOCK, nx // BLOCK, BLOCK)
+    return np.asarray(reduce.reduce(blocks, axis=(1, 3)))
 
 
 @kernel

@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Finds terrain files (.npz), and reads and writes their entries, within a limit of cells."""
 
-import os
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
 from rover_physics.errors import RoverFileError, TerrainError
-from rover_physics.files.config_files import find_config
+from rover_physics.files.config_files import find_config, find_file
 from rover_physics.files.npz_file import NUMBERS, NpzReader
-from rover_physics.files.validation import errors_of, show_file
+from rover_physics.files.validation import errors_of
 from rover_physics.numerics.arrays import seal_array
 
 MAX_CELLS = 25_000_000
@@ -44,16 +43,10 @@ def find_terrain_file(name_or_path: str | Path) -> Path:
     Raises:
         TerrainError: Neither a preset nor a file; the text lists the presets.
     """
-    presets = terrain_presets()
-    if not isinstance(name_or_path, Path) and name_or_path in presets:
-        return presets[name_or_path]
-    path = Path(name_or_path)
-    if not os.path.exists(path):
-        raise TerrainError(
-            f"no terrain {show_file(name_or_path)!r}: there is no such file, and the presets are "
-            f"{', '.join(presets)}"
-        )
-    return path
+    try:
+        return find_file("terrain", name_or_path, terrain_presets())
+    except RoverFileError as error:
+        raise TerrainError(str(error)) from None
 
 
 def read_entries(file: BinaryIO, source: str | Path, max_cells: int) -> dict[str, Any]:

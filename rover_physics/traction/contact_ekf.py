@@ -22,7 +22,6 @@ from rover_physics.names import WHEEL_COUNT, WHEEL_POSITIONS
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import array_of, new_record, record_type
 from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place, rocker_sign
-from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
 
 PAIRS = 5
@@ -118,7 +117,7 @@ class MotionContactEstimator:
 
     def __init__(self, rover: Rover):
         """Prepare for a rover on level ground."""
-        self._linkages = array_of(pack_linkage(rover, *body_mass_and_com(rover)))
+        self._linkages = array_of(pack_linkage(rover))
         low, high = map(WHEEL_POSITIONS.index, rover.suspension.bogie_wheels)
         own = WHEEL_POSITIONS.index(rover.suspension.rocker_wheel)
         self._filters = array_of(

@@ -15,7 +15,6 @@ from rover_physics.names import WHEEL_COUNT, WHEELS
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import array_of, new_record, record_type
 from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place
-from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.terrain.ground import height_at_cell, is_cell_on_map, pack_ground, to_cells
@@ -60,7 +59,7 @@ class MapContactFinder:
     def __init__(self, rover: Rover, terrain: Terrain):
         """Prepare for a rover and a map; takes several milliseconds."""
         self.rover, self.terrain = rover, terrain
-        self._linkages = array_of(pack_linkage(rover, *body_mass_and_com(rover)))
+        self._linkages = array_of(pack_linkage(rover))
         self._ground = pack_ground(terrain)
         self._searches = array_of(new_record(MAP_SEARCH))
 

@@ -114,10 +114,6 @@ class ProgramInputs:
                 f"wheel radius {self.radius} m must all be above 0"
             )
 
-    def max_pull(self, force_unit: float) -> float:
-        """Return the largest traction of a motor in a unit of force [N]."""
-        return self.max_torque / (self.radius * force_unit)
-
 
 MIN_LOAD = 0.05
 """Smallest load that a cone is expanded about, in sixths of the weight."""

@@ -165,7 +165,7 @@ def solve_traction(
     """
     x = rows.pull_equally() if last is None else rows.complete(last / rows.force_unit)
     shares, friction, qp = rows.lateral_shares, inputs.friction, workspace.qp
-    max_pull = inputs.max_pull(rows.force_unit)
+    max_pull = inputs.max_torque / (inputs.radius * rows.force_unit)
     status, iterations, programs = "", 0, 0
     while programs < max_programs:
         write_program(rows, friction, max_pull, x, _measure_peak(shares, friction, x), qp)

@@ -192,8 +192,8 @@ def judge_poses(
     check_sigmas(sigmas)
     check_accepted_chance(accepted_chance)
     model, places = pack_model(rover, terrain, options), check_poses(poses)
-    bends = np.zeros(len(places)) if curvature is None else curvature
-    prediction, verdict = _judge_in_motion(model, places, motions_of(model, places, bends), sigmas)
+    motions = motions_of(model, places, np.zeros(len(places)) if curvature is None else curvature)
+    prediction, verdict = _judge_in_motion(model, places, motions, sigmas)
     if accepted_chance is not None:
         swept = SweptPath(places, prediction, NO_CROSSINGS)
         chance = find_failure_chance(model, swept, on_path=False)
@@ -204,7 +204,7 @@ def judge_poses(
 def _judge_in_motion(
     model: PackedModel, places: np.ndarray, motions: np.ndarray, sigmas: float | None
 ) -> tuple[PathPrediction, Verdict]:
-    """Judge single poses (n, 3) with motions (n, 3) as of `path_motions`."""
+    """Judge single poses (n, 3) with motions (n, 3) as of `motions_of`."""
     prediction = predict_poses(model, places, motions)
     return add_bounds(model, prediction, hold_against_limits(model.rover, prediction), sigmas)
 
@@ -216,7 +216,7 @@ def add_bounds(
 
     On a map with exact heights both stay as they are.
     """
-    bounds = bound_path(model.rover, model.terrain, prediction, model.options, sigmas)
+    bounds = bound_path(model, prediction, sigmas)
     if bounds is None:
         return prediction, verdict
     worst = refuse_worst_case(model.rover, prediction, bounds, verdict)

@@ -26,7 +26,7 @@ from rover_physics.prediction.drops import MIN_ANGLE, find_drops
 from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_kernels import Crossings, add_up, angle_ahead, distance_between
-from rover_physics.prediction.path_motion import path_motions
+from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.sweep import check_poses, find_suspects, joined_paths
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
@@ -130,7 +130,7 @@ class _Sweep:
         self._model = model
         self._counts = np.array([len(one) for one in pieces])
         self._poses = np.concatenate(pieces)
-        self._motions = np.concatenate([path_motions(model, one) for one in pieces])
+        self._motions = np.concatenate([motions_of(model, one) for one in pieces])
         self._results = unwritten_results(len(self._poses))
         self._is_open = np.ones(len(pieces), bool)
 

@@ -33,6 +33,7 @@ from rover_physics.results.uses import RoverLimits, find_broken
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
+from rover_physics.traversability.entrapment import UNKNOWN_CODES
 from rover_physics.traversability.judge import judge_poses
 
 UNKNOWN, PASSABLE, WITH_SPEED_SERVOS, WITH_TRACTION_CONTROL, IMPASSABLE = -1, 0, 1, 2, 3
@@ -41,7 +42,6 @@ none; the names of those from 0 on are TRAVERSABILITY_CLASSES."""
 PART = 256
 """Number of poses that a thread takes at a time, some 3 ms of work on most ground; before each
 part an interruption is possible."""
-_UNKNOWN_CODES = ("off_map", "unknown_ground")
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +115,7 @@ def _judge_classes(
             on_map.rover, on_map.terrain, poses[rows], None, options, sigmas=on_map.sigmas
         )
         codes = np.array(verdict.codes)
-        unknown = np.isin(codes, _UNKNOWN_CODES)
+        unknown = np.isin(codes, UNKNOWN_CODES)
         classes[rows[codes == ""]] = TORQUE_POLICIES.index(policy)
         classes[rows[unknown]] = UNKNOWN
         rows = rows[(codes != "") & ~unknown]

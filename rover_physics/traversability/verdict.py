@@ -21,23 +21,17 @@ from rover_physics.rover.model import Rover
 from rover_physics.status import BoundStatus, PoseStatus
 
 UNSETTLED = {
-    PoseStatus.STEERING: ("steering", ""),
-    PoseStatus.OFF_MAP: ("off_map", "off the map: a wheel would leave the known area"),
-    PoseStatus.UNKNOWN_GROUND: ("unknown_ground", "unknown ground under a wheel"),
-    PoseStatus.NOT_SETTLED: (
-        "not_settled",
-        "no configuration found in which all six wheels touch the ground",
-    ),
-    PoseStatus.NO_EQUILIBRIUM: (
-        "no_equilibrium",
-        "the wheel loads are not determined in this configuration",
-    ),
+    PoseStatus.STEERING: "",
+    PoseStatus.OFF_MAP: "off the map: a wheel would leave the known area",
+    PoseStatus.UNKNOWN_GROUND: "unknown ground under a wheel",
+    PoseStatus.NOT_SETTLED: "no configuration found in which all six wheels touch the ground",
+    PoseStatus.NO_EQUILIBRIUM: "the wheel loads are not determined in this configuration",
     PoseStatus.NOT_COMPUTABLE: (
-        NOT_COMPUTABLE,
-        "a wheel load, torque or margin cannot be computed: it is not a finite number",
+        "a wheel load, torque or margin cannot be computed: it is not a finite number"
     ),
 }
-"""Code and reason of the status of a row that is not settled; those of steering depend on it."""
+"""Reason of the status of a row that is not settled, whose name is the code; that of steering
+depends on the row."""
 EXTREMES = {
     "min_tip_over_ratio": ("tip_over_ratio", np.fmin),
     "max_friction_utilisation": ("friction_utilisation", np.fmax),
@@ -127,7 +121,7 @@ class Verdict:
 def codes_of_verdicts() -> tuple[str, ...]:
     """Return the codes of a verdict; the first that applies is the reason of a waypoint."""
     of_limits = dict.fromkeys(limit.code for limit in table.LIMITS)
-    return (*(code for code, _ in UNSETTLED.values()), *of_limits, TRAPPED, CHANCE)
+    return (*(status.name.lower() for status in UNSETTLED), *of_limits, TRAPPED, CHANCE)
 
 
 def hold_against_limits(rover: Rover, prediction: PathPrediction) -> Verdict:
@@ -163,12 +157,11 @@ def explain_rows(
     for row in np.flatnonzero((first >= 0) | ~prediction.settled).tolist():
         check_interruption()
         status = PoseStatus(prediction.status[row])
-        if status == PoseStatus.STEERING:
-            found[row] = "steering", _explain_steering(rover, prediction.steering_angle[row])
-        elif status != PoseStatus.SETTLED:
-            found[row] = UNSETTLED[status]
-        else:
+        if status == PoseStatus.SETTLED:
             found[row] = explain_use(prediction, uses, row, int(first[row]))
+            continue
+        reason = UNSETTLED[status] or _explain_steering(rover, prediction.steering_angle[row])
+        found[row] = status.name.lower(), reason
     return found
 
 

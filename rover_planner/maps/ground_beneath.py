@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.prediction.evaluation import new_work
 from rover_physics.rover.linkage import pack_linkage, place
-from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
 from rover_planner.maps.cells import CellBox, CellGrid
 from rover_planner.maps.layers import Patch
@@ -147,7 +146,7 @@ def find_ground_beneath(rover: Rover, standing: Standing) -> GroundBeneath:
     q = np.array([standing.z, standing.roll, standing.pitch, rocker, angles[2], angles[3]])
     pose = np.array([standing.x, standing.y, standing.yaw])
     placement = work.placement
-    place(pack_linkage(rover, *body_mass_and_com(rover)), pose, q, placement)
+    place(pack_linkage(rover), pose, q, placement)
     centres = np.array(placement.centres)
     normal = _normal_of(centres)
     axle = np.array(placement.R)[:, 1]

@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from rover_physics.rover.extent import find_reach
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.ground import BLOCK
 
@@ -80,24 +81,10 @@ class SurveyLayout:
 def find_halo(rover: Rover, resolution: float) -> int:
     """Return the number of map cells around the body origin that the rover may touch.
 
-    The distance is the length of the linkage from body origin to wheel, whatever its angles, and
-    the wheel with one radius more; or that of the farthest corner of the belly. It is rounded up
-    to whole blocks of cells, so that blocks are those of the whole map.
+    The distance is the reach of wheels and belly, and a wheel radius more. It is rounded up to
+    whole blocks of cells, so that blocks are those of the whole map.
     """
-    suspension, wheel, belly = rover.suspension, rover.wheel, rover.belly
-    rocker, bogie = suspension.rocker_pivot, suspension.bogie_pivot
-    farthest = max(
-        math.dist((0.0, 0.0, 0.0), rocker)
-        + (
-            math.dist(rocker, position)
-            if name == suspension.rocker_wheel
-            else math.dist(rocker, bogie) + math.dist(bogie, position)
-        )
-        for name, position in suspension.wheels.items()
-    )
-    farthest += wheel.radius + math.hypot(wheel.radius, 0.5 * wheel.width)
-    corner = math.hypot(belly.z, max(map(abs, belly.x)), max(map(abs, belly.y)))
-    cells = math.ceil(max(farthest, corner) / resolution) + 2
+    cells = math.ceil((find_reach(rover) + rover.wheel.radius) / resolution) + 2
     return -(-cells // BLOCK) * BLOCK
 
 

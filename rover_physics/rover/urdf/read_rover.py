@@ -33,9 +33,6 @@ LEVEL = 1e-6
 """Height difference of wheels that counts as none [m]."""
 MAX_ANGLE = 0.1
 """Largest pitch or bogie angle that is made up for [rad]."""
-STEP = 1e-6
-"""Step of the differences that replace derivatives [rad]."""
-ROUNDS = 20
 
 
 @dataclass(frozen=True)
@@ -475,21 +472,11 @@ def level_wheels(reading: _Reading) -> Levelling:
         rear, middle, front = reading.turn(Levelling(*angles.tolist())).wheel_heights()
         return np.array([middle - rear, front - rear])
 
-    angles = np.zeros(2)
-    for _ in range(ROUNDS):
-        off = differ(angles)
-        if np.abs(off).max() <= LEVEL * 1e-3:
-            break
-        if not angles.any() and np.abs(off).max() <= LEVEL:
-            return Levelling()
-        matrix = np.column_stack(
-            [(differ(angles + step) - off) / STEP for step in STEP * np.eye(2)]
-        )
-        if abs(np.linalg.det(matrix)) < 1e-12:
-            break
-        angles = angles - np.linalg.solve(matrix, off)
-        if np.abs(angles).max() > MAX_ANGLE:
-            break
+    if np.abs(differ(np.zeros(2))).max() <= LEVEL:
+        return Levelling()
+    from scipy import optimize  # imported here: few URDFs need it
+
+    angles = optimize.root(differ, np.zeros(2), tol=1e-12).x
     if np.abs(angles).max() > MAX_ANGLE or np.abs(differ(angles)).max() > LEVEL:
         rear, middle, front = reading.wheel_heights()
         raise RoverFileError(

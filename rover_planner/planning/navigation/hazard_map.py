@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Traversability class of each cell of a map and each heading, judged anew where it changed."""
 
-import itertools
 import math
 import time
 from collections.abc import Iterator
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from rover_physics.rover.extent import reach_of_links
 from rover_physics.rover.model import Rover
 from rover_physics.terrain.grid import Terrain
 from rover_physics.traversability.pose_classes import (
@@ -208,18 +208,11 @@ def find_footprint(rover: Rover) -> tuple[float, float]:
     from its pivots than its links are long. A body that rolls by up to MAX_ROLL moves it sideways
     by that length times the sine.
     """
-    suspension, wheel = rover.suspension, rover.wheel
-    rocker, bogie = suspension.rocker_pivot, suspension.bogie_pivot
+    wheel, steep = rover.wheel, math.sin(MAX_ROLL)
     ahead = aside = 0.0
-    steep = math.sin(MAX_ROLL)
-    for name, centre in suspension.wheels.items():
-        chain = [(0.0, 0.0, 0.0), rocker, centre]
-        if name != suspension.rocker_wheel:
-            chain.insert(2, bogie)
-        links = itertools.pairwise(chain)
-        along = sum(math.hypot(b[0] - a[0], b[2] - a[2]) for a, b in links)
+    for name, centre in rover.suspension.wheels.items():
+        along = reach_of_links(rover, name) + wheel.radius
         across = abs(centre[1]) + 0.5 * wheel.width
-        along += wheel.radius
         ahead, aside = max(ahead, along), max(aside, math.hypot(across, steep * along))
     x, y, z = (max(map(abs, side)) for side in (rover.belly.x, rover.belly.y, (rover.belly.z,)))
     return (max(ahead, math.hypot(x, z)), max(aside, math.hypot(y, z)))

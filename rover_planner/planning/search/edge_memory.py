@@ -1,15 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Remembers judged edges and the last path, from one search to the next."""
 
-import math
 from dataclasses import replace
 from functools import lru_cache, partial
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rover_physics.prediction.known_poses import KnownPoses
+from rover_physics.rover.extent import find_reach
 from rover_physics.terrain.ground import BLOCK
 from rover_planner.maps.changes import find_changes, have_same_layers
 from rover_planner.parameters.traverse_server import ALLOW
@@ -139,18 +138,7 @@ def _reach_of(query: SearchQuery) -> float:
     The kernels look at the blocks of cells that wheels and body touch, however these are turned,
     and at the cells around them.
     """
-    rover, suspension = query.rover, query.rover.suspension
-    rocker, bogie = suspension.rocker_pivot, suspension.bogie_pivot
-    farthest = 0.0
-    for name, wheel in suspension.wheels.items():
-        joints = [rocker, bogie, wheel] if name in suspension.bogie_wheels else [rocker, wheel]
-        links = [math.hypot(rocker[0], rocker[2])]
-        links += [math.hypot(b[0] - a[0], b[2] - a[2]) for a, b in pairwise(joints)]
-        farthest = max(farthest, math.hypot(wheel[1], sum(links)))
-    wheel_size = math.hypot(rover.wheel.radius, 0.5 * rover.wheel.width)
-    sides = (max(map(abs, ends)) for ends in (rover.belly.x, rover.belly.y))
-    belly = math.hypot(rover.belly.z, *sides)
-    return max(farthest + wheel_size, belly) + (BLOCK + 1) * query.terrain.resolution
+    return find_reach(query.rover) + (BLOCK + 1) * query.terrain.resolution
 
 
 def _find_touching(query: SearchQuery, edges: Edges, changed: CellCounts) -> NDArray[np.int64]:

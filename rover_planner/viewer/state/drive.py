@@ -13,7 +13,6 @@ from rover_physics.numerics.records import new_record
 from rover_physics.results.path_prediction import PathPrediction, prediction_of
 from rover_physics.results.record import RESULT, numbers_of
 from rover_physics.rover.linkage import PLACEMENT, pack_linkage, place
-from rover_physics.rover.manipulator import body_mass_and_com
 from rover_physics.rover.model import Rover
 from rover_physics.status import PoseStatus
 from rover_planner.planning.asked_poses import AskedPoses
@@ -97,7 +96,7 @@ def place_state(
     (x, y, z), (roll, pitch, yaw) = position, attitude
     placement, pose = new_record(PLACEMENT), np.array([x, y, yaw])
     q = np.array([z, roll, pitch, 0.5 * (angles[0] - angles[1]), *angles[2:]])
-    place(pack_linkage(rover, *body_mass_and_com(rover)), pose, q, placement)
+    place(pack_linkage(rover), pose, q, placement)
     sine, cosine = np.sin(contact)[:, None], np.cos(contact)[:, None]
     down = sine * placement.forward - cosine * placement.up
     values = {

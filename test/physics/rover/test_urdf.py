@@ -166,10 +166,10 @@ def test_wheels_that_are_not_level_are_brought_onto_level_ground(tmp_path):
     read = read_foreign(tmp_path, text)
     suspension = read.rover.suspension
     # The rockers are turned back by the pitch of the body, the bogies by their own angle.
-    assert read.levelling.pitch == pytest.approx(nose_down, abs=1e-6)
-    assert read.levelling.bogie == pytest.approx(turn, abs=1e-6)
+    assert read.levelling.pitch == pytest.approx(nose_down, abs=1e-11)
+    assert read.levelling.bogie == pytest.approx(turn, abs=1e-11)
     for wheel, place in straight.suspension.wheels.items():
-        assert suspension.wheels[wheel] == pytest.approx(place, abs=1e-6)
+        assert suspension.wheels[wheel] == pytest.approx(place, abs=1e-11)
     assert suspension.bogie_limits == pytest.approx((-0.4 - turn, 0.5 - turn), abs=1e-6)
 
 

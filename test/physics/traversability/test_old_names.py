@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Names of version 0.1 work with a warning: they return the predictions of their successors."""
+
+import numpy as np
+import pytest
+
+import rover_physics
+from rover_physics import SweepOptions, judge_path, judge_poses
+from support.paths import poses_at
+from support.rough_grounds import smooth
+from support.rovers import LSR1
+
+GROUND, POSES = smooth(1), poses_at(np.linspace(-0.2, 0.2, 9))
+BACKWARD = SweepOptions(backward=True)
+
+
+def call_old(name, *arguments, **named):
+    warned = f"{name} goes with the next version; judge_"
+    with pytest.warns(DeprecationWarning, match=warned) as at:
+        found = getattr(rover_physics, name)(LSR1, GROUND, *arguments, **named)
+    assert at[0].filename == __file__
+    return found
+
+
+def test_the_old_names_predict_as_the_new_ones_do_and_warn_where_they_are_called():
+    ahead, back = (
+        judge_path(LSR1, GROUND, POSES, options)[0] for options in (SweepOptions(), BACKWARD)
+    )
+    bends = np.full(len(POSES), 0.2)
+    curved = judge_poses(LSR1, GROUND, POSES, bends)[0]
+    found = [
+        (call_old("sweep_path", POSES), ahead),
+        (call_old("sweep_path", poses=POSES, options=BACKWARD), back),
+        (call_old("sweep_paths", [POSES, POSES], BACKWARD)[1], back),
+        (call_old("sweep_poses", POSES, bends), curved),
+    ]
+    for one, expected in found:
+        np.testing.assert_array_equal(one.wheel_loads, expected.wheel_loads)
+        np.testing.assert_array_equal(one.energy, expected.energy)
