@@ -31,6 +31,7 @@ from rover_physics.prediction.servo_path import write_servo_path
 from rover_physics.prediction.sweep import SweptPath
 from rover_physics.results.record import place_results, select_results, unwritten_results
 from rover_physics.results.uses import find_uses
+from rover_physics.rover.extent import find_reach
 from rover_physics.status import PoseStatus, Stall
 from rover_physics.terrain.grid import Terrain
 
@@ -158,12 +159,8 @@ def _find_asked(
 
 def _cut_around(model: PackedModel, poses: Floats) -> Terrain:
     """Return the part of the terrain that a rover at poses (n, 3), and a little off, may touch."""
-    wheels, told = model.wheels, model.rover.uncertainty
-    return cut_around(
-        model.terrain,
-        poses[:, :2],
-        wheels.swing_radius + 2.0 * wheels.radius + 6.0 * told.position,
-    )
+    margin = find_reach(model.rover) + 6.0 * model.rover.uncertainty.position
+    return cut_around(model.terrain, poses[:, :2], margin)
 
 
 def _all_rows(swept: SweptPath) -> Crossings:

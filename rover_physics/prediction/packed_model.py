@@ -129,7 +129,7 @@ class PackedModel:
             poses: (n, 3) x, y [m] and yaw [rad] of the body origin, map frame.
             held: (n, 6, 2) height [m] and contact angle [rad] of wheels that climb a face, NaN for
                 those that rest on the ground; (0, 6, 2) if none climbs.
-            motions: (n, 3) vx, vy [m/s] and yaw rate [rad/s] of the body origin, as `path_motions`
+            motions: (n, 3) vx, vy [m/s] and yaw rate [rad/s] of the body origin, as `motions_of`
                 returns them; (0, 3) if all are straight ahead.
         """
         if self.known is not None and len(motions) and not len(held):
@@ -270,7 +270,7 @@ def _tip_over_on_flat_ground(same: SameObject) -> tuple[float, float]:
         ModelError: The rover tips over on flat ground.
     """
     rover = same.value
-    linkage = pack_linkage(rover, *body_mass_and_com(rover))
+    linkage = pack_linkage(rover)
     work, q = new_work(), np.zeros(6)
     place(linkage, work.pose, q, work.placement)
     place_masses(linkage, q, work.placement)
