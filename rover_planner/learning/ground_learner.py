@@ -66,8 +66,8 @@ SAME_TIME = 0.2
 """Time within which its measurements are not independent, either [s]."""
 LEAST_NOISE, FLUCTUATION_NOISE = 0.10, 0.4
 """Relative noise of one wheel's shear over its load while the torque is steady, and per square of
-the fluctuation of the torque over its mean: what a mean lacks as shears turn and stick is of second
-order."""
+the fluctuation of the torque over its mean: what a mean lacks as shears turn and stick is of
+second order."""
 HIDDEN_SHARE = 0.2
 """Error of the load of the wheels that slip, over what tractions push beyond what holds the rover:
 they push at a contact that the map does not have."""
