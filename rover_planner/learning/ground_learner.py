@@ -49,7 +49,7 @@ LASTING = 3
 """Number of windows in a row in which a wheel that slips does."""
 CERTAIN = 5.0
 """Standard deviations by which a slip must exceed zero."""
-ALONG = 0.75
+ALONG = 0.85
 """Share of a slip along the heading above which the torque shows the shear."""
 MIN_LOAD, MAX_LOAD = 0.3, 4.0
 """Loads of wheels that count, in sixths of the weight."""
@@ -64,10 +64,14 @@ AT_A_PLACE = 1.0
 """Number of independent measurements that a wheel makes at one place."""
 SAME_TIME = 0.2
 """Time within which its measurements are not independent, either [s]."""
-LEAST_NOISE, FLUCTUATION_NOISE = 0.10, 0.23
-"""Relative noise of one wheel's shear over its load while the torque is steady, and per
-fluctuation of the torque over its mean."""
-STICKING_LOSS = 0.4
+LEAST_NOISE, FLUCTUATION_NOISE = 0.10, 0.4
+"""Relative noise of one wheel's shear over its load while the torque is steady, and per square of
+the fluctuation of the torque over its mean: what a mean lacks as shears turn and stick is of
+second order."""
+HIDDEN_SHARE = 0.2
+"""Error of the load of the wheels that slip, over what tractions push beyond what holds the rover:
+they push at a contact that the map does not have."""
+STICKING_LOSS = 0.3
 """Shear that the mean lacks while a wheel sticks and slips by turns, over the fluctuation times 1
 less the slip ratio."""
 MOST_DOUBT = 0.3
@@ -370,14 +374,14 @@ class GroundLearner:
         grips &= beyond < GRIP_EXCESS * self._sense.weight
         proved = np.maximum(np.abs(tractions) - CERTAIN_GRIP * felt.error, 0.0)
         shears = np.abs(tractions) / np.maximum(along, 1e-9) * (1.0 + STICKING_LOSS * sticking)
-        noises = loads * np.hypot(LEAST_NOISE, FLUCTUATION_NOISE * felt.fluctuation)
+        noises = loads * np.hypot(LEAST_NOISE, FLUCTUATION_NOISE * felt.fluctuation**2)
         for one, own in grounds:
             if own.any():
                 one.drive(distance)
             told = np.flatnonzero(tells & own)
             if len(told):
                 load, doubt = float(loads[told].sum()), window.doubts[told].sum()
-                noise = float(np.linalg.norm([*noises[told], doubt])) / load
+                noise = math.hypot(*noises[told], doubt, HIDDEN_SHARE * beyond) / load
                 one.slip(float(shears[told].sum()) / load, noise, float(weights[told].mean()))
             held = np.sort((proved / np.maximum(loads, 1e-9))[counts & grips & own])
             if len(held) >= 2:  # two wheels: the contact of one may be wrong

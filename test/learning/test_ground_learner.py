@@ -100,6 +100,20 @@ def test_a_torque_that_fluctuates_tells_the_friction_of_a_wheel_that_slips_less_
     assert shaky.high - shaky.low > 1.1 * (steady.high - steady.low)
 
 
+def test_torques_beyond_what_holds_the_rover_make_a_slip_tell_less_surely():
+    rows = climb(ROVER, SLOPE, 40.0, speed=0.02)[::5]
+    start = int(np.argmax(rows[:, X] > 0.3))
+    rows = rows[: start + 20]
+    rows[start:, RATES.start] *= 3.5
+    held = learn(rows).estimate.friction
+    grips = TORQUES.start + np.array([1, 2, 4, 5])
+    rows[start:, grips] *= 1.5  # as where wheels push a face that the map lacks
+    pushed = learn(rows).estimate.friction
+    assert held.high is not None and pushed.high is not None
+    assert held.low < SLOPE < held.high and pushed.low < SLOPE < pushed.high
+    assert pushed.high / pushed.low > 1.08 * held.high / held.low
+
+
 def test_wheels_whose_slip_is_hidden_by_noise_prove_no_friction():
     rows = climb(ROVER, SLOPE, 20.0)[::5]
     rows[rows[:, X] > 0.0, RATES] *= 3.0
