@@ -114,7 +114,7 @@ def test_forces_within_the_effective_friction_are_within_the_strength(name, whee
     T, S = t * friction * N, s * friction * N
     result = solve(soil, *wheel, N, T, S)
     circle = math.hypot(t, s)
-    assert result.utilisation <= circle * (1.0 + 1e-9)
+    assert result.utilisation <= circle * (1.0 + 1e-9) + 1e-12  # squares of tiny forces underflow
     thrust = math.hypot(T + result.resistance, S)
     strength = result.drawbar_pull + result.resistance
     if abs(thrust / strength - 1.0) > 1e-9:
