@@ -53,6 +53,7 @@ def judge_path(
     sigmas: float | None = SIGMAS,
     stop_at_failure: bool = False,
     accepted_chance: float | None = None,
+    chance_of_refused: bool = True,
     known: KnownPoses | None = None,
 ) -> tuple[PathPrediction, Verdict]:
     """Predict a path and judge it, including entrapment.
@@ -78,6 +79,7 @@ def judge_path(
             verdict then has the chance, except of a path that stopped at its first failure
             (docs/uncertainty.md); with `stop_at_failure`, one above the accepted chance may be
             larger than told. None does not ask for it.
+        chance_of_refused: Whether to ask for it on a path that is refused without it, too.
         known: What this rover with these options has found on this ground so far; grows. It saves
             time and changes nothing else.
 
@@ -100,6 +102,7 @@ def judge_path(
         sigmas=sigmas,
         stop_at_failure=stop_at_failure,
         accepted_chance=accepted_chance,
+        chance_of_refused=chance_of_refused,
         known=known,
     )[0]
 
@@ -115,6 +118,7 @@ def judge_paths(
     stop_at_failure: bool = False,
     check_entrapment: bool = True,
     accepted_chance: float | None = None,
+    chance_of_refused: bool = True,
     known: KnownPoses | None = None,
 ) -> list[tuple[PathPrediction, Verdict]]:
     """Judge several paths at once, faster than one by one.
@@ -129,6 +133,7 @@ def judge_paths(
         check_entrapment: False where pieces of a longer path are judged, and the whole of it
             later.
         accepted_chance: As for `judge_path`.
+        chance_of_refused: As for `judge_path`.
         known: As for `judge_path`.
 
     Returns:
@@ -141,14 +146,14 @@ def judge_paths(
     check_accepted_chance(accepted_chance)
     model = pack_model(rover, terrain, options).remember(known)
     checked = [check_poses(poses) for poses in paths]
-    judged = []
+    judged, of_refused = [], chance_of_refused and not stop_at_failure
     for swept in predict_paths(model, checked, stop_at_failure):
         check_interruption()
         verdict = hold_against_limits(rover, swept.prediction)
         if check_entrapment and verdict.code != "wheel_drop":
             verdict = refuse_if_trapped(model, course_of(model, swept), verdict)
         prediction, verdict = add_bounds(model, swept.prediction, verdict, sigmas)
-        if accepted_chance is not None and (verdict.traversable or not stop_at_failure):
+        if accepted_chance is not None and (verdict.traversable or of_refused):
             enough = accepted_chance if stop_at_failure else 1.0
             chance = find_failure_chance(model, swept, enough=enough)
             verdict = refuse_chance(verdict, chance, accepted_chance)

@@ -177,13 +177,11 @@ def answer_path_query(
     """
     options = options or PathQueryOptions()
     paths = generate_paths(rover, start, goal, options)
+    stops = len(paths) > 1 or not terrain.contains(*paths[0][-1, :2])
+    if not stops:
+        return choose((check_path(rover, terrain, paths[0], options),))
     judged = judge_paths(
-        rover,
-        terrain,
-        paths,
-        options.model,
-        sigmas=options.map_sigmas,
-        stop_at_failure=len(paths) > 1 or not terrain.contains(*paths[0][-1, :2]),
+        rover, terrain, paths, options.model, sigmas=options.map_sigmas, stop_at_failure=True
     )
     candidates = [
         Candidate(poses, prediction, verdict, path_cost(prediction, verdict))
@@ -245,30 +243,24 @@ def check_path(
 
     With `stop_at_failure`, the waypoints beyond the first failure are left out, and a chance of
     failure above the accepted one may be larger than told. It is asked only of a path that is
-    traversable without it, so refusals are quick.
+    traversable without it.
 
     Raises:
         RoverError: The model refuses an option (ModelError) or the poses (PoseError).
     """
     options = options or PathQueryOptions()
     poses = np.array(poses, np.float64)
-
-    def judge(stop: bool, accepted: float | None) -> tuple[PathPrediction, Verdict]:
-        return judge_path(
-            rover,
-            terrain,
-            poses,
-            options.model,
-            sigmas=options.map_sigmas,
-            stop_at_failure=stop,
-            accepted_chance=accepted,
-            known=known,
-        )
-
-    asked = options.accepted_chance if options.accepted_chance < 1.0 else None
-    prediction, verdict = judge(stop_at_failure or asked is not None, asked)
-    if not (verdict.traversable or stop_at_failure or asked is None):
-        prediction, verdict = judge(False, asked if verdict.code == CHANCE else None)
+    prediction, verdict = judge_path(
+        rover,
+        terrain,
+        poses,
+        options.model,
+        sigmas=options.map_sigmas,
+        stop_at_failure=stop_at_failure,
+        accepted_chance=options.accepted_chance if options.accepted_chance < 1.0 else None,
+        chance_of_refused=False,
+        known=known,
+    )
     return Candidate(poses, prediction, verdict, path_cost(prediction, verdict))
 
 
