@@ -62,6 +62,8 @@ STAYED, HALTED, STUCK_FOR = 0.02, 0.1, 4.0
 first, in more than this time [s] to the end, is stuck; one that slides along a step is not."""
 MOTION_TIME = 0.5
 """Time over which its speed is taken [s]."""
+BEFORE = 1.5
+"""Time before a rover is said to be stuck over which its way is told [s]."""
 
 
 @dataclass(frozen=True)
@@ -222,6 +224,8 @@ class Learned:
     """When the rover was stuck in truth [s]."""
     passed: bool
     """Whether it reached its end."""
+    way_before_notice: float | None
+    """Way [m] in the BEFORE seconds before it was said to be stuck, None if it was not."""
 
     @property
     def friction(self) -> Pair:
@@ -252,7 +256,9 @@ def learn(drive: LearningDrive, keep: Path) -> Learned | None:
     if learner.window is None:
         return None
     under = drive.find_friction(learner.window.places)
-    return Learned(drive, learner.estimate, under, early, find_stuck(recorded), recorded.passed)
+    noticed = learner.estimate.immobilised_time
+    stuck, way = find_stuck(recorded), None if noticed is None else find_way(recorded, noticed)
+    return Learned(drive, learner.estimate, under, early, stuck, recorded.passed, way)
 
 
 def has_truth(estimate: FrictionEstimate, truth: float) -> bool:
@@ -336,6 +342,13 @@ def find_stuck(recorded: Recorded) -> float | None:
     return since if times[-1] - since > STUCK_FOR else None
 
 
+def find_way(recorded: Recorded, time: float) -> float:
+    """Return the way [m] of a rover in the BEFORE seconds before a time [s]."""
+    times, places = recorded.rows[:, log.TIME], recorded.rows[:, [log.X, log.Y]]
+    before, here = np.searchsorted(times, [time - BEFORE, time]).clip(max=len(times) - 1)
+    return float(np.hypot(*(places[here] - places[before])))
+
+
 def main(
     drives: Annotated[int, typer.Option(help="Number of drives.")] = 60,
     seed: Annotated[int, typer.Option(help="Seed of the drives.")] = 1,
@@ -404,12 +417,12 @@ def print_summary(learned: list[Learned]) -> None:
     delays = sorted(
         noticed - since for since, noticed in stuck if since is not None and noticed is not None
     )
-    passed = [one.estimate.immobilised_time for one in learned if one.passed]
+    passed = [one.way_before_notice for one in learned if one.passed]
     late = ", ".join(f"{delay:.1f}" for delay in delays)
     count = sum(since is not None for since, _ in stuck)
     print(f"stuck: {count}, noticed {len(delays)}, after [s]: {late}")
-    false = sum(noticed is not None for noticed in passed)
-    print(f"passed: {len(passed)}, said to be stuck: {false}")
+    ways = ", ".join(f"{1e3 * way:.1f}" for way in passed if way is not None)
+    print(f"passed: {len(passed)}, said to be stuck after a way in {BEFORE} s [mm] of: {ways}")
 
 
 if __name__ == "__main__":
