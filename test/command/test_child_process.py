@@ -33,7 +33,8 @@ with stopping_children() as children:
     children.append(child)
     next(child.lines(lambda: None))
     print(child._process.pid, flush=True)
-    time.sleep(600)
+    while True:  # a signal that comes just before a sleep does not end this sleep
+        time.sleep(0.1)
 """
 
 
