@@ -186,6 +186,14 @@ def test_an_accepted_chance_decides():
     assert plain.traversable and np.isnan(plain.failure_chance) and plain.failure_chance_at == ()
 
 
+def test_a_path_that_is_refused_as_told_is_asked_for_its_chance_if_wanted():
+    asked = rover_with(friction=0.1), plane(0.6, 0.0), straight(5), SLIPPERY
+    told = judge_path(*asked, accepted_chance=0.05)[1]
+    quick = judge_path(*asked, accepted_chance=0.05, chance_of_refused=False)[1]
+    assert told.failure_chance > 0.9 and np.isnan(quick.failure_chance)
+    assert (told.code, told.reason) == (quick.code, quick.reason) and told.code == "friction"
+
+
 def test_a_rover_that_does_not_settle_fails_for_sure():
     beyond = np.array([[0.0, 0.0, 0.0], [9.0, 0.0, 0.0]])
     verdict = judge_poses(rover_with(), plane(0.0, 0.0), beyond, accepted_chance=1.0)[1]
