@@ -112,7 +112,8 @@ def find_failure_chance(
         found = _evaluate(drawn, rows, asked, n, group)
         for results in found:
             if on_path:
-                every = _complete(drawn, swept, rows.results, (asked, results), on_path)
+                every = _place(rows, asked, results)
+                _write_path(drawn, swept, every)
                 results = select_results(every, looked_at)
             broken = find_uses(model.limits, results).use > 1.0
             fails = broken.any(axis=1)
@@ -151,7 +152,9 @@ def _find_asked(
     by_path, asked = _needs_path(model, rows.results), np.flatnonzero(near)
     for group in worst_two:
         found = _evaluate(model, rows, asked, len(swept.prediction.poses), group)[0]
-        worst = _complete(model, swept, rows.results, (asked, found), on_path)
+        worst = _place(rows, asked, found)
+        if on_path:
+            _write_path(model, swept, worst)
         closer |= _find_near(model, swept, worst, on_path, NEAR)
         by_path |= _needs_path(model, worst)
     return np.flatnonzero(near & closer), on_path and by_path
@@ -236,18 +239,15 @@ def _evaluate(
     return results
 
 
-def _complete(
-    model: PackedModel,
-    swept: SweptPath,
-    results: Any,
-    found: tuple[NDArray[np.int64], Any],
-    on_path: bool,
-) -> Any:
-    """Return the RESULTs of all rows with those found at some, and what the path decides then."""
-    results, n = results.copy(), len(swept.prediction.poses)
-    rows, others = found
-    place_results(others, results, rows)
-    if on_path:
-        crossings = swept.crossings._replace(results=results[n:])
-        write_servo_path(model, swept.prediction.poses, results[:n], crossings)
+def _place(rows: Crossings, asked: NDArray[np.int64], found: Any) -> Any:
+    """Return the RESULTs of all rows, with those found where they were asked."""
+    results = rows.results.copy()
+    place_results(found, results, asked)
     return results
+
+
+def _write_path(model: PackedModel, swept: SweptPath, results: Any) -> None:
+    """Write what the path decides into the RESULTs of all rows."""
+    n = len(swept.prediction.poses)
+    crossings = swept.crossings._replace(results=results[n:])
+    write_servo_path(model, swept.prediction.poses, results[:n], crossings)

@@ -177,8 +177,7 @@ def answer_path_query(
     """
     options = options or PathQueryOptions()
     paths = generate_paths(rover, start, goal, options)
-    stops = len(paths) > 1 or not terrain.contains(*paths[0][-1, :2])
-    if not stops:
+    if len(paths) == 1 and terrain.contains(*paths[0][-1, :2]):
         return choose((check_path(rover, terrain, paths[0], options),))
     judged = judge_paths(
         rover, terrain, paths, options.model, sigmas=options.map_sigmas, stop_at_failure=True
