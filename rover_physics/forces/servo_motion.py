@@ -64,6 +64,8 @@ SERVO = record_type(
     ("softness", float),  # width of the transition from load to lifting; 0 in the solution
     ("load", float, (6,)),  # loads over the weight
     ("load_rate", float, (6,)),  # their derivatives by z
+    ("pressing", float, (6,)),  # loads by which the ground gives friction: these loads, or held
+    ("holds_loads", np.bool_),  # whether they are held
     ("rise", float, (6,)),  # speeds of lifting over the nominal speed; rise = load - z
     ("lifted", np.bool_),  # whether any wheel lifts
     ("slip", float, (6,)),  # sliding velocity along the wheel over the nominal speed

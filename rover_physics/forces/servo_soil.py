@@ -52,12 +52,13 @@ def roll_on_soil(servo, wheel, velocity):
     In the derivatives the load itself, over the rover's weight, takes the place of mu N.
 
     Args:
-        servo: SERVO with the load of the wheel, `soil`, `command`, `droop`, `max_traction`.
+        servo: SERVO with `pressing`, the load of the wheel, `soil`, `command`, `droop` and
+            `max_traction`.
         wheel: Index of the wheel.
         velocity: (ALONG, ACROSS, SPIN) of the contact as if the wheel did not turn.
     """
     along, across, spin = velocity
-    load = servo.load[wheel]
+    load = servo.pressing[wheel]
     if not load > 0.0:
         servo.force[wheel, :] = 0.0
         servo.force_rate[wheel, :, :] = 0.0

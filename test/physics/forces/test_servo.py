@@ -13,8 +13,9 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from rover_physics import SweepOptions, judge_path, judge_poses
-from rover_physics.forces.servo import CREEP, write_residual
+from rover_physics.forces.servo_balance import write_residual
 from rover_physics.forces.servo_motion import SERVO as SERVO_RECORD
+from rover_physics.forces.servo_search import CREEP
 from rover_physics.forces.servo_soil import roll_on_soil
 from rover_physics.forces.servo_wheel import S, T, roll_wheel
 from rover_physics.forces.soil import (
@@ -32,6 +33,7 @@ from rover_physics.prediction.path_motion import motions_of
 from rover_physics.status import Stall
 from rover_physics.traversability.torque_ranges import evaluate_in_turn
 from support.paths import poses_at
+from support.reference_drives import drive_ground, drive_path
 from support.rough_grounds import fractal, plane, random_poses, rocky, smooth
 from support.rover_geometry import balance_residuals
 from support.rovers import FIXED, LSR1, M2020
@@ -185,6 +187,13 @@ def test_a_rover_drives_where_its_wheels_can_pull_and_slides_where_they_cannot(s
     assert found.stalls[0] == 0.0
 
 
+@pytest.mark.parametrize("friction", [0.8, 1.5, 2.0])
+def test_more_friction_does_not_stop_a_rover_with_strong_motors(friction):
+    options = replace(SERVO, friction=friction, max_torque=6.0)
+    ground = drive_ground("bump_one_side", 0.0917)
+    assert judge_path(LSR1, ground, drive_path(), options)[1].traversable
+
+
 def test_firm_patches_of_a_soil_layer_are_driven_as_coulomb_ground():
     level = plane(0.1, 0.0)
     soil = np.zeros(level.elevation.shape, np.int32)
@@ -289,7 +298,7 @@ def soil_forces(soil, load, velocity, rim) -> tuple[np.ndarray, float]:
 @given(soils, loads, velocities, droops, st.floats(0.5, 1.0))
 def test_forces_are_those_of_servo_and_soil(soil, load, velocity, droop, share):
     servo = servo_of(10.0, droop, share)
-    servo.soil[0], servo.load[0], servo.slip[0] = SOILS[soil], load, np.nan
+    servo.soil[0], servo.pressing[0], servo.slip[0] = SOILS[soil], load, np.nan
     roll_on_soil(servo, 0, velocity)
 
     def excess(rim):
