@@ -18,7 +18,7 @@ import scipy  # loads `stats` where it is used: that takes a second
 import typer
 
 from benchmarks.measure import print_table
-from rover_physics import Rover, SweepOptions, Terrain, judge_path, load_rover
+from rover_physics import Rover, SweepOptions, Terrain, judge_paths, load_rover
 from rover_physics.rover.uncertainty import Uncertainty
 from support.reference_cases import DATA
 from support.reference_drives import drive_ground, unlimited
@@ -146,7 +146,8 @@ def find_chance(path: ChancePath, model_std: float | None = None) -> tuple[float
     """Return the chance that a path fails, and whether the plain verdict refuses it.
 
     Uncertain are friction and torque limit as they were drawn, where the follower keeps the rover,
-    and the model; its error is the default one or `model_std`.
+    and the model; its error is the default one or `model_std`. A drive ends where its path does, so
+    it is not asked whether the rover is trapped there.
     """
     told = Uncertainty(friction=FRICTION_STD, max_torque=TORQUE_STD)
     differ = {"friction", "max_torque", "position", "heading", "model"}
@@ -154,7 +155,8 @@ def find_chance(path: ChancePath, model_std: float | None = None) -> tuple[float
     known = replace(told, model=told.model if model_std is None else model_std, **others)
     rover = replace(path.rover(path.max_torque), uncertainty=known)
     options = SweepOptions(policy="servo", friction=path.friction)
-    verdict = judge_path(rover, path.ground, path.poses, options, accepted_chance=1.0)[1]
+    asked = {"check_entrapment": False, "accepted_chance": 1.0}
+    _, verdict = judge_paths(rover, path.ground, [path.poses], options, **asked)[0]
     return verdict.failure_chance, not verdict.traversable
 
 
