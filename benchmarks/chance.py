@@ -146,8 +146,8 @@ def find_chance(path: ChancePath, model_std: float | None = None) -> tuple[float
     """Return the chance that a path fails, and whether the plain verdict refuses it.
 
     Uncertain are friction and torque limit as they were drawn, where the follower keeps the rover,
-    and the model; its error is the default one or `model_std`. A drive ends where its path does, so
-    it is not asked whether the rover is trapped there.
+    and the model; its error is the default one or `model_std`. A drive ends where its path does:
+    whether the rover is trapped there is not asked.
     """
     told = Uncertainty(friction=FRICTION_STD, max_torque=TORQUE_STD)
     differ = {"friction", "max_torque", "position", "heading", "model"}
