@@ -37,8 +37,8 @@ QUICK_ATTEMPTS = 5
 PROMISING = 2.0
 """Growth of the largest gap from one attempt to the next that ends the quick attempts."""
 RECOVERY_ATTEMPTS = 3
-"""Largest number of recoveries from the start: all wheels together, one after the other, and
-together from a wheel's radius higher."""
+"""Largest number of recoveries from the start: all wheels together, together from a wheel's radius
+higher, and one after the other, which may leave one side up and the other down at a face."""
 RECOVERIES = 7
 """Times that the gaps are closed wheel by wheel, after the quick attempts have failed."""
 FINAL_ATTEMPTS = 3
@@ -70,7 +70,7 @@ def settle(model, work):
 
     The search starts from q = 0, so the result depends on the pose alone. Where Newton's method
     fails, the gaps are closed wheel by wheel: all wheels together, so that no side comes first;
-    if that fails, one after the other; and if that fails, too, together from higher up.
+    if that fails, together from higher up; and if that fails, too, one after the other.
 
     Args:
         model: A record with `ground` GROUND, `linkage` LINKAGE and `samples` WHEEL_SAMPLES.
@@ -109,10 +109,11 @@ def settle(model, work):
             if attempt > 0:
                 for i in range(6):
                     work.q[i] = work.unsettled[i]
-                work.q[0] += model.samples.radius if attempt > 1 else 0.0
+                work.q[0] += model.samples.radius if attempt == 1 else 0.0
                 place(model.linkage, work.pose, work.q, work.placement)
-            status, worst = _recover(model, work, attempt != 1)
-            if status == ContactStatus.IN_CONTACT and worst <= GAP_TOLERANCE:
+            status, worst = _recover(model, work, attempt != 2)
+            stands = worst <= GAP_TOLERANCE and not _has_turned_over(work.q)
+            if status == ContactStatus.IN_CONTACT and stands:
                 break
     if status != ContactStatus.IN_CONTACT:
         return _refuse(status)

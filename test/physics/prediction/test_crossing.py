@@ -61,6 +61,13 @@ def test_a_wall_higher_than_the_wheel_is_climbed_through_contacts_near_90_degree
     assert angles.max() <= 90.0
 
 
+def test_both_sides_climb_together_where_the_ground_is_alike():
+    """Between foot and top both are places to stand, also one side up and the other down."""
+    prediction, _ = drive(drive_ground("ditch", 0.5214))
+    heights = prediction.between.wheel_centres[:, :, 2]
+    np.testing.assert_allclose(heights[:, :3], heights[:, 3:], atol=1e-3)
+
+
 def test_what_happens_on_a_face_balances_and_counts_at_the_waypoint_that_follows():
     prediction, verdict = drive(drive_ground("step", 0.2), policy="optimal", friction=0.8)
     between = prediction.between
