@@ -90,7 +90,7 @@ def search_everywhere(servo):
         share = _hold_loads(servo)
         if share >= MIN_SPEED_SHARE:
             return share
-        if not is_near(servo):
+        if not _is_near(servo):
             slides += 1
         if slides == MOST_SLIDES:
             break
@@ -131,7 +131,7 @@ def _lower_creep(servo, creep):
         servo.creep = max(creep, CREEP)
         servo.softness = SOFTNESS * servo.creep
         found = _take_newton_steps(servo)
-        if not is_near(servo):
+        if not _is_near(servo):
             return -np.inf
         if creep <= CREEP:
             return _share_if_found(servo, found)
@@ -159,7 +159,7 @@ def _hold_loads(servo):
         servo.pressing[i] = servo.z[i]
     for _ in range(ROUNDS):
         _take_newton_steps(servo)
-        if not is_near(servo):
+        if not _is_near(servo):
             break
         split_loads(servo, servo.z)
         largest = 0.0
@@ -201,13 +201,13 @@ def _take_newton_steps(servo):
             return False
         _copy(trial, z)
         size = new
-        if not is_near(servo):
+        if not _is_near(servo):
             return False
     return size <= PRECISION
 
 
 @kernel
-def is_near(servo):
+def _is_near(servo):
     """Return whether the motion is a number within MAX_MOTION."""
     scale = 0.0
     size = 0.0
