@@ -8,10 +8,13 @@ place. Upwards, the wheel climbs a face: it is held at heights from foot to edge
 its contact, and evaluated at each. Downwards, the wheel drops.
 """
 
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from rover_physics.prediction.failures import mark_failures
 from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import (
     HEIGHT_JUMP,
@@ -24,11 +27,10 @@ from rover_physics.prediction.path_kernels import (
     steps_between,
 )
 from rover_physics.results.record import place_results, select_results
+from rover_physics.results.uses import readable
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 
-PIECES = 4
-"""Number of pieces into which a stretch with a jump is divided in each round."""
 TURNED = 0.1
 """Change of a steering angle [rad] from a waypoint to the next above which the rover is also
 evaluated with the wheels turned where it still stands. Smaller changes count as gradual."""
@@ -39,8 +41,23 @@ CLIMB_STAGES = np.linspace(0.0, 1.0, 6)
 the wheel already touches the edge of the face there: no later contact is as steep."""
 
 
+class AtFailure(IntEnum):
+    """What is searched no further once a pose between waypoints fails in any case."""
+
+    SEARCH_ON = 0
+    """Nothing: all is searched."""
+    LEAVE_REST = 1
+    """The rest of its path."""
+    LEAVE_PATH = 2
+    """Its whole path."""
+
+
 def find_crossings(
-    model: PackedModel, poses: np.ndarray, results: Any, joined: np.ndarray | bool = True
+    model: PackedModel,
+    poses: np.ndarray,
+    results: Any,
+    joined: np.ndarray | bool = True,
+    at_failure: AtFailure = AtFailure.SEARCH_ON,
 ) -> Crossings:
     """Evaluate the poses between waypoints: at jumps, near limits, and where something turns far.
 
@@ -50,6 +67,7 @@ def find_crossings(
             one after the other, map frame.
         results: (n,) RESULT of each waypoint.
         joined: (n - 1,) True where a waypoint and the next one belong to the same path.
+        at_failure: What is left out; with speed servos nothing, for momentum may carry the rover.
 
     Returns:
         The poses between the waypoints, without those of status NOT_SETTLED; poses of climbing
@@ -61,30 +79,67 @@ def find_crossings(
     turns, inside, jumps_in_turns = _divide_turns(model, poses, results, joined)
     if not len(jumps) and not len(inside):
         return at_rest
-    rows = jumps.ravel()
+    rows = jumps[:, :2].ravel()
     at_jumps = select_results(results, rows)
     path = Crossings(
         rows.astype(float), jumps[:, 1].repeat(2), none_held(len(rows)), poses[rows], at_jumps
     )
     known = join_crossings([path, turns])
-    ends = np.vstack([np.arange(len(rows)).reshape(-1, 2), len(rows) + jumps_in_turns])
+    jumps[:, :2] = np.arange(len(rows)).reshape(-1, 2)
+    jumps_in_turns[:, :2] += len(rows)
+    ends, path_of = np.vstack([jumps, jumps_in_turns]), np.append(0, np.cumsum(~joined))
     while len(ends):
+        start = len(known.place)
         known = join_crossings([known, _divide(model, known, ends)])
-        pieces = np.empty((2, len(ends) * PIECES, 2), np.int64)
-        n_open, n_closed = sort_pieces(ends, PIECES, known.views, model.wheels, pieces)
-        ends, closed = pieces[0, :n_open], pieces[1, :n_closed]
+        ends, closed = _sort_pieces(model, known, ends)
         if len(closed):
             known = join_crossings([known, climb_faces(model, known, closed)])
+        if at_failure and not model.wheels.on_servos:
+            failed = _find_failures(model, known.select(slice(start, None)))
+            ends = ends[_are_ahead(known.waypoint[ends[:, 0]], failed, path_of, at_failure)]
     kept = (known.results["status"] != PoseStatus.NOT_SETTLED) | known.climbing
     kept[: len(rows) + len(inside)] = np.append(np.zeros(len(rows), bool), inside)
     return join_crossings([known.select(np.flatnonzero(kept)), at_rest]).in_order()
 
 
+def _sort_pieces(
+    model: PackedModel, known: Crossings, ends: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pieces to divide (k, 3) and to close (m, 2), of stretches that are divided."""
+    count = int(ends[:, 2].sum())
+    to_divide, to_close = np.empty((count, 3), np.int64), np.empty((count, 2), np.int64)
+    found = sort_pieces(ends, known.views, model.wheels, to_divide, to_close)
+    return to_divide[: found[0]], to_close[: found[1]]
+
+
+def _find_failures(model: PackedModel, found: Crossings) -> NDArray[np.int64]:
+    """Return the waypoints that follow poses which fail in any case."""
+    fails = np.empty(len(found.place), bool)
+    mark_failures(*readable(found.results), model.limits.records, model.wheels, fails)
+    fails &= (found.results["status"] != PoseStatus.NOT_SETTLED) | found.climbing
+    return found.waypoint[fails]
+
+
+def _are_ahead(
+    waypoints: NDArray[np.int64],
+    failed: NDArray[np.int64],
+    path_of: NDArray[np.int64],
+    at_failure: AtFailure,
+) -> NDArray[np.bool_]:
+    """Return which waypoints (k,) failures leave to be searched.
+
+    `failed` are the waypoints at which paths fail, `path_of` (n,) is the path of each waypoint.
+    """
+    last = np.full(len(path_of), len(path_of))
+    np.minimum.at(last, path_of[failed], -1 if at_failure == AtFailure.LEAVE_PATH else failed)
+    return np.asarray(waypoints <= last[path_of[waypoints]])
+
+
 def list_jumps(
     model: PackedModel, poses: np.ndarray, results: Any, joined: np.ndarray
 ) -> np.ndarray:
-    """Return the neighbours between which to search, as rows (k, 2)."""
-    jumps = np.empty((len(poses), 2), np.int64)
+    """Return the neighbours between which to search, and numbers of pieces to divide them into."""
+    jumps = np.empty((len(poses), 3), np.int64)
     joined = np.array(joined)  # a kernel is compiled for each layout, and for read-only arrays
     return jumps[: find_jumps(results, poses, joined, model.wheels, jumps)]
 
@@ -98,7 +153,7 @@ def _divide_turns(
     """
     turns = find_turns(model, poses, results, joined)
     if not len(turns):
-        return NO_CROSSINGS, np.empty(0, bool), np.empty((0, 2), np.int64)
+        return NO_CROSSINGS, np.empty(0, bool), np.empty((0, 3), np.int64)
     first, pieces = np.repeat(turns, turns[:, 1] + 1, axis=0).T
     within = np.concatenate([np.arange(count + 1) for count in turns[:, 1]])
     inside, share = (within > 0) & (within < pieces), within / pieces
@@ -144,20 +199,26 @@ def find_turns(
 
 
 def _divide(model: PackedModel, known: Crossings, ends: np.ndarray) -> Crossings:
-    """Evaluate PIECES - 1 poses in each stretch between the rows `ends` (k, 2), evenly.
+    """Evaluate the poses that divide each stretch evenly.
 
     They are in the order of the stretches. Their motions are those of the end of the stretch,
     which lead there.
+
+    Args:
+        model: The model.
+        known: Evaluated poses.
+        ends: (k, 3) rows of `known` at the start and end of each stretch, and numbers of pieces.
     """
-    (before, after), within = ends.T, PIECES - 1
-    share, first = np.arange(1, PIECES) / PIECES, known.place[before]
-    place = first[:, None] + share * (known.place[after] - first)[:, None]
+    before, after, pieces = np.repeat(ends, ends[:, 2] - 1, axis=0).T
+    last = np.cumsum(ends[:, 2] - 1)
+    share = (
+        1 + np.arange(len(before)) - np.repeat(last - ends[:, 2] + 1, ends[:, 2] - 1)
+    ) / pieces
+    place = known.place[before] + share * (known.place[after] - known.place[before])
     steps = steps_between(known.poses[before], known.poses[after])
-    poses = known.poses[before][:, None] + share[:, None] * steps[:, None]
-    at, motions = poses.reshape(-1, 3), np.repeat(known.results["motion"][after], within, axis=0)
-    waypoint = np.repeat(known.waypoint[before], within)
-    results = model.evaluate(at, motions=motions)
-    return Crossings(place.ravel(), waypoint, none_held(len(at)), at, results)
+    poses = known.poses[before] + share[:, None] * steps
+    results = model.evaluate(poses, motions=known.results["motion"][after])
+    return Crossings(place, known.waypoint[before], none_held(len(poses)), poses, results)
 
 
 def climb_faces(model: PackedModel, known: Crossings, ends: np.ndarray) -> Crossings:

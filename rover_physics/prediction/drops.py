@@ -18,6 +18,7 @@ import numpy as np
 from rover_physics.numerics.arrays import view_read_only
 from rover_physics.numerics.kernels import allocating_kernel, exact_kernel
 from rover_physics.prediction.path_kernels import (
+    ANGLE_JUMP,
     FACE,
     HEIGHT_JUMP,
     MIN_SPACING,
@@ -92,7 +93,7 @@ def _find_drops(wheels, poses, results, between):
             lowest = min(lowest, angle[k, wheel])
         if lowest < -MIN_ANGLE:
             result = results[i] if i < n else between.results[i - n]
-            _find_rolling_off_edge(angle[k], result, wheels, rolling_off_edge[k])
+            _find_rolling_off_edge(result, wheels, rolling_off_edge[k])
     first_open = _clear_open_runs(rolling_off_edge)
     _clear_slides(height, angle, wheels.drop_limit, rolling_off_edge)
     descents, drops = np.zeros((n + m, 6)), np.zeros((n, 6))
@@ -143,27 +144,42 @@ def _merge(n, place, order):
 
 
 @exact_kernel
-def _find_rolling_off_edge(angle, result, wheels, rolling_off_edge):
-    """Write (6,) True for wheels that roll off an edge.
+def _find_rolling_off_edge(result, wheels, rolling_off_edge):
+    """Write (6,) True for wheels that may roll off an edge."""
+    some, on_edges = may_roll_off_edge(result, wheels)
+    for wheel in range(6):
+        rolling_off_edge[wheel] = some and _rolls_off_edge(result, wheels, wheel, on_edges)
 
-    None does if the rover as a whole goes downhill: it then slides.
+
+@exact_kernel
+def may_roll_off_edge(result, wheels):
+    """Return whether some wheels may roll off an edge; the path around the pose decides.
+
+    None does if the rover as a whole goes downhill: it then slides. Also return whether all wheels
+    that are beyond their limits are at edges.
     """
     on_edges = True
     for wheel in range(6):
-        if angle[wheel] >= -MIN_ANGLE and not _is_held(result, wheels, wheel):
+        if angle_ahead(result, wheel) >= -MIN_ANGLE and not _is_held(result, wheels, wheel):
             on_edges = False
     count, others, least_held = 0, 0.0, np.inf
     for wheel in range(6):
-        mu = result.friction[wheel]
+        mu, angle = result.friction[wheel], angle_ahead(result, wheel)
         least_held = min(least_held, np.arctan(mu) if mu == mu else np.arctan(1.0))
-        slips = angle[wheel] < -MIN_ANGLE and not _is_held(result, wheels, wheel)
-        rolling_off_edge[wheel] = angle[wheel] < -FACE or (on_edges and slips)
-        if rolling_off_edge[wheel]:
+        if _rolls_off_edge(result, wheels, wheel, on_edges):
             count += 1
-        elif angle[wheel] == angle[wheel]:
-            others += angle[wheel]
-    if count > MAX_ROLLING_OFF_EDGE or others / max(6 - count, 1) < -0.5 * least_held:
-        rolling_off_edge[:] = False
+        elif angle == angle:
+            others += angle
+    slides = others / max(6 - count, 1) < -0.5 * least_held
+    return 0 < count <= MAX_ROLLING_OFF_EDGE and not slides, on_edges
+
+
+@exact_kernel
+def _rolls_off_edge(result, wheels, wheel, on_edges):
+    """Return whether a wheel goes down too steeply to roll, or is at an edge and not held."""
+    angle = angle_ahead(result, wheel)
+    slips = on_edges and angle < -MIN_ANGLE and not _is_held(result, wheels, wheel)
+    return angle < -FACE or slips
 
 
 @exact_kernel
@@ -242,9 +258,10 @@ def _measure_drops(radius, course, rolling_off_edge, descents):
 def _share_of_drop(angle, other):
     """Return the share of a step in which a wheel falls that falls at one of its ends only.
 
-    It does from where its contact angle passes FACE, else for half the step.
+    It does from where its contact angle passes FACE, if the contact jumps there for the whole step,
+    else for half of it.
     """
     steep, flat = min(angle, other), max(angle, other)
     if flat >= -FACE > steep:
-        return (steep + FACE) / (steep - flat)
+        return 1.0 if flat - steep > ANGLE_JUMP else (steep + FACE) / (steep - flat)
     return 0.5

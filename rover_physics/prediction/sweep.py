@@ -18,17 +18,16 @@ from numpy.typing import ArrayLike
 from rover_physics.errors import PoseError
 from rover_physics.numerics.arrays import view_read_only
 from rover_physics.numerics.interruption import check_interruption
-from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.numerics.plausible import MAX_COORDINATE
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.threads import limit_threads
-from rover_physics.prediction.crossing import climb_faces, find_crossings
-from rover_physics.prediction.drops import MIN_ANGLE, Drops, find_drops
+from rover_physics.prediction.crossing import AtFailure, climb_faces, find_crossings
+from rover_physics.prediction.drops import Drops, find_drops
+from rover_physics.prediction.failures import find_suspects
 from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import (
     Crossings,
     add_up,
-    angle_ahead,
     distances_between,
     find_remaining_jumps,
     join_crossings,
@@ -47,8 +46,7 @@ from rover_physics.results.record import (
     select_results,
     unwritten_results,
 )
-from rover_physics.results.uses import RoverLimits, find_broken, find_uses, readable
-from rover_physics.status import PoseStatus
+from rover_physics.results.uses import RoverLimits, find_uses, readable
 
 FIRST_BLOCK = 32
 """Number of waypoints of a path that are evaluated first."""
@@ -109,12 +107,13 @@ def predict_paths(
     started = [_StartedPath(model, poses, stop_at_failure) for poses in paths]
     going, block = started, FIRST_BLOCK if stop_at_failure else max(map(len, paths), default=0)
     cost = model.relative_cost(sum(map(len, paths)))
+    at_failure = AtFailure.LEAVE_REST if stop_at_failure else AtFailure.SEARCH_ON
     with limit_threads(cost):  # set once, not per round
         while going:
             check_interruption()
             began = time.perf_counter()
             _evaluate_block(model, going, block)
-            _search_crossings(model, going)
+            _search_crossings(model, going, at_failure)
             for path in going:
                 check_interruption()
                 path.look_for_failure()
@@ -261,7 +260,7 @@ class _StartedPath:
         end = self.evaluated
         if self._stops:
             news = self.results[self.searched : self.evaluated]
-            suspect, failure = find_suspects(*readable(news), self._model.limits.records)
+            suspect, failure = self._find_suspects(news)
             end = self.evaluated if failure < 0 else self.searched + failure + 1
             self._suspicious |= 0 <= suspect < end - self.searched
         first = max(self.searched - 1, 0)
@@ -272,9 +271,11 @@ class _StartedPath:
         """Keep the crossings of the last stretch, whose places count from the path's start."""
         self._crossings.append(crossings)
         if self._stops:
-            between = readable(crossings.results)
-            suspect = find_suspects(*between, self._model.limits.records)[0]
-            self._suspicious |= bool(suspect >= 0)
+            self._suspicious |= bool(self._find_suspects(crossings.results)[0] >= 0)
+
+    def _find_suspects(self, results: Any) -> tuple[int, int]:
+        found = find_suspects(*readable(results), self._model.limits.records, self._model.wheels)
+        return found[0], found[1]
 
     def look_for_failure(self) -> None:
         """Complete the path if all of it is swept, or if a waypoint that is swept fails."""
@@ -297,40 +298,6 @@ class _StartedPath:
             self.swept = swept
         elif failure >= 0 and (complete or failure < drops.decided):
             self.swept = swept.cut(failure + 1)
-
-
-@exact_kernel
-def find_suspects(results, numbers, limits):
-    """Return the first row that may break a limit, and the first that does so in any case; or -1.
-
-    A wheel that rolls off an edge needs no equilibrium, so a row with a contact that is behind a
-    wheel and steep may keep limits that it breaks. What the path around a row decides is not
-    known yet.
-
-    Args:
-        results: (n,) RESULT.
-        numbers: The same as numbers (n, RESULT_COLUMNS).
-        limits: (k,) LIMIT.
-    """
-    suspect = -1
-    for row in range(results.size):
-        broken, in_any_case = 0, 0
-        if results[row].status == PoseStatus.SETTLED:
-            broken, in_any_case = find_broken(numbers, row, limits)
-        if broken >= 0:
-            suspect = row if suspect < 0 else suspect
-            if in_any_case >= 0 or not _may_roll_off_edge(results[row]):
-                return suspect, row
-    return suspect, -1
-
-
-@exact_kernel
-def _may_roll_off_edge(result):
-    """Return whether a contact is so far behind its wheel that the wheel may roll off an edge."""
-    steepest = 0.0
-    for wheel in range(6):
-        steepest = min(steepest, angle_ahead(result, wheel))
-    return steepest < -MIN_ANGLE
 
 
 def find_first_failure(limits: RoverLimits, prediction: PathPrediction) -> int:
@@ -358,14 +325,16 @@ def _evaluate_block(model: PackedModel, paths: Sequence[_StartedPath], size: int
         path.evaluated, first = block.stop, end
 
 
-def _search_crossings(model: PackedModel, paths: Sequence[_StartedPath]) -> None:
+def _search_crossings(
+    model: PackedModel, paths: Sequence[_StartedPath], at_failure: AtFailure
+) -> None:
     """Search the crossings of the next stretches of all paths together."""
     stretches = [path.stretch() for path in paths]
     pairs = list(zip(paths, stretches, strict=True))
     ends = np.cumsum([stretch.stop - stretch.start for stretch in stretches])
     poses = np.concatenate([path.poses[stretch] for path, stretch in pairs])
     results = join_results([path.results[stretch] for path, stretch in pairs])
-    crossings = find_crossings(model, poses, results, joined_paths(ends))
+    crossings = find_crossings(model, poses, results, joined_paths(ends), at_failure)
     for (path, stretch), first, end in zip(pairs, [0, *ends[:-1]], ends, strict=True):
         path.take_crossings(crossings.between(first, end, stretch.start))
 

@@ -21,13 +21,20 @@ from rover_physics.limits.table import MAX_SLIDE, MAX_TURN_OFF
 from rover_physics.numerics.arrays import view_read_only
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.numerics.quiet import quiet
-from rover_physics.prediction.crossing import find_crossings, find_turns, list_jumps, turn_wheels
+from rover_physics.prediction.crossing import (
+    AtFailure,
+    find_crossings,
+    find_turns,
+    list_jumps,
+    turn_wheels,
+)
 from rover_physics.prediction.drops import MIN_ANGLE, find_drops
+from rover_physics.prediction.failures import find_suspects, mark_failures
 from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_kernels import Crossings, add_up, angle_ahead, distance_between
 from rover_physics.prediction.path_motion import motions_of
-from rover_physics.prediction.sweep import check_poses, find_suspects, joined_paths
+from rover_physics.prediction.sweep import check_poses, joined_paths
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, SweepOptions
 from rover_physics.results.path_prediction import PathPrediction
 from rover_physics.results.record import place_results, select_results, unwritten_results
@@ -153,7 +160,10 @@ class _Sweep:
     def _close_failures(self, results: Any, piece: np.ndarray) -> dict[int, str]:
         """Return the codes of pieces with RESULTs (n,) that fail in any case, by index (n,)."""
         fails = np.zeros(len(piece), bool)
-        mark_failures(*readable(results), self._model.limits.records, fails)
+        look = self._model.limits.records, self._model.wheels
+        mark_failures(*readable(results), *look, fails)
+        if not fails.any():
+            return {}
         failed, first = np.unique(piece[fails], return_index=True)
         at = np.flatnonzero(fails)[first]
         found = find_codes(self._model.limits, select_results(results, at))
@@ -162,8 +172,9 @@ class _Sweep:
         return codes
 
     def look_between(self) -> dict[int, PieceVerdict]:
-        """Return the verdicts of pieces that fail or pass by what is between waypoints, by index.
+        """Return the verdicts of pieces by what is between waypoints too, by index.
 
+        With speed servos those are left out on which the path decides more than drops.
         `find_failures` must have evaluated the waypoints.
         """
         indices = np.flatnonzero(self._is_open)
@@ -182,12 +193,26 @@ class _Sweep:
         look = self._model.limits.records, self._model.wheels, float(linkage.length)
         sum_up_pieces(path, inside, look, float(linkage.steering_rate), sums, found)
         found[unsure, 0] = np.nan
-        passes = {
-            k: PieceVerdict("", *row)
-            for k, row in zip(indices.tolist(), found.tolist(), strict=True)
-            if row[0] == row[0]
-        }
-        return passes | {k: PieceVerdict(code) for k, code in codes.items()}
+        passes = found[:, 0] == found[:, 0]
+        self._is_open[indices[passes]] = False
+        if not self._model.wheels.on_servos:
+            codes |= self._find_broken(results, np.repeat(indices, self._counts[indices]))
+            codes |= self._find_broken(between.results, owner)
+        verdicts = {k: PieceVerdict(code) for k, code in codes.items()}
+        for k, row in zip(indices[passes].tolist(), found[passes].tolist(), strict=True):
+            verdicts[k] = PieceVerdict("", *row)
+        return verdicts
+
+    def _find_broken(self, results: Any, piece: np.ndarray) -> dict[int, str]:
+        """Return the codes of open pieces with RESULTs (n,) that break a limit, by index (n,).
+
+        What the path decides must be written into the results.
+        """
+        rows = np.flatnonzero(self._is_open[piece])
+        if not len(rows):
+            return {}
+        codes = find_codes(self._model.limits, select_results(results, rows))
+        return {k: code for k, code in zip(piece[rows].tolist(), codes, strict=True) if code}
 
     def _find_between(
         self, poses: np.ndarray, results: Any, ends: np.ndarray
@@ -203,7 +228,7 @@ class _Sweep:
             far = find_turns(model, poses, results, joined)
             unsure = np.searchsorted(ends, np.append(jumps[:, 0], far[:, 0]), side="right")
             return turn_wheels(model, poses, results, joined), unsure.tolist()
-        between = find_crossings(model, poses, results, joined)
+        between = find_crossings(model, poses, results, joined, AtFailure.LEAVE_PATH)
         angles = np.where(results["wheel_speed"] < 0.0, -1.0, 1.0) * results["contact_angle"]
         steep = np.flatnonzero((angles < -MIN_ANGLE).any(axis=1))
         rows = np.append(between.waypoint, steep)
@@ -215,14 +240,6 @@ class _Sweep:
             results["falling"][piece] = drops.at_waypoints
             inside.results["falling"] = drops.between
         return between, []
-
-
-@exact_kernel
-def mark_failures(results, numbers, limits, fails):
-    """Write True into fails (n,) for RESULTs (n,) that break a limit in any case."""
-    for row in range(results.size):
-        here = slice(row, row + 1)
-        fails[row] = find_suspects(results[here], numbers[here], limits)[1] >= 0
 
 
 @exact_kernel
@@ -272,7 +289,7 @@ def add_exposure(numbers, time, limits):
 @exact_kernel
 def _is_easy(results, numbers, limits, wheels):
     """Return whether no RESULT breaks a limit and, on servos, no wheel may fall or lift."""
-    if find_suspects(results, numbers, limits)[0] >= 0:
+    if find_suspects(results, numbers, limits, wheels)[0] >= 0:
         return False
     if not wheels.on_servos:
         return True

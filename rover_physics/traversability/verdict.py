@@ -154,12 +154,13 @@ def explain_rows(
     """Return code and reason of each row that does not pass, in the order of the rows."""
     first = uses.find_first()
     found: dict[int, tuple[str, str]] = {}
+    statuses = prediction.status.tolist()
     for row in np.flatnonzero((first >= 0) | ~prediction.settled).tolist():
         check_interruption()
-        status = PoseStatus(prediction.status[row])
-        if status == PoseStatus.SETTLED:
+        if statuses[row] == PoseStatus.SETTLED:
             found[row] = explain_use(prediction, uses, row, int(first[row]))
             continue
+        status = PoseStatus(statuses[row])
         reason = UNSETTLED[status] or _explain_steering(rover, prediction.steering_angle[row])
         found[row] = status.name.lower(), reason
     return found

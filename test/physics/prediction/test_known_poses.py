@@ -10,12 +10,15 @@ from rover_physics import SweepOptions, judge_path, judge_pieces
 from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.results.record import RESULT, numbers_of
+from rover_physics.results.uses import find_codes
 from support.paths import poses_at
 from support.rough_grounds import rocky
 from support.rovers import LSR1
 
 GROUND = rocky(5)
-WAY = poses_at(np.linspace(-1.0, 1.0, 101))
+X = np.linspace(-1.0, 1.0, 101)
+WAY, EASY = poses_at(X), poses_at(X, -0.2)
+"""Paths, of which the second passes."""
 
 
 @pytest.fixture
@@ -50,11 +53,23 @@ def test_a_path_is_the_same_to_the_bit_with_what_is_known_and_is_not_evaluated_a
 
 def test_a_path_of_judged_pieces_is_hardly_evaluated_again(asked):
     of_pieces = KnownPoses()
-    judge_pieces(LSR1, GROUND, [WAY[:51], WAY[50:]], known=of_pieces)
+    judge_pieces(LSR1, GROUND, [EASY[:51], EASY[50:]], known=of_pieces)
     before = asked.poses
     for known in (of_pieces, KnownPoses(others=of_pieces)):
-        judge_path(LSR1, GROUND, WAY, known=known)
+        judge_path(LSR1, GROUND, EASY, known=known)
     assert asked.poses - before < 0.1 * before
+
+
+def test_what_fails_between_waypoints_is_not_searched_further(asked):
+    model = pack_model(LSR1, GROUND)
+    fails = find_codes(model.limits, model.evaluate(WAY))
+    assert not any(fails)
+    assert judge_pieces(LSR1, GROUND, [WAY])[0].code
+    of_piece, asked.poses = asked.poses - len(WAY), 0
+    judge_path(LSR1, GROUND, WAY, stop_at_failure=True)
+    up_to_failure, asked.poses = asked.poses, 0
+    judge_path(LSR1, GROUND, WAY)
+    assert of_piece < 0.8 * asked.poses and up_to_failure < 0.8 * asked.poses
 
 
 def test_a_changed_model_knows_nothing_and_the_same_one_all(asked):
