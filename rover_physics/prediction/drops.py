@@ -258,8 +258,8 @@ def _measure_drops(radius, course, rolling_off_edge, descents):
 def _share_of_drop(angle, other):
     """Return the share of a step in which a wheel falls that falls at one of its ends only.
 
-    It does from where its contact angle passes FACE, if the contact jumps there for the whole step,
-    else for half of it.
+    It does from where its contact angle passes FACE, and for the whole step if the contact jumps
+    there; else for half of it.
     """
     steep, flat = min(angle, other), max(angle, other)
     if flat >= -FACE > steep:
