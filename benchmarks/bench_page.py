@@ -4,27 +4,18 @@
 Needs Chromium and the extras view and test.
 """
 
-import itertools
 import statistics
 import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.grounds import made_reef
-from benchmarks.measure import Figure, median_time
+from benchmarks.measure import Figure
 from benchmarks.processes import memory_of
-from rover_physics.rover.rover_file import load_rover
-from rover_physics.terrain.grid import Terrain, save_terrain
-from rover_planner.command.view import SEED, TERRAIN_SIZE, choose_ends
-from rover_planner.viewer.documents.paths import describe_verdict
-from rover_planner.viewer.state.judging import judge_steps
-from rover_planner.viewer.state.scenario import Scenario, Shown
-from rover_planner.viewer.state.session import ViewSession
-from rover_planner.worlds.mars_terrain import make_mars_terrain
+from rover_physics.terrain.grid import save_terrain
 from support.viewer.browser import Visitor, open_browser
 from support.viewer.sessions import wait_patiently as wait_until
 
@@ -51,29 +42,9 @@ ENTER = """(value) => new Promise((done) => {
 
 def measure() -> list[Figure]:
     """Measure on the made ground that the page shows without one, and on the made reef."""
-    made, reef = make_mars_terrain(SEED, TERRAIN_SIZE, 0.05), made_reef()
     with tempfile.TemporaryDirectory() as folder:
-        save_terrain(file := Path(folder) / "reef.npz", reef)
-        return [
-            measure_verdict("made ground", made),
-            measure_verdict("made reef", reef),
-            *measure_on("made ground"),
-            *measure_on("made reef", str(file)),
-        ]
-
-
-def measure_verdict(name: str, terrain: Terrain) -> Figure:
-    """Measure the CPU time from a changed number to the verdict on the path looked at."""
-    rover, frictions = load_rover("lsr1"), itertools.count(0.6, 0.01)
-    shown = ViewSession(Scenario(rover, rover, terrain, *choose_ends(rover, terrain))).shown
-
-    def judge() -> None:
-        asked = replace(shown.scenario, rover=replace(rover, friction=next(frictions)))
-        steps = judge_steps(asked, shown, shown.index)
-        describe_verdict(next(one for one in steps if isinstance(one, Shown)))
-
-    taken = 1000.0 * median_time(judge, TRIES)
-    return Figure("page", f"{name}, verdict, CPU time", taken, "ms", repeats=TRIES)
+        save_terrain(file := Path(folder) / "reef.npz", made_reef())
+        return [*measure_on("made ground"), *measure_on("made reef", str(file))]
 
 
 def measure_on(name: str, *terrain: str) -> Iterator[Figure]:

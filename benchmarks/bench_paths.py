@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Times paths against their poses: judged, written to a file, stopped at a failure, and in memory.
+"""Times paths against their poses: judged, written to a file, and in memory.
 
 Ground is mild or rocky; paths are straight with 2 cm between waypoints, on one thread. Paths that
 are judged in ways on and back too are part of the rocky ones.
@@ -91,13 +91,12 @@ def measure_ratios(
 ) -> list[Figure]:
     """Compare judged paths with their scored poses, in turns."""
     score, judge = partial(score_poses, rover, ground), partial(judge_path, rover, ground)
-    times = sum_times(paths, score, judge, partial(judge, stop_at_failure=True))
-    scored, judged, stopped = (1e6 * times / sum(map(len, paths))).tolist()
-    ratio = {"unit": "x", "against": "poses scored, in turns", "repeats": REPEATS}
+    times = sum_times(paths, score, judge)
+    scored, judged = (1e6 * times / sum(map(len, paths))).tolist()
+    against = "poses scored, in turns"
     return [
         Figure("paths", f"{name}: a waypoint judged", judged, "us", repeats=REPEATS),
-        Figure("paths", f"{name}: judged", judged / scored, target=most, **ratio),
-        Figure("paths", f"{name}: judged up to the first failure", stopped / scored, **ratio),
+        Figure("paths", f"{name}: judged", judged / scored, "x", most, False, against, REPEATS),
     ]
 
 

@@ -1,19 +1,34 @@
 # SPDX-License-Identifier: Apache-2.0
 """Times single poses on one core, and a map of a million cells."""
 
-import resource
 import statistics
 import time
+from collections.abc import Iterator
 from functools import partial
 
 import numba
+import numpy as np
 
-from benchmarks.grounds import all_grounds, made_square, random_poses
-from benchmarks.measure import Figure, median_times, peak_memory
-from rover_physics import Rover, SweepOptions, load_rover, score_poses, sweep_map
+from benchmarks.grounds import all_grounds, made_reef, made_square, poses_anywhere, real_maps
+from benchmarks.measure import REPEATS, Figure, median_times
+from rover_physics import (
+    PoseStatus,
+    Rover,
+    SweepOptions,
+    Terrain,
+    load_rover,
+    score_poses,
+    sweep_map,
+)
+from rover_physics.names import OPTIMAL
+from rover_physics.numerics.kernels import kernel
+from rover_physics.terrain.ground import look_up, pack_ground
+from support.reference_cases import reference_ground
 
-POSES = 4_000
-"""Poses on each ground."""
+POSES = 1_500
+"""Poses on known ground that are timed."""
+LOOK_UPS, LOOKED_UP = 306, 100
+"""Bare look-ups of the ground that a pose is compared with, and poses at which they are timed."""
 MAP_CELLS = 1_000
 """Cells along each side of the map."""
 MAP_ROWS = (100, 180)
@@ -24,32 +39,67 @@ def measure() -> list[Figure]:
     """Measure poses and the map."""
     threads, rover = numba.config.NUMBA_NUM_THREADS, load_rover("lsr1")
     numba.set_num_threads(1)
-    figures = measure_poses(rover)
+    figures = [*measure_poses(rover)]
     numba.set_num_threads(threads)
-    return figures + measure_map(rover)
+    return [*figures, measure_map(rover)]
 
 
-def measure_poses(rover: Rover) -> list[Figure]:
-    """Measure a pose anywhere on each ground under both policies."""
-    figures = []
-    for name, ground in all_grounds().items():
-        poses = random_poses(ground, POSES)
-        calls = [
-            partial(score_poses, rover, ground, poses, SweepOptions(policy=policy))
-            for policy in ("equal", "optimal")
-        ]
-        equal, optimal = (1e6 * taken / POSES for taken in median_times(calls))
-        figures += [
-            Figure("pose", f"{name}: full, equal torques", equal, "us", 8.0),
-            Figure("pose", f"{name}: what optimal torques add", optimal - equal, "us", 100.0),
-        ]
-    return figures
+def measure_poses(rover: Rover) -> Iterator[Figure]:
+    """Measure poses anywhere, all at once and one by one (some 30 us a call are Python)."""
+    usual = all_grounds()
+    grounds = {"waves": reference_ground("settled_a/waves").terrain, **usual, **real_maps()}
+    for name, terrain in (grounds | {"made reef": made_reef()}).items():
+        poses = poses_anywhere(terrain, 20 * POSES)
+        status = score_poses(rover, terrain, poses).status
+        known = np.isin(status, (PoseStatus.SETTLED, PoseStatus.NOT_SETTLED))
+        poses, status = poses[known][:POSES], status[known][:POSES]
+        ground, places = pack_ground(terrain), places_below(rover, poses[:LOOKED_UP])
+        score = partial(score_poses, rover, terrain, poses)
+        looks = partial(sum_heights, ground.records, places)
+        calls = score, partial(score, SweepOptions(policy=OPTIMAL)), looks
+        equal, optimal, look = 1e6 * np.array(median_times(calls))
+        pose, more = equal / len(poses), (optimal - equal) / len(poses)
+        longest = max(_time(rover, terrain, poses[i : i + 1]) for i in range(len(poses)))
+        settled = 100.0 * float((status == PoseStatus.SETTLED).mean())
+        for what, value, unit, most, repeats in (
+            ("mean, equal torques", pose, "us", 8.0 if name in usual else None, REPEATS),
+            ("what optimal torques add", more, "us", 100.0, REPEATS),
+            (f"over {LOOK_UPS} bare look-ups", pose / (look / LOOKED_UP), "x", None, REPEATS),
+            ("longest", longest, "us", 3000.0, 1),
+            ("settled", settled, "%", None, 1),
+        ):
+            yield Figure("pose", f"{name}: {what}", value, unit, most, repeats=repeats)
 
 
-def measure_map(rover: Rover) -> list[Figure]:
+def places_below(rover: Rover, poses: np.ndarray) -> np.ndarray:
+    """Return LOOK_UPS places (n, 2) [m] for each pose (n, 3), on lines below its wheels."""
+    centres = [(x, side * y) for x, y, _ in rover.suspension.wheels.values() for side in (-1, 1)]
+    along = rover.wheel.radius * np.linspace(-1.0, 1.0, LOOK_UPS // len(centres))
+    x, y = (np.array(centres)[:, None] + np.stack([along, 0.0 * along], axis=-1)).reshape(-1, 2).T
+    cosine, sine = np.cos(poses[:, 2:]), np.sin(poses[:, 2:])
+    places = np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
+    return (poses[:, None, :2] + places).reshape(-1, 2)
+
+
+@kernel
+def sum_heights(grounds, places):
+    """Look up the ground at places (n, 2) [m], and do nothing else; grounds are (1,) GROUND."""
+    total = 0.0
+    for k in range(places.shape[0]):
+        total += look_up(grounds[0], places[k, 0], places[k, 1])[0]
+    return total
+
+
+def _time(rover: Rover, terrain: Terrain, pose: np.ndarray) -> float:
+    """Return the CPU time of a pose (1, 3) [us]."""
+    began = time.thread_time_ns()
+    score_poses(rover, terrain, pose)
+    return 1e-3 * (time.thread_time_ns() - began)
+
+
+def measure_map(rover: Rover) -> Figure:
     """Sweep a map at 8 headings, row by row, until there is enough."""
-    ground, rates, before = made_square(2, MAP_CELLS), [], peak_memory(resource.RUSAGE_SELF)
-    began = time.perf_counter()
+    ground, rates, began = made_square(2, MAP_CELLS), [], time.perf_counter()
     for first, scores in sweep_map(rover, ground):
         taken = time.perf_counter() - began
         if MAP_ROWS[0] <= first < MAP_ROWS[1]:
@@ -57,11 +107,5 @@ def measure_map(rover: Rover) -> list[Figure]:
         if first >= MAP_ROWS[1]:
             break
         began = time.perf_counter()
-    rate, cells = statistics.median(rates), ground.elevation.size
-    memory = peak_memory(resource.RUSAGE_SELF) - before
-    name = f"map of {MAP_CELLS:,} x {MAP_CELLS:,} cells"
-    return [
-        Figure("map", f"{name}: poses per second, all threads", rate, "1/s", repeats=len(rates)),
-        Figure("map", f"{name}: 8 headings take", 8 * cells / rate, "s", repeats=len(rates)),
-        Figure("map", f"{name}: memory for it", memory, "MB", repeats=1),
-    ]
+    name = f"{MAP_CELLS:,} x {MAP_CELLS:,} cells: poses per second, all threads"
+    return Figure("map", name, statistics.median(rates), "1/s", repeats=len(rates))

@@ -20,6 +20,7 @@ import typer
 from benchmarks.measure import print_table
 from rover_physics import Rover, SweepOptions, Terrain, judge_paths, load_rover
 from rover_physics.rover.uncertainty import Uncertainty
+from support.paths import arc_of, poses_at
 from support.reference_cases import DATA
 from support.reference_drives import drive_ground, unlimited
 
@@ -92,10 +93,7 @@ class ChancePath:
     def poses(self) -> np.ndarray:
         """Waypoints (n, 3) x, y [m] and yaw [rad]."""
         along = np.linspace(0.0, LENGTH, round(LENGTH / SPACING) + 1)
-        turn = self.curvature * along
-        ahead = along * np.sinc(turn / np.pi)
-        aside = 0.5 * turn * along * np.sinc(turn / (2.0 * np.pi)) ** 2
-        return np.column_stack([START + ahead, aside, turn])
+        return arc_of(self.curvature, along) + poses_at(START)
 
     def rover(self, max_torque: float) -> Rover:
         """Return the rover lsr1 with a torque limit [N m], and MuJoCo's limits only."""
@@ -289,7 +287,7 @@ def main(
     print_table(f"Reliability; {TOLD}", columns, rows)
     kinds = np.array([path.kind for path in held])
     curved = np.array([path.curvature != 0.0 for path in held])
-    groups = {"all": curved | True, "curves": curved, "side slopes": kinds == "cross_slope"}
+    groups = {"all": curved | True, "curves": curved}
     groups |= {kind: kinds == kind for kind in sorted(set(kinds.tolist()))}
     columns = {"paths": "", "number": "", "Brier": ".3f", "plain": ".3f"}
     columns |= {f"failed below {ACCEPTED:g}": "", "sure ones refused": ""}

@@ -14,7 +14,8 @@ import numpy as np
 import typer
 
 from benchmarks.chance import FAST, ChancePath, draw_path, draw_truths, read_driven_paths
-from benchmarks.drives import LOOK_AHEAD, MAX_TILT
+from benchmarks.drives import LOOK_AHEAD
+from rover_planner.simulator.mujoco_plant import MAX_TILT
 from rover_planner.simulator.mujoco_rover import MujocoRover
 from rover_planner.simulator.path_follower import PathFollower
 from support.reference_drives import KEPT

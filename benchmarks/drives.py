@@ -14,6 +14,7 @@ from benchmarks.measure import console
 from rover_physics import Rover, Terrain, load_rover
 from rover_physics.names import EQUAL, OPTIMAL
 from rover_planner.parameters.traction_controller import TractionControllerParameters
+from rover_planner.simulator.mujoco_plant import MAX_TILT
 from rover_planner.simulator.mujoco_rover import TIMESTEP, MujocoRover
 from rover_planner.simulator.path_follower import PathFollower
 from rover_planner.simulator.second_try import SecondTry
@@ -29,17 +30,14 @@ START, END = -1.2, 1.2
 """x of the body's origin at the start and at the end of a drive [m]."""
 LOOK_AHEAD = 0.5
 """Look-ahead distance of the path follower that steers [m]."""
-MAX_TILT = 1.2
-"""Tilt from which a rover counts as tipped over [rad]."""
 MAX_OFFSET = 1.0
 """Distance from the x axis from which a rover counts as lost [m]."""
 MIN_LOAD = 0.02
 """Load above which the utilisation of a wheel counts, in sixths of the weight."""
 SERVO, DROOP, EQUAL_TORQUES = "servo", "servo with droop", "equal"
 BY_MOTION, BY_MAP = "optimal", "optimal, map"
-CONTROLLERS = (SERVO, DROOP, EQUAL_TORQUES, BY_MOTION, BY_MAP)
-"""Speed servos with an integral part or with droop, equal torques, and the QP with contact angles
-from motion or from the map."""
+"""Controllers: speed servos with an integral part or with droop, equal torques, and the QP with
+contact angles from motion or from the map."""
 
 
 @dataclass(frozen=True)
@@ -88,8 +86,6 @@ class DriveResult:
     """x of the body's origin at the end [m]."""
     mean_utilisation: float
     """Mean over time of the largest friction utilisation of the six wheels."""
-    peak_utilisation: float
-    """95th percentile over time of the largest friction utilisation."""
     slip: float
     """Distance that a tread slid over the ground [m], mean of the six wheels."""
     torque: float
@@ -155,7 +151,7 @@ def follow_axis(
     Args:
         plant: The rover, at START.
         obstacle: What the controller is told.
-        name: One of CONTROLLERS.
+        name: The controller, such as SERVO.
         tries: Attempts at one place; a rover that stands still backs off before another one.
         most_time: Time after which a rover counts as stuck, as a multiple of the time at SPEED.
     """
@@ -196,7 +192,6 @@ def drive(
         passed=bool(plant.pose[0] >= END),
         end=float(plant.pose[0]),
         mean_utilisation=float(np.mean(peaks)),
-        peak_utilisation=float(np.percentile(peaks, 95)),
         slip=float(slip),
         torque=float(torque / plant.time),
         energy=float(energy),

@@ -8,11 +8,9 @@ import numpy as np
 
 from rover_physics import Terrain, load_terrain
 from rover_planner.worlds.mars_terrain import make_mars_terrain
+from support.paths import poses_at
+from support.project.checkout import TOP
 from support.reference_cases import reference_ground
-
-ROOT = Path(__file__).resolve().parents[1]
-MARGIN = 0.8
-"""Distance of the poses from the map's edge [m]: the rover stays on the map."""
 
 
 def all_grounds() -> dict[str, Terrain]:
@@ -27,7 +25,7 @@ def all_grounds() -> dict[str, Terrain]:
 
 def real_maps() -> dict[str, Terrain]:
     """Return the maps of the folder ROVER_TERRAIN_DIR by name."""
-    folder = Path(os.environ.get("ROVER_TERRAIN_DIR", ROOT.parent / "shared" / "terrain"))
+    folder = Path(os.environ.get("ROVER_TERRAIN_DIR", TOP.parent / "shared" / "terrain"))
     return {path.stem: load_terrain(path) for path in sorted(folder.glob("*.npz"))}
 
 
@@ -55,16 +53,15 @@ def made_reef() -> Terrain:
     return Terrain(z, resolution, (-half, -half))
 
 
-def random_poses(ground: Terrain, count: int) -> np.ndarray:
-    """Return random poses (count, 3) on the ground with random headings."""
+def poses_anywhere(terrain: Terrain, count: int) -> np.ndarray:
+    """Return poses (count, 3) at random known cells with random headings."""
     rng = np.random.default_rng(0)
-    xmin, xmax, ymin, ymax = ground.bounds
-    low, high = (xmin + MARGIN, ymin + MARGIN), (xmax - MARGIN, ymax - MARGIN)
-    places = rng.uniform(low, high, (count, 2))
-    return np.column_stack([places, rng.uniform(-np.pi, np.pi, count)])
+    cells = np.argwhere(np.isfinite(terrain.elevation))
+    at = cells[rng.integers(0, len(cells), count)] + rng.uniform(-0.5, 0.5, (count, 2))
+    x, y = terrain.origin[0] + terrain.resolution * at[:, 1], terrain.resolution * at[:, 0]
+    return np.column_stack([x, terrain.origin[1] + y, rng.uniform(-np.pi, np.pi, count)])
 
 
 def straight(length: float, x: float = 0.0, y: float = 0.0) -> np.ndarray:
     """Return poses (n, 3) every 2 cm along x, of a length and with their middle at x, y [m]."""
-    along = x + np.arange(-0.5 * length, 0.5 * length, 0.02)
-    return np.column_stack([along, np.full_like(along, y), np.zeros_like(along)])
+    return poses_at(x + np.arange(-0.5 * length, 0.5 * length, 0.02), y)

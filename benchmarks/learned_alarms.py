@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hours of ordinary drives on all test grounds: alarms of slip and sticking, against the truth.
+"""Hours of ordinary drives in MuJoCo: alarms of slip and of sticking, against the truth.
 
 Run from the repository: python -m benchmarks.learned_alarms [--hours H] [--seed S]
 
@@ -7,7 +7,6 @@ Each drive is drawn at random from what the model lets pass: straight, curves, t
 backward, rests. All sensors have noise. It needs the extra `bench`.
 """
 
-import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
@@ -20,29 +19,22 @@ from scipy.stats import chi2
 from benchmarks.drives import PERIOD, SPEED, run_in_processes
 from benchmarks.grounds import all_grounds
 from benchmarks.learned_soil import make_ground
-from benchmarks.learning import add_noise, has_truth, told_rover
+from benchmarks.learning import add_noise, told_rover
 from benchmarks.measure import print_table
 from rover_physics import Rover, Terrain, judge_poses
-from rover_physics.prediction.sweep_options import SweepOptions
 from rover_planner.errors import PlanningError
 from rover_planner.learning.drive_log import RATES, TIME, YAW, X, Y
 from rover_planner.learning.ground_learner import GroundEstimate, GroundLearner
 from rover_planner.simulator.mujoco_plant import MujocoPlant
-from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from support.learning_drives import row_of_plant
 from support.reference_drives import drive_ground
 
-MUJOCO, QUASI_STATIC, SOIL = "MuJoCo", "quasi-static", "soil"
-SOFT = "lunar_nominal"
-"""Soil of drives over soil."""
 TURN, RADII = 0.1, (0.8, 3.0)
 """Rate of turns on the spot [rad/s], and smallest and largest radius of curves [m]."""
 PARTS, LASTS = 6, (5.0, 14.0)
 """Number of parts of a drive, and shortest and longest duration of each [s]."""
 MARGIN = 1.0
 """Least distance of the course from the map's edge [m]."""
-STEP = 0.1
-"""Period of the quasi-static simulator [s]."""
 TRUE_SLIP, BEFORE = 0.1, 0.8
 """A wheel slips in truth if its tread slid by more than this share of what it rolled, in this time
 before it is noticed [s]."""
@@ -54,39 +46,26 @@ treads roll."""
 
 
 @dataclass(frozen=True)
-class Outing:
-    """A drive."""
+class Alarms:
+    """What a drive had told; None for what it had not."""
 
-    simulator: str
-    """MUJOCO, QUASI_STATIC or SOIL."""
     ground: str
     """Name of the ground."""
     seed: int
     """Seed of course and noise; the learner hears commands if it is odd."""
-
-
-@dataclass(frozen=True)
-class Alarms:
-    """What a drive had told; None for what it had not."""
-
-    outing: Outing
-    """The drive."""
     seconds: float
     """Its duration [s]."""
     slip: bool | None
-    """Whether a wheel slipped in truth when this was first told; on soil all wheels slip, and
-    nothing is asked."""
+    """Whether a wheel slipped in truth when this was first told."""
     stuck: bool | None
     """Whether the rover was stuck in truth when this was first told."""
     faults: str
     """Sensors that were not believed, and why."""
-    is_within: bool
-    """Whether the interval of the friction has the truth."""
 
     @property
     def counts(self) -> tuple[bool, ...]:
-        """What is false of slip, sticking, sensors and the friction, then what is true."""
-        false = self.slip is False, self.stuck is False, bool(self.faults), not self.is_within
+        """What is false of slip, sticking and sensors, then what is true."""
+        false = self.slip is False, self.stuck is False, bool(self.faults)
         return (*false, self.slip is True, self.stuck is True)
 
 
@@ -99,13 +78,12 @@ def grounds() -> dict[str, Terrain]:
     return all_grounds() | more
 
 
-def draw_course(outing: Outing) -> tuple[np.ndarray, np.ndarray] | None:
+def draw_course(ground: Terrain, seed: int) -> tuple[np.ndarray, np.ndarray] | None:
     """Return a start (3,) and parts (k, 3) of a course: speed, yaw rate, duration.
 
     None if there is none that the model lets pass.
     """
-    rng, rover, ground = np.random.default_rng(outing.seed), told_rover(), grounds()[outing.ground]
-    options = SweepOptions(soil=SOFT if outing.simulator == SOIL else None)
+    rng, rover = np.random.default_rng(seed), told_rover()
     low, high = np.array(ground.bounds[::2]) + MARGIN, np.array(ground.bounds[1::2]) - MARGIN
     for _ in range(300):
         start = np.append(rng.uniform(low, high), rng.uniform(-np.pi, np.pi))
@@ -113,7 +91,7 @@ def draw_course(outing: Outing) -> tuple[np.ndarray, np.ndarray] | None:
         poses, curvature = follow(start, parts)
         if (poses[:, :2] < low).any() or (poses[:, :2] > high).any():
             continue
-        if judge_poses(rover, ground, poses, curvature, options)[1].traversable:
+        if judge_poses(rover, ground, poses, curvature)[1].traversable:
             return start, parts
     return None
 
@@ -149,47 +127,45 @@ def follow(start: np.ndarray, parts: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return np.cumsum(np.vstack([start, steps]), axis=0), np.append(0.0, curvatures)
 
 
-def drive(outing: Outing, start: np.ndarray, parts: np.ndarray) -> Iterator[np.ndarray]:
+def drive(ground: Terrain, start: np.ndarray, parts: np.ndarray) -> Iterator[np.ndarray]:
     """Return rows of a drive without noise, slip speeds (n, 6) and commanded speeds (n,)."""
-    placed = told_rover(), grounds()[outing.ground], tuple(start.tolist())
-    soil, is_exact = SOFT if outing.simulator == SOIL else None, outing.simulator == MUJOCO
-    plant = MujocoPlant(*placed) if is_exact else QuasiStaticPlant(*placed, soil=soil)
-    period, driven = PERIOD if is_exact else STEP, []
-    for speed, turn in commands_of(parts, period).tolist():
-        plant.drive(speed, turn, period)
-        row = row_of_plant(plant, (len(driven) + 1) * period)
-        slips = plant.simulated.measure_contacts().slip_speeds if is_exact else np.zeros(6)
-        driven.append((row, slips, speed))
+    plant = MujocoPlant(told_rover(), ground, tuple(start.tolist()))
+    driven = []
+    for speed, turn in commands_of(parts, PERIOD).tolist():
+        plant.drive(speed, turn, PERIOD)
+        row = row_of_plant(plant, (len(driven) + 1) * PERIOD)
+        driven.append((row, plant.simulated.measure_contacts().slip_speeds, speed))
         if plant.state().stopped:
             break
     return map(np.array, zip(*driven, strict=True))
 
 
-def listen(outing: Outing) -> Alarms | None:
+def listen(name: str, seed: int) -> Alarms | None:
     """Drive and listen to the learner; None if there is no course, or no standing at its start."""
-    course = draw_course(outing)
+    ground = grounds()[name]
+    course = draw_course(ground, seed)
     if course is None:
         return None
     try:
-        rows, slips, commands = drive(outing, *course)
+        rows, slips, commands = drive(ground, *course)
     except PlanningError:
         return None
     rover = told_rover()
-    learner, faults = GroundLearner(rover, grounds()[outing.ground]), {}
-    noisy = add_noise(rows, "strong" if outing.seed % 3 == 0 else "usual", outing.seed)
+    learner, faults = GroundLearner(rover, ground), {}
+    noisy = add_noise(rows, "strong" if seed % 3 == 0 else "usual", seed)
     for row, command in zip(noisy, commands, strict=True):
-        if outing.seed % 2:
+        if seed % 2:
             learner.commanded = float(command)
         if learner.take(row):
             faults |= learner.estimate.faults
     told = learner.estimate
     return Alarms(
-        outing,
+        name,
+        seed,
         float(rows[-1, TIME] - rows[0, TIME]),
-        None if outing.simulator == SOIL else slipped_in_truth(told, rows, slips, rover),
+        slipped_in_truth(told, rows, slips, rover),
         stuck_in_truth(told, rows, rover),
         ", ".join(f"{wheel}: {why}" for wheel, why in faults.items()),
-        outing.simulator == SOIL or has_truth(told.friction, rover.friction),
     )
 
 
@@ -225,34 +201,27 @@ def rate(count: int, hours: float) -> str:
 
 
 def main(
-    hours: Annotated[float, typer.Option(help="Hours in each simulator.")] = 1.0,
+    hours: Annotated[float, typer.Option(help="Hours.")] = 1.0,
     seed: Annotated[int, typer.Option(help="Seed of the drives.")] = 1,
-    only: Annotated[str, typer.Option(help="One simulator: MuJoCo, quasi-static, soil.")] = "",
 ) -> None:
-    """Drive, and print the alarms by simulator and ground."""
+    """Drive, and print the alarms by ground."""
     mean = PARTS * (0.5 * sum(LASTS) * 5.0 + LASTS[0]) / 6.0
     count, names = round(3600.0 * hours / mean), list(grounds())
-    simulators = [only] if only else [QUASI_STATIC, SOIL, MUJOCO]
-    outings = [
-        Outing(simulator, names[k % len(names)], 1000 * seed + k)
-        for simulator in simulators
-        for k in range(count)
-    ]
-    heard = [one for one in run_in_processes(listen, [(o,) for o in outings]) if one]
+    jobs = [(names[k % len(names)], 1000 * seed + k) for k in range(count)]
+    heard = [one for one in run_in_processes(listen, jobs) if one]
     rows: list[tuple] = []
-    for simulator, name in itertools.product(simulators, (*names, "all")):
-        here = [one for one in heard if one.outing.simulator == simulator]
-        own = [one for one in here if name in (one.outing.ground, "all")]
+    for name in (*names, "all"):
+        own = [one for one in heard if name in (one.ground, "all")]
         driven = sum(one.seconds for one in own) / 3600.0
-        counts = np.array([one.counts for one in own], int).reshape(-1, 6).sum(axis=0)
-        *false, outside, slipped, stuck = counts.tolist()
+        counts = np.array([one.counts for one in own], int).reshape(-1, 5).sum(axis=0)
+        *false, slipped, stuck = counts.tolist()
         cells = [rate(n, driven) for n in false] if name == "all" else false
-        rows.append((simulator, name, driven, *cells, slipped, stuck, outside))
+        rows.append((name, driven, *cells, slipped, stuck))
     for one in heard:
-        if any(one.counts[:4]):
+        if any(one.counts[:3]):
             print(one)
-    headings = "slip", "stuck", "sensor", "slipped in truth", "stuck in truth", "friction outside"
-    columns = {"simulator": "", "ground": "", "hours": ".2f"} | dict.fromkeys(headings, "")
+    headings = "slip", "stuck", "sensor", "slipped in truth", "stuck in truth"
+    columns = {"ground": "", "hours": ".2f"} | dict.fromkeys(headings, "")
     print_table("False alarms in ordinary drives; in the last row per hour", columns, rows)
 
 

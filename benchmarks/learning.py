@@ -1,12 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drives in MuJoCo on ground of unknown friction: what is learned of it, against the truth.
 
-Run from the repository: python -m benchmarks.learning [--drives N] [--seed S] [--keep FOLDER]
+Run from the repository: python -m benchmarks.learning [--drives N] [--seed S] [--example FOLDER]
 It needs the extra `bench`. Drives are drawn at random: ground, friction, control, noise, rate.
 """
 
-import hashlib
-import tempfile
 from collections import defaultdict
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -114,16 +112,6 @@ class LearningDrive:
         """Return the rows that are kept, with noise."""
         return add_noise(rows, self.noise, self.seed, self.step)
 
-    @property
-    def label(self) -> str:
-        """All of it in one line."""
-        low, high = self.frictions
-        mu = f"{low:.2f}" if self.layout == CONSTANT else f"{low:.2f}|{high:.2f} {self.layout}"
-        return (
-            f"{self.kind} {self.size:.3g}, {mu}, {self.controller}, {1e3 * self.timestep:.0f} ms, "
-            f"{self.noise} noise, {1.0 / (self.step * PERIOD):.0f} Hz"
-        )
-
 
 EXAMPLE = LearningDrive("slope", 24.0, 1, CONSTANT, (0.4, 0.4), SERVO, 0.004, "usual", 1)
 """A drive that ends stuck, for docs/learning.md."""
@@ -160,24 +148,12 @@ def draw_drive(seed: int, number: int) -> LearningDrive:
     )
 
 
-def record(drive: LearningDrive, keep: Path) -> Recorded:
-    """Drive in MuJoCo, unless a folder has what was driven; keep it there."""
-    file = keep / f"{hash_of(drive):016x}.npz"
-    if file.exists():
-        with np.load(file) as kept:
-            return Recorded(kept["rows"], bool(kept["passed"]))
+def record(drive: LearningDrive) -> Recorded:
+    """Drive in MuJoCo."""
     obstacle, start = drive.obstacle, (START, 0.0, 0.0)
     plant = MujocoRover(obstacle.rover, drive.ground, start, drive.frictions[0], drive.timestep)
     rows = [row_of(plant) for _ in follow_axis(plant, obstacle, drive.controller, most_time=1.5)]
-    recorded = Recorded(np.array(rows).reshape(-1, log.WIDTH), bool(plant.pose[0] >= END))
-    np.savez(file, rows=recorded.rows, passed=recorded.passed)
-    return recorded
-
-
-def hash_of(drive: LearningDrive) -> int:
-    """Return a number for what is driven, without the noise and the rate of the log."""
-    text = repr(replace(drive, noise="", step=1))
-    return int(hashlib.sha256(text.encode()).hexdigest()[:15], 16)
+    return Recorded(np.array(rows).reshape(-1, log.WIDTH), bool(plant.pose[0] >= END))
 
 
 def row_of(plant: MujocoRover) -> np.ndarray:
@@ -214,6 +190,8 @@ class Learned:
 
     drive: LearningDrive
     """The drive."""
+    recorded: Recorded
+    """What became of it."""
     estimate: GroundEstimate
     """The estimate at its end."""
     under: np.ndarray
@@ -222,28 +200,21 @@ class Learned:
     """The friction when slip first bounds it."""
     stuck_time: float | None
     """When the rover was stuck in truth [s]."""
-    passed: bool
-    """Whether it reached its end."""
     way_before_notice: float | None
     """Way [m] in the BEFORE seconds before it was said to be stuck, None if it was not."""
 
     @property
-    def friction(self) -> Pair:
-        """The friction, and that under most wheels."""
-        return self.estimate.friction, float(np.median(self.under))
-
-    @property
     def pairs(self) -> list[Pair]:
-        """The friction; per side, each with its own."""
+        """The friction and that under most wheels; per side, each with its own."""
         if self.drive.layout != SIDES:
-            return [self.friction]
+            return [(self.estimate.friction, float(np.median(self.under)))]
         truths = np.median(self.under.reshape(2, -1), axis=1).tolist()
         return list(zip(self.estimate.sides.values(), truths, strict=True))
 
 
-def learn(drive: LearningDrive, keep: Path) -> Learned | None:
+def learn(drive: LearningDrive) -> Learned | None:
     """Drive and learn; None where the rover could not stand at the start, or left the map."""
-    recorded = record(drive, keep)
+    recorded = record(drive)
     if len(recorded.rows) < 50:
         return None
     learner, early = GroundLearner(told_rover(), drive.obstacle.ground), None
@@ -258,7 +229,7 @@ def learn(drive: LearningDrive, keep: Path) -> Learned | None:
     under = drive.find_friction(learner.window.places)
     noticed = learner.estimate.immobilised_time
     stuck, way = find_stuck(recorded), None if noticed is None else find_way(recorded, noticed)
-    return Learned(drive, learner.estimate, under, early, stuck, recorded.passed, way)
+    return Learned(drive, recorded, learner.estimate, under, early, stuck, way)
 
 
 def has_truth(estimate: FrictionEstimate, truth: float) -> bool:
@@ -274,7 +245,7 @@ def measure_yaw_rates(truth: np.ndarray, seed: int) -> np.ndarray:
     return np.asarray(np.gradient(truth[:, log.YAW], times) + noise + bias)
 
 
-def print_odometry(learned: list[Learned], keep: Path) -> None:
+def print_odometry(learned: list[Learned]) -> None:
     """Print misses at the ends of drives without visual odometry, after those before with it.
 
     Friction is that which is told, and that which was learned on the drive with visual odometry.
@@ -282,7 +253,7 @@ def print_odometry(learned: list[Learned], keep: Path) -> None:
     rover = told_rover()
     teacher, found = WheelOdometry(rover), defaultdict[tuple[str, ...], list[Any]](list)
     for one in learned:
-        drive, recorded = one.drive, record(one.drive, keep)
+        drive, recorded = one.drive, one.recorded
         if not recorded.passed:
             continue
         truth, rows = recorded.rows[:: drive.step], drive.add_noise(recorded.rows)
@@ -352,44 +323,20 @@ def find_way(recorded: Recorded, time: float) -> float:
 def main(
     drives: Annotated[int, typer.Option(help="Number of drives.")] = 60,
     seed: Annotated[int, typer.Option(help="Seed of the drives.")] = 1,
-    keep: Annotated[Path | None, typer.Option(help="Folder that keeps the drives.")] = None,
     example: Annotated[
         Path | None, typer.Option(help="Only write drive.csv and terrain.npz of a drive there.")
     ] = None,
 ) -> None:
-    """Learn from drives and print errors, coverage and times."""
-    keep = keep or Path(tempfile.mkdtemp())
-    keep.mkdir(parents=True, exist_ok=True)
+    """Learn from drives and print errors and coverage."""
     if example is not None:
         example.mkdir(parents=True, exist_ok=True)
-        write_csv(example / "drive.csv", EXAMPLE.add_noise(record(EXAMPLE, keep).rows))
+        write_csv(example / "drive.csv", EXAMPLE.add_noise(record(EXAMPLE).rows))
         save_terrain(example / "terrain.npz", EXAMPLE.obstacle.ground)
         return
-    jobs = [(draw_drive(seed, number), keep) for number in range(drives)]
+    jobs = [(draw_drive(seed, number),) for number in range(drives)]
     learned = [one for one in run_in_processes(learn, jobs) if one is not None]
-    columns = {"drive": "", "friction": "", "error": "+.0%", "interval": "", "early": "+.0%"}
-    columns |= {"right left": "", "slip [s]": ".1f", "stuck [s]": ".1f", "noticed [s]": ".1f"}
-    print_table("What was learned", columns | {"faults": ""}, map(describe, learned))
     print_summary(learned)
-    print_odometry(learned, keep)
-
-
-def describe(one: Learned) -> tuple[str | float | None, ...]:
-    """Return the row of a drive."""
-    estimate, (friction, truth) = one.estimate, one.friction
-    early, high = one.early if one.drive.layout == CONSTANT else None, friction.high
-    return (
-        one.drive.label,
-        f"{friction.mean:.2f} [{friction.low:.2f}, {f'{high:.2f}' if high else '-'}]",
-        friction.mean / truth - 1.0 if high else None,
-        "" if all(has_truth(*pair) for pair in one.pairs) else "outside",
-        early.mean / truth - 1.0 if early else None,
-        " ".join(f"{side.mean:.2f}" for side in estimate.sides.values()),
-        estimate.slip_time,
-        one.stuck_time,
-        estimate.immobilised_time,
-        " ".join(estimate.faults.values()),
-    )
+    print_odometry(learned)
 
 
 def print_summary(learned: list[Learned]) -> None:
@@ -417,7 +364,7 @@ def print_summary(learned: list[Learned]) -> None:
     delays = sorted(
         noticed - since for since, noticed in stuck if since is not None and noticed is not None
     )
-    passed = [one.way_before_notice for one in learned if one.passed]
+    passed = [one.way_before_notice for one in learned if one.recorded.passed]
     late = ", ".join(f"{delay:.1f}" for delay in delays)
     count = sum(since is not None for since, _ in stuck)
     print(f"stuck: {count}, noticed {len(delays)}, after [s]: {late}")

@@ -61,24 +61,22 @@ class Figure:
 
 @dataclass(frozen=True)
 class Run:
-    """Times and output of a command."""
+    """Times of a command."""
 
     seconds: float
     """Time by the clock [s]."""
     cpu: float
     """CPU time of all its processes [s]."""
-    printed: str
-    """What it printed."""
 
 
 def run_command(*words: object) -> Run:
     """Run `rover_planner` with words."""
     began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
     command = [sys.executable, "-m", "rover_planner", *map(str, words)]
-    printed = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return Run(time.perf_counter() - began, cpu, printed)
+    return Run(time.perf_counter() - began, cpu)
 
 
 def run_predict(folder: Path, ground: Terrain, poses: np.ndarray) -> Run:
@@ -89,9 +87,9 @@ def run_predict(folder: Path, ground: Terrain, poses: np.ndarray) -> Run:
     return run_command("predict", "lsr1", *files)
 
 
-def peak_memory(whose: int = resource.RUSAGE_CHILDREN) -> float:
-    """Return the peak memory so far [MiB] of a child process, or of this one by RUSAGE_SELF."""
-    return resource.getrusage(whose).ru_maxrss / 1024
+def peak_memory() -> float:
+    """Return the peak memory so far [MiB] of a child process."""
+    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
 
 
 def median_time(function: Callable[[], object], repeats: int = REPEATS) -> float:

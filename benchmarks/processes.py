@@ -11,7 +11,6 @@ import os
 import subprocess
 import sys
 import tempfile
-import threading
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -31,13 +30,13 @@ from msg_adapters.paths import stamped_pose
 from rover_physics import Terrain, save_terrain
 from rover_planner.demo.child_process import ChildProcess, stopping_children
 from rover_planner.ros.qos import service_qos, topic_qos
-from support.ros_fixtures import RosRun, call
+from support.project.checkout import TOP
+from support.ros_fixtures import RosRun, call, finish
 from support.waiting import wait_until
 
 SERVER, CONTROLLER, ECHO = "traverse_server", "traction_controller", "echo"
 DOMAIN = 101 + os.getpid() % 100
 """A ROS domain that tests do not use."""
-ROOT = Path(__file__).resolve().parents[1]
 START_TIME = 300.0
 """Longest wait for a node or its first answer [s]; it may have to compile."""
 ATTEMPTS = 15
@@ -45,10 +44,6 @@ ATTEMPTS = 15
 
 Pose = tuple[float, float, float]
 """x, y [m] and yaw [rad] of the body origin, map frame."""
-
-
-class LostAnswerError(Exception):
-    """A client has waited in vain for an answer."""
 
 
 class NodeProcesses:
@@ -65,7 +60,7 @@ class NodeProcesses:
         self, module: str, *words: str, environment: Mapping[str, str] | None = None
     ) -> ChildProcess:
         """Start a module of this checkout, with additions to this process's environment."""
-        settings = {"ROS_DOMAIN_ID": str(DOMAIN), "PYTHONPATH": str(ROOT)}
+        settings = {"ROS_DOMAIN_ID": str(DOMAIN), "PYTHONPATH": str(TOP)}
         settings |= {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"} | dict(environment or {})
         log = self.folder / f"{len(self._children)}.log"
         child = ChildProcess(module, words, os.environ | settings, log)
@@ -163,15 +158,6 @@ class Client:
         message: ParameterMessage = Parameter(name, value=value).to_parameter_msg()
         request = SetParameters.Request(parameters=[message])
         return finish(self._parameters.call_async(request), 10.0).results[0].successful
-
-
-def finish(future: Any, timeout: float) -> Any:
-    """Wait for the response of a call; raise LostAnswerError after a timeout [s]."""
-    done = threading.Event()
-    future.add_done_callback(lambda _: done.set())
-    if not done.wait(timeout):
-        raise LostAnswerError(f"no answer within {timeout} s")
-    return future.result()
 
 
 def memory_of(child: ChildProcess | subprocess.Popen, kind: str = "VmRSS") -> float:

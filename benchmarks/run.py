@@ -22,16 +22,16 @@ from typing import Annotated
 
 import typer
 
-from benchmarks.measure import Figure, console, print_figures, write_figures
+from benchmarks.measure import OUTPUT, Figure, console, print_figures, write_figures
+from support.project.checkout import TOP
 
-HERE = Path(__file__).resolve().parent
-ROOT = HERE.parent
-RESULTS = ROOT / "bench_output" / "results.json"
-TOPICS = tuple(sorted(path.stem.removeprefix("bench_") for path in HERE.glob("bench_*.py")))
+RESULTS = TOP / OUTPUT / "results.json"
+FILES = sorted((TOP / "benchmarks").glob("bench_*.py"))
+TOPICS = tuple(path.stem.removeprefix("bench_") for path in FILES)
 Topic = StrEnum("Topic", TOPICS)
 
 
-def run_topic(topic: str, checkout: Path = ROOT) -> list[Figure]:
+def run_topic(topic: str, checkout: Path = TOP) -> list[Figure]:
     """Return the figures of a topic, measured by a checkout in a process of its own."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "figures.json"
@@ -42,7 +42,7 @@ def run_topic(topic: str, checkout: Path = ROOT) -> list[Figure]:
     return [Figure(**{k: v for k, v in row.items() if k != "met"}) for row in rows]
 
 
-def compare(topic: str, other: Path, rounds: int, this: Path = ROOT) -> list[Figure]:
+def compare(topic: str, other: Path, rounds: int, this: Path = TOP) -> list[Figure]:
     """Return the ratios of a topic's figures, this checkout's over another's, run in turns."""
     here, there = defaultdict[str, list[float]](list), defaultdict[str, list[float]](list)
     for turn in range(rounds):

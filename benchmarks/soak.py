@@ -33,23 +33,16 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64MultiArray, String
 
-from benchmarks.processes import (
-    ROOT,
-    START_TIME,
-    LostAnswerError,
-    NodeProcesses,
-    finish,
-    memory_of,
-    open_nodes,
-)
+from benchmarks.processes import START_TIME, NodeProcesses, memory_of, open_nodes
 from benchmarks.stepped_clock import SteppedClock
 from msg_adapters.odometry import odometry_to_pose
 from rover_physics import save_terrain
 from rover_planner.demo.child_process import ChildProcess
 from rover_planner.ros.qos import sensor_qos, topic_qos
 from rover_planner.worlds.mars_terrain import make_mars_terrain
+from support.project.checkout import TOP
 from support.project.launch_files import simulation_commands
-from support.ros_fixtures import RosRun
+from support.ros_fixtures import LostAnswerError, RosRun, finish
 from support.waiting import wait_until
 
 FLIGHT = 0.1
@@ -62,7 +55,7 @@ PRIORITY = 50
 """Real-time priority of simulator and controller, as the drivers of a rover have."""
 REACH = 3.0
 """Largest distance of a goal [m]."""
-PARAMETERS = ROOT / "config" / "parameters"
+PARAMETERS = TOP / "config" / "parameters"
 MISSION, PAGE = "mission_planner", "view"
 VICTIMS = ("traverse_server", "traction_controller", PAGE, MISSION, "rover_simulator")
 """Programs that are killed in turn."""
@@ -70,7 +63,7 @@ ROCKS = (0.01, 0.005, 0.015)
 """Cover by rocks of the maps, all of one relief; the first is the ground."""
 LOOPBACK = {
     "ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET",
-    "FASTRTPS_DEFAULT_PROFILES_FILE": str(ROOT / "config" / "fast_dds_loopback.xml"),
+    "FASTRTPS_DEFAULT_PROFILES_FILE": str(TOP / "config" / "fast_dds_loopback.xml"),
 }
 """Environment in which programs do not wait for each other's shared memory, as on a robot."""
 STEPS = (5, 0)

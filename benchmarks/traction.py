@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Closed-loop drives in MuJoCo with speed servos, equal torques and the quadratic program.
 
-Run from the repository: python -m benchmarks.traction [--quick] [--out FOLDER]
+Run from the repository: python -m benchmarks.traction
 It needs the extra `bench`. Its results are in docs/traction.md.
 """
 
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import typer
@@ -29,8 +29,6 @@ from benchmarks.measure import OUTPUT, print_table, write_rows
 CONTROLLERS = (SERVO, EQUAL_TORQUES, BY_MOTION, BY_MAP)
 ROUGH = ("rocks", "relief")
 """Kinds of rough ground."""
-QUICK_STEP = 5
-"""With --quick, every so many-th obstacle is driven over."""
 SUMS = {
     "slip": ("slip [m]", 3, np.sum),
     "torque": ("torque [N m]", 3, np.mean),
@@ -56,18 +54,6 @@ def sum_up(drives: Drives, kinds: Sequence[str]) -> dict[str, dict[str, Any]]:
             values = [getattr(drives[o, name], key) for o in common] or [np.nan]
             sums[name][key] = float(join(values))
     return sums
-
-
-def print_drives(drives: Drives) -> None:
-    """Print a row for each drive."""
-    columns = {"obstacle": "", "controller": "", "end [m]": ".2f", "utilisation mean": ".2f"}
-    columns |= {"95 %": ".2f", "slip [m]": ".3f", "torque [N m]": ".3f", "energy [J]": ".1f"}
-    rows = []
-    for (obstacle, name), row in drives.items():
-        used = row.mean_utilisation, row.peak_utilisation
-        end = "passed" if row.passed else row.end
-        rows.append((obstacle.label, name, end, *used, row.slip, row.torque, row.energy))
-    print_table("LSR-1 in MuJoCo, 2.4 m at 6 cm/s", columns, rows)
 
 
 def print_sums(sums: dict[str, dict[str, Any]], title: str) -> None:
@@ -104,22 +90,17 @@ def draw_sums(sums: dict[str, dict[str, Any]], picture: Path) -> None:
     figure.savefig(picture, dpi=150)
 
 
-def main(
-    quick: Annotated[bool, typer.Option("--quick", help="Every fifth obstacle only.")] = False,
-    out: Annotated[Path, typer.Option(help="Folder of the results.")] = OUTPUT,
-) -> None:
-    """Run the drives, print tables, and write JSON and a picture."""
-    obstacles = OBSTACLES[::QUICK_STEP] if quick else OBSTACLES
-    jobs = [(obstacle, name) for obstacle in obstacles for name in CONTROLLERS]
+def main() -> None:
+    """Run the drives, print tables, and write JSON and a picture to bench_output."""
+    jobs = [(obstacle, name) for obstacle in OBSTACLES for name in CONTROLLERS]
     drives = dict(zip(jobs, run_in_processes(drive, jobs), strict=True))
-    everything = sum_up(drives, [obstacle.kind for obstacle in obstacles])
+    everything = sum_up(drives, [obstacle.kind for obstacle in OBSTACLES])
     rough = sum_up(drives, ROUGH)
-    print_drives(drives)
     print_sums(everything, "All obstacles that all controllers passed: sums and means")
     print_sums(rough, "Rocks and relief that all controllers passed: sums and means")
     rows = [asdict(o) | {"controller": name} | asdict(row) for (o, name), row in drives.items()]
-    write_rows({"drives": rows, "all": everything, "rough": rough}, out / "traction.json")
-    draw_sums(everything, out / "traction.png")
+    write_rows({"drives": rows, "all": everything, "rough": rough}, OUTPUT / "traction.json")
+    draw_sums(everything, OUTPUT / "traction.png")
 
 
 if __name__ == "__main__":

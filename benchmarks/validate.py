@@ -32,6 +32,7 @@ from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES, balance_
 from rover_physics.prediction.evaluation import new_work, stand
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.traversability.verdict import hold_against_limits
+from support.paths import arc_of, poses_at
 from support.reference_cases import DATA, reference_predictions, steered_predictions
 from support.reference_drives import KEPT, drive_ground, drive_path, unlimited
 
@@ -147,11 +148,8 @@ class Curve:
         x, y, yaw = self.start
         share = np.linspace(0.0, 1.0, 241)
         if np.isinf(self.curvature):
-            return np.column_stack([x + 0.0 * share, y + 0.0 * share, yaw + TURN * share])
-        turn = self.curvature * LENGTH * share
-        ahead, aside = np.sin(turn) / self.curvature, (1.0 - np.cos(turn)) / self.curvature
-        c, s = np.cos(yaw), np.sin(yaw)
-        return np.column_stack([x + c * ahead - s * aside, y + s * ahead + c * aside, yaw + turn])
+            return poses_at(x, y, yaw + TURN * share)
+        return arc_of(self.curvature, LENGTH * share, yaw) + poses_at(x, y)
 
     def predict_trace(self) -> PathPrediction:
         """Return the prediction at the poses of the trace."""
@@ -191,11 +189,9 @@ def settled_errors(cases) -> dict[str, np.ndarray]:
     weight = load_rover("lsr1").weight
     for case, prediction in cases:
         centres = np.linalg.norm(prediction.wheel_centres - case.wheel_centres, axis=2)
-        attitude = np.column_stack([prediction.roll, prediction.pitch]) - case.attitude
         joints = np.hstack([prediction.rocker_angle, prediction.bogie_angle]) - case.joints
         forces = size_of_forces(prediction) - np.linalg.norm(case.forces, axis=2)
         errors["wheel centres [mm]"].append(1e3 * centres)
-        errors["roll and pitch [deg]"].append(np.degrees(attitude))
         errors["suspension angles [deg]"].append(np.degrees(joints))
         errors["wheel forces [% of the weight]"].append(100.0 * forces / weight)
     return {name: np.abs(np.concatenate(parts)).ravel() for name, parts in errors.items()}

@@ -2,7 +2,7 @@
 """Writes the pictures of docs/viewer.md: `python -m benchmarks.viewer_pictures docs`."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -49,13 +49,6 @@ CASES: dict[str, tuple[str, Callable[[], Terrain], tuple[Pose, Pose] | None]] = 
 }
 """Name of the ground, the ground, and start and goal (None: those that `rover_planner view`
 chooses) of each picture. The first shows the page as it opens, the others a refused path."""
-
-
-def write_pictures(folder: Path, names: list[str]) -> Iterator[str]:
-    """Write the pictures and yield their names with what they show."""
-    with open_browser() as browser:
-        for name in names:
-            yield f"{name}: {_write(browser, folder / name)}"
 
 
 def _write(browser: Any, file: Path) -> str:
@@ -110,13 +103,11 @@ def _show_drive(page: Page) -> str:
     return page.session.shown.verdict.reason or "traversable"
 
 
-def main(
-    folder: Annotated[Path, typer.Argument(help="Folder of the pictures.")],
-    names: Annotated[list[str] | None, typer.Argument(help="Pictures (default: all).")] = None,
-) -> None:
-    """Write pictures and print what they show."""
-    for line in write_pictures(folder, names or list(CASES)):
-        print(line, flush=True)
+def main(folder: Annotated[Path, typer.Argument(help="Folder of the pictures.")]) -> None:
+    """Write the pictures and print what they show."""
+    with open_browser() as browser:
+        for name in CASES:
+            print(f"{name}: {_write(browser, folder / name)}", flush=True)
 
 
 if __name__ == "__main__":

@@ -99,11 +99,21 @@ def call(client, request, timeout: float = TIMEOUT, attempts: int = 2):
     # A client may discover a service before the service discovers the client. The service waits
     # for only 0.1 s then, and its first response may be lost, so a request is sent again.
     for _ in range(attempts):
-        done = threading.Event()
         future = client.call_async(request)
-        future.add_done_callback(lambda _, done=done: done.set())
-        if done.wait(timeout):
-            break
+        with contextlib.suppress(LostAnswerError):
+            return finish(future, timeout)
         client.remove_pending_request(future)
-    assert future.done(), f"no answer from {client.srv_name}"
+    raise AssertionError(f"no answer from {client.srv_name}")
+
+
+class LostAnswerError(Exception):
+    """A client has waited in vain for an answer."""
+
+
+def finish(future: Any, timeout: float) -> Any:
+    """Wait for the response of a call; raise LostAnswerError after a timeout [s]."""
+    done = threading.Event()
+    future.add_done_callback(lambda _: done.set())
+    if not done.wait(timeout):
+        raise LostAnswerError(f"no answer within {timeout} s")
     return future.result()

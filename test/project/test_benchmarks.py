@@ -16,9 +16,9 @@ from support.project.checkout import TOP
 SMALL = {
     "page": {"TRIES": 1},
     "paths": {"REPEATS": 1, "MANY": 5_000},
-    "poses": {"POSES": 20, "MAP_CELLS": 60, "MAP_ROWS": (0, 40)},
+    "poses": {"POSES": 10, "MAP_CELLS": 60, "MAP_ROWS": (0, 40)},
     "rest": {"SETTLING": 0.5, "SECONDS": 1.0},
-    "rough": {"POSES": 10, "LOOKED_AT": 3, "CELLS": (0.4,)},
+    "rough": {"LOOKED_AT": 3, "CELLS": (0.4,)},
     "service": {"QUESTIONS": 20, "WARM_UP": 2, "NINES": 2, "CELLS": 60},
     "start": {"STARTS": 1, "COLD_STARTS": 0},
     "stop": {"MAPS": ((6.0, 0.05, 0.0),), "REPEATS": 2},

@@ -10,10 +10,11 @@ from collections import Counter
 
 import pytest
 
-from benchmarks.processes import SERVER, START_TIME, LostAnswerError, finish, open_nodes
+from benchmarks.processes import SERVER, START_TIME, open_nodes
 from msg_adapters.identity import path_hash
 from msg_adapters.paths import poses_path
 from support.grounds import make_terrain, waves
+from support.ros_fixtures import LostAnswerError, finish
 from support.waiting import wait_until
 
 pytestmark = [pytest.mark.long, pytest.mark.timed]
