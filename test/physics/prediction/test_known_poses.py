@@ -9,9 +9,10 @@ import pytest
 from rover_physics import SweepOptions, judge_path, judge_pieces
 from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.prediction.packed_model import PackedModel, pack_model
-from rover_physics.results.record import RESULT, numbers_of
+from rover_physics.results.record import numbers_of
 from rover_physics.results.uses import find_codes
 from support.paths import poses_at
+from support.predictions import assert_same
 from support.rough_grounds import rocky
 from support.rovers import LSR1
 
@@ -46,9 +47,7 @@ def test_a_path_is_the_same_to_the_bit_with_what_is_known_and_is_not_evaluated_a
     assert asked.poses - before < 0.1 * before  # wheels that climb, and other ways out
     for prediction, verdict in (first, again):
         assert verdict == anew[1]
-        for name in RESULT.names:
-            one, other = prediction.results[name], anew[0].results[name]
-            np.testing.assert_array_equal(one, other, err_msg=name)
+        assert_same(prediction, anew[0])
 
 
 def test_a_path_of_judged_pieces_is_hardly_evaluated_again(asked):
