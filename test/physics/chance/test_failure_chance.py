@@ -108,21 +108,23 @@ def test_optimal_torques_give_way_to_a_wheel_that_has_less():
     assert found.max_torque_saturation > 0.99 and found.failure_chance == 0.0
 
 
-def test_the_torque_limit_counts_like_friction():
-    found = chance_near_torque(plane(0.2, 0.0), rover_with(max_torque=0.1))
-    assert found == pytest.approx(NormalDist(1.0, 0.1).cdf(0.9), abs=ONE)
-
-
 def rising(x, y):
     """Return the height of a slope that gets steeper: contact angles differ by 0.2 rad."""
     return 0.12 * x**2 + 0.25 * x
 
 
 @pytest.mark.parametrize(
-    ("ground", "share"), [(plane(0.2, 0.0), EVEN_SHARE), (make_terrain(rising, half=3.0), 1.0)]
+    ("ground", "name", "share"),
+    [
+        (plane(0.2, 0.0), "max_torque", 1.0),
+        (plane(0.2, 0.0), "model", EVEN_SHARE),
+        (make_terrain(rising, half=3.0), "model", 1.0),
+    ],
 )
-def test_of_the_error_of_the_model_a_share_counts_where_the_ground_is_even(ground, share):
-    found = chance_near_torque(ground, rover_with(model=0.1), use=0.97)
+def test_the_torque_limit_counts_and_of_the_error_of_the_model_a_share_on_even_ground(
+    ground, name, share
+):
+    found = chance_near_torque(ground, rover_with(**{name: 0.1}), use=0.97)
     assert found == pytest.approx(NormalDist(1.0, 0.1 * share).cdf(0.97), abs=ONE)
 
 

@@ -20,7 +20,6 @@ from support.rovers import LSR1, M2020
 from support.traction_states import state_of
 
 FRICTION = np.full(6, 0.8)
-INPUTS = ProgramInputs(FRICTION, LSR1.wheel.max_torque, LSR1.wheel.radius)
 
 
 def rough_states(rover):
@@ -153,14 +152,12 @@ def test_equal_torques_are_those_of_the_sweep(rover):
 
 
 def test_shared_torques_of_turned_wheels_keep_the_balance_and_need_less_friction():
-    writer, workspace = BalanceWriter(LSR1), TractionWorkspace()
     better = []
     for seed, curvature in enumerate(CURVATURES):
         _, prediction = curved_poses(LSR1, seed, curvature)
         for i in np.flatnonzero(prediction.settled):
-            rows = writer.write(state_of(LSR1, prediction, i), 0.0)
-            equal = solve_traction(workspace, rows, INPUTS, max_programs=0)
-            answer = solve_traction(workspace, rows, INPUTS, max_programs=12)
+            state = state_of(LSR1, prediction, i)
+            equal, answer = (solve(LSR1, state, programs=count) for count in (0, 12))
             assert not answer.fallback
             A, b = free_balance_matrix(LSR1, prediction, i)
             forces = np.concatenate([answer.loads, answer.tractions, answer.lateral])
