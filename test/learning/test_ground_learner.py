@@ -6,24 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steered_drive import SteeredDrive
-from rover_planner.learning.drive_log import (
-    PITCH,
-    RATES,
-    ROLL,
-    STEERING,
-    SUSPENSION,
-    TIME,
-    TORQUES,
-    WIDTH,
-    YAW,
-    X,
-    Y,
-)
+from rover_planner.learning.drive_log import RATES, STEERING, SUSPENSION, TIME, TORQUES, YAW, X
 from rover_planner.learning.ground_learner import GroundLearner
-from support.learning_drives import climb, ramp
+from support.learning_drives import climb, ramp, row_of_plant
 from support.reference_drives import drive_ground
 
 SPEED = 0.06
@@ -196,20 +183,12 @@ def test_slip_is_seen_without_any_torque_and_measures_nothing():
 
 def drive_up(friction: float, degrees: float, seconds: float) -> np.ndarray:
     """Return rows of a drive up a slope in MuJoCo by speed servos, from just before it."""
-    mujoco_rover = pytest.importorskip("rover_planner.simulator.mujoco_rover")
-    plant = mujoco_rover.MujocoRover(
-        ROVER, drive_ground("slope", degrees), (-0.5, 0.0, 0.0), friction
-    )
-    rows = []
-    while plant.time < seconds:
-        row = np.full(WIDTH, np.nan)
-        row[TORQUES] = plant.servo(np.full(6, SPEED / ROVER.wheel.radius), 0.02)
-        joints = plant.joint_positions
-        row[[TIME, X, Y, YAW]] = plant.time, *plant.pose[[0, 1, 3]]
-        row[[ROLL, PITCH]] = plant.attitude
-        row[SUSPENSION] = [joints[name] for name in SUSPENSION_JOINTS]
-        row[RATES], row[STEERING] = plant.wheel_rates, 0.0
-        rows.append(row)
+    simulator = pytest.importorskip("rover_planner.simulator.mujoco_plant")
+    ground, rows = drive_ground("slope", degrees), []
+    plant = simulator.MujocoPlant(ROVER, ground, (-0.5, 0.0, 0.0), friction)
+    for time in np.arange(0.0, seconds, 0.02):
+        plant.drive(SPEED, 0.0, 0.02)
+        rows.append(row_of_plant(plant, time))
     return np.array(rows)
 
 

@@ -113,17 +113,11 @@ def test_energy_uphill_is_the_weight_lifted_and_braking_downhill_gives_nothing_b
     assert prediction.energy[-1] == pytest.approx(lifted, rel=1e-4)
 
 
-def poses_on(terrain: Terrain, shape) -> np.ndarray:
-    """Return poses (*shape, 3) on and somewhat beyond a map."""
-    rng = np.random.default_rng(4)
-    xmin, xmax, ymin, ymax = terrain.bounds
-    return rng.uniform([xmin, ymin, -np.pi], [xmax, ymax, np.pi], (*shape, 3))
-
-
 @pytest.mark.parametrize(("ground", "shape"), [(low_rock, (5, 8)), (gap, (60, 50))])
 def test_scores_are_those_of_a_sweep_and_its_verdict_on_one_thread_and_on_several(ground, shape):
     terrain = make_terrain(ground)
-    poses = poses_on(terrain, shape)
+    (xmin, xmax, ymin, ymax), rng = terrain.bounds, np.random.default_rng(4)
+    poses = rng.uniform([xmin, ymin, -np.pi], [xmax, ymax, np.pi], (*shape, 3))
     scores = score_poses(LSR1, terrain, poses, SweepOptions(friction=0.5))
     path = judge_path(LSR1, terrain, poses.reshape(-1, 3), SweepOptions(friction=0.5))[0]
     expected = {

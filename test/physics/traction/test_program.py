@@ -127,12 +127,12 @@ CURVATURES = (0.0, 0.5, -0.5, 1.2, -2.5, np.inf, -np.inf)
 BOTH = pytest.mark.parametrize("rover", [LSR1, M2020], ids=lambda rover: rover.name)
 
 
-def curved_poses(rover, seed, curvature, **options):
+def curved_poses(rover, seed, curvature):
     """Return settled random poses on rough ground with wheels turned for a curvature."""
     poses = random_poses(seed, 12, 1.5)
     curvatures = np.full(len(poses), curvature / (2.0 if rover is M2020 else 1.0))
     ground = plane(0.15, 0.1, half=5.0) if rover is M2020 else fractal(seed)
-    return ground, judge_poses(rover, ground, poses, curvatures, **options)[0]
+    return ground, judge_poses(rover, ground, poses, curvatures)[0]
 
 
 @BOTH

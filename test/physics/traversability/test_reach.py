@@ -18,7 +18,7 @@ from support.rovers import LSR1, M2020
 ARM = LSR1.manipulator
 UNEQUAL = replace(ARM, link_lengths=(0.2, 0.5, 0.2))
 LIMITED = replace(ARM, joint_limits=((-3.2, 3.2), (-1.0, 1.0), (0.0, 2.5)))
-LIMITED_ROVER = replace(LSR1, manipulator=LIMITED)
+STIFF = replace(LSR1, manipulator=LIMITED)
 LEVEL, POSE = plane(0.0, 0.0), [0.0, 0.0, 0.0]
 HEIGHT = 0.30
 places = st.floats(-1.0, 1.0)
@@ -55,9 +55,7 @@ def test_solutions_keep_the_joint_limits(x, y, z):
 def test_an_angle_beyond_its_joint_limits_is_refused_by_name():
     assert arm_angles(LIMITED, {"arm_shoulder": 1.0})[1] == 1.0
     with pytest.raises(ModelError, match=r"arm_shoulder.* 1\.1; it must be within -1 to 1 rad"):
-        judge_path(LIMITED_ROVER, LEVEL, [POSE], SweepOptions(joint_angles={"arm_shoulder": 1.1}))[
-            0
-        ]
+        judge_path(STIFF, LEVEL, [POSE], SweepOptions(joint_angles={"arm_shoulder": 1.1}))[0]
 
 
 # The query
@@ -104,7 +102,7 @@ def test_too_near_says_by_how_much_and_joint_limits_are_told_apart():
     assert (answer.reachable, answer.code) == (False, "too_near")
     assert answer.out_of_reach == pytest.approx(-0.08, abs=1e-4)
     assert "0.080 m too near" in answer.reason
-    answer = judge_reach(LIMITED_ROVER, LEVEL, POSE, [0.25, 0.0, 0.15 + HEIGHT + 0.55])
+    answer = judge_reach(STIFF, LEVEL, POSE, [0.25, 0.0, 0.15 + HEIGHT + 0.55])
     assert (answer.reachable, answer.code) == (False, "joint_limits")
     assert "arm_shoulder at" in answer.reason
     assert "limits -1.00 to 1.00 rad" in answer.reason
