@@ -35,11 +35,10 @@ def level(angles=(0.0,) * 6):
     return MeasuredState(0.0, 0.0, 0.0, np.zeros(2), np.array(angles))
 
 
-def solve(rover, state, net=0.0, friction=FRICTION, torque=None, programs=12, **more):
-    rows = BalanceWriter(rover).write(state, net)
+def solve(rover, state, friction=FRICTION, torque=None, programs=12, workspace=None):
+    rows = BalanceWriter(rover).write(state, 0.0)
     inputs = ProgramInputs(friction, torque or rover.wheel.max_torque, rover.wheel.radius)
-    workspace = more.pop("workspace", None) or TractionWorkspace()
-    return solve_traction(workspace, rows, inputs, max_programs=programs, **more)
+    return solve_traction(workspace or TractionWorkspace(), rows, inputs, max_programs=programs)
 
 
 def test_the_answer_is_within_3_percent_of_the_optimum():

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from rover_physics import SweepOptions, Terrain, judge_path, judge_paths, judge_pieces, load_rover
 from rover_physics.prediction import sweep
-from rover_physics.prediction.packed_model import PackedModel, pack_model
+from rover_physics.prediction.packed_model import pack_model
 from rover_physics.results.path_prediction import BOUNDED_VALUES
 from rover_physics.results.record import QUANTITIES
 from rover_physics.traversability.judge import PartwiseJudge
@@ -84,22 +84,6 @@ def test_a_wheel_on_its_way_off_an_edge_at_the_end_of_a_block_is_no_failure(monk
     for block in (1, 2, 3, 5, 7, 11):
         monkeypatch.setattr(sweep, "FIRST_BLOCK", block)
         assert judge_path(ROVER, GROUND, poses, stop_at_failure=True)[1].traversable
-
-
-def test_nothing_is_evaluated_or_searched_far_beyond_a_failure_at_the_start(monkeypatch):
-    elevation = np.where(np.arange(GROUND.elevation.shape[1]) < 60, np.nan, GROUND.elevation)
-    ground, poses = replace(GROUND, elevation=elevation), straight(-3.0)
-    evaluated = []
-    evaluate = PackedModel.evaluate
-
-    def counting(model, at, *held, **motions):
-        evaluated.append(len(at))
-        return evaluate(model, at, *held, **motions)
-
-    monkeypatch.setattr(PackedModel, "evaluate", counting)
-    _, verdict = judge_path(ROVER, ground, poses, stop_at_failure=True)
-    assert verdict.first_failure == 0
-    assert sum(evaluated) == sweep.FIRST_BLOCK
 
 
 def inclined(slope: float) -> Terrain:
