@@ -6,9 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics import SweepOptions, Terrain, judge_path
+from rover_physics import SweepOptions, Terrain, judge_path, judge_paths
 from rover_physics.prediction.drops import FACE
-from rover_physics.traversability.verdict import hold_against_limits
 from support.grounds import make_terrain
 from support.paths import poses_at
 from support.reference_drives import drive_ground, drive_path, unlimited
@@ -27,8 +26,8 @@ def sharp_step(size: float, resolution: float = 0.005) -> Terrain:
 
 def drive(ground, rover=FREE, **options):
     """Return prediction and verdict of a drive without a look at traps."""
-    prediction = judge_path(rover, ground, drive_path(), SweepOptions(**options))[0]
-    return prediction, hold_against_limits(rover, prediction)
+    asked = rover, ground, [drive_path()], SweepOptions(**options)
+    return judge_paths(*asked, check_entrapment=False)[0]
 
 
 def falling_away(degrees: float) -> Terrain:
