@@ -43,20 +43,12 @@ def test_a_rover_that_stands_while_its_wheels_turn_or_push_is_stuck_within_two_s
     assert noticed is not None and noticed <= 2.0
 
 
-@pytest.mark.parametrize(
-    ("spins", "steered", "begin"),
-    [(1.0, 0.0, 1.25), (np.inf, 2.6, 3.75)],
-    ids=["wheels stand and then spin", "wheels are steered at first"],
-)
-def test_a_commanded_rover_is_stuck_from_when_it_stands_with_wheels_that_are_not_steered(
-    spins, steered, begin
-):
+def test_a_rover_whose_wheels_stand_and_then_spin_is_stuck_from_when_it_stands():
     watch = StuckWatch(SPEED, MAX_TORQUE)
-    for time in PERIOD * np.arange(1, 40):
-        rolling, scrub = SPEED * (time >= spins), 0.014 * (time < steered)
-        one = window(float(time), 0.0, rolling, deviation=0.02, scrub=scrub)
+    for time in PERIOD * np.arange(1, 20):
+        one = window(float(time), 0.0, 0.0 if time < 1.0 else SPEED, deviation=0.02)
         stuck = watch.update(one, np.ones(6), 0.0, commanded=SPEED)
-        assert stuck == (time > begin)
+        assert stuck == (time > 1.25)
 
 
 @pytest.mark.parametrize(("speed", "rolling"), [(0.2 * SPEED, SPEED), (0.2 * SPEED, 0.2 * SPEED)])
@@ -76,6 +68,14 @@ def test_a_rover_that_turns_back_is_not_stuck():
 def test_a_rover_that_rests_or_climbs_is_not_stuck():
     assert first_notice(0.0, 0.0, 0.5) is None
     assert first_notice(0.0, SPEED, 1.0, climb=0.05) is None
+
+
+def test_a_rover_that_stands_while_its_wheels_are_steered_is_not_stuck():
+    watch = StuckWatch(SPEED, MAX_TORQUE)
+    for time in PERIOD * np.arange(1, 40):
+        one = window(float(time), 0.0, 0.0, deviation=0.02, scrub=0.014 if time < 2.6 else 0.0)
+        stuck = watch.update(one, np.ones(6), 0.0, commanded=SPEED)
+        assert stuck == (time > 3.75)
 
 
 def test_a_rover_that_turns_on_the_spot_or_steers_is_not_stuck():

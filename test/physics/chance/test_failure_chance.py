@@ -76,10 +76,8 @@ def test_samples_over_the_error_of_the_model_are_spread_as_told():
 
 
 def test_a_path_that_passes_in_the_best_sample_alone_does_not_fail_for_sure():
-    rover, ground = rover_with(max_torque=0.1), plane(0.2, 0.0)
-    used = chance_on(ground, rover).max_torque_saturation * rover.wheel.max_torque
-    weak = replace(rover, wheel=replace(rover.wheel, max_torque=used / 1.19))
-    assert chance_on(ground, weak).failure_chance == 1.0 - 1.0 / SAMPLES
+    found = chance_near_torque(plane(0.2, 0.0), rover_with(max_torque=0.1), use=1.19)
+    assert found == 1.0 - 1.0 / SAMPLES
 
 
 def test_what_fails_for_sure_further_on_changes_no_chance_before_it():

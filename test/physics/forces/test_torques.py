@@ -2,7 +2,6 @@
 """Optimal torques and the ranges of torques, by linear programs of their own."""
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -67,15 +66,14 @@ def test_optimal_torques_never_use_more_friction_than_equal_ones(seed, asked):
     assert (least <= most * (1.0 + 1e-4) + 1e-6).all()
 
 
-def range_by_program(prediction, i, wheel, max_torque, *, inside: bool, shared: bool):
-    """Return the range [N m] of a wheel's torque by linear programs."""
-    unit, share = LSR1.wheel.radius * LSR1.weight, INSIDE if inside else 1.0
+def range_by_program(prediction, i, wheel, max_torque, shared, share):
+    """Return the range [N m] of a wheel's torque by linear programs, with a share of friction."""
     cost = np.eye(12)[6 + wheel]
     ends = [
         sign * solve_forces(LSR1, prediction, i, sign * cost, max_torque, share, shared).fun
         for sign in (1.0, -1.0)
     ]
-    return unit * np.array(ends)
+    return LSR1.wheel.radius * LSR1.weight * np.array(ends)
 
 
 @pytest.mark.parametrize(
@@ -95,8 +93,10 @@ def test_ranges_lie_between_those_of_linear_programs(ground, poses, friction, ma
             continue
         for wheel in range(6):
             compared += 1
-            program = partial(range_by_program, optimal, i, wheel, max_torque, shared=shared)
-            widest, within = program(inside=False), program(inside=True)
+            widest, within = (
+                range_by_program(optimal, i, wheel, max_torque, shared, share)
+                for share in (1.0, INSIDE)
+            )
             assert widest[0] - slack <= ranges.lowest[i, wheel] <= within[0] + slack
             assert within[1] - slack <= ranges.highest[i, wheel] <= widest[1] + slack
     assert compared >= 6
