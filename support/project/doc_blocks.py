@@ -8,7 +8,6 @@ from pathlib import Path
 
 from support.project.checkout import TOP
 
-PAGES = [TOP / "README.md", *sorted((TOP / "docs").rglob("*.md"))]
 _FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 _MARK = re.compile(r"<!-- not run: (.+) -->\n\Z")
 
@@ -35,7 +34,7 @@ class Block:
         return f"{self.page}:{self.line}"
 
 
-def read_blocks(page: Path, top: Path = TOP) -> list[Block]:
+def read_blocks(page: Path) -> list[Block]:
     """Return the blocks of a page in sh and Python, from top to bottom."""
     text = page.read_text(encoding="utf-8")
     found = list(_FENCE.finditer(text))
@@ -48,7 +47,7 @@ def read_blocks(page: Path, top: Path = TOP) -> list[Block]:
         output = following[2] if at_once and following[1] == "text" else None
         blocks.append(
             Block(
-                page.relative_to(top).as_posix(),
+                page.relative_to(TOP).as_posix(),
                 text[: match.start()].count("\n") + 2,
                 match[1],
                 match[2],
