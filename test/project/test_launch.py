@@ -48,16 +48,14 @@ def test_the_rover_starts_as_its_parameter_files_say():
         assert (node.namespace, node.respawn) == ("", True)
 
 
-def test_the_controller_expects_the_watch_of_the_server_unless_it_is_told_not_to():
+def test_the_controller_expects_the_watch_of_the_server():
     server, controller = (node.parameters[1] for node in start_rover())
     assert server["monitor"] is True and 0.0 < controller["stop_timeout"] < 0.5
     for name, given in (("traverse_server", server), ("traction_controller", controller)):
         check_parameters(name, given)
-    for node in start_rover(watch="false"):
-        assert node.parameters[1] == {"use_sim_time": False}
 
 
-def test_arguments_of_the_rover_take_precedence_over_its_files():
+def test_arguments_of_the_rover_take_precedence_over_its_files_and_can_leave_out_the_watch():
     server, controller = start_rover(
         namespace="one", use_sim_time="True", respawn="false", rover="m2020",
         terrain_file="spirit", watch="false",

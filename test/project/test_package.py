@@ -7,7 +7,6 @@ import re
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator
 from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
@@ -143,20 +142,18 @@ def modules() -> dict[str, Path]:
     return found
 
 
-def imported_by(path: Path) -> Iterator[str]:
-    """Yield the modules of the packages that a file imports."""
-    for name in imported_names(path):
-        while name and name not in modules():
-            name = name.rpartition(".")[0]
-        if name:
-            yield name
+def module_of(name: str) -> str:
+    """Return the module of the packages that a dotted name is or stands in, empty if in none."""
+    while name and name not in modules():
+        name = name.rpartition(".")[0]
+    return name
 
 
 @cache
 def imports() -> dict[str, frozenset[str]]:
     """Return what each module imports; the façade of a package names what it holds as text."""
     return {
-        name: frozenset(imported_by(path)) - {name}
+        name: frozenset(map(module_of, imported_names(path))) - {name, ""}
         for name, path in modules().items()
         if path.name != "__init__.py"
     }
