@@ -16,7 +16,6 @@ PAGES = sorted(
     path.relative_to(TOP)
     for path in [*TOP.glob("*.md"), *(TOP / "docs").rglob("*.md"), TOP / "examples/README.md"]
 )
-CODE = re.compile(r"`([^`\n]+)`")
 PACKAGES = ("rover_physics", "rover_planner", "msg_adapters", "support", "benchmarks")
 FOLDERS = (*PACKAGES, "config", "docs", "examples", "launch", "test")
 SUFFIXES = (".py", ".md", ".yaml", ".npz", ".png", ".xml", ".txt")
@@ -39,11 +38,6 @@ def current_text(page: Path) -> str:
     return text
 
 
-def code_spans(page: Path) -> set[str]:
-    """Return what stands in `backquotes` outside of fenced blocks."""
-    return set(CODE.findall(re.sub(r"^```.*?^```", "", current_text(page), flags=re.M | re.S)))
-
-
 def names_a_place(word: str) -> bool:
     """Tell whether a word is the name of a file or a folder of the project."""
     is_file = re.fullmatch(r"[\w./-]*\w\.\w+", word) and word.endswith(SUFFIXES)
@@ -56,7 +50,7 @@ def exists(word: str, page: Path) -> bool:
     if (TOP / word).exists() or (TOP / page).parent.joinpath(word).exists():
         return True
     return "/" not in word and any(
-        path.name == word and not any(part.startswith(".") for part in path.parts)
+        not any(part.startswith(".") for part in path.parts)
         for folder in FOLDERS
         for path in (TOP / folder).rglob(word)
     )
@@ -72,7 +66,8 @@ def is_in_code(dotted: str) -> bool:
 
 
 def missing_files(page: Path) -> set[str]:
-    named = {word for word in code_spans(page) if names_a_place(word)}
+    outside_blocks = re.sub(r"^```.*?^```", "", current_text(page), flags=re.M | re.S)
+    named = {word for word in re.findall(r"`([^`\n]+)`", outside_blocks) if names_a_place(word)}
     named -= {*MADE, *(word for word in named if word.startswith(WRITTEN))}
     links = {link for link in re.findall(r"\]\(([^)#]+)\)", read(page)) if "://" not in link}
     return {word for word in named if not exists(word, page)} | {

@@ -15,19 +15,11 @@ import pytest
 
 import rover_physics
 from rover_planner.nodes.programs import PROGRAMS
+from rover_planner.shell.extras import PLAIN
 from support.project.checkout import TOP, console_scripts, setup_arguments
 
-ROS_FREE = {
-    "numpy",
-    "scipy",
-    "numba",
-    "osqp",
-    "clarabel",
-    "pydantic",
-    "pydantic_core",
-    "yaml",
-    "rover_physics",
-}
+ROS_FREE = {*PLAIN, "pydantic_core", "rover_physics"} - {"rich", "typer"}
+"""What the physics may import beside the standard library."""
 
 
 @cache
