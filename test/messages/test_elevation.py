@@ -3,7 +3,6 @@
 
 import array
 import tracemalloc
-import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -21,6 +20,7 @@ from msg_adapters.results.grids import terrain_to_occupancy_grid
 from rover_physics import Terrain
 from rover_physics.errors import TerrainError
 
+pytestmark = pytest.mark.filterwarnings("error")  # no warning of NumPy, whatever the points
 XYZ = ("x", "y", "z")
 KINDS = ("i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8")
 """Types of fields, in the order of their numbers from 1 on."""
@@ -79,11 +79,9 @@ def assert_same(terrain, expected):
 
 
 def refusal_of(cloud, resolution=0.0, **options):
-    """Return the text of the refusal of a cloud, without any warning of NumPy."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        with pytest.raises((MessageError, TerrainError)) as raised:
-            terrain_from_point_cloud(cloud, resolution, **options)
+    """Return the text of the refusal of a cloud."""
+    with pytest.raises((MessageError, TerrainError)) as raised:
+        terrain_from_point_cloud(cloud, resolution, **options)
     assert len(str(raised.value)) <= MAX_TEXT
     return str(raised.value)
 
@@ -362,9 +360,7 @@ def test_points_half_way_between_cells_stay_on_the_map(halves, resolution, origi
     kind=st.sampled_from(("<f4", "<f8")),
 )
 def test_every_set_of_points_becomes_a_terrain_or_a_refusal(rows, resolution, kind):
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        try:
-            assert terrain_from_point_cloud(cloud_of(rows, kind=kind), resolution)
-        except (MessageError, TerrainError) as error:
-            assert len(str(error)) <= MAX_TEXT
+    try:
+        assert terrain_from_point_cloud(cloud_of(rows, kind=kind), resolution)
+    except (MessageError, TerrainError) as error:
+        assert len(str(error)) <= MAX_TEXT
