@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from rover_planner.advice.advise import Advice, grow_advice
+from rover_planner.advice.advise import STOPPED, Advice, grow_advice
 from rover_planner.advice.case import case_of
 from rover_planner.advice.remedy import Remedy
 from rover_planner.planning.assumptions import assume
@@ -95,7 +95,7 @@ def _write_progress(advised: Advised | None, is_seeking: bool, now: float) -> st
     if not is_seeking and advice is not None and advice.complete:
         return "" if advice.found else advice.describe()
     if not is_seeking:
-        return "the search was stopped" + ("" if advised.remedies else " before it found anything")
+        return "the search was stopped" if advised.remedies else STOPPED
     names = () if advice is None else advice.tried
     tried = f"tried: {' and '.join(names).replace('_', ' ') or 'nothing yet'}"
     found = len(advised.remedies) or "nothing"
