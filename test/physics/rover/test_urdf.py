@@ -41,11 +41,8 @@ def foreign_urdf() -> str:
     """Return a URDF as CAD programs write: x forward, y right, z down, wheels on short axles."""
 
     def link(name: str, mass: float, geometry: str = "") -> str:
-        inertia = 'ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"'
-        return (
-            f'<link name="{name}"><inertial><mass value="{mass}"/><inertia {inertia}/></inertial>'
-            f"{geometry}</link>"
-        )
+        inertial = f'<inertial><mass value="{mass}"/></inertial>'
+        return f'<link name="{name}">{inertial}{geometry}</link>'
 
     def joint(name: str, kind: str, parent: str, child: str, xyz: str, axis: str) -> str:
         return (
