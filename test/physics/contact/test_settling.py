@@ -199,11 +199,8 @@ def test_it_is_the_height_of_the_belly_above_the_highest_known_ground_below(grou
 def test_it_is_what_a_look_at_every_cell_gives(seed, make):
     ground = make(seed)
     prediction = judge_poses(LSR1, ground, random_poses(seed, 2, 0.6), np.zeros(2))[0]
-    ny, nx = ground.elevation.shape
-    x, y = np.meshgrid(
-        ground.origin[0] + np.arange(nx) * ground.resolution,
-        ground.origin[1] + np.arange(ny) * ground.resolution,
-    )
+    rows, columns = ground.resolution * np.indices(ground.elevation.shape)
+    x, y = ground.origin[0] + columns, ground.origin[1] + rows
     for i in np.flatnonzero(prediction.settled):
         R, origin = attitude_of(prediction, i), prediction.position[i]
         belly_z = (-0.06 - R[0, 2] * (x - origin[0]) - R[1, 2] * (y - origin[1])) / R[2, 2]

@@ -27,10 +27,8 @@ speeds = st.floats(-0.1, 0.1)
 
 def steer(rover: Rover, *motion: float) -> tuple[bool, np.ndarray, np.ndarray]:
     """Return whether the wheels can follow, steering angles [rad] and rolling speeds [m/s]."""
-    body = rover.masses.body
-    linkage = pack_linkage(rover, body.mass, np.array(body.com))
     angles, rolling = np.full(6, np.nan), np.full(6, np.nan)
-    can_follow = steer_wheels(linkage, np.array(motion, float), angles, rolling)
+    can_follow = steer_wheels(pack_linkage(rover), np.array(motion, float), angles, rolling)
     return bool(can_follow), angles, rolling
 
 

@@ -72,31 +72,25 @@ def foreign_urdf() -> str:
     return text + "</robot>"
 
 
-def foreign_map() -> dict[str, Any]:
-    wheels = {"rear": "B", "middle": "M", "front": "F"}
-    return {
-        "axes": {"forward": "x", "up": "-z"},
-        "rocker": {"right": "PR", "left": "PL"},
-        "bogie": {"right": "QR", "left": "QL"},
-        "wheels": {
-            f"{position}_{side}": f"W{letter}{side[0].upper()}"
-            for position, letter in wheels.items()
-            for side in ("right", "left")
-        },
-        "rover": {
-            "gravity": 9.81,
-            "friction": 0.7,
-            "nominal_speed": 0.05,
-            "belly": {"z": -0.05, "x": [-0.2, 0.2], "y": [-0.2, 0.2]},
-            "limits": rover_to_dict(load_rover("lsr1"))["limits"],
-        },
-    }
+FOREIGN_MAP: dict[str, Any] = {
+    "axes": {"forward": "x", "up": "-z"},
+    "rocker": {"right": "PR", "left": "PL"},
+    "bogie": {"right": "QR", "left": "QL"},
+    "wheels": dict(zip(WHEELS, ("WBR", "WMR", "WFR", "WBL", "WML", "WFL"), strict=True)),
+    "rover": {
+        "gravity": 9.81,
+        "friction": 0.7,
+        "nominal_speed": 0.05,
+        "belly": {"z": -0.05, "x": [-0.2, 0.2], "y": [-0.2, 0.2]},
+        "limits": rover_to_dict(load_rover("lsr1"))["limits"],
+    },
+}
 
 
 def read_foreign(folder: Path, text: str = "", **keys: Any) -> ReadRover:
     """Read the foreign rover with keys of its map changed; None leaves a key out."""
     (folder / "foreign.urdf").write_text(text or foreign_urdf())
-    contents = {k: v for k, v in (foreign_map() | keys).items() if v is not None}
+    contents = {k: v for k, v in (FOREIGN_MAP | keys).items() if v is not None}
     save_yaml(folder / "foreign.yaml", contents)
     return rover_from_urdf(folder / "foreign.urdf", folder / "foreign.yaml")
 
@@ -170,7 +164,7 @@ def test_wheels_that_are_not_level_are_brought_onto_level_ground(tmp_path):
             {
                 "steering": {"rear_right": "QR"},
                 "bogie": {"right": "WMR", "left": "QL"},
-                "wheels": foreign_map()["wheels"] | {"middle_right": "WFR", "front_right": "Root"},
+                "wheels": FOREIGN_MAP["wheels"] | {"middle_right": "WFR", "front_right": "Root"},
             },
             "wheels.front_right: joint Root is floating; it must turn",
         ),
@@ -300,13 +294,9 @@ def test_a_file_of_many_links_is_refused_at_once():
 
 
 def test_limits_that_no_joint_reaches_count_as_none():
-    text = (
-        '<robot><link name="a"/><link name="b"/><joint name="j" type="revolute">'
-        '<parent link="a"/><child link="b"/>'
-        '<limit lower="-1.79769e+308" upper="1.79769e+308" effort="0" velocity="1e+300"/>'
-        "</joint></robot>"
-    )
-    joint = parse_robot(text.encode()).joints["j"]
+    limits = 'lower="-0.4" upper="0.5" effort="3" velocity="2"'
+    none = 'lower="-1.79769e+308" upper="1.79769e+308" effort="0" velocity="1e+300"'
+    joint = parse_robot(foreign_urdf().replace(limits, none).encode()).joints["PR"]
     assert (joint.lower, joint.upper) == (-math.inf, math.inf)
     assert (joint.effort, joint.velocity) == (math.inf, math.inf)
 

@@ -185,9 +185,7 @@ ENTRIES = {"elevation": FLAT, "resolution": 0.1, "origin": [0.0, 0.0]}
         *[({name: None}, f"no entry {name};") for name in ENTRIES],
         ({"resolution": -1.0}, r"resolution is -1\.0"),
         ({"elevation": np.empty((2, 2), object)}, "entry elevation is damaged .Object arrays"),
-        ({"soil": SOIL + 1}, r"soil\[0, 0\] is 0; it must be -1"),
         ({"elevation": np.zeros((12, 12))}, "entry elevation has 144 values; the limit is 120"),
-        ({"soil": np.zeros((12, 12), int)}, "entry soil has 144 values; the limit is 120"),
     ],
 )
 def test_a_file_with_a_wrong_entry_is_refused_by_its_name(tmp_path, changes, text):
