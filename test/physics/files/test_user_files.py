@@ -7,6 +7,7 @@ import struct
 import time
 import tracemalloc
 import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -152,25 +153,20 @@ KINDS = {
 READERS = (load_rover, load_study, load_terrain, read_poses, read_prediction)
 
 
-@pytest.fixture
-def oddities(tmp_path):
-    """Return a folder with things that are no regular files, and their names."""
-    return tmp_path, make_oddities(tmp_path)
-
-
 @pytest.mark.parametrize("name", KINDS)
-def test_what_is_no_regular_file_is_refused_with_its_kind(oddities, name):
+def test_what_is_no_regular_file_is_refused_with_its_kind(tmp_path, name):
+    make_oddities(tmp_path)
     with pytest.raises(RoverFileError, match=KINDS[name]):
-        read_regular_file(oddities[0] / name, 1000)
+        read_regular_file(tmp_path / name, 1000)
 
 
 @pytest.mark.parametrize("read", READERS, ids=lambda read: read.__name__)
-def test_no_reader_waits_for_a_pipe_or_reads_a_device(oddities, read, monkeypatch):
-    monkeypatch.chdir(oddities[0])  # a relative name means nothing there
-    for name in oddities[1]:
+def test_no_reader_waits_for_a_pipe_or_reads_a_device(tmp_path, read, monkeypatch):
+    monkeypatch.chdir(tmp_path)  # a relative name means nothing there
+    for name in make_oddities(tmp_path):
         began = time.perf_counter()
         with pytest.raises((RoverError, PlanningError)) as raised:
-            read(oddities[0].__class__(name))
+            read(Path(name))
         assert time.perf_counter() - began < 20.0, name
         assert len(str(raised.value)) <= 400
         assert str(raised.value).isprintable()
@@ -186,11 +182,12 @@ def test_a_file_above_the_limit_is_refused_even_if_the_system_does_not_know_its_
             read_regular_file(name, most)
 
 
-def test_writing_to_a_pipe_without_reader_a_full_disk_or_a_folder_is_refused(oddities):
+def test_writing_to_a_pipe_without_reader_a_full_disk_or_a_folder_is_refused(tmp_path):
+    make_oddities(tmp_path)
     for name, reason in [
-        (oddities[0] / "pipe", "No such device"),
-        (oddities[0] / "folder", "Is a directory"),
-        (oddities[0] / "no" / "file", "No such file"),
+        (tmp_path / "pipe", "No such device"),
+        (tmp_path / "folder", "Is a directory"),
+        (tmp_path / "no" / "file", "No such file"),
         ("/dev/full", "No space left"),
         ("x" * 300, "File name too long"),
     ]:

@@ -70,8 +70,6 @@ COULOMB = {"model": "coulomb", "source": "s"}
          "dune.friction_angle is 28.0; .* at most 1.2 in rad"),
         ({"dune": DUNE | {"friction_angle": 0.0, "cohesion": 0.0}},
          "dune.cohesion is 0.0; .*some strength"),
-        ({"dune": DUNE | {"k_phi": 0.0}},
-         r"dune.k_phi is 0.0; it must be a number above 0 in N/m\^\(n\+2\)"),
     ],
 )  # fmt: skip
 def test_what_is_no_mapping_of_soils_and_wrong_values_are_refused_by_their_key(data, text):
