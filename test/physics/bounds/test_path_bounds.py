@@ -279,11 +279,9 @@ def test_the_foot_of_a_wall_has_no_bounds_and_says_why():
 )
 def test_unknown_ground_and_the_end_of_the_map_within_reach_are_told_apart(last, status, code):
     """A wheel that stands just clear of them may be turned over them by errors of 5 cm."""
-    ground = plane(0.0, 0.0, half=1.2)
-    elevation = ground.elevation.copy()
-    elevation[:, last + 1 :] = np.nan
-    ground = with_std(replace(ground, elevation=elevation), 0.015)
-    edge = ground.origin[0] + ground.resolution * last
+    edge = RESOLUTION * last - 1.2
+    known = make_terrain(lambda x, y: np.where(x > edge + 1e-6, np.nan, 0.0), RESOLUTION, 1.2)
+    ground = with_std(known, 0.015)
     poses = np.array([[edge - 0.501, 0.0, 0.0], [edge - 0.7, 0.0, 0.0]])
     prediction, verdict = judge_path(LSR1, ground, poses)
     assert prediction.settled.all()

@@ -134,9 +134,7 @@ REACH = LEVEL.bounds[1] - 0.5
     ],
 )
 def test_wheels_over_unknown_ground_and_off_the_map_are_told_apart(ground, x, status):
-    prediction = judge_path(LSR1, ground, [[x, 0.0, 0.0]])[0]
-    assert prediction.status.tolist() == [status]
-    assert prediction.settled.tolist() == [status == PoseStatus.SETTLED]
+    assert judge_path(LSR1, ground, [[x, 0.0, 0.0]])[0].status.tolist() == [status]
 
 
 def test_a_wall_across_the_rover_is_never_settled_by_a_guess():
