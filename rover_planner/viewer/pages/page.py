@@ -59,7 +59,7 @@ class Page(PageBase):
         self._judging = self.begin_work(self._take_judged, "judge")
         session.judge = self._judging.ask
         self._advised: advice.Advised | None = None
-        """The path that is looked at and the advice on it; None if nothing is known."""
+        """The path that is looked at and the advice on it; None if none was sought."""
         self._offers = {
             "presets": list(preset_names()),
             "soils": list(load_soils()),
@@ -108,7 +108,7 @@ class Page(PageBase):
             "place": lambda words: playback.go_to(playback.drive.time_at(words["distance"])),
             "speed": lambda words: setattr(playback, "speed", float(words["times"])),
             "failure": lambda _words: self._go_to_failure(),
-            "advise": lambda _words: self._advice.ask(advice.seek_advice(session.shown.path)),
+            "advise": lambda _words: self._seek_advice(),
             "ghost": lambda words: self._show_ghost(words["words"]),
             "remedy": lambda words: self._take_remedy(words["words"]),
             "save rover": lambda _words: _write_rover(session.wanted.rover),
@@ -155,8 +155,13 @@ class Page(PageBase):
 
     # Advice.
 
+    def _seek_advice(self) -> None:
+        self._advised = advice.Advised(self.session.shown.path, time.monotonic())
+        self._advice.ask(advice.seek_advice(self._advised))
+
     def _take_advice(self, _steps: Any, found: advice.Advised | BaseException) -> None:
         if isinstance(found, BaseException):
+            self._advised = None
             raise PlanningError(f"no advice: {found}")
         if found.path is self.session.shown.path:
             self._advised = found
