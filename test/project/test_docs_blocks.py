@@ -17,15 +17,15 @@ import pytest
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
 from support.project.checkout import TOP, console_scripts, setup_arguments
-from support.project.doc_blocks import PAGES, Block, read_blocks
+from support.project.doc_blocks import Block, read_blocks
 from support.project.processes import ProcessToken
 from support.ros_fixtures import domain_id
 
 LONGEST, GRACE = 300.0, 20.0
 """Longest time for a block, and for its processes to end after it [s]."""
 
+PAGES = [TOP / "README.md", *sorted((TOP / "docs").rglob("*.md"))]
 BLOCKS = [block for page in PAGES for block in read_blocks(page)]
-PAGES_TO_RUN = sorted({block.page for block in BLOCKS})
 
 
 def test_what_a_robot_does_not_get_from_apt_is_installed_by_pip():
@@ -124,7 +124,7 @@ def reader(tmp_path, programs):
     "page",
     [
         pytest.param(page, marks=[] if page == "README.md" else [pytest.mark.long])
-        for page in PAGES_TO_RUN
+        for page in dict.fromkeys(block.page for block in BLOCKS)
     ],
 )
 def test_the_blocks_of_a_page_run_as_written(page, reader):
