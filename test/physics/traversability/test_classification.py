@@ -29,7 +29,7 @@ POSE = [[0.0, 0.0, 0.0]]
 STEEP = plane(0.45, 0.0)
 """A slope on which equal torques slip and optimal ones use 0.58 of the friction of 0.8."""
 ONTO_A_BUMP = unlimited(LSR1), drive_ground("bump_one_side", 0.1), drive_path()[54:59]
-"""Rover, ground, and waypoints of which the third one follows the climb of the right front wheel."""
+"""Rover, ground, and waypoints; the third one follows the climb of the right front wheel."""
 WEAK = SweepOptions(friction=1.0, max_torque=1.0)
 """Motors with which speed servos stall at the bump, and optimal torques do not."""
 
