@@ -26,9 +26,7 @@ def learn(shape, told: str, seconds=80.0) -> SoilEstimate:
     learner = GroundLearner(ROVER, ground, soil=told)
     for row in rows:
         learner.take(row)
-    soil = learner.estimate.soil
-    assert soil is not None
-    return soil
+    return learner.estimate.soil
 
 
 def test_sinkage_resistance_and_strength_are_learned_whatever_was_told():
