@@ -15,8 +15,6 @@ DATA = Path(__file__).resolve().parents[1] / "test" / "data"
 FILES = ("settled_a.npz", "settled_b.npz")
 STEERED = ("steered.npz",)
 """File of the cases with turned end wheels."""
-TURNED = ("rear_r", "mid_r", "front_r", "rear_l", "mid_l", "front_l")
-"""Names of the wheels in the files, in wheel order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,8 +37,6 @@ class ReferenceGround:
     """(n, 4) angles of rocker right and left, bogie right and left [rad]."""
     curvature: np.ndarray
     """(n,) curvature that the end wheels are turned for [1/m], 0 where none is turned."""
-    steering: np.ndarray
-    """(n, 6) steering angles [rad]."""
 
 
 @lru_cache
@@ -72,9 +68,6 @@ def _read_cases(label: str, terrain: Terrain, rows: list[dict]) -> ReferenceGrou
         attitude=column("roll", "pitch"),
         joints=column("rocker_r", "rocker_l", "bogie_r", "bogie_l"),
         curvature=np.array([row.get("kappa", 0.0) for row in rows]),
-        steering=np.array(
-            [[row.get("steering", {}).get(wheel, 0.0) for wheel in TURNED] for row in rows]
-        ),
     )
 
 

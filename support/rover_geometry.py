@@ -114,20 +114,18 @@ def balance_sums(rover: Rover, placed: Placed, acting: list) -> np.ndarray:
     """
     axis = placed.attitude[:, 1]
 
-    def moment(pivot, choose):
-        about = (np.cross(p - pivot, f) for f, p, side, bogie in acting if choose(side, bogie))
+    def moment(pivot, side=None, bogie_only=False):
+        about = (
+            np.cross(point - pivot, force)
+            for force, point, its_side, on_bogie in acting
+            if side in (None, its_side) and (on_bogie or not bogie_only)
+        )
         return sum(about, start=np.zeros(3))
 
     total_force = sum((force for force, *_ in acting), start=np.zeros(3))
-    total_moment = moment(placed.origin, lambda side, bogie: True)
-    about_bogies = [
-        axis @ moment(placed.bogie_pivots[k], lambda side, bogie, k=k: bogie and side == k)
-        for k in range(2)
-    ]
-    about_rockers = [
-        axis @ moment(placed.rocker_pivots[k], lambda side, bogie, k=k: side == k)
-        for k in range(2)
-    ]
+    total_moment = moment(placed.origin)
+    about_bogies = [axis @ moment(placed.bogie_pivots[k], k, bogie_only=True) for k in range(2)]
+    about_rockers = [axis @ moment(placed.rocker_pivots[k], k) for k in range(2)]
     wheels = rover.suspension.wheels
     base = wheels["front"][0] - wheels["rear"][0]
     moments = [*total_moment, *about_bogies, about_rockers[0] - about_rockers[1]]

@@ -37,7 +37,7 @@ def check_parameters(node: str, values: dict[str, Any]) -> None:
         specs[name].check(tuple(value) if isinstance(value, list) else value)
 
 
-def test_the_rover_starts_as_its_parameter_files_say():
+def test_the_rover_starts_as_its_parameter_files_say_and_expects_the_watch_of_the_server():
     nodes = start_rover()
     assert [node.executable for node in nodes] == ["traverse_server", "traction_controller"]
     for node in nodes:
@@ -46,13 +46,9 @@ def test_the_rover_starts_as_its_parameter_files_say():
         assert file == str(TOP / "config" / "parameters" / f"{node.executable}.yaml")
         assert Path(file).is_file() and given["use_sim_time"] is False
         assert (node.namespace, node.respawn) == ("", True)
-
-
-def test_the_controller_expects_the_watch_of_the_server():
-    server, controller = (node.parameters[1] for node in start_rover())
+        check_parameters(node.executable, given)
+    server, controller = (node.parameters[1] for node in nodes)
     assert server["monitor"] is True and 0.0 < controller["stop_timeout"] < 0.5
-    for name, given in (("traverse_server", server), ("traction_controller", controller)):
-        check_parameters(name, given)
 
 
 def test_arguments_of_the_rover_take_precedence_over_its_files_and_can_leave_out_the_watch():

@@ -11,18 +11,14 @@ from rover_physics import Rover, RoverError, load_rover
 from rover_physics.errors import RoverFileError
 from rover_physics.files.config_files import find_config
 from rover_physics.rover.model import Steering
-from rover_physics.rover.rover_file import preset_names, rover_from_dict
+from rover_physics.rover.rover_file import preset_names, rover_from_dict, rover_to_dict
 
 NAN, INF = float("nan"), float("inf")
 OPTIONAL = ("manipulator", "manipulator.payload", "steering", "wheel.servo_droop")
 """Keys of the lsr1 file that may be left out."""
 
 
-def contents(name: str = "lsr1") -> dict[str, Any]:
-    return yaml.safe_load(find_config(f"rovers/{name}.yaml").read_text(encoding="utf-8"))
-
-
-LSR1 = contents()
+LSR1 = yaml.safe_load(find_config("rovers/lsr1.yaml").read_text(encoding="utf-8"))
 
 
 def changed(key: str, *value: object) -> dict[str, Any]:
@@ -136,7 +132,7 @@ def test_a_stowed_arm_outside_its_limits_and_pivots_of_a_bogie_behind_are_refuse
     limits = [[-1.0, 1.0], [-1.0, 1.0], [0.0, 1.0]]
     must = "within manipulator.joint_limits, for arm_yaw"
     assert must in refusal("manipulator.joint_limits", limits)
-    data = contents("m2020")
+    data = rover_to_dict(load_rover("m2020"))
     data["suspension"]["bogie_pivot"][0] = 0.1
     with pytest.raises(RoverFileError, match="between its two wheels, rear and middle"):
         rover_from_dict(data, "test")
