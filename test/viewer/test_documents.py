@@ -274,6 +274,7 @@ def test_a_refusal_on_unknown_ground_is_at_the_time_to_which_the_drive_is_played
     assert path.failure is not None and path.failure.code == "unknown_ground"
     assert path.failure.state.time == path.trajectory.times[-1]
     assert (path.trajectory.length == 0) == (start > 0.0) == (path.failure.state.time == 0.0)
+    assert (path.trajectory.state_at(0.0) is None) == (start > 0.0)
     told = [
         paths.describe_verdict(session.shown),
         paths.describe_limits(path, None),
