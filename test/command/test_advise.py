@@ -68,7 +68,9 @@ def test_each_remedy_is_what_predict_passes_with(files, capsys, monkeypatch):
             assert prediction["traversable"], remedy["words"]
 
 
-def test_a_path_that_passes_is_answered(files, capsys):
+def test_a_path_that_passes_needs_no_advice(files, capsys):
     assert main(arguments(files, "--friction", "1.0")) == 0
-    assert json.loads((files / "out.json").read_text())["traversable"] is True
-    assert "traversable as it is" in capsys.readouterr().out
+    advice = json.loads((files / "out.json").read_text())
+    assert advice["traversable"] and advice["complete"]
+    assert not advice["remedies"] and not advice["others"]
+    assert capsys.readouterr().out == "the path is traversable as it is\n"

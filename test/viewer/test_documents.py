@@ -98,14 +98,14 @@ def test_board_lanes_curves_and_verdict_show_one_number_for_the_wheel_that_fails
 
 def test_the_worst_so_far_grows_and_has_all_limits_in_one_unit():
     path = judged_on(waves)
-    uses = [
-        paths.describe_uses(path, time) for time in np.linspace(0.0, path.trajectory.times[-1], 5)
+    times = np.linspace(0.0, path.trajectory.times[-1], 5)
+    worst = [
+        [one["worst"].replace("not asked", "-1") for one in paths.describe_uses(path, time)]
+        for time in times
     ]
-    worst = [[one["worst"].replace("not asked", "-1") for one in row] for row in uses]
     shares = np.array([[float(words.split()[0]) for words in row] for row in worst])
     assert (np.diff(shares, axis=0) >= 0.0).all()
-    assert len(uses[0]) == len(path.limits.lanes)
-    assert all(one["worst"].endswith("%") for one in uses[-1])
+    assert all(words.endswith("%") for words in worst[-1])
 
 
 def test_a_path_that_fails_at_its_first_pose_has_a_lane_and_a_use_for_each_limit():
