@@ -187,18 +187,15 @@ def files(tmp_path, monkeypatch):
     return write_ground_and_path(tmp_path)
 
 
-def predict(*more, rover="lsr1", terrain="terrain.npz", poses="poses.npz", out="out.npz"):
-    return ["predict", rover, terrain, poses, out, *more]
-
-
+PREDICT = ["predict", "lsr1", "terrain.npz", "poses.npz", "out.npz"]
 REFUSED = [
     ([], "command"),
     (["dance"], "dance"),
     (["predict"], "ROVER"),
-    (predict("--tool-force", "0", "1"), "tool-force"),
-    (predict("--arm", "arm_yaw=nan"), "NAME=RAD"),
-    (predict("--arm", "arm_yaw=0.1"), "lacks arm_shoulder, arm_elbow"),
-    (predict("--arm", "arm_yaw=0.1", "--arm", "arm_yaw=0.2"), "twice"),
+    ([*PREDICT, "--tool-force", "0", "1"], "tool-force"),
+    ([*PREDICT, "--arm", "arm_yaw=nan"], "NAME=RAD"),
+    ([*PREDICT, "--arm", "arm_yaw=0.1"], "lacks arm_shoulder, arm_elbow"),
+    ([*PREDICT, "--arm", "arm_yaw=0.1", "--arm", "arm_yaw=0.2"], "twice"),
     (["reach", "lsr1", "terrain.npz", "here", "2", "0.5", "2.5", "2.3", "0.3"], "'X'"),
     (["plan", "lsr1", "terrain.npz", "o.npz", "--start=1,2", "--goal=1,0,0"], "'1,2' is no pose"),
     (["replay-plan", "terrain.npz", "o.npz"], "terrain.npz holds no question for a path"),
