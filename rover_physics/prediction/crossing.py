@@ -2,10 +2,10 @@
 """Poses between waypoints, where wheels climb faces, roll off edges, or sweep round in a turn.
 
 A wheel contact can jump from one waypoint to the next. The poses in between then decide whether
-the rover gets there. The path is divided around each jump until the jump is resolved, its place
-decides nothing, or the piece is shorter than MIN_SPACING. A jump in height that remains is at one
-place. Upwards, the wheel climbs a face: it is held at heights from foot to edge, with the face as
-its contact, and evaluated at each. Downwards, the wheel drops.
+the rover gets there. The path is halved around each jump until the jump is resolved, its place
+decides nothing, or the stretch is shorter than MIN_SPACING (see `halving.py`). A jump in height
+that remains is at one place. Upwards, the wheel climbs a face: it is held at heights from foot to
+edge, with the face as its contact, and evaluated at each. Downwards, the wheel drops.
 """
 
 from functools import partial

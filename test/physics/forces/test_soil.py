@@ -37,10 +37,6 @@ def friction_of(soil, radius, width, N, mu=MU):
 SOILS = {name: pack_soils((name,))[1] for name in (*RIGID, "firm_ground")}
 
 
-def packed(name):
-    return SOILS[name].copy()
-
-
 # Worked from Wong's formulas by hand, with D = 2 r, k = k_c + b k_phi, x = i l / K:
 #
 # Lunar nominal, r = 0.25 m, b = 0.2 m, N = 200 N; k = 1400 + 0.2 x 820000 = 165400 N/m^2
@@ -67,14 +63,14 @@ HAND = [
 
 @pytest.mark.parametrize(("name", "r", "b", "N", "z0", "R", "pull", "torque", "largest"), HAND)
 def test_the_model_gives_the_values_worked_by_hand(name, r, b, N, z0, R, pull, torque, largest):
-    result = solve(packed(name), r, b, N, pull, 0.0)
+    result = solve(SOILS[name], r, b, N, pull, 0.0)
     assert result.slip_ratio == pytest.approx(0.2, abs=2e-6)
     assert result.sinkage == pytest.approx(z0, rel=1e-6)
     assert result.resistance == pytest.approx(R, rel=1e-6)
     assert result.torque == pytest.approx(torque, rel=1e-5)
     assert result.drawbar_pull == pytest.approx(largest, rel=5e-6)
     assert result.utilisation == pytest.approx(pull / largest, rel=5e-6)
-    assert friction_of(packed(name), r, b, N) == pytest.approx(largest / N, rel=5e-6)
+    assert friction_of(SOILS[name], r, b, N) == pytest.approx(largest / N, rel=5e-6)
 
 
 def thrust_at_slip(soil, radius, width, N, slip) -> float:
@@ -94,7 +90,7 @@ wheels = st.tuples(st.floats(0.05, 0.6), st.floats(0.03, 0.5))
 
 @given(names, wheels, loads, st.floats(-0.999, 0.999))
 def test_slip_to_pull_and_back_is_the_same_slip(name, wheel, N, slip):
-    soil, (r, b) = packed(name), wheel
+    soil, (r, b) = SOILS[name], wheel
     result = solve(soil, r, b, N, 0.0, 0.0)
     assume(result.sinkage < r)
     pull = thrust_at_slip(soil, r, b, N, slip) - result.resistance
@@ -108,7 +104,7 @@ def test_slip_to_pull_and_back_is_the_same_slip(name, wheel, N, slip):
 
 @given(names, wheels, loads, st.floats(-1.5, 1.5), st.floats(-1.5, 1.5))
 def test_forces_within_the_effective_friction_are_within_the_strength(name, wheel, N, t, s):
-    soil = packed(name)
+    soil = SOILS[name]
     friction = friction_of(soil, *wheel, N)
     assume(friction > MIN_FRICTION)
     T, S = t * friction * N, s * friction * N
@@ -127,7 +123,7 @@ def test_forces_within_the_effective_friction_are_within_the_strength(name, whee
 
 
 def test_a_wheel_that_cannot_pull_itself_may_still_be_dragged_unless_sunk_to_its_axle():
-    soil = packed("mars_simulant")
+    soil = SOILS["mars_simulant"]
     sunk = solve(soil, 0.1, 0.08, 2000.0, 1.0, 0.0)
     assert sunk.sinkage > 0.1 and sunk.utilisation == np.inf
     assert sunk.drawbar_pull == -sunk.resistance < 0.0
