@@ -22,7 +22,6 @@ class SimulatedClock:
     def __init__(self, rover):
         self.time, self.step = 1_000_000 * NANOSECONDS, 10_000_000
         self._publisher = rover.create_publisher(ClockMessage, "/clock", 10)
-        self._running = True
         rover.create_timer(0.01, self._tick)
 
     def _tick(self):

@@ -2,12 +2,9 @@
 """A traverse server hears parameters, maps, cancels and signals while it works on a question."""
 
 import threading
-import time
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from rclpy.qos import QoSProfile, ReliabilityPolicy
-from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import Trigger
 
 from msg_adapters.elevation import terrain_to_point_cloud
@@ -46,20 +43,6 @@ def test_stamps_of_answers_differ_even_while_the_clock_is_paused(start_server, c
     plans = [client.can_traverse(START, GOAL) for _ in range(3)]
     stamps = [plan.header.stamp.nanosec for plan in plans]
     assert stamps == sorted(set(stamps)) and {plan.header.stamp.sec for plan in plans} == {0}
-
-
-def test_a_best_effort_map_is_heard_where_the_parameter_says_so(start_server, client):
-    server = start_server(input_reliability="best_effort")
-    qos = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
-    publisher = client.create_publisher(PointCloud2, "elevation_cloud", qos)
-    cloud = terrain_to_point_cloud(make_terrain(waves), "map")
-
-    def heard() -> bool:
-        publisher.publish(cloud)
-        time.sleep(0.05)
-        return server.service.terrain is not None
-
-    wait_until(heard, "the map")
 
 
 def test_diagnostics_tell_what_is_wrong_and_a_no_is_not_an_error(start_server, client):
