@@ -23,7 +23,7 @@ from rover_planner.nodes.rover_simulator import RoverSimulator
 from rover_planner.nodes.traction_controller import TractionController
 from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
 from support.grounds import make_terrain, waves
-from support.ros_fixtures import PATIENT, run_in_executor
+from support.ros_fixtures import PATIENT, hear, run_in_executor
 from support.waiting import wait_until
 
 START_X = -1.0
@@ -57,18 +57,11 @@ class Ear(Node):
 
     def __init__(self, ros):
         super().__init__("ear", context=ros.context)
-        self.heard = {}
-        for kind, topic, qos in (
-            (JointState, "joint_states", topic_qos()),  # a reliable subscriber
-            (Imu, "imu", sensor_qos()),
-            (PointCloud2, "elevation_cloud", map_qos()),
-            (DiagnosticArray, "/diagnostics", topic_qos()),
-        ):
-            self.create_subscription(kind, topic, self._keeper(topic), qos)
+        self.joint_states = hear(self, JointState, "joint_states", topic_qos())  # reliable
+        self.imu = hear(self, Imu, "imu", sensor_qos())
+        self.clouds = hear(self, PointCloud2, "elevation_cloud", map_qos())
+        self.diagnostics = hear(self, DiagnosticArray, "/diagnostics")
         self._commands = self.create_publisher(TwistStamped, "cmd_vel", sensor_qos())
-
-    def _keeper(self, topic):
-        return lambda message: self.heard.setdefault(topic, []).append(message)
 
     def command(self, speed, yaw_rate=0.0):
         twist = TwistStamped()
@@ -85,9 +78,9 @@ def test_it_publishes_what_a_rover_would_drives_as_commanded_and_stops_when_comm
     ear, start_simulator
 ):
     simulator = start_simulator(steering_sign="right")
-    wanted = {"joint_states", "imu", "elevation_cloud", "/diagnostics"}
-    wait_until(lambda: wanted <= ear.heard.keys(), "joint states, attitude, map and diagnostics")
-    state, imu = ear.heard["joint_states"][-1], ear.heard["imu"][-1]
+    for heard in (ear.joint_states, ear.imu, ear.clouds, ear.diagnostics):
+        wait_until(lambda heard=heard: heard, "joint states, attitude, map and diagnostics")
+    state, imu = ear.joint_states[-1], ear.imu[-1]
     rover, plant = simulator.simulation.settings.rover, simulator.simulation.plant
     arm, steering = rover.manipulator.joints, steering_joints(rover)
     assert list(state.name) == [*SUSPENSION_JOINTS, *WHEEL_JOINTS, *steering, *arm]
@@ -95,15 +88,15 @@ def test_it_publishes_what_a_rover_would_drives_as_commanded_and_stops_when_comm
     attitude = imu_to_attitude(imu)
     assert imu.linear_acceleration.z == pytest.approx(9.81, abs=0.3)
     assert np.isfinite([attitude.roll, attitude.pitch]).all()
-    seen = terrain_from_point_cloud(ear.heard["elevation_cloud"][-1])
+    seen = terrain_from_point_cloud(ear.clouds[-1])
     assert np.isfinite(seen.elevation_at(*plant.state().position[:2]))
-    status = ear.heard["/diagnostics"][-1].status[0]
+    status = ear.diagnostics[-1].status[0]
     assert (status.level, status.values[0].key) == (status.OK, "position")
     assert status.values[0].value.startswith(f"[{START_X}, 0.0, ")
 
     def steers():
         ear.command(0.05, 0.05)
-        state = ear.heard["joint_states"][-1]
+        state = ear.joint_states[-1]
         found = dict(zip(state.name, state.position, strict=True))
         turned = plant.pose()[2] > 0.01 and plant.pose()[0] > START_X + 0.01
         return turned and found["front_left_steering"] < -0.2 and found
@@ -117,11 +110,11 @@ def test_with_simulated_time_it_is_the_source_of_the_clock_and_late_steps_do_not
     ros, ear, start_simulator
 ):
     simulator = start_simulator(use_sim_time=True, rate=100.0)
-    wait_until(lambda: len(ear.heard.get("joint_states", ())) > 20, "joint states")
+    wait_until(lambda: len(ear.joint_states) > 20, "joint states")
     run_in_executor(simulator, lambda: time.sleep(0.2))
-    have = len(ear.heard["joint_states"])
-    wait_until(lambda: len(ear.heard["joint_states"]) > have + 20, "more of them")
-    stamps = [stamp_to_ns(state.header.stamp) for state in ear.heard["joint_states"]]
+    have = len(ear.joint_states)
+    wait_until(lambda: len(ear.joint_states) > have + 20, "more of them")
+    stamps = [stamp_to_ns(state.header.stamp) for state in ear.joint_states]
     assert set(np.diff(stamps)) == {10_000_000}
     wait_until(lambda: simulator.get_clock().now().nanoseconds >= stamps[-1], "its own clock")
 

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Maps are heard whenever and however they are published, or who cannot be heard is named."""
 
+from functools import partial
+
 import pytest
 from rclpy.node import Node
-from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import PointCloud2
 
@@ -21,13 +22,10 @@ def hear(ros):
     """Return a function that starts a node with parameters; it returns the maps it hears."""
 
     def start(**values):
-        heard, given = [], [Parameter(name, value=value) for name, value in values.items()]
-        node = RoverNode(
-            "hearer", TraverseServerParameters, context=ros.context, parameter_overrides=given
-        )
+        heard: list[bytes] = []
+        node = ros.start(partial(RoverNode, "hearer", TraverseServerParameters), **values)
+        node.create_timer(0.1, lambda: None)  # as nodes have: a mismatch wakes no executor
         subscribe_to_map(node, PointCloud2, "maps", heard.append)
-        node.create_timer(0.1, lambda: None)  # as nodes have: a mismatch alone wakes none of them
-        ros.spin(node)
         return heard
 
     return start

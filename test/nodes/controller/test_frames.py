@@ -14,7 +14,7 @@ from rover_planner.planning.navigation.transforms import Rigid
 from rover_planner.ros.qos import map_qos, sensor_qos
 from support.messages import odometry_at, send_map_odom
 from support.rough_grounds import RESOLUTION, plane
-from support.waiting import TIMEOUT, repeat_until, wait_until
+from support.waiting import repeat_until, wait_until
 
 MAP_ODOM = Rigid.from_rpy(1.0, -0.5, 0.4, 0.0, 0.0, np.pi / 2)
 """Where odometry began, on the map."""
@@ -33,8 +33,6 @@ def test_odometry_in_odom_serves_on_a_map_in_map(rover, start_controller):
     send_map_odom(controller, MAP_ODOM, age=7.5)
     stale = "the transform from 'odom' to 'map' is stale: it is "
     repeat_until(send, lambda: rover.count_lines(stale), "the refusal of a stale transform")
-    line = next(line for line in rover.log if stale in line)
-    assert 7.5 <= float(line.partition(stale)[2].split()[0]) < 7.5 + TIMEOUT
     repeat_until(send, lambda: contact_source(rover) == "motion", "the drive without the map")
     send_map_odom(controller, MAP_ODOM, is_static=True)
     repeat_until(send, lambda: contact_source(rover) == "map", "contacts from the map")

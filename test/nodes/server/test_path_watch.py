@@ -7,15 +7,14 @@ from statistics import median
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy.node import Node
 from std_srvs.srv import SetBool
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.identity import path_hash
 from rover_planner.nodes.navigation.path_watch import PathWatch
 from support.grounds import make_terrain, wall_at, waves
-from support.planner_client import SERVER, begin_plan, verdict_of
-from support.ros_fixtures import call
+from support.planner_client import SERVER, begin_plan
+from support.ros_fixtures import call, hear
 from support.standing_rover import GOAL, START, StandingRover, rock_ahead
 from support.waiting import wait_until
 
@@ -53,8 +52,7 @@ def test_a_rock_put_across_the_path_stops_the_rover_and_the_verdict_says_why(wat
     server, rover = watched
     client.heard["verdict"].clear()
     time_stop(rover, client)
-    wait_until(lambda: client.heard["verdict"], "the verdict")
-    verdict = verdict_of({"verdict": client.heard["verdict"][-1]})
+    verdict = client.wait_for_verdict()
     assert verdict["service"] == "monitor" and verdict["traversable"] == "false"
     assert " m ahead: " in verdict["reason"]
     assert verdict["map_hash"] == server.service.known_map.fingerprint
@@ -67,12 +65,9 @@ def test_a_rock_put_across_the_path_stops_the_rover_and_the_verdict_says_why(wat
     )
 
 
-def test_the_stop_is_a_heartbeat_with_the_path_and_the_age_of_the_map(watched, ros):
+def test_the_stop_is_a_heartbeat_with_the_path_and_the_age_of_the_map(watched):
     server, rover = watched
-    told = []
-    ros.spin(Node("operator", context=ros.context)).create_subscription(
-        DiagnosticStatus, f"{SERVER}/watch", told.append, 10
-    )
+    told = hear(rover, DiagnosticStatus, f"{SERVER}/watch")
     wait_until(lambda: len(told) > 3, "the state of the watch")
     values = {one.key: one.value for one in told[-1].values}
     assert values["path_hash"] == server.watch.finding.path_hash
