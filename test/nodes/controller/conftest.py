@@ -107,6 +107,11 @@ class DrivenRover(Node):
             self.log.append(message.msg)
 
     @property
+    def values(self) -> dict[str, str]:
+        """The values of the controller's last status by key."""
+        return {entry.key: entry.value for entry in self.status.values}
+
+    @property
     def torque(self) -> float:
         """The largest torque of the last command [N m]; 0 if there is none."""
         return self.commands[-1][1] if self.commands else 0.0
