@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Inputs that cannot be used stop the rover, are named once, and pass by themselves."""
+"""Inputs that cannot be used are named once, and a rover that they stop goes on by itself."""
 
 import copy
 import math
 
 import pytest
 from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Twist
 from nav_msgs.msg import Odometry
 from rclpy.parameter import Parameter
 from sensor_msgs.msg import PointCloud2
 
 from msg_adapters.elevation import terrain_to_point_cloud
 from rover_planner.nodes.warm_up import JOINTS
+from rover_planner.ros import subscriptions
 from rover_planner.ros.qos import map_qos, sensor_qos
 from support.messages import odometry_at
-from support.ros_fixtures import run_in_executor
+from support.ros_fixtures import RosRun, run_in_executor
 from support.rough_grounds import plane
 from support.waiting import repeat_until, wait_until
 
@@ -111,3 +113,33 @@ def test_a_mounted_imu_is_turned_into_the_body_frame_and_steering_has_the_sign_o
     wait_until(lambda: rover.state == "driving", "driving")
     assert node.service._body_rates == pytest.approx([-0.1, 0.0, 0.0])
     assert node.service.steering[5] == -0.2
+
+
+@pytest.fixture
+def unstamped(start_rover):
+    """Return a rover that sends Twist; in a context of its own, which refuses another type."""
+    run = RosRun()
+    yield start_rover(run, Twist)
+    run.close()
+
+
+def test_cmd_vel_without_a_stamp_is_driven_where_the_parameter_says_so(
+    unstamped, start_controller
+):
+    start_controller(cmd_vel_stamped=False)
+    unstamped.wait_until_driven()
+
+
+def test_cmd_vel_of_another_type_is_named_with_the_parameter(
+    unstamped, start_controller, capfd, monkeypatch
+):
+    monkeypatch.setattr(subscriptions, "PERIOD", 0.5)
+    start_controller()
+    text = "cmd_vel of /rover is not heard: its type is geometry_msgs/msg/Twist; "
+    text += "set parameter cmd_vel_stamped to false"
+    wait_until(
+        lambda: any(text in value for value in unstamped.values.values()),
+        "the warning in the diagnostics",
+    )
+    # The rover may discover the controller's log after the warning, so the terminal counts.
+    assert capfd.readouterr().err.count(text) == 1
