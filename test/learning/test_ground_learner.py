@@ -6,24 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.rover.rover_file import load_rover
 from rover_physics.rover.steered_drive import SteeredDrive
-from rover_planner.learning.drive_log import (
-    PITCH,
-    RATES,
-    ROLL,
-    STEERING,
-    SUSPENSION,
-    TIME,
-    TORQUES,
-    WIDTH,
-    YAW,
-    X,
-    Y,
-)
+from rover_planner.learning.drive_log import RATES, STEERING, SUSPENSION, TIME, TORQUES, YAW, X
 from rover_planner.learning.ground_learner import GroundLearner
-from support.learning_drives import climb, ramp
+from support.learning_drives import climb, ramp, row_of_plant
 from support.reference_drives import drive_ground
 
 SPEED = 0.06
@@ -39,8 +26,13 @@ def learn(rows, terrain=None) -> GroundLearner:
     return learner
 
 
-def test_wheels_that_grip_prove_a_friction_and_nothing_above():
-    estimate = learn(climb(ROVER, SLOPE, 20.0)[::5]).estimate
+@pytest.mark.parametrize("spacing", [1, 10])
+def test_wheels_that_grip_prove_a_friction_and_nothing_above_however_rarely_a_pose_is_measured(
+    spacing,
+):
+    rows = climb(ROVER, SLOPE, 20.0)
+    rows[np.arange(len(rows)) % spacing != 0, X : SUSPENSION.stop] = np.nan
+    estimate = learn(rows).estimate
     assert 0.6 * SLOPE < estimate.friction.low < 1.1 * SLOPE
     assert estimate.friction.high is None
     assert estimate.slip_time is None and estimate.immobilised_time is None
@@ -142,15 +134,6 @@ def test_a_gap_and_a_jump_of_the_odometry_are_no_slip():
     assert learn(rows).estimate.slip_time is None
 
 
-def test_a_pose_that_is_measured_less_often_than_the_wheels_serves():
-    rows = climb(ROVER, SLOPE, 20.0)
-    sparse = np.arange(len(rows)) % 10 != 0
-    rows[sparse, X : SUSPENSION.stop] = np.nan
-    estimate = learn(rows).estimate
-    assert 0.6 * SLOPE < estimate.friction.low < 1.1 * SLOPE
-    assert estimate.slip_time is None and not estimate.faults
-
-
 def test_nothing_is_learned_from_rows_without_a_pose():
     rows = climb(ROVER, SLOPE, 5.0)
     rows[:, YAW] = np.nan
@@ -196,20 +179,12 @@ def test_slip_is_seen_without_any_torque_and_measures_nothing():
 
 def drive_up(friction: float, degrees: float, seconds: float) -> np.ndarray:
     """Return rows of a drive up a slope in MuJoCo by speed servos, from just before it."""
-    mujoco_rover = pytest.importorskip("rover_planner.simulator.mujoco_rover")
-    plant = mujoco_rover.MujocoRover(
-        ROVER, drive_ground("slope", degrees), (-0.5, 0.0, 0.0), friction
-    )
-    rows = []
-    while plant.time < seconds:
-        row = np.full(WIDTH, np.nan)
-        row[TORQUES] = plant.servo(np.full(6, SPEED / ROVER.wheel.radius), 0.02)
-        joints = plant.joint_positions
-        row[[TIME, X, Y, YAW]] = plant.time, *plant.pose[[0, 1, 3]]
-        row[[ROLL, PITCH]] = plant.attitude
-        row[SUSPENSION] = [joints[name] for name in SUSPENSION_JOINTS]
-        row[RATES], row[STEERING] = plant.wheel_rates, 0.0
-        rows.append(row)
+    simulator = pytest.importorskip("rover_planner.simulator.mujoco_plant")
+    ground, rows = drive_ground("slope", degrees), []
+    plant = simulator.MujocoPlant(ROVER, ground, (-0.5, 0.0, 0.0), friction)
+    for time in np.arange(0.0, seconds, 0.02):
+        plant.drive(SPEED, 0.0, 0.02)
+        rows.append(row_of_plant(plant, time))
     return np.array(rows)
 
 

@@ -57,10 +57,11 @@ def taught():
 
 
 def follow(taught, seed, pitch, roll, friction=ROVER.friction):
-    """Return odometry and truth of a drive on known ground, not measured in another way."""
+    """Return odometry and truth of a drive, not measured in another way; a friction is known."""
     odometry = WheelOdometry(ROVER)
     odometry.forward, odometry.side = taught.forward, taught.side
-    odometry.friction, odometry.friction_deviation = friction, 0.05 * friction
+    if friction is not None:
+        odometry.friction, odometry.friction_deviation = friction, 0.05 * friction
     return odometry, drive(odometry, seed, pitch, roll)
 
 
@@ -92,9 +93,7 @@ def test_where_all_friction_is_used_the_way_is_not_known(taught):
 
 def test_on_ground_of_unknown_friction_the_way_up_a_slope_is_less_sure(taught):
     known, _ = follow(taught, 3, -0.3, 0.0)
-    unknown = WheelOdometry(ROVER)
-    unknown.forward, unknown.side = taught.forward, taught.side
-    drive(unknown, 3, -0.3, 0.0)
+    unknown, _ = follow(taught, 3, -0.3, 0.0, friction=None)
     assert unknown.covariance[0, 0] > 4.0 * known.covariance[0, 0]
 
 

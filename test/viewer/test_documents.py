@@ -10,7 +10,12 @@ import pytest
 from rover_physics.names import EQUAL, OPTIMAL, SERVO, SIDES, WHEELS
 from rover_physics.traversability.judge import judge_path
 from rover_planner.viewer.documents import paths
-from rover_planner.viewer.documents.paths import compare_drives, describe_sliders, read_values
+from rover_planner.viewer.documents.paths import (
+    compare_drives,
+    describe_sliders,
+    list_sliders,
+    read_values,
+)
 from rover_planner.viewer.state.path_limits import Lane
 from rover_planner.viewer.state.scenario import CANDIDATES, Judged, Shown
 from support.grounds import gap, wall_at, waves
@@ -305,7 +310,8 @@ def test_the_board_has_all_loads_and_unknown_values_are_none_or_a_question_mark(
 
 def test_each_number_of_the_rover_has_a_slider_and_what_it_changes_of_the_drive_is_listed():
     session = session_on(ramp)
-    labels = [one[0] for part in describe_sliders(session.wanted) for one in part["sliders"]]
+    sliders = describe_sliders(list_sliders(LSR1), session.wanted)
+    labels = [one[0] for part in sliders for one in part["sliders"]]
     assert labels == list(read_values(session.wanted))
     before = session.shown.path
     session.change_rover([("friction",)], 0.4)

@@ -30,6 +30,7 @@ from support.viewer.sessions import wait_patiently as wait_until
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
+from rover_planner.viewer.documents.paths import FULL_TURN
 from rover_planner.viewer.pages import base, sharing
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.scene.canvas import Canvas, Strand
@@ -113,6 +114,25 @@ def test_a_number_or_an_angle_beyond_the_ends_of_its_slider_is_that_at_its_end(p
         most = sliders[label][2]
         wait_until(lambda at=label, most=most: told(page, "values")[at] == most, label)
     wait_for_rest(page)
+
+
+def test_the_ends_of_a_slider_include_a_number_or_an_angle_that_was_set_elsewhere(page):
+    session, arm = page.session, LSR1.manipulator
+
+    def ends(label: str) -> list[float]:
+        rows = {one[0]: one for part in told(page, "sliders") for one in part["sliders"]}
+        return rows[label][1:3]
+
+    most = 1.5 * ends(FRICTION)[1]
+    slippery = replace(LSR1, friction=most)
+    ask(page, lambda: session.take_change(replace(session.wanted, rover=slippery)))
+    assert ends(FRICTION)[1] == most
+    set_friction(page, 0.9 * most)  # as it was dragged to, and it can be dragged back
+    assert ends(FRICTION)[1] == most
+    turned = replace(arm, joint_limits=None, stowed=(-4.0, *arm.stowed[1:]))
+    ask(page, lambda: session.take_rover(replace(LSR1, manipulator=turned)))
+    assert ends("arm_yaw [rad]") == [-4.0, FULL_TURN]
+    assert ends(FRICTION)[1] < most
 
 
 def test_a_rover_file_and_a_preset_are_loaded_and_the_arm_follows(page):
