@@ -144,12 +144,6 @@ def test_what_was_not_tried_in_time_is_told():
         list(grow_within(refused_by(wall), check))
 
 
-def test_a_path_that_passes_needs_no_advice():
-    (advice,) = grow_advice(refused_by(lambda x, y: 0.0 * x))
-    assert advice.complete and not advice.found
-    assert advice.describe() == "the path is traversable as it is"
-
-
 def test_two_poses_far_apart_are_start_and_goal():
     ends = STRAIGHT[[0, -1]]
     path = path_of(LSR1, ends, 0.02)

@@ -73,8 +73,10 @@ def test_each_remedy_is_what_predict_passes_with(files, capsys, monkeypatch):
 
 def test_a_path_that_passes_and_one_without_time_are_answered(files, capsys, monkeypatch):
     assert main(arguments(files, "--friction", "1.0")) == 0
-    assert json.loads((files / "out.json").read_text())["traversable"] is True
-    assert "traversable as it is" in capsys.readouterr().out
+    advice = json.loads((files / "out.json").read_text())
+    assert advice["traversable"] and advice["complete"]
+    assert not advice["remedies"] and not advice["others"]
+    assert capsys.readouterr().out == "the path is traversable as it is\n"
     monkeypatch.setattr(Budget, "remaining", 0.0)
     assert main(arguments(files)) == 0
     answer = json.loads((files / "out.json").read_text())

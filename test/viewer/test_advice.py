@@ -10,12 +10,7 @@ pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 from rover_planner.advice.advise import grow_advice
 from rover_planner.advice.case import Case
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.viewer.documents.advice import (
-    PROMISED,
-    Advised,
-    apply_remedy,
-    describe_advice,
-)
+from rover_planner.viewer.documents.advice import PROMISED, Advised, apply_remedy, describe_advice
 from rover_planner.viewer.pages.page import Page
 from support.grounds import rock_left
 from support.viewer.sessions import LSR1, ask, session_on, wait_for_rest

@@ -9,14 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from support.viewer.browser import (
-    LAPTOP,
-    SCALE,
-    WAIT,
-    Visitor,
-    needs_browser,
-    open_browser,
-)
+from support.viewer.browser import LAPTOP, SCALE, WAIT, Visitor, needs_browser, open_browser
 from support.viewer.sessions import LSR1, ask, blocked_session, held, wait_for_rest
 from support.viewer.sessions import wait_patiently as wait_until
 

@@ -205,19 +205,16 @@ def test_the_ghost_of_a_failure_stays_for_the_next_one_and_hides_without(page):
         np.testing.assert_allclose(
             ghosts[-1].position, canvas.to_scene(failure.state.position), rtol=1e-6
         )
-    ghost, (wheel, _), (own, _) = (
-        canvas.nodes["/failure"],
-        *(one.meshes[failure.link] for one in (scene.ghost, scene.rover)),
-    )
-    assert ghosts[0] is ghosts[1] and ghost.visible
-    assert canvas.nodes[wheel].color == REFUSED
+    ghost, rovers = canvas.nodes["/failure"], (scene.ghost, scene.rover)
+    wheel, own = (canvas.nodes[one.meshes[failure.link][0]] for one in rovers)
+    assert ghosts[0] is ghosts[1] and ghost.visible and wheel.color == REFUSED
     for state, failing in ((failure.state, True), (None, False)):
         ask(page, lambda state=state: scene.show(state, failure))
         assert ghost.visible != failing
-        assert state is None or canvas.nodes[own].opacity == 1.0  # as of what fails
+        assert state is None or own.opacity == 1.0  # as of what fails
     ask(page, lambda: scene.mark_failure(None))
     ask(page, lambda: scene.show(failure.state))
-    assert not ghost.visible and canvas.nodes[own].opacity is None
+    assert not ghost.visible and own.opacity is None
 
 
 @pytest.fixture

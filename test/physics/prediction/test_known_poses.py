@@ -11,7 +11,6 @@ from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.sweep import FIRST_BLOCK
 from rover_physics.results.record import numbers_of
-from rover_physics.results.uses import find_codes
 from support.paths import poses_at
 from support.predictions import assert_same
 from support.rough_grounds import rocky
@@ -60,18 +59,6 @@ def test_a_path_of_judged_pieces_is_hardly_evaluated_again(asked):
     for known in (of_pieces, KnownPoses(others=of_pieces)):
         judge_path(LSR1, GROUND, EASY, known=known)
     assert asked.poses - before < 0.1 * before
-
-
-def test_what_fails_between_waypoints_is_not_searched_further(asked):
-    model = pack_model(LSR1, GROUND)
-    fails = find_codes(model.limits, model.evaluate(WAY))
-    assert not any(fails)
-    assert judge_pieces(LSR1, GROUND, [WAY])[0].code
-    of_piece, asked.poses = asked.poses - len(WAY), 0
-    judge_path(LSR1, GROUND, WAY, stop_at_failure=True)
-    up_to_failure, asked.poses = asked.poses, 0
-    judge_path(LSR1, GROUND, WAY)
-    assert of_piece < 0.8 * asked.poses and up_to_failure < 0.8 * asked.poses
 
 
 def test_nothing_is_evaluated_or_searched_far_beyond_a_failure_at_the_start(asked):

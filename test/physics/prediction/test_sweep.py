@@ -97,20 +97,15 @@ def test_paths_swept_together_are_as_swept_one_by_one(policy):
         assert_same(prediction.between, alone.between)
 
 
-def test_the_way_up_a_slope_takes_longer_than_its_shadow():
-    prediction = judge_path(LSR1, plane(0.4, 0.0), line(-0.3, 0.3))[0]
-    way = 0.6 * np.hypot(1.0, 0.4)
-    assert prediction.time[0] == 0.0 and prediction.distance[-1] == pytest.approx(0.6)
-    assert prediction.time[-1] == pytest.approx(way / LSR1.nominal_speed, rel=1e-4)
-
-
-def test_energy_uphill_is_the_weight_lifted_and_braking_downhill_gives_nothing_back():
+def test_uphill_time_is_that_of_the_way_and_energy_of_the_weight_lifted_and_brakes_give_none():
     down = judge_path(LSR1, plane(-0.3, 0.0), line(-0.3, 0.3))[0]
     assert (down.torque < 0.0).all() and down.energy[-1] == 0.0
-    prediction = judge_path(LSR1, plane(0.3, 0.0), line(-0.3, 0.3), SweepOptions(friction=2.0))[0]
-    lifted = LSR1.weight * np.ptp(prediction.position[:, 2])
-    assert prediction.energy[0] == 0.0
-    assert prediction.energy[-1] == pytest.approx(lifted, rel=1e-4)
+    up = judge_path(LSR1, plane(0.3, 0.0), line(-0.3, 0.3), SweepOptions(friction=2.0))[0]
+    lifted = LSR1.weight * np.ptp(up.position[:, 2])
+    assert up.energy[0] == 0.0 and up.energy[-1] == pytest.approx(lifted, rel=1e-4)
+    assert up.time[0] == 0.0 and up.distance[-1] == pytest.approx(0.6)
+    way = 0.6 * np.hypot(1.0, 0.3)
+    assert up.time[-1] == pytest.approx(way / LSR1.nominal_speed, rel=1e-4)
 
 
 @pytest.mark.parametrize(("ground", "shape"), [(low_rock, (5, 8)), (gap, (60, 50))])
