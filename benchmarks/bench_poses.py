@@ -57,7 +57,7 @@ def measure_poses(rover: Rover) -> Iterator[Figure]:
         score = partial(score_poses, rover, terrain, poses)
         looks = partial(sum_heights, ground.records, places)
         calls = score, partial(score, SweepOptions(policy=OPTIMAL)), looks
-        equal, optimal, look = 1e6 * np.array(median_times(calls))
+        equal, optimal, look = (1e6 * taken for taken in median_times(calls))
         pose, more = equal / len(poses), (optimal - equal) / len(poses)
         longest = max(_time(rover, terrain, poses[i : i + 1]) for i in range(len(poses)))
         settled = 100.0 * float((status == PoseStatus.SETTLED).mean())
