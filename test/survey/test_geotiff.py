@@ -90,7 +90,7 @@ def test_a_tif_gives_the_bits_of_the_same_map_in_an_npz_file(tmp_path):
     one = survey_tif(path, request, tmp_path / "out", chunk=21)
     terrain = Terrain(heights.astype(float), CELL, (7.0, -3.0))
     other = survey_here(tmp_path / "npz", terrain, request, chunk=63)
-    assert_same_bits(layers_of(one), layers_of(other))
+    assert_same_bits(layers_of(one.store), layers_of(other.store))
 
 
 @pytest.mark.parametrize("kind", [np.uint64, np.float32])

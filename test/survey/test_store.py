@@ -11,16 +11,17 @@ import pytest
 
 pytest.importorskip("zarr", reason="install the extra survey")
 
-from rover_physics import load_rover, save_terrain
+from rover_physics import save_terrain
 from rover_planner.cli import main
 from rover_planner.errors import PlanningError
 from rover_planner.survey.chunk_survey import compute_chunk
 from rover_planner.survey.store import NOTES, SurveyStore
 from rover_planner.survey.survey import prepare_survey
-from support.rovers import LSR1
+from support.rovers import LSR1, M2020
 from support.survey_maps import (
     assert_same_bits,
     compute_here,
+    count_chunks,
     layers_of,
     make_request,
     make_rough_map,
@@ -75,13 +76,13 @@ def test_finished_chunks_are_not_done_again_and_half_written_ones_are(surveyed, 
     assert again.finished == 4 and again.chunks == prepared.chunks[4:]
     compute_here(again)
     assert prepare(tmp_path, request).chunks == []
-    assert_same_bits(layers_of(again), layers_of(prepare(surveyed, request)))
+    assert_same_bits(layers_of(again.store), layers_of(prepare(surveyed, request).store))
 
 
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"rover": load_rover("m2020")}, "another rover: lsr1, not m2020"),
+        ({"rover": M2020}, "another rover: lsr1, not m2020"),
         ({"rover": HEAVIER}, "another rover (wheel (mass: 0.35, not 0.36))"),
         ({"policy": "optimal"}, "another options (policy: equal, not optimal)"),
         ({"headings": 8}, "another headings: 4, not 8"),
@@ -89,10 +90,8 @@ def test_finished_chunks_are_not_done_again_and_half_written_ones_are(surveyed, 
 )
 def test_a_store_of_another_survey_is_refused(files, changes, said):
     prepare(files)
-    rover = changes.pop("rover", None)
-    request = make_request(**changes)
     with pytest.raises(PlanningError) as refusal:
-        prepare(files, request if rover is None else replace(request, rover=rover))
+        prepare(files, make_request(**changes))
     assert said in str(refusal.value)
 
 
@@ -169,13 +168,13 @@ def test_a_missing_layer_is_named(files):
 def test_a_chunk_that_lost_a_file_is_done_again(finished):
     request = make_request(step=4, headings=2)
     prepared = prepare(finished, request)
-    before = layers_of(prepared)
+    before = layers_of(prepared.store)
     assert prepared.chunks == []
     for lost in ((0, 0), (2, 1)):  # in the first one nothing is known
         (prepared.store.path / "worst_tilt" / "c" / str(lost[0]) / str(lost[1])).unlink()
     again = prepare(finished, request)
     assert again.chunks == [(0, 0), (2, 1)] and again.finished == 7
-    assert_same_bits(layers_of(compute_here(again)), before)
+    assert_same_bits(layers_of(compute_here(again).store), before)
     assert prepare(finished, request).chunks == []
 
 
@@ -211,7 +210,7 @@ def test_files_are_on_the_disk_before_a_chunk_counts_as_finished(files, monkeypa
     forced, fsync = [], os.fsync
 
     def force(number):
-        forced.append((Path(f"/proc/self/fd/{number}").readlink(), count_finished(path)))
+        forced.append((Path(f"/proc/self/fd/{number}").readlink(), count_chunks(path)))
         fsync(number)
 
     monkeypatch.setattr(os, "fsync", force)
@@ -222,10 +221,6 @@ def test_files_are_on_the_disk_before_a_chunk_counts_as_finished(files, monkeypa
         assert {file, *file.parents[: len(file.relative_to(path).parts)]} <= before
     mark = prepared.store.layer("seconds").file_of(chunk)
     assert (mark, 1) in forced and (path, 1) in forced
-
-
-def count_finished(path: Path) -> int:
-    return sum(file.is_file() for file in (path / "seconds" / "c").rglob("*"))
 
 
 def test_a_file_that_was_not_renamed_is_not_seen(finished):
