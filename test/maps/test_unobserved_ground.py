@@ -7,15 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics import Terrain, load_rover
+from rover_physics import Terrain
 from rover_planner.maps.layers import FOOTPRINT, CellSources
 from rover_planner.maps.unobserved_ground import SEEN, UNSEEN, ObservedGround, observed_ground
 from rover_planner.parameters.traverse_server import ALLOW, ALLOW_FOOTPRINT, REFUSE
+from support.rovers import LSR1
 
-LSR1 = load_rover("lsr1")  # its belly is 0.6 m x 0.4 m
 PATH = np.column_stack([np.arange(0.0, 2.0, 0.02), np.zeros(100), np.zeros(100)])
-
-
 SHAPE = (81, 161)
 LEVEL = Terrain(np.zeros(SHAPE), 0.05, (-2.0, -2.0))
 X = -2.0 + 0.05 * np.arange(161)
@@ -26,7 +24,8 @@ def test_the_share_is_that_of_the_cells_under_the_belly():
     elevation = np.zeros(SHAPE)
     elevation[:, (X >= 1.0) & (X < 1.5)] = np.nan
     share = observed_ground(replace(LEVEL, elevation=elevation), None).share(LSR1, PATH)
-    # The belly sweeps x from -0.3 to 2.28 m: 53 columns of cells, of which 10 are unknown.
+    # The belly, 0.6 m x 0.4 m, sweeps x from -0.3 to 2.28 m: 53 columns of cells, 10 of them
+    # unknown.
     assert share.unobserved_share == pytest.approx(10 / 53, abs=0.01)
     assert share.footprint_share == 0.0
     assert PATH[share.first, 0] == pytest.approx(0.7, abs=0.04)

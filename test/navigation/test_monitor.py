@@ -6,10 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.server_health import ERROR, OK, WARN
-from rover_planner.planning.answering.service_settings import load_service_settings
-from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.monitor import (
     ARRIVED,
     IDLE,
@@ -23,15 +20,14 @@ from rover_planner.planning.navigation.monitor import (
 from rover_planner.planning.navigation.watched_path import WatchedPath
 from rover_planner.planning.verdict_report import SuspensionReport
 from support.grounds import make_terrain, wall_at, waves
+from support.services import make_service
 
 STRAIGHT = np.column_stack([np.linspace(-2.0, 2.0, 201), np.zeros(201), np.zeros(201)])
 
 
 @pytest.fixture(scope="module")
 def service():
-    service = TraverseService(load_service_settings(TraverseServerParameters()))
-    service.take_terrain(make_terrain(waves))
-    return service
+    return make_service(make_terrain(waves))
 
 
 def sight(service, pose, time=0.0, ground=waves):

@@ -47,9 +47,9 @@ class Work:
 class Desk:
     """A queue whose judgements are collected as (name, judgement)."""
 
-    def __init__(self, max_waiting: int = 100):
+    def __init__(self):
         self.told: list[tuple[str, object]] = []
-        self.max_waiting = max_waiting
+        self.max_waiting = 100
         self.queue = QuestionQueue(
             lambda asked: asked.question.judge(asked.budget),
             lambda _finish: None,
@@ -115,14 +115,13 @@ def test_a_question_that_never_began_is_busy(desk):
     assert desk.wait(2) == [("first", TOO_LONG), ("second", BUSY)]
 
 
-def test_beyond_the_queue_the_answer_is_busy_at_once():
-    desk = Desk(max_waiting=1)
+def test_beyond_the_queue_the_answer_is_busy_at_once(desk):
+    desk.max_waiting = 1
     assert desk.work("works", work_on, seconds=0.5).begun.wait(20.0)
     desk.ask("waits", lambda _: 5, seconds=20.0)
     desk.ask("too many", lambda _: 6)
     assert desk.told == [("too many", BUSY)]
     assert sorted(desk.wait(3)[1:]) == [("waits", 5), ("works", TOO_LONG)]
-    desk.queue.close()
 
 
 def test_work_that_checks_nothing_is_refused_after_its_grace_and_its_answer_is_dropped(desk):
