@@ -20,7 +20,7 @@ RESOLUTION = 0.1
 """Cell size of the maps [m]."""
 
 
-def make_rough_map(rows=150, columns=170, **layers) -> Terrain:
+def make_rough_map(rows=150, columns=170, origin=(1200.0, -340.0)) -> Terrain:
     """Return waves with rocks, a wall and a hole of unknown ground, far from the origin."""
     rng = np.random.default_rng(3)
     y, x = np.mgrid[0:rows, 0:columns] * RESOLUTION
@@ -29,7 +29,7 @@ def make_rough_map(rows=150, columns=170, **layers) -> Terrain:
         heights += 0.15 * np.exp(-((x - at_x) ** 2 + (y - at_y) ** 2) / 0.03)
     heights[:, columns // 2 : columns // 2 + 3] += 0.6 * (y[:, :1] < 0.7 * rows * RESOLUTION)
     heights[rows // 3 : rows // 3 + 2, columns // 4 : columns // 4 + 2] = np.nan
-    return Terrain(heights, RESOLUTION, (1200.0, -340.0), **layers)
+    return Terrain(heights, RESOLUTION, origin)
 
 
 def make_request(**changes) -> SurveyRequest:

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measured angles and pose give the six contacts, and with them the ground under the rover."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -11,7 +9,8 @@ from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.maps.ground_beneath import Standing, find_ground_beneath
 from rover_planner.maps.layers import CONTACT, FOOTPRINT
 from rover_planner.maps.living_map import LivingMap
-from support.grounds import make_terrain, rocky, waves
+from support.grounds import make_terrain, raised, rocky, waves
+from support.rough_grounds import with_std
 from support.rovers import LSR1, M2020
 
 SLOPE = make_terrain(lambda x, y: 0.2 * x - 0.15 * y + 3.0)
@@ -46,10 +45,8 @@ def test_the_contacts_of_a_settled_rover_lie_on_the_ground(rover, yaw):
 
 def blind_behind(ground, x):
     """Return a ground that is unknown up to x."""
-    elevation = ground.elevation.copy()
-    columns = ground.origin[0] + ground.resolution * np.arange(elevation.shape[1])
-    elevation[:, columns < x] = np.nan
-    return replace(ground, elevation=elevation)
+    columns = ground.origin[0] + ground.resolution * np.arange(ground.elevation.shape[1])
+    return raised(ground, np.s_[:, columns < x], np.nan)
 
 
 def fill(living, standing, margin=0.0):
@@ -126,7 +123,6 @@ def test_a_contact_replaces_what_was_assumed_and_a_map_replaces_both():
 
 def test_filled_heights_are_uncertain_on_an_uncertain_map_only():
     assert filled(SLOPE).snapshot().terrain.elevation_std is None
-    uncertain = replace(SLOPE, elevation_std=np.full(SLOPE.elevation.shape, 0.001))
-    std = filled(uncertain).snapshot()
+    std = filled(with_std(SLOPE, 0.001)).snapshot()
     is_filled = np.isin(std.sources.source, (CONTACT, FOOTPRINT))
     assert (std.terrain.elevation_std[is_filled] == 0.02).all()

@@ -17,6 +17,7 @@ from rover_planner.errors import PlanningError
 from rover_planner.survey.chunk_survey import compute_chunk
 from rover_planner.survey.store import NOTES, SurveyStore
 from rover_planner.survey.survey import prepare_survey
+from support.grounds import raised
 from support.rovers import LSR1, M2020
 from support.survey_maps import (
     assert_same_bits,
@@ -34,11 +35,9 @@ HEAVIER = replace(LSR1, wheel=replace(LSR1.wheel, mass=0.36))
 @pytest.fixture(scope="module")
 def surveyed(tmp_path_factory):
     """Return a folder with a map, whose first chunk of 16 cells is unknown, and its survey."""
-    ground, request = make_rough_map(140, 140), make_request(step=4, headings=2)
-    elevation = ground.elevation.copy()
-    elevation[:100, :100] = np.nan
+    ground = raised(make_rough_map(140, 140), np.s_[:100, :100], np.nan)
     folder = tmp_path_factory.mktemp("surveyed")
-    survey_here(folder, replace(ground, elevation=elevation), request, chunk=16)
+    survey_here(folder, ground, make_request(step=4, headings=2), chunk=16)
     return folder
 
 
@@ -101,10 +100,7 @@ def test_a_store_of_another_map_or_version_is_refused(files, monkeypatch):
     with pytest.raises(PlanningError, match="another version: .*, not 99.0"):
         prepare(files)
     monkeypatch.undo()
-    terrain = make_rough_map(70, 70)
-    heights = terrain.elevation.copy()
-    heights[5, 5] += 1e-9
-    save_terrain(files / "map.npz", replace(terrain, elevation=heights))
+    save_terrain(files / "map.npz", raised(make_rough_map(70, 70), (5, 5), 1e-9))
     with pytest.raises(PlanningError, match="another map"):
         prepare(files)
 

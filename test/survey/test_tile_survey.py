@@ -36,7 +36,7 @@ TOP_HEAVY = replace(
 
 @pytest.fixture(scope="module")
 def ground() -> Terrain:
-    return replace(make_rough_map(110, 110), origin=(0.0, 0.0))
+    return make_rough_map(110, 110, (0.0, 0.0))
 
 
 def places_on(terrain: Terrain, every=4) -> np.ndarray:
@@ -206,8 +206,8 @@ def test_any_chunks_give_the_same_bits(tmp_path, step, chunk):
 
 @pytest.mark.parametrize("policy", ["equal", "servo", "optimal"])
 def test_ground_beyond_the_halo_is_not_looked_at(policy):
-    request, terrain = make_request(policy=policy, turns=True), make_rough_map(120, 120)
-    terrain = replace(terrain, origin=(0.0, 0.0))
+    request = make_request(policy=policy, turns=True)
+    terrain = make_rough_map(120, 120, (0.0, 0.0))
     halo, first, end = find_halo(request.rover, terrain.resolution), 40, 80
     heights = np.full_like(terrain.elevation, np.nan)
     heights[:, 60:] = 5.0

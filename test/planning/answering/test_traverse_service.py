@@ -14,7 +14,8 @@ from rover_planner.planning.answering.search_watch import NewerMapError, SearchW
 from rover_planner.planning.answering.snapshot import GivenPath
 from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.path_geometry import densify
-from support.grounds import make_terrain, rocky, wall_at, waves
+from support.grounds import make_terrain, raised, rocky, wall_at, waves
+from support.rough_grounds import with_std
 from support.services import load_settings, make_service
 
 FAN = {"planner": "fan", "candidate_count": 1}
@@ -23,7 +24,7 @@ FAN = {"planner": "fan", "candidate_count": 1}
 
 def test_an_uncertain_map_is_judged_by_its_bounds_as_the_settings_say():
     certain = make_terrain(waves)
-    uncertain = replace(certain, elevation_std=np.full(certain.elevation.shape, 0.005))
+    uncertain = with_std(certain, 0.005)
     start, goal = (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
     service = make_service(uncertain, **FAN)
     refused = service.snapshot().answer(start, goal).report.to_dict()
@@ -107,10 +108,7 @@ def test_what_was_learned_on_a_class_of_ground_holds_for_all_of_it():
 
 
 def test_gaps_are_filled_or_not_as_the_settings_say_even_afterwards():
-    terrain = make_terrain(waves)
-    elevation = terrain.elevation.copy()
-    elevation[80, 80] = np.nan
-    service = make_service(replace(terrain, elevation=elevation))
+    service = make_service(raised(make_terrain(waves), (80, 80), np.nan))
     assert np.isnan(service.terrain.elevation[80, 80])
     service.settings = load_settings(unknown_cells="interpolate")
     service.refresh_map()
@@ -199,7 +197,7 @@ def test_densify_refuses_an_endless_path():
 def test_a_changed_map_ends_a_search_while_there_is_patience():
     ground, start, goal = make_terrain(wall_at(0.0)), (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
     service, reports = make_service(ground, planner="lattice", search_budget=60.0), []
-    newer = replace(ground, elevation=ground.elevation + 0.01)
+    newer = raised(ground, ..., 0.01)
     maps = [service.known_map]
 
     def look_and_change(report):
