@@ -41,24 +41,17 @@ def test_the_start_footprint_is_told_apart():
     assert [share.first_refused(rule) for rule in (ALLOW, ALLOW_FOOTPRINT, REFUSE)] == [-1, -1, 0]
 
 
-def test_ground_off_the_map_was_not_seen():
-    kinds = np.full(SHAPE, SEEN, np.uint8)
-    far = PATH + np.array([5.0, 0.0, 0.0])
-    share = ObservedGround(LEVEL, kinds).share(LSR1, far)
-    assert share.first == share.first_beyond_footprint
-    assert 5.6 < far[share.first, 0] + 0.3 + 0.06 < 6.2
-    assert share.unobserved_share == 0.0  # the shares are those of cells on the map
-    away = ObservedGround(LEVEL, kinds).share(LSR1, PATH + np.array([1e7, 0.0, 0.0]))
-    assert (away.unobserved_share, away.first) == (1.0, 0)
-
-
-def test_a_long_path_off_the_map_takes_no_time():
-    x = np.arange(0.0, 20_000.0, 0.02)
+def test_ground_off_the_map_was_not_seen_and_a_long_path_there_takes_no_time():
+    x, seen = np.arange(0.0, 20_000.0, 0.02), observed_ground(LEVEL, None)
     path = np.column_stack([x, 0.0 * x, 0.0 * x])
     began = time.process_time()
-    share = observed_ground(LEVEL, None).share(LSR1, path)
+    share = seen.share(LSR1, path)
     assert time.process_time() - began < 2.0
-    assert 5.6 < path[share.first, 0] + 0.3 < 6.2 + 0.6
+    assert share.first == share.first_beyond_footprint
+    assert 5.6 < path[share.first, 0] + 0.3 + 0.06 < 6.2
+    assert share.unobserved_share == 0.0  # the shares are those of cells on the map
+    away = seen.share(LSR1, PATH + np.array([1e7, 0.0, 0.0]))
+    assert (away.unobserved_share, away.first) == (1.0, 0)
 
 
 def test_a_long_path_counts_each_cell_once():

@@ -17,6 +17,7 @@ from rover_planner.survey.dask_cluster import ClusterSettings
 from rover_planner.survey.runner import run_survey
 from rover_planner.survey.store import SurveyStore
 from rover_planner.survey.survey import prepare_survey
+from support.project.checkout import TOP
 from support.survey_maps import (
     assert_same_bits,
     count_chunks,
@@ -31,7 +32,6 @@ from support.waiting import wait_until, wait_until_gone
 
 pytestmark = pytest.mark.long
 
-REPOSITORY = Path(__file__).resolve().parents[2]
 SIDE = 180
 """Cells of a side of the map; it has 9 chunks."""
 SHARED = ("--headings", 4, "--chunk", 64, "--workers", 2)
@@ -54,7 +54,7 @@ def start(module, *words) -> subprocess.Popen:
 
     return subprocess.Popen(
         [sys.executable, "-m", module, *map(str, words)],
-        env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
+        env=os.environ | {"PYTHONPATH": str(TOP)},
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heed_signals,
     )  # fmt: skip
 
