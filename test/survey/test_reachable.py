@@ -165,17 +165,19 @@ def test_the_command_prints_area_and_longest_way_and_draws_them(tmp_path, capfd)
         find_reachable(store, 3.0, 2.0)
 
 
-def test_a_start_where_the_rover_cannot_stand_says_why(tmp_path, capfd):
+def test_a_start_where_the_rover_cannot_stand_says_why_and_is_drawn(tmp_path, capfd):
     elevation = np.zeros((60, 60))
     elevation[:, 30:] += 2.0 * 0.1 * np.arange(30)  # 63 degrees
     store = survey_here(tmp_path, Terrain(elevation, 0.1), make_request()).store
     codes = json.loads((store.path / "zarr.json").read_text())["attributes"][NOTES]["limits"]
     first = codes[str(int(store.layer("first_limit")[30, 45]))]
-    assert main(["reachable", str(store.path), "--from", "4.5,3"]) == 0
+    picture = tmp_path / "area.png"
+    words = ["reachable", str(store.path), "--picture", str(picture), "--from"]
+    assert main([*words, "4.5,3"]) == 0 and picture.stat().st_size > 1000
     report = json.loads(capfd.readouterr().out)
     assert report["cells"] == 0 and first
     assert report["reason"] == f"no heading is passable at the start: {first}"
-    assert main(["reachable", str(store.path), "--from", "1.5,3"]) == 0
+    assert main([*words, "1.5,3"]) == 0
     report = json.loads(capfd.readouterr().out)
     assert report["cells"] > 0 and report["reason"] == ""
 
