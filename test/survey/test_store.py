@@ -161,15 +161,15 @@ def test_a_missing_layer_is_named(files):
         SurveyStore(path)
 
 
-def test_a_chunk_that_lost_a_file_is_done_again(finished):
+def test_a_chunk_that_lost_a_file_or_its_mark_is_done_again(finished):
     request = make_request(step=4, headings=2)
     prepared = prepare(finished, request)
     before = layers_of(prepared.store)
     assert prepared.chunks == []
-    for lost in ((0, 0), (2, 1)):  # in the first one nothing is known
-        (prepared.store.path / "worst_tilt" / "c" / str(lost[0]) / str(lost[1])).unlink()
+    for lost in ("worst_tilt/c/0/0", "worst_tilt/c/2/1", "seconds/c/0/1"):
+        (prepared.store.path / lost).unlink()  # in the first one nothing is known
     again = prepare(finished, request)
-    assert again.chunks == [(0, 0), (2, 1)] and again.finished == 7
+    assert again.chunks == [(0, 0), (0, 1), (2, 1)] and again.finished == 6
     assert_same_bits(layers_of(compute_here(again).store), before)
     assert prepare(finished, request).chunks == []
 

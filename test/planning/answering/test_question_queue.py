@@ -56,15 +56,14 @@ class Desk:
             lambda place, error: f"{place}: {error!r}",
         )
 
-    def ask(self, name, work, seconds: float = 20.0, clock=time.monotonic) -> None:
-        question = Question(name, "", work, lambda code, _: code)
-        self.put(question, Budget(seconds, clock))
-
-    def put(self, question, budget) -> None:
+    def ask(
+        self, name, work, seconds=20.0, clock=time.monotonic, refuse=lambda code, _: code
+    ) -> None:
         def answer(judgement) -> None:
-            self.told.append((question.service, judgement))
+            self.told.append((name, judgement))
 
-        self.queue.ask(Asked(question, budget, answer), self.max_waiting)
+        asked = Asked(Question(name, "", work, refuse), Budget(seconds, clock), answer)
+        self.queue.ask(asked, self.max_waiting)
 
     def work(self, name, answer, seconds: float) -> Work:
         """Ask a question whose time begins with the work on it."""
@@ -141,8 +140,7 @@ def test_work_that_checks_nothing_is_refused_after_its_grace_and_its_answer_is_d
 
 def test_errors_of_the_input_are_bad_requests_and_others_internal_errors(desk):
     for name, error in (("one", PoseError("no pose")), ("two", KeyError("k"))):
-        work = Mock(side_effect=error)
-        desk.put(Question(name, "", work, lambda *both: both), Budget(20.0))
+        desk.ask(name, Mock(side_effect=error), refuse=lambda *both: both)
     first, second = (told for _, told in desk.wait(2))
     assert first == ("bad_request", "no pose")
     assert second == ("internal_error", "internal error: two: KeyError('k')")
