@@ -222,6 +222,8 @@ class Learned:
     """The friction when slip first bounds it."""
     stuck_time: float | None
     """When the rover was stuck in truth [s]."""
+    noticed_time: float | None
+    """When it was first said to be stuck from then on [s]; one that creeps may be before, too."""
     passed: bool
     """Whether it reached its end."""
     way_before_notice: float | None
@@ -248,17 +250,21 @@ def learn(drive: LearningDrive, keep: Path) -> Learned | None:
         return None
     learner, early = GroundLearner(told_rover(), drive.obstacle.ground), None
     learner.commanded = SPEED
+    said: list[float] = []
     for row in drive.add_noise(recorded.rows):
-        if learner.take(row) and early is None:
+        is_new = learner.take(row)
+        if is_new and learner.stuck and learner.window is not None:
+            said.append(learner.window.time)
+        if is_new and early is None:
             estimate = learner.estimate
             if estimate.slip_time is not None and estimate.friction.high is not None:
                 early = estimate.friction
     if learner.window is None:
         return None
     under = drive.find_friction(learner.window.places)
-    noticed = learner.estimate.immobilised_time
-    stuck, way = find_stuck(recorded), None if noticed is None else find_way(recorded, noticed)
-    return Learned(drive, learner.estimate, under, early, stuck, recorded.passed, way)
+    stuck, way = find_stuck(recorded), find_way(recorded, said[0]) if said else None
+    noticed = next((time for time in said if stuck is not None and time >= stuck), None)
+    return Learned(drive, learner.estimate, under, early, stuck, noticed, recorded.passed, way)
 
 
 def has_truth(estimate: FrictionEstimate, truth: float) -> bool:
@@ -413,7 +419,7 @@ def print_summary(learned: list[Learned]) -> None:
     columns = {"friction": "", "drives": "", "bounded": "", "median error": ".1%"}
     columns |= {"within 10 %": ".0%", "interval has it": ".0%"}
     print_table("By layout of the friction", columns, rows)
-    stuck = [(one.stuck_time, one.estimate.immobilised_time) for one in learned]
+    stuck = [(one.stuck_time, one.noticed_time) for one in learned]
     delays = sorted(
         noticed - since for since, noticed in stuck if since is not None and noticed is not None
     )

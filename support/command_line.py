@@ -22,11 +22,9 @@ def write_ground_and_path(folder: Path) -> Path:
     return folder
 
 
-def predict_arguments(
-    folder: Path, rover="lsr1", terrain="terrain.npz", poses="poses.npz", out="out.npz"
-) -> list[str]:
-    """Return the arguments of `rover_planner predict` for files of a folder."""
-    return ["predict", str(rover), *(str(folder / name) for name in (terrain, poses, out))]
+def predict_arguments(folder: Path, terrain="terrain.npz", out="out.npz") -> list[str]:
+    """Return the arguments of `rover_planner predict` for files of a folder and the rover lsr1."""
+    return ["predict", "lsr1", *(str(folder / name) for name in (terrain, "poses.npz", out))]
 
 
 def assert_refused(capfd, code: int, word: str) -> None:

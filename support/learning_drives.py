@@ -8,7 +8,7 @@ import numpy as np
 from rover_physics import Rover, Terrain
 from rover_physics.names import STEERING_JOINTS, SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.arrays import Floats
-from rover_physics.numerics.quaternions import matrix_from_xyzw
+from rover_physics.numerics.quaternions import rpy_from_xyzw
 from rover_planner.learning import drive_log as log
 from rover_planner.simulator.quasi_static_plant import QuasiStaticPlant
 from rover_planner.simulator.simulation import Plant
@@ -65,9 +65,8 @@ def drive_over_soil(rover: Rover, ground: Terrain, soil: str, seconds: float) ->
 def row_of_plant(plant: Plant, time: float) -> Floats:
     """Return what is measured of a simulated rover at a time [s]."""
     state, row = plant.state(), np.full(log.WIDTH, np.nan)
-    R = matrix_from_xyzw(state.orientation)
     row[[log.TIME, log.X, log.Y, log.YAW]] = time, *plant.pose()
-    row[[log.ROLL, log.PITCH]] = np.arctan2(R[2, 1], R[2, 2]), np.arcsin(-R[2, 0])
+    row[[log.ROLL, log.PITCH]] = rpy_from_xyzw(state.orientation)[:2]
     row[log.SUSPENSION] = [state.joint_positions[name] for name in SUSPENSION_JOINTS]
     row[log.RATES] = [state.joint_velocities[name] for name in WHEEL_JOINTS]
     row[log.STEERING] = [state.joint_positions.get(name, 0.0) for name in STEERING_JOINTS]
@@ -80,9 +79,8 @@ def ramp(slope: float) -> Terrain:
     return plane(slope, 0.0, half=3.0)
 
 
-def write_csv(path: Path, rows: Floats, names: list[str] | None = None) -> None:
+def write_csv(path: Path, rows: Floats, names: list[str] = NAMES) -> None:
     """Write rows as a CSV file, in an order of columns; NaN becomes an empty field."""
-    names = NAMES if names is None else names
     lines = [",".join(names)]
     places = [NAMES.index(name) for name in names]
     for row in rows[:, places].tolist():

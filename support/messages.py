@@ -79,6 +79,14 @@ def send_map_odom(node: Any, rigid: Rigid, age: float = 0.0, is_static: bool = F
     node.frames.take(SimpleNamespace(transforms=[transform]), is_static=is_static)
 
 
+def set_field(message: Any, path: str, value: Any) -> None:
+    """Set a field of a message, given by names and places in lists such as poses.2.pose."""
+    *inner, last = path.split(".")
+    for name in inner:
+        message = message[int(name)] if name.isdigit() else getattr(message, name)
+    setattr(message, last, value)
+
+
 def grid_map_of(
     layers: dict[str, np.ndarray],
     resolution: float = 0.05,

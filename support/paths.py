@@ -14,11 +14,10 @@ def arc_of(curvature: float, along: np.ndarray, yaw: float = 0.0) -> np.ndarray:
     """Return poses on an arc through the origin, where it has a heading `yaw` [rad].
 
     Args:
-        curvature: Its curvature [1/m], positive to the left.
+        curvature: Its curvature [1/m], positive to the left; 0 on a straight line.
         along: (n,) way of each pose from the origin [m].
         yaw: Heading at the origin [rad].
     """
     turn = curvature * along
-    x, y = np.sin(turn) / curvature, (1.0 - np.cos(turn)) / curvature
-    c, s = np.cos(yaw), np.sin(yaw)
-    return poses_at(c * x - s * y, s * x + c * y, yaw + turn)
+    chord, direction = along * np.sinc(0.5 * turn / np.pi), yaw + 0.5 * turn
+    return poses_at(chord * np.cos(direction), chord * np.sin(direction), yaw + turn)

@@ -9,16 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from rover_physics import PathPrediction, Terrain, judge_path, judge_poses, load_rover
+from rover_physics import PathPrediction, Terrain, judge_poses, load_rover
 
 DATA = Path(__file__).resolve().parents[1] / "test" / "data"
 FILES = ("settled_a.npz", "settled_b.npz")
-STEERED = "steered.npz"
+STEERED = ("steered.npz",)
 """File of the cases with turned end wheels."""
-
-
-TURNED = ("rear_r", "mid_r", "front_r", "rear_l", "mid_l", "front_l")
-"""Names of the wheels in the files, in wheel order."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,14 +37,12 @@ class ReferenceGround:
     """(n, 4) angles of rocker right and left, bogie right and left [rad]."""
     curvature: np.ndarray
     """(n,) curvature that the end wheels are turned for [1/m], 0 where none is turned."""
-    steering: np.ndarray
-    """(n, 6) steering angles [rad]."""
 
 
-@lru_cache(maxsize=1)
-def reference_grounds() -> tuple[ReferenceGround, ...]:
-    """Return all grounds of both files with straight wheels, with their cases."""
-    return tuple(ground for file in FILES for ground in _read_grounds(file))
+@lru_cache
+def reference_grounds(files: tuple[str, ...] = FILES) -> tuple[ReferenceGround, ...]:
+    """Return all grounds of files, by default those with straight wheels, with their cases."""
+    return tuple(ground for file in files for ground in _read_grounds(file))
 
 
 def _read_grounds(file: str) -> Iterator[ReferenceGround]:
@@ -74,27 +68,25 @@ def _read_cases(label: str, terrain: Terrain, rows: list[dict]) -> ReferenceGrou
         attitude=column("roll", "pitch"),
         joints=column("rocker_r", "rocker_l", "bogie_r", "bogie_l"),
         curvature=np.array([row.get("kappa", 0.0) for row in rows]),
-        steering=np.array(
-            [[row.get("steering", {}).get(wheel, 0.0) for wheel in TURNED] for row in rows]
-        ),
     )
 
 
-@lru_cache(maxsize=1)
 def reference_predictions() -> tuple[tuple[ReferenceGround, PathPrediction], ...]:
-    """Return the model's predictions for all reference cases under equal torques."""
-    rover = load_rover("lsr1")
-    grounds = reference_grounds()
-    return tuple((case, judge_path(rover, case.terrain, case.poses)[0]) for case in grounds)
+    """Return the model's predictions for all cases with straight wheels under equal torques."""
+    return _predict(FILES)
 
 
-@lru_cache(maxsize=1)
 def steered_predictions() -> tuple[tuple[ReferenceGround, PathPrediction], ...]:
     """Return the model's predictions for the cases with turned wheels under equal torques."""
+    return _predict(STEERED)
+
+
+@lru_cache
+def _predict(files: tuple[str, ...]) -> tuple[tuple[ReferenceGround, PathPrediction], ...]:
     rover = load_rover("lsr1")
     return tuple(
         (case, judge_poses(rover, case.terrain, case.poses, case.curvature)[0])
-        for case in _read_grounds(STEERED)
+        for case in reference_grounds(files)
     )
 
 

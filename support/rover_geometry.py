@@ -29,6 +29,8 @@ class Placed:
     """(3,) body origin [m]."""
     wheels: np.ndarray
     """(6, 3) wheel centres, computed from the suspension angles [m]."""
+    axles: np.ndarray
+    """(6, 3) axles of the wheels, each turned about the z axis of its link."""
     rocker_pivots: np.ndarray
     """(2, 3) [m]."""
     bogie_pivots: np.ndarray
@@ -49,7 +51,7 @@ def place_rover(rover: Rover, prediction: PathPrediction, i: int) -> Placed:
     """Return the positions of the parts at waypoint i, from pose and suspension angles only."""
     R, origin = attitude_of(prediction, i), prediction.position[i]
     suspension, masses = rover.suspension, rover.masses
-    wheels, on_bogie, rocker_pivots, bogie_pivots = [], [], [], []
+    wheels, axles, on_bogie, rocker_pivots, bogie_pivots = [], [], [], [], []
     parts = [(masses.body.mass, R @ np.array(masses.body.com) + origin, None, False)]
     for side, mirror in enumerate((np.array([1, -1, 1.0]), np.ones(3))):
         angle = prediction.rocker_angle[i, side]
@@ -65,6 +67,8 @@ def place_rover(rover: Rover, prediction: PathPrediction, i: int) -> Placed:
 
         for name in ("rear", "middle", "front"):
             carried = name != suspension.rocker_wheel
+            steered = Rotation.from_rotvec([0.0, 0.0, prediction.steering_angle[i, len(wheels)]])
+            axles.append(R @ (links[carried][0] * steered).apply([0.0, 1.0, 0.0]))
             wheels.append(place(suspension.wheels[name], carried))
             on_bogie.append(carried)
             parts.append((rover.wheel.mass, wheels[-1], side, carried))
@@ -73,22 +77,14 @@ def place_rover(rover: Rover, prediction: PathPrediction, i: int) -> Placed:
         rocker_pivots.append(R @ rocker_pivot + origin)
         bogie_pivots.append(R @ bogie_pivot + origin)
     return Placed(
-        R, origin, np.array(wheels), np.array(rocker_pivots), np.array(bogie_pivots),
-        np.array(on_bogie), parts,
+        R, origin, np.array(wheels), np.array(axles), np.array(rocker_pivots),
+        np.array(bogie_pivots), np.array(on_bogie), parts,
     )  # fmt: skip
 
 
 def wheel_axes(rover: Rover, prediction: PathPrediction, i: int) -> np.ndarray:
-    """Return the axles (6, 3) of the wheels, each turned about the z axis of its link."""
-    attitude, axes = attitude_of(prediction, i), []
-    for wheel, turn in enumerate(prediction.steering_angle[i]):
-        side, name = wheel // 3, ("rear", "middle", "front")[wheel % 3]
-        angle = prediction.rocker_angle[i, side]
-        if name != rover.suspension.rocker_wheel:
-            angle += prediction.bogie_angle[i, side]
-        link = Rotation.from_rotvec([0.0, angle, 0.0]) * Rotation.from_rotvec([0.0, 0.0, turn])
-        axes.append(attitude @ link.apply([0.0, 1.0, 0.0]))
-    return np.array(axes)
+    """Return the axles (6, 3) of the wheels at waypoint i."""
+    return place_rover(rover, prediction, i).axles
 
 
 def contact_frames(rover: Rover, prediction: PathPrediction, i: int) -> np.ndarray:
@@ -118,20 +114,18 @@ def balance_sums(rover: Rover, placed: Placed, acting: list) -> np.ndarray:
     """
     axis = placed.attitude[:, 1]
 
-    def moment(pivot, choose):
-        about = (np.cross(p - pivot, f) for f, p, side, bogie in acting if choose(side, bogie))
+    def moment(pivot, side=None, bogie_only=False):
+        about = (
+            np.cross(point - pivot, force)
+            for force, point, its_side, on_bogie in acting
+            if side in (None, its_side) and (on_bogie or not bogie_only)
+        )
         return sum(about, start=np.zeros(3))
 
     total_force = sum((force for force, *_ in acting), start=np.zeros(3))
-    total_moment = moment(placed.origin, lambda side, bogie: True)
-    about_bogies = [
-        axis @ moment(placed.bogie_pivots[k], lambda side, bogie, k=k: bogie and side == k)
-        for k in range(2)
-    ]
-    about_rockers = [
-        axis @ moment(placed.rocker_pivots[k], lambda side, bogie, k=k: side == k)
-        for k in range(2)
-    ]
+    total_moment = moment(placed.origin)
+    about_bogies = [axis @ moment(placed.bogie_pivots[k], k, bogie_only=True) for k in range(2)]
+    about_rockers = [axis @ moment(placed.rocker_pivots[k], k) for k in range(2)]
     wheels = rover.suspension.wheels
     base = wheels["front"][0] - wheels["rear"][0]
     moments = [*total_moment, *about_bogies, about_rockers[0] - about_rockers[1]]

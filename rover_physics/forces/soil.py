@@ -83,8 +83,6 @@ class WheelOnSoil(NamedTuple):
     """Sinkage [m]."""
     resistance: float
     """Motion resistance [N]."""
-    drawbar_pull: float
-    """Largest drawbar pull [N], negative if the resistance exceeds the thrust."""
     torque: float
     """Wheel torque [N m] that the forces need."""
     utilisation: float
@@ -118,12 +116,12 @@ def solve_wheel(soil, wheel, N, T, S):
     """
     mu, radius, width = wheel.friction, wheel.radius, wheel.width
     if not N > 0.0:
-        return WheelOnSoil(1.0, 0.0, 0.0, 0.0, radius * T, np.inf)
+        return WheelOnSoil(1.0, 0.0, 0.0, radius * T, np.inf)
     if soil[SOIL_MODEL] == COULOMB:
         largest = _own_friction(soil, mu) * N
         utilisation = np.sqrt(T * T + S * S) / largest
         slip = coulomb_slip(utilisation)
-        return WheelOnSoil(slip, 0.0, 0.0, largest, radius * T, utilisation)
+        return WheelOnSoil(slip, 0.0, 0.0, radius * T, utilisation)
     sinkage = find_sinkage(soil, radius, width, N)
     resistance = motion_resistance(soil, width, sinkage)
     length = contact_length(radius, sinkage)
@@ -134,9 +132,7 @@ def solve_wheel(soil, wheel, N, T, S):
     slip = 1.0 if thrust >= 0.0 else -1.0
     if utilisation <= 1.0:
         slip = _slip_of_thrust(thrust, S, strength, soil[SHEAR_MODULUS] / length)
-    return WheelOnSoil(
-        slip, sinkage, resistance, largest - resistance, radius * thrust, utilisation
-    )
+    return WheelOnSoil(slip, sinkage, resistance, radius * thrust, utilisation)
 
 
 @kernel

@@ -2,32 +2,40 @@
 """Poses between waypoints, where wheels climb faces, roll off edges, or sweep round in a turn.
 
 A wheel contact can jump from one waypoint to the next. The poses in between then decide whether
-the rover gets there. The path is divided around each jump until the jump is resolved, its place
-decides nothing, or the piece is shorter than MIN_SPACING. A jump in height that remains is at one
-place. Upwards, the wheel climbs a face: it is held at heights from foot to edge, with the face as
-its contact, and evaluated at each. Downwards, the wheel drops.
+the rover gets there. The path is halved around each jump until the jump is resolved, its place
+decides nothing, or the stretch is shorter than MIN_SPACING (see `halving.py`). A jump in height
+that remains is at one place. Upwards, the wheel climbs a face: it is held at heights from foot to
+edge, with the face as its contact, and evaluated at each. Downwards, the wheel drops.
 """
 
-from enum import IntEnum
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rover_physics.prediction.failures import mark_failures
+from rover_physics.numerics.interruption import check_interruption
+from rover_physics.numerics.threads import limit_threads, run_in_turn
+from rover_physics.prediction.evaluation import NONE_HELD, evaluate_poses, new_works
+from rover_physics.prediction.halving import AtFailure, Progress, Stretches
 from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import (
     HEIGHT_JUMP,
     NO_CROSSINGS,
     Crossings,
+    Wheels,
     find_jumps,
     join_crossings,
     none_held,
-    sort_pieces,
     steps_between,
 )
-from rover_physics.results.record import place_results, select_results
-from rover_physics.results.uses import readable
+from rover_physics.results.record import (
+    forget_uncomputable,
+    new_results,
+    numbers_of,
+    place_results,
+    select_results,
+)
 from rover_physics.status import PoseStatus
 from rover_physics.terrain.grid import Terrain
 
@@ -36,20 +44,15 @@ TURNED = 0.1
 evaluated with the wheels turned where it still stands. Smaller changes count as gradual."""
 TURN_SPACING = 0.25
 """Largest distance of the outermost wheel [wheel radii] between poses of a turn."""
+GROUP = 32
+"""Number of stretches that are halved together."""
+POSES_IN_STRETCH = 8
+"""Space for so many poses is provided for each stretch at a time."""
+Searched = tuple[NDArray[np.int64], NDArray[np.int64], Wheels, int]
+"""The last fields of `Stretches`."""
 CLIMB_STAGES = np.linspace(0.0, 1.0, 6)
 """Fractions of a face's height at which a climbing wheel is evaluated. The foot (0) counts only if
 the wheel already touches the edge of the face there: no later contact is as steep."""
-
-
-class AtFailure(IntEnum):
-    """What is searched no further once a pose between waypoints fails in any case."""
-
-    SEARCH_ON = 0
-    """Nothing: all is searched."""
-    LEAVE_REST = 1
-    """The rest of its path."""
-    LEAVE_PATH = 2
-    """Its whole path."""
 
 
 def find_crossings(
@@ -79,67 +82,96 @@ def find_crossings(
     turns, inside, jumps_in_turns = _divide_turns(model, poses, results, joined)
     if not len(jumps) and not len(inside):
         return at_rest
-    rows = jumps[:, :2].ravel()
+    rows = jumps.ravel()
     at_jumps = select_results(results, rows)
     path = Crossings(
         rows.astype(float), jumps[:, 1].repeat(2), none_held(len(rows)), poses[rows], at_jumps
     )
     known = join_crossings([path, turns])
-    jumps[:, :2] = np.arange(len(rows)).reshape(-1, 2)
-    jumps_in_turns[:, :2] += len(rows)
-    ends, path_of = np.vstack([jumps, jumps_in_turns]), np.append(0, np.cumsum(~joined))
-    while len(ends):
-        start = len(known.place)
-        known = join_crossings([known, _divide(model, known, ends)])
-        ends, closed = _sort_pieces(model, known, ends)
-        if len(closed):
-            known = join_crossings([known, climb_faces(model, known, closed)])
-        if at_failure and not model.wheels.on_servos:
-            failed = _find_failures(model, known.select(slice(start, None)))
-            ends = ends[_are_ahead(known.waypoint[ends[:, 0]], failed, path_of, at_failure)]
-    kept = (known.results["status"] != PoseStatus.NOT_SETTLED) | known.climbing
-    kept[: len(rows) + len(inside)] = np.append(np.zeros(len(rows), bool), inside)
-    return join_crossings([known.select(np.flatnonzero(kept)), at_rest]).in_order()
+    ends = np.vstack([np.arange(len(rows)).reshape(-1, 2), len(rows) + jumps_in_turns])
+    path_of = np.append(0, np.cumsum(~joined))
+    at_failure = AtFailure.SEARCH_ON if model.wheels.on_servos else at_failure
+    last = np.full(path_of[-1] + 1, len(path_of))
+    searched = last, path_of, model.wheels, int(at_failure)
+    found = _halve_in_turn(model, known, ends, searched)
+    in_turns = known.select(len(rows) + np.flatnonzero(inside))
+    return join_crossings([in_turns, *found, at_rest]).in_order()
 
 
-def _sort_pieces(
-    model: PackedModel, known: Crossings, ends: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the pieces to divide (k, 3) and to close (m, 2), of stretches that are divided."""
-    count = int(ends[:, 2].sum())
-    to_divide, to_close = np.empty((count, 3), np.int64), np.empty((count, 2), np.int64)
-    found = sort_pieces(ends, known.views, model.wheels, to_divide, to_close)
-    return to_divide[: found[0]], to_close[: found[1]]
+def _halve_in_turn(
+    model: PackedModel, known: Crossings, ends: NDArray[np.int64], searched: Searched
+) -> list[Crossings]:
+    """Evaluate the poses within stretches, in groups by threads.
 
-
-def _find_failures(model: PackedModel, found: Crossings) -> NDArray[np.int64]:
-    """Return the waypoints that follow poses which fail in any case."""
-    fails = np.empty(len(found.place), bool)
-    mark_failures(*readable(found.results), model.limits.records, model.wheels, fails)
-    fails &= (found.results["status"] != PoseStatus.NOT_SETTLED) | found.climbing
-    return found.waypoint[fails]
-
-
-def _are_ahead(
-    waypoints: NDArray[np.int64],
-    failed: NDArray[np.int64],
-    path_of: NDArray[np.int64],
-    at_failure: AtFailure,
-) -> NDArray[np.bool_]:
-    """Return which waypoints (k,) failures leave to be searched.
-
-    `failed` are the waypoints at which paths fail, `path_of` (n,) is the path of each waypoint.
+    Args:
+        model: The model.
+        known: Evaluated poses.
+        ends: (k, 2) rows of them at the ends of the stretches.
+        searched: The last fields of `Stretches`.
     """
-    last = np.full(len(path_of), len(path_of))
-    np.minimum.at(last, path_of[failed], -1 if at_failure == AtFailure.LEAVE_PATH else failed)
-    return np.asarray(waypoints <= last[path_of[waypoints]])
+    groups = np.array_split(ends, -(-len(ends) // GROUP)) if len(ends) else []
+    found = [NO_CROSSINGS] * len(groups)
+
+    def halve(k: int) -> None:
+        found[k] = _halve(model, known.select(groups[k].ravel()), searched)
+
+    with limit_threads(model.relative_cost(POSES_IN_STRETCH * len(ends))) as threads:
+        run_in_turn((partial(halve, k) for k in range(len(groups))), threads)
+    return found
+
+
+def _halve(model: PackedModel, known: Crossings, searched: Searched) -> Crossings:
+    """Evaluate the poses within stretches, and those of wheels that climb there.
+
+    Args:
+        model: The model.
+        known: (2k,) evaluated poses, by twos the ends of a stretch.
+        searched: As for `_halve_in_turn`.
+    """
+    first, stretches = len(known.place), len(known.place) // 2
+    numbers = np.array([first, first + stretches, 0])
+    ends = np.vstack([np.zeros((first, 2), np.int64), np.arange(first).reshape(-1, 2)])
+    closed, works, found = np.empty((0, 2), np.int64), new_works(1, 1), known
+    while numbers[Progress.NEXT] < numbers[Progress.ROWS]:
+        check_interruption()
+        more = numbers[Progress.ROWS] - len(found.place) + POSES_IN_STRETCH * stretches + 2
+        found = join_crossings([found, _unasked(more)])
+        rows = len(found.place)
+        ends, closed = (_lengthen(array, rows) for array in (ends, closed))
+        asked = Stretches(ends, found.place, found.waypoint, closed, numbers, *searched)
+        written, motions = (found.results, numbers_of(found.results)), np.empty((rows, 3))
+        places = found.poses, motions, NONE_HELD
+        limits = model.limits.records
+        evaluate_poses(model.records[None], limits, places, asked, works, written, (0, 1))
+    end, (last, path_of, *_) = numbers[Progress.ROWS], searched
+    forget_uncomputable(found.results[first:end])
+    closed = closed[: numbers[Progress.CLOSED]]
+    waypoint = found.waypoint[closed[:, 0]]
+    climbs = climb_faces(model, found, closed[waypoint <= last[path_of[waypoint]]])
+    settled = found.results["status"][first:end] != PoseStatus.NOT_SETTLED
+    return join_crossings([found.select(first + np.flatnonzero(settled)), climbs])
+
+
+def _unasked(count: int) -> Crossings:
+    """Return so many rows for poses to come."""
+    return Crossings(
+        np.empty(count), np.zeros(count, np.int64), none_held(count),
+        np.empty((count, 3)), new_results(count),
+    )  # fmt: skip
+
+
+def _lengthen(array: NDArray[np.int64], rows: int) -> NDArray[np.int64]:
+    """Return an array with so many rows; the new ones are to be written."""
+    longer = np.empty((rows, *array.shape[1:]), array.dtype)
+    longer[: len(array)] = array
+    return longer
 
 
 def list_jumps(
     model: PackedModel, poses: np.ndarray, results: Any, joined: np.ndarray
 ) -> np.ndarray:
-    """Return the neighbours between which to search, and numbers of pieces to divide them into."""
-    jumps = np.empty((len(poses), 3), np.int64)
+    """Return the neighbours between which to search, as rows (k, 2)."""
+    jumps = np.empty((len(poses), 2), np.int64)
     joined = np.array(joined)  # a kernel is compiled for each layout, and for read-only arrays
     return jumps[: find_jumps(results, poses, joined, model.wheels, jumps)]
 
@@ -153,7 +185,7 @@ def _divide_turns(
     """
     turns = find_turns(model, poses, results, joined)
     if not len(turns):
-        return NO_CROSSINGS, np.empty(0, bool), np.empty((0, 3), np.int64)
+        return NO_CROSSINGS, np.empty(0, bool), np.empty((0, 2), np.int64)
     first, pieces = np.repeat(turns, turns[:, 1] + 1, axis=0).T
     within = np.concatenate([np.arange(count + 1) for count in turns[:, 1]])
     inside, share = (within > 0) & (within < pieces), within / pieces
@@ -196,29 +228,6 @@ def find_turns(
     rows = np.flatnonzero(joined & far & (results["motion"][1:, 2] != 0.0))
     pieces = np.ceil(swing[rows] / (TURN_SPACING * wheels.radius)).astype(np.int64)
     return np.column_stack([rows, pieces])
-
-
-def _divide(model: PackedModel, known: Crossings, ends: np.ndarray) -> Crossings:
-    """Evaluate the poses that divide each stretch evenly.
-
-    They are in the order of the stretches. Their motions are those of the end of the stretch,
-    which lead there.
-
-    Args:
-        model: The model.
-        known: Evaluated poses.
-        ends: (k, 3) rows of `known` at the start and end of each stretch, and numbers of pieces.
-    """
-    before, after, pieces = np.repeat(ends, ends[:, 2] - 1, axis=0).T
-    last = np.cumsum(ends[:, 2] - 1)
-    share = (
-        1 + np.arange(len(before)) - np.repeat(last - ends[:, 2] + 1, ends[:, 2] - 1)
-    ) / pieces
-    place = known.place[before] + share * (known.place[after] - known.place[before])
-    steps = steps_between(known.poses[before], known.poses[after])
-    poses = known.poses[before] + share[:, None] * steps
-    results = model.evaluate(poses, motions=known.results["motion"][after])
-    return Crossings(place, known.waypoint[before], none_held(len(poses)), poses, results)
 
 
 def climb_faces(model: PackedModel, known: Crossings, ends: np.ndarray) -> Crossings:

@@ -17,6 +17,7 @@ from rover_physics.forces.stability import CORNERS, find_support, tip_over_angle
 from rover_physics.forces.torques import TORQUE_SEARCH, apply_torques, minimise_friction
 from rover_physics.numerics.kernels import kernel
 from rover_physics.numerics.records import new_record, record_type
+from rover_physics.prediction.halving import Progress, ask_middle, halve
 from rover_physics.results.uses import find_broken
 from rover_physics.rover.linkage import LINKAGE, PLACEMENT, place_masses
 from rover_physics.rover.steered_drive import steer_wheels
@@ -104,31 +105,53 @@ def new_works(threads: int, poses: int) -> Any:
 
 
 @kernel
-def evaluate_poses(models, limits, places, works, written, part):
+def evaluate_poses(models, limits, places, stretches, works, written, part):
     """Evaluate the poses of some chunks into results, one chunk per work space.
+
+    With stretches, it evaluates what they ask for, from the next row on and as long as there is
+    space for more; all of it is one chunk.
 
     Args:
         models: (m, 1) or (m, 3) MODEL, the rows of which differ in friction, torques and masses
-            alone: the rover settles in all of them as in the first.
+            alone: the rover settles in all of them as in the first; (1, 1) or (1, 3) with
+            stretches.
         limits: (k,) LIMIT.
         places: `poses`, `motions` and `held` of `PackedModel.evaluate`.
+        stretches: Stretches, or NO_STRETCHES.
         works: (chunks,) WORK.
         written: RESULTs (n m,), those of a pose side by side, and the same as numbers
             (n m, RESULT_COLUMNS), written.
         part: The first chunk and the one after the last.
     """
     (poses, motions, held), chunks = places, works.size
-    n, variants = poses.shape[0], models.shape[0]
+    n, divides = poses.shape[0], stretches.ends.shape[0] > 0
     for chunk in range(part[0], part[1]):
-        work = works[chunk]
-        for i in range(n * chunk // chunks, n * (chunk + 1) // chunks):
-            set_pose(models[0, 0], poses, motions, i, work)
-            hold_wheels(held, i, work.contacts)
-            status = stand(models[0, 0], work)
-            for k in range(variants):
-                if k > 0 and status == PoseStatus.SETTLED:
-                    place_masses(models[k, 0].linkage, work.q, work.placement)
-                _evaluate_row(models[k], limits, work, status, written, i * variants + k)
+        i, end = n * chunk // chunks, n * (chunk + 1) // chunks
+        if divides:
+            i, end = stretches.numbers[Progress.NEXT], stretches.numbers[Progress.ROWS]
+        while i < end and (not divides or end + 2 <= n):
+            if divides and not ask_middle(stretches, poses, motions, written[0], i):
+                written[0][i].status = PoseStatus.NOT_SETTLED.value
+            else:
+                set_pose(models[0, 0], poses, motions, i, works[chunk])
+                hold_wheels(held, i, works[chunk].contacts)
+                _evaluate_rows(models, limits, works[chunk], written, i)
+                if divides:
+                    halve(stretches, poses, written, limits, i)
+                    end = stretches.numbers[Progress.ROWS]
+            i += 1
+        if divides:
+            stretches.numbers[Progress.NEXT] = i
+
+
+@kernel
+def _evaluate_rows(models, limits, work, written, i):
+    """Evaluate all models at pose i of the work space, into their rows; as `evaluate_poses`."""
+    status, variants = stand(models[0, 0], work), models.shape[0]
+    for k in range(variants):
+        if k > 0 and status == PoseStatus.SETTLED:
+            place_masses(models[k, 0].linkage, work.q, work.placement)
+        _evaluate_row(models[k], limits, work, status, written, i * variants + k)
 
 
 @kernel

@@ -27,6 +27,7 @@ from rover_physics.prediction.evaluation import (
     new_work,
     new_works,
 )
+from rover_physics.prediction.halving import NO_STRETCHES
 from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.prediction.path_kernels import Wheels
 from rover_physics.prediction.sweep_options import DEFAULT_OPTIONS, POLICIES, SweepOptions
@@ -160,7 +161,8 @@ class PackedModel:
                 rows = results[part.start * count : part.stop * count]
                 clear_results(rows)
                 places = poses[part], motions[part], held[part]
-                sweep = variants, self.limits.records, places, works, (rows, numbers_of(rows))
+                written = rows, numbers_of(rows)
+                sweep = variants, self.limits.records, places, NO_STRETCHES, works, written
                 run_chunks(evaluate_poses, sweep, len(works), threads)
                 forget_uncomputable(rows)
         return results.reshape(-1, count)

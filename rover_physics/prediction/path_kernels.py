@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import int64
 
 from rover_physics.numerics.arrays import Floats, view_read_only
 from rover_physics.numerics.kernels import exact_kernel
@@ -36,8 +35,6 @@ NEAR_LIMIT, LEAST_TURN = 0.9, 0.02
 """Share of a limit from which any peak is looked for if a contact turns by that [rad]."""
 ROUNDING = 1e-9
 """Descent [m] below which it counts as zero, and excess of a force limit that does."""
-MAX_PIECES = 4
-"""Most pieces into which a stretch is divided at a time."""
 AT_LIMIT = 0.95
 """Share of a limit from which a peak is looked for at the smallest spacing."""
 
@@ -144,7 +141,7 @@ def find_jumps(results, poses, joined, wheels, ends):
         poses: (n, 3) x, y [m] and yaw [rad] of the waypoints.
         joined: (n - 1,) True where a waypoint and the next one belong to the same path.
         wheels: Wheels.
-        ends: (>= n, 3) rows of the pairs, and numbers of pieces to divide them into, written.
+        ends: (>= n, 2) rows of the pairs, written.
     """
     count = 0
     for row in range(results.size - 1):
@@ -153,69 +150,18 @@ def find_jumps(results, poses, joined, wheels, ends):
         distance = distance_between(poses[row], poses[row + 1], wheels.swing_radius)
         if not 0.0 < distance <= wheels.radius:
             continue
-        wanted = _wanted_spacing(results[row], results[row + 1], wheels)
-        if wanted < distance:
+        if wanted_spacing(results[row], results[row + 1], wheels) < distance:
             ends[count, 0], ends[count, 1] = row, row + 1
-            ends[count, 2] = _count_pieces(distance, wanted)
             count += 1
     return count
 
 
 @exact_kernel
-def sort_pieces(ends, known, wheels, open_ends, closed_ends):
-    """Find the pieces of stretches to divide or to close; return how many of each.
-
-    A piece in which a contact still jumps is closed if it is shorter than MIN_SPACING, or if the
-    rover does not settle at a pose within it. Other pieces are open if they are longer than they
-    should be and the rover settles at all poses within them.
-
-    Args:
-        ends: (k, 3) rows of `known` at the start and end of each stretch, and the number of its
-            pieces; the poses within the stretches are the last rows.
-        known: Crossings.
-        wheels: Wheels.
-        open_ends: (>= all pieces, 3) end rows of the open pieces, and numbers of pieces to divide
-            them into, written.
-        closed_ends: (>= all pieces, 2) end rows of the closed ones, written.
-    """
-    results, poses = known.results, known.poses
-    n_open, n_closed, row = 0, 0, results.size
-    for k in range(ends.shape[0]):
-        row -= ends[k, 2] - 1
-    for k in range(ends.shape[0]):
-        before, skipped, pieces = ends[k, 0], False, ends[k, 2]
-        for i in range(pieces):
-            after = row + i if i < pieces - 1 else ends[k, 1]
-            if results[after].status == PoseStatus.NOT_SETTLED:
-                skipped = True
-                continue
-            distance = distance_between(poses[before], poses[after], wheels.swing_radius)
-            wanted = _wanted_spacing(results[before], results[after], wheels)
-            jumps = _jumps(results[before], results[after], wheels)
-            if jumps and (skipped or distance < MIN_SPACING):
-                closed_ends[n_closed, 0], closed_ends[n_closed, 1] = before, after
-                n_closed += 1
-            elif wanted < distance and not skipped:
-                open_ends[n_open, 0], open_ends[n_open, 1] = before, after
-                open_ends[n_open, 2] = _count_pieces(distance, wanted)
-                n_open += 1
-            before, skipped = after, False
-        row += pieces - 1
-    return n_open, n_closed
-
-
-@exact_kernel
-def _count_pieces(distance, wanted):
-    """Return the number of pieces of a stretch [m] whose poses should be `wanted` [m] apart."""
-    return int64(min(max(np.ceil(distance / wanted), 2.0), MAX_PIECES))
-
-
-@exact_kernel
-def _wanted_spacing(here, there, wheels):
+def wanted_spacing(here, there, wheels):
     """Return the distance [m] up to which two poses tell what is between them; inf for any."""
     if here.status != PoseStatus.SETTLED or there.status != PoseStatus.SETTLED:
         return np.inf
-    if not _jumps(here, there, wheels):
+    if not jumps_between(here, there, wheels):
         return _finest(here, there, wheels)
     return MIN_SPACING if _decides(here, there, wheels) else JUMP_SPACING * wheels.radius
 
@@ -260,7 +206,8 @@ def angle_ahead(result, wheel):
 
 
 @exact_kernel
-def _jumps(here, there, wheels):
+def jumps_between(here, there, wheels):
+    """Return whether a wheel's height or a steep contact jumps between two settled poses."""
     if here.status != PoseStatus.SETTLED or there.status != PoseStatus.SETTLED:
         return False
     for wheel in range(6):
@@ -427,7 +374,7 @@ def find_remaining_jumps(path, between, wheels, ends):
             here = waypoint
         a = path.results[last] if last < n else between.results[last - n]
         b = path.results[here] if here < n else between.results[here - n]
-        if _jumps(a, b, wheels):
+        if jumps_between(a, b, wheels):
             apart = 0.0
             if last < n and here < n:
                 apart = distance_between(path.poses[last], path.poses[here], wheels.swing_radius)

@@ -21,9 +21,10 @@ from rover_physics.numerics.interruption import check_interruption
 from rover_physics.numerics.plausible import MAX_COORDINATE
 from rover_physics.numerics.quiet import quiet
 from rover_physics.numerics.threads import limit_threads
-from rover_physics.prediction.crossing import AtFailure, climb_faces, find_crossings
+from rover_physics.prediction.crossing import climb_faces, find_crossings
 from rover_physics.prediction.drops import Drops, find_drops
 from rover_physics.prediction.failures import find_suspects
+from rover_physics.prediction.halving import AtFailure
 from rover_physics.prediction.packed_model import PackedModel
 from rover_physics.prediction.path_kernels import (
     Crossings,

@@ -21,15 +21,10 @@ from rover_physics.limits.table import MAX_SLIDE, MAX_TURN_OFF
 from rover_physics.numerics.arrays import view_read_only
 from rover_physics.numerics.kernels import exact_kernel
 from rover_physics.numerics.quiet import quiet
-from rover_physics.prediction.crossing import (
-    AtFailure,
-    find_crossings,
-    find_turns,
-    list_jumps,
-    turn_wheels,
-)
+from rover_physics.prediction.crossing import find_crossings, find_turns, list_jumps, turn_wheels
 from rover_physics.prediction.drops import MIN_ANGLE, find_drops
 from rover_physics.prediction.failures import find_suspects, mark_failures
+from rover_physics.prediction.halving import AtFailure
 from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_kernels import Crossings, add_up, angle_ahead, distance_between

@@ -20,6 +20,7 @@ from rover_physics.forces.equilibrium import FREE_FORCES, FREE_TORQUES
 from rover_physics.limits.table import WHEEL_CONSTRAINTS
 from rover_physics.numerics.arrays import Floats, freeze_fields
 from rover_physics.prediction.evaluation import NONE_HELD, evaluate_poses, new_works
+from rover_physics.prediction.halving import NO_STRETCHES
 from rover_physics.prediction.packed_model import PackedModel, pack_model
 from rover_physics.prediction.path_motion import motions_of
 from rover_physics.prediction.sweep import check_poses
@@ -106,7 +107,8 @@ def evaluate_in_turn(
     for i in range(len(poses)):
         places = poses[i : i + 1], motions[i : i + 1], NONE_HELD
         # The kernel of sweeps, for one pose: a kernel of its own would compile the model again.
-        evaluate_poses(model.records[None], model.limits.records, places, works, written, (0, 1))
+        sweep = model.records[None], model.limits.records, places, NO_STRETCHES, works, written
+        evaluate_poses(*sweep, (0, 1))
         yield results, works[0]
 
 

@@ -17,6 +17,8 @@ from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.candidates import generate_candidates
 from rover_planner.planning.path_geometry import distance_along
 
+STOPPED = "the search was stopped before it found anything"
+"""What is told of a search that nothing is known of."""
 MOST_REMEDIES = 5
 """Largest number of remedies that are told."""
 ENDS_APART = 0.5
@@ -96,7 +98,7 @@ def grow_within(case: Case, check: Callable[[], object]) -> Iterator[Advice]:
         check: Called again and again; it stops the work by a QuestionStoppedError.
 
     Raises:
-        QuestionStoppedError: Not even the path itself was judged.
+        QuestionStoppedError: Not even the path itself was judged; it says STOPPED.
         RoverError: The model refuses the path or an option.
     """
     growing, has_begun = grow_advice(case), False
@@ -104,14 +106,19 @@ def grow_within(case: Case, check: Callable[[], object]) -> Iterator[Advice]:
         try:
             with interruptible(check):
                 advice = next(growing, None)
-        except QuestionStoppedError:
+        except QuestionStoppedError as error:
             if has_begun:
                 return
-            raise
+            raise QuestionStoppedError(error.code, STOPPED) from error
         if advice is None:
             return
         has_begun = True
         yield advice
+
+
+def refuse(code: str, reason: str) -> dict[str, Any]:
+    """Return the answer without advice as JSON types, with keys that advice has."""
+    return {"code": code, "reason": reason, "remedies": [], "others": [], "complete": False}
 
 
 def path_of(rover: Rover, poses: Floats, spacing: float) -> Floats:

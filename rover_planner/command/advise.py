@@ -3,7 +3,7 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -44,12 +44,12 @@ def advise(
     from rover_physics.prediction.sweep_options import SweepOptions
     from rover_physics.rover.rover_file import load_rover
     from rover_physics.terrain.grid import load_terrain
-    from rover_planner.advice.advise import grow_within, path_of
+    from rover_planner.advice.advise import STOPPED, grow_within, path_of, refuse
     from rover_planner.advice.case import Case
     from rover_planner.advice.levers import SPACING
     from rover_planner.command.prediction_files import read_poses
     from rover_planner.nodes.warm_up import search_paths
-    from rover_planner.planning.answering.budget import Budget
+    from rover_planner.planning.answering.budget import Budget, QuestionStoppedError
     from rover_planner.shell.progress import show_progress
 
     model = load_rover(rover)
@@ -63,19 +63,32 @@ def advise(
     )
     path = path_of(model, read_poses(poses), SPACING)
     case = Case(model, load_terrain(terrain, max_cells), path, options, sigmas, accepted_chance)
-    with show_progress() as progress:
-        progress("load the model (the first run compiles it)")
-        search_paths()  # so that the budget is not spent on it
-        for advice in grow_within(case, Budget(budget).check):
-            progress(f"{len(advice.found)} remedies; tried {' and '.join(advice.tried)}")
-    out.write_text(
-        json.dumps(advice.to_dict(), indent=1, allow_nan=False) + "\n", encoding="utf-8"
-    )
+    advice = None
+    try:
+        with show_progress() as progress:
+            progress("load the model (the first run compiles it)")
+            search_paths()  # so that the budget is not spent on it
+            for advice in grow_within(case, Budget(budget).check):
+                progress(f"{len(advice.found)} remedies; tried {' and '.join(advice.tried)}")
+    except KeyboardInterrupt:
+        if advice is None or not advice.found:
+            typer.echo(STOPPED, err=True)
+        raise
+    except QuestionStoppedError as error:
+        _write(out, refuse(error.code, str(error)))
+        typer.echo(f"{error}; a larger --budget tries more")
+        return
+    assert advice is not None
+    _write(out, advice.to_dict())
     if picture is not None:
         from rover_planner.figures.advice_picture import draw_advice
 
         draw_advice(picture, advice, Path(terrain).name)
     _print_table(advice)
+
+
+def _write(out: Path, report: dict[str, Any]) -> None:
+    out.write_text(json.dumps(report, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
 def _print_table(advice: "Advice") -> None:

@@ -9,7 +9,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from msg_adapters.results.diagnostics import to_json
-from rover_planner.advice.advise import Advice, grow_within
+from rover_planner.advice.advise import Advice, grow_within, refuse
 from rover_planner.advice.case import Case, case_of
 from rover_planner.nodes.question_desk import QuestionDesk
 from rover_planner.parameters.traverse_server import TraverseServerParameters
@@ -64,7 +64,7 @@ class AdviceTopics:
             response.message = to_json(report)
             reply(response)
 
-        question = Question("advise", "", partial(self._seek, self._refused), _refuse)
+        question = Question("advise", "", partial(self._seek, self._refused), refuse)
         budget = Budget(self._node.values.advice_time)
         self._queue.ask(Asked(question, budget, answer), max_waiting=0)
 
@@ -73,7 +73,7 @@ class AdviceTopics:
     ) -> Advice | dict[str, Any]:
         """Return advice, and publish it as it grows; called in the thread."""
         if refused is None:
-            return _refuse("no_path", NOTHING_REFUSED)
+            return refuse("no_path", NOTHING_REFUSED)
         told = None
         for advice in grow_within(_case_of(refused), lambda: self._desk.give_way(check)):
             if told is None or len(advice.found) > len(told.found):
@@ -84,11 +84,6 @@ class AdviceTopics:
 
     def _publish(self, advice: Advice) -> None:
         self._growing.publish(String(data=to_json(advice.to_dict())))
-
-
-def _refuse(code: str, reason: str) -> dict[str, Any]:
-    """Return the answer without advice, which has the same keys."""
-    return {"code": code, "reason": reason, "remedies": [], "others": [], "complete": False}
 
 
 def _case_of(judgement: PathJudgement) -> Case:

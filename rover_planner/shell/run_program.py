@@ -97,7 +97,7 @@ def end_as_by_ctrl_c() -> Iterator[None]:
 def end_with(name: str, code: int, text: str) -> int:
     """Print in one line on stderr why a program ends; return the exit code."""
     with contextlib.suppress(OSError):  # stderr itself may be closed or full
-        print(one_line(f"{name}: {text}", MAX_LINE), file=sys.stderr, flush=True)
+        print(one_line(f"{name}: {text}"), file=sys.stderr, flush=True)
     return code
 
 
@@ -109,8 +109,8 @@ def _drop_output() -> None:
         os.close(nowhere)
 
 
-def one_line(text: str, most: int = MAX_LINE) -> str:
-    """Return a text without line breaks and control characters, cut to `most` characters."""
-    words = " ".join(text[: 10 * most].split())
+def one_line(text: str) -> str:
+    """Return a text without line breaks and control characters, cut to MAX_LINE characters."""
+    words = " ".join(text[: 10 * MAX_LINE].split())
     shown = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in words)
-    return shown if len(shown) <= most else f"{shown[: most - 3]}..."
+    return shown if len(shown) <= MAX_LINE else f"{shown[: MAX_LINE - 3]}..."

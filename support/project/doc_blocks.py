@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Code blocks of README and docs."""
 
-import itertools
 import re
 from dataclasses import dataclass
 from pathlib import Path
 
 from support.project.checkout import TOP
 
-PAGES = [TOP / "README.md", *sorted((TOP / "docs").rglob("*.md"))]
-_FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
-_MARK = re.compile(r"<!-- not run: (.+) -->\n\Z")
+_BLOCK = re.compile(
+    r"(?:<!-- not run: (?P<not_run>[^\n]+) -->\n)?"
+    r"^```(?P<language>sh|python)\n(?P<text>.*?)^```$"
+    r"(?:\s*^```text\n(?P<output>.*?)^```$)?",
+    re.MULTILINE | re.DOTALL,
+)
 
 
 @dataclass(frozen=True)
@@ -35,25 +37,17 @@ class Block:
         return f"{self.page}:{self.line}"
 
 
-def read_blocks(page: Path, top: Path = TOP) -> list[Block]:
+def read_blocks(page: Path) -> list[Block]:
     """Return the blocks of a page in sh and Python, from top to bottom."""
     text = page.read_text(encoding="utf-8")
-    found = list(_FENCE.finditer(text))
-    blocks = []
-    for match, following in itertools.zip_longest(found, found[1:]):
-        if match[1] not in ("sh", "python"):
-            continue
-        mark = _MARK.search(text[: match.start()])
-        at_once = following is not None and not text[match.end() : following.start()].strip()
-        output = following[2] if at_once and following[1] == "text" else None
-        blocks.append(
-            Block(
-                page.relative_to(top).as_posix(),
-                text[: match.start()].count("\n") + 2,
-                match[1],
-                match[2],
-                mark[1] if mark else "",
-                output,
-            )
+    return [
+        Block(
+            page.relative_to(TOP).as_posix(),
+            text[: match.start("text")].count("\n") + 1,
+            match["language"],
+            match["text"],
+            match["not_run"] or "",
+            match["output"],
         )
-    return blocks
+        for match in _BLOCK.finditer(text)
+    ]

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Processes of a test, known by a token that all of them inherit in their environment."""
 
+import contextlib
 import os
 import signal
 import time
@@ -44,7 +45,5 @@ class ProcessToken:
     def kill(self) -> None:
         """End whatever is left."""
         for number in self.find():
-            try:
+            with contextlib.suppress(ProcessLookupError):
                 os.kill(number, signal.SIGKILL)
-            except ProcessLookupError:
-                continue

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from rover_physics.rover.model import Rover
-from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain
 from rover_planner.planning.path_query import PathQueryOptions
 from rover_planner.planning.search.query import LatticeSettings
@@ -18,9 +17,10 @@ from rover_planner.viewer.state.judging import Step
 from rover_planner.viewer.state.scenario import Pose, Scenario, Shown
 from rover_planner.viewer.state.session import REFUSALS, ViewSession
 from support.grounds import make_terrain, waves
+from support.paths import poses_at
+from support.rovers import LSR1
 from support.waiting import wait_until
 
-LSR1 = load_rover("lsr1")
 START, GOAL = (-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)
 FAR = (500_000.0, 4_000_000.0)
 """Place of a map in a UTM zone: easting and northing [m]."""
@@ -33,8 +33,7 @@ PATIENCE = 120.0
 
 def straight(length: float = 2.0, spacing: float = 0.02) -> np.ndarray:
     """Return poses (n, 3) along x from x = -1 m, with a length and a spacing [m]."""
-    x = np.arange(-1.0, length - 1.0 + 1e-9, spacing)
-    return np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])
+    return poses_at(np.arange(-1.0, length - 1.0 + 1e-9, spacing))
 
 
 def ramp(x, y):

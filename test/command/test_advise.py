@@ -8,8 +8,11 @@ import pytest
 
 from rover_physics import save_terrain
 from rover_planner.advice import seek
+from rover_planner.advice.advise import STOPPED
 from rover_planner.advice.levers import LEVERS
 from rover_planner.cli import main
+from rover_planner.planning.answering.budget import Budget
+from rover_planner.shell.run_program import EXIT_INTERRUPTED
 from support.grounds import make_terrain
 
 KEYS = {
@@ -68,7 +71,25 @@ def test_each_remedy_is_what_predict_passes_with(files, capsys, monkeypatch):
             assert prediction["traversable"], remedy["words"]
 
 
-def test_a_path_that_passes_and_one_without_time_are_answered(files, capsys):
+def test_a_path_that_passes_and_one_without_time_are_answered(files, capsys, monkeypatch):
     assert main(arguments(files, "--friction", "1.0")) == 0
-    assert json.loads((files / "out.json").read_text())["traversable"] is True
-    assert "traversable as it is" in capsys.readouterr().out
+    advice = json.loads((files / "out.json").read_text())
+    assert advice["traversable"] and advice["complete"]
+    assert not advice["remedies"] and not advice["others"]
+    assert capsys.readouterr().out == "the path is traversable as it is\n"
+    monkeypatch.setattr(Budget, "remaining", 0.0)
+    assert main(arguments(files)) == 0
+    answer = json.loads((files / "out.json").read_text())
+    assert (answer["code"], answer["reason"]) == ("too_long", STOPPED)
+    assert not answer["complete"] and not answer["remedies"]
+    assert capsys.readouterr().out == f"{STOPPED}; a larger --budget tries more\n"
+
+
+def test_an_interruption_before_the_first_result_is_told(files, capsys, monkeypatch):
+    def interrupt(_budget: Budget) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Budget, "check", interrupt)
+    assert main(arguments(files)) == EXIT_INTERRUPTED
+    assert capsys.readouterr().err == f"{STOPPED}\n"
+    assert not (files / "out.json").exists()

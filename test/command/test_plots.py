@@ -28,16 +28,11 @@ def holed():
     return Terrain(elevation, 0.1, (-6.0, -4.0))
 
 
-def ask(terrain, name, goal):
-    answer = answer_path_query(LSR1, terrain, (-4, 0, 0), goal, COARSE)
-    return Goal(name, "plain", goal), answer
-
-
 def test_a_picture_shows_accepted_and_refused_answers_each_with_its_curves(tmp_path, holed):
+    goals = {"A": (0, 0, 0), "B": (4, 3, 0.5), "C": (9, 0, 0)}
     answers = [
-        ask(holed, "A", (0, 0, 0)),
-        ask(holed, "B", (4, 3, 0.5)),
-        ask(holed, "C", (9, 0, 0)),
+        (Goal(name, "plain", goal), answer_path_query(LSR1, holed, (-4, 0, 0), goal, COARSE))
+        for name, goal in goals.items()
     ]
     assert [answer.traversable for _, answer in answers] == [True, False, False]
     path = tmp_path / "picture.svg"
@@ -70,35 +65,21 @@ def test_the_use_along_a_plan_has_the_peaks_between_waypoints():
     assert highest >= path.verdict.risk > path.prediction.friction_utilisation.max()
 
 
-@pytest.fixture
-def draw(tmp_path, holed, monkeypatch):
-    """Return a function that draws one answer, and returns the axes of the map and the others."""
+def test_forces_that_no_verdict_asks_for_are_shaded(tmp_path, monkeypatch):
+    """A wheel that rolls off an edge may use more friction than the verdict tells."""
     drawn = []
     monkeypatch.setattr(Figure, "savefig", lambda self, *_, **__: drawn.append(self))
-
-    def draw_one(name, answer):
-        asked = Goal(name, "plain", answer.chosen.poses[-1])
-        draw_answers(tmp_path / "picture.png", LSR1, holed, [(asked, answer)], "title")
-        on_map = next(axes for axes in drawn[-1].axes if axes.get_xlabel() == "x [m]")
-        return on_map, [axes for axes in drawn[-1].axes if axes is not on_map]
-
-    return draw_one
-
-
-def test_forces_that_no_verdict_asks_for_are_shaded(draw):
-    """A wheel that rolls off an edge may use more friction than the verdict tells."""
     x = 0.05 * np.arange(121) - 4.5
     ledge = Terrain(np.tile(np.where(x < -2.5, 0.06, 0.0), (81, 1)), 0.05, (-4.5, -2.0))
     options = dataclasses.replace(COARSE, count=1, waypoint_spacing=0.02)
-    answer = answer_path_query(LSR1, ledge, (-3.5, 0, 0), (-1.5, 0, 0), options)
-    prediction = answer.chosen.prediction
-    falls = prediction.falling.any(axis=1)
-    assert 0 < falls.sum() < len(falls)
-    _, others = draw("A", answer)
-    shaded = {axes.get_ylabel().split("\n")[0]: len(axes.patches) for axes in others}
-    for name in ("wheel load [N]", "friction", "torque"):
-        assert shaded[name] >= falls.sum()
-    assert shaded["tip-over margin"] == 0
-    before = answer_path_query(LSR1, ledge, (-3.5, 0, 0), (-3.2, 0, 0), options)
-    assert before.traversable
-    assert not any(axes.patches for axes in draw("B", before)[1])
+    for goal, is_beyond in (((-3.2, 0, 0), False), ((-1.5, 0, 0), True)):
+        answer = answer_path_query(LSR1, ledge, (-3.5, 0, 0), goal, options)
+        falls = answer.chosen.prediction.falling.any(axis=1)
+        assert (0 < falls.sum() < len(falls)) == is_beyond
+        asked = Goal("A", "plain", goal)
+        draw_answers(tmp_path / "picture.png", LSR1, ledge, [(asked, answer)], "title")
+        curves = [axes for axes in drawn[-1].axes if axes.get_xlabel() != "x [m]"]
+        shaded = {axes.get_ylabel().split("\n")[0]: len(axes.patches) for axes in curves}
+        for name in ("wheel load [N]", "friction", "torque"):
+            assert shaded[name] >= falls.sum()
+        assert any(shaded.values()) == is_beyond and shaded["tip-over margin"] == 0

@@ -22,28 +22,22 @@ def by_name(table):
 
 SHAPES = by_name(
     {
-        (): "traversable first_failure",
+        (): "traversable first_failure assumptions",
         (N,): "settled roll pitch tip_over_ratio tip_over_force_angle belly_clearance energy time "
-        "reason",
-        (N, 2): "rocker_angle bogie_angle",
-        (N, 3): "position",
+        "reason status power distance speed_share stalls",
+        (N, 2): "rocker_angle bogie_angle drift",
+        (N, 3): "position poses motion deviation",
         (N, 6): "wheel_loads tangential lateral friction_utilisation slip_ratio torque_saturation "
-        "steering_angle wheel_speed",
-        (N, 6, 3): "wheel_centres",
+        "steering_angle wheel_speed contact_angle torque friction sinkage motion_resistance "
+        "wheel_drop falling slip_speed lift_rate lift_height",
+        (N, 6, 3): "wheel_centres contact_points",
     }
 )
-REPLAY_SHAPES = by_name(
-    {
-        (): "assumptions",
-        (N,): "status power distance speed_share stalls",
-        (N, 2): "drift",
-        (N, 3): "poses motion deviation",
-        (N, 6): "contact_angle torque friction sinkage motion_resistance wheel_drop falling "
-        "slip_speed lift_rate lift_height",
-        (N, 6, 3): "contact_points",
-    }
-)
-"""What the file holds beside the contract's arrays, for a replay."""
+TYPES = {
+    "traversable": "b", "first_failure": "i", "assumptions": "U", "settled": "b", "reason": "U",
+    "status": "i", "falling": "b",
+}  # fmt: skip
+"""Kinds of the types of arrays that hold no floats."""
 
 
 @pytest.fixture
@@ -51,11 +45,16 @@ def files(tmp_path):
     return write_ground_and_path(tmp_path)
 
 
-def test_an_uncertain_map_adds_bounds_unless_told_not_to(files):
-    terrain = load_terrain(files / "terrain.npz")
+def make_uncertain(file):
+    """Give the map in a file standard deviations."""
+    terrain = load_terrain(file)
     std = np.full(terrain.elevation.shape, 0.004)
-    save_terrain(files / "uncertain.npz", replace(terrain, elevation_std=std))
-    words = predict_arguments(files, terrain="uncertain.npz")
+    save_terrain(file, replace(terrain, elevation_std=std))
+
+
+def test_an_uncertain_map_adds_bounds_unless_told_not_to(files):
+    make_uncertain(files / "terrain.npz")
+    words = predict_arguments(files)
     assert main([*words, "--sigmas", "2", "--friction", "0.2"]) == 0
     with np.load(files / "out.npz") as out:
         assert out["map_sigmas"] == 2.0
@@ -89,16 +88,12 @@ def test_prediction_has_every_array_of_the_contract(files, capfd):
     told = f"wrote {files / 'out.npz'}: {N} waypoints, traversable\n"
     assert capfd.readouterr() == (told, "")
     with np.load(files / "out.npz", allow_pickle=False) as out:
-        assert {name: out[name].shape for name in out.files} == SHAPES | REPLAY_SHAPES
-        assert out["settled"].dtype == bool
-        assert out["traversable"].dtype == bool
+        assert {name: out[name].shape for name in out.files} == SHAPES
+        assert {name: out[name].dtype.kind for name in TYPES} == TYPES
+        assert all(out[name].dtype == np.float64 for name in SHAPES.keys() - TYPES)
         assert bool(out["traversable"])
-        assert out["first_failure"].dtype.kind == "i"
         assert int(out["first_failure"]) == -1
-        assert out["reason"].dtype.kind == "U"
         assert (out["reason"] == "").all()
-        floats = SHAPES.keys() - {"settled", "traversable", "first_failure", "reason"}
-        assert all(out[name].dtype == np.float64 for name in floats)
         assert out["wheel_loads"].sum(axis=1) == pytest.approx(out["wheel_loads"][0].sum())
 
 
@@ -119,20 +114,12 @@ def test_a_refused_path_is_still_exit_code_0_with_the_reason_and_nan(files, capf
         assert np.isnan(out["wheel_loads"][-1]).all()
 
 
-CLASS_SHAPES = by_name(
-    {
-        (N,): "traversability_class class_constraint class_wheel class_margin",
-        (N, 6, 2): "torque_range",
-    }
-)
-
-
 def test_classes_and_torque_ranges_are_added_on_demand(files):
     assert main([*predict_arguments(files), "--classes", "--torque-ranges"]) == 0
     with np.load(files / "out.npz", allow_pickle=False) as out:
-        assert {
-            name: out[name].shape for name in out.files
-        } == SHAPES | REPLAY_SHAPES | CLASS_SHAPES
+        names = ("traversability_class", "class_constraint", "class_wheel", "class_margin")
+        shapes = SHAPES | dict.fromkeys(names, (N,)) | {"torque_range": (N, 6, 2)}
+        assert {name: out[name].shape for name in out.files} == shapes
         assert set(out["traversability_class"]) == {"passable"}
         assert set(out["class_constraint"]) <= {"friction", "torque", "wheel_lift"}
         assert set(out["class_wheel"]) <= set(WHEELS)
@@ -172,9 +159,7 @@ def test_each_option_changes_the_prediction_as_it_should(files):
 )
 def test_a_long_path_that_is_written_in_parts_gives_the_same_file(files, monkeypatch, words):
     if "--sigmas" in words:
-        terrain = load_terrain(files / "terrain.npz")
-        std = np.full(terrain.elevation.shape, 0.004)
-        save_terrain(files / "terrain.npz", replace(terrain, elevation_std=std))
+        make_uncertain(files / "terrain.npz")
     assert main([*predict_arguments(files), *words]) == 0
     monkeypatch.setattr("rover_planner.command.predict.MAX_IN_MEMORY", 0)
     monkeypatch.setattr("rover_planner.command.prediction_files.BLOCK", 7)

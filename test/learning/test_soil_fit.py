@@ -6,11 +6,10 @@ import pytest
 
 from rover_physics.errors import SoilError
 from rover_physics.traction.balance import BalanceWriter
-from rover_planner.learning.drive_log import PITCH, RATES, ROLL, TORQUES, X, Y
 from rover_planner.learning.ground_learner import GroundLearner
 from rover_planner.learning.soil_fit import SoilEstimate, SoilFit
 from support.grounds import make_terrain
-from support.learning_drives import drive_over_soil
+from support.learning_drives import drive_over_soil, scatter
 from support.rovers import LSR1 as ROVER
 
 
@@ -22,15 +21,12 @@ def expect(soil: str) -> SoilEstimate:
 def learn(shape, told: str, seconds=80.0) -> SoilEstimate:
     """Return what a drive with noise over dry sand tells, of a shape z(x, y)."""
     ground = make_terrain(shape, half=2.6)
-    rows, rng = drive_over_soil(ROVER, ground, "dry_sand", seconds), np.random.default_rng(0)
-    for columns, sigma in (([X, Y], 1e-3), ([ROLL, PITCH], 3e-3), (TORQUES, 0.03), (RATES, 3e-3)):
-        rows[:, columns] += sigma * rng.standard_normal(rows[:, columns].shape)
+    rows = drive_over_soil(ROVER, ground, "dry_sand", seconds)
+    scatter(rows, np.random.default_rng(0), 1e-3, 3e-3, 0.0, 0.03, 3e-3)
     learner = GroundLearner(ROVER, ground, soil=told)
     for row in rows:
         learner.take(row)
-    soil = learner.estimate.soil
-    assert soil is not None
-    return soil
+    return learner.estimate.soil
 
 
 def test_sinkage_resistance_and_strength_are_learned_whatever_was_told():
@@ -58,7 +54,6 @@ def test_without_a_drive_it_is_what_was_told_and_nothing_is_told_apart():
     assert found.sinkage[0] == pytest.approx(7.4e-3, abs=1e-4)  # docs/soil.md
 
 
-@pytest.mark.parametrize(("soil", "word"), [("firm_ground", "yield"), ("snow", "no soil 'snow'")])
-def test_a_soil_that_does_not_yield_is_refused(soil, word):
-    with pytest.raises(SoilError, match=word):
-        expect(soil)
+def test_a_soil_that_does_not_yield_is_refused():
+    with pytest.raises(SoilError, match="yield"):
+        expect("firm_ground")

@@ -57,10 +57,11 @@ def taught():
 
 
 def follow(taught, seed, pitch, roll, friction=ROVER.friction):
-    """Return odometry and truth of a drive on known ground, not measured in another way."""
+    """Return odometry and truth of a drive, not measured in another way; a friction is known."""
     odometry = WheelOdometry(ROVER)
     odometry.forward, odometry.side = taught.forward, taught.side
-    odometry.friction, odometry.friction_deviation = friction, 0.05 * friction
+    if friction is not None:
+        odometry.friction, odometry.friction_deviation = friction, 0.05 * friction
     return odometry, drive(odometry, seed, pitch, roll)
 
 
@@ -84,18 +85,13 @@ def test_the_covariance_is_that_of_the_misses(taught):
     assert np.mean(np.array(squares) < 5.99) > 0.9
 
 
-def test_where_all_friction_is_used_the_way_is_not_known(taught):
-    sure, _ = follow(taught, 3, -0.2, 0.0)
-    unsure, _ = follow(taught, 3, -0.2, 0.0, friction=0.21)
-    assert unsure.covariance[0, 0] > 25.0 * sure.covariance[0, 0]
-
-
-def test_on_ground_of_unknown_friction_the_way_up_a_slope_is_less_sure(taught):
-    known, _ = follow(taught, 3, -0.3, 0.0)
-    unknown = WheelOdometry(ROVER)
-    unknown.forward, unknown.side = taught.forward, taught.side
-    drive(unknown, 3, -0.3, 0.0)
-    assert unknown.covariance[0, 0] > 4.0 * known.covariance[0, 0]
+@pytest.mark.parametrize(("pitch", "friction", "ratio"), [(-0.2, 0.21, 25.0), (-0.3, None, 4.0)])
+def test_where_all_friction_is_used_or_it_is_unknown_the_way_up_a_slope_is_less_sure(
+    taught, pitch, friction, ratio
+):
+    sure, _ = follow(taught, 3, pitch, 0.0)
+    unsure, _ = follow(taught, 3, pitch, 0.0, friction)
+    assert unsure.covariance[0, 0] > ratio * sure.covariance[0, 0]
 
 
 @pytest.mark.parametrize(("deviation", "furthest"), [(0.03, 0.2), (0.3, 1.2)])

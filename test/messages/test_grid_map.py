@@ -2,7 +2,7 @@
 """GridMaps, made and recorded, become terrains cell by cell, wherever their buffer starts."""
 
 import lzma
-from pathlib import Path
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from msg_adapters.errors import MessageError
 from msg_adapters.grid_map import GridMapLayers, terrain_from_grid_map
 from rover_physics.terrain.grid import fingerprint
-from support.messages import grid_map_of, move_buffer, store_by_rows
+from support.messages import grid_map_of, move_buffer, set_field, store_by_rows
+from support.project.checkout import TOP
 
 RNG = np.random.default_rng(3)
 HEIGHTS = RNG.normal(0.0, 0.3, (7, 5)).astype(np.float32)
@@ -75,77 +76,55 @@ def test_an_orientation_of_zeros_is_not_set_and_taken_as_unturned():
     np.testing.assert_array_equal(terrain_from_grid_map(message).elevation, HEIGHTS)
 
 
-def _set(path, value):
-    def change(message):
-        *inner, last = path.split(".")
-        for name in inner:
-            message = message[int(name)] if name.isdigit() else getattr(message, name)
-        setattr(message, last, value)
-
-    return change
-
-
 TURN = SimpleNamespace(x=0.0, y=0.0, z=0.1, w=0.995)
 
 
 @pytest.mark.parametrize(
-    ("change", "text"),
+    ("path", "value", "text"),
     [
-        (_set("info.pose.orientation", TURN), "grid map is turned"),
-        (_set("layers", ["height"]), "no layer 'elevation'; it has height: set elevation_layer"),
-        (_set("layers", ["elevation", "elevation"]), "2 layers and 1 arrays"),
-        (_set("basic_layers", ["seen"]), "basic layer 'seen'"),
-        (_set("info.length_x", 0.26), "length_x 0.26"),
-        (_set("info.length_y", float("nan")), "length_y nan"),
-        (_set("info.resolution", 0.0), "resolution 0.0"),
-        (_set("info.length_x", 1e6), "at most 25000000"),
-        (_set("outer_start_index", 5), "starts at row 5"),
-        (_set("data.0.data", HEIGHTS.ravel()[:-1]), "34 values"),
-        (_set("data.0.layout.data_offset", 2), "37"),
-        (_set("data.0.layout.dim.0.label", "rows"), "dimensions ['rows', 'row_index']"),
-        (_set("data.0.layout.dim.0.size", 5), "sizes [5, 5]"),
-        (_set("data.0.layout.dim", []), "dimensions []"),
-        (_set("data.0.data", np.full(35, np.nan, np.float32)), "none of the grid map's 35"),
+        ("info.pose.orientation", TURN, "grid map is turned"),
+        ("layers", ["height"], "no layer 'elevation'; it has height: set elevation_layer"),
+        ("layers", ["elevation", "elevation"], "2 layers and 1 arrays"),
+        ("basic_layers", ["seen"], "basic layer 'seen'"),
+        ("info.length_x", 0.26, "length_x 0.26"),
+        ("info.length_y", float("nan"), "length_y nan"),
+        ("info.resolution", 0.0, "resolution 0.0"),
+        ("info.length_x", 1e6, "at most 25000000"),
+        ("outer_start_index", 5, "starts at row 5"),
+        ("data.0.data", HEIGHTS.ravel()[:-1], "34 values"),
+        ("data.0.layout.data_offset", 2, "37"),
+        ("data.0.layout.dim.0.label", "rows", "dimensions ['rows', 'row_index']"),
+        ("data.0.layout.dim.0.size", 5, "sizes [5, 5]"),
+        ("data.0.layout.dim", [], "dimensions []"),
+        ("data.0.data", np.full(35, np.nan, np.float32), "none of the grid map's 35"),
     ],
 )
-def test_a_bad_grid_map_is_refused_by_name(change, text):
+def test_a_bad_grid_map_is_refused_by_name(path, value, text):
     message = grid_map_of({"elevation": HEIGHTS}, 0.05)
-    change(message)
-    with pytest.raises(MessageError) as error:
+    set_field(message, path, value)
+    with pytest.raises(MessageError, match=re.escape(text)):
         terrain_from_grid_map(message)
-    assert text in str(error.value)
 
 
-DATA = Path(__file__).resolve().parents[1] / "data"
-
-
-@pytest.fixture(scope="module")
-def recorded_grid_map(tmp_path_factory):
-    """Return the GridMap of a ROS 1 bag of traversability_estimation (test/data/README.md)."""
+def test_a_grid_map_of_legged_robots_is_read_from_its_bag(tmp_path):
+    """The bag is a ROS 1 bag of traversability_estimation (test/data/README.md)."""
     pytest.importorskip("rosbags", reason="no rosbags: pip install '.[bags]'")
     from rosbags.highlevel import AnyReader
 
-    file = tmp_path_factory.mktemp("bag") / "elevation_map.bag"
-    file.write_bytes(lzma.decompress((DATA / "grid_map.bag.xz").read_bytes()))
+    file = tmp_path / "elevation_map.bag"
+    file.write_bytes(lzma.decompress((TOP / "test" / "data" / "grid_map.bag.xz").read_bytes()))
     with AnyReader([file]) as reader:
         ((connection, _, raw),) = list(reader.messages())
-        return reader.deserialize(raw, connection.msgtype)
-
-
-def test_a_grid_map_of_legged_robots_is_read_from_its_bag(recorded_grid_map):
-    terrain = terrain_from_grid_map(recorded_grid_map)
+        recorded = reader.deserialize(raw, connection.msgtype)
+    terrain = terrain_from_grid_map(recorded)
     # 3 m along x and 3.99 m along y around (0, 0), cells of 3 cm, all known
     assert terrain.elevation.shape == (133, 100) and terrain.resolution == 0.03
     assert terrain.origin == pytest.approx((-1.485, -1.98))
-    (stored,) = (
-        layer.data
-        for name, layer in zip(recorded_grid_map.layers, recorded_grid_map.data, strict=True)
-        if name == "elevation"
-    )
+    stored = recorded.data[recorded.layers.index("elevation")].data
     # Value k is that of row k % 100 and column k // 100; rows run along -x, columns along -y.
     for k in range(0, len(stored), 37):
         x, y = 1.485 - 0.03 * (k % 100), 1.98 - 0.03 * (k // 100)
         row, column = round((y + 1.98) / 0.03), round((x + 1.485) / 0.03)
         assert terrain.elevation[row, column] == stored[k]
-    moved = terrain_from_grid_map(move_buffer(recorded_grid_map, 11, 97))
+    moved = terrain_from_grid_map(move_buffer(recorded, 11, 97))
     assert moved.elevation.tobytes() == terrain.elevation.tobytes()

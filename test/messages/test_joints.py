@@ -30,8 +30,6 @@ def test_positions_are_found_by_name_in_any_order_and_others_are_not_looked_at()
 @pytest.mark.parametrize(
     "state",
     [
-        JointState(),
-        JointState(name=["rocker_left"]),
         JointState(name=["rocker_left"], velocity=[1.0], effort=[2.0]),
         JointState(name=["camera"], position=[1.0]),
     ],

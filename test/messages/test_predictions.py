@@ -23,6 +23,8 @@ from rover_physics.names import SUSPENSION_JOINTS, WHEEL_JOINTS
 from rover_physics.numerics.quaternions import xyzw_from_rpy
 from rover_physics.rover.steering_joints import steered_wheels, steering_joints
 from rover_physics.traversability import classification
+from support.grounds import make_terrain, waves
+from support.paths import arc_of, poses_at
 from support.rovers import FIXED, LSR1
 
 STAMP = Time(sec=12, nanosec=34)
@@ -33,14 +35,9 @@ FLAT = Terrain(np.zeros((81, 81)), 0.05, (-2.0, -2.0))
 @pytest.fixture(scope="module")
 def prediction():
     """Return 60 waypoints over waves, the last ten of them off the map."""
-    axis = np.arange(101) * 0.05 - 2.5
-    x, y = np.meshgrid(axis, axis)
-    terrain = Terrain(0.05 * np.sin(2.0 * x) + 0.04 * np.sin(1.5 * y), 0.05, (-2.5, -2.5))
-    poses = np.zeros((60, 3))
-    poses[:, 0] = -1.0 + 0.05 * np.arange(60)
-    poses[50:, 0] += 3.0
-    poses[:, 2] = 0.1
-    predicted = judge_path(LSR1, terrain, poses)[0]
+    x = -1.0 + 0.05 * np.arange(60)
+    x[50:] += 6.0
+    predicted = judge_path(LSR1, make_terrain(waves), poses_at(x, 0.0, 0.1))[0]
     assert predicted.settled[:50].all() and not predicted.settled[50:].any()
     return predicted
 
@@ -68,8 +65,8 @@ def test_an_array_whose_length_disagrees_is_refused():
 def test_the_trajectory_names_its_joints_and_ends_where_the_rover_cannot_settle(prediction):
     message = joint_trajectory(prediction, LSR1, HEADER)
     assert message.header.frame_id == "map" and message.header.stamp == STAMP
-    assert JOINTS == SUSPENSION_JOINTS + WHEEL_JOINTS
-    assert tuple(message.joint_names) == JOINTS + steering_joints(LSR1)
+    names = SUSPENSION_JOINTS + WHEEL_JOINTS + steering_joints(LSR1)
+    assert tuple(message.joint_names) == names
     assert len(message.points) == 50
     for i in (0, 20, 49):
         point = message.points[i]
@@ -98,26 +95,21 @@ def test_a_trajectory_of_points_filled_anew_is_the_same_as_one_of_new_points(pre
 
 def test_a_trajectory_has_the_angles_of_the_steered_wheels_with_the_sign_of_the_rover():
     turned = np.linspace(0.0, 0.5, 30)
-    path = np.column_stack([np.sin(turned), 1.0 - np.cos(turned), turned])
+    path = arc_of(1.0, turned)
     prediction = judge_path(LSR1, FLAT, path)[0]
-    for positive, sign in (("left", 1.0), ("right", -1.0)):
-        names = JointNames(steering=positive)
-        message = joint_trajectory(prediction, LSR1, HEADER, names=names)
-        for i, point in enumerate(message.points):
-            angles = dict(zip(message.joint_names, point.positions, strict=True))
-            own = {name: angles[name] for name in steering_joints(LSR1)}
-            assert list(own.values()) == pytest.approx(
-                sign * prediction.steering_angle[i, steered_wheels(LSR1)]
-            )
-        assert sign * own["front_left_steering"] > 0.3
+    message = joint_trajectory(prediction, LSR1, HEADER, names=JointNames(steering="right"))
+    positions = np.array([point.positions for point in message.points])
+    steering = prediction.steering_angle[:, steered_wheels(LSR1)]
+    np.testing.assert_array_equal(positions[:, len(JOINTS) :], -steering)
+    assert positions[-1, message.joint_names.index("front_left_steering")] < -0.3
     message = joint_trajectory(judge_path(FIXED, FLAT, path)[0], FIXED, HEADER)
     assert tuple(message.joint_names) == JOINTS and len(message.points[0].positions) == 10
 
 
 def test_in_a_turn_on_the_spot_wheels_of_one_side_roll_forwards_and_of_the_other_back():
     turned = np.linspace(0.0, 1.0, 30)
-    path = np.column_stack([0.0 * turned, 0.0 * turned, turned])
-    last = joint_trajectory(judge_path(LSR1, FLAT, path)[0], LSR1, HEADER).points[-1]
+    prediction = judge_path(LSR1, FLAT, poses_at(0.0, 0.0, turned))[0]
+    last = joint_trajectory(prediction, LSR1, HEADER).points[-1]
     reach = np.hypot([0.4, 0.0, 0.4], 0.31) / LSR1.wheel.radius
     assert last.positions[4:10] == pytest.approx([*reach, *-reach], rel=0.01)
     assert (np.sign(last.velocities[4:10]) == np.sign(last.positions[4:10])).all()

@@ -56,10 +56,9 @@ def cloud() -> PointCloud2:
 
 def fields_of(message, like) -> object:
     """Return the fields of a message that `like` has, as plain values."""
-    if hasattr(like, "_fields"):
-        return [getattr(message, name) for name in like._fields]
-    if hasattr(like, "__dict__"):
-        return {name: fields_of(getattr(message, name), one) for name, one in vars(like).items()}
+    names = getattr(like, "_fields", getattr(like, "__dict__", ()))
+    if names:
+        return [fields_of(getattr(message, name), getattr(like, name)) for name in names]
     if isinstance(like, list):
         return [fields_of(one, other) for one, other in zip(message, like, strict=True)]
     if isinstance(like, memoryview):

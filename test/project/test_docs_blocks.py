@@ -17,15 +17,15 @@ import pytest
 pytest.importorskip("rclpy", reason="needs ROS 2")
 
 from support.project.checkout import TOP, console_scripts, setup_arguments
-from support.project.doc_blocks import PAGES, Block, read_blocks
+from support.project.doc_blocks import Block, read_blocks
 from support.project.processes import ProcessToken
 from support.ros_fixtures import domain_id
 
 LONGEST, GRACE = 300.0, 20.0
 """Longest time for a block, and for its processes to end after it [s]."""
 
+PAGES = [TOP / "README.md", *sorted((TOP / "docs").rglob("*.md"))]
 BLOCKS = [block for page in PAGES for block in read_blocks(page)]
-PAGES_TO_RUN = sorted({block.page for block in BLOCKS})
 
 
 def test_what_a_robot_does_not_get_from_apt_is_installed_by_pip():
@@ -59,64 +59,46 @@ def programs(tmp_path) -> Path:
     return folder
 
 
-class Reader:
-    """A person at a shell in an empty folder, who runs one block after another."""
+@pytest.fixture
+def token():
+    """Return the mark of the processes of a page; what is left of them in the end is killed."""
+    made = ProcessToken()
+    yield made
+    made.kill()
 
-    def __init__(self, folder: Path, programs: Path):
-        self.folder = folder
-        self.token = ProcessToken()
-        self.environment = os.environ | self.token.environment | {
-            "PATH": f"{programs}{os.pathsep}{os.environ['PATH']}",
-            "PYTHONPATH": str(TOP),
-            "PYTHONUNBUFFERED": "1",
-            "ROS_DOMAIN_ID": str(domain_id()),
-            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-        }  # fmt: skip
 
-    def run(self, block: Block) -> None:
-        """Run a block; what it says on stdout, its exit code and its processes must be right."""
-        shell = block.language == "sh"
-        # Job control, as at a prompt, so that `kill %1` ends what a job started too.
-        text = f"set -m -e -o pipefail\n{block.text}" if shell else block.text
-        script = self._aside("script")
-        script.write_text(text, encoding="utf-8")
-        with open(self._aside("out"), "w") as out, open(self._aside("err"), "w") as err:
-            ended = subprocess.run(
-                ["bash" if shell else sys.executable, str(script)],
-                cwd=self.folder,
-                env=self.environment,
-                stdin=subprocess.DEVNULL,
-                stdout=out,
-                stderr=err,
-                timeout=LONGEST,
-                start_new_session=True,
-            )
-        left = self.token.wait_until_gone(GRACE)
-        out_text, err_text = self._aside("out").read_text(), self._aside("err").read_text()
-        said = f"{block}\n{out_text}\n{err_text}"
-        assert ended.returncode == 0, said
-        assert "Traceback" not in said and "[FATAL]" not in said, said
-        assert not left, f"processes are left by {said}"
-        if block.output is not None:
-            assert lines_of(out_text) == lines_of(block.output), said
-
-    def _aside(self, name: str) -> Path:
-        """Return a file beside the reader's folder, which holds what blocks write alone."""
-        return self.folder.parent / name
+def run_block(block: Block, folder: Path, programs: Path, token: ProcessToken) -> None:
+    """Run a block in a folder; what it prints, its exit code and its processes must be right."""
+    shell = block.language == "sh"
+    # Job control, as at a prompt, so that `kill %1` ends what a job started too.
+    text = f"set -m -e -o pipefail\n{block.text}" if shell else block.text
+    # Beside the folder, which holds what blocks write alone.
+    script, out, err = (folder.parent / name for name in ("script", "out", "err"))
+    script.write_text(text, encoding="utf-8")
+    environment = os.environ | token.environment | {
+        "PATH": f"{programs}{os.pathsep}{os.environ['PATH']}",
+        "PYTHONPATH": str(TOP),
+        "PYTHONUNBUFFERED": "1",
+        "ROS_DOMAIN_ID": str(domain_id()),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+    }  # fmt: skip
+    with out.open("w") as to_out, err.open("w") as to_err:
+        ended = subprocess.run(
+            ["bash" if shell else sys.executable, str(script)],
+            cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=to_out, stderr=to_err,
+            timeout=LONGEST, start_new_session=True,
+        )  # fmt: skip
+    left = token.wait_until_gone(GRACE)
+    said = f"{block}\n{out.read_text()}\n{err.read_text()}"
+    assert ended.returncode == 0, said
+    assert "Traceback" not in said and "[FATAL]" not in said, said
+    assert not left, f"processes are left by {said}"
+    if block.output is not None:
+        assert lines_of(out.read_text()) == lines_of(block.output), said
 
 
 def lines_of(text: str) -> list[str]:
     return [line.rstrip() for line in text.strip().splitlines()]
-
-
-@pytest.fixture
-def reader(tmp_path, programs):
-    """Return a reader in a fresh folder; whatever is left at the end is killed."""
-    folder = tmp_path / "work"
-    folder.mkdir()
-    person = Reader(folder, programs)
-    yield person
-    person.token.kill()
 
 
 @pytest.mark.slow
@@ -124,10 +106,12 @@ def reader(tmp_path, programs):
     "page",
     [
         pytest.param(page, marks=[] if page == "README.md" else [pytest.mark.long])
-        for page in PAGES_TO_RUN
+        for page in dict.fromkeys(block.page for block in BLOCKS)
     ],
 )
-def test_the_blocks_of_a_page_run_as_written(page, reader):
+def test_the_blocks_of_a_page_run_as_written(page, tmp_path, programs, token):
+    folder = tmp_path / "work"
+    folder.mkdir()
     for block in BLOCKS:
         if block.page == page and not block.not_run:
-            reader.run(block)
+            run_block(block, folder, programs, token)

@@ -6,7 +6,9 @@ import re
 from pathlib import Path
 
 import pytest
+import typer
 
+from rover_planner.cli import app
 from rover_planner.nodes.programs import PROGRAMS
 from support.project.checkout import TOP, console_scripts
 
@@ -14,7 +16,6 @@ PAGES = sorted(
     path.relative_to(TOP)
     for path in [*TOP.glob("*.md"), *(TOP / "docs").rglob("*.md"), TOP / "examples/README.md"]
 )
-CODE = re.compile(r"`([^`\n]+)`")
 PACKAGES = ("rover_physics", "rover_planner", "msg_adapters", "support", "benchmarks")
 FOLDERS = (*PACKAGES, "config", "docs", "examples", "launch", "test")
 SUFFIXES = (".py", ".md", ".yaml", ".npz", ".png", ".xml", ".txt")
@@ -37,17 +38,11 @@ def current_text(page: Path) -> str:
     return text
 
 
-def code_spans(page: Path) -> set[str]:
-    """Return what stands in `backquotes` outside of fenced blocks."""
-    return set(CODE.findall(re.sub(r"^```.*?^```", "", current_text(page), flags=re.M | re.S)))
-
-
-def is_file_name(word: str) -> bool:
-    return bool(re.fullmatch(r"[\w./-]*\w\.\w+", word)) and word.endswith(SUFFIXES)
-
-
-def is_folder_name(word: str) -> bool:
-    return bool(re.fullmatch(r"[\w./-]+/", word)) and word.split("/")[0] in FOLDERS
+def names_a_place(word: str) -> bool:
+    """Tell whether a word is the name of a file or a folder of the project."""
+    is_file = re.fullmatch(r"[\w./-]*\w\.\w+", word) and word.endswith(SUFFIXES)
+    is_folder = re.fullmatch(r"[\w./-]+/", word) and word.split("/")[0] in FOLDERS
+    return bool(is_file or is_folder)
 
 
 def exists(word: str, page: Path) -> bool:
@@ -55,7 +50,7 @@ def exists(word: str, page: Path) -> bool:
     if (TOP / word).exists() or (TOP / page).parent.joinpath(word).exists():
         return True
     return "/" not in word and any(
-        path.name == word and not any(part.startswith(".") for part in path.parts)
+        not any(part.startswith(".") for part in path.parts)
         for folder in FOLDERS
         for path in (TOP / folder).rglob(word)
     )
@@ -71,7 +66,8 @@ def is_in_code(dotted: str) -> bool:
 
 
 def missing_files(page: Path) -> set[str]:
-    named = {word for word in code_spans(page) if is_file_name(word) or is_folder_name(word)}
+    outside_blocks = re.sub(r"^```.*?^```", "", current_text(page), flags=re.M | re.S)
+    named = {word for word in re.findall(r"`([^`\n]+)`", outside_blocks) if names_a_place(word)}
     named -= {*MADE, *(word for word in named if word.startswith(WRITTEN))}
     links = {link for link in re.findall(r"\]\(([^)#]+)\)", read(page)) if "://" not in link}
     return {word for word in named if not exists(word, page)} | {
@@ -95,32 +91,25 @@ def test_files_links_names_and_targets_of_a_page_exist(page):
     assert set(re.findall(r"(?:`|^)make (\w+)", read(page), re.MULTILINE)) <= set(targets)
 
 
-def options_of_the_commands() -> dict[str, set[str]]:
-    """Return the options of each subcommand of rover_planner."""
-    import typer
-
-    from rover_planner.cli import app
-
-    group = typer.main.get_command(app)
-    return {
-        name: {option for parameter in command.params for option in parameter.opts}
-        for name, command in group.commands.items()
-    }
+OPTIONS = {
+    name: {option for parameter in command.params for option in parameter.opts}
+    for name, command in typer.main.get_command(app).commands.items()
+}
+"""Options of each subcommand of rover_planner."""
 
 
 def test_the_page_of_the_command_line_has_every_command():
     text = read(Path("docs/command_line.md"))
-    for name in options_of_the_commands():
+    for name in OPTIONS:
         assert re.search(rf"^\| `{name}[ `]", text, re.MULTILINE), name
 
 
 @pytest.mark.parametrize("page", PAGES, ids=str)
 def test_every_option_that_a_page_gives_to_a_command_exists(page):
-    known = options_of_the_commands()
     for command, rest in re.findall(r"rover_planner (\w+)([^`\n#]*)", current_text(page)):
-        if command in known:
+        if command in OPTIONS:
             asked = set(re.findall(r"(?<!\w)--[a-z][\w-]*", rest))
-            assert asked <= known[command], f"rover_planner {command}"
+            assert asked <= OPTIONS[command], f"rover_planner {command}"
 
 
 @pytest.mark.parametrize("page", PAGES, ids=str)

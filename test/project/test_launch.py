@@ -27,23 +27,17 @@ OF_OTHERS = {"robot_description", "diagnostics"}
 """Topics in layouts that are not published by a node under its own help's name."""
 
 
-def check_parameter_file(node: str, path: Path) -> None:
-    """Hold the parameters of a file for a node against its table; `/**` is every node."""
-    values = yaml.safe_load(path.read_text(encoding="utf-8"))
-    assert set(values) & {"/**", node}, f"{path.name} has nothing for {node}"
-    for section in ("/**", node):
-        check_parameters(node, values.get(section, {}).get("ros__parameters", {}))
-
-
 def check_parameters(node: str, values: dict[str, Any]) -> None:
-    """Hold parameters against the table of their node."""
+    """Hold parameters against the table of their node; every node has use_sim_time."""
     specs = {spec.name: spec for spec in PROGRAMS[node].parameters}
     for name, value in values.items():
+        if name == "use_sim_time":
+            continue
         assert name in specs, f"{node} has no parameter {name}"
         specs[name].check(tuple(value) if isinstance(value, list) else value)
 
 
-def test_the_rover_starts_as_its_parameter_files_say():
+def test_the_rover_starts_as_its_parameter_files_say_and_expects_the_watch_of_the_server():
     nodes = start_rover()
     assert [node.executable for node in nodes] == ["traverse_server", "traction_controller"]
     for node in nodes:
@@ -52,18 +46,12 @@ def test_the_rover_starts_as_its_parameter_files_say():
         assert file == str(TOP / "config" / "parameters" / f"{node.executable}.yaml")
         assert Path(file).is_file() and given["use_sim_time"] is False
         assert (node.namespace, node.respawn) == ("", True)
-
-
-def test_the_controller_expects_the_watch_of_the_server_unless_it_is_told_not_to():
-    server, controller = (node.parameters[1] for node in start_rover())
+        check_parameters(node.executable, given)
+    server, controller = (node.parameters[1] for node in nodes)
     assert server["monitor"] is True and 0.0 < controller["stop_timeout"] < 0.5
-    for name, given in (("traverse_server", server), ("traction_controller", controller)):
-        check_parameters(name, {k: v for k, v in given.items() if k != "use_sim_time"})
-    for node in start_rover(watch="false"):
-        assert node.parameters[1] == {"use_sim_time": False}
 
 
-def test_arguments_of_the_rover_take_precedence_over_its_files():
+def test_arguments_of_the_rover_take_precedence_over_its_files_and_can_leave_out_the_watch():
     server, controller = start_rover(
         namespace="one", use_sim_time="True", respawn="false", rover="m2020",
         terrain_file="spirit", watch="false",
@@ -75,9 +63,7 @@ def test_arguments_of_the_rover_take_precedence_over_its_files():
     for node in (server, controller):
         assert (node.namespace, node.respawn) == ("one", False)
         assert ("diagnostics", "/diagnostics") in node.remappings
-        check_parameters(
-            node.executable, {k: v for k, v in node.parameters[1].items() if k != "use_sim_time"}
-        )
+        check_parameters(node.executable, node.parameters[1])
     assert [n.executable for n in start_rover(traction_controller="false")] == ["traverse_server"]
     with pytest.raises(ValueError, match="'maybe' must be true or false"):
         start_rover(respawn="maybe")
@@ -108,7 +94,7 @@ def test_the_simulation_is_the_rover_with_a_simulator():
 def test_a_parameter_file_has_parameters_that_exist_for_any_namespace(path):
     ((pattern, content),) = yaml.safe_load(path.read_text()).items()
     assert (pattern, list(content)) == ("/**", ["ros__parameters"])
-    check_parameter_file(path.stem.removeprefix("simulated_"), path)
+    check_parameters(path.stem.removeprefix("simulated_"), content["ros__parameters"])
 
 
 def test_a_parameter_file_has_the_defaults_where_it_is_not_for_a_simulation():
@@ -149,7 +135,9 @@ CONFIG = TOP / "config"
 
 
 def test_every_parameter_of_the_file_for_nav2_is_one_of_the_server():
-    check_parameter_file("traverse_server", CONFIG / "nav2" / "watch.yaml")
+    ((node, content),) = yaml.safe_load((CONFIG / "nav2" / "watch.yaml").read_text()).items()
+    assert node == "traverse_server"
+    check_parameters(node, content["ros__parameters"])
 
 
 @pytest.mark.parametrize("preset", preset_names())

@@ -70,15 +70,21 @@ def colcon(python: Path, folder: Path, *words: str) -> subprocess.CompletedProce
     return ended
 
 
-def sourced(folder: Path, command: str, token: ProcessToken | None = None) -> str:
-    """Run a command in a shell that has sourced the workspace; return what it says."""
-    clean = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+def sourced(folder: Path, command: str) -> str:
+    """Run a command in a shell that has sourced the workspace; return what it says.
+
+    Whatever it leaves running is ended.
+    """
+    token = ProcessToken()
+    clean = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"} | token.environment
     clean |= {"ROS_DOMAIN_ID": str(domain_id()), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-    ended = subprocess.run(
-        ["bash", "-e", "-o", "pipefail", "-c", f"source install/setup.bash\n{command}"],
-        cwd=folder, env=clean | ({} if token is None else token.environment),
-        capture_output=True, text=True, timeout=300,
-    )  # fmt: skip
+    try:
+        ended = subprocess.run(
+            ["bash", "-e", "-o", "pipefail", "-c", f"source install/setup.bash\n{command}"],
+            cwd=folder, env=clean, capture_output=True, text=True, timeout=300,
+        )  # fmt: skip
+    finally:
+        token.kill()
     assert ended.returncode == 0, ended.stdout + ended.stderr
     return ended.stdout + ended.stderr
 
@@ -111,11 +117,7 @@ def test_a_server_of_the_workspace_answers_its_mission_planner(workspace):
         {programs}/traverse_server --ros-args {parameters} & trap 'kill $!' EXIT
         {programs}/mission_planner --start=1,1,0 --goal=3,1,0 --timeout 240
     """
-    token = ProcessToken()
-    try:
-        told = sourced(workspace, script, token)
-    finally:
-        token.kill()
+    told = sourced(workspace, script)
     assert "traversable" in told and "not traversable" not in told
 
 
@@ -125,11 +127,7 @@ def test_the_ros2_command_does_what_readme_says(workspace):
     blocks = read_blocks(TOP / "README.md")
     one, two = (block.text for block in blocks if block.not_run == "needs the ros2 command")
     script = f"({one}) > server.log 2>&1 & {WAIT_FOR_SERVER}\n{two}\nros2 daemon stop"
-    token = ProcessToken()
-    try:
-        told = sourced(workspace, script, token)
-    finally:
-        token.kill()
+    told = sourced(workspace, script)
     assert "goal 1: yes" in told and "nav_msgs.srv.GetPlan_Response" in told
     assert "message: traversable" in told and "label: wheel" in told
     assert "Coulomb friction" in told and "Set parameter successful" in told

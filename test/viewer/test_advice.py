@@ -10,12 +10,7 @@ pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 from rover_planner.advice.advise import grow_advice
 from rover_planner.advice.case import Case
 from rover_planner.planning.path_query import PathQueryOptions
-from rover_planner.viewer.documents.advice import (
-    PROMISED,
-    Advised,
-    apply_remedy,
-    describe_advice,
-)
+from rover_planner.viewer.documents.advice import PROMISED, Advised, apply_remedy, describe_advice
 from rover_planner.viewer.pages.page import Page
 from support.grounds import rock_left
 from support.viewer.sessions import LSR1, ask, session_on, wait_for_rest
@@ -98,8 +93,22 @@ def test_a_search_tells_what_was_found_by_a_promised_time_and_that_it_goes_on():
         words = describe_advice(advised, True, since + PROMISED)["words"]
         assert words.startswith(f"{found} found so far; the search goes on, tried: ")
     stopped, ended = (describe_advice(one, False, since) for one in (first, last))
-    assert stopped["can_ask"] and stopped["words"] == "the search was stopped"
+    assert stopped["can_ask"]
+    assert stopped["words"] == "the search was stopped before it found anything"
     assert not ended["can_ask"] and ended["words"] == "" and ended["rows"]
+
+
+def test_a_search_that_is_stopped_before_its_first_result_tells_so(page):
+    assert page.channel.parts["advice"]["words"] == ""
+
+    def stop() -> None:
+        page.hear({"ask": "advise"})
+        page.hear({"ask": "cancel"})
+
+    ask(page, stop)
+    words = "the search was stopped before it found anything"
+    wait_until(lambda: page.channel.parts["advice"]["words"] == words, "the words")
+    assert page.channel.parts["advice"]["can_ask"] and page._advised.advice is None
 
 
 def test_a_search_ends_when_nobody_looks_at_its_path_any_more(page):

@@ -35,19 +35,18 @@ def found() -> list:
 
 
 @pytest.fixture
-def busy_judge(found):
+def work(found):
     """Work that must end, although `judge_without_end` does not by itself."""
-    work = BackgroundWork(lambda _, one: found.append(one), "judge of this test")
-    yield work
-    assert work.close()
-    assert "judge of this test" not in {thread.name for thread in threading.enumerate()}
+    made = BackgroundWork(lambda _, one: found.append(one))
+    yield made
+    assert made.close()
 
 
 def wait_for_idle(work) -> None:
     wait_until(lambda: work.progress is None, "the end of the work", 60.0)
 
 
-def test_a_newer_request_stops_at_once_what_follows_a_result(found):
+def test_a_newer_request_stops_at_once_what_follows_a_result(work, found):
     steps = {"old": 0}
 
     def count_steps():
@@ -57,7 +56,6 @@ def test_a_newer_request_stops_at_once_what_follows_a_result(found):
             yield Progress("step", 1, 1)
             time.sleep(0.005)
 
-    work = BackgroundWork(lambda _, one: found.append(one))
     work.ask(count_steps())
     wait_until(lambda: steps["old"] > 3, "the old work to begin")
     work.ask(iter(["new", "last"]))
@@ -65,10 +63,9 @@ def test_a_newer_request_stops_at_once_what_follows_a_result(found):
     wait_for_idle(work)
     assert steps["old"] <= asked_at + 2
     assert found == ["old", "new", "last"]
-    assert work.close()
 
 
-def test_a_first_result_waits_for_no_older_work_and_what_follows_it_does(found):
+def test_a_first_result_waits_for_no_older_work_and_what_follows_it_does(work, found):
     go_on = threading.Event()
 
     def work_on(number):
@@ -76,18 +73,16 @@ def test_a_first_result_waits_for_no_older_work_and_what_follows_it_does(found):
         go_on.wait()
         yield f"rest of {number}"
 
-    work, asked = BackgroundWork(lambda _, one: found.append(one)), [1, 2, 3]
-    for number in asked:
+    for number in (1, 2, 3):
         work.ask(work_on(number))
         wait_until(lambda count=number: len(found) == count, "the verdict")
-    assert found == asked and work.progress
+    assert found == [1, 2, 3] and work.progress
     go_on.set()
     wait_for_idle(work)
     assert found[3:] == ["rest of 3"]
-    assert work.close()
 
 
-def test_the_time_of_a_newer_request_does_not_count_from_the_result_of_an_older_one(found):
+def test_the_time_of_a_newer_request_does_not_count_from_the_result_of_an_older_one(work, found):
     go_on = threading.Event()
 
     def work_on(is_new):
@@ -96,49 +91,44 @@ def test_the_time_of_a_newer_request_does_not_count_from_the_result_of_an_older_
         yield "verdict"
         go_on.wait()
 
-    work = BackgroundWork(lambda _, one: found.append(one))
     work.ask(work_on(False))
     wait_until(lambda: found and work.progress.seconds > 0.5, "time without a result")
     work.ask(work_on(True))
     assert work.progress.seconds < 0.5
     go_on.set()
-    wait_for_idle(work)
-    assert work.close()
 
 
 @pytest.mark.timed
-def test_cancelled_work_stops_soon_and_is_never_delivered(busy_judge, found):
+def test_cancelled_work_stops_soon_and_is_never_delivered(work, found):
     quick = session_on(ramp).wanted
-    busy_judge.ask(judge_without_end())
-    wait_until(lambda: busy_judge.progress.step == 2, "the second path")
-    assert busy_judge.progress.describe() == f"{PATH} 2 of 3"
+    work.ask(judge_without_end())
+    wait_until(lambda: work.progress.step == 2, "the second path")
+    assert work.progress.describe() == f"{PATH} 2 of 3"
     passed = start_watch()
-    assert busy_judge.cancel()
-    assert busy_judge.progress is None and not busy_judge.cancel()
-    busy_judge.ask(judge_steps(quick))
-    wait_until(lambda: busy_judge.progress is None or busy_judge.progress.what, "the next work")
+    assert work.cancel()
+    assert work.progress is None and not work.cancel()
+    work.ask(judge_steps(quick))
+    wait_until(lambda: work.progress is None or work.progress.what, "the next work")
     assert passed() < STOP_TIME
-    wait_for_idle(busy_judge)
+    wait_for_idle(work)
     assert {shown.scenario for shown in found} == {quick}
-    busy_judge.ask(judge_without_end())
-    wait_until(lambda: busy_judge.progress.what, "the work to begin")
+    work.ask(judge_without_end())
+    wait_until(lambda: work.progress.what, "the work to begin")
     passed = start_watch()
-    assert busy_judge.close()
+    assert work.close()
     assert passed() < STOP_TIME
 
 
 @pytest.mark.parametrize("error", [MemoryError(), SystemExit(3)])
-def test_an_error_is_delivered_and_what_is_asked_next_is_done(error, found):
+def test_an_error_is_delivered_and_what_is_asked_next_is_done(error, work, found):
     def fail():
         raise error
         yield
 
-    work = BackgroundWork(lambda _, one: found.append(one))
     for steps in (fail(), iter(["answer"])):
         work.ask(steps)
         wait_for_idle(work)
     assert found == [error, "answer"]
-    assert work.close()
 
 
 def test_a_process_ends_although_work_runs_in_it():

@@ -10,7 +10,12 @@ import pytest
 from rover_physics.names import EQUAL, OPTIMAL, SERVO, SIDES, WHEELS
 from rover_physics.traversability.judge import judge_path
 from rover_planner.viewer.documents import paths
-from rover_planner.viewer.documents.paths import compare_drives, describe_sliders, read_values
+from rover_planner.viewer.documents.paths import (
+    compare_drives,
+    describe_sliders,
+    list_sliders,
+    read_values,
+)
 from rover_planner.viewer.state.path_limits import Lane
 from rover_planner.viewer.state.scenario import CANDIDATES, Judged, Shown
 from support.grounds import gap, wall_at, waves
@@ -98,14 +103,14 @@ def test_board_lanes_curves_and_verdict_show_one_number_for_the_wheel_that_fails
 
 def test_the_worst_so_far_grows_and_has_all_limits_in_one_unit():
     path = judged_on(waves)
-    uses = [
-        paths.describe_uses(path, time) for time in np.linspace(0.0, path.trajectory.times[-1], 5)
+    times = np.linspace(0.0, path.trajectory.times[-1], 5)
+    worst = [
+        [one["worst"].replace("not asked", "-1") for one in paths.describe_uses(path, time)]
+        for time in times
     ]
-    worst = [[one["worst"].replace("not asked", "-1") for one in row] for row in uses]
     shares = np.array([[float(words.split()[0]) for words in row] for row in worst])
     assert (np.diff(shares, axis=0) >= 0.0).all()
-    assert len(uses[0]) == len(path.limits.lanes)
-    assert all(one["worst"].endswith("%") for one in uses[-1])
+    assert all(words.endswith("%") for words in worst[-1])
 
 
 def test_a_path_that_fails_at_its_first_pose_has_a_lane_and_a_use_for_each_limit():
@@ -274,6 +279,7 @@ def test_a_refusal_on_unknown_ground_is_at_the_time_to_which_the_drive_is_played
     assert path.failure is not None and path.failure.code == "unknown_ground"
     assert path.failure.state.time == path.trajectory.times[-1]
     assert (path.trajectory.length == 0) == (start > 0.0) == (path.failure.state.time == 0.0)
+    assert (path.trajectory.state_at(0.0) is None) == (start > 0.0)
     told = [
         paths.describe_verdict(session.shown),
         paths.describe_limits(path, None),
@@ -305,7 +311,8 @@ def test_the_board_has_all_loads_and_unknown_values_are_none_or_a_question_mark(
 
 def test_each_number_of_the_rover_has_a_slider_and_what_it_changes_of_the_drive_is_listed():
     session = session_on(ramp)
-    labels = [one[0] for part in describe_sliders(session.wanted) for one in part["sliders"]]
+    sliders = describe_sliders(list_sliders(LSR1), session.wanted)
+    labels = [one[0] for part in sliders for one in part["sliders"]]
     assert labels == list(read_values(session.wanted))
     before = session.shown.path
     session.change_rover([("friction",)], 0.4)

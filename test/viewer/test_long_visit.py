@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.bench_page import MOST_MEMORY, open_view
+from benchmarks.bench_page import AT_REST, MOST_MEMORY, open_view
 from benchmarks.grounds import made_reef
 from benchmarks.processes import memory_of
 from rover_physics.terrain.grid import save_terrain
@@ -30,15 +30,8 @@ PICTURES = os.environ.get("ROVER_PICTURES", "")
 
 def wait_for_rest(visitor: Visitor) -> None:
     """Wait until nothing is judged and nothing is old."""
-    tab = visitor.tab
-    tab.wait_for_timeout(300)
-    wait_until(
-        lambda: (
-            not tab.locator("#judging, #old").count()
-            and not tab.locator("#paths tbody[data-old]:not([data-old=false])").count()
-        ),
-        "all paths to be judged",
-    )
+    visitor.tab.wait_for_timeout(300)
+    wait_until(lambda: visitor.tab.evaluate(AT_REST), "all paths to be judged")
 
 
 def change(visitor: Visitor, values: dict[str, str]) -> None:

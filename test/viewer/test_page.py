@@ -9,14 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from support.viewer.browser import (
-    LAPTOP,
-    SCALE,
-    WAIT,
-    Visitor,
-    needs_browser,
-    open_browser,
-)
+from support.viewer.browser import LAPTOP, SCALE, WAIT, Visitor, needs_browser, open_browser
 from support.viewer.sessions import LSR1, ask, blocked_session, held, wait_for_rest
 from support.viewer.sessions import wait_patiently as wait_until
 
@@ -154,6 +147,18 @@ def test_a_refusal_leads_to_its_place_where_all_parts_show_one_number(visitor, p
         lambda: np.allclose(camera.look_at, path.failure.state.position, atol=1e-3),
         "the camera to look there",
     )
+
+
+def test_a_number_beyond_the_ends_of_its_slider_is_where_the_slider_is(visitor, page):
+    label, session = "torque limit [N m]", page.session
+    visitor.open_tab("Rover")
+    strong = replace(LSR1, wheel=replace(LSR1.wheel, max_torque=25.0))
+    ask(page, lambda: session.take_change(replace(session.wanted, rover=strong)))
+    wait_until(lambda: visitor.box(label).input_value() == "25", "the number")
+    slider = visitor.tab.get_by_role("slider", name=label, exact=True)
+    assert float(slider.input_value()) == pytest.approx(25.0, abs=0.1)
+    ask(page, session.undo)
+    wait_for_rest(page)
 
 
 def test_a_dragged_number_is_judged_and_the_reason_of_a_refused_one_stays_on_the_screen(

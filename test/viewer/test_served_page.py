@@ -30,6 +30,7 @@ from support.viewer.sessions import wait_patiently as wait_until
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
+from rover_planner.viewer.documents.paths import FULL_TURN
 from rover_planner.viewer.pages import base, sharing
 from rover_planner.viewer.pages.page import Page
 from rover_planner.viewer.scene.canvas import Canvas, Strand
@@ -115,6 +116,25 @@ def test_a_number_or_an_angle_beyond_the_ends_of_its_slider_is_that_at_its_end(p
     wait_for_rest(page)
 
 
+def test_the_ends_of_a_slider_include_a_number_or_an_angle_that_was_set_elsewhere(page):
+    session, arm = page.session, LSR1.manipulator
+
+    def ends(label: str) -> list[float]:
+        rows = {one[0]: one for part in told(page, "sliders") for one in part["sliders"]}
+        return rows[label][1:3]
+
+    most = 1.5 * ends(FRICTION)[1]
+    slippery = replace(LSR1, friction=most)
+    ask(page, lambda: session.take_change(replace(session.wanted, rover=slippery)))
+    assert ends(FRICTION)[1] == most
+    set_friction(page, 0.9 * most)  # as it was dragged to, and it can be dragged back
+    assert ends(FRICTION)[1] == most
+    turned = replace(arm, joint_limits=None, stowed=(-4.0, *arm.stowed[1:]))
+    ask(page, lambda: session.take_rover(replace(LSR1, manipulator=turned)))
+    assert ends("arm_yaw [rad]") == [-4.0, FULL_TURN]
+    assert ends(FRICTION)[1] < most
+
+
 def test_a_rover_file_and_a_preset_are_loaded_and_the_arm_follows(page):
     text = write_rover(replace(LSR1, name="bare", manipulator=None))
     page.hear({"ask": "upload", "name": "bare.yaml", "text": text})
@@ -185,19 +205,16 @@ def test_the_ghost_of_a_failure_stays_for_the_next_one_and_hides_without(page):
         np.testing.assert_allclose(
             ghosts[-1].position, canvas.to_scene(failure.state.position), rtol=1e-6
         )
-    ghost, (wheel, _), (own, _) = (
-        canvas.nodes["/failure"],
-        *(one.meshes[failure.link] for one in (scene.ghost, scene.rover)),
-    )
-    assert ghosts[0] is ghosts[1] and ghost.visible
-    assert canvas.nodes[wheel].color == REFUSED
+    ghost, rovers = canvas.nodes["/failure"], (scene.ghost, scene.rover)
+    wheel, own = (canvas.nodes[one.meshes[failure.link][0]] for one in rovers)
+    assert ghosts[0] is ghosts[1] and ghost.visible and wheel.color == REFUSED
     for state, failing in ((failure.state, True), (None, False)):
         ask(page, lambda state=state: scene.show(state, failure))
         assert ghost.visible != failing
-        assert state is None or canvas.nodes[own].opacity == 1.0  # as of what fails
+        assert state is None or own.opacity == 1.0  # as of what fails
     ask(page, lambda: scene.mark_failure(None))
     ask(page, lambda: scene.show(failure.state))
-    assert not ghost.visible and canvas.nodes[own].opacity is None
+    assert not ghost.visible and own.opacity is None
 
 
 @pytest.fixture

@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Advice on the path that is looked at: sought, told beside the reason of a refusal, and taken."""
 
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from rover_planner.advice.advise import Advice, grow_advice
+from rover_planner.advice.advise import STOPPED, Advice, grow_advice
 from rover_planner.advice.case import case_of
 from rover_planner.advice.remedy import Remedy
 from rover_planner.planning.assumptions import assume
@@ -24,25 +23,26 @@ class Advised:
     """The path."""
     since: float
     """When a visitor asked for advice, on the monotonic clock [s]."""
-    advice: Advice
-    """What was found so far."""
+    advice: Advice | None = None
+    """What was found so far; None before the first result."""
 
     @property
     def remedies(self) -> list[Remedy]:
         """The remedies in the order of the list."""
-        return [*self.advice.remedies, *self.advice.others]
+        found = self.advice
+        return [] if found is None else [*found.remedies, *found.others]
 
 
-def seek_advice(path: Judged) -> Iterator[Advised]:
+def seek_advice(advised: Advised) -> Iterator[Advised]:
     """Yield the advice on a path as it grows.
 
     Raises:
         RoverError: The model refuses the path or an option.
     """
-    asked, since = path.scenario, time.monotonic()
-    case = case_of(asked.rover, asked.terrain, path.poses, asked.options)
+    asked = advised.path.scenario
+    case = case_of(asked.rover, asked.terrain, advised.path.poses, asked.options)
     for found in grow_advice(case):
-        yield Advised(path, since, found)
+        yield replace(advised, advice=found)
 
 
 def apply_remedy(scenario: Scenario, remedy: Remedy) -> Scenario:
@@ -68,11 +68,12 @@ def describe_advice(advised: Advised | None, is_seeking: bool, now: float) -> di
     A change of the ground is no value of the page: such remedies are told, and not taken.
 
     Args:
-        advised: The advice on the path that is looked at; None if nothing is known.
+        advised: The advice on the path that is looked at; None if none was sought.
         is_seeking: True if levers are still tried.
         now: The monotonic clock [s].
     """
-    is_complete = advised is not None and advised.advice.complete
+    advice = None if advised is None else advised.advice
+    is_complete = advice is not None and advice.complete
     rows = [
         {
             "taken": all(one.lever.name != "ground" for one in remedy.levers),
@@ -89,13 +90,14 @@ def describe_advice(advised: Advised | None, is_seeking: bool, now: float) -> di
 def _write_progress(advised: Advised | None, is_seeking: bool, now: float) -> str:
     """Return how far the search is: what is tried, or what was found at its end."""
     if advised is None:
-        return "tried: nothing yet" if is_seeking else ""
+        return ""
     advice = advised.advice
-    if not advice.complete and not is_seeking:
-        return "the search was stopped"
-    if not is_seeking:
+    if not is_seeking and advice is not None and advice.complete:
         return "" if advice.found else advice.describe()
-    tried = f"tried: {' and '.join(advice.tried).replace('_', ' ') or 'nothing yet'}"
+    if not is_seeking:
+        return "the search was stopped" if advised.remedies else STOPPED
+    names = () if advice is None else advice.tried
+    tried = f"tried: {' and '.join(names).replace('_', ' ') or 'nothing yet'}"
     found = len(advised.remedies) or "nothing"
     is_late = now - advised.since >= PROMISED
     return f"{found} found so far; the search goes on, {tried}" if is_late else tried

@@ -53,13 +53,14 @@ class Page(PageBase):
         self._opening: tuple[sharing.PageLink, Scenario] | None = None
         """The link whose path and time are not shown yet, and what it asks for."""
         self._told_at = 0.0
+        self._sliders: paths.Sliders = {}
         asked = session.wanted
         super().__init__(asked.rover, asked.terrain, address, ground_name, survey)
         self._advice = self.begin_work(self._take_advice, "advice")
         self._judging = self.begin_work(self._take_judged, "judge")
         session.judge = self._judging.ask
         self._advised: advice.Advised | None = None
-        """The path that is looked at and the advice on it; None if nothing is known."""
+        """The path that is looked at and the advice on it; None if none was sought."""
         self._offers = {
             "presets": list(preset_names()),
             "soils": list(load_soils()),
@@ -108,7 +109,7 @@ class Page(PageBase):
             "place": lambda words: playback.go_to(playback.drive.time_at(words["distance"])),
             "speed": lambda words: setattr(playback, "speed", float(words["times"])),
             "failure": lambda _words: self._go_to_failure(),
-            "advise": lambda _words: self._advice.ask(advice.seek_advice(session.shown.path)),
+            "advise": lambda _words: self._seek_advice(),
             "ghost": lambda words: self._show_ghost(words["words"]),
             "remedy": lambda words: self._take_remedy(words["words"]),
             "save rover": lambda _words: _write_rover(session.wanted.rover),
@@ -129,7 +130,7 @@ class Page(PageBase):
 
     def _change_value(self, label: str, number: float) -> None:
         """Change a number of the rover, or turn a joint, by the label of its slider."""
-        parts = paths.list_sliders(self.session.wanted.loaded).values()
+        parts = self._find_sliders().values()
         found = [one for values in parts for one in values if one.label == label]
         if not found:
             raise PlanningError(f"the rover has no number {label!r}")
@@ -141,6 +142,15 @@ class Page(PageBase):
             session.take_change(session.wanted.change_options(joint_angles=angles))
         else:
             session.change_rover(one.keys, number)
+
+    def _find_sliders(self) -> paths.Sliders:
+        """Return the sliders of the rover; their ends include all that was wanted of it."""
+        wanted = self.session.wanted
+        if self.has_changed("loaded", wanted.loaded):
+            self._sliders = paths.list_sliders(wanted.loaded)
+        if self.has_changed("wanted", wanted):
+            self._sliders = paths.widen_sliders(self._sliders, wanted)
+        return self._sliders
 
     def _cancel(self) -> None:
         self.session.is_stopped |= self._judging.cancel()
@@ -155,8 +165,13 @@ class Page(PageBase):
 
     # Advice.
 
+    def _seek_advice(self) -> None:
+        self._advised = advice.Advised(self.session.shown.path, time.monotonic())
+        self._advice.ask(advice.seek_advice(self._advised))
+
     def _take_advice(self, _steps: Any, found: advice.Advised | BaseException) -> None:
         if isinstance(found, BaseException):
+            self._advised = None
             raise PlanningError(f"no advice: {found}")
         if found.path is self.session.shown.path:
             self._advised = found
@@ -330,7 +345,7 @@ class Page(PageBase):
         helps = advice.describe_advice(self._advised, is_seeking, time.monotonic())
         tell("advice", None if shown.verdict.traversable else helps)
         made("current", lambda *_: sharing.write_link(self._link()), shown, self.colouring)
-        made("sliders", lambda _: paths.describe_sliders(wanted), wanted.loaded)
+        made("sliders", lambda now: paths.describe_sliders(now, wanted), self._find_sliders())
         made("values", paths.read_values, wanted)
         made("changes", paths.describe_changes, path, reference, session.kept is not None)
         made("limits", paths.describe_limits, path, reference, shown.chance)

@@ -8,6 +8,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
 from rover_planner.advice import seek
+from rover_planner.advice.advise import STOPPED
 from rover_planner.advice.levers import LEVERS
 from rover_planner.ros.qos import latched_qos
 from support.grounds import make_terrain, rock_left
@@ -65,6 +66,23 @@ def test_advice_in_work_gives_way_to_questions_and_ends_when_it_is_cancelled(
     wait_until(advice.done, "the end of the advice")
     assert json.loads(advice.result().message)["code"] == "cancelled"
     wait_until(question.done, "the end of the question")
+
+
+def test_advice_whose_time_is_up_before_its_first_result_tells_so(
+    start_server, client, ros, endless
+):
+    server = start_server(planner="fan", candidate_count=1, advice_time=0.5, time_budget=600.0)
+    client.send_terrain(make_terrain(rock_left))
+    assert not client.can_traverse(START, GOAL).poses
+    with endless():  # a question that lasts longer
+        _, question = begin_plan(ros, START, GOAL)
+        wait_until(lambda: server.desk.open_count == 1, "the question")
+        advice = send_request(client, "advise")
+        wait_until(advice.done, "the end of the advice")
+        answer = json.loads(advice.result().message)
+        assert (answer["code"], answer["reason"]) == ("too_long", STOPPED)
+        send_request(client, "cancel")
+        wait_until(question.done, "the end of the question")
 
 
 def test_advice_that_has_begun_is_cancelled_too(start_server, client):

@@ -50,11 +50,12 @@ def chance_near_torque(ground: Terrain, rover, use: float = 0.9) -> float:
 
 
 @pytest.mark.parametrize("slope", [0.26, 0.3, 0.33])
-def test_the_chance_is_that_of_a_friction_below_what_the_slope_needs(slope):
-    found = chance_on(plane(slope, 0.0), rover_with(friction=0.1))
+def test_the_chance_is_that_of_a_friction_below_what_the_slope_needs_all_along_a_path(slope):
+    found = chance_on(plane(slope, 0.0), rover_with(friction=0.1), n=40)
     expected = NormalDist(1.0, 0.1).cdf(found.max_friction_utilisation)
     assert 0.005 < expected < 0.995
     assert found.failure_chance == pytest.approx(expected, abs=ONE)
+    assert set(found.failure_chance_at) == {found.failure_chance}
 
 
 def test_samples_over_the_error_of_the_model_are_spread_as_told():
@@ -75,10 +76,8 @@ def test_samples_over_the_error_of_the_model_are_spread_as_told():
 
 
 def test_a_path_that_passes_in_the_best_sample_alone_does_not_fail_for_sure():
-    rover, ground = rover_with(max_torque=0.1), plane(0.2, 0.0)
-    used = chance_on(ground, rover).max_torque_saturation * rover.wheel.max_torque
-    weak = replace(rover, wheel=replace(rover.wheel, max_torque=used / 1.19))
-    assert chance_on(ground, weak).failure_chance == 1.0 - 1.0 / SAMPLES
+    found = chance_near_torque(plane(0.2, 0.0), rover_with(max_torque=0.1), use=1.19)
+    assert found == 1.0 - 1.0 / SAMPLES
 
 
 def test_what_fails_for_sure_further_on_changes_no_chance_before_it():
@@ -108,21 +107,23 @@ def test_optimal_torques_give_way_to_a_wheel_that_has_less():
     assert found.max_torque_saturation > 0.99 and found.failure_chance == 0.0
 
 
-def test_the_torque_limit_counts_like_friction():
-    found = chance_near_torque(plane(0.2, 0.0), rover_with(max_torque=0.1))
-    assert found == pytest.approx(NormalDist(1.0, 0.1).cdf(0.9), abs=ONE)
-
-
 def rising(x, y):
     """Return the height of a slope that gets steeper: contact angles differ by 0.2 rad."""
     return 0.12 * x**2 + 0.25 * x
 
 
 @pytest.mark.parametrize(
-    ("ground", "share"), [(plane(0.2, 0.0), EVEN_SHARE), (make_terrain(rising, half=3.0), 1.0)]
+    ("ground", "name", "share"),
+    [
+        (plane(0.2, 0.0), "max_torque", 1.0),
+        (plane(0.2, 0.0), "model", EVEN_SHARE),
+        (make_terrain(rising, half=3.0), "model", 1.0),
+    ],
 )
-def test_of_the_error_of_the_model_a_share_counts_where_the_ground_is_even(ground, share):
-    found = chance_near_torque(ground, rover_with(model=0.1), use=0.97)
+def test_the_torque_limit_counts_and_of_the_error_of_the_model_a_share_on_even_ground(
+    ground, name, share
+):
+    found = chance_near_torque(ground, rover_with(**{name: 0.1}), use=0.97)
     assert found == pytest.approx(NormalDist(1.0, 0.1 * share).cdf(0.97), abs=ONE)
 
 
@@ -135,13 +136,6 @@ def test_a_peak_between_waypoints_counts_though_the_position_is_uncertain():
     assert prediction.friction_utilisation.max() < 0.6 < 0.9 < found.max_friction_utilisation
     expected = NormalDist(1.0, 0.1).cdf(found.max_friction_utilisation)
     assert found.failure_chance == pytest.approx(expected, abs=ONE)
-
-
-def test_what_is_common_stays_common_along_a_path():
-    rover, ground = rover_with(friction=0.1), plane(0.3, 0.0)
-    few, many = (chance_on(ground, rover, n=n) for n in (1, 40))
-    assert many.failure_chance == few.failure_chance > 0.0
-    assert set(many.failure_chance_at) == {few.failure_chance}
 
 
 @pytest.mark.parametrize(("name", "std"), [("com", 0.1), ("friction_per_wheel", 0.1)])

@@ -13,13 +13,12 @@ from support.grounds import make_terrain
 from support.paths import poses_at
 from support.project.checkout import TOP
 from support.reference_cases import reference_predictions, steered_predictions
-from support.rough_grounds import fractal, plane, random_poses, rocky, scaled_for, smooth
-from support.rover_geometry import ANGLE, GAP, attitude_of, place_rover, wheel_axes, wheel_gaps
-from support.rovers import LSR1, M2020
+from support.rough_grounds import fractal, plane, random_poses, rocky, smooth
+from support.rover_geometry import ANGLE, GAP, attitude_of, wheel_axes, wheel_gaps
+from support.rovers import LSR1
 
 slopes = st.floats(-0.4, 0.4)
 headings = st.floats(-np.pi, np.pi)
-few = settings(max_examples=10)
 both_sets = pytest.mark.parametrize(
     ("predict", "count"),
     [(reference_predictions, 81), (steered_predictions, 21)],
@@ -97,18 +96,7 @@ def test_contact_points_lie_on_the_wheels_and_on_the_ground(predict, count):
         assert points[:, 2] == pytest.approx(heights, abs=0.01)
 
 
-@pytest.mark.parametrize("rover", [LSR1, M2020], ids=lambda rover: rover.name)
-def test_wheel_centres_follow_from_pose_and_suspension_angles(rover):
-    ground, poses = scaled_for(rover, fractal(3), random_poses(1, 20, 0.8))
-    prediction = judge_path(rover, ground, poses)[0]
-    assert prediction.settled.all()
-    assert np.array_equal(prediction.rocker_angle[:, 1], -prediction.rocker_angle[:, 0])
-    for i in range(20):
-        wheels = place_rover(rover, prediction, i).wheels
-        assert prediction.wheel_centres[i] == pytest.approx(wheels, abs=1e-11 * rover.wheel.radius)
-
-
-@few
+@settings(max_examples=10)
 @given(slopes, slopes, st.floats(-5.0, 5.0), headings)
 def test_on_a_plane_the_rover_lies_like_the_plane(slope_x, slope_y, height, yaw):
     prediction = judge_path(LSR1, plane(slope_x, slope_y, height), [[0.1, -0.05, yaw]])[0]
@@ -146,9 +134,7 @@ REACH = LEVEL.bounds[1] - 0.5
     ],
 )
 def test_wheels_over_unknown_ground_and_off_the_map_are_told_apart(ground, x, status):
-    prediction = judge_path(LSR1, ground, [[x, 0.0, 0.0]])[0]
-    assert prediction.status.tolist() == [status]
-    assert prediction.settled.tolist() == [status == PoseStatus.SETTLED]
+    assert judge_path(LSR1, ground, [[x, 0.0, 0.0]])[0].status.tolist() == [status]
 
 
 def test_a_wall_across_the_rover_is_never_settled_by_a_guess():
@@ -211,11 +197,8 @@ def test_it_is_the_height_of_the_belly_above_the_highest_known_ground_below(grou
 def test_it_is_what_a_look_at_every_cell_gives(seed, make):
     ground = make(seed)
     prediction = judge_poses(LSR1, ground, random_poses(seed, 2, 0.6), np.zeros(2))[0]
-    ny, nx = ground.elevation.shape
-    x, y = np.meshgrid(
-        ground.origin[0] + np.arange(nx) * ground.resolution,
-        ground.origin[1] + np.arange(ny) * ground.resolution,
-    )
+    rows, columns = ground.resolution * np.indices(ground.elevation.shape)
+    x, y = ground.origin[0] + columns, ground.origin[1] + rows
     for i in np.flatnonzero(prediction.settled):
         R, origin = attitude_of(prediction, i), prediction.position[i]
         belly_z = (-0.06 - R[0, 2] * (x - origin[0]) - R[1, 2] * (y - origin[1])) / R[2, 2]

@@ -88,13 +88,6 @@ def test_an_error_names_key_value_and_rule(changes, text):
     assert refusal(**changes) == text
 
 
-def test_an_unknown_key_is_named_before_the_missing_one_that_it_was_meant_for():
-    data = walker(hips=[0, 0, 0])
-    del data["hip"]
-    with pytest.raises(RoverFileError, match="unknown key hips; did you mean hip[?]"):
-        read_as(Walker, data, "a walker file")
-
-
 def test_errors_name_the_part_of_a_file_from_the_top_and_open_with_the_file():
     with pytest.raises(RoverFileError, match=r"^dune\.legs\[0\]\.length is 0; "):
         read_as(Walker, walker(legs=[{"length": 0}]), "a walker file", ("dune",))

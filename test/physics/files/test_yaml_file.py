@@ -30,7 +30,7 @@ HOSTILE = [
 def error_of(folder, text) -> str:
     """Return the error of a file with this text, without the file's name."""
     path = folder / "file.yaml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(text, encoding="utf-8", errors="surrogatepass")
     with pytest.raises(RoverError) as raised:
         load_rover(path)
     return str(raised.value).removeprefix(f"{path}: ")
@@ -76,12 +76,13 @@ def test_of_merged_keys_the_nearest_counts():
     assert parse_yaml(text)["d"] == {"x": 4, "y": 1}
 
 
-def test_impossible_merges_and_references_are_refused_at_once():
+def test_impossible_merges_and_references_and_deep_nesting_are_refused_at_once():
     keys = ",".join(f"k{k}: 1" for k in range(3000))
     start = time.perf_counter()
     for text, said in (
         ("a: &a {x: 1}\nb: {<<: *a, x: 2, x: 3}", "duplicate key x in lines 2 and 2"),
         ("a: &a {b: *a}\n", "references stand for inf values"),
+        ("- " * 50_000, "recursion"),
         (
             f"a: &a {{{keys}}}\nb: {{<<: [{'*a,' * 10_000}]}}\n",
             r"references stand for 6e\+07 values",
@@ -97,21 +98,6 @@ def test_a_large_file_is_refused_before_it_is_parsed(tmp_path):
     assert text == "is larger than 100000 bytes, the most that is read"
 
 
-def test_deep_nesting_is_refused_at_once(tmp_path):
-    start = time.perf_counter()
-    assert "recursion" in error_of(tmp_path, "- " * 50_000)
-    assert time.perf_counter() - start < 30.0
-
-
-@pytest.mark.parametrize(
-    ("content", "reason"),
-    [
-        (b"a: \0", "special characters are not allowed"),
-        (b"a: \xed\xa0\x80", "not a text file in UTF-8"),
-    ],
-)
-def test_bytes_that_are_no_text_are_refused(tmp_path, content, reason):
-    path = tmp_path / "file.yaml"
-    path.write_bytes(content)
-    with pytest.raises(RoverFileError, match=reason):
-        load_rover(path)
+def test_bytes_that_are_no_text_are_refused(tmp_path):
+    assert "special characters are not allowed" in error_of(tmp_path, "a: \0")
+    assert "not a text file in UTF-8" in error_of(tmp_path, "a: \ud800")

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rover_physics import PoseStatus, Rover, SweepOptions, judge_path, judge_poses
+from rover_physics import PoseStatus, SweepOptions, judge_path, judge_poses
 from rover_physics.forces.stability import tip_over_angles
 from rover_physics.prediction.packed_model import pack_model
 from rover_physics.prediction.path_motion import motions_of
@@ -132,19 +132,14 @@ def test_torque_is_traction_times_radius_and_both_utilisations_are_shares_of_the
 # Free forces: what torques change, and what no balance decides
 
 
-def balance_of(rover: Rover):
-    """Return the balance of a rover on level ground."""
-    model, ahead = pack_model(rover, plane(0.0, 0.0), SweepOptions("optimal")), np.zeros((1, 3))
-    ((_, work),) = evaluate_in_turn(model, ahead, motions_of(model, ahead, None))
-    return work.balance
-
-
 @pytest.mark.parametrize(
     ("torques", "changes"),
     [([-0.2, 0.2, 0.0], [-0.733, 1.467, -0.733]), ([0.0, -0.2, 0.2], [0.0, 0.0, 0.0])],
 )
 def test_torques_change_loads_as_in_figure_4(torques, changes):
-    balance, pulls = balance_of(LSR1), np.array(torques * 2) / LSR1.wheel.radius
+    model, ahead = pack_model(LSR1, plane(0.0, 0.0), SweepOptions("optimal")), np.zeros((1, 3))
+    ((_, work),) = evaluate_in_turn(model, ahead, motions_of(model, ahead, None))
+    balance, pulls = work.balance, np.array(torques * 2) / LSR1.wheel.radius
     relative = pulls[:5] - pulls[5]
     assert balance.tangential[:, 1:6] @ relative == pytest.approx(pulls, abs=1e-9)
     loads = balance.normal[:, 1:6] @ relative

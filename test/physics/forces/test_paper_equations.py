@@ -7,8 +7,6 @@ test_rough_poses.py; (8) to (15), in 3-D and with all weights, are the nine sums
 test_equilibrium.py.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from rover_physics import PathPrediction, Rover, judge_path
@@ -17,59 +15,41 @@ from support.rover_geometry import attitude_of
 from support.rovers import LSR1
 
 
-class Links(NamedTuple):
-    """The paper's lengths and angles of a rover with the bogie ahead, see docs/physics.md."""
-
-    l1: float
-    l2: float
-    l3: float
-    l4: float
-    alpha: float
-    beta: float
-    gamma: float
-    middle: float
-    """Elevation of the middle wheel from the bogie pivot on flat ground [rad]."""
-    w: float
-
-
-def links_of(rover: Rover) -> Links:
-    def link(start, end):
-        along, up = end[0] - start[0], end[2] - start[2]
-        return np.hypot(along, up), np.arctan2(up, along)
-
-    suspension = rover.suspension
-    l1, rear = link(suspension.rocker_pivot, suspension.wheels["rear"])
-    l2, bogie = link(suspension.rocker_pivot, suspension.bogie_pivot)
-    l3, middle = link(suspension.bogie_pivot, suspension.wheels["middle"])
-    l4, front = link(suspension.bogie_pivot, suspension.wheels["front"])
-    w = 2.0 * suspension.rocker_pivot[1]
-    return Links(l1, l2, l3, l4, bogie - rear, front - middle, rear, middle, w)
+def link_of(start, end) -> tuple[float, float]:
+    """Return length and elevation of a link between two points of the body's plane."""
+    along, up = end[0] - start[0], end[2] - start[2]
+    return np.hypot(along, up), np.arctan2(up, along)
 
 
 def closure(rover: Rover, prediction: PathPrediction, i: int) -> dict:
     """Return what is left of eqs (1) and (3) to (7), by their numbers [rad, m].
 
     The paper's roll is the camber of the wheels, positive when the right side is high; its link
-    angles are elevations in the plane of the wheels.
+    angles are elevations in the plane of the wheels. The symbols are those of docs/physics.md.
     """
-    k = links_of(rover)
+    suspension = rover.suspension
+    l1, gamma = link_of(suspension.rocker_pivot, suspension.wheels["rear"])
+    l2, bogie = link_of(suspension.rocker_pivot, suspension.bogie_pivot)
+    l3, middle = link_of(suspension.bogie_pivot, suspension.wheels["middle"])
+    l4, front = link_of(suspension.bogie_pivot, suspension.wheels["front"])
+    alpha, beta = bogie - gamma, front - middle
     R = attitude_of(prediction, i)
     nose_up, roll = np.arctan2(R[2, 0], R[2, 2]), -np.arcsin(R[2, 1])
     rockers = nose_up - prediction.rocker_angle[i]
-    theta1, theta3 = k.gamma + rockers
-    theta2, theta4 = k.middle + rockers - prediction.bogie_angle[i]
+    theta1, theta3 = gamma + rockers
+    theta2, theta4 = middle + rockers - prediction.bogie_angle[i]
     z1r, z2r, z3r, z1l, z2l, z3l = prediction.wheel_centres[i, :, 2]
     c, s = np.cos(roll), np.sin
-    across = k.w * s(roll)
-    to_pivot = k.l3 * s(theta2) + k.l2 * s(theta1 + k.alpha)
-    to_left_bogie = to_pivot - k.l2 * s(theta3 + k.alpha)
+    across = 2.0 * suspension.rocker_pivot[1] * s(roll)
+    to_pivot = l3 * s(theta2) + l2 * s(theta1 + alpha)
+    to_left_bogie = to_pivot - l2 * s(theta3 + alpha)
     return {
-        1: (theta1 + theta3) / 2.0 - k.gamma - nose_up,
-        3: z2r - z3r - c * (k.l3 * s(theta2) - k.l4 * s(theta2 + k.beta)),
-        4: z2r - z1r - c * (to_pivot - k.l1 * s(theta1)),
-        5: z2r - z1l - c * (to_pivot - k.l1 * s(theta3)) - across,
-        6: z2r - z2l - c * (to_left_bogie - k.l3 * s(theta4)) - across,
-        7: z2r - z3l - c * (to_left_bogie - k.l4 * s(theta4 + k.beta)) - across,
+        1: (theta1 + theta3) / 2.0 - gamma - nose_up,
+        3: z2r - z3r - c * (l3 * s(theta2) - l4 * s(theta2 + beta)),
+        4: z2r - z1r - c * (to_pivot - l1 * s(theta1)),
+        5: z2r - z1l - c * (to_pivot - l1 * s(theta3)) - across,
+        6: z2r - z2l - c * (to_left_bogie - l3 * s(theta4)) - across,
+        7: z2r - z3l - c * (to_left_bogie - l4 * s(theta4 + beta)) - across,
     }
 
 

@@ -194,15 +194,6 @@ def test_more_friction_does_not_stop_a_rover_with_strong_motors(friction):
     assert judge_path(LSR1, ground, drive_path(), options)[1].traversable
 
 
-def test_firm_patches_of_a_soil_layer_are_driven_as_coulomb_ground():
-    level = plane(0.1, 0.0)
-    soil = np.zeros(level.elevation.shape, np.int32)
-    layered = replace(level, soil=soil, soil_names=("firm_ground",))
-    firm = judge_path(LSR1, layered, POSE, replace(SERVO, friction=0.3))[0]
-    plain = judge_path(LSR1, level, POSE, replace(SERVO, friction=0.8))[0]
-    np.testing.assert_array_equal(firm.torque, plain.torque)
-
-
 @pytest.mark.parametrize(("soil", "curvature"), [("lunar_nominal", 0.0), ("lete_sand", np.inf)])
 def test_on_rough_soil_servos_drive_wherever_equal_torques_suffice(soil, curvature):
     poses, bends = random_poses(3, 40, 0.8), np.full(40, curvature)

@@ -2,7 +2,6 @@
 """Optimal torques and the ranges of torques, by linear programs of their own."""
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -10,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rover_physics import SweepOptions, find_torque_ranges, judge_path
-from rover_physics.traversability.verdict import hold_against_limits
 from support.best_torques import INSIDE, can_stand, solve_forces
 from support.reference_cases import reference_ground
 from support.rough_grounds import fractal, plane, random_poses, rocky, smooth
@@ -68,15 +66,14 @@ def test_optimal_torques_never_use_more_friction_than_equal_ones(seed, asked):
     assert (least <= most * (1.0 + 1e-4) + 1e-6).all()
 
 
-def range_by_program(prediction, i, wheel, max_torque, *, inside: bool, shared: bool):
-    """Return the range [N m] of a wheel's torque by linear programs."""
-    unit, share = LSR1.wheel.radius * LSR1.weight, INSIDE if inside else 1.0
+def range_by_program(prediction, i, wheel, max_torque, shared, share):
+    """Return the range [N m] of a wheel's torque by linear programs, with a share of friction."""
     cost = np.eye(12)[6 + wheel]
     ends = [
         sign * solve_forces(LSR1, prediction, i, sign * cost, max_torque, share, shared).fun
         for sign in (1.0, -1.0)
     ]
-    return unit * np.array(ends)
+    return LSR1.wheel.radius * LSR1.weight * np.array(ends)
 
 
 @pytest.mark.parametrize(
@@ -96,8 +93,10 @@ def test_ranges_lie_between_those_of_linear_programs(ground, poses, friction, ma
             continue
         for wheel in range(6):
             compared += 1
-            program = partial(range_by_program, optimal, i, wheel, max_torque, shared=shared)
-            widest, within = program(inside=False), program(inside=True)
+            widest, within = (
+                range_by_program(optimal, i, wheel, max_torque, shared, share)
+                for share in (1.0, INSIDE)
+            )
             assert widest[0] - slack <= ranges.lowest[i, wheel] <= within[0] + slack
             assert within[1] - slack <= ranges.highest[i, wheel] <= widest[1] + slack
     assert compared >= 6
@@ -116,8 +115,8 @@ def test_torques_that_a_policy_uses_are_within_the_ranges(seed, yaw, soil):
     ground, pose = smooth(seed), [[0.1, 0.2, yaw]]
     ranges = find_torque_ranges(LSR1, ground, pose, SweepOptions(soil=soil))
     for policy in ("equal", "optimal"):
-        prediction = judge_path(LSR1, ground, pose, SweepOptions(policy=policy, soil=soil))[0]
-        if hold_against_limits(LSR1, prediction).code not in ("", "belly", "tilt"):
+        prediction, verdict = judge_path(LSR1, ground, pose, SweepOptions(policy, soil=soil))
+        if verdict.code not in ("", "belly", "tilt"):
             continue
         assert ranges.feasible[0]
         assert (prediction.torque >= ranges.lowest - 1e-4).all()

@@ -5,14 +5,12 @@ import ast
 import functools
 import threading
 import time
-from pathlib import Path
 
 import pytest
 
 from rover_physics.numerics.kernel_cache import _only_load, loading_only
 from rover_physics.numerics.threads import CALLS_IN_WORK, run_in_turn
-
-REPOSITORY = Path(__file__).resolve().parents[3]
+from support.project.checkout import TOP
 
 
 @pytest.mark.parametrize("threads", [1, 3])
@@ -63,7 +61,7 @@ def test_kernels_are_not_made_by_functions():
     """Kernels of one name from one line differ for Python only: on disk they may be mixed up."""
     found = []
     for package in ("rover_physics", "rover_planner"):
-        for path in (REPOSITORY / package).rglob("*.py"):
+        for path in (TOP / package).rglob("*.py"):
             text = path.read_text(encoding="utf-8")
             tree = ast.parse(text if "kernels" in text else "")
             for node in set(ast.walk(tree)) - set(tree.body):

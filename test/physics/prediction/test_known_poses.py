@@ -9,9 +9,10 @@ import pytest
 from rover_physics import SweepOptions, judge_path, judge_pieces
 from rover_physics.prediction.known_poses import KnownPoses
 from rover_physics.prediction.packed_model import PackedModel, pack_model
-from rover_physics.results.record import RESULT, numbers_of
-from rover_physics.results.uses import find_codes
+from rover_physics.prediction.sweep import FIRST_BLOCK
+from rover_physics.results.record import numbers_of
 from support.paths import poses_at
+from support.predictions import assert_same
 from support.rough_grounds import rocky
 from support.rovers import LSR1
 
@@ -19,6 +20,8 @@ GROUND = rocky(5)
 X = np.linspace(-1.0, 1.0, 101)
 WAY, EASY = poses_at(X), poses_at(X, -0.2)
 """Paths, of which the second passes."""
+STRAIGHT = np.tile([0.1, 0.0, 0.0], (len(WAY), 1))
+"""Motions straight ahead."""
 
 
 @pytest.fixture
@@ -46,9 +49,7 @@ def test_a_path_is_the_same_to_the_bit_with_what_is_known_and_is_not_evaluated_a
     assert asked.poses - before < 0.1 * before  # wheels that climb, and other ways out
     for prediction, verdict in (first, again):
         assert verdict == anew[1]
-        for name in RESULT.names:
-            one, other = prediction.results[name], anew[0].results[name]
-            np.testing.assert_array_equal(one, other, err_msg=name)
+        assert_same(prediction, anew[0])
 
 
 def test_a_path_of_judged_pieces_is_hardly_evaluated_again(asked):
@@ -60,27 +61,20 @@ def test_a_path_of_judged_pieces_is_hardly_evaluated_again(asked):
     assert asked.poses - before < 0.1 * before
 
 
-def test_what_fails_between_waypoints_is_not_searched_further(asked):
-    model = pack_model(LSR1, GROUND)
-    fails = find_codes(model.limits, model.evaluate(WAY))
-    assert not any(fails)
-    assert judge_pieces(LSR1, GROUND, [WAY])[0].code
-    of_piece, asked.poses = asked.poses - len(WAY), 0
-    judge_path(LSR1, GROUND, WAY, stop_at_failure=True)
-    up_to_failure, asked.poses = asked.poses, 0
-    judge_path(LSR1, GROUND, WAY)
-    assert of_piece < 0.8 * asked.poses and up_to_failure < 0.8 * asked.poses
+def test_nothing_is_evaluated_or_searched_far_beyond_a_failure_at_the_start(asked):
+    path = poses_at(np.linspace(-5.0, 1.0, 10 * FIRST_BLOCK))  # it begins off the map
+    assert judge_path(LSR1, GROUND, path, stop_at_failure=True)[1].first_failure == 0
+    assert asked.poses == FIRST_BLOCK
 
 
 def test_a_changed_model_knows_nothing_and_the_same_one_all(asked):
     model = pack_model(LSR1, GROUND).remember(KnownPoses())
-    straight = np.tile([0.1, 0.0, 0.0], (len(WAY), 1))
-    model.evaluate(WAY, motions=straight)
+    model.evaluate(WAY, motions=STRAIGHT)
     before = asked.poses
-    model.change(policy="equal").evaluate(WAY, motions=straight)
+    model.change(policy="equal").evaluate(WAY, motions=STRAIGHT)
     assert asked.poses == before
     for other in (model.change(friction=0.4), model.hold_steering(np.full(6, 0.1))):
-        other.evaluate(WAY, motions=straight)
+        other.evaluate(WAY, motions=STRAIGHT)
         before += len(WAY)
         assert asked.poses == before
 
@@ -88,12 +82,11 @@ def test_a_changed_model_knows_nothing_and_the_same_one_all(asked):
 def test_places_are_forgotten_and_so_are_the_oldest_poses(asked):
     known = KnownPoses(most=150)
     model = pack_model(LSR1, GROUND).remember(known)
-    straight = np.tile([0.1, 0.0, 0.0], (len(WAY), 1))
 
     def count_new(poses):
         before = asked.poses
-        found = model.evaluate(poses, motions=straight[: len(poses)])
-        anew = pack_model(LSR1, GROUND).evaluate(poses, motions=straight[: len(poses)])
+        found = model.evaluate(poses, motions=STRAIGHT[: len(poses)])
+        anew = pack_model(LSR1, GROUND).evaluate(poses, motions=STRAIGHT[: len(poses)])
         np.testing.assert_array_equal(numbers_of(found), numbers_of(anew))
         return asked.poses - before - len(poses)
 

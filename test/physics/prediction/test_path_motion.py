@@ -29,8 +29,7 @@ def motions(poses, rover=LSR1, backward=False, curvature=None):
 
 
 def straight(count=20, spacing=0.05, yaw=0.7):
-    way = spacing * np.arange(count)
-    return poses_at(way * np.cos(yaw), way * np.sin(yaw), yaw)
+    return arc_of(0.0, spacing * np.arange(count), yaw)
 
 
 def arc(curvature, spacing=0.05, length=1.5, yaw=0.3):

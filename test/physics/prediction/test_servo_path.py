@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics import SweepOptions, judge_path
-from rover_physics.traversability.verdict import hold_against_limits
+from rover_physics import SweepOptions, judge_path, judge_paths
 from support.grounds import make_terrain
 from support.paths import arc_of
 from support.reference_drives import drive_ground, drive_path, unlimited
@@ -20,9 +19,8 @@ SERVO = SweepOptions(policy="servo")
 
 def drive(kind: str, size: float, policy: str = "servo", spacing: float = 0.01, **options):
     """Return prediction and verdict of a drive over an obstacle."""
-    ground, asked = drive_ground(kind, size), SweepOptions(policy, **options)
-    prediction = judge_path(ROVER, ground, drive_path(spacing), asked)[0]
-    return prediction, hold_against_limits(ROVER, prediction)
+    asked = ROVER, drive_ground(kind, size), [drive_path(spacing)], SweepOptions(policy, **options)
+    return judge_paths(*asked, check_entrapment=False)[0]
 
 
 def test_a_wheel_that_hops_stops_no_rover_with_servos():

@@ -27,31 +27,19 @@ from rover_physics.traversability.verdict import hold_against_limits
 from support.grounds import gap, make_terrain, waves
 from support.grounds import rocky as low_rock
 from support.paths import poses_at
+from support.predictions import assert_same
 from support.rough_grounds import plane, random_poses, rocky, with_std
 from support.rovers import LSR1
 
 LEVEL = plane(0.0, 0.0)
 POSE = [[0.0, 0.0, 0.0]]
 NAN, INF = float("nan"), float("inf")
-GROWING = {"energy", "time", "distance"}
-ALONG_THE_PATH = GROWING | {"wheel_drop", "falling", "between", "waypoint", "bounds"}
 few = settings(max_examples=8)
 
 
 def line(start: float, end: float, count: int = 41) -> np.ndarray:
     """Return a straight path along x."""
     return poses_at(np.linspace(start, end, count))
-
-
-def columns(prediction):
-    """Return the arrays of a prediction that hold a row per waypoint of its own, by name."""
-    names = ["poses", "status", *(one.name for one in QUANTITIES if not one.of_path)]
-    return {name: np.ascontiguousarray(getattr(prediction, name)) for name in names}
-
-
-def assert_identical(prediction, expected, rows=slice(None)):
-    for name, values in columns(prediction).items():
-        assert values.tobytes() == columns(expected)[name][rows].tobytes(), name
 
 
 @pytest.mark.parametrize(
@@ -91,7 +79,8 @@ def test_any_choice_of_poses_gives_identical_rows(seed, count):
     rows = np.random.default_rng(seed).choice(70, count, replace=False)
     everything = judge_path(LSR1, ground, poses)[0]
     chosen = judge_path(LSR1, ground, poses[rows])[0]
-    assert_identical(chosen, everything, rows)
+    for name in ("status", *(one.name for one in QUANTITIES if not one.of_path)):
+        assert chosen.results[name].tobytes() == everything.results[name][rows].tobytes(), name
     assert (everything.status == PoseStatus.SETTLED).any()
     assert (everything.status == PoseStatus.OFF_MAP).any()
 
@@ -104,39 +93,26 @@ def test_paths_swept_together_are_as_swept_one_by_one(policy):
     assert sum(len(prediction.between.poses) for prediction in together) > 20
     for poses, prediction in zip(paths, together, strict=True):
         alone = judge_path(LSR1, ground, poses, SweepOptions(policy=policy))[0]
-        for part, expected in ((prediction, alone), (prediction.between, alone.between)):
-            assert_identical(part, expected)
-            for name in sorted(ALONG_THE_PATH - {"between", "bounds"}):
-                assert getattr(part, name).tobytes() == getattr(expected, name).tobytes(), name
+        assert_same(prediction, alone)
+        assert_same(prediction.between, alone.between)
 
 
-def test_the_way_up_a_slope_takes_longer_than_its_shadow():
-    prediction = judge_path(LSR1, plane(0.4, 0.0), line(-0.3, 0.3))[0]
-    way = 0.6 * np.hypot(1.0, 0.4)
-    assert prediction.time[0] == 0.0 and prediction.distance[-1] == pytest.approx(0.6)
-    assert prediction.time[-1] == pytest.approx(way / LSR1.nominal_speed, rel=1e-4)
-
-
-def test_energy_uphill_is_the_weight_lifted_and_braking_downhill_gives_nothing_back():
+def test_uphill_time_is_that_of_the_way_and_energy_of_the_weight_lifted_and_brakes_give_none():
     down = judge_path(LSR1, plane(-0.3, 0.0), line(-0.3, 0.3))[0]
     assert (down.torque < 0.0).all() and down.energy[-1] == 0.0
-    prediction = judge_path(LSR1, plane(0.3, 0.0), line(-0.3, 0.3), SweepOptions(friction=2.0))[0]
-    lifted = LSR1.weight * np.ptp(prediction.position[:, 2])
-    assert prediction.energy[0] == 0.0
-    assert prediction.energy[-1] == pytest.approx(lifted, rel=1e-4)
-
-
-def poses_on(terrain: Terrain, shape) -> np.ndarray:
-    """Return poses (*shape, 3) on and somewhat beyond a map."""
-    rng = np.random.default_rng(4)
-    xmin, xmax, ymin, ymax = terrain.bounds
-    return rng.uniform([xmin, ymin, -np.pi], [xmax, ymax, np.pi], (*shape, 3))
+    up = judge_path(LSR1, plane(0.3, 0.0), line(-0.3, 0.3), SweepOptions(friction=2.0))[0]
+    lifted = LSR1.weight * np.ptp(up.position[:, 2])
+    assert up.energy[0] == 0.0 and up.energy[-1] == pytest.approx(lifted, rel=1e-4)
+    assert up.time[0] == 0.0 and up.distance[-1] == pytest.approx(0.6)
+    way = 0.6 * np.hypot(1.0, 0.3)
+    assert up.time[-1] == pytest.approx(way / LSR1.nominal_speed, rel=1e-4)
 
 
 @pytest.mark.parametrize(("ground", "shape"), [(low_rock, (5, 8)), (gap, (60, 50))])
 def test_scores_are_those_of_a_sweep_and_its_verdict_on_one_thread_and_on_several(ground, shape):
     terrain = make_terrain(ground)
-    poses = poses_on(terrain, shape)
+    (xmin, xmax, ymin, ymax), rng = terrain.bounds, np.random.default_rng(4)
+    poses = rng.uniform([xmin, ymin, -np.pi], [xmax, ymax, np.pi], (*shape, 3))
     scores = score_poses(LSR1, terrain, poses, SweepOptions(friction=0.5))
     path = judge_path(LSR1, terrain, poses.reshape(-1, 3), SweepOptions(friction=0.5))[0]
     expected = {
@@ -182,7 +158,7 @@ def test_sweeps_at_once_have_the_bits_of_sweeps_alone():
         found = list(pool.map(lambda one: judge_path(LSR1, *one), asked * 2))
     for (prediction, verdict), (other, other_verdict) in zip(alone * 2, found, strict=True):
         assert other_verdict.codes == verdict.codes
-        assert_identical(other, prediction)
+        assert_same(other, prediction)
 
 
 def test_a_check_that_raises_ends_the_sweep_and_the_next_one_runs():
@@ -200,6 +176,6 @@ def test_slices_change_no_bit_of_a_prediction_or_its_bounds(monkeypatch):
     monkeypatch.setattr(interruption, "MAX_GROWTH", 1.0)
     with interruptible(lambda: None):
         parts = judge_path(LSR1, ground, poses)[0]
-    assert_identical(parts, whole)
+    assert_same(parts, whole)
     for name in ("roll", "wheel_loads", "belly_clearance"):
         np.testing.assert_array_equal(getattr(parts.bounds, name), getattr(whole.bounds, name))

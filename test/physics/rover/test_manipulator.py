@@ -32,7 +32,6 @@ def pose_of(yaw=0.0, shoulder=0.0, elbow=0.0) -> dict[str, float]:
 )
 def test_the_tip_is_where_plain_geometry_has_it(joints, tip):
     points = link_points(ARM, np.array(joints))
-    assert points[0] == pytest.approx(ARM.base)
     assert points[1] == pytest.approx([0.25, 0.0, 0.15])
     assert points[3] == pytest.approx(tip)
 
@@ -74,12 +73,10 @@ def test_impossible_angles_and_payloads_are_refused_by_name(rover, held, said):
         body_mass_and_com(rover, held.get("angles"), payload=held.get("payload"))
 
 
-def test_a_payload_too_heavy_for_the_rover_tips_it_and_a_file_that_has_it_is_refused():
-    held = SweepOptions(joint_angles=pose_of(), payload=20.0)
-    assert judge_path(LSR1, LEVEL, POSE, held)[1].code == "tip_over"
+def test_a_file_with_a_payload_that_tips_the_rover_is_refused():
     heavy = replace(LSR1, manipulator=replace(ARM, stowed=(0.0, 0.0, 0.0), payload=20.0))
     with pytest.raises(ModelError, match="tips over on flat ground"):
-        judge_path(heavy, LEVEL, POSE)[0]
+        judge_path(heavy, LEVEL, POSE)
 
 
 @pytest.mark.parametrize("share", [0.98, 1.02])
@@ -101,7 +98,7 @@ def test_the_margin_is_gone_when_a_load_empties_one_side(kind, share):
 @pytest.mark.parametrize("name", ["tool_force", "tool_moment"])
 def test_a_load_without_an_arm_or_that_is_no_vector_is_refused_by_name(name):
     with pytest.raises(ModelError, match=f"{name}.*m2020.*no manipulator"):
-        judge_path(M2020, LEVEL, POSE, SweepOptions(**{name: [0.0, 0.0, 1.0]}))[0]
+        judge_path(M2020, LEVEL, POSE, SweepOptions(**{name: [0.0, 0.0, 1.0]}))
     for value in ([0.0, np.nan, 0.0], [np.inf, 0, 0], [1.0, 2.0], 3.0, "up"):
         with pytest.raises(ModelError, match=rf"{name} is .* three .*numbers"):
             SweepOptions(**{name: value})

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from rover_physics import Rover
 from rover_physics.errors import ModelError
+from rover_physics.names import WHEEL_POSITIONS
 from rover_physics.rover.linkage import pack_linkage
 from rover_physics.rover.steered_drive import STAND_ERROR, SteeredDrive, steer_wheels
 from rover_physics.rover.steering_joints import (
@@ -26,20 +27,13 @@ speeds = st.floats(-0.1, 0.1)
 
 def steer(rover: Rover, *motion: float) -> tuple[bool, np.ndarray, np.ndarray]:
     """Return whether the wheels can follow, steering angles [rad] and rolling speeds [m/s]."""
-    body = rover.masses.body
-    linkage = pack_linkage(rover, body.mass, np.array(body.com))
     angles, rolling = np.full(6, np.nan), np.full(6, np.nan)
-    can_follow = steer_wheels(linkage, np.array(motion, float), angles, rolling)
+    can_follow = steer_wheels(pack_linkage(rover), np.array(motion, float), angles, rolling)
     return bool(can_follow), angles, rolling
 
 
 def with_limit(rover: Rover, limit: float) -> Rover:
     return replace(rover, steering=replace(rover.steering, limit=limit))
-
-
-def wheels_of(rover: Rover) -> np.ndarray:
-    left = np.array([rover.suspension.wheels[name][:2] for name in ("rear", "middle", "front")])
-    return np.vstack([left * [1.0, -1.0], left])
 
 
 @given(st.sampled_from([LSR1, M2020, ALL_STEER, FIXED]), speeds, speeds, st.floats(-0.2, 0.2))
@@ -48,9 +42,10 @@ def test_every_wheel_rolls_where_the_body_takes_it_as_far_as_it_steers(rover, vx
     if len(steered) == 2:
         vy = 0.0  # fixed wheels cannot go sideways
     can_follow, angles, rolling = steer(rover, vx, vy, rate)
-    wheels = wheels_of(rover)
+    left = np.array([rover.suspension.wheels[name][:2] for name in WHEEL_POSITIONS])
+    wheels = np.vstack([left * [1.0, -1.0], left])
     carried = np.column_stack([vx - rate * wheels[:, 1], vy + rate * wheels[:, 0]])
-    turns = np.array([name in steered for name in ("rear", "middle", "front")] * 2)
+    turns = np.array([name in steered for name in WHEEL_POSITIONS] * 2)
     rolled = rolling[:, None] * np.column_stack([np.cos(angles), np.sin(angles)])
     assert can_follow
     assert np.abs(angles).max() <= np.pi / 2
@@ -59,15 +54,6 @@ def test_every_wheel_rolls_where_the_body_takes_it_as_far_as_it_steers(rover, vx
     assert rolled[follows] == pytest.approx(carried[follows], abs=1e-9)
     assert not angles[~turns].any()
     assert rolling[~turns] == pytest.approx(carried[~turns, 0], abs=1e-15)
-
-
-def test_on_the_spot_the_right_wheels_roll_forwards_and_the_left_ones_back():
-    can_follow, angles, rolling = steer(LSR1, 0.0, 0.0, 0.1)
-    assert can_follow
-    end = np.arctan2(0.40, 0.31)
-    assert angles == pytest.approx([-end, 0.0, end, end, 0.0, -end])
-    sides = np.array([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])
-    assert rolling == pytest.approx(0.1 * np.hypot(*wheels_of(LSR1).T) * sides)
 
 
 def test_a_limit_that_is_rounded_down_from_a_right_angle_allows_it():

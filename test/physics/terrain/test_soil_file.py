@@ -17,29 +17,24 @@ DUNE = {
 
 
 @pytest.mark.parametrize(
-    ("name", "cohesion", "degrees", "k_c", "k_phi", "n", "shear_modulus"),
+    ("name", "published"),
     [
-        ("lunar_nominal", 170.0, 35.0, 1.4e3, 820e3, 1.0, 0.0178),
-        ("mars_simulant", 300.0, 17.8, 5.79e3, 180e3, 0.8, 0.01),
-        ("dry_sand", 1040.0, 28.0, 0.99e3, 1528.43e3, 1.1, 0.025),
-        ("lete_sand", 1300.0, 31.1, 102e3, 5301e3, 0.79, 0.012),
+        ("lunar_nominal", (170.0, 35.0, 1.4e3, 820e3, 1.0, 0.0178)),
+        ("mars_simulant", (300.0, 17.8, 5.79e3, 180e3, 0.8, 0.01)),
+        ("dry_sand", (1040.0, 28.0, 0.99e3, 1528.43e3, 1.1, 0.025)),
+        ("lete_sand", (1300.0, 31.1, 102e3, 5301e3, 0.79, 0.012)),
     ],
 )
-def test_presets_have_the_published_values_in_si_units(
-    name, cohesion, degrees, k_c, k_phi, n, shear_modulus
-):
+def test_presets_have_the_published_values_in_si_units(name, published):
     soil = load_soils()[name]
-    assert (soil.name, soil.model) == (name, "bekker_wong")
-    assert (soil.cohesion, soil.k_c, soil.k_phi, soil.n) == (cohesion, k_c, k_phi, n)
-    assert math.degrees(soil.friction_angle) == pytest.approx(degrees, abs=1e-4)
-    assert soil.shear_modulus == shear_modulus
-    assert math.isnan(soil.friction)
+    degrees = math.degrees(soil.friction_angle)
+    values = (soil.cohesion, degrees, soil.k_c, soil.k_phi, soil.n, soil.shear_modulus)
+    assert values == pytest.approx(published, rel=3e-6)
 
 
-def test_every_preset_says_where_it_is_from_and_is_in_the_docs():
+def test_every_preset_is_in_the_docs():
     text = (TOP / "docs" / "soil.md").read_text(encoding="utf-8")
-    for name, soil in load_soils().items():
-        assert soil.source.strip()
+    for name in load_soils():
         assert f"`{name}`" in text
 
 
@@ -75,8 +70,6 @@ COULOMB = {"model": "coulomb", "source": "s"}
          "dune.friction_angle is 28.0; .* at most 1.2 in rad"),
         ({"dune": DUNE | {"friction_angle": 0.0, "cohesion": 0.0}},
          "dune.cohesion is 0.0; .*some strength"),
-        ({"dune": DUNE | {"k_phi": 0.0}},
-         r"dune.k_phi is 0.0; it must be a number above 0 in N/m\^\(n\+2\)"),
     ],
 )  # fmt: skip
 def test_what_is_no_mapping_of_soils_and_wrong_values_are_refused_by_their_key(data, text):

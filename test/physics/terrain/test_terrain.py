@@ -4,12 +4,14 @@
 import gc
 import pickle
 import weakref
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.interpolate import RegularGridInterpolator
 
 from rover_physics import Terrain, load_rover, load_terrain, save_terrain
 from rover_physics.errors import TerrainError
@@ -23,39 +25,31 @@ from rover_physics.terrain.ground import (
 from rover_physics.terrain.terrain_file import terrain_presets
 
 
-def plane(ny=6, nx=8, resolution=0.5, origin=(-1.0, 2.0), a=0.1, b=-0.2, c=0.3):
-    """Return the terrain z = a + b x + c y."""
+def plane(ny=6, nx=8, resolution=0.5, origin=(-1.0, 2.0)):
+    """Return the terrain z = 0.1 - 0.2 x + 0.3 y."""
     x = origin[0] + resolution * np.arange(nx)
     y = origin[1] + resolution * np.arange(ny)
-    return Terrain(a + b * x[None, :] + c * y[:, None], resolution, origin)
-
-
-coefficients = st.floats(-2.0, 2.0)
+    return Terrain(0.1 - 0.2 * x[None, :] + 0.3 * y[:, None], resolution, origin)
 
 
 @given(
-    coefficients,
-    coefficients,
-    coefficients,
+    st.integers(0, 1000),
     st.floats(0.01, 3.0),
     st.tuples(st.floats(-50.0, 50.0), st.floats(-50.0, 50.0)),
     st.lists(st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0)), min_size=1, max_size=20),
 )
-def test_look_up_reproduces_planes(a, b, c, resolution, origin, places):
-    terrain = plane(5, 7, resolution, origin, a, b, c)
-    xmin, xmax, ymin, ymax = terrain.bounds
+def test_rows_go_along_y_columns_along_x_and_the_look_up_between_is_bilinear(
+    seed, resolution, origin, places
+):
+    heights = np.random.default_rng(seed).normal(size=(5, 7))
+    terrain = Terrain(heights, resolution, origin)
+    xs, ys = (start + resolution * np.arange(n) for start, n in zip(origin, (7, 5), strict=True))
+    assert terrain.bounds == (xs[0], xs[-1], ys[0], ys[-1])
     u, v = np.array(places).T
-    x, y = xmin + u * (xmax - xmin), ymin + v * (ymax - ymin)
+    x, y = xs[0] + u * (xs[-1] - xs[0]), ys[0] + v * (ys[-1] - ys[0])
     assert terrain.contains(x, y).all()
-    assert np.allclose(terrain.elevation_at(x, y), a + b * x + c * y, rtol=0.0, atol=1e-10)
-
-
-def test_rows_go_along_y_columns_along_x_and_cells_have_their_heights():
-    heights = np.random.default_rng(1).normal(size=(6, 8))
-    terrain = Terrain(heights, 0.5, (-1.0, 2.0))
-    x, y = np.meshgrid(-1.0 + 0.5 * np.arange(8), 2.0 + 0.5 * np.arange(6))
-    np.testing.assert_allclose(terrain.elevation_at(x, y), heights, atol=1e-12)
-    assert terrain.bounds == (-1.0, 2.5, 2.0, 4.5)
+    expected = RegularGridInterpolator((ys, xs), heights, bounds_error=False, fill_value=None)
+    np.testing.assert_allclose(terrain.elevation_at(x, y), expected((y, x)), rtol=0.0, atol=1e-9)
 
 
 def test_look_up_is_unknown_off_the_map_and_where_a_corner_is_unknown():
@@ -65,7 +59,7 @@ def test_look_up_is_unknown_off_the_map_and_where_a_corner_is_unknown():
     y = [3.0, 3.0, ymin - 0.01, ymax + 0.01, 3.0]
     assert np.isnan(terrain.elevation_at(x, y)).all()
     assert not terrain.contains(x, y).any()
-    heights = plane().elevation.copy()
+    heights = terrain.elevation.copy()
     heights[2, 3] = np.nan
     terrain = Terrain(heights, 0.5, (-1.0, 2.0))
     x, y, near = -1.0 + 0.5 * 3, 2.0 + 0.5 * 2, np.array([-0.2, 0.2])
@@ -132,8 +126,8 @@ def test_a_filled_gap_is_as_uncertain_as_the_worst_of_its_rim():
     assert np.array_equal(filled[known], std[known])
 
 
-def with_gap(ny=20, nx=24, rows=slice(8, 11), columns=slice(9, 14)):
-    terrain = plane(ny, nx, 0.1, (0.0, 0.0))
+def with_gap(rows=slice(8, 11), columns=slice(9, 14)):
+    terrain = plane(20, 24, 0.1, (0.0, 0.0))
     heights = terrain.elevation.copy()
     heights[rows, columns] = np.nan
     return terrain, Terrain(heights, 0.1)
@@ -170,12 +164,9 @@ def test_a_saved_terrain_is_loaded_as_it_was(tmp_path):
         terrain = Terrain(heights, 0.25, (3.0, -4.0), soil_names=NAMES if some else (), **some)
         save_terrain(tmp_path / "a.npz", terrain, source="made up")
         loaded = load_terrain(tmp_path / "a.npz")
-        assert np.array_equal(loaded.elevation, heights, equal_nan=True)
-        assert (loaded.resolution, loaded.origin) == (0.25, (3.0, -4.0))
-        assert loaded.soil_names == terrain.soil_names
-        for name, layer in layers.items():
-            found = getattr(loaded, name)
-            assert found is None if not some else np.array_equal(found, layer, equal_nan=True)
+        for one in fields(Terrain):
+            found, saved = getattr(loaded, one.name), getattr(terrain, one.name)
+            np.testing.assert_array_equal(found, saved, one.name)
 
 
 ENTRIES = {"elevation": FLAT, "resolution": 0.1, "origin": [0.0, 0.0]}
@@ -187,9 +178,7 @@ ENTRIES = {"elevation": FLAT, "resolution": 0.1, "origin": [0.0, 0.0]}
         *[({name: None}, f"no entry {name};") for name in ENTRIES],
         ({"resolution": -1.0}, r"resolution is -1\.0"),
         ({"elevation": np.empty((2, 2), object)}, "entry elevation is damaged .Object arrays"),
-        ({"soil": SOIL + 1}, r"soil\[0, 0\] is 0; it must be -1"),
         ({"elevation": np.zeros((12, 12))}, "entry elevation has 144 values; the limit is 120"),
-        ({"soil": np.zeros((12, 12), int)}, "entry soil has 144 values; the limit is 120"),
     ],
 )
 def test_a_file_with_a_wrong_entry_is_refused_by_its_name(tmp_path, changes, text):
@@ -203,13 +192,6 @@ def test_an_unreadable_or_unwritable_file_is_refused(tmp_path):
     np.save(tmp_path / "single.npy", FLAT)
     with pytest.raises(TerrainError, match=r"single.npy: .*\.npz"):
         load_terrain(tmp_path / "single.npy")
-    for path in (tmp_path / "none.npz", str(tmp_path / "none.npz")):
-        with pytest.raises(
-            TerrainError, match=r"none\.npz': there is no such file, and the presets are sp"
-        ):
-            load_terrain(path)
-    with pytest.raises(TerrainError, match="it is a directory; it must be a regular file"):
-        load_terrain(tmp_path)
     with pytest.raises(TerrainError, match="cannot be written: No such file"):
         save_terrain(tmp_path / "none" / "map.npz", plane())
 
@@ -220,8 +202,6 @@ def test_a_preset_is_found_by_its_name_from_any_folder_and_keeps_its_licence(
     monkeypatch.chdir(tmp_path)
     terrain = load_terrain("spirit")
     assert terrain.elevation.shape == (400, 434)
-    assert terrain.resolution == pytest.approx(0.03)
-    assert np.isnan(terrain.elevation).mean() == pytest.approx(0.55, abs=0.01)
     for name, path in terrain_presets().items():
         with np.load(path, allow_pickle=False) as entries:
             assert "NASA/JPL" in str(entries["licence"]), name
@@ -263,8 +243,6 @@ def test_an_edit_of_the_array_that_was_given_does_not_reach_the_ground():
     assert Terrain(terrain.elevation, 0.1).elevation is terrain.elevation  # nothing to protect
     with pytest.raises(ValueError, match="read-only"):
         terrain.elevation[4, 4] = 5.0
-    with pytest.raises(ValueError, match="read-only"):
-        terrain.elevation.flat[0] = 5.0
 
 
 def test_a_ground_outlives_its_terrain():

@@ -20,7 +20,6 @@ from support.rovers import LSR1, M2020
 from support.traction_states import state_of
 
 FRICTION = np.full(6, 0.8)
-INPUTS = ProgramInputs(FRICTION, LSR1.wheel.max_torque, LSR1.wheel.radius)
 
 
 def rough_states(rover):
@@ -36,11 +35,10 @@ def level(angles=(0.0,) * 6):
     return MeasuredState(0.0, 0.0, 0.0, np.zeros(2), np.array(angles))
 
 
-def solve(rover, state, net=0.0, friction=FRICTION, torque=None, programs=12, **more):
-    rows = BalanceWriter(rover).write(state, net)
+def solve(rover, state, friction=FRICTION, torque=None, programs=12, workspace=None):
+    rows = BalanceWriter(rover).write(state, 0.0)
     inputs = ProgramInputs(friction, torque or rover.wheel.max_torque, rover.wheel.radius)
-    workspace = more.pop("workspace", None) or TractionWorkspace()
-    return solve_traction(workspace, rows, inputs, max_programs=programs, **more)
+    return solve_traction(workspace or TractionWorkspace(), rows, inputs, max_programs=programs)
 
 
 def test_the_answer_is_within_3_percent_of_the_optimum():
@@ -128,12 +126,12 @@ CURVATURES = (0.0, 0.5, -0.5, 1.2, -2.5, np.inf, -np.inf)
 BOTH = pytest.mark.parametrize("rover", [LSR1, M2020], ids=lambda rover: rover.name)
 
 
-def curved_poses(rover, seed, curvature, **options):
+def curved_poses(rover, seed, curvature):
     """Return settled random poses on rough ground with wheels turned for a curvature."""
     poses = random_poses(seed, 12, 1.5)
     curvatures = np.full(len(poses), curvature / (2.0 if rover is M2020 else 1.0))
     ground = plane(0.15, 0.1, half=5.0) if rover is M2020 else fractal(seed)
-    return ground, judge_poses(rover, ground, poses, curvatures, **options)[0]
+    return ground, judge_poses(rover, ground, poses, curvatures)[0]
 
 
 @BOTH
@@ -153,14 +151,12 @@ def test_equal_torques_are_those_of_the_sweep(rover):
 
 
 def test_shared_torques_of_turned_wheels_keep_the_balance_and_need_less_friction():
-    writer, workspace = BalanceWriter(LSR1), TractionWorkspace()
     better = []
     for seed, curvature in enumerate(CURVATURES):
         _, prediction = curved_poses(LSR1, seed, curvature)
         for i in np.flatnonzero(prediction.settled):
-            rows = writer.write(state_of(LSR1, prediction, i), 0.0)
-            equal = solve_traction(workspace, rows, INPUTS, max_programs=0)
-            answer = solve_traction(workspace, rows, INPUTS, max_programs=12)
+            state = state_of(LSR1, prediction, i)
+            equal, answer = (solve(LSR1, state, programs=count) for count in (0, 12))
             assert not answer.fallback
             A, b = free_balance_matrix(LSR1, prediction, i)
             forces = np.concatenate([answer.loads, answer.tractions, answer.lateral])

@@ -28,8 +28,8 @@ from support.rovers import LSR1
 POSE = [[0.0, 0.0, 0.0]]
 STEEP = plane(0.45, 0.0)
 """A slope on which equal torques slip and optimal ones use 0.58 of the friction of 0.8."""
-ONTO_A_BUMP = drive_path()[54:59]
-"""Waypoints at which the right front wheel climbs a bump; the third one follows the climb."""
+ONTO_A_BUMP = unlimited(LSR1), drive_ground("bump_one_side", 0.1), drive_path()[54:59]
+"""Rover, ground, and waypoints; the third one follows the climb of the right front wheel."""
 WEAK = SweepOptions(friction=1.0, max_torque=1.0)
 """Motors with which speed servos stall at the bump, and optimal torques do not."""
 
@@ -55,12 +55,11 @@ def test_with_speed_servos_the_margin_is_that_of_the_whole_rover():
 
 
 def test_a_climb_that_stalls_servos_needs_traction_control_and_its_margin_is_that_of_optimal():
-    rover, bump = unlimited(LSR1), drive_ground("bump_one_side", 0.1)
-    found = classify_path(rover, bump, ONTO_A_BUMP, WEAK)
+    found = classify_path(*ONTO_A_BUMP, WEAK)
     assert [waypoint.traversability_class for waypoint in found] == [
         PASSABLE, PASSABLE, WITH_TRACTION_CONTROL, PASSABLE, PASSABLE,
     ]  # fmt: skip
-    optimal = judge_path(rover, bump, ONTO_A_BUMP, replace(WEAK, policy="optimal"))[0].between
+    optimal = judge_path(*ONTO_A_BUMP, replace(WEAK, policy="optimal"))[0].between
     assert found[2].policy == "optimal"
     assert found[2].margin == pytest.approx(1.0 - optimal.torque_saturation.max())
     assert "motors stall" in found[2].reason
@@ -83,27 +82,19 @@ def test_classes_agree_with_the_verdicts_of_all_policies():
         judge_path(LSR1, ground, poses, SweepOptions(friction=0.22, policy=policy))[0]
         for policy in ("equal", "servo", "optimal")
     ]
-    equal, servo, optimal = (hold_against_limits(LSR1, path) for path in paths)
     falls = np.any([path.falling.any(axis=1) for path in paths], axis=0)
-    seen = set()
-    codes = zip(equal.codes, servo.codes, optimal.codes, falls, strict=True)
-    for waypoint, (one, two, other, fall) in zip(classes, codes, strict=True):
-        seen.add(waypoint.traversability_class)
-        expected = IMPASSABLE
-        if not one:
-            expected = PASSABLE
-        elif not two:
-            expected = WITH_SPEED_SERVOS
-        elif not other:
-            expected = WITH_TRACTION_CONTROL
-        assert waypoint.traversability_class == expected
-        if expected == IMPASSABLE:
-            assert waypoint.constraint == other
+    named = PASSABLE, WITH_SPEED_SERVOS, WITH_TRACTION_CONTROL
+    policies = zip(*(hold_against_limits(LSR1, path).codes for path in paths), strict=True)
+    for waypoint, codes, fall in zip(classes, policies, falls, strict=True):
+        passed = [name for name, code in zip(named, codes, strict=True) if not code]
+        assert waypoint.traversability_class == (passed[0] if passed else IMPASSABLE)
+        if not passed:
+            assert waypoint.constraint == codes[-1]
             assert not waypoint.margin > 0.0
         elif not fall:
             assert waypoint.constraint in WHEEL_CONSTRAINTS
             assert waypoint.margin >= -1e-9
-    assert len(seen) >= 3
+    assert len({waypoint.traversability_class for waypoint in classes}) >= 3
 
 
 def test_where_the_rover_would_be_trapped_the_waypoint_is_impassable_for_that():
@@ -150,10 +141,9 @@ OPTIMAL = SweepOptions(policy="optimal")
 
 @pytest.mark.parametrize(("margin", "passes"), [(0.0, True), (0.2, True), (0.3, False)])
 def test_a_waypoint_that_needs_traction_control_keeps_the_margin(margin, passes):
-    rover, bump = unlimited(LSR1), drive_ground("bump_one_side", 0.1)
     options = replace(WEAK, policy="optimal", control_margin=margin)
-    verdict = judge_path(rover, bump, ONTO_A_BUMP, options)[1]
-    found = classify_path(rover, bump, ONTO_A_BUMP, options)[2]
+    verdict = judge_path(*ONTO_A_BUMP, options)[1]
+    found = classify_path(*ONTO_A_BUMP, options)[2]
     assert verdict.traversable is passes
     assert found.traversability_class == (WITH_TRACTION_CONTROL if passes else IMPASSABLE)
     assert ("1 less control margin 0.3" in verdict.reason) is not passes

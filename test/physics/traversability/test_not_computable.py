@@ -44,35 +44,28 @@ EXTREMES = (
 )  # fmt: skip
 
 
-def numbers_of(value, place=()):
-    """Yield the places of the numbers in nested dataclasses, dicts and tuples."""
+def change_numbers(value, change, place=()):
+    """Return a copy of nested dataclasses, dicts and tuples with change(place, number) for each.
+
+    No check of a rover file is made.
+    """
     if is_dataclass(value):
-        for field in fields(value):
-            yield from numbers_of(getattr(value, field.name), (*place, field.name))
-    elif isinstance(value, dict):
-        for name, inner in value.items():
-            yield from numbers_of(inner, (*place, name))
-    elif isinstance(value, tuple):
-        for k, inner in enumerate(value):
-            yield from numbers_of(inner, (*place, k))
-    elif isinstance(value, float):
-        yield place
+        inner = {field.name: getattr(value, field.name) for field in fields(value)}
+        return replace(value, **change_numbers(inner, change, place))
+    if isinstance(value, dict):
+        return {name: change_numbers(one, change, (*place, name)) for name, one in value.items()}
+    if isinstance(value, tuple):
+        return tuple(change_numbers(one, change, (*place, k)) for k, one in enumerate(value))
+    return change(place, value) if isinstance(value, float) else value
 
 
-def with_number(value, place, number):
-    """Return a copy with another number at a place; no check of a rover file is made."""
-    if not place:
-        return number
-    inner = place[0]
-    if is_dataclass(value):
-        changed = with_number(getattr(value, inner), place[1:], number)
-        return replace(value, **{inner: changed})
-    items = dict(value) if isinstance(value, dict) else list(value)
-    items[inner] = with_number(items[inner], place[1:], number)
-    return items if isinstance(value, dict) else tuple(items)
+def with_number(rover, place, number):
+    return change_numbers(rover, lambda at, value: number if at == place else value)
 
 
-NUMBERS = sorted(numbers_of(LSR1), key=str)
+NUMBERS = []
+"""Places of all numbers of the rover."""
+change_numbers(LSR1, lambda place, value: NUMBERS.append(place) or value)
 
 
 def assert_computed(prediction, verdict):

@@ -10,14 +10,15 @@ from hypothesis import strategies as st
 
 from rover_physics import SweepOptions, Terrain, judge_path, judge_paths, judge_pieces, load_rover
 from rover_physics.prediction import sweep
-from rover_physics.prediction.packed_model import PackedModel, pack_model
+from rover_physics.prediction.packed_model import pack_model
 from rover_physics.results.path_prediction import BOUNDED_VALUES
 from rover_physics.results.record import QUANTITIES
 from rover_physics.traversability.judge import PartwiseJudge
 from rover_physics.traversability.pieces import SAFE, find_exposure
 from rover_physics.traversability.verdict import hold_against_limits
 from support.grounds import make_terrain
-from support.paths import poses_at
+from support.paths import arc_of, poses_at
+from support.predictions import assert_same
 from support.reference_drives import drive_ground, drive_path
 from support.rough_grounds import bouldered, bowl, fractal, rocky, scaled_for, with_std
 from support.rovers import LSR1 as ROVER
@@ -35,7 +36,7 @@ OPTIONS = {
 def straight(y: float, length=9.0, x=0.0, yaw=0.0, spacing=0.02) -> np.ndarray:
     """Return poses (n, 3) on a straight line with its middle at x, y."""
     along = np.arange(-0.5 * length, 0.5 * length, spacing)
-    return poses_at(x + along * np.cos(yaw), y + along * np.sin(yaw), yaw)
+    return arc_of(0.0, along, yaw) + poses_at(x, y)
 
 
 @st.composite
@@ -56,11 +57,6 @@ def courses(draw) -> tuple[Terrain, np.ndarray]:
 
 def first_refusal(verdict) -> tuple:
     return verdict.traversable, verdict.first_failure, verdict.code, verdict.reason
-
-
-def assert_same(one, other) -> None:
-    for name in ("poses", "waypoint", "status", *(each.name for each in QUANTITIES)):
-        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
 
 
 @settings(max_examples=15)
@@ -88,31 +84,6 @@ def test_a_wheel_on_its_way_off_an_edge_at_the_end_of_a_block_is_no_failure(monk
     for block in (1, 2, 3, 5, 7, 11):
         monkeypatch.setattr(sweep, "FIRST_BLOCK", block)
         assert judge_path(ROVER, GROUND, poses, stop_at_failure=True)[1].traversable
-
-
-def test_nothing_is_evaluated_or_searched_far_beyond_a_failure_at_the_start(monkeypatch):
-    elevation = np.where(np.arange(GROUND.elevation.shape[1]) < 60, np.nan, GROUND.elevation)
-    ground, poses = replace(GROUND, elevation=elevation), straight(-3.0)
-    evaluated = []
-    evaluate = PackedModel.evaluate
-
-    def counting(model, at, *held, **motions):
-        evaluated.append(len(at))
-        return evaluate(model, at, *held, **motions)
-
-    monkeypatch.setattr(PackedModel, "evaluate", counting)
-    _, verdict = judge_path(ROVER, ground, poses, stop_at_failure=True)
-    assert verdict.first_failure == 0
-    assert sum(evaluated) == sweep.FIRST_BLOCK
-
-
-def test_bounds_refuse_the_same_waypoint_with_and_without_stopping():
-    asked = ROVER, with_std(GROUND, 0.004), straight(-3.0, 3.0, spacing=0.05)
-    options = SweepOptions(policy="optimal", friction=0.6)
-    whole, verdict = judge_path(*asked, options)
-    cut, stopped = judge_path(*asked, options, stop_at_failure=True)
-    assert first_refusal(stopped) == first_refusal(verdict)
-    np.testing.assert_array_equal(cut.bounds.status, whole.bounds.status[: len(cut.poses)])
 
 
 def inclined(slope: float) -> Terrain:
@@ -162,11 +133,15 @@ def test_all_numbers_and_the_verdict_are_those_of_the_whole_path(case, monkeypat
     monkeypatch.setattr(sweep, "PART", 17)
     terrain, poses, options = CASES[case]
     whole, verdict = judge_path(ROVER, terrain, poses, options)
+    cut, stopped = judge_path(ROVER, terrain, poses, options, stop_at_failure=True)
+    assert first_refusal(stopped) == first_refusal(verdict)
     taken, found = judge_in_parts(terrain, poses, options)
     apart = 1e-9 if options.policy == "servo" else 0.0  # drift adds up in parts
     for name in ("poses", "status", *(one.name for one in QUANTITIES)):
         values = np.concatenate([getattr(part, name) for part in taken])
         np.testing.assert_allclose(values, getattr(whole, name), rtol=apart, err_msg=name)
+    if whole.bounds:
+        np.testing.assert_array_equal(cut.bounds.status, whole.bounds.status[: len(cut.poses)])
     for name in BOUNDED_VALUES if whole.bounds else ():
         values = np.concatenate([getattr(part.bounds, name) for part in taken])
         np.testing.assert_array_equal(values, getattr(whole.bounds, name), err_msg=name)
@@ -192,11 +167,8 @@ def random_pieces(count, seed, half=2.0):
         if rng.random() < 0.2:
             found.append(poses_at(x, y, yaw + 1.2 * way))
             continue
-        yaws = yaw + bend * way
-        steps = np.diff(way)[:, None] * np.column_stack([np.cos(yaws), np.sin(yaws)])[:-1]
-        places = np.array([x, y]) + np.vstack([np.zeros(2), np.cumsum(steps, axis=0)])
         back = np.pi if rng.random() < 0.3 else 0.0
-        found.append(np.column_stack([places, yaws + back]))
+        found.append(arc_of(bend, way, yaw) + poses_at(x, y, back))
     return found
 
 

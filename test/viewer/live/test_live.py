@@ -18,7 +18,6 @@ from msg_adapters.commands import labelled_array
 from msg_adapters.paths import poses_path
 from msg_adapters.results.predictions import waypoint_array
 from rover_physics.names import WHEEL_JOINTS
-from rover_physics.rover.rover_file import load_rover
 from rover_planner.errors import PlanningError
 from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.ros.qos import latched_qos, result_qos, sensor_qos, topic_qos
@@ -37,9 +36,8 @@ from rover_planner.viewer.live.live_state import (
     describe_learned,
     read_state,
 )
+from support.rovers import LSR1
 from support.waiting import repeat_until, wait_until
-
-LSR1 = load_rover("lsr1")
 
 
 @pytest.fixture

@@ -7,7 +7,6 @@ from rclpy.parameter import Parameter
 
 pytest.importorskip("viser", reason="no viser: pip install '.[view]'")
 
-from rover_physics.rover.rover_file import load_rover
 from rover_physics.terrain.grid import Terrain, save_terrain
 from rover_physics.warm_up import warm_up
 from rover_planner.nodes.rover_simulator import RoverSimulator
@@ -17,12 +16,11 @@ from rover_planner.viewer.pages.live_page import LivePage
 from rover_planner.viewer.pages.sharing import PageLink, write_link
 from rover_planner.viewer.state.colours import UNKNOWN, to_linear
 from support.grounds import make_terrain, waves
-from support.viewer.sessions import ask
+from support.viewer.sessions import LSR1, ask
 from support.viewer.sessions import wait_patiently as wait_until
 
 pytestmark = pytest.mark.slow
 
-LSR1 = load_rover("lsr1")
 QUERY = write_link(
     PageLink(
         loaded={},
