@@ -4,6 +4,7 @@
 from functools import cache, partial
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry, Path
 from nav_msgs.srv import GetPlan, LoadMap
 from rcl_interfaces.msg import Log
@@ -152,6 +153,11 @@ class PlannerClient(Node):
         """Wait for a log line of the server with a text in it."""
         wait_until(lambda: any(text in line for line in self.logs), f"a log line with {text!r}")
 
+    def wait_for_verdict(self) -> dict[str, str]:
+        """Wait for a verdict; return its keys and values."""
+        wait_until(lambda: self.heard["verdict"], "the verdict")
+        return verdict_of(self.heard["verdict"][-1])
+
     def send(self, publisher, message) -> None:
         """Publish a message as soon as someone hears it."""
         wait_until(lambda: publisher.get_subscription_count() > 0, publisher.topic_name)
@@ -167,12 +173,12 @@ def begin_plan(ros: RosRun, start=START, goal=GOAL) -> tuple[GetPlan.Request, Fu
     return request, service.call_async(request)
 
 
-def verdict_of(results: dict) -> dict[str, str]:
-    """Return the keys and values of the verdict among the results."""
-    return {entry.key: entry.value for entry in results["verdict"].status[0].values}
+def verdict_of(message: DiagnosticArray) -> dict[str, str]:
+    """Return the keys and values of a message of ~/verdict."""
+    return {entry.key: entry.value for entry in message.status[0].values}
 
 
 def ask(client: PlannerClient, start=START, goal=GOAL, **arguments):
     """Ask for a plan; return it with its verdict and results."""
     plan, results = client.next_results(lambda: client.can_traverse(start, goal, **arguments))
-    return plan, verdict_of(results), results
+    return plan, verdict_of(results["verdict"]), results

@@ -13,6 +13,7 @@ from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
 
 from rover_planner.ros.guard import GuardedExecutor
 from support.waiting import TIMEOUT, wait_until
@@ -84,6 +85,13 @@ class RosRun:
         with contextlib.suppress(ExternalShutdownException):
             while not self._ending.is_set():
                 executor.spin_once(timeout_sec=TIMEOUT)
+
+
+def hear(node: Node, kind: type, topic: str, qos: QoSProfile | int = 10) -> list[Any]:
+    """Return a list that gets each message which a node hears on a topic from now on."""
+    heard: list[Any] = []
+    node.create_subscription(kind, topic, heard.append, qos)
+    return heard
 
 
 def run_in_executor(node: Node, function: Callable[[], Any]) -> Any:

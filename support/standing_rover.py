@@ -45,6 +45,11 @@ class StandingRover(Node):
     def _publish(self) -> None:
         self._odometry.publish(odometry_at(START))
 
+    @property
+    def silence(self) -> float:
+        """Time since the last stop was heard [s]."""
+        return time.monotonic() - self.stops[-1][1]
+
     def wait_for_stop(self, value: bool = True) -> float:
         """Wait until the last stop has a value; return when that was heard [s]."""
         wait_until(lambda: self.stops and self.stops[-1][0] == value, f"stop {value}")

@@ -30,7 +30,7 @@ from rover_planner.planning.marked_places import parse_place
 from rover_planner.ros.qos import latched_qos, map_qos, sensor_qos, topic_qos
 from support.learning_drives import climb, ramp
 from support.messages import row_messages
-from support.ros_fixtures import RosRun
+from support.ros_fixtures import RosRun, hear
 from support.waiting import wait_until
 
 SLOPE = 0.3
@@ -45,21 +45,19 @@ class Rover(Node):
 
     def __init__(self, ros: RosRun):
         super().__init__("rover", context=ros.context)
-        self.estimates: list[dict] = []
-        self.stops: list[bool] = []
-        self.marks: list[str] = []
         self._map = self.create_publisher(PointCloud2, "elevation_cloud", map_qos())
-        self.wheels: list[Odometry] = []
         kinds = {"joint_states": JointState, "odometry": Odometry, "cmd_vel": TwistStamped}
         kinds["imu"] = Imu
         self._senders = {n: self.create_publisher(k, n, topic_qos()) for n, k in kinds.items()}
-        for kind, topic, hear, qos in (
-            (String, ESTIMATE, lambda m: self.estimates.append(json.loads(m.data)), latched_qos()),
-            (Odometry, "ground_learner/odometry", self.wheels.append, sensor_qos()),
-            (String, MARK_PLACE, lambda m: self.marks.append(m.data), latched_qos()),
-            (Bool, EMERGENCY_STOP, lambda m: self.stops.append(m.data), latched_qos()),
-        ):
-            self.create_subscription(kind, topic, hear, qos)
+        self.estimates = hear(self, String, ESTIMATE, latched_qos())
+        self.wheels = hear(self, Odometry, "ground_learner/odometry", sensor_qos())
+        self.marks = hear(self, String, MARK_PLACE, latched_qos())
+        self.stops = hear(self, Bool, EMERGENCY_STOP, latched_qos())
+
+    @property
+    def estimate(self) -> dict:
+        """The last estimate."""
+        return json.loads(self.estimates[-1].data)
 
     def is_heard(self) -> bool:
         """Return whether all topics are connected."""
@@ -111,7 +109,7 @@ def test_a_drive_is_learned_and_a_rover_that_gets_stuck_is_stopped_and_its_place
     rows[60:, X] = rows[60, X] + 1e-4 * np.random.default_rng(1).standard_normal(60)
     drive(node, rover, rows[:60])
     wait_until(lambda: rover.estimates, "an estimate")
-    assert not rover.stops and not rover.estimates[-1]["stuck"]
+    assert not rover.stops and not rover.estimate["stuck"]
     way = rows[59, X] - rows[0, X]
     wait_until(
         lambda: rover.wheels and abs(rover.wheels[-1].pose.pose.position.x - way) < 0.05,
@@ -120,13 +118,13 @@ def test_a_drive_is_learned_and_a_rover_that_gets_stuck_is_stopped_and_its_place
     assert rover.wheels[-1].header.frame_id == "odom"
     assert 0.0 < rover.wheels[-1].pose.covariance[0] < 0.1**2
     drive(node, rover, rows[60:])
-    wait_until(lambda: rover.stops == [True], "the stop")
-    wait_until(lambda: rover.estimates[-1]["stuck"], "that it is stuck")
+    wait_until(lambda: rover.stops == [Bool(data=True)], "the stop")
+    wait_until(lambda: rover.estimate["stuck"], "that it is stuck")
     wait_until(lambda: rover.marks, "the mark")
-    place = parse_place(rover.marks[0], MARK_PLACE)
+    place = parse_place(rover.marks[0].data, MARK_PLACE)
     assert place.x - rows[60, X] == pytest.approx(place.radius, abs=0.01)
     assert "stays" in place.reason and place.date.startswith("2023-11-14")
-    last = rover.estimates[-1]
+    last = rover.estimate
     assert 6.0 < last["immobilised_time"] - BEGIN < 8.0
     assert last["friction"]["low"] > 0.5 * SLOPE
     read = parse_learned(json.dumps(last), ESTIMATE)  # as a server does

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A rover whose watch is lost stops: the processes of the launch file, killed while it drives."""
 
-import os
 import signal
 import subprocess
 import time
@@ -46,19 +45,14 @@ class Ear(Node):
 
 
 @pytest.fixture
-def start_simulation(tmp_path):
-    """Return a function that starts the processes of simulation.launch.py, and ends them."""
-    file, started = tmp_path / "waves.npz", {}
+def processes(tmp_path, monkeypatch):
+    """Start the processes of simulation.launch.py, and end them; return them by name."""
+    file = tmp_path / "waves.npz"
     save_terrain(file, make_terrain(waves, half=5.0))
-    environment = os.environ | {"ROS_DOMAIN_ID": str(domain_id())}
-
-    def start(**given):
-        commands = simulation_commands(terrain_file=str(file), **given)
-        started.update({name: subprocess.Popen(words, env=environment)
-                        for name, words in commands.items()})  # fmt: skip
-        return started
-
-    yield start
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id()))
+    commands = simulation_commands(terrain_file=str(file))
+    started = {name: subprocess.Popen(words) for name, words in commands.items()}
+    yield started
     for process in started.values():
         process.kill()
         process.wait()
@@ -76,9 +70,9 @@ def start_drive(planner) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
 def test_the_rover_stops_within_half_a_second_of_the_loss_of_the_server(
-    ros, start_simulation, planner, how
+    ros, processes, planner, how
 ):
-    processes, ear = start_simulation(), ros.spin(Ear(ros))
+    ear = ros.spin(Ear(ros))
     wait_until(lambda: ear.state, "the controller", 120.0)
     assert ear.state == "fault"  # nothing was accepted yet
     start_drive(planner)
@@ -93,10 +87,7 @@ def test_the_rover_stops_within_half_a_second_of_the_loss_of_the_server(
         processes["traverse_server"].send_signal(signal.SIGCONT)
         wait_until(lambda: ear.state == "driving", "the watch to go on")
         return
-    words = processes["traverse_server"].args
-    processes["traverse_server"] = subprocess.Popen(
-        words, env=os.environ | {"ROS_DOMAIN_ID": str(domain_id())}
-    )
+    processes["traverse_server"] = subprocess.Popen(processes["traverse_server"].args)
     pose = planner.wait_for_pose(lambda pose: True, 1.0)
     time.sleep(2.0)
     assert ear.state == "fault"  # the new server has accepted no path

@@ -105,7 +105,6 @@ def test_parameters_are_declared_as_the_table_says(make_node, table):
     ("text", "said"),
     [
         ("friction:=-1.0", r"^parameter friction is -1.0; it must be in 0 to 10$"),
-        ("friction:=1", "^parameter friction is 1; it must be of type double, such as 0.0$"),
         ("joint_map:=[]", r"is \[\], which has no type in ROS; leave it out, its default is "),
         ("base_offset:=[]", r"is \[\]; it must hold 6 finite numbers"),
     ],
@@ -123,7 +122,6 @@ def test_a_bad_change_leaves_the_value_and_says_why(make_node):
         ("friction", math.nan, "value: nan"),
         ("friction", "rough", "Wrong parameter type"),
         ("friction", 99.0, "friction"),
-        ("policy", "fair", "one of equal, servo, optimal"),
         ("map_frame", "odom", "read-only"),
     ]:
         result = change(node, name, value)

@@ -5,6 +5,7 @@ import itertools
 import time
 from types import SimpleNamespace
 
+import pytest
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
@@ -18,7 +19,22 @@ from support.waiting import wait_until
 NAMES, WORDS = ("questions", "answers"), ["bad", "good", "better", "best"]
 
 
-def test_messages_wait_until_polled_come_in_the_order_of_arrival_and_errors_end_nothing(ros):
+@pytest.fixture
+def advertise(ros):
+    """Return a function that makes publishers of topics by name, which are heard."""
+    speaker = ros.spin(Node("speaker", context=ros.context))
+
+    def make(kind, *names):
+        publishers = [speaker.create_publisher(kind, name, topic_qos()) for name in names]
+        wait_until(lambda: all(p.get_subscription_count() for p in publishers), "the topics")
+        return publishers
+
+    return make
+
+
+def test_messages_wait_until_polled_come_in_the_order_of_arrival_and_errors_end_nothing(
+    ros, advertise
+):
     node = Node("hearer", context=ros.context)
     guard, heard = Guard(node.get_logger()), []
 
@@ -33,14 +49,9 @@ def test_messages_wait_until_polled_come_in_the_order_of_arrival_and_errors_end_
     due: list[bool] = []
     topics.subscribe(String, "news", take, topic_qos(), lambda: bool(due))
     ros.spin(node)
-    speaker = ros.spin(Node("speaker", context=ros.context))
-    publishers = [speaker.create_publisher(String, name, topic_qos()) for name in NAMES]
-    news = speaker.create_publisher(String, "news", topic_qos())
-    publishers.append(news)
-    wait_until(lambda: all(p.get_subscription_count() for p in publishers), "the subscriptions")
+    *publishers, news = advertise(String, *NAMES, "news")
     topics.poll()
     before = time.monotonic()
-    publishers.remove(news)
     news.publish(String(data="later"))
     for publisher, word in zip(itertools.cycle(publishers), WORDS, strict=False):
         publisher.publish(String(data=word))
@@ -57,7 +68,7 @@ def test_messages_wait_until_polled_come_in_the_order_of_arrival_and_errors_end_
     assert heard[-1][0] == "later"
 
 
-def test_what_cannot_be_used_is_logged_once_or_refused_by_who_asks(ros, monkeypatch):
+def test_what_cannot_be_used_is_logged_once_or_refused_by_who_asks(ros, advertise, monkeypatch):
     node, lines, refused = Node("hearer", context=ros.context), [], []
     monkeypatch.setattr(node, "get_logger", lambda: SimpleNamespace(warning=lines.append))
     guard = Guard(SimpleNamespace(error=lines.append))
@@ -71,13 +82,7 @@ def test_what_cannot_be_used_is_logged_once_or_refused_by_who_asks(ros, monkeypa
     topics.subscribe(
         JointState, "others", take, topic_qos(), refuse=lambda name, error, _: refused.append(name)
     )
-    speaker = ros.spin(Node("speaker", context=ros.context))
-    joints, others = (
-        speaker.create_publisher(JointState, name, topic_qos()) for name in ("joints", "others")
-    )
-    wait_until(
-        lambda: joints.get_subscription_count() and others.get_subscription_count(), "the topics"
-    )
+    joints, others = advertise(JointState, "joints", "others")
     for publisher in (joints, joints, others):
         publisher.publish(JointState())
 

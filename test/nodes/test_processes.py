@@ -36,21 +36,12 @@ def end(process, how, count=1):
 
 
 @pytest.mark.long
-def test_a_server_says_what_it_does_answers_another_process_and_ends_cleanly(
-    start_process, client, tmp_path
-):
+def test_a_server_says_which_map_it_has_and_ends_cleanly(start_process, tmp_path):
     file = tmp_path / "flat.npz"
     save_terrain(file, Terrain(np.zeros((101, 101)), 0.05, (-2.5, -2.5)))
-    process = start_process(
-        "traverse_server", f"terrain_file:={file}", "time_budget:=60.0", "terain_file:=spirit"
-    )
+    process = start_process("traverse_server", f"terrain_file:={file}")
     told = read_until(process, "ready for rover lsr1, map ")
     assert "101 x 101 cells of 0.05 m, 100 % known" in told
-    assert told.count("terain_file does not exist and is ignored; the nearest is terrain_f") == 1
-    plan, results = client.next_results(
-        lambda: client.can_traverse((-1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
-    )
-    assert len(plan.poses) == 21 and len(results["plan"].poses) == 21
     end(process, signal.SIGINT, count=3)  # launch and the terminal both send one
 
 

@@ -95,6 +95,16 @@ def replay(capsys, bag: Path, out: Path, *words: str) -> tuple[list[dict], dict]
     return answers, total
 
 
+def published(out: Path, name: str, kind: type) -> list[tuple[int, Any]]:
+    """Return the recorded messages of a topic of the server with their times [ns]."""
+    with Reader(out / "predictions") as reader:
+        there = [one for one in reader.connections if one.topic == f"/traverse_server/{name}"]
+        return [
+            (stamp, deserialize_message(bytes(raw), kind))
+            for _, stamp, raw in reader.messages(there)
+        ]
+
+
 @pytest.mark.parametrize("storage", STORAGES)
 def test_a_drive_is_judged_in_stretches_with_what_was_measured(storage, tmp_path, capsys):
     seen, name = cloud(waves()), "/elevation_cloud"
@@ -128,17 +138,13 @@ def test_predictions_are_recorded_as_a_server_publishes_them(tmp_path, capsys):
     bag = record(tmp_path / "bag", messages)
     answers, _ = replay(capsys, bag, tmp_path / "out", "--stretch", "1")
     assert [answer["kind"] for answer in answers] == ["driven", "check_path", "driven"]
-    loads = []
     with Reader(tmp_path / "out" / "predictions") as reader:
         counts = {c.topic: c.msgcount for c in reader.connections}
-        for connection, stamp, raw in reader.messages():
-            if connection.topic == "/traverse_server/wheel_loads":
-                loads.append((stamp, deserialize_message(bytes(raw), Float64MultiArray).data))
     assert counts == {f"/traverse_server/{name}": 3 for name in RESULT_KINDS}
     told = {answer["stamp"]: answer["prediction"] for answer in answers}
-    for stamp, data in loads:
+    for stamp, loads in published(tmp_path / "out", "wheel_loads", Float64MultiArray):
         file = np.load(tmp_path / "out" / told[f"{stamp // 10**9}.{stamp % 10**9:09d}"])
-        np.testing.assert_array_equal(np.array(data).reshape(-1, 6), file["wheel_loads"])
+        np.testing.assert_array_equal(np.array(loads.data).reshape(-1, 6), file["wheel_loads"])
 
 
 def test_each_new_map_is_asked_for_a_goal_from_the_odometry(tmp_path, capsys):
@@ -236,14 +242,6 @@ def test_recorded_transforms_place_odometry_and_clouds_on_the_map(tmp_path, caps
     np.testing.assert_allclose(poses[0], [1.0, 0.0, 0.0], atol=1e-6)
 
 
-def messages_on(bag, topic, kind):
-    """Return the messages of a topic."""
-    with Reader(bag) as reader:
-        connections = [one for one in reader.connections if one.topic == topic]
-        found = reader.messages(connections)
-        return [deserialize_message(bytes(raw), kind) for _, _, raw in found]
-
-
 def test_paths_goals_and_answers_are_those_of_the_robot_with_its_offset_and_joints(
     tmp_path, capsys
 ):
@@ -260,10 +258,10 @@ def test_paths_goals_and_answers_are_those_of_the_robot_with_its_offset_and_join
     for answer, begin in zip(answers, ((1.0, 0.0), (sent.x, sent.y)), strict=True):
         poses = np.load(tmp_path / "out" / answer["prediction"])["poses"]
         np.testing.assert_allclose(poses[0, :2], np.add(begin, (0.2, 0.1)), atol=1e-6)
-    told = tmp_path / "out" / "predictions"
-    plan = messages_on(told, "/traverse_server/plan", PathMessage)[0].poses[0].pose.position
-    np.testing.assert_allclose([plan.x, plan.y], [1.0, 0.0], atol=0.1)  # the rover leans
-    for joints in messages_on(told, "/traverse_server/predicted_joints", JointTrajectory):
+    (_, plan), *_ = published(tmp_path / "out", "plan", PathMessage)
+    place = plan.poses[0].pose.position
+    np.testing.assert_allclose([place.x, place.y], [1.0, 0.0], atol=0.1)  # the rover leans
+    for _, joints in published(tmp_path / "out", "predicted_joints", JointTrajectory):
         assert "bogie_r" in joints.joint_names and "bogie_right" not in joints.joint_names
 
 

@@ -21,9 +21,13 @@ from rover_planner.errors import PlanningError
 from rover_planner.nodes.mission.drive import Drive, DriveSettings
 from rover_planner.nodes.rover_simulator import RoverSimulator
 from rover_planner.nodes.traction_controller import TractionController
+from rover_planner.nodes.traverse_server import TraverseServer
+from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
 from rover_planner.ros.qos import map_qos, sensor_qos, topic_qos
+from rover_planner.worlds.mars_terrain import make_mars_terrain
 from support.grounds import make_terrain, waves
-from support.ros_fixtures import PATIENT, run_in_executor
+from support.ros_fixtures import PATIENT, hear, run_in_executor
+from support.rovers import LSR1
 from support.waiting import wait_until
 
 START_X = -1.0
@@ -57,18 +61,11 @@ class Ear(Node):
 
     def __init__(self, ros):
         super().__init__("ear", context=ros.context)
-        self.heard = {}
-        for kind, topic, qos in (
-            (JointState, "joint_states", topic_qos()),  # a reliable subscriber
-            (Imu, "imu", sensor_qos()),
-            (PointCloud2, "elevation_cloud", map_qos()),
-            (DiagnosticArray, "/diagnostics", topic_qos()),
-        ):
-            self.create_subscription(kind, topic, self._keeper(topic), qos)
+        self.joint_states = hear(self, JointState, "joint_states", topic_qos())  # reliable
+        self.imu = hear(self, Imu, "imu", sensor_qos())
+        self.clouds = hear(self, PointCloud2, "elevation_cloud", map_qos())
+        self.diagnostics = hear(self, DiagnosticArray, "/diagnostics")
         self._commands = self.create_publisher(TwistStamped, "cmd_vel", sensor_qos())
-
-    def _keeper(self, topic):
-        return lambda message: self.heard.setdefault(topic, []).append(message)
 
     def command(self, speed, yaw_rate=0.0):
         twist = TwistStamped()
@@ -85,9 +82,9 @@ def test_it_publishes_what_a_rover_would_drives_as_commanded_and_stops_when_comm
     ear, start_simulator
 ):
     simulator = start_simulator(steering_sign="right")
-    wanted = {"joint_states", "imu", "elevation_cloud", "/diagnostics"}
-    wait_until(lambda: wanted <= ear.heard.keys(), "joint states, attitude, map and diagnostics")
-    state, imu = ear.heard["joint_states"][-1], ear.heard["imu"][-1]
+    for heard in (ear.joint_states, ear.imu, ear.clouds, ear.diagnostics):
+        wait_until(lambda heard=heard: heard, "joint states, attitude, map and diagnostics")
+    state, imu = ear.joint_states[-1], ear.imu[-1]
     rover, plant = simulator.simulation.settings.rover, simulator.simulation.plant
     arm, steering = rover.manipulator.joints, steering_joints(rover)
     assert list(state.name) == [*SUSPENSION_JOINTS, *WHEEL_JOINTS, *steering, *arm]
@@ -95,15 +92,15 @@ def test_it_publishes_what_a_rover_would_drives_as_commanded_and_stops_when_comm
     attitude = imu_to_attitude(imu)
     assert imu.linear_acceleration.z == pytest.approx(9.81, abs=0.3)
     assert np.isfinite([attitude.roll, attitude.pitch]).all()
-    seen = terrain_from_point_cloud(ear.heard["elevation_cloud"][-1])
+    seen = terrain_from_point_cloud(ear.clouds[-1])
     assert np.isfinite(seen.elevation_at(*plant.state().position[:2]))
-    status = ear.heard["/diagnostics"][-1].status[0]
+    status = ear.diagnostics[-1].status[0]
     assert (status.level, status.values[0].key) == (status.OK, "position")
     assert status.values[0].value.startswith(f"[{START_X}, 0.0, ")
 
     def steers():
         ear.command(0.05, 0.05)
-        state = ear.heard["joint_states"][-1]
+        state = ear.joint_states[-1]
         found = dict(zip(state.name, state.position, strict=True))
         turned = plant.pose()[2] > 0.01 and plant.pose()[0] > START_X + 0.01
         return turned and found["front_left_steering"] < -0.2 and found
@@ -117,11 +114,11 @@ def test_with_simulated_time_it_is_the_source_of_the_clock_and_late_steps_do_not
     ros, ear, start_simulator
 ):
     simulator = start_simulator(use_sim_time=True, rate=100.0)
-    wait_until(lambda: len(ear.heard.get("joint_states", ())) > 20, "joint states")
+    wait_until(lambda: len(ear.joint_states) > 20, "joint states")
     run_in_executor(simulator, lambda: time.sleep(0.2))
-    have = len(ear.heard["joint_states"])
-    wait_until(lambda: len(ear.heard["joint_states"]) > have + 20, "more of them")
-    stamps = [stamp_to_ns(state.header.stamp) for state in ear.heard["joint_states"]]
+    have = len(ear.joint_states)
+    wait_until(lambda: len(ear.joint_states) > have + 20, "more of them")
+    stamps = [stamp_to_ns(state.header.stamp) for state in ear.joint_states]
     assert set(np.diff(stamps)) == {10_000_000}
     wait_until(lambda: simulator.get_clock().now().nanoseconds >= stamps[-1], "its own clock")
 
@@ -136,25 +133,68 @@ def test_bad_parameters_are_refused_by_name(start_simulator):
             start_simulator(**given)
 
 
+def drive_together(planner, nodes, goal, settings) -> float:
+    """Drive to a goal by simulator, server and controller; return how far off the rover is [m]."""
+    simulator, server, controller = nodes
+    planner.wait_for_server()
+    wait_until(lambda: server.service.terrain is not None, "the map")
+    plant = simulator.simulation.plant
+    answer = planner.ask(plant.pose(), goal)
+    assert answer["traversable"], answer["reason"]
+    Drive(planner, goal, settings, lambda told: None).run(answer["poses"])
+    assert controller.statistics.updates > 20
+    return np.hypot(*(plant.pose() - goal)[:2])
+
+
 @pytest.mark.slow
 def test_simulator_server_controller_and_planner_drive_together_to_a_goal(
     ros, start_simulator, start_server, planner
 ):
-    simulator = start_simulator(follow_commands=True)
-    server, controller = start_server(planner="fan"), start_controller(ros)
-    planner.wait_for_server()
-    wait_until(lambda: server.service.terrain is not None, "the map")
-    place = simulator.simulation.plant.pose()
-    goal = [place[0] + 0.25, 0.01, 0.0]
-    answer = planner.ask(place, goal)
-    assert answer["traversable"], answer["reason"]
+    simulator, controller = start_simulator(follow_commands=True), start_controller(ros)
+    nodes = simulator, start_server(planner="fan"), controller
     settings = DriveSettings(position_tolerance=0.1, timeout=200.0)
-    Drive(planner, goal, settings, lambda told: None).run(answer["poses"])
-    assert np.hypot(*(simulator.simulation.plant.pose() - goal)[:2]) < 0.1
-    assert controller.statistics.updates > 20
+    assert drive_together(planner, nodes, [START_X + 0.25, 0.01, 0.0], settings) < 0.1
     assert controller.statistics.fallbacks == 0
-    for node in (simulator, server, controller):
-        assert ros.is_alive(node)
+    assert all(ros.is_alive(node) for node in nodes)
+
+
+@pytest.mark.long  # two to three minutes each
+@pytest.mark.parametrize("engine", ["quasi_static", "mujoco"])
+def test_a_rover_drives_around_boulders_that_it_sees_on_the_way(
+    ros, start_simulator, planner, tmp_path, engine
+):
+    terrain = make_mars_terrain(4, 8.0, rock_cover=0.25, crater_density=0.0)
+    start, goal = (-0.01, -0.45, 0.45), (2.8, -0.25, 2.02)
+    save_terrain(tmp_path / "ground.npz", terrain)
+    options = PathQueryOptions().change(policy="optimal")
+    assert not answer_path_query(LSR1, terrain, start, goal, options).traversable
+    server = ros.start(
+        TraverseServer,
+        policy="optimal",
+        map_updates="merge",
+        search_frontier=True,
+        search_budget=8.0,
+        time_budget=60.0,
+    )
+    controller = ros.start(TractionController, enabled_at_start=True)
+    simulator = start_simulator(
+        terrain_file=str(tmp_path / "ground.npz"),
+        start_x=start[0],
+        start_y=start[1],
+        start_yaw=start[2],
+        engine=engine,
+        sensor_range=4.0,
+        sensor_occlusion=False,
+        map_rate=1.0,
+        follow_commands=True,
+        speed=0.1,
+    )
+    first = wait_until(lambda: server.service.terrain, "the map")
+    nodes, settings = (simulator, server, controller), DriveSettings(timeout=400.0, patience=5.0)
+    assert drive_together(planner, nodes, goal, settings) < 0.25
+    last = server.service.terrain
+    assert np.isfinite(last.elevation).sum() > np.isfinite(first.elevation).sum()
+    assert all(ros.is_alive(node) for node in nodes)
 
 
 def test_it_gives_way_to_speeds_from_elsewhere_and_drives_them_by_torques(

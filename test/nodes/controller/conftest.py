@@ -28,8 +28,6 @@ RATE = 50.0
 """Messages per second of each sensor."""
 QUEUE = 1000
 """Messages that wait for a listener that is late; none is lost."""
-LATENESS = ("waiting for ", " stale: none for ", "updates came too late", "the clock was stepped")
-"""Texts of faults that come at the start, and on a machine that stalls."""
 
 
 class DrivenRover(Node):
@@ -109,6 +107,11 @@ class DrivenRover(Node):
             self.log.append(message.msg)
 
     @property
+    def values(self) -> dict[str, str]:
+        """The values of the controller's last status by key."""
+        return {entry.key: entry.value for entry in self.status.values}
+
+    @property
     def torque(self) -> float:
         """The largest torque of the last command [N m]; 0 if there is none."""
         return self.commands[-1][1] if self.commands else 0.0
@@ -117,24 +120,6 @@ class DrivenRover(Node):
     def push(self) -> float:
         """The sum of the torques of the last command [N m]; 0 if there is none."""
         return self.commands[-1][2] if self.commands else 0.0
-
-    @property
-    def faults(self) -> list[str]:
-        """Lines of the log about faults, without those of the start and of a late machine."""
-        lines = [line for line in self.log if "fault" in line]
-        return [line for line in lines if not any(text in line for text in LATENESS)]
-
-    def pushes_on(self, heard: int, count: int) -> bool:
-        """Return whether so many commands in a row push, of those after the first `heard`.
-
-        On a machine that stalls inputs are stale; the rover then rests, and a new row begins.
-        """
-        row = 0
-        for *_, push in self.commands[heard:]:
-            row = row + 1 if push > 0.0 else 0
-            if row >= count:
-                return True
-        return False
 
     def commands_after(self, stamp: int) -> list[tuple[int, float]]:
         """Return time [ns] and sum of torques of the commands that were sent after a time [ns]."""

@@ -12,7 +12,7 @@ from rover_physics.rover.steered_drive import SteeredDrive
 from rover_physics.rover.steering_joints import steering_joints
 from rover_planner.nodes.traction_controller import NODE_NAME
 from rover_planner.nodes.warm_up import JOINTS
-from rover_planner.ros.qos import topic_qos
+from support.ros_fixtures import hear
 from support.rovers import LSR1
 from support.waiting import wait_until
 
@@ -23,13 +23,10 @@ SPEED, YAW_RATE = 0.03, 0.03
 
 
 def test_rates_and_steering_angles_are_those_of_the_commanded_motion(rover, start_controller):
-    heard = {}
-    for group in ("commands", "velocity_commands", "steering_commands"):
-        rover.create_subscription(
-            Float64MultiArray, f"{NODE_NAME}/{group}",
-            lambda message, group=group: heard.__setitem__(group, np.array(message.data)),
-            topic_qos(),
-        )  # fmt: skip
+    efforts, speeds, turns = (
+        hear(rover, Float64MultiArray, f"{NODE_NAME}/{group}")
+        for group in ("commands", "velocity_commands", "steering_commands")
+    )
     aims = SteeredDrive(LSR1).aim(SPEED, YAW_RATE)
     steering = dict(zip((f"{n.removesuffix('_wheel')}_steering" for n in WHEEL_JOINTS),
                         aims.angles.tolist(), strict=True))  # fmt: skip
@@ -49,11 +46,11 @@ def test_rates_and_steering_angles_are_those_of_the_commanded_motion(rover, star
     rates = aims.speeds / LSR1.wheel.radius * [SIGNS[name] for name in WHEEL_JOINTS]
     turned = np.array([SIGNS[name] * steering[name] for name in steering_joints(LSR1)])
 
-    def commands(group: str, right: np.ndarray) -> bool:
-        return group in heard and np.allclose(heard[group], right, rtol=0.0, atol=1e-6)
+    def is_told(heard: list[Float64MultiArray], right: np.ndarray) -> bool:
+        return heard and np.allclose(heard[-1].data, right, rtol=0.0, atol=1e-6)
 
-    wait_until(lambda: commands("velocity_commands", rates[::-1]), "the rates")
-    wait_until(lambda: commands("steering_commands", turned), "the angles")
+    wait_until(lambda: is_told(speeds, rates[::-1]), "the rates")
+    wait_until(lambda: is_told(turns, turned), "the angles")
     signs = np.array([SIGNS[name] for name in WHEEL_JOINTS[::-1]])
-    wait_until(lambda: "commands" in heard and heard["commands"] @ signs > 0.0, "the efforts")
+    wait_until(lambda: efforts and efforts[-1].data @ signs > 0.0, "the efforts")
     assert np.abs(controller.service.joints.suspension_angles).max() < 1e-9

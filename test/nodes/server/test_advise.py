@@ -83,16 +83,3 @@ def test_advice_whose_time_is_up_before_its_first_result_tells_so(
         assert (answer["code"], answer["reason"]) == ("too_long", STOPPED)
         send_request(client, "cancel")
         wait_until(question.done, "the end of the question")
-
-
-def test_advice_that_has_begun_is_cancelled_too(start_server, client):
-    start_server(planner="fan", candidate_count=1, advice_time=600.0)
-    grown: list[String] = []
-    client.create_subscription(String, f"{SERVER}/advice", grown.append, latched_qos())
-    client.send_terrain(make_terrain(rock_left))
-    assert not client.can_traverse(START, GOAL).poses
-    advice = send_request(client, "advise")
-    wait_until(lambda: grown, "the first advice")
-    assert call(client.create_client(Trigger, f"{SERVER}/cancel"), Trigger.Request()).success
-    wait_until(advice.done, "the end of the advice")
-    assert json.loads(advice.result().message)["code"] == "cancelled"

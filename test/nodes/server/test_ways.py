@@ -8,9 +8,9 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 
 from msg_adapters.results.grids import NOT_REACHED, REACHED
-from rover_planner.ros.qos import topic_qos
 from support.grounds import make_terrain, pen, waves
 from support.planner_client import SERVER, ask
+from support.ros_fixtures import hear
 from support.waiting import wait_until
 
 INSIDE, BEYOND = (0.0, 0.0, 0.0), (2.6, 0.0, 1.57)
@@ -38,10 +38,7 @@ def test_without_a_path_the_code_says_so_and_the_closed_area_is_a_grid(start_ser
 @pytest.mark.long  # the search alone is held by test/planning/answering
 def test_a_search_tells_of_its_progress_and_goes_on_with_a_newer_map(start_server, client):
     start_server(lattice_cell=0.06, **LONG)  # so that it takes long
-    reports, plans = [], []
-    client.create_subscription(
-        DiagnosticArray, f"{SERVER}/search_progress", reports.append, topic_qos()
-    )
+    plans, reports = [], hear(client, DiagnosticArray, f"{SERVER}/search_progress")
     client.send_terrain(make_terrain(pen))
     asking = threading.Thread(target=lambda: plans.append(client.can_traverse(INSIDE, BEYOND)))
     asking.start()

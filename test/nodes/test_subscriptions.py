@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Maps are heard whenever and however they are published, or who cannot be heard is named."""
+
+from functools import partial
+
+import pytest
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import PointCloud2
+
+from rover_planner.parameters.traverse_server import TraverseServerParameters
+from rover_planner.ros.node import RoverNode
+from rover_planner.ros.qos import map_qos
+from rover_planner.ros.subscriptions import subscribe_to_map
+from support.waiting import repeat_until, wait_until
+
+BEST_EFFORT = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+@pytest.fixture
+def hear(ros):
+    """Return a function that starts a node with parameters; it returns the maps it hears."""
+
+    def start(**values):
+        heard: list[bytes] = []
+        node = ros.start(partial(RoverNode, "hearer", TraverseServerParameters), **values)
+        node.create_timer(0.1, lambda: None)  # as nodes have: a mismatch wakes no executor
+        subscribe_to_map(node, PointCloud2, "maps", heard.append)
+        return heard
+
+    return start
+
+
+@pytest.fixture
+def advertise(ros):
+    """Return a function that makes a publisher of maps with a profile."""
+    speaker = ros.spin(Node("speaker", context=ros.context))
+    return lambda qos: speaker.create_publisher(PointCloud2, "maps", qos)
+
+
+def test_a_map_from_before_the_start_is_heard(advertise, hear):
+    advertise(map_qos()).publish(PointCloud2())
+    heard = hear()
+    wait_until(lambda: heard, "the map")
+
+
+@pytest.mark.parametrize(
+    ("values", "qos"),
+    [
+        ({}, map_qos(DurabilityPolicy.VOLATILE)),
+        ({"input_reliability": "best_effort"}, BEST_EFFORT),
+    ],
+)
+def test_volatile_maps_and_where_the_parameter_says_so_best_effort_ones_are_heard(
+    advertise, hear, values, qos
+):
+    heard, publisher = hear(**values), advertise(qos)
+    repeat_until(lambda: publisher.publish(PointCloud2()), lambda: heard, "the map")
+
+
+def test_a_best_effort_publisher_is_named_with_the_parameter_that_mends_it(advertise, hear, capfd):
+    hear()
+    advertise(BEST_EFFORT)
+    text = "a publisher of maps is not heard: its reliability does not match; "
+    text += "set input_reliability to best_effort"
+    told = []
+
+    def is_told() -> bool:
+        told.append(capfd.readouterr().err)
+        return text in "".join(told)
+
+    wait_until(is_told, "the warning")
