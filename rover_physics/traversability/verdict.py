@@ -21,17 +21,20 @@ from rover_physics.rover.model import Rover
 from rover_physics.status import BoundStatus, PoseStatus
 
 UNSETTLED = {
-    PoseStatus.STEERING: "",
-    PoseStatus.OFF_MAP: "off the map: a wheel would leave the known area",
-    PoseStatus.UNKNOWN_GROUND: "unknown ground under a wheel",
-    PoseStatus.NOT_SETTLED: "no configuration found in which all six wheels touch the ground",
-    PoseStatus.NO_EQUILIBRIUM: "the wheel loads are not determined in this configuration",
-    PoseStatus.NOT_COMPUTABLE: (
-        "a wheel load, torque or margin cannot be computed: it is not a finite number"
-    ),
+    status: (status.name.lower(), reason)
+    for status, reason in {
+        PoseStatus.STEERING: "",
+        PoseStatus.OFF_MAP: "off the map: a wheel would leave the known area",
+        PoseStatus.UNKNOWN_GROUND: "unknown ground under a wheel",
+        PoseStatus.NOT_SETTLED: "no configuration found in which all six wheels touch the ground",
+        PoseStatus.NO_EQUILIBRIUM: "the wheel loads are not determined in this configuration",
+        PoseStatus.NOT_COMPUTABLE: (
+            "a wheel load, torque or margin cannot be computed: it is not a finite number"
+        ),
+    }.items()
 }
-"""Reason of the status of a row that is not settled, whose name is the code; that of steering
-depends on the row."""
+"""Code and reason of the status of a row that is not settled; the reason of steering depends on
+the row."""
 EXTREMES = {
     "min_tip_over_ratio": ("tip_over_ratio", np.fmin),
     "max_friction_utilisation": ("friction_utilisation", np.fmax),
@@ -121,7 +124,7 @@ class Verdict:
 def codes_of_verdicts() -> tuple[str, ...]:
     """Return the codes of a verdict; the first that applies is the reason of a waypoint."""
     of_limits = dict.fromkeys(limit.code for limit in table.LIMITS)
-    return (*(status.name.lower() for status in UNSETTLED), *of_limits, TRAPPED, CHANCE)
+    return (*(code for code, _ in UNSETTLED.values()), *of_limits, TRAPPED, CHANCE)
 
 
 def hold_against_limits(rover: Rover, prediction: PathPrediction) -> Verdict:
@@ -160,9 +163,8 @@ def explain_rows(
         if statuses[row] == PoseStatus.SETTLED:
             found[row] = explain_use(prediction, uses, row, int(first[row]))
             continue
-        status = PoseStatus(statuses[row])
-        reason = UNSETTLED[status] or _explain_steering(rover, prediction.steering_angle[row])
-        found[row] = status.name.lower(), reason
+        code, reason = UNSETTLED[statuses[row]]
+        found[row] = code, reason or _explain_steering(rover, prediction.steering_angle[row])
     return found
 
 
