@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Grounds for tests: heights as functions of x and y [m], and terrains made of them."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from rover_physics import Terrain
@@ -12,6 +14,13 @@ def make_terrain(height, resolution=0.05, half=4.0) -> Terrain:
     x, y = np.meshgrid(axis, axis)
     elevation = np.broadcast_to(height(x, y), x.shape).astype(np.float32)
     return Terrain(elevation, resolution, (-half, -half))
+
+
+def raised(terrain: Terrain, cells, by) -> Terrain:
+    """Return a terrain with some cells higher by some metres, or unknown if that is NaN."""
+    elevation = terrain.elevation.copy()
+    elevation[cells] += by
+    return replace(terrain, elevation=elevation)
 
 
 def waves(x, y):

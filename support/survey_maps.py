@@ -8,17 +8,19 @@ from pathlib import Path
 
 import numpy as np
 
-from rover_physics import SweepOptions, Terrain, load_rover, save_terrain
+from rover_physics import SweepOptions, Terrain, save_terrain
 from rover_planner.survey.chunk_survey import ChunkReport, SurveyJob, compute_chunk, survey_chunk
 from rover_planner.survey.layout import Index
 from rover_planner.survey.request import SurveyRequest
+from rover_planner.survey.store import SurveyStore
 from rover_planner.survey.survey import PreparedSurvey, prepare_survey
+from support.rovers import LSR1
 
 RESOLUTION = 0.1
 """Cell size of the maps [m]."""
 
 
-def make_rough_map(rows=150, columns=170, **layers) -> Terrain:
+def make_rough_map(rows=150, columns=170, origin=(1200.0, -340.0)) -> Terrain:
     """Return waves with rocks, a wall and a hole of unknown ground, far from the origin."""
     rng = np.random.default_rng(3)
     y, x = np.mgrid[0:rows, 0:columns] * RESOLUTION
@@ -27,13 +29,13 @@ def make_rough_map(rows=150, columns=170, **layers) -> Terrain:
         heights += 0.15 * np.exp(-((x - at_x) ** 2 + (y - at_y) ** 2) / 0.03)
     heights[:, columns // 2 : columns // 2 + 3] += 0.6 * (y[:, :1] < 0.7 * rows * RESOLUTION)
     heights[rows // 3 : rows // 3 + 2, columns // 4 : columns // 4 + 2] = np.nan
-    return Terrain(heights, RESOLUTION, (1200.0, -340.0), **layers)
+    return Terrain(heights, RESOLUTION, origin)
 
 
 def make_request(**changes) -> SurveyRequest:
     """Return a request of lsr1 at 4 headings with changes; `policy` is that of the options."""
     options = SweepOptions(policy=changes.pop("policy", "equal"))
-    return SurveyRequest(load_rover("lsr1"), options, **({"headings": 4} | changes))
+    return SurveyRequest(**{"rover": LSR1, "options": options, "headings": 4} | changes)
 
 
 def prepare_here(
@@ -60,9 +62,15 @@ def survey_here(
     return compute_here(prepare_here(folder, terrain, request, **changes))
 
 
-def layers_of(prepared: PreparedSurvey) -> dict[str, np.ndarray]:
+def layers_of(store: SurveyStore) -> dict[str, np.ndarray]:
     """Return all layers of a store."""
-    return {name: prepared.store.layer(name)[:] for name in prepared.store.layer_names()}
+    return {name: store.layer(name)[:] for name in store.layer_names()}
+
+
+def count_chunks(out: Path) -> int:
+    """Return the number of finished chunks, while a survey runs."""
+    files = Path(out, "seconds", "c").rglob("*")
+    return sum(path.is_file() and not path.name.endswith("partial") for path in files)
 
 
 def assert_same_bits(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> None:

@@ -2,22 +2,20 @@
 """A rover whose camera sees ahead only starts from where it stands and reaches its goal."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
-from rover_physics import Terrain
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_physics.numerics.quaternions import rpy_from_xyzw
 from rover_planner.maps.ground_beneath import Standing
 from rover_planner.maps.map_keeper import MapKeeper
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
-from rover_planner.parameters.traverse_server import FAN, MERGE, TraverseServerParameters
-from rover_planner.planning.answering.service_settings import load_service_settings
+from rover_planner.parameters.traverse_server import FAN, MERGE
 from rover_planner.planning.answering.snapshot import GivenPath
-from rover_planner.planning.answering.traverse_service import TraverseService
-from rover_planner.simulator.simulation import Simulation, load_simulation_settings
+from rover_planner.simulator.simulation import Simulation, SimulationSettings
 from support.grounds import make_terrain, waves
+from support.rovers import LSR1
+from support.services import make_service
 
 CAMERA = {"sensor_field_of_view": math.radians(60.0), "sensor_least_range": 0.5}
 """A camera that sees 60 degrees ahead, from 0.5 m on."""
@@ -34,16 +32,15 @@ def standing_of(state):
 
 
 class Drive:
-    """A simulated rover with a camera, and a server that knows no more than it measures."""
+    """A simulated rover whose camera has looked once, and a server that knows no more."""
 
-    def __init__(self, ground: Terrain, **parameters):
+    def __init__(self, **parameters):
         simulated = RoverSimulatorParameters(start_x=START[0], speed=0.08, **CAMERA)
-        settings = replace(load_simulation_settings(simulated), terrain=ground)
-        self.simulation = Simulation(settings)
-        asked = TraverseServerParameters(map_updates=MERGE, planner=FAN, **parameters)
-        self.service = TraverseService(load_service_settings(asked))
-        self.keeper = MapKeeper(settings.rover, asked)
+        self.simulation = Simulation(SimulationSettings(LSR1, make_terrain(waves), simulated))
+        self.service = make_service(map_updates=MERGE, planner=FAN, **parameters)
+        self.keeper = MapKeeper(LSR1, self.service.settings.parameters)
         self.time = 0.0
+        self.look()
 
     def look(self) -> None:
         """Give the server the map that the camera sees now."""
@@ -63,8 +60,7 @@ class Drive:
 
 
 def test_the_first_drive_is_accepted_and_reaches_its_goal():
-    drive = Drive(make_terrain(waves), footprint_margin=MARGIN)
-    drive.look()
+    drive = Drive(footprint_margin=MARGIN)
     first = drive.service.snapshot().answer(START, GOAL)
     assert first.traversable, first.reason
     assert 0.1 < first.ground.footprint_share <= first.ground.unobserved_share < 0.5
@@ -84,14 +80,12 @@ def test_the_first_drive_is_accepted_and_reaches_its_goal():
 
 def test_without_the_footprint_the_start_is_unknown_ground():
     for parameters in ({"fill_under_rover": False}, {"footprint_margin": 0.0}):
-        drive = Drive(make_terrain(waves), **parameters)
-        drive.look()
+        drive = Drive(**parameters)
         assert drive.service.snapshot().answer(START, GOAL).code == "unknown_ground"
 
 
 def test_blind_ground_is_refused_where_the_parameter_says_so():
-    drive = Drive(make_terrain(waves), footprint_margin=MARGIN, blind_ground="refuse")
-    drive.look()
+    drive = Drive(footprint_margin=MARGIN, blind_ground="refuse")
     refused = drive.service.snapshot().answer(START, GOAL)
     assert refused.code == "blind_ground" and not refused.traversable
     report = refused.report.to_dict()
@@ -101,10 +95,8 @@ def test_blind_ground_is_refused_where_the_parameter_says_so():
 
 
 def test_ground_beyond_the_start_is_not_assumed_again():
-    drive = Drive(make_terrain(waves), footprint_margin=MARGIN)
-    drive.look()
+    drive = Drive(footprint_margin=MARGIN)
     filled = drive.service.known_map.cells.count()["footprint"]
-    drive.simulation.take_speeds(0.0, 0.15, 0.0)
     for k in range(20):
         drive.simulation.take_speeds(0.0, 0.15, drive.time)
         assert drive.go(0.4) == ""

@@ -1,19 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Measured angles and pose give the six contacts, and with them the ground under the rover."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from rover_physics import Terrain, judge_path, load_rover
+from rover_physics import Terrain, judge_path
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.maps.ground_beneath import Standing, find_ground_beneath
 from rover_planner.maps.layers import CONTACT, FOOTPRINT
 from rover_planner.maps.living_map import LivingMap
-from support.grounds import make_terrain, rocky, waves
+from support.grounds import make_terrain, raised, rocky, waves
+from support.rough_grounds import with_std
+from support.rovers import LSR1, M2020
 
-ROVERS = {name: load_rover(name) for name in ("lsr1", "m2020")}
 SLOPE = make_terrain(lambda x, y: 0.2 * x - 0.15 * y + 3.0)
 
 
@@ -31,45 +30,43 @@ def standing_at(rover, terrain, pose):
     ), there
 
 
-@pytest.mark.parametrize("name", ROVERS)
+@pytest.mark.parametrize("rover", [LSR1, M2020], ids=lambda rover: rover.name)
 @pytest.mark.parametrize("yaw", [0.0, -2.5])
-def test_the_contacts_of_a_settled_rover_lie_on_the_ground(name, yaw):
+def test_the_contacts_of_a_settled_rover_lie_on_the_ground(rover, yaw):
     for ground, tolerance in ((SLOPE, 1e-4), (make_terrain(waves), 0.005)):
-        standing, there = standing_at(ROVERS[name], ground, (0.2, -0.3, yaw))
-        contacts = find_ground_beneath(ROVERS[name], standing).contacts
+        standing, there = standing_at(rover, ground, (0.2, -0.3, yaw))
+        contacts = find_ground_beneath(rover, standing).contacts
         on_ground = ground.elevation_at(contacts[:, 0], contacts[:, 1])
         # A wheel that leans touches with its edge, by half its width times the slope.
-        edge = 0.5 * ROVERS[name].wheel.width * 0.25
+        edge = 0.5 * rover.wheel.width * 0.25
         np.testing.assert_allclose(contacts[:, 2], on_ground, atol=tolerance + edge)
-        assert np.abs(contacts - there.contact_points[0]).max() < ROVERS[name].wheel.radius
+        assert np.abs(contacts - there.contact_points[0]).max() < rover.wheel.radius
 
 
-def blind_behind(ground, x, shape=None):
+def blind_behind(ground, x):
     """Return a ground that is unknown up to x."""
-    elevation = ground.elevation.copy()
-    columns = ground.origin[0] + ground.resolution * np.arange(elevation.shape[1])
-    elevation[:, columns < x] = np.nan
-    return replace(ground, elevation=elevation)
+    columns = ground.origin[0] + ground.resolution * np.arange(ground.elevation.shape[1])
+    return raised(ground, np.s_[:, columns < x], np.nan)
 
 
-def fill(living, rover, standing, margin=0.0, std=0.02):
-    patch, is_contact = find_ground_beneath(rover, standing).patch(living.grid, margin, std)
+def fill(living, standing, margin=0.0):
+    patch, is_contact = find_ground_beneath(LSR1, standing).patch(living.grid, margin, 0.02)
     return living.fill(patch, is_contact, 5.0)
 
 
 def filled(ground, margin=0.0, pose=(0.0, 0.0, 0.3)):
-    standing, _ = standing_at(ROVERS["lsr1"], ground, pose)
+    standing, _ = standing_at(LSR1, ground, pose)
     living = LivingMap()
     living.replace(blind_behind(ground, 0.8), "elevation_cloud", 1.0)
-    assert fill(living, ROVERS["lsr1"], standing, margin)
+    assert fill(living, standing, margin)
     return living
 
 
 def test_a_rover_on_ground_it_never_saw_settles_where_it_stands():
     ground = make_terrain(rocky)
-    standing, true = standing_at(ROVERS["lsr1"], ground, (0.0, 0.0, 0.3))
+    standing, true = standing_at(LSR1, ground, (0.0, 0.0, 0.3))
     terrain = filled(ground).snapshot().terrain
-    there = judge_path(ROVERS["lsr1"], terrain, np.array([(0.0, 0.0, 0.3)]))[0]
+    there = judge_path(LSR1, terrain, np.array([(0.0, 0.0, 0.3)]))[0]
     assert there.settled[0]
     np.testing.assert_allclose(there.position[0], true.position[0], atol=0.01)
     for name in ("roll", "pitch", "rocker_angle", "bogie_angle"):
@@ -103,10 +100,10 @@ def test_the_margin_continues_the_ground_around_the_wheels():
 
 def test_a_map_that_begins_ahead_of_the_rover_grows_to_where_it_stands():
     ahead = Terrain(np.zeros((40, 40)), 0.05, (0.6, -1.0))
-    standing, _ = standing_at(ROVERS["lsr1"], make_terrain(lambda x, y: 0.0 * x), (0.0, 0.0, 0.0))
+    standing, _ = standing_at(LSR1, make_terrain(lambda x, y: 0.0 * x), (0.0, 0.0, 0.0))
     living = LivingMap()
     living.replace(ahead, "elevation_cloud", 1.0)
-    assert fill(living, ROVERS["lsr1"], standing)
+    assert fill(living, standing)
     terrain = living.snapshot().terrain
     assert terrain.contains(-0.5, 0.0) and terrain.elevation_at(0.0, 0.0) == pytest.approx(0.0)
 
@@ -114,8 +111,8 @@ def test_a_map_that_begins_ahead_of_the_rover_grows_to_where_it_stands():
 def test_a_contact_replaces_what_was_assumed_and_a_map_replaces_both():
     living = filled(SLOPE, margin=0.5)
     first = living.snapshot()
-    standing, _ = standing_at(ROVERS["lsr1"], SLOPE, (0.02, 0.1, 0.3))
-    assert fill(living, ROVERS["lsr1"], standing)
+    standing, _ = standing_at(LSR1, SLOPE, (0.02, 0.1, 0.3))
+    assert fill(living, standing)
     second = living.snapshot()
     turned = (first.sources.source == FOOTPRINT) & (second.sources.source == CONTACT)
     assert turned.any()
@@ -126,7 +123,6 @@ def test_a_contact_replaces_what_was_assumed_and_a_map_replaces_both():
 
 def test_filled_heights_are_uncertain_on_an_uncertain_map_only():
     assert filled(SLOPE).snapshot().terrain.elevation_std is None
-    uncertain = replace(SLOPE, elevation_std=np.full(SLOPE.elevation.shape, 0.001))
-    std = filled(uncertain).snapshot()
+    std = filled(with_std(SLOPE, 0.001)).snapshot()
     is_filled = np.isin(std.sources.source, (CONTACT, FOOTPRINT))
     assert (std.terrain.elevation_std[is_filled] == 0.02).all()

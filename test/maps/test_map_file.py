@@ -2,16 +2,14 @@
 """load_map reads terrain files below its folder and within its limits, and nothing else."""
 
 import os
-import time
 
 import numpy as np
 import pytest
 
-from rover_physics import RoverError, save_terrain
+from rover_physics import save_terrain
 from rover_physics.errors import TerrainError
 from rover_planner.maps.map_file import MapFileError, MapLimits, open_map
 from support.grounds import make_terrain, waves
-from support.hostile_files import make_oddities
 
 
 @pytest.fixture
@@ -91,7 +89,7 @@ def test_a_link_that_replaces_a_part_after_the_check_is_not_followed(maps, monke
 @pytest.mark.parametrize(
     "url",
     ["", "//[", "http://a/b.npz", "file://host/a.npz", "file://[::1", "u" * 5000, "file:///%00",
-     "\n", "file:///%ff", "spirit", "/"],
+     "\n", "file:///%ff", "\udcff", "a\0b", "spirit", "/"],
     ids=lambda url: ascii(url[:20]),
 )  # fmt: skip
 def test_what_names_no_file_is_refused_in_one_short_line(url):
@@ -101,13 +99,11 @@ def test_what_names_no_file_is_refused_in_one_short_line(url):
     assert str(raised.value).isprintable()
 
 
-def test_pipes_devices_sockets_folders_and_loops_are_refused_at_once(tmp_path):
-    for name in make_oddities(tmp_path):
-        for folder in ("/", str(tmp_path)):
-            began = time.perf_counter()
-            with pytest.raises((RoverError, MapFileError)):
-                open_map(name, MapLimits(folder))
-            assert time.perf_counter() - began < 20.0, name
+def test_what_is_no_regular_file_is_refused_at_once(maps):
+    os.mkfifo(maps / "pipe")
+    for folder, name, kind in ((maps, "pipe", "a named pipe"), ("/", "/dev/zero", "a device")):
+        with pytest.raises(MapFileError, match=kind):
+            load(folder, name)
 
 
 def test_a_file_above_a_limit_is_refused_by_the_parameters_name(maps):

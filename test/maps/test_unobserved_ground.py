@@ -7,15 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_physics import Terrain, load_rover
+from rover_physics import Terrain
 from rover_planner.maps.layers import FOOTPRINT, CellSources
 from rover_planner.maps.unobserved_ground import SEEN, UNSEEN, ObservedGround, observed_ground
 from rover_planner.parameters.traverse_server import ALLOW, ALLOW_FOOTPRINT, REFUSE
+from support.rovers import LSR1
 
-LSR1 = load_rover("lsr1")  # its belly is 0.6 m x 0.4 m
 PATH = np.column_stack([np.arange(0.0, 2.0, 0.02), np.zeros(100), np.zeros(100)])
-
-
 SHAPE = (81, 161)
 LEVEL = Terrain(np.zeros(SHAPE), 0.05, (-2.0, -2.0))
 X = -2.0 + 0.05 * np.arange(161)
@@ -26,7 +24,8 @@ def test_the_share_is_that_of_the_cells_under_the_belly():
     elevation = np.zeros(SHAPE)
     elevation[:, (X >= 1.0) & (X < 1.5)] = np.nan
     share = observed_ground(replace(LEVEL, elevation=elevation), None).share(LSR1, PATH)
-    # The belly sweeps x from -0.3 to 2.28 m: 53 columns of cells, of which 10 are unknown.
+    # The belly, 0.6 m x 0.4 m, sweeps x from -0.3 to 2.28 m: 53 columns of cells, 10 of them
+    # unknown.
     assert share.unobserved_share == pytest.approx(10 / 53, abs=0.01)
     assert share.footprint_share == 0.0
     assert PATH[share.first, 0] == pytest.approx(0.7, abs=0.04)
@@ -42,24 +41,17 @@ def test_the_start_footprint_is_told_apart():
     assert [share.first_refused(rule) for rule in (ALLOW, ALLOW_FOOTPRINT, REFUSE)] == [-1, -1, 0]
 
 
-def test_ground_off_the_map_was_not_seen():
-    kinds = np.full(SHAPE, SEEN, np.uint8)
-    far = PATH + np.array([5.0, 0.0, 0.0])
-    share = ObservedGround(LEVEL, kinds).share(LSR1, far)
-    assert share.first == share.first_beyond_footprint
-    assert 5.6 < far[share.first, 0] + 0.3 + 0.06 < 6.2
-    assert share.unobserved_share == 0.0  # the shares are those of cells on the map
-    away = ObservedGround(LEVEL, kinds).share(LSR1, PATH + np.array([1e7, 0.0, 0.0]))
-    assert (away.unobserved_share, away.first) == (1.0, 0)
-
-
-def test_a_long_path_off_the_map_takes_no_time():
-    x = np.arange(0.0, 20_000.0, 0.02)
+def test_ground_off_the_map_was_not_seen_and_a_long_path_there_takes_no_time():
+    x, seen = np.arange(0.0, 20_000.0, 0.02), observed_ground(LEVEL, None)
     path = np.column_stack([x, 0.0 * x, 0.0 * x])
     began = time.process_time()
-    share = observed_ground(LEVEL, None).share(LSR1, path)
+    share = seen.share(LSR1, path)
     assert time.process_time() - began < 2.0
-    assert 5.6 < path[share.first, 0] + 0.3 < 6.2 + 0.6
+    assert share.first == share.first_beyond_footprint
+    assert 5.6 < path[share.first, 0] + 0.3 + 0.06 < 6.2
+    assert share.unobserved_share == 0.0  # the shares are those of cells on the map
+    away = seen.share(LSR1, PATH + np.array([1e7, 0.0, 0.0]))
+    assert (away.unobserved_share, away.first) == (1.0, 0)
 
 
 def test_a_long_path_counts_each_cell_once():

@@ -11,7 +11,8 @@ from rover_physics.numerics.interruption import interruptible
 from rover_physics.traversability.classification import TRAVERSABILITY_CLASSES, classify_judged
 from rover_physics.traversability.pose_classes import RoverOnMap, classify_poses
 from rover_planner.planning.navigation.hazard_map import HazardMap
-from support.rovers import LSR1
+from support.grounds import raised
+from support.rovers import LSR1, M2020
 
 OPTIONS = SweepOptions(control_margin=0.3)
 UNKNOWN, IMPASSABLE = -1, TRAVERSABILITY_CLASSES.index("impassable")
@@ -121,17 +122,16 @@ def test_no_cell_is_free_where_all_headings_fail():
 
 
 @pytest.mark.parametrize(
-    ("rover", "cell", "height"),
-    [("lsr1", 0.05, None), ("lsr1", 0.12, -0.4), ("m2020", 0.1, np.nan)],
+    ("rover", "cell", "cells", "by"),
+    [
+        (LSR1, 0.05, np.s_[40:48, 50:57], np.random.default_rng(1).normal(0.0, 0.1, (8, 7))),
+        (LSR1, 0.12, (42, 41), -0.4),
+        (M2020, 0.1, (42, 41), np.nan),
+    ],
 )
-def test_an_updated_map_equals_a_new_one_and_judges_little(rover, cell, height):
-    rover, before = load_rover(rover), rough(8, (60, 60), cell, 0.2)
-    elevation = before.elevation.copy()
-    if height is None:
-        elevation[40:48, 50:57] += np.random.default_rng(1).normal(0.0, 0.1, (8, 7))
-    else:
-        elevation[42, 41] = height
-    after = replace(before, elevation=elevation)
+def test_an_updated_map_equals_a_new_one_and_judges_little(rover, cell, cells, by):
+    before = rough(8, (60, 60), cell, 0.2)
+    after = raised(before, cells, by)
     hazards = judged(before, 1, rover)
     old = hazards.view().classes.copy()
     hazards.take(RoverOnMap(rover, after, OPTIONS))
@@ -166,7 +166,7 @@ def test_the_same_map_judges_nothing_and_another_rover_option_or_grid_all_anew()
     hazards.take(RoverOnMap(LSR1, replace(terrain, elevation=terrain.elevation.copy()), OPTIONS))
     assert hazards.stale_count == 0
     for other in (
-        RoverOnMap(load_rover("m2020"), terrain, OPTIONS),
+        RoverOnMap(M2020, terrain, OPTIONS),
         RoverOnMap(LSR1, terrain, replace(OPTIONS, friction=0.5)),
         RoverOnMap(LSR1, replace(terrain, origin=(-2.03, 1.0)), OPTIONS),
         RoverOnMap(LSR1, replace(terrain, friction=np.full((36, 40), 0.7)), OPTIONS),

@@ -6,10 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.server_health import ERROR, OK, WARN
-from rover_planner.planning.answering.service_settings import load_service_settings
-from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.navigation.monitor import (
     ARRIVED,
     IDLE,
@@ -23,15 +20,15 @@ from rover_planner.planning.navigation.monitor import (
 from rover_planner.planning.navigation.watched_path import WatchedPath
 from rover_planner.planning.verdict_report import SuspensionReport
 from support.grounds import make_terrain, wall_at, waves
+from support.rough_grounds import with_std
+from support.services import make_service
 
 STRAIGHT = np.column_stack([np.linspace(-2.0, 2.0, 201), np.zeros(201), np.zeros(201)])
 
 
 @pytest.fixture(scope="module")
 def service():
-    service = TraverseService(load_service_settings(TraverseServerParameters()))
-    service.take_terrain(make_terrain(waves))
-    return service
+    return make_service(make_terrain(waves))
 
 
 def sight(service, pose, time=0.0, ground=waves):
@@ -40,7 +37,9 @@ def sight(service, pose, time=0.0, ground=waves):
     return Sight(service.snapshot(), pose, time)
 
 
-def watching(service):
+@pytest.fixture
+def monitor(service):
+    """Return a monitor that watches a path."""
     monitor = PathMonitor()
     assert monitor.take_path(WatchedPath(STRAIGHT, "abc"), sight(service, STRAIGHT[0]))
     assert monitor.look(sight(service, STRAIGHT[0])).state == WATCHING
@@ -83,8 +82,7 @@ def test_the_place_goes_on_where_a_path_backs_up():
     assert path.is_end(path.find_place(np.array([0.0, 0.3, 0.0]), last).index)
 
 
-def test_a_wall_ahead_stops_and_one_behind_does_not(service):
-    monitor = watching(service)
+def test_a_wall_ahead_stops_and_one_behind_does_not(service, monitor):
     assert monitor.look(sight(service, STRAIGHT[50], 1.0)).place.index == 50
     found = monitor.look(sight(service, STRAIGHT[50], 2.0, wall_at(0.5)))
     assert found.state == STOPPED and found.judgement.reason[0].isdigit()
@@ -94,8 +92,9 @@ def test_a_wall_ahead_stops_and_one_behind_does_not(service):
     assert monitor.look(behind).state == WATCHING
 
 
-def test_what_is_near_is_judged_on_the_map_around_it_so_that_a_large_one_delays_no_stop(service):
-    monitor = watching(service)
+def test_what_is_near_is_judged_on_the_map_around_it_so_that_a_large_one_delays_no_stop(
+    service, monitor
+):
     large = make_terrain(wall_at(0.5), half=12.0)
     service.take_terrain(large)
     found = monitor.look(Sight(service.snapshot(), STRAIGHT[0], 1.0))
@@ -103,24 +102,25 @@ def test_what_is_near_is_judged_on_the_map_around_it_so_that_a_large_one_delays_
     assert found.judgement.judge.terrain.elevation.size < 0.2 * large.elevation.size
 
 
-def test_a_wall_that_is_certain_stops_before_the_errors_of_the_map_are_allowed_for(service):
-    for ground, std, is_exact in ((wall_at(0.5), 0.001, True), (waves, 0.2, False)):
-        terrain, monitor = make_terrain(ground, half=3.0), watching(service)
-        doubtful = replace(terrain, elevation_std=np.full(terrain.elevation.shape, std))
-        service.take_terrain(doubtful)
-        found = monitor.look(Sight(service.snapshot(), STRAIGHT[0], 1.0))
-        assert found.state == STOPPED
-        assert (found.judgement.candidate.prediction.bounds is None) == is_exact
+@pytest.mark.parametrize(
+    ("ground", "std", "is_exact"), [(wall_at(0.5), 0.001, True), (waves, 0.2, False)]
+)
+def test_a_wall_that_is_certain_stops_before_the_errors_of_the_map_are_allowed_for(
+    service, monitor, ground, std, is_exact
+):
+    service.take_terrain(with_std(make_terrain(ground, half=3.0), std))
+    found = monitor.look(Sight(service.snapshot(), STRAIGHT[0], 1.0))
+    assert found.state == STOPPED
+    assert (found.judgement.candidate.prediction.bounds is None) == is_exact
 
 
-def test_a_stop_does_not_wait_for_what_lies_beyond_its_reason(service):
-    found = watching(service).look(sight(service, STRAIGHT[0], 1.0, wall_at(0.5)))
+def test_a_stop_does_not_wait_for_what_lies_beyond_its_reason(service, monitor):
+    found = monitor.look(sight(service, STRAIGHT[0], 1.0, wall_at(0.5)))
     assert found.state == STOPPED and not found.judgement.candidate.is_complete
     assert found.judgement.complete().candidate.is_complete
 
 
-def test_the_rest_is_judged_once_for_each_map(service):
-    monitor = watching(service)
+def test_the_rest_is_judged_once_for_each_map(service, monitor):
     one = sight(service, STRAIGHT[10], 10.0)
     judged = [monitor.look(replace(one, time=10.0 + 0.1 * k)).judged for k in range(5)]
     assert judged == [2] * 5
@@ -130,15 +130,13 @@ def test_the_rest_is_judged_once_for_each_map(service):
     service.settings = settings
 
 
-def test_a_map_that_changes_all_the_time_leaves_time_for_others(service):
-    monitor = watching(service)
+def test_a_map_that_changes_all_the_time_leaves_time_for_others(service, monitor):
     for k in range(20):
         monitor.look(sight(service, STRAIGHT[10], 10.0 + 1e-3 * k))
     assert monitor.finding.judged < 10
 
 
-def test_the_end_of_the_path_ends_the_watch(service):
-    monitor = watching(service)
+def test_the_end_of_the_path_ends_the_watch(service, monitor):
     for row in (60, 120, 200):
         found = monitor.look(sight(service, STRAIGHT[row], float(row)))
     assert found.state == ARRIVED
@@ -147,12 +145,13 @@ def test_the_end_of_the_path_ends_the_watch(service):
     assert monitor.look(sight(service, STRAIGHT[0], 301.0)).state == IDLE
 
 
-def test_a_rover_off_its_path_or_lost_is_to_stop(service):
-    monitor = watching(service)
+def test_a_rover_off_its_path_is_to_stop(service, monitor):
     assert monitor.look(sight(service, (-2.0, 0.4, 0.0), 0.9)).state == WATCHING
     found = monitor.look(sight(service, (-2.0, 0.6, 0.0), 1.0))
     assert (found.state, found.judgement.code) == (STOPPED, "off_path")
-    monitor = watching(service)
+
+
+def test_a_rover_that_is_lost_is_to_stop(service, monitor):
     assert monitor.look(sight(service, None, 0.9)).state == WATCHING
     found = monitor.look(sight(service, None, 1.1))
     assert found.judgement.code == "no_pose" and "1.1 s" in found.judgement.reason
@@ -160,8 +159,7 @@ def test_a_rover_off_its_path_or_lost_is_to_stop(service):
     assert monitor.finding.state == STOPPED
 
 
-def test_joint_states_that_cease_stop_a_rover_that_had_them(service):
-    monitor = watching(service)
+def test_joint_states_that_cease_stop_a_rover_that_had_them(service, monitor):
     here = sight(service, STRAIGHT[0])
     assert monitor.look(replace(here, time=9.0)).state == WATCHING  # it never had any
     measured = replace(here, snapshot=replace(here.snapshot, measured_pose=STRAIGHT[0]))
@@ -185,8 +183,7 @@ def test_a_difference_counts_once_it_has_lasted():
     assert drift.latest == {} and drift.lasting() == 0.0
 
 
-def test_health_tells_a_stop_then_drift_with_its_size(service):
-    monitor = watching(service)
+def test_health_tells_a_stop_then_drift_with_its_size(service, monitor):
     found = replace(monitor.finding, mismatch={"bogie_left": -0.25})
     assert describe_watch(monitor.finding, True, 0.1).level == OK
     health = describe_watch(found, True, 0.1)

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 
 from rover_physics.limits.table import CHANCE
-from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.path_query import PathQueryOptions, answer_path_query
 from rover_planner.planning.search.path_search import FOUND, find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from support.rough_grounds import plane
 from support.rovers import LSR1
+from support.services import load_settings
 
 START, GOAL = (-1.2, 0.0, 0.0), (1.2, 0.0, 0.0)
 LONG = LatticeSettings(budget=60.0, cell=0.3)
@@ -63,5 +62,4 @@ def test_a_search_goes_around_what_may_fail_if_the_weight_of_chances_pays_for_it
 
 @pytest.mark.parametrize(("parameters", "accepted"), [({}, 0.05), ({"accepted_chance": 0.1}, 0.1)])
 def test_a_server_accepts_one_failure_of_twenty_unless_told_otherwise(parameters, accepted):
-    settings = load_service_settings(TraverseServerParameters(**parameters))
-    assert settings.query.accepted_chance == accepted
+    assert load_settings(**parameters).query.accepted_chance == accepted

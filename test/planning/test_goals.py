@@ -10,16 +10,14 @@ from rover_physics import Terrain, load_terrain
 from rover_planner.errors import PlanningError
 from rover_planner.planning.goals import choose_mission, footprint_radius
 from rover_planner.worlds.mars_terrain import make_mars_terrain
+from support.grounds import raised
 from support.rovers import LSR1
 
 
 @pytest.fixture(scope="module")
 def holed():
     """A Mars-like terrain with a corner that was never seen."""
-    made = make_mars_terrain(2, 16.0, 0.1)
-    elevation = made.elevation.copy()
-    elevation[90:, 90:] = np.nan
-    return Terrain(elevation, made.resolution, made.origin)
+    return raised(make_mars_terrain(2, 16.0, 0.1), np.s_[90:, 90:], np.nan)
 
 
 def by_intent(mission):

@@ -13,6 +13,7 @@ from rover_planner.planning.path_query import (
     choose,
 )
 from support.grounds import make_terrain
+from support.rough_grounds import with_std
 from support.rovers import LSR1
 
 COARSE = PathQueryOptions(count=5, spacing=0.4, waypoint_spacing=0.1)
@@ -59,7 +60,7 @@ def test_the_safer_path_wins_and_energy_decides_between_equals():
 
 
 def test_on_an_uncertain_map_the_bounds_are_the_risk():
-    uncertain = replace(FLAT, elevation_std=np.full(FLAT.elevation.shape, 0.003))
+    uncertain = with_std(FLAT, 0.003)
 
     def risk_on(ground, sigmas):
         options = replace(COARSE, map_sigmas=sigmas)

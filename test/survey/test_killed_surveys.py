@@ -17,8 +17,10 @@ from rover_planner.survey.dask_cluster import ClusterSettings
 from rover_planner.survey.runner import run_survey
 from rover_planner.survey.store import SurveyStore
 from rover_planner.survey.survey import prepare_survey
+from support.project.checkout import TOP
 from support.survey_maps import (
     assert_same_bits,
+    count_chunks,
     die_on_one,
     layers_of,
     make_request,
@@ -30,7 +32,6 @@ from support.waiting import wait_until, wait_until_gone
 
 pytestmark = pytest.mark.long
 
-REPOSITORY = Path(__file__).resolve().parents[2]
 SIDE = 180
 """Cells of a side of the map; it has 9 chunks."""
 SHARED = ("--headings", 4, "--chunk", 64, "--workers", 2)
@@ -41,7 +42,7 @@ def whole(tmp_path_factory):
     """Return a map, and the layers that this process finds on it in one chunk."""
     folder = tmp_path_factory.mktemp("survey")
     prepared = survey_here(folder, make_rough_map(SIDE, SIDE), make_request(), chunk=192)
-    return folder / "map.npz", layers_of(prepared)
+    return folder / "map.npz", layers_of(prepared.store)
 
 
 def start(module, *words) -> subprocess.Popen:
@@ -53,7 +54,7 @@ def start(module, *words) -> subprocess.Popen:
 
     return subprocess.Popen(
         [sys.executable, "-m", module, *map(str, words)],
-        env=os.environ | {"PYTHONPATH": str(REPOSITORY)},
+        env=os.environ | {"PYTHONPATH": str(TOP)},
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, preexec_fn=heed_signals,
     )  # fmt: skip
 
@@ -63,12 +64,6 @@ def finish(process: subprocess.Popen) -> dict:
     out, err = process.communicate(timeout=200)
     assert (process.returncode, err) == (0, "")
     return json.loads(out)
-
-
-def count_chunks(out: Path) -> int:
-    """Return the number of finished chunks, while a survey runs."""
-    files = Path(out, "seconds", "c").rglob("*")
-    return sum(path.is_file() and not path.name.endswith("partial") for path in files)
 
 
 def wait_for_a_chunk(out: Path) -> None:
@@ -83,11 +78,6 @@ def children_of(pid) -> list[int]:
         for child in " ".join(children).split()
         if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes()
     ]
-
-
-def layers_in(path) -> dict:
-    store = SurveyStore(path)
-    return {name: store.layer(name)[:] for name in store.layer_names()}
 
 
 @pytest.mark.parametrize(
@@ -114,7 +104,7 @@ def test_a_killed_command_leaves_no_worker_and_goes_on_where_it_was(whole, tmp_p
     assert 1 <= done < 9
     report = finish(start(*words))
     assert report["chunks_found"] == done and report["chunks_done"] == 9 - done
-    assert_same_bits(layers_in(out), layers)
+    assert_same_bits(layers_of(SurveyStore(out)), layers)
 
 
 def test_a_killed_worker_costs_only_its_chunks_time(whole, tmp_path):
@@ -127,7 +117,7 @@ def test_a_killed_worker_costs_only_its_chunks_time(whole, tmp_path):
         assert finish(process)["chunks_done"] == 9
     finally:
         process.kill()
-    assert_same_bits(layers_in(out), layers)
+    assert_same_bits(layers_of(SurveyStore(out)), layers)
 
 
 def test_a_chunk_of_which_workers_die_is_named_and_the_rest_stands(tmp_path):

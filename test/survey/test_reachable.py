@@ -119,14 +119,12 @@ def test_the_area_is_kept_in_the_store_with_what_was_surveyed_then(tmp_path):
     first = found.distance[:].tobytes()
     other = find_reachable(prepared.store, 2.5, 2.5)
     kept = zarr.open_group(prepared.store.path, mode="r", path=GROUP)
-    for name in ("cells", "longest"):
-        assert kept.attrs[name] == getattr(found, name)
-    assert kept.attrs["farthest"] == list(found.farthest)
+    told = {"from": [2.5, 2.5], "start": [25, 25], "farthest": list(found.farthest)}
+    told |= {"cells": found.cells, "longest": found.longest, "chunks_finished": 1}
+    assert told.items() <= dict(kept.attrs).items()
     distance = kept[DISTANCE][:]
     assert distance.tobytes() == other.distance[:].tobytes() == first
-    assert kept.attrs["from"] == [2.5, 2.5] and kept.attrs["start"] == [25, 25]
-    assert kept.attrs["cells"] == np.isfinite(distance).sum()
-    assert kept.attrs["chunks_finished"] == 1
+    assert found.cells == np.isfinite(distance).sum()
     assert not [path for path in prepared.store.path.iterdir() if path.name.startswith(".reach")]
 
 
@@ -165,21 +163,21 @@ def test_the_command_prints_area_and_longest_way_and_draws_them(tmp_path, capfd)
     store.mark_failed((0, 0))
     with pytest.raises(PlanningError, match="not surveyed yet"):
         find_reachable(store, 3.0, 2.0)
-    with pytest.raises(PlanningError, match=r"from \(99, 0\) is off the map; .* x 0 to 6.9"):
-        find_reachable(store, 99.0, 0.0)
 
 
-def test_a_start_where_the_rover_cannot_stand_says_why(tmp_path, capfd):
+def test_a_start_where_the_rover_cannot_stand_says_why_and_is_drawn(tmp_path, capfd):
     elevation = np.zeros((60, 60))
     elevation[:, 30:] += 2.0 * 0.1 * np.arange(30)  # 63 degrees
     store = survey_here(tmp_path, Terrain(elevation, 0.1), make_request()).store
     codes = json.loads((store.path / "zarr.json").read_text())["attributes"][NOTES]["limits"]
     first = codes[str(int(store.layer("first_limit")[30, 45]))]
-    assert main(["reachable", str(store.path), "--from", "4.5,3"]) == 0
+    picture = tmp_path / "area.png"
+    words = ["reachable", str(store.path), "--picture", str(picture), "--from"]
+    assert main([*words, "4.5,3"]) == 0 and picture.stat().st_size > 1000
     report = json.loads(capfd.readouterr().out)
     assert report["cells"] == 0 and first
     assert report["reason"] == f"no heading is passable at the start: {first}"
-    assert main(["reachable", str(store.path), "--from", "1.5,3"]) == 0
+    assert main([*words, "1.5,3"]) == 0
     report = json.loads(capfd.readouterr().out)
     assert report["cells"] > 0 and report["reason"] == ""
 

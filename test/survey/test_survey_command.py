@@ -89,7 +89,7 @@ def test_a_cluster_finds_what_one_process_finds_and_a_second_run_does_nothing(
     assert sum(report["best_class"].values()) == pytest.approx(1.0, abs=1e-5)
     assert picture.stat().st_size > 10_000
     done = prepare_survey(request, str(ground), tmp_path / "out")
-    assert_same_bits(layers_of(done), layers_of(whole))
+    assert_same_bits(layers_of(done.store), layers_of(whole.store))
     (tmp_path / "out" / ".lock").unlink()
     (tmp_path / "out" / ".lock").mkdir()  # as on a read-only disk, to which nothing is written
     assert survey(*words) == 0

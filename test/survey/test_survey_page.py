@@ -38,25 +38,20 @@ def shown(surveyed):
     return ShownSurvey(surveyed, LSR1, load_map(surveyed, 10_000))
 
 
-def colour(shown, name, x, y):
-    return shown.colour(name, LSR1, DEFAULT_OPTIONS, (x, y))
-
-
-def colour_at(shown, name, place):
-    x, y = place
-    found = colour(shown, name, np.array([x]), np.array([y]))
-    return tuple(found.colours[0, 0].tolist())
+def look_at(shown, x, y):
+    """Return the colour of a place, and the legend."""
+    found = shown.colour(CLASS, LSR1, DEFAULT_OPTIONS, (np.array([x]), np.array([y])))
+    return tuple(found.colours[0, 0].tolist()), str(found.legend)
 
 
 def test_classes_have_the_colours_of_the_picture_and_a_legend_of_those_that_are_there(shown):
     passable, impassable = (
         tuple(bytes.fromhex(CLASS_COLOURS[k][1:])) for k in (0, CLASS_NUMBERS["impassable"])
     )
-    assert colour_at(shown, CLASS, PASSABLE) == passable
-    assert colour_at(shown, CLASS, WALL) == impassable
-    assert colour_at(shown, CLASS, HOLE) == UNKNOWN
-    assert colour_at(shown, CLASS, (-3.0, 1.0)) == UNKNOWN
-    legend = str(colour(shown, CLASS, np.array([1.0]), np.array([1.0])).legend)
+    for place, colour in ((WALL, impassable), (HOLE, UNKNOWN), ((-3.0, 1.0), UNKNOWN)):
+        assert look_at(shown, *place)[0] == colour
+    found, legend = look_at(shown, *PASSABLE)
+    assert found == passable
     assert "impassable" in legend and "traction control" not in legend
     assert "2 headings" in legend and "not as on the page" not in legend
 

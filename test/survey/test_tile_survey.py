@@ -36,7 +36,7 @@ TOP_HEAVY = replace(
 
 @pytest.fixture(scope="module")
 def ground() -> Terrain:
-    return replace(make_rough_map(110, 110), origin=(0.0, 0.0))
+    return make_rough_map(110, 110, (0.0, 0.0))
 
 
 def places_on(terrain: Terrain, every=4) -> np.ndarray:
@@ -76,7 +76,7 @@ def is_clear(terrain: Terrain, places: np.ndarray) -> np.ndarray:
     ("policy", "std"), [("equal", None), ("servo", None), ("optimal", None), ("equal", 0.01)]
 )
 def test_limits_and_classes_are_those_of_predict(ground, policy, std):
-    request = replace(make_request(policy=policy, headings=1), rover=TOP_HEAVY)
+    request = make_request(policy=policy, headings=1, rover=TOP_HEAVY)
     places = places_on(ground)
     if std is not None:
         std = np.where(np.isnan(ground.elevation), np.nan, std)
@@ -196,8 +196,8 @@ def test_any_chunks_give_the_same_bits(tmp_path, step, chunk):
     whole = survey_here(tmp_path / "whole", terrain, request, chunk=2000)
     parts = survey_here(tmp_path / "parts", terrain, request, chunk=chunk)
     assert len(parts.chunks) >= len(whole.chunks) == 1
-    found = layers_of(whole)
-    assert_same_bits(found, layers_of(parts))
+    found = layers_of(whole.store)
+    assert_same_bits(found, layers_of(parts.store))
     assert step > 1 or len(np.unique(found["first_limit"])) > 3
     moved = replace(terrain, origin=(0.0, 0.0))
     tile = survey_tile(request, moved, places_on(terrain, step))["first_limit"]
@@ -206,8 +206,8 @@ def test_any_chunks_give_the_same_bits(tmp_path, step, chunk):
 
 @pytest.mark.parametrize("policy", ["equal", "servo", "optimal"])
 def test_ground_beyond_the_halo_is_not_looked_at(policy):
-    request, terrain = make_request(policy=policy, turns=True), make_rough_map(120, 120)
-    terrain = replace(terrain, origin=(0.0, 0.0))
+    request = make_request(policy=policy, turns=True)
+    terrain = make_rough_map(120, 120, (0.0, 0.0))
     halo, first, end = find_halo(request.rover, terrain.resolution), 40, 80
     heights = np.full_like(terrain.elevation, np.nan)
     heights[:, 60:] = 5.0

@@ -32,6 +32,8 @@ def test_who_comes_after_the_answer_hears_all_results_of_the_last_one(start_serv
         _, future = begin_plan(ros, goal=end)
         wait_until(future.done, "the answer")
     plan = future.result().plan
+    work = server._results._deferred_work
+    wait_until(lambda: not work._answers, "the results, which nobody hears yet")
     late = ros.spin(PlannerClient(ros)).heard
     wait_until(lambda: all(late.values()), "all results")
     wait_until(lambda: late["plan"][-1] == plan, "those of the last answer")

@@ -47,24 +47,23 @@ class Work:
 class Desk:
     """A queue whose judgements are collected as (name, judgement)."""
 
-    def __init__(self, max_waiting: int = 100):
+    def __init__(self):
         self.told: list[tuple[str, object]] = []
-        self.max_waiting = max_waiting
+        self.max_waiting = 100
         self.queue = QuestionQueue(
             lambda asked: asked.question.judge(asked.budget),
             lambda _finish: None,
             lambda place, error: f"{place}: {error!r}",
         )
 
-    def ask(self, name, work, seconds: float = 20.0, clock=time.monotonic) -> None:
-        question = Question(name, "", work, lambda code, _: code)
-        self.put(question, Budget(seconds, clock))
-
-    def put(self, question, budget) -> None:
+    def ask(
+        self, name, work, seconds=20.0, clock=time.monotonic, refuse=lambda code, _: code
+    ) -> None:
         def answer(judgement) -> None:
-            self.told.append((question.service, judgement))
+            self.told.append((name, judgement))
 
-        self.queue.ask(Asked(question, budget, answer), self.max_waiting)
+        asked = Asked(Question(name, "", work, refuse), Budget(seconds, clock), answer)
+        self.queue.ask(asked, self.max_waiting)
 
     def work(self, name, answer, seconds: float) -> Work:
         """Ask a question whose time begins with the work on it."""
@@ -115,14 +114,13 @@ def test_a_question_that_never_began_is_busy(desk):
     assert desk.wait(2) == [("first", TOO_LONG), ("second", BUSY)]
 
 
-def test_beyond_the_queue_the_answer_is_busy_at_once():
-    desk = Desk(max_waiting=1)
+def test_beyond_the_queue_the_answer_is_busy_at_once(desk):
+    desk.max_waiting = 1
     assert desk.work("works", work_on, seconds=0.5).begun.wait(20.0)
     desk.ask("waits", lambda _: 5, seconds=20.0)
     desk.ask("too many", lambda _: 6)
     assert desk.told == [("too many", BUSY)]
     assert sorted(desk.wait(3)[1:]) == [("waits", 5), ("works", TOO_LONG)]
-    desk.queue.close()
 
 
 def test_work_that_checks_nothing_is_refused_after_its_grace_and_its_answer_is_dropped(desk):
@@ -142,8 +140,7 @@ def test_work_that_checks_nothing_is_refused_after_its_grace_and_its_answer_is_d
 
 def test_errors_of_the_input_are_bad_requests_and_others_internal_errors(desk):
     for name, error in (("one", PoseError("no pose")), ("two", KeyError("k"))):
-        work = Mock(side_effect=error)
-        desk.put(Question(name, "", work, lambda *both: both), Budget(20.0))
+        desk.ask(name, Mock(side_effect=error), refuse=lambda *both: both)
     first, second = (told for _, told in desk.wait(2))
     assert first == ("bad_request", "no pose")
     assert second == ("internal_error", "internal error: two: KeyError('k')")

@@ -9,34 +9,22 @@ import pytest
 
 from rover_physics.names import SUSPENSION_JOINTS
 from rover_planner.errors import PlanningError
-from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.questions import Register
 from rover_planner.planning.answering.search_watch import NewerMapError, SearchWatch
-from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.snapshot import GivenPath
-from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.learned_ground import LearnedGround
 from rover_planner.planning.path_geometry import densify
-from support.grounds import make_terrain, rocky, wall_at, waves
+from support.grounds import make_terrain, raised, rocky, wall_at, waves
+from support.rough_grounds import with_std
+from support.services import load_settings, make_service
 
 FAN = {"planner": "fan", "candidate_count": 1}
 """Parameters of a service that does not search."""
 
 
-def load(**parameters):
-    return load_service_settings(TraverseServerParameters(**parameters))
-
-
-def make_service(terrain=None, **parameters):
-    service = TraverseService(load(**parameters))
-    if terrain is not None:
-        service.take_terrain(terrain)
-    return service
-
-
 def test_an_uncertain_map_is_judged_by_its_bounds_as_the_settings_say():
     certain = make_terrain(waves)
-    uncertain = replace(certain, elevation_std=np.full(certain.elevation.shape, 0.005))
+    uncertain = with_std(certain, 0.005)
     start, goal = (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
     service = make_service(uncertain, **FAN)
     refused = service.snapshot().answer(start, goal).report.to_dict()
@@ -44,7 +32,7 @@ def test_an_uncertain_map_is_judged_by_its_bounds_as_the_settings_say():
     assert refused["reason"].endswith("at worst within 3 sigma of the map")
     assert refused["map_sigmas"] == 3.0
     assert refused["friction_utilisation_bound"] > refused["max_friction_utilisation"]
-    service.settings = load(map_sigmas=0.0, **FAN)
+    service.settings = load_settings(map_sigmas=0.0, **FAN)
     passed = service.snapshot().answer(start, goal).report.to_dict()
     assert passed["traversable"] and passed["map_sigmas"] == 0.0
     assert passed["friction_utilisation_bound"] is None
@@ -101,7 +89,7 @@ def test_what_was_learned_on_a_class_of_ground_holds_for_all_of_it():
 
     def used_on(number, **layers):
         service = make_service(replace(flat, ground_class=number + 0.0 * numbers, **layers))
-        service.settings = load(learn="use")
+        service.settings = load_settings(learn="use")
         service.take_ground(ground)
         return service, friction_used(service)
 
@@ -115,20 +103,17 @@ def test_what_was_learned_on_a_class_of_ground_holds_for_all_of_it():
     assert used_on(np.nan)[1] == pytest.approx(0.8 / 0.5 * told, rel=1e-6)
     own = np.full(flat.elevation.shape, 0.6)
     assert used_on(1, friction=own)[1] == pytest.approx(0.8 / 0.6 * told, rel=1e-6)
-    service.settings = load()
+    service.settings = load_settings()
     assert friction_used(service) == pytest.approx(told, rel=1e-6)
 
 
 def test_gaps_are_filled_or_not_as_the_settings_say_even_afterwards():
-    terrain = make_terrain(waves)
-    elevation = terrain.elevation.copy()
-    elevation[80, 80] = np.nan
-    service = make_service(replace(terrain, elevation=elevation))
+    service = make_service(raised(make_terrain(waves), (80, 80), np.nan))
     assert np.isnan(service.terrain.elevation[80, 80])
-    service.settings = load(unknown_cells="interpolate")
+    service.settings = load_settings(unknown_cells="interpolate")
     service.refresh_map()
     assert np.isfinite(service.terrain.elevation[80, 80])
-    service.settings = load()
+    service.settings = load_settings()
     service.refresh_map()
     assert np.isnan(service.terrain.elevation[80, 80])
 
@@ -212,7 +197,7 @@ def test_densify_refuses_an_endless_path():
 def test_a_changed_map_ends_a_search_while_there_is_patience():
     ground, start, goal = make_terrain(wall_at(0.0)), (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)
     service, reports = make_service(ground, planner="lattice", search_budget=60.0), []
-    newer = replace(ground, elevation=ground.elevation + 0.01)
+    newer = raised(ground, ..., 0.01)
     maps = [service.known_map]
 
     def look_and_change(report):

@@ -10,22 +10,18 @@ import numpy as np
 import pytest
 
 from rover_physics.names import SUSPENSION_JOINTS
-from rover_planner.parameters.traverse_server import TraverseServerParameters
 from rover_planner.planning.answering.budget import QuestionStoppedError
 from rover_planner.planning.answering.judgement import refusal
 from rover_planner.planning.answering.questions import Register
-from rover_planner.planning.answering.service_settings import load_service_settings
-from rover_planner.planning.answering.traverse_service import TraverseService
 from support.grounds import make_terrain, wall_at
+from support.services import make_service
 
 DOCS = Path(__file__).parents[3] / "docs" / "traverse_server.md"
 
 
 @pytest.fixture(scope="module")
 def service():
-    parameters = TraverseServerParameters(candidate_count=2, planner="fan")
-    service = TraverseService(load_service_settings(parameters))
-    service.take_terrain(make_terrain(wall_at(0.5)))
+    service = make_service(make_terrain(wall_at(0.5)), candidate_count=2, planner="fan")
     service.take_joints(dict.fromkeys(SUSPENSION_JOINTS, 0.0))
     service.take_pose(np.array([-2.0, 0.0, 0.0]))
     return service

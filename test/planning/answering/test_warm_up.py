@@ -15,27 +15,22 @@ from rover_physics.rover.rover_file import load_rover
 from rover_planner.learning.ground_learner import GroundLearner
 from rover_planner.nodes.warm_up import GROUPS
 from rover_planner.parameters.rover_simulator import RoverSimulatorParameters
-from rover_planner.parameters.traverse_server import TraverseServerParameters
-from rover_planner.planning.answering.service_settings import load_service_settings
 from rover_planner.planning.answering.snapshot import GivenPath
-from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.simulator.simulation import Simulation, SimulationSettings
 from support.grounds import make_terrain, wall_at, waves
 from support.learning_drives import climb
+from support.services import make_service
 
 def compiled():
     # A kernel that an earlier program left on disk is a new one on a fresh disk: both count.
     kernels = [one for one in gc.get_objects() if isinstance(one, Kernel)]
     return {f"{one.__module__}.{one.__name__}": len(one.signatures) for one in kernels}
 
-def service(**parameters):
-    values = TraverseServerParameters(waypoint_spacing=0.1, candidate_count=2, **parameters)
-    return TraverseService(load_service_settings(values))
-
+coarse = {"waypoint_spacing": 0.1, "candidate_count": 2}
 for group in GROUPS:
     for step in group:
         step()
-service()
+make_service(**coarse)
 before = compiled()
 start, goal = (-1.0, 0.0, 0.0), (2.0, 0.2, 0.0)
 heights = waves, lambda x, y: wall_at(0.9)(x, y) - np.where(x > 0.3, 0.06, 0.0)
@@ -47,7 +42,7 @@ for parameters, asked in (
     (fan | {"policy": "optimal"}, grounds[::2]),
     (fan | {"soil": "mars_simulant"}, grounds[::2]),  # sinkage takes long
 ):
-    answering = service(**parameters)
+    answering = make_service(**coarse, **parameters)
     for ground in asked:
         answering.take_terrain(ground)
         answering.snapshot().answer(start, goal, 0.3).complete()

@@ -133,19 +133,3 @@ def test_a_search_goes_on_after_all_that_is_learned_as_one_from_scratch():
                 goals.costs[route.goal] += 0.2 * rng.random()
             steps += 1
     assert steps > 100
-
-
-def test_a_search_goes_on_after_edges_are_refused_and_is_exact_again():
-    known, *estimates = random_knowledge(7)
-    known.standing[:], known.state[:] = 0, 0
-    starts, goals = (Seeds(np.array([node]), np.zeros(1)) for node in (16 * 14, 16 * 60))
-    search, before = ShortestPaths(known, *estimates, starts), 0.0
-    for _ in range(30):
-        route = search.find(starts, goals, 0.0)
-        assert route is not None and route.cost >= before - 1e-9
-        before = route.cost
-        known.state.flat[route.edges[len(route.edges) // 2]] = FAILS
-        search.note(EDGES.ends(route.edges))
-    costs = dijkstra(explicit_costs(known, search.graph(0.0)), indices=starts.nodes)
-    route = search.find(starts, goals, 0.0)
-    assert abs(route.cost - costs[0, goals.nodes[0]]) < 1e-5

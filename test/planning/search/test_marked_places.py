@@ -9,15 +9,8 @@ import pytest
 from rover_physics import Terrain, load_rover
 from rover_planner.errors import PlanningError
 from rover_planner.maps.unobserved_ground import ASSUMED, ObservedGround, observed_ground
-from rover_planner.parameters.traverse_server import (
-    ALLOW_FOOTPRINT,
-    AUTO,
-    REFUSE,
-    TraverseServerParameters,
-)
-from rover_planner.planning.answering.service_settings import load_service_settings
+from rover_planner.parameters.traverse_server import ALLOW_FOOTPRINT, AUTO, REFUSE
 from rover_planner.planning.answering.snapshot import GivenPath
-from rover_planner.planning.answering.traverse_service import TraverseService
 from rover_planner.planning.marked_places import (
     MARKED_CODE,
     NONE_MARKED,
@@ -31,6 +24,7 @@ from rover_planner.planning.search.path_search import START_REFUSED, find_path
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
 from rover_planner.planning.search.unobserved_check import UnobservedCheck
 from support.rough_grounds import plane
+from support.services import make_service
 
 PLACE = MarkedPlace(1.5, 0.0, 0.4, "wheels turn and the rover stays", "2026-11-25 04:00:00 UTC")
 START, GOAL = (0.0, 0.0, 0.0), (3.0, 0.0, 0.0)
@@ -38,10 +32,7 @@ START, GOAL = (0.0, 0.0, 0.0), (3.0, 0.0, 0.0)
 
 @pytest.fixture
 def service():
-    parameters = TraverseServerParameters(planner=AUTO, search_budget=60.0)
-    service = TraverseService(load_service_settings(parameters))
-    service.take_terrain(plane(0.0, 0.0, half=4.0))
-    return service
+    return make_service(plane(0.0, 0.0, half=4.0), planner=AUTO, search_budget=60.0)
 
 
 def straight(first: float, last: float) -> np.ndarray:

@@ -26,7 +26,7 @@ from rover_planner.planning.search.path_search import (
     find_path,
 )
 from rover_planner.planning.search.query import LatticeSettings, SearchQuery
-from support.grounds import make_terrain, pen, waves
+from support.grounds import make_terrain, pen, raised, waves
 from support.rough_grounds import fractal, rocky
 from support.rovers import LSR1
 
@@ -183,10 +183,9 @@ def test_impossible_ends_and_settings_are_refused_by_name(start, goal, said):
 def test_after_a_change_of_the_map_what_is_remembered_gives_the_way_of_a_new_search(around):
     question, first, memory = around
     before, memory = question.terrain, deepcopy(memory)
-    elevation = np.array(before.elevation)
-    x = before.origin[0] + before.resolution * np.arange(elevation.shape[1])
-    elevation[np.ix_((x > 1.9) & (x < 2.3), np.abs(x) < 0.1)] += 1.0  # a longer wall
-    after = replace(before, elevation=elevation)
+    x = before.origin[0] + before.resolution * np.arange(before.elevation.shape[1])
+    longer = np.ix_((x > 1.9) & (x < 2.3), np.abs(x) < 0.1)
+    after = raised(before, longer, 1.0)
     warm, cold = find_path(ask(after), LONG, memory), find_path(ask(after), LONG)
     assert not np.array_equal(first.path.poses, cold.path.poses)
     assert warm.outcome == cold.outcome == FOUND
@@ -198,11 +197,8 @@ def test_after_a_change_of_the_map_what_is_remembered_gives_the_way_of_a_new_sea
 
 def test_the_last_way_is_the_first_path_after_a_change_of_the_map_that_it_passes(around):
     question, first, memory = around
-    before, memory = question.terrain, deepcopy(memory)
-    elevation = np.array(before.elevation)
-    elevation[:3] += 0.02  # far from the way
-    after = replace(before, elevation=elevation)
-    asked = replace(LONG, ends_at_first=True)
+    memory, asked = deepcopy(memory), replace(LONG, ends_at_first=True)
+    after = raised(question.terrain, np.s_[:3], 0.02)  # far from the way
     again = find_path(ask(after), asked, memory)
     assert again.outcome == FOUND and again.expanded == 0
     np.testing.assert_array_equal(again.path.poses, first.path.poses)
@@ -211,12 +207,10 @@ def test_the_last_way_is_the_first_path_after_a_change_of_the_map_that_it_passes
 
 
 def test_nodes_without_ground_are_none_on_which_the_rover_can_stand():
-    ground = rocky(3)
-    elevation = np.array(ground.elevation)
-    rng = np.random.default_rng(1)
-    elevation[rng.random(elevation.shape) < 0.02] = np.nan
-    elevation[: len(elevation) // 2] = np.nan
-    ground = replace(ground, elevation=elevation)
+    ground, rng = rocky(3), np.random.default_rng(1)
+    unknown = rng.random(ground.elevation.shape) < 0.02
+    unknown[: len(unknown) // 2] = True
+    ground = raised(ground, unknown, np.nan)
     nodes = nodes_within(0.1, (-3.2, -3.2), (3.2, 3.2))
     estimate = estimate_ground(LSR1, ground, nodes)
     groundless = np.flatnonzero(estimate.groundless)
@@ -250,10 +244,8 @@ def test_only_the_heights_around_the_window_are_looked_at(monkeypatch):
     estimate = estimate_ground(LSR1, part, nodes)
     assert not estimate.groundless.any() and not estimate.doubt.any()
     assert find_path(question, LONG).outcome == FOUND
-    wall = np.array(wide.elevation)
-    wall[:, 430] = 3.0
-    enclosed = replace(wide, elevation=wall)
-    refused = find_path(replace(question, terrain=enclosed), LatticeSettings(budget=0.3))
+    enclosed = replace(question, terrain=raised(wide, np.s_[:, 430], 3.0))
+    refused = find_path(enclosed, LatticeSettings(budget=0.3))
     assert refused.outcome in (OUT_OF_TIME, NO_WAY)
     assert "m around start and goal" in refused.reason
 

@@ -23,6 +23,7 @@ from support.rovers import FIXED, LSR1
 
 STEP, SPEED = 0.02, 0.06
 WAVY, LEVEL = make_terrain(waves, half=3.0), plane(0.0, 0.0, half=3.0)
+ENGINES = pytest.mark.parametrize("engine", [QuasiStaticPlant, MujocoPlant])
 
 
 def drive(plant, seconds: float, speed: float = SPEED, yaw_rate: float = 0.0):
@@ -91,7 +92,7 @@ def test_torques_that_hold_the_slope_keep_the_speed_and_more_drive_it_up():
     assert high > -0.99 and pull(plant, 2.0, 0.5 * needed) < high
 
 
-@pytest.mark.parametrize("engine", [QuasiStaticPlant, MujocoPlant])
+@ENGINES
 def test_a_brake_stops_the_rover_and_holds_it_on_a_slope(engine):
     plant = engine(LSR1, plane(-np.tan(np.radians(3.0)), 0.0, half=3.0), (-1.0, 0.0, 0.0))
     pull(plant, 0.5, np.zeros(6))
@@ -202,9 +203,8 @@ def test_a_rover_that_stands_still_backs_off_twice_and_then_gives_up(wall_falls)
 def test_the_ground_goes_on_where_a_file_does_not_know_it_and_the_sensor_does_not_see_it():
     hole = lambda x, y: waves(x, y) + np.where(np.hypot(x, y) < 0.3, np.nan, 0.0)  # noqa: E731
     ground = make_terrain(hole, half=3.0)
-    simulation = Simulation(
-        SimulationSettings(LSR1, ground, RoverSimulatorParameters(start_x=-0.6))
-    )
+    given = RoverSimulatorParameters(start_x=-0.6)
+    simulation = Simulation(SimulationSettings(LSR1, ground, given))
     drive(simulation.plant, 13.0)
     assert simulation.plant.pose()[0] > 0.1  # a server that interpolates has let it pass
     assert np.isnan(simulation.look(simulation.plant.state().position, 0.0).elevation_at(0.0, 0.0))
@@ -269,10 +269,8 @@ def test_a_path_driven_backwards_is_followed_backwards_from_beside_it():
 
 
 def test_a_change_from_forwards_to_backwards_is_driven_to_its_corner():
-    there = line((0.0, 0.0), (1.0, 0.0), 0.0)
-    angle = np.linspace(0.0, 0.8, 40)[1:]
-    back = np.column_stack([1.0 - np.sin(angle), np.cos(angle) - 1.0, angle])  # arc to the right
-    path = np.vstack([there, back])
+    back = np.array([1.0, 0.0, 0.0]) + arc(-1.0, 0.8)  # to the right
+    path = np.vstack([line((0.0, 0.0), (1.0, 0.0), 0.0), back[1:]])
     poses, commands = follow(path, (0.0, 0.0, 0.0))
     gears = np.sign(commands[:, 0])
     assert np.count_nonzero(np.diff(gears)) == 1 and gears[0] > 0.0 > gears[-1]
@@ -284,7 +282,6 @@ def test_a_change_from_forwards_to_backwards_is_driven_to_its_corner():
 
 LOOK_AHEAD = 0.4
 REACH = float(np.hypot(0.4, 0.31))
-ENGINES = pytest.mark.parametrize("engine", [QuasiStaticPlant, MujocoPlant])
 
 
 def arc(radius, angle):
@@ -294,11 +291,9 @@ def arc(radius, angle):
 
 
 def turn_and_go(angle, length):
-    turned = np.linspace(0.0, angle, 40)
-    way = np.linspace(0.0, length, 40)[1:]
-    spot = np.column_stack([0.0 * turned, 0.0 * turned, turned])
-    straight = np.column_stack([way * np.cos(angle), way * np.sin(angle), np.full(39, angle)])
-    return np.vstack([spot, straight])
+    spot = line((0.0, 0.0), (0.0, 0.0), np.linspace(0.0, angle, 40), 40)
+    end = length * np.cos(angle), length * np.sin(angle)
+    return np.vstack([spot, line((0.0, 0.0), end, angle, 40)[1:]])
 
 
 def drive_along(plant, path):
@@ -356,8 +351,7 @@ def test_fixed_wheels_have_no_steering_joints_and_skid_in_curves(engine):
 
 
 def test_a_turn_by_more_than_half_a_circle_goes_the_way_of_the_path():
-    path = line((0.0, 0.0), (0.0, 0.0), 0.0, 60)
-    path[:, 2] = wrap(np.linspace(0.0, 4.0, 60))
+    path = line((0.0, 0.0), (0.0, 0.0), wrap(np.linspace(0.0, 4.0, 60)), 60)
     _, commands = follow(path, (0.0, 0.0, 0.0), SPEED, 0.1)
     assert (commands[:, 0] == 0.0).all() and (commands[:, 1] > 0.0).all()
     assert 0.1 * commands[:, 1].sum() == pytest.approx(4.0, abs=0.02)
