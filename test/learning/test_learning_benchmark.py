@@ -15,12 +15,10 @@ DRIVE = learning.LearningDrive(
 """A drive on flat ground."""
 
 
-def test_a_rover_that_creeps_before_it_halts_is_noticed_no_earlier_than_it_halts(
-    monkeypatch, tmp_path
-):
+def test_a_rover_that_creeps_before_it_halts_is_noticed_no_earlier_than_it_halts(monkeypatch):
     rows = climb(learning.told_rover(), 0.0, 15.0)
     rows[:, X] = np.interp(rows[:, TIME], [0.0, 5.0, 15.0], [-1.0, -0.7, -0.67])
     monkeypatch.setattr(learning, "record", lambda *_: learning.Recorded(rows, passed=False))
-    learned = learning.learn(DRIVE, tmp_path)
+    learned = learning.learn(DRIVE)
     assert learned.estimate.immobilised_time < learned.stuck_time - 0.5
     assert learned.stuck_time <= learned.noticed_time < learned.stuck_time + 0.2
