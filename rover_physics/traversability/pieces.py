@@ -2,10 +2,10 @@
 """Judges many short pieces of path at once, as `judge_paths` does but faster.
 
 A search asks about thousands of pieces and needs to know only whether each passes, and what it
-costs. A piece fails if one of its waypoints, or a pose between them, does in any case. It passes
-if none of them breaks a limit while no wheel falls, and with speed servos only if no contact jumps
-and no wheel may fall. `judge_paths` decides about the others. The verdicts are the same as its
-own.
+costs. A piece fails if one of its waypoints, or a pose between them, breaks a limit; what is left
+of it is then not looked at. With speed servos a piece passes only if no contact jumps and no wheel
+may fall; about the others, and on maps with uncertain heights, `judge_paths` decides. The verdicts
+are the same as its own.
 """
 
 import math
