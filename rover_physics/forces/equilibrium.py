@@ -56,6 +56,7 @@ def balance_forces(linkage, placement, contacts, columns, balance):
             extra lateral forces, too.
         balance: BALANCE, written.
     """
+    write_shares(linkage, placement, balance.shares)
     write_equations(linkage, placement, contacts, columns, balance)
     return solve_equations(columns, balance)
 
@@ -95,11 +96,10 @@ def write_equations(linkage, placement, contacts, columns, balance):
 
     Rows of balance.A and balance.B: forces along map x, y, z over the weight; moments about map x,
     y, z over weight times reference length; right and left bogie; differential. Arguments are as
-    for `balance_forces`.
+    for `balance_forces`; `balance.shares` is as `write_shares` writes it.
     """
     A, B, frames = balance.A, balance.B, balance.frames
     _write_frames(placement, contacts, frames)
-    write_shares(linkage, placement, balance.shares)
     common, free = balance.shares.common, balance.shares.free
     A[:, :] = 0.0
     B[:, :] = 0.0

@@ -20,6 +20,7 @@ from rover_physics.forces.servo_motion import MOTIONS, WEIGHTS, find_motions
 from rover_physics.forces.servo_search import CREEP, find_drive, search_everywhere
 from rover_physics.forces.servo_soil import direction_of_travel
 from rover_physics.forces.servo_wheel import D, S, T
+from rover_physics.forces.shares import write_shares
 from rover_physics.forces.soil import (
     BEKKER_WONG,
     SOIL_MODEL,
@@ -49,6 +50,7 @@ def balance_servos(model, work):
     """
     linkage, settings, servo = model.linkage, model.settings, work.servo
     columns = np.int64(1)  # a literal would be compiled as a type of its own
+    write_shares(linkage, work.placement, work.balance.shares)
     write_equations(linkage, work.placement, work.contacts, columns, work.balance)
     push = linkage.radius * linkage.mass * linkage.gravity
     servo.droop = settings.servo_droop

@@ -70,6 +70,9 @@ FORCE_ROW, MOMENT_ROW = 0, 3
 FIRST_LATERAL, COMMON_TRACTION = 6, 8
 """Rows of the two lateral terms and of the common traction in the solution of `equilibrium`."""
 
+LEAST_LOAD = 0.1
+"""Smallest load over the mean load by which a wheel shares lateral forces."""
+
 
 @dataclass(frozen=True)
 class MeasuredState:
@@ -89,6 +92,8 @@ class MeasuredState:
     """(6,) distances of the contacts from the wheels' middle planes, positive to the left [m]."""
     steering: np.ndarray = field(default_factory=lambda: np.zeros(WHEEL_COUNT))
     """(6,) steering angles in [rad], positive to the left."""
+    loads: np.ndarray = field(default_factory=lambda: np.ones(WHEEL_COUNT))
+    """(6,) loads, in any unit, to which the lateral forces are in proportion."""
 
 
 class BalanceRows(NamedTuple):
@@ -104,8 +109,8 @@ class BalanceRows(NamedTuple):
     lateral_shares: Floats
     """Shares (6, 2) of the wheels in the lateral terms: S_i = s0 share_i0 + s1 share_i1.
 
-    With wheels straight ahead they are 1 and the wheel's position along the body in rover lengths,
-    from rear to front axle.
+    With wheels straight ahead they are the wheel's load over the mean load, and that times its
+    position along the body in rover lengths, from rear to front axle.
     """
     directions: Floats
     """(6,) 1 where a wheel rolls forward, -1 where backward."""
@@ -147,6 +152,7 @@ MEASUREMENT = record_type(
     ("contact_angles", float, (WHEEL_COUNT,)),  # [rad]
     ("contact_offsets", float, (WHEEL_COUNT,)),  # [m]
     ("steering", float, (WHEEL_COUNT,)),  # [rad]
+    ("loads", float, (WHEEL_COUNT,)),  # in any unit
     ("push", float),  # wanted push along the motion of ROLLING [N]
     ("resistance", float),  # resistance to the travel of the wheels [N]
 )
@@ -210,8 +216,9 @@ class BalanceWriter:
 
     def _take(self, state: MeasuredState, push: float = 0.0, resistance: float = 0.0) -> None:
         q = 0.0, state.roll, state.pitch, state.rocker_angle, *state.bogie_angles
-        angles, offsets = state.contact_angles, state.contact_offsets
-        self.works["measured"][0] = q, angles, offsets, state.steering, push, resistance
+        contacts = state.contact_angles, state.contact_offsets
+        wheels = state.steering, state.loads
+        self.works["measured"][0] = q, *contacts, *wheels, push, resistance
 
     def write(
         self, state: MeasuredState, net_traction: float, resistance: float = 0.0
@@ -288,6 +295,7 @@ def write_balance(linkages, works, rows):
     for wheel in range(WHEEL_COUNT):
         angle, offset = measured.contact_angles[wheel], measured.contact_offsets[wheel]
         write_point(linkage.radius, work, wheel, (np.sin(angle), np.cos(angle)), offset)
+    _weigh_lateral_shares(measured.loads, balance.shares)
     write_equations(linkage, placement, work.contacts, columns, balance)
     _add_push(linkage, work)
     if not solve_equations(columns, balance):
@@ -295,6 +303,20 @@ def write_balance(linkages, works, rows):
     _write_rows(balance, rows)
     _add_resistance(measured.resistance / rows.force_unit, rows)
     return True
+
+
+@kernel
+def _weigh_lateral_shares(loads, shares):
+    """Multiply the lateral SHARES by loads (6,) over their mean, of at least LEAST_LOAD.
+
+    What wheels can hold is in proportion to their loads. With equal shares those that carry least,
+    on a side slope the upper ones, would seem to slip.
+    """
+    mean = loads.sum() / WHEEL_COUNT
+    for wheel in range(WHEEL_COUNT):
+        weight = max(loads[wheel] / mean, LEAST_LOAD)
+        for term in range(2):
+            shares.common[wheel, term] *= weight
 
 
 @kernel

@@ -159,6 +159,7 @@ def _balance_at(end, linkages, search, works, sense):
     for wheel in range(WHEEL_COUNT):
         measured.contact_angles[wheel] = sense.ends[end, wheel]
         measured.steering[wheel] = search.placement.steering[wheel]
+        measured.loads[wheel] = 1.0
         sense.tractions[wheel] = state.tractions[wheel] / unit
     for i in range(EQUATIONS):
         sense.b[i] = 0.0

@@ -98,7 +98,7 @@ class TractionService:
         self._pose, self._deviation = np.zeros(4), 0.0
         self._finder: MapContactFinder | None = None
         self._last_time: float | None = None
-        self._last: Floats | None = None
+        self._last: TractionAnswer | None = None
         self._apply(settings)
         self._estimator = MotionContactEstimator(settings.rover)
         self._create_loops()
@@ -350,9 +350,11 @@ class TractionService:
     def _measure_state(self, estimate: ContactEstimate) -> MeasuredState:
         """Return the measured state with estimated contact angles."""
         joints = _mean_rocker(self.joints.suspension_angles)
+        loads = np.ones(WHEEL_COUNT) if self._last is None else self._last.loads
         return MeasuredState(
-            self.roll, self.pitch, joints[0], joints[1:], estimate.angles, steering=self.steering
-        )
+            self.roll, self.pitch, joints[0], joints[1:], estimate.angles,
+            steering=self.steering, loads=loads,
+        )  # fmt: skip
 
     def _mean_wanted(self) -> float:
         """Return the wanted mean speed of the wheels [m/s]."""
@@ -374,11 +376,12 @@ class TractionService:
 
     def _share_torques(self, rows: BalanceRows) -> TractionAnswer:
         """Return the torques of the policy, and record whether a limit is active."""
+        last = self._last
         answer = solve_traction(
-            self._workspace, rows, self._inputs, self._last,
+            self._workspace, rows, self._inputs, None if last is None else last.tractions,
             max_programs=MAX_PROGRAMS if self._optimal else 0,
         )  # fmt: skip
-        self._last = answer.tractions
+        self._last = answer
         self._peak = float(answer.utilisation.max())
         slips = not self._optimal and answer.friction_slack > 0.0
         self._limited = answer.torque_slack > 0.0 or slips

@@ -95,6 +95,16 @@ def test_up_a_plane_all_wheels_use_the_same_share_and_what_friction_and_motors_l
     assert np.abs(answer.torques).max() == pytest.approx(0.6 * needed)
 
 
+def test_across_a_slope_no_wheel_slips_before_all_do_where_sideways_forces_go_by_the_loads():
+    slope = 0.53
+    prediction = judge_path(LSR1, plane(0.0, slope), [[0.0, 0.0, 0.0]])[0]
+    state, friction = state_of(LSR1, prediction, 0), np.full(6, 0.6)
+    equal = solve(LSR1, state, friction)
+    assert equal.friction_slack > 0.1, "the upper wheels, of which equal parts ask too much"
+    by_load = solve(LSR1, replace(state, loads=equal.loads), friction)
+    assert by_load.utilisation.max() < 1.02 * slope / 0.6
+
+
 def test_a_wheel_that_has_to_lift_is_told_with_its_missing_load():
     state = replace(level(), roll=1.2)
     answer = solve(LSR1, state)
