@@ -220,6 +220,15 @@ class BalanceWriter:
         wheels = state.steering, state.loads
         self.works["measured"][0] = q, *contacts, *wheels, push, resistance
 
+    def find_loads(self, state: MeasuredState) -> Floats:
+        """Return the loads (6,) [N] of equal torques that hold the rover at a measured state.
+
+        Raises:
+            ModelError: As `write`.
+        """
+        rows = self.write(state, 0.0)
+        return np.asarray(rows.force_unit * rows.pull_equally()[LOADS])
+
     def write(
         self, state: MeasuredState, net_traction: float, resistance: float = 0.0
     ) -> BalanceRows:

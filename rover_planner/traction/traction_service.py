@@ -4,7 +4,7 @@
 import math
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -291,6 +291,8 @@ class TractionService:
         state = self._measure_state(estimate)
         push = self._find_push(duration)
         try:
+            if self._optimal:
+                state = replace(state, loads=self._writer.find_loads(level))
             rows = self._write_rows(state, push)
         except ModelError as error:
             rows, warning = self._write_rows(level, push), str(error)
@@ -350,11 +352,9 @@ class TractionService:
     def _measure_state(self, estimate: ContactEstimate) -> MeasuredState:
         """Return the measured state with estimated contact angles."""
         joints = _mean_rocker(self.joints.suspension_angles)
-        loads = np.ones(WHEEL_COUNT) if self._last is None else self._last.loads
         return MeasuredState(
-            self.roll, self.pitch, joints[0], joints[1:], estimate.angles,
-            steering=self.steering, loads=loads,
-        )  # fmt: skip
+            self.roll, self.pitch, joints[0], joints[1:], estimate.angles, steering=self.steering
+        )
 
     def _mean_wanted(self) -> float:
         """Return the wanted mean speed of the wheels [m/s]."""
