@@ -89,6 +89,7 @@ def measure_state(here: PathPrediction, on_bogie: NDArray[np.bool_]) -> Measured
         float(here.roll[0]), float(here.pitch[0]), float(here.rocker_angle[0, 0]),
         here.bogie_angle[0], here.contact_angle[0],
         np.sum(arms * find_axles(here, on_bogie), axis=1), here.steering_angle[0],
+        here.wheel_loads[0],
     )  # fmt: skip
 
 
